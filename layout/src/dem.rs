@@ -1,0 +1,127 @@
+//! The meeting point of import and build: what a digital elevation model says about
+//! itself ([`DemInfo`]) and how its samples arrive ([`DemSource::stream`]).
+//!
+//! A source pushes rectangular windows of raw samples into a [`SampleSink`], in any order and
+//! from any number of threads; it never holds the whole grid. Windows are in source order: row 0
+//! is the northernmost row, column 0 the westernmost. A void is NaN. Cost: each sample is decoded
+//! once and pushed once.
+
+use crate::error::LayoutError;
+
+/// Storage type of the samples of a DEM, as its file declares it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SampleType {
+    /// Unsigned 8-bit integers.
+    U8,
+    /// Unsigned 16-bit integers.
+    U16,
+    /// Signed 16-bit integers.
+    I16,
+    /// Unsigned 32-bit integers.
+    U32,
+    /// Signed 32-bit integers.
+    I32,
+    /// IEEE single precision.
+    F32,
+    /// IEEE double precision.
+    F64,
+}
+
+impl SampleType {
+    /// Whether every value of the type is a whole number.
+    pub fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// Whether every value of the type is exactly representable as `f32`.
+    pub fn fits_f32(self) -> bool {
+        matches!(self, Self::U8 | Self::U16 | Self::I16 | Self::F32)
+    }
+}
+
+/// Unit of the horizontal coordinates of a DEM's reference system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum HorizontalUnit {
+    /// The file does not say.
+    #[default]
+    Unknown,
+    /// Metres.
+    Metre,
+    /// Degrees of longitude and latitude.
+    Degree,
+    /// International feet, 0.3048 m.
+    Foot,
+    /// US survey feet, 1200/3937 m.
+    UsSurveyFoot,
+}
+
+/// Where a DEM lies on the ground.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Georeference {
+    /// EPSG code of the horizontal reference system, if the file names one.
+    pub epsg: Option<u32>,
+    /// Name of the reference system in words; empty if unknown.
+    pub crs_name: String,
+    /// Unit of the coordinates that `pixel_to_crs` yields.
+    pub unit: HorizontalUnit,
+    /// Affine map from *sample centres* (column, row; row 0 northernmost in file order) to reference-system
+    /// coordinates: `x = m[0] + m[1]*col + m[2]*row`, `y = m[3] + m[4]*col + m[5]*row`.
+    pub pixel_to_crs: Option<[f64; 6]>,
+    /// Radius of the body's equator in metres when the file names one other than the Earth's.
+    pub body_radius_m: Option<f64>,
+}
+
+/// What a DEM file says about itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DemInfo {
+    /// Samples from west to east, at least 2.
+    pub samples_wide: u32,
+    /// Samples from north to south, at least 2.
+    pub samples_high: u32,
+    /// Storage type of the samples.
+    pub sample_type: SampleType,
+    /// Metres of height a raw unit.
+    pub height_scale: f64,
+    /// Metres of height at raw value 0.
+    pub height_offset_m: f64,
+    /// Where it lies.
+    pub georeference: Georeference,
+    /// Name of the format in words, for messages: "16-bit PNG", "VTP BT 1.3".
+    pub format: String,
+}
+
+/// A rectangle of samples in source order: row 0 northernmost, column 0 westernmost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub col: u32,
+    /// First row.
+    pub row: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// Takes windows of raw samples from a [`DemSource`].
+pub trait SampleSink: Sync {
+    /// Takes `window.width * window.height` raw samples, rows from north to south, voids NaN.
+    /// The window lies inside the DEM; every sample of the DEM is pushed exactly once.
+    ///
+    /// # Errors
+    /// Whatever keeps the sink from storing them, such as a full disk; the source stops and passes it on.
+    fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError>;
+}
+
+/// An elevation data set that can be read window by window.
+pub trait DemSource: Sync {
+    /// What the data set says about itself.
+    fn info(&self) -> &DemInfo;
+
+    /// Pushes every sample exactly once into `sink`, decoding on the current rayon pool where the
+    /// format allows it. Holds a few windows at a time, never the whole grid.
+    ///
+    /// # Errors
+    /// Damage in the data, naming the file and the place; or the sink's own error.
+    fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError>;
+}

@@ -1,0 +1,72 @@
+//! The one error type of this crate. Its variants tell apart what a caller would handle apart:
+//! not our format, damaged, unsupported, I/O, wrong usage. Every message says what, where, and
+//! what to do.
+
+use std::path::{Path, PathBuf};
+
+/// Anything that can go wrong between a DEM and a terrain file, or in reading one.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LayoutError {
+    /// The operating system refused an operation on a file.
+    #[error("{}: {action}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was attempted, as a phrase: "cannot open the file".
+        action: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is not of the format it was taken for.
+    #[error("{}: {problem}", path.display())]
+    NotThisFormat {
+        /// The file.
+        path: PathBuf,
+        /// What it is not, and what to do.
+        problem: String,
+    },
+    /// The file is of the right format, but a part of it is damaged, cut short or contradicts itself.
+    #[error("{}: {place}: {problem}", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file: "header", "tile 17", "page 4711".
+        place: String,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+    /// The file is sound but uses something this version cannot read.
+    #[error("{}: {problem}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What it uses, and what to do instead.
+        problem: String,
+    },
+    /// The request cannot be met as asked: a budget too small, a size out of range.
+    #[error("{0}")]
+    Usage(String),
+}
+
+impl LayoutError {
+    /// An I/O error on `path` while attempting `action` ("cannot read the file").
+    pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
+        Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// A format mismatch.
+    pub fn not_this_format(path: &Path, problem: impl Into<String>) -> Self {
+        Self::NotThisFormat { path: path.to_owned(), problem: problem.into() }
+    }
+
+    /// Damage at `place` of `path`.
+    pub fn damaged(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::Damaged { path: path.to_owned(), place: place.into(), problem: problem.into() }
+    }
+
+    /// Something sound but not supported.
+    pub fn unsupported(path: &Path, problem: impl Into<String>) -> Self {
+        Self::Unsupported { path: path.to_owned(), problem: problem.into() }
+    }
+}
