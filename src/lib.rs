@@ -1,1 +1,4 @@
-//! Terrasoar.
+//! Terrasoar: fly over terrain far larger than memory.
+pub mod flight;
+pub mod stats;
+pub mod view;

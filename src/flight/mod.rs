@@ -1,0 +1,36 @@
+//! Recorded flights: a camera path as data, so that every replay sees the same frames.
+
+use crate::view::{View, Viewport};
+use glam::DVec3;
+
+/// One frame of a flight, in the units of the flight file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlightFrame {
+    /// Seconds since the start.
+    pub time_s: f64,
+    /// Eye position in metres east, north and up (see [`crate::view`]).
+    pub eye_m: [f64; 3],
+    /// Heading in degrees, clockwise from north.
+    pub yaw_deg: f64,
+    /// Climb of the line of sight in degrees, -90..=90.
+    pub pitch_deg: f64,
+    /// Roll in degrees, positive to the right.
+    pub roll_deg: f64,
+    /// Vertical field of view in degrees, above 0 and below 180.
+    pub vertical_fov_deg: f64,
+}
+
+impl FlightFrame {
+    /// The frame's camera for a picture of `viewport` at `tolerance_px`.
+    pub fn view(&self, viewport: Viewport, tolerance_px: f64) -> View {
+        View {
+            eye_m: DVec3::from_array(self.eye_m),
+            yaw_rad: self.yaw_deg.to_radians(),
+            pitch_rad: self.pitch_deg.to_radians(),
+            roll_rad: self.roll_deg.to_radians(),
+            vertical_fov_rad: self.vertical_fov_deg.to_radians(),
+            viewport,
+            tolerance_px,
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Where the eye is and what it sees: one frame's camera and its requirements on the mesh.
+//!
+//! Space is metres east, north and up of the terrain's south-west sample at height zero. Angles at this
+//! boundary are radians; flights and flags speak degrees.
+
+use glam::DVec3;
+
+/// A size in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Viewport {
+    /// Pixels across.
+    pub width_px: u32,
+    /// Pixels down.
+    pub height_px: u32,
+}
+
+impl Default for Viewport {
+    fn default() -> Self {
+        Self { width_px: 800, height_px: 600 }
+    }
+}
+
+/// One frame's camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Eye position in metres east, north and up.
+    pub eye_m: DVec3,
+    /// Heading in radians, clockwise from north.
+    pub yaw_rad: f64,
+    /// Climb of the line of sight in radians, positive upwards.
+    pub pitch_rad: f64,
+    /// Roll in radians, positive to the right.
+    pub roll_rad: f64,
+    /// Vertical field of view in radians, above 0 and below pi.
+    pub vertical_fov_rad: f64,
+    /// Size of the picture.
+    pub viewport: Viewport,
+    /// Largest error on the screen that the mesh may show, in pixels; above 0.
+    pub tolerance_px: f64,
+}
+
+impl View {
+    /// Unit vectors to the right, up and forward of the eye.
+    pub fn axes(&self) -> [DVec3; 3] {
+        let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
+        let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
+        let forward = DVec3::new(sin_yaw * cos_pitch, cos_yaw * cos_pitch, sin_pitch);
+        let level_right = DVec3::new(cos_yaw, -sin_yaw, 0.0);
+        let level_up = level_right.cross(forward);
+        let (sin_roll, cos_roll) = self.roll_rad.sin_cos();
+        let right = level_right * cos_roll - level_up * sin_roll;
+        let up = level_right * sin_roll + level_up * cos_roll;
+        [right, up, forward]
+    }
+
+    /// Pixels a radian of the vertical field of view: the paper's alpha = m / phi (Bao et al., eq. 1).
+    pub fn pixels_per_radian(&self) -> f64 {
+        f64::from(self.viewport.height_px) / self.vertical_fov_rad
+    }
+
+    /// Outward unit normals of the left, right, bottom and top planes of the view pyramid; each passes through the eye.
+    pub fn side_normals(&self) -> [DVec3; 4] {
+        let [right, up, forward] = self.axes();
+        let tan_y = (0.5 * self.vertical_fov_rad).tan();
+        let tan_x = tan_y * f64::from(self.viewport.width_px) / f64::from(self.viewport.height_px);
+        [
+            (-right - forward * tan_x).normalize(),
+            (right - forward * tan_x).normalize(),
+            (-up - forward * tan_y).normalize(),
+            (up - forward * tan_y).normalize(),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_point_out_of_what_is_seen() {
+        for (yaw, pitch, roll) in [(0.0, 0.0, 0.0), (1.0, -0.4, 0.3), (4.0, 0.7, -2.0)] {
+            let view = View {
+                eye_m: DVec3::new(5.0, 6.0, 7.0),
+                yaw_rad: yaw,
+                pitch_rad: pitch,
+                roll_rad: roll,
+                vertical_fov_rad: 0.8,
+                viewport: Viewport::default(),
+                tolerance_px: 1.0,
+            };
+            let [right, up, forward] = view.axes();
+            assert!((right.cross(up) + forward).length() < 1e-12, "right-handed, looking along forward");
+            for n in view.side_normals() {
+                assert!(n.dot(forward) < 0.0);
+            }
+            let half_width = 0.4f64.tan() * 800.0 / 600.0;
+            let edge = |s: f64| forward + right * (half_width * s) + up * (0.4f64.tan() * s);
+            assert!(view.side_normals().iter().all(|n| n.dot(edge(0.999)) < 0.0));
+            assert!(view.side_normals().iter().all(|n| n.dot(edge(-0.999)) < 0.0));
+            assert!(view.side_normals().iter().any(|n| n.dot(edge(1.001)) > 0.0));
+        }
+    }
+
+    #[test]
+    fn yaw_is_clockwise_from_north_and_pitch_is_up() {
+        let view = View {
+            eye_m: DVec3::ZERO,
+            yaw_rad: std::f64::consts::FRAC_PI_2,
+            pitch_rad: 0.0,
+            roll_rad: 0.0,
+            vertical_fov_rad: 0.8,
+            viewport: Viewport::default(),
+            tolerance_px: 1.0,
+        };
+        assert!((view.axes()[2] - DVec3::X).length() < 1e-12, "yaw 90 degrees looks east");
+        let up = View { pitch_rad: 0.5, ..view };
+        assert!(up.axes()[2].z > 0.0);
+        assert!((view.axes()[1] - DVec3::Z).length() < 1e-12);
+    }
+}
