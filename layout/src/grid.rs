@@ -242,8 +242,7 @@ impl Grid {
     /// The apexes of the triangles whose longest edge a vertex splits: two, or one on the square's border.
     pub fn apexes(&self, p: GridPoint) -> impl Iterator<Item = GridPoint> + use<> {
         let [b, d] = self.edge_ends(p);
-        let (hx, hy) =
-            ((i64::from(d.x()) - i64::from(b.x())) / 2, (i64::from(d.y()) - i64::from(b.y())) / 2);
+        let (hx, hy) = ((i64::from(d.x()) - i64::from(b.x())) / 2, (i64::from(d.y()) - i64::from(b.y())) / 2);
         let n = i64::from(self.side_steps());
         [(-hy, hx), (hy, -hx)].into_iter().filter_map(move |(dx, dy)| {
             let (x, y) = (i64::from(p.x()) + dx, i64::from(p.y()) + dy);

@@ -1,9 +1,21 @@
-//! The Terrasoar terrain file: elevation data in, paged interleaved-quadtree records out.
+//! The Terrasoar terrain file: elevation data in, error bounds and nested spheres computed, pages out, and a reader of it.
+//!
+//! The way data takes: [`import`] turns a DEM into a [`dem::DemSource`]; [`build`] computes what refinement needs and writes
+//! the file that FORMAT.md specifies; [`terrain`] opens it. This crate knows bytes and knows no camera.
+pub mod atomic_file;
+pub mod build;
+pub mod bytes;
 pub mod dem;
+pub mod directory;
 pub mod error;
 pub mod grid;
+pub mod header;
 pub mod import;
 pub mod octave;
 pub mod order;
 pub mod record;
+pub mod source;
 pub mod synth;
+pub mod terrain;
+
+pub use error::LayoutError;

@@ -145,6 +145,20 @@ pub fn point_of(k: u32, slot: u64) -> Option<GridPoint> {
         .then(|| GridPoint::new((u as u32) << t, (w as u32) << t))
 }
 
+/// Least cell coordinates (X, Y) of the block of 4^order white slots that starts `offset` into its level.
+pub(crate) const fn white_block_at(offset: u64, order: u32) -> [u64; 2] {
+    let y = gather(offset >> 1);
+    let x = gather(offset) ^ y;
+    [x >> order << order, y >> order << order]
+}
+
+/// Least turned coordinates (A, B) of the block of 4^order black slots that starts `offset` into its level at depth `d`.
+pub(crate) const fn black_block_at(d: u32, offset: u64, order: u32) -> [u64; 2] {
+    let a = gather(offset >> 1) ^ ((1 << d) - 1);
+    let b = a ^ gather(offset) ^ (1 << d);
+    [a >> order << order, b >> order << order]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -211,10 +225,8 @@ mod tests {
             let g = grid(k);
             let c = corners(k);
             let centre = (CENTRE_SLOT, GridPoint::new(1 << (k - 1), 1 << (k - 1)));
-            let visited: u64 = ROOTS
-                .iter()
-                .map(|&(split, [b, d])| walk(&g, 2 * k - 2, centre, split, c[b], c[d]))
-                .sum();
+            let visited: u64 =
+                ROOTS.iter().map(|&(split, [b, d])| walk(&g, 2 * k - 2, centre, split, c[b], c[d])).sum();
             assert_eq!(visited, 4 * ((1 << (2 * k - 1)) - 1));
         }
     }

@@ -220,14 +220,7 @@ impl RecordCodec for Compact {
     }
 
     #[inline]
-    fn encode(
-        &self,
-        level: u32,
-        value: f64,
-        class: VertexClass,
-        error_m: f64,
-        radius_m: f64,
-    ) -> Option<u32> {
+    fn encode(&self, level: u32, value: f64, class: VertexClass, error_m: f64, radius_m: f64) -> Option<u32> {
         if class == VertexClass::Inert {
             return Some(Self::INERT);
         }
@@ -248,7 +241,8 @@ impl RecordCodec for Compact {
                 let error_code = if error_m <= 0.0 {
                     0
                 } else {
-                    let guess = self.error_steps.index_at_least(error_m / self.errors[1] * BELOW)?.checked_add(1)?;
+                    let guess =
+                        self.error_steps.index_at_least(error_m / self.errors[1] * BELOW)?.checked_add(1)?;
                     (guess..FRINGE).find(|code| self.errors[usize::from(*code)] >= error_m)?
                 };
                 (error_code, radius_code(&self.radius_steps).filter(|code| *code < 255)?)
@@ -326,7 +320,8 @@ pub struct Exact8 {
 impl Exact8 {
     /// The codec of a file with this grid and scale.
     pub fn new(grid: &Grid, scale: &RecordScale) -> Self {
-        let edge_m = std::array::from_fn(|l| if (l as u32) < grid.levels() { grid.edge_m(l as u32) } else { 0.0 });
+        let edge_m =
+            std::array::from_fn(|l| if (l as u32) < grid.levels() { grid.edge_m(l as u32) } else { 0.0 });
         Self { height_base_m: scale.height_base_m, height_step_m: scale.height_step_m, edge_m }
     }
 }
@@ -352,8 +347,7 @@ impl RecordCodec for Exact8 {
         let radius_bits = (raw >> 48) as u32;
         let radius = f32::from_bits(radius_bits << 16);
         Vertex {
-            height_m: self.height_base_m
-                + finite(f64::from(f32::from_bits(raw as u32))) * self.height_step_m,
+            height_m: self.height_base_m + finite(f64::from(f32::from_bits(raw as u32))) * self.height_step_m,
             error_m: magnitude(error),
             radius_m: magnitude(radius),
             class: signed_class(error, radius, radius_bits == 0xffff && error.to_bits() == 0),
@@ -453,8 +447,12 @@ mod tests {
         Grid::new([65, 65], [10.0, 13.0]).unwrap()
     }
 
-    const SCALE: RecordScale =
-        RecordScale { height_base_m: -12.5, height_step_m: 0.25, error_top_m: 900.0, radius_steps_per_octave: 64 };
+    const SCALE: RecordScale = RecordScale {
+        height_base_m: -12.5,
+        height_step_m: 0.25,
+        error_top_m: 900.0,
+        radius_steps_per_octave: 64,
+    };
 
     fn rounds_up<C: RecordCodec>(codec: &C, level: u32, value: f64, error_m: f64, stretch: f64) {
         let value = C::round_height(value);

@@ -1,0 +1,169 @@
+//! A file that appears under its name only when it is complete.
+//!
+//! On Linux the bytes go to a file without a name, so that even a killed process leaves nothing behind; elsewhere, and on file
+//! systems without nameless files, to a temporary file beside the target that is removed when dropped.
+//! Publishing syncs the bytes, then renames over whatever had the name.
+
+use crate::error::LayoutError;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// A file being written.
+#[derive(Debug)]
+pub struct AtomicFile {
+    target: PathBuf,
+    inner: Inner,
+}
+
+#[derive(Debug)]
+enum Inner {
+    #[cfg(target_os = "linux")]
+    Nameless(File),
+    Named(tempfile::NamedTempFile),
+}
+
+/// The folder a file lies in; the current one for a bare name.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+impl AtomicFile {
+    /// Starts a file that will be called `target`.
+    ///
+    /// # Errors
+    /// [`LayoutError::Io`] if its folder does not exist or cannot be written to; [`LayoutError::Usage`] if `target` is a folder.
+    pub fn create(target: &Path) -> Result<Self, LayoutError> {
+        if target.is_dir() {
+            return Err(LayoutError::Usage(format!(
+                "{}: the output is a folder; name a file in it",
+                target.display()
+            )));
+        }
+        #[cfg(target_os = "linux")]
+        if let Some(file) = nameless(folder_of(target)) {
+            return Ok(Self { target: target.to_owned(), inner: Inner::Nameless(file) });
+        }
+        let file = tempfile::Builder::new()
+            .prefix(".terrasoar-")
+            .suffix(".partial")
+            .tempfile_in(folder_of(target))
+            .map_err(|e| LayoutError::io(target, "cannot create the file", e))?;
+        Ok(Self { target: target.to_owned(), inner: Inner::Named(file) })
+    }
+
+    /// The file to write to.
+    pub fn file(&self) -> &File {
+        match &self.inner {
+            #[cfg(target_os = "linux")]
+            Inner::Nameless(file) => file,
+            Inner::Named(file) => file.as_file(),
+        }
+    }
+
+    /// Name it will have.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Syncs what was written and gives the file its name, replacing what had it.
+    ///
+    /// # Errors
+    /// [`LayoutError::Io`]; nothing is left behind then.
+    pub fn publish(self) -> Result<(), LayoutError> {
+        let target = self.target;
+        let failed = |e| LayoutError::io(&target, "cannot write the file", e);
+        match self.inner {
+            #[cfg(target_os = "linux")]
+            Inner::Nameless(file) => {
+                file.sync_all().map_err(failed)?;
+                name_file(&file, &target).map_err(failed)
+            }
+            Inner::Named(file) => {
+                file.as_file().sync_all().map_err(failed)?;
+                file.persist(&target).map(drop).map_err(|e| failed(e.error))
+            }
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn nameless(folder: &Path) -> Option<File> {
+    use rustix::fs::{CWD, Mode, OFlags, openat};
+    let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
+    openat(CWD, folder, flags, Mode::from_raw_mode(0o644)).ok().map(File::from)
+}
+
+#[cfg(target_os = "linux")]
+fn name_file(file: &File, target: &Path) -> std::io::Result<()> {
+    use rustix::fs::{AtFlags, CWD, linkat};
+    use std::os::fd::AsRawFd;
+    let link = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
+    // A link cannot replace a name, a rename can: link to a fresh name first where the target exists.
+    if !target.exists() && linkat(CWD, &link, CWD, target, AtFlags::SYMLINK_FOLLOW).is_ok() {
+        return Ok(());
+    }
+    let folder = tempfile::Builder::new().prefix(".terrasoar-").tempdir_in(folder_of(target))?;
+    let name = folder.path().join("complete");
+    linkat(CWD, &link, CWD, &name, AtFlags::SYMLINK_FOLLOW)?;
+    std::fs::rename(&name, target)
+}
+
+/// Writes all of `bytes` at `offset`.
+pub(crate) fn write_at(file: &File, bytes: &[u8], offset: u64) -> std::io::Result<()> {
+    #[cfg(unix)]
+    return std::os::unix::fs::FileExt::write_all_at(file, bytes, offset);
+    #[cfg(windows)]
+    {
+        let mut done = 0;
+        while done < bytes.len() {
+            done += std::os::windows::fs::FileExt::seek_write(file, &bytes[done..], offset + done as u64)?;
+        }
+        Ok(())
+    }
+}
+
+/// Fills `bytes` from `offset`.
+pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> std::io::Result<()> {
+    #[cfg(unix)]
+    return std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset);
+    #[cfg(windows)]
+    {
+        let mut done = 0;
+        while done < bytes.len() {
+            match std::os::windows::fs::FileExt::seek_read(file, &mut bytes[done..], offset + done as u64)? {
+                0 => return Err(std::io::ErrorKind::UnexpectedEof.into()),
+                count => done += count,
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_appears_before_publishing_and_nothing_else_after() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a");
+        let names = || std::fs::read_dir(folder.path()).unwrap().count();
+        let file = AtomicFile::create(&target).unwrap();
+        write_at(file.file(), b"half", 0).unwrap();
+        assert!(!target.exists());
+        drop(file);
+        assert_eq!(names(), 0);
+        for text in ["one", "two"] {
+            let file = AtomicFile::create(&target).unwrap();
+            write_at(file.file(), text.as_bytes(), 0).unwrap();
+            file.publish().unwrap();
+            assert_eq!(std::fs::read_to_string(&target).unwrap(), text);
+            assert_eq!(names(), 1);
+        }
+        assert!(AtomicFile::create(folder.path()).is_err());
+        assert!(AtomicFile::create(&folder.path().join("missing/x")).is_err());
+    }
+}

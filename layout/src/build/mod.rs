@@ -1,0 +1,381 @@
+//! From a DEM to a terrain file, out of core: spool the samples, survey them, then work north in bands, computing error, radius and
+//! saturation bottom-up and writing pages as they fill.
+//!
+//! The order of work: a row of tiles is scanned for own errors ([`scan`]); then every level, finest first, makes the records of the rows whose
+//! children and own errors are complete ([`saturate`]); then pages whose rows are complete are written ([`writer`]). Each level lags a little
+//! behind the one below, so a few rows a level are all that is held. Cost: one pass over the samples to spool them, one to survey, one to build.
+//!
+//! Invariant: neither threads nor the memory budget change a byte of the file.
+
+mod band;
+mod levels;
+mod padding;
+mod plan;
+mod plane;
+mod saturate;
+mod scan;
+mod spacing;
+mod spool;
+mod survey;
+mod writer;
+
+use crate::atomic_file::AtomicFile;
+use crate::dem::DemSource;
+use crate::error::LayoutError;
+use crate::grid::Grid;
+use crate::header::{ErrorKind, Header};
+use crate::order::corners;
+use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
+use band::Band;
+use levels::{LevelShape, Levels};
+use rayon::prelude::*;
+use saturate::Saturator;
+use scan::{FIRST_SCANNED, OwnErrors, scan_tile_row};
+use spool::Spool;
+use std::path::Path;
+use std::sync::atomic::AtomicU32;
+use survey::HeightCode;
+use writer::PageWriter;
+
+/// Mebibyte.
+const MIB: u64 = 1 << 20;
+/// Memory kept aside for decoders, threads and the program itself.
+const RESERVED_BYTES: u64 = 36 * MIB;
+/// Largest tile: beyond this a tile no longer fits a core's cache.
+const LARGEST_TILE: u32 = 256;
+
+/// What to build.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BuildOptions {
+    /// Spacing in metres (east, north) instead of what the DEM says.
+    pub spacing_m: Option<[f64; 2]>,
+    /// Factor on all heights; the default is 1.
+    pub z_scale: f64,
+    /// Memory budget in MiB; at least 48.
+    pub memory_mib: u64,
+    /// Record kind; `None` chooses the smallest that keeps every height exactly. Either exact kind stands for both.
+    pub record: Option<RecordKind>,
+    /// Kind of error to store.
+    pub error: ErrorKind,
+    /// Raw value that means "no data", beside what the DEM declares.
+    pub nodata: Option<f64>,
+    /// Largest side of a tile in steps, a power of two from 2 to 256. Smaller tiles save memory and cost time; the file is the same.
+    pub largest_tile: u32,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self {
+            spacing_m: None,
+            z_scale: 1.0,
+            memory_mib: 512,
+            record: None,
+            error: ErrorKind::Bounded,
+            nodata: None,
+            largest_tile: LARGEST_TILE,
+        }
+    }
+}
+
+/// Hears how a build gets on.
+pub trait BuildProgress: Sync {
+    /// A stage begins that will work through `samples` samples.
+    fn stage(&self, name: &'static str, samples: u64);
+    /// More samples of the stage are done.
+    fn advance(&self, samples: u64);
+}
+
+/// Hears nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Silent;
+
+impl BuildProgress for Silent {
+    fn stage(&self, _: &'static str, _: u64) {}
+    fn advance(&self, _: u64) {}
+}
+
+/// Builds the terrain file `out` from `dem`, on the current rayon pool, and returns its header. `out` appears only when it is
+/// complete; whatever had the name is replaced then.
+///
+/// # Errors
+/// Damage in the DEM; I/O; [`LayoutError::Usage`] for options or sizes that cannot be met, saying which.
+pub fn build(
+    dem: &dyn DemSource,
+    out: &Path,
+    options: &BuildOptions,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
+    let info = dem.info();
+    if !(options.z_scale.is_finite() && options.z_scale > 0.0) {
+        return Err(LayoutError::Usage(format!("--z-scale is a positive factor, not {}", options.z_scale)));
+    }
+    let (spacing_m, spacing_origin) = spacing::resolve(info, options.spacing_m)?;
+    let grid = Grid::new([info.samples_wide, info.samples_high], spacing_m)?;
+    let samples = u64::from(info.samples_wide) * u64::from(info.samples_high);
+    let memory = MemoryPlan::new(&grid, info.sample_type.fits_f32(), options)?;
+    let file = AtomicFile::create(out)?;
+    let advance = |n| progress.advance(n);
+
+    progress.stage("reading", samples);
+    let spool = Spool::new(info, options.nodata, out, memory.spool_bytes, &advance)?;
+    dem.stream(&spool)?;
+    let stats = spool.stats();
+    if stats.voids == samples {
+        return Err(LayoutError::Usage("the elevation model has no heights: every sample is void".into()));
+    }
+
+    progress.stage("surveying", samples);
+    let code = HeightCode::choose(info, options.z_scale, &stats, options.record);
+    let height_range_m = survey::check_heights(info, &code, &stats)?;
+    let steepest_m = survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
+    let scale = survey::record_scale(&grid, &code, height_range_m, steepest_m);
+    let mut header = Header {
+        grid,
+        record_kind: code.kind,
+        scale,
+        error_kind: options.error,
+        has_voids: stats.voids > 0,
+        heights_rounded: code.rounds,
+        generation: 1,
+        height_range_m,
+        nodata_samples: stats.voids,
+        stored_pages: 0,
+        root_page: 0,
+        root_checksum: 0,
+        file_bytes: 0,
+        sample_to_crs: spacing::sample_to_crs(info),
+        epsg: info.georeference.epsg,
+        crs_unit: info.georeference.unit,
+        spacing_origin,
+        body_radius_m: info.georeference.body_radius_m,
+        crs_name: info.georeference.crs_name.clone(),
+        source: info.format.clone(),
+    };
+
+    progress.stage("building", samples);
+    let work = Work { spool: &spool, code, scale, tile: memory.tile, file: &file, advance: &advance };
+    match code.kind {
+        RecordKind::Compact => work.run(Compact::new(&grid, &scale), &mut header)?,
+        RecordKind::Exact8 => work.run(Exact8::new(&grid, &scale), &mut header)?,
+        RecordKind::Exact16 => work.run(Exact16::new(&grid, &scale), &mut header)?,
+    }
+    progress.stage("syncing", 0);
+    drop(spool);
+    file.publish()?;
+    Ok(header)
+}
+
+/// How the budget is spent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct MemoryPlan {
+    /// Side of a tile in steps, a power of two.
+    tile: u32,
+    /// Bytes the spool may hold in memory.
+    spool_bytes: u64,
+}
+
+impl MemoryPlan {
+    fn new(grid: &Grid, single: bool, options: &BuildOptions) -> Result<Self, LayoutError> {
+        let memory_mib = options.memory_mib;
+        let budget = memory_mib * MIB;
+        let [wide, high] = grid.samples().map(u64::from);
+        let n = grid.side_steps();
+        // Pages of the directory and their plan, some 48 bytes each, for the widest record the samples may need.
+        let record_bytes = if single { 8 } else { 16 };
+        let directory = crate::order::slot_count(grid.k()) * record_bytes / 4096 * 48;
+        let fixed = RESERVED_BYTES + directory;
+        let threads = rayon::current_num_threads() as u64;
+        let work = |tile: u32| {
+            let tile = u64::from(tile);
+            // Codes and voids of some 2.5 tile rows, records and own errors beside them, 128 rows of records a level that wait for their pages.
+            wide * (5 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
+                + wide * 200 * record_bytes
+                + threads * (tile + 1) * (tile + 1) * 8
+        };
+        let largest = n.min(options.largest_tile.clamp(2, LARGEST_TILE));
+        let smallest = largest.min(16);
+        let spool = wide * high * if single { 4 } else { 8 };
+        let available = budget.saturating_sub(fixed);
+        let largest_within = |bytes: u64| {
+            (0..=8)
+                .rev()
+                .map(|m| 1 << m)
+                .filter(|s| (smallest..=largest).contains(s))
+                .find(|s| work(*s) <= bytes)
+        };
+        if let Some(tile) = largest_within(available.saturating_sub(spool)).filter(|t| *t >= largest.min(128))
+        {
+            return Ok(Self { tile, spool_bytes: spool });
+        }
+        match largest_within(available) {
+            Some(tile) => Ok(Self { tile, spool_bytes: 0 }),
+            None => Err(LayoutError::Usage(format!(
+                "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; give at least --memory {}",
+                (fixed + work(smallest)).div_ceil(MIB)
+            ))),
+        }
+    }
+}
+
+/// What the work on one file needs to know.
+struct Work<'a> {
+    spool: &'a Spool<'a>,
+    code: HeightCode,
+    scale: RecordScale,
+    tile: u32,
+    file: &'a AtomicFile,
+    advance: &'a (dyn Fn(u64) + Sync),
+}
+
+impl Work<'_> {
+    fn run<C: RecordCodec>(&self, codec: C, header: &mut Header) -> Result<(), LayoutError> {
+        let grid = header.grid;
+        let [wide, high] = grid.samples();
+        let plan = plan::Plan::new(&grid, header.records_per_page())?;
+        let mut state = State {
+            grid,
+            tile: self.tile,
+            saturator: Saturator {
+                grid,
+                codec,
+                scale: self.scale,
+                error_kind: header.error_kind,
+                has_voids: header.has_voids,
+            },
+            shapes: (0..grid.levels()).map(|l| LevelShape::new(&grid, l)).collect(),
+            band: Band::new(grid, self.tile, self.code.code(self.spool.stats().range[0])),
+            own: Levels::new(grid),
+            records: Levels::new(grid),
+            writer: PageWriter::new(self.file, grid, plan, header.record_kind),
+            scanned: 0,
+        };
+        state.band.preload_coarse(self.spool, &self.code)?;
+        state.make_own_rows(0);
+        let tile_rows = (high - 1).div_ceil(self.tile).max(1);
+        for tile_y in 0..tile_rows {
+            let last = ((tile_y + 1) * self.tile).min(high - 1);
+            let before = state.band.rows_read();
+            state.band.read_through(last, self.spool, &self.code)?;
+            state.make_own_rows((tile_y + 1) * self.tile);
+            if header.error_kind == ErrorKind::Bounded {
+                scan_tile_row(&grid, &state.band, &state.own, tile_y, self.tile, self.scale.height_step_m);
+            }
+            state.scanned = if tile_y + 1 == tile_rows { u32::MAX } else { (tile_y + 1) * self.tile };
+            state.advance()?;
+            (self.advance)(u64::from(state.band.rows_read() - before) * u64::from(wide));
+        }
+        state.finish(header)
+    }
+}
+
+/// The work on one file as far as it has come.
+struct State<'a, C: RecordCodec> {
+    grid: Grid,
+    tile: u32,
+    saturator: Saturator<C>,
+    shapes: Vec<LevelShape>,
+    band: Band,
+    own: OwnErrors,
+    records: Levels<C::Raw>,
+    writer: PageWriter<'a, C>,
+    /// Own errors of rows below this are complete; `u32::MAX` when all are.
+    scanned: u32,
+}
+
+impl<C: RecordCodec> State<'_, C> {
+    /// Levels whose triangles fit a tile.
+    fn tile_levels(&self) -> u32 {
+        2 * self.tile.trailing_zeros()
+    }
+
+    /// Makes room for the own errors of rows up to `last_y`, and of all rows of levels larger than a tile.
+    fn make_own_rows(&mut self, last_y: u32) {
+        for shape in &self.shapes[FIRST_SCANNED.min(self.grid.levels()) as usize..] {
+            let last = if shape.level() >= self.tile_levels() { u32::MAX } else { last_y };
+            let mut row = self.own.next_row(shape.level());
+            while row < shape.rows() && shape.row_y(row) <= last {
+                let cells = (0..shape.columns(row)).map(|_| AtomicU32::new(0)).collect();
+                self.own.push(shape.level(), cells);
+                row += 1;
+            }
+        }
+    }
+
+    /// All rows of `level` up to this y are done.
+    fn done_y(&self, level: u32) -> i64 {
+        let (shape, next) = (&self.shapes[level as usize], self.records.next_row(level));
+        if next >= shape.rows() { i64::MAX } else { i64::from(shape.row_y(next)) - 1 }
+    }
+
+    /// Whether everything that the row at `y` of a level depends on is there.
+    fn is_ready(&self, shape: &LevelShape, y: u32) -> bool {
+        let all = self.scanned == u32::MAX;
+        let (level, step) = (shape.level(), shape.step());
+        let own = all || (level < self.tile_levels() && (level < FIRST_SCANNED || y < self.scanned));
+        let codes = all || y + step < self.band.rows_read();
+        let to_child = if shape.is_white() { step } else { step / 2 };
+        let children = level == 0
+            || self.done_y(level - 1) >= i64::from(y + to_child).min(i64::from(self.grid.side_steps()));
+        own && codes && children
+    }
+
+    /// Makes every row that can be made, writes every page that can be written, forgets what nobody needs.
+    fn advance(&mut self) -> Result<(), LayoutError> {
+        for level in 0..self.grid.levels() {
+            let shape = self.shapes[level as usize];
+            let first = self.records.next_row(level);
+            let mut end = first;
+            while end < shape.rows() && self.is_ready(&shape, shape.row_y(end)) {
+                end += 1;
+            }
+            let made: Vec<Box<[C::Raw]>> = (first..end)
+                .into_par_iter()
+                .map(|row| self.saturator.row(&shape, row, &self.band, &self.own, &self.records))
+                .collect::<Result<_, LayoutError>>()?;
+            for row in made {
+                self.records.push(level, row);
+            }
+        }
+        for level in 0..self.grid.levels() {
+            let waiting = self.writer.advance(level, self.done_y(level), &self.records)?;
+            let parent_needs = match self.shapes.get(level as usize + 1) {
+                Some(parent) if self.records.next_row(level + 1) < parent.rows() => {
+                    i64::from(parent.row_y(self.records.next_row(level + 1))) - i64::from(parent.step())
+                }
+                _ => i64::MAX,
+            };
+            let shape = self.shapes[level as usize];
+            let keep = first_row_at(&shape, waiting.min(parent_needs).min(self.done_y(level)));
+            self.records.drop_below(level, keep);
+            self.own.drop_below(level, self.records.next_row(level));
+        }
+        let needed = (0..self.tile_levels().min(self.grid.levels()))
+            .map(|level| {
+                let shape = &self.shapes[level as usize];
+                (self.done_y(level)).saturating_sub(i64::from(shape.step()))
+            })
+            .min()
+            .unwrap_or(0);
+        // The next row of tiles begins with the last row read.
+        let last_read = i64::from(self.band.rows_read()) - 1;
+        self.band.drop_below(needed.clamp(0, last_read) as u32);
+        Ok(())
+    }
+
+    fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
+        for (slot, corner) in corners(self.grid.k()).into_iter().enumerate() {
+            let class = if self.band.is_void(corner) { VertexClass::FringeVoid } else { VertexClass::Plain };
+            let code = self.band.code(corner);
+            let raw = self.saturator.codec.encode(0, code, class, 0.0, 0.0).unwrap_or(C::INERT);
+            self.writer.set(slot as u64, raw);
+        }
+        self.writer.finish(header)
+    }
+}
+
+/// First row of a level at or north of `y`.
+fn first_row_at(shape: &LevelShape, y: i64) -> usize {
+    let y = y.clamp(0, i64::from(u32::MAX / 4)) as u32;
+    let guess = if shape.is_white() { y / (2 * shape.step()) } else { y / shape.step() };
+    (guess as usize).min(shape.rows())
+}

@@ -1,0 +1,60 @@
+//! The plane of a bin-tree triangle over the sample grid, and the largest distance of samples from it.
+//!
+//! Every sample's distance is computed from the triangle's own numbers in one fixed order of operations, whichever tile
+//! asks: tile size, memory budget and threads cannot change a bit of the result. On whole height codes all of
+//! it is exact.
+
+use crate::grid::GridPoint;
+
+/// `z = (zv + gy * (y - yv)) + gx * (x - xv)` in height codes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plane {
+    xv: f64,
+    yv: f64,
+    zv: f64,
+    gx: f64,
+    gy: f64,
+}
+
+impl Plane {
+    /// The plane through apex `a` and base `b`, `d` of a bin-tree triangle, each with its height code.
+    pub(super) fn of([a, b, d]: [(GridPoint, f64); 3]) -> Self {
+        let x = |p: (GridPoint, f64)| f64::from(p.0.x());
+        let y = |p: (GridPoint, f64)| f64::from(p.0.y());
+        let (xv, yv, zv) = (0.5 * (x(b) + x(d)), 0.5 * (y(b) + y(d)), 0.5 * (b.1 + d.1));
+        let (gx, gy) = if y(b) == y(d) {
+            ((d.1 - b.1) / (x(d) - x(b)), (a.1 - zv) / (y(a) - yv))
+        } else if x(b) == x(d) {
+            ((a.1 - zv) / (x(a) - xv), (d.1 - b.1) / (y(d) - y(b)))
+        } else if y(a) == y(b) {
+            ((a.1 - b.1) / (x(a) - x(b)), (d.1 - a.1) / (y(d) - y(a)))
+        } else {
+            ((d.1 - a.1) / (x(d) - x(a)), (a.1 - b.1) / (y(a) - y(b)))
+        };
+        Self { xv, yv, zv, gx, gy }
+    }
+
+    /// Largest distance in codes of the samples `row` from the plane; the first lies at (`x`, `y`). Void samples are NaN and do not count.
+    #[inline]
+    pub(super) fn farthest_in_row(&self, x: u32, y: u32, row: &[f64]) -> f64 {
+        let base = self.zv + self.gy * (f64::from(y) - self.yv);
+        let first = f64::from(x) - self.xv;
+        let (chunks, rest) = row.as_chunks::<8>();
+        // Comparisons with NaN are false, which leaves voids out. Eight lanes, so that the compiler can vectorise.
+        let mut lanes = [0.0f64; 8];
+        let mut done = 0.0;
+        for chunk in chunks {
+            for (lane, (value, best)) in chunk.iter().zip(&mut lanes).enumerate() {
+                let distance = (value - (base + self.gx * (first + (done + lane as f64)))).abs();
+                *best = if distance > *best { distance } else { *best };
+            }
+            done += 8.0;
+        }
+        let mut farthest = lanes.into_iter().fold(0.0, f64::max);
+        for (i, value) in rest.iter().enumerate() {
+            let distance = (value - (base + self.gx * (first + (done + i as f64)))).abs();
+            farthest = if distance > farthest { distance } else { farthest };
+        }
+        farthest
+    }
+}

@@ -1,0 +1,271 @@
+//! The bounded error of every vertex before saturation: the largest distance of any sample from the two triangles
+//! the vertex splits, by brute force, tile by tile.
+//!
+//! A tile scans the triangles inside it level by level and adds its samples to the larger triangles it lies in. Tiles share
+//! only maxima, kept in atomics, so they run in parallel and in any order. Cost: each sample is compared with one or two planes a level,
+//! about two nanoseconds of one core each. Triangles that padding deforms are left to [`super::padding`].
+
+use super::band::Band;
+use super::levels::{LevelShape, Levels};
+use super::plane::Plane;
+use crate::grid::{Grid, GridPoint};
+use crate::order::corners;
+use crate::record::f32_at_least;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// First level whose own error needs a scan. At levels 0 and 1 every sample in the diamond is the vertex, a corner, or a child's vertex
+/// on the edge it splits.
+pub(super) const FIRST_SCANNED: u32 = 2;
+
+/// Own errors in metres, as the bits of non-negative singles, whose order is that of the numbers.
+pub(super) type OwnErrors = Levels<AtomicU32>;
+
+/// Scans the tiles of one row of tiles, whose south border is row `tile_y * side`.
+pub(super) fn scan_tile_row(grid: &Grid, band: &Band, own: &OwnErrors, tile_y: u32, side: u32, step_m: f64) {
+    let [wide, high] = grid.samples();
+    let y0 = tile_y * side;
+    debug_assert!(y0 < high);
+    let tiles = (wide - 1).div_ceil(side).max(1);
+    (0..tiles).into_par_iter().for_each_init(Vec::new, |buffer, tile_x| {
+        let tile = Tile::load(grid, band, tile_x * side, y0, side, buffer);
+        tile.scan_inside(own, step_m);
+        tile.scan_around(own, step_m);
+    });
+}
+
+struct Tile<'a> {
+    grid: &'a Grid,
+    band: &'a Band,
+    x0: u32,
+    y0: u32,
+    side: u32,
+    /// Samples of the tile that exist, east and north.
+    samples: [u32; 2],
+    /// Filled codes with NaN at voids, rows of `side + 1`.
+    codes: &'a [f64],
+}
+
+impl<'a> Tile<'a> {
+    fn load(grid: &'a Grid, band: &'a Band, x0: u32, y0: u32, side: u32, buffer: &'a mut Vec<f64>) -> Self {
+        let samples = [0, 1].map(|i| (grid.samples()[i] - [x0, y0][i]).min(side + 1));
+        buffer.clear();
+        buffer.resize((side as usize + 1) * (side as usize + 1), f64::NAN);
+        let rows = buffer.chunks_exact_mut(side as usize + 1).zip(y0..y0 + samples[1]);
+        for (to, y) in rows {
+            let columns = x0 as usize..(x0 + samples[0]) as usize;
+            to[..columns.len()].copy_from_slice(&band.row(y)[columns.clone()]);
+            let voids = band.row_voids(y);
+            if !voids.is_empty() {
+                for (value, _) in to.iter_mut().zip(&voids[columns]).filter(|(_, is_void)| **is_void) {
+                    *value = f64::NAN;
+                }
+            }
+        }
+        Self { grid, band, x0, y0, side, samples, codes: buffer }
+    }
+
+    /// Code at tile coordinates.
+    #[inline(always)]
+    fn at(&self, x: u32, y: u32) -> f64 {
+        self.codes[y as usize * (self.side as usize + 1) + x as usize]
+    }
+
+    /// A triangle's corners with codes, if it lies in the data and none of them is void.
+    #[inline(always)]
+    fn corners(&self, points: [[u32; 2]; 3]) -> Option<[(GridPoint, f64); 3]> {
+        let mut ok = true;
+        let corners = points.map(|[x, y]| {
+            let inside = x < self.samples[0] && y < self.samples[1];
+            let code = if inside { self.at(x, y) } else { f64::NAN };
+            ok &= !code.is_nan();
+            (GridPoint::new(self.x0 + x, self.y0 + y), code)
+        });
+        ok.then_some(corners)
+    }
+
+    /// Largest distance from `plane` over tile columns `from..=to` of tile row `y`.
+    #[inline(always)]
+    fn row(&self, plane: &Plane, from: u32, to: u32, y: u32) -> f64 {
+        let at = y as usize * (self.side as usize + 1);
+        plane.farthest_in_row(self.x0 + from, self.y0 + y, &self.codes[at + from as usize..=at + to as usize])
+    }
+
+    /// Scans all triangles whose split vertex has a level of at least [`FIRST_SCANNED`] and that lie inside the tile.
+    fn scan_inside(&self, own: &OwnErrors, step_m: f64) {
+        let mut s = 2;
+        while s < self.side {
+            self.scan_black(own, s, step_m);
+            self.scan_white(own, s, step_m);
+            s *= 2;
+        }
+    }
+
+    /// Triangles on axis-aligned edges of length 2s.
+    fn scan_black(&self, own: &OwnErrors, s: u32, step_m: f64) {
+        for y in (0..self.samples[1]).step_by(s as usize) {
+            let odd_row = (y / s) & 1 == 1;
+            let first = if odd_row { 0 } else { s };
+            for x in (first..self.samples[0].min(self.side + 1)).step_by(2 * s as usize) {
+                let mut farthest = 0.0f64;
+                if odd_row {
+                    // Vertical edge; apexes to the west and the east.
+                    let ends = [[x, y - s], [x, y + s]];
+                    if let Some(c) = x.checked_sub(s).and_then(|w| self.corners([[w, y], ends[0], ends[1]])) {
+                        let plane = Plane::of(c);
+                        for row in y - s + 1..y + s {
+                            let reach = s - row.abs_diff(y);
+                            farthest = farthest.max(self.row(&plane, x - reach, x, row));
+                        }
+                    }
+                    if let Some(c) = self.corners([[x + s, y], ends[0], ends[1]]) {
+                        let plane = Plane::of(c);
+                        for row in y - s + 1..y + s {
+                            let reach = s - row.abs_diff(y);
+                            farthest = farthest.max(self.row(&plane, x, x + reach, row));
+                        }
+                    }
+                } else {
+                    let ends = [[x - s, y], [x + s, y]];
+                    if let Some(c) = y.checked_sub(s).and_then(|w| self.corners([[x, w], ends[0], ends[1]])) {
+                        let plane = Plane::of(c);
+                        for row in y - s + 1..=y {
+                            let reach = s - (y - row);
+                            farthest = farthest.max(self.row(&plane, x - reach, x + reach, row));
+                        }
+                    }
+                    if let Some(c) = self.corners([[x, y + s], ends[0], ends[1]]) {
+                        let plane = Plane::of(c);
+                        for row in y..y + s {
+                            let reach = s - (row - y);
+                            farthest = farthest.max(self.row(&plane, x - reach, x + reach, row));
+                        }
+                    }
+                }
+                self.raise(own, x, y, farthest, step_m);
+            }
+        }
+    }
+
+    /// Triangles on the diagonals of squares of side 2s.
+    fn scan_white(&self, own: &OwnErrors, s: u32, step_m: f64) {
+        for y in (s..self.samples[1].min(self.side)).step_by(2 * s as usize) {
+            for x in (s..self.samples[0].min(self.side)).step_by(2 * s as usize) {
+                let v = GridPoint::new(self.x0 + x, self.y0 + y);
+                let [b, d] = self.grid.edge_ends(v).map(|p| [p.x() - self.x0, p.y() - self.y0]);
+                // Rising: the diagonal climbs from south-west to north-east.
+                let rising = (b[0] < d[0]) == (b[1] < d[1]);
+                let mut farthest = 0.0f64;
+                for apex_south in [true, false] {
+                    let apex_east = rising == apex_south;
+                    let apex =
+                        [if apex_east { x + s } else { x - s }, if apex_south { y - s } else { y + s }];
+                    let Some(corners) = self.corners([apex, b, d]) else { continue };
+                    let plane = Plane::of(corners);
+                    for row in y - s..=y + s {
+                        let along = row + s - y; // 0..=2s from the south
+                        let diagonal = if rising { x - s + along } else { x + s - along };
+                        let (from, to) = if apex_east { (diagonal, x + s) } else { (x - s, diagonal) };
+                        farthest = farthest.max(self.row(&plane, from, to, row));
+                    }
+                }
+                self.raise(own, x, y, farthest, step_m);
+            }
+        }
+    }
+
+    /// Adds the tile's samples to every larger triangle that contains one of its four quarters.
+    fn scan_around(&self, own: &OwnErrors, step_m: f64) {
+        if self.side == self.grid.side_steps() || self.samples.iter().any(|s| *s < 2) {
+            return;
+        }
+        let half = self.side / 2;
+        // Doubled coordinates of a point inside each quarter: south, east, north, west.
+        let (cx, cy) = (2 * self.x0 + self.side, 2 * self.y0 + self.side);
+        let quarters = [(cx, cy - half), (cx + half, cy), (cx, cy + half), (cx - half, cy)];
+        for (quarter, (px, py)) in quarters.into_iter().enumerate() {
+            for_each_triangle_around(self.grid, px, py, self.side, |split, triangle| {
+                if triangle.iter().any(|p| self.grid.is_padding(*p)) {
+                    return;
+                }
+                let codes = triangle.map(|p| self.band.coarse_code(p));
+                let [Some(a), Some(b), Some(d)] = codes else { return };
+                let plane = Plane::of([(triangle[0], a), (triangle[1], b), (triangle[2], d)]);
+                let mut farthest = 0.0f64;
+                for row in 0..self.samples[1] {
+                    let (south, north) = (row, self.side - row);
+                    let (from, to) = match quarter {
+                        0 if south <= half => (south, self.side - south),
+                        2 if north <= half => (north, self.side - north),
+                        1 => (self.side - south.min(north), self.side),
+                        3 => (0, south.min(north)),
+                        _ => continue,
+                    };
+                    farthest = farthest.max(self.row(&plane, from, to, row));
+                }
+                own.raise(split, farthest, step_m);
+            });
+        }
+    }
+
+    fn raise(&self, own: &OwnErrors, x: u32, y: u32, farthest: f64, step_m: f64) {
+        if farthest > 0.0 {
+            own.raise(GridPoint::new(self.x0 + x, self.y0 + y), farthest, step_m);
+        }
+    }
+}
+
+/// Calls `visit(split vertex, [apex, base, base])` for the bin-tree triangles that contain the point (`px`, `py`), in half steps, and
+/// whose split vertex lies on a coarser grid than tiles of `side` steps hold.
+fn for_each_triangle_around(
+    grid: &Grid,
+    px: u32,
+    py: u32,
+    side: u32,
+    mut visit: impl FnMut(GridPoint, [GridPoint; 3]),
+) {
+    let n = grid.side_steps();
+    let c = corners(grid.k());
+    let centre = GridPoint::new(n / 2, n / 2);
+    let contains = |[a, b, d]: [GridPoint; 3]| {
+        let cross = |p: GridPoint, q: GridPoint| {
+            (2 * i64::from(q.x()) - 2 * i64::from(p.x())) * (i64::from(py) - 2 * i64::from(p.y()))
+                - (2 * i64::from(q.y()) - 2 * i64::from(p.y())) * (i64::from(px) - 2 * i64::from(p.x()))
+        };
+        let signs = [cross(a, b), cross(b, d), cross(d, a)];
+        signs.iter().all(|s| *s >= 0) || signs.iter().all(|s| *s <= 0)
+    };
+    // The centre's own triangles: the two halves of the square along the diagonal it splits.
+    let [b, d] = grid.edge_ends(centre);
+    for apex in grid.apexes(centre) {
+        if contains([apex, b, d]) {
+            visit(centre, [apex, b, d]);
+            break;
+        }
+    }
+    let roots = [[centre, c[0], c[1]], [centre, c[1], c[2]], [centre, c[2], c[3]], [centre, c[3], c[0]]];
+    let Some(mut triangle) = roots.into_iter().find(|t| contains(*t)) else { return };
+    let first_level = 2 * side.trailing_zeros();
+    loop {
+        let [a, b, d] = triangle;
+        let v = b.midpoint(d);
+        if grid.level(v) < first_level {
+            return;
+        }
+        visit(v, triangle);
+        triangle = if contains([v, b, a]) { [v, b, a] } else { [v, a, d] };
+    }
+}
+
+impl OwnErrors {
+    /// Raises the own error of `v` to at least `codes` height codes.
+    fn raise(&self, v: GridPoint, codes: f64, step_m: f64) {
+        // Rounding of the distance itself is below 2^-40 of it and of the heights it came from.
+        let metres = f32_at_least(codes * step_m * (1.0 + 1e-9));
+        let shape = LevelShape::new(self.grid(), self.grid().level(v));
+        let (row, column) = shape.index(v);
+        if let Some(cell) = self.row(shape.level(), row).and_then(|r| r.get(column)) {
+            cell.fetch_max(metres.to_bits(), Ordering::Relaxed);
+        }
+    }
+}

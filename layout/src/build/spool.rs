@@ -1,0 +1,210 @@
+//! The samples on their way from the DEM to the build: one row-major copy, south row first, in memory if the budget
+//! allows, else in a nameless temporary file.
+//!
+//! While samples arrive their statistics are taken: range, voids, and which height steps they are whole multiples of. A void is
+//! NaN. Samples that single precision holds exactly take 4 bytes, others 8.
+
+use crate::atomic_file::{read_at, write_at};
+use crate::dem::{DemInfo, SampleSink, SampleType, Window};
+use crate::error::LayoutError;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError, RwLock};
+
+/// Height steps tried on floating-point samples, in raw units, coarsest first.
+pub(super) const CANDIDATE_STEPS: [f64; 9] = [1.0, 0.5, 0.25, 0.125, 0.1, 0.05, 0.02, 0.01, 0.001];
+
+/// What is known of the samples once all have arrived.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SampleStats {
+    /// Lowest and highest raw value; NaN if all are void.
+    pub(super) range: [f64; 2],
+    pub(super) voids: u64,
+    /// Which of [`CANDIDATE_STEPS`] all samples are whole multiples of.
+    pub(super) steps: [bool; CANDIDATE_STEPS.len()],
+    /// Whether single precision holds every sample exactly.
+    pub(super) fits_f32: bool,
+}
+
+impl SampleStats {
+    fn new() -> Self {
+        Self { range: [f64::NAN; 2], voids: 0, steps: [true; CANDIDATE_STEPS.len()], fits_f32: true }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.range = [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])];
+        self.voids += other.voids;
+        self.steps.iter_mut().zip(other.steps).for_each(|(a, b)| *a &= b);
+        self.fits_f32 &= other.fits_f32;
+    }
+
+    fn of(samples: &[f64], sample_type: SampleType) -> Self {
+        let mut stats = Self::new();
+        for &value in samples {
+            if value.is_nan() {
+                stats.voids += 1;
+                continue;
+            }
+            stats.range = [stats.range[0].min(value), stats.range[1].max(value)];
+        }
+        if !sample_type.fits_f32() {
+            stats.fits_f32 = samples.iter().all(|v| v.is_nan() || f64::from(*v as f32) == *v);
+        }
+        if !sample_type.is_integer() {
+            for (holds, step) in stats.steps.iter_mut().zip(CANDIDATE_STEPS) {
+                *holds = samples.iter().all(|v| v.is_nan() || is_multiple(*v, step, sample_type));
+            }
+        }
+        stats
+    }
+}
+
+/// Whether `value` is what its type makes of a whole number of `step`s.
+fn is_multiple(value: f64, step: f64, sample_type: SampleType) -> bool {
+    let exact = (value / step).round() * step;
+    if sample_type == SampleType::F32 { exact as f32 == value as f32 } else { exact == value }
+}
+
+enum Storage {
+    Memory(RwLock<Vec<u8>>),
+    File(File),
+}
+
+/// The spooled samples of one DEM.
+pub(super) struct Spool<'a> {
+    target: PathBuf,
+    wide: u32,
+    high: u32,
+    double: bool,
+    sample_type: SampleType,
+    nodata: Option<f64>,
+    storage: Storage,
+    stats: Mutex<SampleStats>,
+    advance: &'a (dyn Fn(u64) + Sync),
+}
+
+impl<'a> Spool<'a> {
+    /// An empty spool for the samples of `info`, in memory if that takes at most `memory_bytes`, else in the folder of `target`.
+    pub(super) fn new(
+        info: &DemInfo,
+        nodata: Option<f64>,
+        target: &Path,
+        memory_bytes: u64,
+        advance: &'a (dyn Fn(u64) + Sync),
+    ) -> Result<Self, LayoutError> {
+        let double = !info.sample_type.fits_f32();
+        let bytes = u64::from(info.samples_wide) * u64::from(info.samples_high) * if double { 8 } else { 4 };
+        let storage = if bytes <= memory_bytes {
+            Storage::Memory(RwLock::new(vec![0; crate::bytes::to_usize(bytes)?]))
+        } else {
+            let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let file = tempfile::tempfile_in(folder)
+                .map_err(|e| LayoutError::io(target, "cannot create a temporary file beside it", e))?;
+            Storage::File(file)
+        };
+        Ok(Self {
+            target: target.to_owned(),
+            wide: info.samples_wide,
+            high: info.samples_high,
+            double,
+            sample_type: info.sample_type,
+            nodata,
+            storage,
+            stats: Mutex::new(SampleStats::new()),
+            advance,
+        })
+    }
+
+    /// Statistics of what has arrived.
+    pub(super) fn stats(&self) -> SampleStats {
+        *self.stats.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn sample_bytes(&self) -> u64 {
+        if self.double { 8 } else { 4 }
+    }
+
+    fn failed(&self, e: std::io::Error) -> LayoutError {
+        LayoutError::io(&self.target, "cannot write the temporary file beside it", e)
+    }
+
+    /// Row `y`, counted from the south, of raw samples.
+    pub(super) fn read_row(&self, y: u32, row: &mut [f64]) -> Result<(), LayoutError> {
+        let offset = u64::from(y) * u64::from(self.wide) * self.sample_bytes();
+        let length = row.len() * self.sample_bytes() as usize;
+        match &self.storage {
+            Storage::Memory(bytes) => {
+                let bytes = bytes.read().unwrap_or_else(PoisonError::into_inner);
+                let at = offset as usize;
+                self.decode(&bytes[at..at + length], row);
+            }
+            Storage::File(file) => {
+                let mut bytes = vec![0; length];
+                read_at(file, &mut bytes, offset).map_err(|e| {
+                    LayoutError::io(&self.target, "cannot read the temporary file beside it", e)
+                })?;
+                self.decode(&bytes, row);
+            }
+        }
+        Ok(())
+    }
+
+    fn decode(&self, bytes: &[u8], row: &mut [f64]) {
+        if self.double {
+            for (value, raw) in row.iter_mut().zip(bytes.as_chunks().0) {
+                *value = f64::from_le_bytes(*raw);
+            }
+        } else {
+            for (value, raw) in row.iter_mut().zip(bytes.as_chunks().0) {
+                *value = f64::from(f32::from_le_bytes(*raw));
+            }
+        }
+    }
+
+    fn encode(&self, row: &[f64], bytes: &mut Vec<u8>) {
+        bytes.clear();
+        if self.double {
+            bytes.extend(row.iter().flat_map(|v| v.to_le_bytes()));
+        } else {
+            bytes.extend(row.iter().flat_map(|v| (*v as f32).to_le_bytes()));
+        }
+    }
+}
+
+impl SampleSink for Spool<'_> {
+    fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
+        let inside = window.col.checked_add(window.width).is_some_and(|end| end <= self.wide)
+            && window.row.checked_add(window.height).is_some_and(|end| end <= self.high)
+            && samples.len() == window.width as usize * window.height as usize;
+        if !inside {
+            return Err(LayoutError::Usage(format!(
+                "a window {window:?} does not lie in the elevation model"
+            )));
+        }
+        let cleaned;
+        let is_void = |v: f64| !v.is_finite() || self.nodata == Some(v);
+        let samples = if samples.iter().any(|v| is_void(*v) && !v.is_nan()) {
+            cleaned = samples.iter().map(|v| if is_void(*v) { f64::NAN } else { *v }).collect::<Vec<_>>();
+            &cleaned
+        } else {
+            samples
+        };
+        let stats = SampleStats::of(samples, self.sample_type);
+        let mut bytes = Vec::new();
+        for (i, row) in samples.chunks_exact(window.width.max(1) as usize).enumerate() {
+            self.encode(row, &mut bytes);
+            let y = self.high - 1 - (window.row + i as u32);
+            let offset = (u64::from(y) * u64::from(self.wide) + u64::from(window.col)) * self.sample_bytes();
+            match &self.storage {
+                Storage::Memory(all) => {
+                    let mut all = all.write().unwrap_or_else(PoisonError::into_inner);
+                    all[offset as usize..offset as usize + bytes.len()].copy_from_slice(&bytes);
+                }
+                Storage::File(file) => write_at(file, &bytes, offset).map_err(|e| self.failed(e))?,
+            }
+        }
+        self.stats.lock().unwrap_or_else(PoisonError::into_inner).merge(&stats);
+        (self.advance)(samples.len() as u64);
+        Ok(())
+    }
+}

@@ -1,0 +1,167 @@
+//! From statistics to a record kind and its scale, and from a pass over the rows to the steepest slope, which bounds the radii.
+
+use super::spool::{CANDIDATE_STEPS, SampleStats, Spool};
+use crate::dem::{DemInfo, SampleType};
+use crate::error::LayoutError;
+use crate::grid::Grid;
+use crate::record::{RecordKind, RecordScale};
+use rayon::prelude::*;
+
+/// Largest height code of compact records.
+const LARGEST_CODE: f64 = 65535.0;
+
+/// How raw samples become the heights of records.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct HeightCode {
+    pub(super) kind: RecordKind,
+    /// Raw sample at code 0.
+    pub(super) raw_base: f64,
+    /// Raw units a code.
+    pub(super) raw_step: f64,
+    /// Whether heights change by it.
+    pub(super) rounds: bool,
+    /// Metres at code 0.
+    pub(super) base_m: f64,
+    /// Metres a code.
+    pub(super) step_m: f64,
+}
+
+impl HeightCode {
+    /// Chooses the smallest record that keeps every height exactly, or what the user asked for.
+    pub(super) fn choose(
+        info: &DemInfo,
+        z_scale: f64,
+        stats: &SampleStats,
+        asked: Option<RecordKind>,
+    ) -> Self {
+        let [low, high] = stats.range;
+        let range = high - low;
+        let exact_kind = if stats.fits_f32 { RecordKind::Exact8 } else { RecordKind::Exact16 };
+        let step = if info.sample_type.is_integer() {
+            Some(1.0)
+        } else {
+            CANDIDATE_STEPS.into_iter().zip(stats.steps).find(|(_, holds)| *holds).map(|(step, _)| step)
+        };
+        let lossless = step.filter(|step| range / step <= LARGEST_CODE);
+        let (kind, raw_base, raw_step, rounds) = match (asked.map(RecordKind::name), lossless) {
+            (Some("exact"), _) => (exact_kind, 0.0, 1.0, false),
+            (_, Some(step)) => (RecordKind::Compact, (low / step).round() * step, step, false),
+            (Some(_), None) => (RecordKind::Compact, low, range / LARGEST_CODE, true),
+            (None, None) => (exact_kind, 0.0, 1.0, false),
+        };
+        let scale_m = info.height_scale * z_scale;
+        Self {
+            kind,
+            raw_base,
+            raw_step,
+            rounds,
+            base_m: (info.height_offset_m + raw_base * info.height_scale) * z_scale,
+            step_m: raw_step * scale_m,
+        }
+    }
+
+    /// The code of a raw sample; NaN stays NaN.
+    #[inline]
+    pub(super) fn code(&self, raw: f64) -> f64 {
+        match self.kind {
+            RecordKind::Compact => ((raw - self.raw_base) / self.raw_step).round_ties_even(),
+            RecordKind::Exact8 => f64::from(raw as f32),
+            RecordKind::Exact16 => raw,
+        }
+    }
+
+    /// Metres of a code.
+    pub(super) fn metres(&self, code: f64) -> f64 {
+        self.base_m + code * self.step_m
+    }
+}
+
+/// Checks that metres of height are sane numbers.
+pub(super) fn check_heights(
+    info: &DemInfo,
+    code: &HeightCode,
+    stats: &SampleStats,
+) -> Result<[f64; 2], LayoutError> {
+    let range_m = stats.range.map(|raw| code.metres(code.code(raw)));
+    if range_m.iter().any(|h| h.is_nan() || h.abs() > 1e9) || code.step_m.is_nan() || code.step_m <= 0.0 {
+        let [low, high] = stats.range;
+        let hint = if info.sample_type == SampleType::F32 || info.sample_type == SampleType::F64 {
+            "is a no-data value not declared? name it with --nodata"
+        } else {
+            "check --z-scale"
+        };
+        return Err(LayoutError::Usage(format!(
+            "the heights {low} to {high} (raw) are not heights in metres of up to a million kilometres; {hint}"
+        )));
+    }
+    Ok(range_m)
+}
+
+/// Rows read at a time.
+const ROWS: u32 = 64;
+
+/// Steepest height difference in metres between neighbouring samples that are not void, in x and in y.
+pub(super) fn steepest_steps_m(
+    spool: &Spool<'_>,
+    grid: &Grid,
+    code: &HeightCode,
+    advance: &(dyn Fn(u64) + Sync),
+) -> Result<[f64; 2], LayoutError> {
+    let [wide, high] = grid.samples();
+    let blocks: Vec<u32> = (0..high).step_by(ROWS as usize).collect();
+    let steepest = blocks
+        .into_par_iter()
+        .map(|first| {
+            let mut last_row = vec![f64::NAN; wide as usize];
+            let mut row = last_row.clone();
+            let mut steepest = [0.0f64; 2];
+            // The row below the block belongs to it, so that no pair of rows is left out.
+            for y in first.saturating_sub(1)..(first + ROWS).min(high) {
+                spool.read_row(y, &mut row)?;
+                row.iter_mut().for_each(|v| *v = code.code(*v));
+                for pair in row.windows(2) {
+                    steepest[0] = steepest[0].max((pair[0] - pair[1]).abs());
+                }
+                for (a, b) in row.iter().zip(&last_row) {
+                    steepest[1] = steepest[1].max((a - b).abs());
+                }
+                std::mem::swap(&mut row, &mut last_row);
+            }
+            advance(u64::from(ROWS.min(high - first)) * u64::from(wide));
+            Ok(steepest)
+        })
+        .try_reduce(|| [0.0; 2], |a, b| Ok([a[0].max(b[0]), a[1].max(b[1])]))?;
+    Ok(steepest.map(|s| s * code.step_m))
+}
+
+/// The scale of records that holds every error and radius.
+pub(super) fn record_scale(
+    grid: &Grid,
+    code: &HeightCode,
+    range_m: [f64; 2],
+    steepest_m: [f64; 2],
+) -> RecordScale {
+    let [dx, dy] = grid.spacing_m();
+    let [gx, gy] = steepest_m;
+    // Largest |p_v - p_c| over its flat counterpart, for black and for white vertices.
+    let black = 1f64.hypot((gx + gy) / dx.hypot(dy));
+    let white = dx.hypot(gx).max(dy.hypot(gy)) / dx.max(dy);
+    let stretch = black.max(white);
+    let steps = [64, 32, 16]
+        .into_iter()
+        .find(|steps| {
+            // Rounding up by q at each level adds up to the sum of a geometric series over levels that shrink by sqrt(2).
+            let q = 2f64.powf(1.0 / f64::from(*steps)) * 1.001;
+            let shrink = std::f64::consts::FRAC_1_SQRT_2;
+            let growth = q * (1.0 - shrink) / (1.0 - q * shrink);
+            // Levels of uneven spacing shrink unevenly; a factor of two covers them.
+            (stretch * growth * 2.0).log2() * f64::from(*steps) <= 254.0
+        })
+        .unwrap_or(8);
+    RecordScale {
+        height_base_m: code.base_m,
+        height_step_m: code.step_m,
+        error_top_m: ((range_m[1] - range_m[0]) * (1.0 + 1e-6)).max(code.step_m).max(1e-6),
+        radius_steps_per_octave: steps,
+    }
+}

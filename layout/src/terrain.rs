@@ -1,0 +1,383 @@
+//! An opened terrain file: checked header and directory over a source, and the way from a slot to a vertex.
+//!
+//! [`Terrain`] owns the source and knows what the header knows. [`Records`] is what refinement holds: a codec, the page
+//! table and the bytes, resolved once, so that a vertex costs one table lookup, one load and a decode.
+//!
+//! Invariant: every page number in the table lies inside the source as it was when it was opened.
+
+use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
+use crate::directory::{ENTRY_BYTES, Entry, leaf_page};
+use crate::error::LayoutError;
+use crate::grid::{Grid, GridPoint};
+use crate::header::{Header, INERT_PAGE, LEAF_ENTRIES};
+use crate::order::slot_of;
+use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
+use crate::source::{MapSource, PreadSource, Source};
+use std::path::Path;
+
+/// An opened and checked terrain file.
+pub struct Terrain {
+    source: Box<dyn Source>,
+    header: Header,
+    entries: Vec<Entry>,
+    /// Page number of each logical page, absent ones replaced by the inert page.
+    pages: Vec<u32>,
+}
+
+impl std::fmt::Debug for Terrain {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Terrain")
+            .field("path", &self.path())
+            .field("header", &self.header)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Terrain {
+    /// Opens the file at `path`: checks it by plain reads, then maps it (see [`MapSource`] for what that asks of others).
+    ///
+    /// # Errors
+    /// As FORMAT.md, section 6: not a terrain file, another version, truncated or damaged; or I/O.
+    pub fn open(path: &Path) -> Result<Self, LayoutError> {
+        let file = PreadSource::open(path)?;
+        let (header, entries) = read_structure(&file)?;
+        Self::assemble(Box::new(MapSource::map(file)?), header, entries)
+    }
+
+    /// Opens any source.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn from_source(source: Box<dyn Source>) -> Result<Self, LayoutError> {
+        let (header, entries) = read_structure(&*source)?;
+        Self::assemble(source, header, entries)
+    }
+
+    fn assemble(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Result<Self, LayoutError> {
+        let pages = entries.iter().map(|e| if e.is_present() { e.page } else { INERT_PAGE }).collect();
+        Ok(Self { source, header, entries, pages })
+    }
+
+    /// The file's name for messages.
+    pub fn path(&self) -> &Path {
+        self.source.path()
+    }
+
+    /// What the file says about itself.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Grid shape and spacing.
+    pub fn grid(&self) -> &Grid {
+        &self.header.grid
+    }
+
+    /// The directory: one entry a logical record page.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// Bytes per sample of the DEM, everything counted.
+    pub fn bytes_per_sample(&self) -> f64 {
+        let [wide, high] = self.grid().samples();
+        self.header.file_bytes as f64 / (f64::from(wide) * f64::from(high))
+    }
+
+    /// The source it reads from.
+    pub fn source(&self) -> &dyn Source {
+        &*self.source
+    }
+
+    /// One record page, checked against its checksum. Absent pages read as inert ones.
+    ///
+    /// # Errors
+    /// [`LayoutError::Damaged`] naming the page if it does not match; I/O.
+    pub fn checked_page(&self, logical_page: u64) -> Result<Box<Page>, LayoutError> {
+        let mut page = Box::new([0; PAGE_BYTES]);
+        let index = to_usize(logical_page)?;
+        let Some(entry) = self.entries.get(index) else {
+            return Err(LayoutError::Usage(format!(
+                "page {logical_page} does not exist; the file has {}",
+                self.entries.len()
+            )));
+        };
+        let number = if entry.is_present() { entry.page } else { INERT_PAGE };
+        self.source.read_at(u64::from(number) * PAGE_BYTES as u64, &mut page[..])?;
+        if entry.is_present() && checksum(&page[..]) != entry.checksum {
+            return Err(LayoutError::damaged(
+                self.path(),
+                format!("record page {logical_page} (file page {number})"),
+                "the checksum does not match; restore a copy of the file or build it again",
+            ));
+        }
+        Ok(page)
+    }
+
+    /// One vertex, read from a checked page.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`]; [`LayoutError::Usage`] for a point outside the square.
+    pub fn checked_vertex(&self, p: GridPoint) -> Result<Vertex, LayoutError> {
+        let n = self.grid().side_steps();
+        if p.x() > n || p.y() > n {
+            return Err(LayoutError::Usage(format!(
+                "sample ({}, {}) lies outside the terrain",
+                p.x(),
+                p.y()
+            )));
+        }
+        let slot = slot_of(self.grid().k(), p);
+        let per_page = self.header.records_per_page();
+        let page = self.checked_page(slot / per_page)?;
+        let at = (slot % per_page) as usize * self.header.record_kind.bytes();
+        let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };
+        let (grid, scale) = (self.grid(), &self.header.scale);
+        Ok(match self.header.record_kind {
+            RecordKind::Compact => Compact::new(grid, scale).decode(Compact::read(&page[at..]), level),
+            RecordKind::Exact8 => Exact8::new(grid, scale).decode(Exact8::read(&page[at..]), level),
+            RecordKind::Exact16 => Exact16::new(grid, scale).decode(Exact16::read(&page[at..]), level),
+        })
+    }
+
+    /// Height in metres at a horizontal position in metres east and north of the south-west sample, interpolated
+    /// bilinearly between the four samples around it. `Ok(None)` outside the data or where one of them is void.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`].
+    pub fn height_m(&self, east_m: f64, north_m: f64) -> Result<Option<f64>, LayoutError> {
+        let [dx, dy] = self.grid().spacing_m();
+        let [wide, high] = self.grid().samples();
+        let (gx, gy) = (snap(east_m / dx), snap(north_m / dy));
+        let (last_x, last_y) = (f64::from(wide - 1), f64::from(high - 1));
+        if !((0.0..=last_x).contains(&gx) && (0.0..=last_y).contains(&gy)) {
+            return Ok(None);
+        }
+        let (x0, y0) = (gx.floor() as u32, gy.floor() as u32);
+        let (fx, fy) = (gx - f64::from(x0), gy - f64::from(y0));
+        let mut height = 0.0;
+        for (x, wx) in [(x0, 1.0 - fx), (x0 + 1, fx)] {
+            for (y, wy) in [(y0, 1.0 - fy), (y0 + 1, fy)] {
+                // A sample without weight may lie outside or be void.
+                if wx * wy > 0.0 {
+                    let vertex = self.checked_vertex(GridPoint::new(x, y))?;
+                    if vertex.class.is_void() {
+                        return Ok(None);
+                    }
+                    height += vertex.height_m * wx * wy;
+                }
+            }
+        }
+        Ok(Some(height))
+    }
+
+    /// The records as refinement reads them. `None` if the source cannot lend its bytes as one slice.
+    pub fn records(&self) -> Option<AnyRecords<'_>> {
+        let bytes = self.source.bytes()?;
+        let (grid, scale) = (self.grid(), &self.header.scale);
+        Some(match self.header.record_kind {
+            RecordKind::Compact => AnyRecords::Compact(Records::new(self, bytes, Compact::new(grid, scale))),
+            RecordKind::Exact8 => AnyRecords::Exact8(Records::new(self, bytes, Exact8::new(grid, scale))),
+            RecordKind::Exact16 => AnyRecords::Exact16(Records::new(self, bytes, Exact16::new(grid, scale))),
+        })
+    }
+}
+
+/// Positions a hair off a sample, from spacings that are not exact in binary, mean the sample.
+fn snap(v: f64) -> f64 {
+    let near = v.round();
+    if (v - near).abs() < 1e-9 * near.abs().max(1.0) { near } else { v }
+}
+
+/// The records of a terrain, of whichever kind.
+#[derive(Debug, Clone)]
+pub enum AnyRecords<'a> {
+    /// 4-byte records.
+    Compact(Records<'a, Compact>),
+    /// 8-byte records.
+    Exact8(Records<'a, Exact8>),
+    /// 16-byte records.
+    Exact16(Records<'a, Exact16>),
+}
+
+/// Runs `$body` with `$records` bound to the records of whichever kind.
+#[macro_export]
+macro_rules! with_records {
+    ($any:expr, $records:ident => $body:expr) => {
+        match $any {
+            $crate::terrain::AnyRecords::Compact($records) => $body,
+            $crate::terrain::AnyRecords::Exact8($records) => $body,
+            $crate::terrain::AnyRecords::Exact16($records) => $body,
+        }
+    };
+}
+
+/// The records of a terrain, of kind `C`: the hot path from slot to vertex.
+#[derive(Debug, Clone)]
+pub struct Records<'a, C: RecordCodec> {
+    bytes: &'a [u8],
+    pages: &'a [u32],
+    codec: C,
+    grid: Grid,
+    has_voids: bool,
+}
+
+impl<'a, C: RecordCodec> Records<'a, C> {
+    /// Binary logarithm of the records a page.
+    const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
+
+    fn new(terrain: &'a Terrain, bytes: &'a [u8], codec: C) -> Self {
+        let header = terrain.header();
+        Self { bytes, pages: &terrain.pages, codec, grid: header.grid, has_voids: header.has_voids }
+    }
+
+    /// Grid shape and spacing.
+    #[inline(always)]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Whether any sample is void.
+    pub fn has_voids(&self) -> bool {
+        self.has_voids
+    }
+
+    /// Bytes a record.
+    pub const fn record_bytes(&self) -> usize {
+        C::BYTES
+    }
+
+    /// Logical page of a slot.
+    #[inline(always)]
+    pub fn page_of(slot: u64) -> u64 {
+        slot >> Self::PAGE_SHIFT
+    }
+
+    /// The vertex at `slot`, whose level is `level` (0 for corners).
+    ///
+    /// # Panics
+    /// For a slot past the last page.
+    #[inline(always)]
+    pub fn vertex(&self, slot: u64, level: u32) -> Vertex {
+        let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize;
+        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        let at = page * PAGE_BYTES + within;
+        self.codec.decode(C::read(&self.bytes[at..at + C::BYTES]), level)
+    }
+
+    /// The vertex at a grid point.
+    pub fn vertex_at(&self, p: GridPoint) -> Vertex {
+        let level = if self.grid.is_corner(p) { 0 } else { self.grid.level(p) };
+        self.vertex(slot_of(self.grid.k(), p), level)
+    }
+}
+
+/// Reads and checks header and directory (FORMAT.md, section 6).
+fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>), LayoutError> {
+    let path = source.path();
+    let length = source.byte_count();
+    let page_bytes = PAGE_BYTES as u64;
+    let mut slot_a = Box::new([0; PAGE_BYTES]);
+    let mut slot_b = Box::new([0; PAGE_BYTES]);
+    if length < 4 * page_bytes {
+        let mut start = [0; 8];
+        let have = (length as usize).min(8);
+        source.read_at(0, &mut start[..have])?;
+        return Err(if have > 0 && crate::header::MAGIC.starts_with(&start[..have]) {
+            truncated(path, length, None)
+        } else {
+            LayoutError::not_this_format(
+                path,
+                "this is not a terrain file (.iqt); make one from elevation data with `terrasoar build`",
+            )
+        });
+    }
+    source.read_at(0, &mut slot_a[..])?;
+    source.read_at(page_bytes, &mut slot_b[..])?;
+    let header = Header::current(path, &slot_a, &slot_b)?;
+    if length < header.file_bytes {
+        return Err(truncated(path, length, Some(header.file_bytes)));
+    }
+    let damaged = |place: String, problem: &str| {
+        LayoutError::damaged(path, place, format!("{problem}; restore a copy of the file or build it again"))
+    };
+    check_inert_page(source, &header)?;
+    let root_bytes = to_usize(header.root_entries() * ENTRY_BYTES as u64)?;
+    let mut root = vec![0; root_bytes];
+    source.read_at(u64::from(header.root_page) * page_bytes, &mut root)?;
+    if checksum(&root) != header.root_checksum {
+        return Err(damaged("directory root".into(), "the checksum does not match"));
+    }
+    let in_file = |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * page_bytes <= header.file_bytes;
+    let count = to_usize(header.record_pages())?;
+    let mut entries = Vec::with_capacity(count);
+    let mut leaf = leaf_page(&[]);
+    for i in 0..header.root_entries() as usize {
+        let here = Entry::read(&root, i);
+        let in_leaf = (count - i * LEAF_ENTRIES as usize).min(LEAF_ENTRIES as usize);
+        if !here.is_present() {
+            entries.resize(entries.len() + in_leaf, Entry::default());
+            continue;
+        }
+        if !in_file(here.page) {
+            return Err(damaged(format!("directory leaf {i}"), "it lies outside the file"));
+        }
+        source.read_at(u64::from(here.page) * page_bytes, &mut leaf)?;
+        if checksum(&leaf) != here.checksum {
+            return Err(damaged(format!("directory leaf {i}"), "the checksum does not match"));
+        }
+        for j in 0..in_leaf {
+            let entry = Entry::read(&leaf, j);
+            if entry.is_present() && !in_file(entry.page) {
+                return Err(damaged(
+                    format!("directory entry of record page {}", entries.len()),
+                    "the page lies outside the file",
+                ));
+            }
+            entries.push(entry);
+        }
+    }
+    let stored = entries.iter().filter(|e| e.is_present()).count() as u64;
+    if stored != header.stored_pages {
+        return Err(damaged("directory".into(), "it holds another number of pages than the header says"));
+    }
+    Ok((header, entries))
+}
+
+fn check_inert_page(source: &dyn Source, header: &Header) -> Result<(), LayoutError> {
+    let mut page = Box::new([0; PAGE_BYTES]);
+    source.read_at(u64::from(INERT_PAGE) * PAGE_BYTES as u64, &mut page[..])?;
+    if page[..] != inert_page(header.record_kind)[..] {
+        return Err(LayoutError::damaged(
+            source.path(),
+            "inert page",
+            "it holds something else; restore a copy of the file or build it again",
+        ));
+    }
+    Ok(())
+}
+
+/// A page of inert records.
+pub(crate) fn inert_page(kind: RecordKind) -> Box<Page> {
+    fn fill<C: RecordCodec>() -> Box<Page> {
+        let mut page = Box::new([0; PAGE_BYTES]);
+        for record in page.chunks_exact_mut(C::BYTES) {
+            C::write(C::INERT, record);
+        }
+        page
+    }
+    match kind {
+        RecordKind::Compact => fill::<Compact>(),
+        RecordKind::Exact8 => fill::<Exact8>(),
+        RecordKind::Exact16 => fill::<Exact16>(),
+    }
+}
+
+fn truncated(path: &Path, length: u64, wanted: Option<u64>) -> LayoutError {
+    let wanted = wanted.map_or(String::new(), |w| format!(" of {w}"));
+    LayoutError::damaged(
+        path,
+        format!("byte {length}"),
+        format!("the file is cut short: it has {length} bytes{wanted}; copy it again or build it again"),
+    )
+}
