@@ -42,7 +42,8 @@ impl Output {
         };
         let failed = |source| LayoutError::io(out, CANNOT_WRITE, source);
         let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let temporary = builder().prefix(".terrasoar-").suffix(".part").tempfile_in(folder).map_err(failed)?;
+        let temporary =
+            builder().prefix(".terrasoar-").suffix(".part").tempfile_in(folder).map_err(failed)?;
         let mut file = BufWriter::with_capacity(1 << 18, temporary.reopen().map_err(failed)?);
         let encoder = if png {
             let mut encoder = Encoder::new(file, size, size);
