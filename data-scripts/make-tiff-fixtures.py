@@ -116,7 +116,7 @@ def main():
             make(f"int16-{shape}-bigtiff-deflate", int16, *options, *packed("DEFLATE", 2), "-co", "BIGTIFF=YES")
             make(f"float32-{shape}-bigtiff-big-endian-lzw", int16, "-ot", "Float32", *options, *packed("LZW", 2),
                  "-co", "BIGTIFF=YES", "-co", "ENDIANNESS=BIG")
-        make("float32-tiles-big-endian-p3", int16, "-ot", "Float32", *tiled, *packed("DEFLATE", 3), "-co", "ENDIANNESS=BIG")
+        # Big-endian with predictor 3 is left out: GDAL 3.6 cannot read back what it writes so.
 
         # Voids.
         make("int16-nodata", hole, *tiled, *packed("DEFLATE", 2), epsg="26710")

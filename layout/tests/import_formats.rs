@@ -89,7 +89,7 @@ fn bt_versions_and_types() {
     wrong[14] = 200;
     std::fs::write(&path, &wrong).unwrap();
     assert!(refusal(std::slice::from_ref(&path)).contains("cut short"));
-    std::fs::write(&path, &bt(3, true, 2)).unwrap();
+    std::fs::write(&path, bt(3, true, 2)).unwrap();
     assert!(refusal(std::slice::from_ref(&path)).contains("float32"));
     wrong[9] = b'4';
     std::fs::write(&path, &wrong).unwrap();

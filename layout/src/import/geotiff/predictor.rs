@@ -72,3 +72,34 @@ fn sum<const N: usize>(row: &mut [u8], add: impl Fn([u8; N], [u8; N]) -> [u8; N]
         *sample = total;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reals_come_back_in_either_byte_order() {
+        let reals = [1521.5f32, 1522.25, -3.0e-7, f32::MAX];
+        let mut stored: Vec<u8> =
+            (0..4).flat_map(|byte| reals.map(|real| real.to_be_bytes()[byte])).collect();
+        for at in (1..stored.len()).rev() {
+            stored[at] = stored[at].wrapping_sub(stored[at - 1]);
+        }
+        for (big_endian, bytes) in [(true, reals.map(f32::to_be_bytes)), (false, reals.map(f32::to_le_bytes))]
+        {
+            let mut row = stored.clone();
+            floating(&mut row, 16, 4, big_endian, &mut Vec::new());
+            assert_eq!(row, bytes.concat());
+        }
+    }
+
+    #[test]
+    fn differences_wrap_in_either_byte_order() {
+        let mut row = [0xff, 0xff, 0x02, 0x00];
+        horizontal(&mut row, 4, 2, false);
+        assert_eq!(row, [0xff, 0xff, 0x01, 0x00]);
+        let mut row = [0xff, 0xff, 0x00, 0x02];
+        horizontal(&mut row, 4, 2, true);
+        assert_eq!(row, [0xff, 0xff, 0x00, 0x01]);
+    }
+}
