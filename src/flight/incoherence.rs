@@ -52,7 +52,9 @@ pub struct Solution {
 #[non_exhaustive]
 pub enum SolveError<E: std::error::Error + 'static> {
     /// The wanted incoherence is none.
-    #[error("an incoherence of {wanted_percent} % cannot be asked for; give a percentage above 0 and up to 100")]
+    #[error(
+        "an incoherence of {wanted_percent} % cannot be asked for; give a percentage above 0 and up to 100"
+    )]
     Wanted {
         /// The percentage given.
         wanted_percent: f64,
@@ -94,7 +96,9 @@ pub enum SolveError<E: std::error::Error + 'static> {
         speed_m: f64,
     },
     /// The measure gave no percentage.
-    #[error("the incoherence measured at {speed_m} m a frame is {found} %, which is no percentage; this is a fault of the engine measured")]
+    #[error(
+        "the incoherence measured at {speed_m} m a frame is {found} %, which is no percentage; this is a fault of the engine measured"
+    )]
     Measured {
         /// The speed, in metres a frame.
         speed_m: f64,
@@ -134,7 +138,11 @@ pub fn solve<E: std::error::Error + 'static>(
     let flight_at = |speed_m_per_frame| generate(ground, &FlightPlan { speed_m_per_frame, ..*plan });
     let mut measured = |speed_m: f64, pairs: &[(FlightFrame, FlightFrame)]| {
         let found = measure(pairs).map_err(|source| SolveError::Measure { speed_m, source })?;
-        if found.is_finite() && found >= 0.0 { Ok(found) } else { Err(SolveError::Measured { speed_m, found }) }
+        if found.is_finite() && found >= 0.0 {
+            Ok(found)
+        } else {
+            Err(SolveError::Measured { speed_m, found })
+        }
     };
     let [width, length] = ground.extent_m();
     let mut search = Search::new(width.max(length), wanted_percent);
@@ -247,7 +255,8 @@ impl Search {
             }
             _ => {
                 // Not bracketed yet: go where a power law puts it and half as far again, doubling with each miss.
-                let stride = (1.5 * end.excess.abs()).clamp(0.3, 4.0) * f64::from(1u32 << (repeated - 1).min(4));
+                let stride =
+                    (1.5 * end.excess.abs()).clamp(0.3, 4.0) * f64::from(1u32 << (repeated - 1).min(4));
                 let target = if above { end.speed - stride } else { end.speed + stride };
                 let target = target.clamp(self.limits[0], self.limits[1]);
                 ((target - end.speed).abs() > 1e-9).then_some(target)
@@ -256,7 +265,8 @@ impl Search {
     }
 
     fn failure<E: std::error::Error>(&self, trials: &[Trial], wanted_percent: f64) -> SolveError<E> {
-        let fold = |f: fn(f64, f64) -> f64, of: fn(&Trial) -> f64, start| trials.iter().map(of).fold(start, f);
+        let fold =
+            |f: fn(f64, f64) -> f64, of: fn(&Trial) -> f64, start| trials.iter().map(of).fold(start, f);
         let percent = |t: &Trial| t.percent;
         let speed = |t: &Trial| t.speed_m_per_frame;
         let closest = |above: bool| {
@@ -307,7 +317,11 @@ mod tests {
     fn a_power_law_takes_few_trials() {
         for wanted in [0.05, 0.61, 1.36, 5.29, 40.0] {
             let solution = solved(FlightKind::Straight, wanted, |v| 0.06 * v.powf(0.9)).unwrap();
-            assert!((solution.best.percent / wanted - 1.0).abs() <= TOLERANCE, "{wanted}: {:?}", solution.best);
+            assert!(
+                (solution.best.percent / wanted - 1.0).abs() <= TOLERANCE,
+                "{wanted}: {:?}",
+                solution.best
+            );
             assert!(solution.trials.len() <= 6, "{wanted}: {:?}", solution.trials);
             assert!((solution.checked_percent / wanted - 1.0).abs() < 0.05);
             let (a, b) = (solution.flight.frames[0], solution.flight.frames[1]);

@@ -4,7 +4,8 @@
 //! been checked against the format's ranges.
 
 use super::format::{
-    self, FIELDS, MAGIC, MAX_FRAMES, MAX_LINE_BYTES, MAX_NOTES, UNITS, VERSION, excerpt, fault_in, frame_of, note_of,
+    self, FIELDS, MAGIC, MAX_FRAMES, MAX_LINE_BYTES, MAX_NOTES, UNITS, VERSION, excerpt, fault_in, frame_of,
+    note_of,
 };
 use super::{Flight, FlightError, FlightFrame};
 use std::fs::File;
@@ -80,11 +81,16 @@ impl<R: BufRead> FlightReader<R> {
     }
 
     fn read_header(&mut self) -> Result<(), FlightError> {
-        let not_a_flight = |path: &Path, found: &str| FlightError::NotAFlight { path: path.into(), found: found.into() };
+        let not_a_flight =
+            |path: &Path, found: &str| FlightError::NotAFlight { path: path.into(), found: found.into() };
         let first = match read_line(&mut self.input, &mut self.buffer, &self.path, &mut self.line) {
             Ok(line) => line,
-            Err(FlightError::NotText { path, .. }) => return Err(not_a_flight(&path, "bytes that are not text")),
-            Err(FlightError::LineTooLong { path, .. }) => return Err(not_a_flight(&path, "a very long line")),
+            Err(FlightError::NotText { path, .. }) => {
+                return Err(not_a_flight(&path, "bytes that are not text"));
+            }
+            Err(FlightError::LineTooLong { path, .. }) => {
+                return Err(not_a_flight(&path, "a very long line"));
+            }
             Err(other) => return Err(other),
         };
         let Some(first) = first else { return Err(not_a_flight(&self.path, "nothing: it is empty")) };
@@ -99,7 +105,8 @@ impl<R: BufRead> FlightReader<R> {
             Ok(older) if older < VERSION => return Err(not_a_flight(&self.path, &excerpt(first))),
             _ => return Err(FlightError::Newer { path: self.path.clone(), found: excerpt(version) }),
         }
-        let second = read_line(&mut self.input, &mut self.buffer, &self.path, &mut self.line)?.unwrap_or_default();
+        let second =
+            read_line(&mut self.input, &mut self.buffer, &self.path, &mut self.line)?.unwrap_or_default();
         if !second.split_ascii_whitespace().eq(UNITS) {
             return Err(FlightError::Units { path: self.path.clone(), found: excerpt(second) });
         }
@@ -266,7 +273,10 @@ mod tests {
             (frame("0 0 0 0 0 90.5 0 45"), "pitch_deg is 90.5"),
             (frame("0 0 0 0 0 0 0 180"), "vfov_deg is 180; it must be above 0 and below 180"),
             (frame("-1 0 0 0 0 0 0 45"), "time_s is -1"),
-            (frame(&format!("{ok}\n2{}\n1{}", &ok[1..], &ok[1..])), "f.flight:5: time_s goes back from 2 to 1"),
+            (
+                frame(&format!("{ok}\n2{}\n1{}", &ok[1..], &ok[1..])),
+                "f.flight:5: time_s goes back from 2 to 1",
+            ),
             (frame(&format!("{ok}\n{}", "1".repeat(5000))), "f.flight:4: the line is longer than 4096 bytes"),
         ] {
             let found = message(&text);
@@ -274,7 +284,9 @@ mod tests {
             assert!(found.len() < 200, "{found}");
         }
         let notes: String = (0..257).map(|i| format!("# n{i}: v\n")).collect();
-        assert!(message(&format!("{HEAD}{notes}")).contains("f.flight:259: the flight has more than 256 notes"));
+        assert!(
+            message(&format!("{HEAD}{notes}")).contains("f.flight:259: the flight has more than 256 notes")
+        );
     }
 
     #[test]

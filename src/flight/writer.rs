@@ -2,7 +2,9 @@
 //!
 //! What is written reads back bit for bit. [`Flight::write`] replaces the file only once it is complete.
 
-use super::format::{FIELDS, MAGIC, MAX_FRAMES, MAX_NOTES, UNITS, VERSION, excerpt, fault_in, note_line, push_frame, values};
+use super::format::{
+    FIELDS, MAGIC, MAX_FRAMES, MAX_NOTES, UNITS, VERSION, excerpt, fault_in, note_line, push_frame, values,
+};
 use super::{Flight, FlightError, FlightFrame};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -36,7 +38,8 @@ impl Flight {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let file = builder.tempfile_in(folder).map_err(failed)?;
-        let file = self.write_to(BufWriter::new(file), path)?.into_inner().map_err(|e| failed(e.into_error()))?;
+        let file =
+            self.write_to(BufWriter::new(file), path)?.into_inner().map_err(|e| failed(e.into_error()))?;
         file.persist(path).map(drop).map_err(|e| failed(e.error))
     }
 
@@ -98,7 +101,12 @@ impl<W: Write> FlightWriter<W> {
             });
         }
         if frame.time_s < self.before_s {
-            return Err(FlightError::TimeBackwards { path: path(), line, found: frame.time_s, before: self.before_s });
+            return Err(FlightError::TimeBackwards {
+                path: path(),
+                line,
+                found: frame.time_s,
+                before: self.before_s,
+            });
         }
         if self.frames == MAX_FRAMES {
             return Err(FlightError::TooManyFrames { path: path(), line });

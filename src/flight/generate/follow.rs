@@ -110,7 +110,8 @@ fn highest_within(mut values: Vec<f64>, reach: usize) -> Vec<f64> {
     let mut covered = 0;
     while covered < reach {
         let step = (2 * covered + 1).min(reach - covered);
-        values = (0..n).map(|i| values[i].max(values[(i + step) % n]).max(values[(i + n - step) % n])).collect();
+        values =
+            (0..n).map(|i| values[i].max(values[(i + step) % n]).max(values[(i + n - step) % n])).collect();
         covered += step;
     }
     values

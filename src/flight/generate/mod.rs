@@ -116,7 +116,9 @@ pub enum GenerateError {
         allowed: &'static str,
     },
     /// The terrain's size or heights are not what a flight can be made over.
-    #[error("the terrain's {what} is {found} m; a flight needs it to be {allowed}; check the terrain's spacing and height scale")]
+    #[error(
+        "the terrain's {what} is {found} m; a flight needs it to be {allowed}; check the terrain's spacing and height scale"
+    )]
     Ground {
         /// What of the terrain.
         what: &'static str,
@@ -215,7 +217,12 @@ pub fn generate(ground: &dyn Ground, plan: &FlightPlan) -> Result<Flight, Genera
 fn check(plan: &FlightPlan) -> Result<(), GenerateError> {
     let rate = plan.turn_rate_deg_per_frame;
     for (parameter, found, inside, allowed) in [
-        ("number of frames", plan.frames as f64, (1..=MAX_FRAMES).contains(&plan.frames), "from 1 to 10000000"),
+        (
+            "number of frames",
+            plan.frames as f64,
+            (1..=MAX_FRAMES).contains(&plan.frames),
+            "from 1 to 10000000",
+        ),
         (
             "speed in metres a frame",
             plan.speed_m_per_frame,

@@ -88,7 +88,10 @@ mod tests {
     #[test]
     fn a_circle_that_fits_is_flown_whole() {
         for rate in [0.5, -2.0] {
-            let plan = FlightPlan { turn_rate_deg_per_frame: rate, ..FlightPlan::new(FlightKind::Turn, 1500, 100.0) };
+            let plan = FlightPlan {
+                turn_rate_deg_per_frame: rate,
+                ..FlightPlan::new(FlightKind::Turn, 1500, 100.0)
+            };
             let flight = generate(&puget(), &plan).unwrap();
             for pair in flight.frames.windows(2) {
                 assert!((step_m(&pair[0], &pair[1]) - 100.0).abs() < 1e-6);
