@@ -4,5 +4,6 @@ pub mod flyover;
 pub mod mesh;
 pub mod metric;
 pub mod refine;
+pub mod report;
 pub mod stats;
 pub mod view;
