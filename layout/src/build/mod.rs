@@ -364,8 +364,7 @@ impl<C: RecordCodec> State<'_, C> {
 
     fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
         let records = corners(self.grid.k()).map(|corner| {
-            let class =
-                if self.band.is_void(corner) { VertexClass::FringeVoid } else { VertexClass::Plain };
+            let class = if self.band.is_void(corner) { VertexClass::FringeVoid } else { VertexClass::Plain };
             let code = self.band.code(corner);
             self.saturator.codec.encode(0, code, class, 0.0, 0.0).unwrap_or(C::INERT)
         });

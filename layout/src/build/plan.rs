@@ -8,11 +8,8 @@ use super::levels::LevelShape;
 use crate::bytes::to_usize;
 use crate::error::LayoutError;
 use crate::grid::Grid;
-use crate::order::{level_slots, point_of, slot_count};
+use crate::order::{BLOCK_SLOTS, level_slots, point_of, slot_count};
 use rayon::prelude::*;
-
-/// Slots that an aligned block of a level's quadtree has at most, so that its rows lie close together.
-const BLOCK_SLOTS: u64 = 1024;
 
 /// The slots of one page that lie in one block of one level: gathered together once the last of their rows is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::header::{Header, INERT_PAGE};
-use crate::order::point_of;
+use crate::order::{BLOCK_SLOTS, BlockPoints, level_slots};
 use crate::record::{RecordCodec, RecordKind};
 use crate::terrain::inert_page;
 use rayon::prelude::*;
@@ -84,7 +84,14 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
                 batch.par_iter().with_min_len(16).map(|part| self.gather(part, &shape, records)).collect();
             let mut complete = Vec::new();
             for (part, bytes) in batch.iter().zip(gathered) {
-                complete.extend(put(&mut self.open, &mut self.lacking, &self.inert, C::BYTES, part.first, &bytes));
+                complete.extend(put(
+                    &mut self.open,
+                    &mut self.lacking,
+                    &self.inert,
+                    C::BYTES,
+                    part.first,
+                    &bytes,
+                ));
             }
             let file = self.file;
             write_pages(file, &mut self.entries, &self.inert, complete)
@@ -98,8 +105,12 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     /// The bytes of a part's records.
     fn gather(&self, part: &PagePart, shape: &LevelShape, records: &Levels<C::Raw>) -> Vec<u8> {
         let mut bytes = vec![0; part.count as usize * C::BYTES];
-        for (slot, place) in (part.first..).zip(bytes.chunks_exact_mut(C::BYTES)) {
-            let raw = point_of(self.grid.k(), slot)
+        let offset = part.first - level_slots(self.grid.k(), shape.level()).start;
+        let within = (offset % BLOCK_SLOTS) as usize;
+        let block = BlockPoints::new(self.grid.k(), shape.level(), offset - within as u64);
+        for (i, place) in bytes.chunks_exact_mut(C::BYTES).enumerate() {
+            let raw = block
+                .point(within + i)
                 .filter(|p| !shape.is_beyond(*p))
                 .and_then(|p| {
                     let (row, column) = shape.index(p);
@@ -200,21 +211,13 @@ fn write_pages(
     inert: &Page,
     pages: Vec<(u64, Box<Page>)>,
 ) -> std::io::Result<()> {
-    let places: &[Entry] = entries;
-    let sums: Vec<Option<u32>> = pages
-        .par_iter()
-        .map(|(number, page)| {
-            if **page == *inert {
-                return Ok(None);
-            }
-            let place = places[*number as usize].page;
-            write_at(file.file(), &page[..], u64::from(place) * PAGE)?;
-            Ok(Some(checksum(&page[..])))
-        })
-        .collect::<std::io::Result<_>>()?;
-    for ((number, _), sum) in pages.iter().zip(sums) {
+    let sums: Vec<Option<u32>> =
+        pages.par_iter().map(|(_, page)| (**page != *inert).then(|| checksum(&page[..]))).collect();
+    // One after the other: writers to one file would only wait for each other.
+    for ((number, page), sum) in pages.iter().zip(sums) {
         if let Some(sum) = sum {
             let entry = &mut entries[*number as usize];
+            write_at(file.file(), &page[..], u64::from(entry.page) * PAGE)?;
             (entry.checksum, entry.generation) = (sum, 1);
         }
     }
