@@ -171,11 +171,16 @@ fn main() -> Result<(), Failure> {
     timed_build(&dem, &path("step.iqt"), arguments.spacing_m, "step")?;
 
     println!("\n## SMART against SOAR, straight flight, 800x600, bounded error\n");
-    println!("| incoherence % | tolerance px | m a frame | triangles | tests % | worst frame % | speed-up | soar ms | same mesh |");
+    println!(
+        "| incoherence % | tolerance px | m a frame | triangles | tests % | worst frame % | speed-up | soar ms | same mesh |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|");
     let bounded = Terrain::open(&path("bounded.iqt"))?;
-    for (percent, tolerance_px) in [(0.61, 0.5), (0.61, 1.0), (0.61, 2.0), (0.61, 4.0), (1.4, 1.0), (5.3, 1.0)] {
-        let (frames, speed) = flight(&bounded, FlightKind::Straight, arguments.frames, percent, tolerance_px)?;
+    for (percent, tolerance_px) in
+        [(0.61, 0.5), (0.61, 1.0), (0.61, 2.0), (0.61, 4.0), (1.4, 1.0), (5.3, 1.0)]
+    {
+        let (frames, speed) =
+            flight(&bounded, FlightKind::Straight, arguments.frames, percent, tolerance_px)?;
         let c = compare(&bounded, &frames, tolerance_px)?;
         let (soar, smart) = (&c.engines[0].summary, &c.engines[1]);
         println!(
@@ -191,7 +196,9 @@ fn main() -> Result<(), Failure> {
     }
 
     println!("\n## SOAR alone, one thread, step error, 346,000 triangles\n");
-    println!("| samples | tolerance px | triangles | ms | million triangles/s | ns a vertex test |\n|---|---|---|---|---|---|");
+    println!(
+        "| samples | tolerance px | triangles | ms | million triangles/s | ns a vertex test |\n|---|---|---|---|---|---|"
+    );
     let small = match &arguments.dem {
         Some(_) => path("step.iqt"),
         None => {
