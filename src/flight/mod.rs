@@ -1,7 +1,22 @@
 //! Recorded flights: a camera path as data, so that every replay sees the same frames.
+//!
+//! A flight is a text file (`FLIGHT.md` beside this source specifies it) or is generated over a terrain.
+//! **A flight holds no clock and no chance: equal input gives equal frames.**
+
+mod error;
+mod format;
+pub mod generate;
+pub mod incoherence;
+mod reader;
+mod writer;
 
 use crate::view::{View, Viewport};
 use glam::DVec3;
+
+pub use error::FlightError;
+pub use format::{MAX_FRAMES, VERSION};
+pub use reader::FlightReader;
+pub use writer::FlightWriter;
 
 /// One frame of a flight, in the units of the flight file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,4 +48,16 @@ impl FlightFrame {
             tolerance_px,
         }
     }
+}
+
+/// A camera path: its frames in the order flown, and what its author noted about it.
+///
+/// Costs 64 bytes a frame; [`FlightReader`] and [`FlightWriter`] pass frames on one by one instead.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Flight {
+    /// Named notes in file order, such as `("terrain", "alps.tsoar")`. Names match `[a-z][a-z0-9-]*`, values
+    /// are single lines without surrounding white space; at most 256.
+    pub notes: Vec<(String, String)>,
+    /// Frames in the order flown, 1..=[`MAX_FRAMES`] of them, whose times never decrease.
+    pub frames: Vec<FlightFrame>,
 }

@@ -1,0 +1,352 @@
+//! What a comparison leaves in a directory: figures for programs, plots and one page for people.
+//!
+//! | file | what |
+//! |---|---|
+//! | `frames-<engine>.csv` | every figure of every frame, a file an engine |
+//! | `summary.json` | sums, ratios and sweeps |
+//! | `plot-*.svg`, `plot-*.png` | the plots, with the feature `plots` |
+//! | `report.html` | tables and plots in one file that needs no other |
+//!
+//! **Equal input gives equal bytes**: nothing here reads a clock, a locale or a system font. Files of the same
+//! name are replaced, others left alone; the page is written last.
+
+#[cfg(feature = "plots")]
+mod chart;
+mod csv;
+#[cfg(feature = "plots")]
+mod figures;
+mod html;
+mod number;
+#[cfg(feature = "plots")]
+mod plot;
+
+pub use csv::write_frames_csv;
+
+use crate::stats::{Comparison, FrameStats};
+use crate::view::Viewport;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Why a report cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// The directory cannot be made.
+    #[error("cannot make the report's directory {}: {source}; choose another one or check its permissions", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {}: {source}; check the directory's permissions and free space", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A plot cannot be drawn or saved.
+    #[error("cannot draw {}: {reason}; build without the feature `plots` for a report without them", path.display())]
+    Draw {
+        /// The plot's file.
+        path: PathBuf,
+        /// What the drawing library says.
+        reason: String,
+    },
+    /// The summary cannot be put into JSON.
+    #[error("cannot put the summary into {}: {source}; this is a fault of terrasoar, please report it", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What the JSON library says.
+        source: serde_json::Error,
+    },
+}
+
+/// What was compared, as it stands in the report's titles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReportTitle {
+    /// The terrain's name.
+    pub terrain: String,
+    /// The flight's name.
+    pub flight: String,
+    /// Tolerance of the comparison in pixels.
+    pub tolerance_px: f64,
+    /// Size of the picture.
+    pub viewport: Viewport,
+}
+
+/// One engine's figures at one value of what a sweep varies.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SweepPoint {
+    /// Tolerance in pixels or incoherence in percent; above 0.
+    pub x: f64,
+    /// The engine.
+    pub engine: String,
+    /// Median over the frames of the base engine's update time over this one's.
+    pub speedup_median: f64,
+    /// Vertex tests over the base engine's.
+    pub vertex_tests_ratio: f64,
+}
+
+/// All that goes into a report. The first run is the base that the others are compared with.
+#[derive(Debug, Clone, Copy)]
+pub struct ComparisonReport<'a> {
+    /// What was compared.
+    pub title: &'a ReportTitle,
+    /// Each engine's name and frames, in the order of the comparison.
+    pub runs: &'a [(String, Vec<FrameStats>)],
+    /// The comparison of these runs.
+    pub comparison: &'a Comparison,
+    /// Figures by tolerance; empty if none were taken.
+    pub tolerance_sweep: &'a [SweepPoint],
+    /// Figures by incoherence; empty if none were taken.
+    pub incoherence_sweep: &'a [SweepPoint],
+}
+
+/// A plot as the page shows it.
+struct PlotFile {
+    /// What it shows, in a sentence.
+    caption: String,
+    /// File names of the drawing and the picture.
+    svg: String,
+    png: String,
+    /// The drawing itself.
+    drawing: String,
+}
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    terrain: &'a str,
+    flight: &'a str,
+    tolerance_px: f64,
+    viewport_px: [u32; 2],
+    comparison: &'a Comparison,
+    tolerance_sweep: &'a [SweepPoint],
+    incoherence_sweep: &'a [SweepPoint],
+}
+
+impl ComparisonReport<'_> {
+    /// Writes the report into the directory `dir`, made if missing, and gives the files written in order; the last
+    /// is the page to open.
+    ///
+    /// # Errors
+    /// [`ReportError`], which names the file; files before it are then complete.
+    pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
+        std::fs::create_dir_all(dir).map_err(|source| ReportError::Directory { path: dir.into(), source })?;
+        let mut written = Vec::new();
+        let names: Vec<&str> = self.runs.iter().map(|(engine, _)| engine.as_str()).collect();
+        let frame_files: Vec<String> =
+            file_parts(&names).into_iter().map(|part| format!("frames-{part}.csv")).collect();
+        for ((_, frames), name) in self.runs.iter().zip(&frame_files) {
+            let path = dir.join(name);
+            write_frames_csv(&path, frames)?;
+            written.push(path);
+        }
+        let path = dir.join("summary.json");
+        write_text(&path, &self.summary_json(&path)?)?;
+        written.push(path);
+        let plots = self.write_plots(dir, &mut written)?;
+        let path = dir.join("report.html");
+        write_text(&path, &html::page(self, &frame_files, &plots))?;
+        written.push(path);
+        Ok(written)
+    }
+
+    fn summary_json(&self, path: &Path) -> Result<String, ReportError> {
+        let summary = Summary {
+            terrain: &self.title.terrain,
+            flight: &self.title.flight,
+            tolerance_px: self.title.tolerance_px,
+            viewport_px: [self.title.viewport.width_px, self.title.viewport.height_px],
+            comparison: self.comparison,
+            tolerance_sweep: self.tolerance_sweep,
+            incoherence_sweep: self.incoherence_sweep,
+        };
+        match serde_json::to_string_pretty(&summary) {
+            Ok(text) => Ok(text + "\n"),
+            Err(source) => Err(ReportError::Json { path: path.into(), source }),
+        }
+    }
+
+    #[cfg(feature = "plots")]
+    fn write_plots(&self, dir: &Path, written: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
+        let mut plots = Vec::new();
+        for chart in figures::all(self) {
+            let (svg, png) = (format!("{}.svg", chart.stem), format!("{}.png", chart.stem));
+            let (svg_path, png_path) = (dir.join(&svg), dir.join(&png));
+            let drawn = |path: &Path| {
+                let path = path.to_path_buf();
+                move |reason| ReportError::Draw { path, reason }
+            };
+            let drawing = plot::svg(&chart).map_err(drawn(&svg_path))?;
+            write_text(&svg_path, &drawing)?;
+            plot::write_png(&chart, &png_path).map_err(drawn(&png_path))?;
+            written.extend([svg_path, png_path]);
+            plots.push(PlotFile { caption: chart.caption, svg, png, drawing });
+        }
+        Ok(plots)
+    }
+
+    #[cfg(not(feature = "plots"))]
+    fn write_plots(&self, _: &Path, _: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
+        Ok(Vec::new())
+    }
+}
+
+fn write_text(path: &Path, text: &str) -> Result<(), ReportError> {
+    std::fs::write(path, text).map_err(|source| ReportError::Write { path: path.into(), source })
+}
+
+/// Engine names as parts of file names: lower-case letters, digits, `-`, `_`; all different.
+fn file_parts(names: &[&str]) -> Vec<String> {
+    let mut parts: Vec<String> = Vec::with_capacity(names.len());
+    for name in names {
+        let safe = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
+        let mut part: String = name.chars().take(64).map(safe).collect();
+        if part.is_empty() {
+            part.push_str("engine");
+        }
+        let free = (2u32..).map(|n| format!("{part}-{n}")).find(|p| !parts.contains(p));
+        parts.push(if parts.contains(&part) { free.unwrap_or(part) } else { part });
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flight of `frames` as three engines might fly it.
+    pub(super) fn made_up_runs(frames: u64) -> Vec<(String, Vec<FrameStats>)> {
+        let engine =
+            |name: &str, tests: &dyn Fn(f64) -> f64, ms: &dyn Fn(f64) -> f64, pages: &dyn Fn(f64) -> f64| {
+                let frame = |i: u64| {
+                    let t = i as f64;
+                    let noise = ((i.wrapping_mul(2_654_435_761) >> 7) % 1000) as f64 / 1000.0;
+                    FrameStats {
+                        frame: i,
+                        triangles: 51_000 + 400 * (i % 17),
+                        new_triangles: if i == 0 { 51_000 } else { 300 + i % 90 },
+                        vertex_tests: (tests(t) * (0.9 + 0.2 * noise)) as u64,
+                        splits: 140,
+                        merges: 120,
+                        pages_touched: (pages(t) * (0.95 + 0.1 * noise)) as u64,
+                        record_bytes_touched: 1_234_567,
+                        update_ms: ms(t) * (0.9 + 0.3 * noise * noise),
+                        mesh_hash: 0x1234_5678_9abc ^ i,
+                    }
+                };
+                (name.to_owned(), (0..frames).map(frame).collect())
+            };
+        let wave = |t: f64| 1.0 + 0.25 * (t / 90.0).sin() + 0.1 * (t / 23.0).cos();
+        vec![
+            engine("soar", &|t| 120_000.0 * wave(t), &|t| 21.0 * wave(t), &|t| 900.0 * wave(t)),
+            engine(
+                "smart",
+                &|t| 120_000.0 * wave(t) * (0.065 + 0.04 * (t / 41.0).sin().powi(8)),
+                &|t| 2.1 * wave(t),
+                &|t| 130.0 * wave(t),
+            ),
+            engine("smart-cache", &|t| 9_000.0 * wave(t), &|t| 1.4 * wave(t), &|t| 60.0 * wave(t)),
+        ]
+    }
+
+    pub(super) fn made_up_sweep(xs: &[f64]) -> Vec<SweepPoint> {
+        let point = |x: f64, engine: &str, top: f64| SweepPoint {
+            x,
+            engine: engine.into(),
+            speedup_median: 1.0 + top / (0.6 + x),
+            vertex_tests_ratio: 0.05 + 0.01 * x,
+        };
+        xs.iter()
+            .flat_map(|x| [point(*x, "soar", 0.0), point(*x, "smart", 12.0), point(*x, "smart-cache", 17.0)])
+            .collect()
+    }
+
+    pub(super) fn title() -> ReportTitle {
+        ReportTitle {
+            terrain: "Puget Sound 8193 x 8193".into(),
+            flight: "straight, 12 m a frame".into(),
+            tolerance_px: 1.0,
+            viewport: Viewport::default(),
+        }
+    }
+
+    fn with_report<T>(frames: u64, check: impl FnOnce(&ComparisonReport<'_>) -> T) -> T {
+        let (runs, title) = (made_up_runs(frames), title());
+        check(&ComparisonReport {
+            title: &title,
+            comparison: &Comparison::of(&runs),
+            runs: &runs,
+            tolerance_sweep: &made_up_sweep(&[0.5, 1.0, 2.0, 4.0, 8.0]),
+            incoherence_sweep: &made_up_sweep(&[0.61, 1.36, 5.29]),
+        })
+    }
+
+    #[test]
+    fn the_directory_holds_what_the_report_says_and_twice_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let kept = std::env::var_os("TERRASOAR_REPORT_DIR").map(PathBuf::from);
+        let first = kept.unwrap_or_else(|| folder.path().join("a/b"));
+        let (a, b) =
+            with_report(1000, |r| (r.write(&first).unwrap(), r.write(&folder.path().join("c")).unwrap()));
+        assert_eq!(a.len(), if cfg!(feature = "plots") { 15 } else { 5 });
+        for (a, b) in a.iter().zip(&b) {
+            assert_eq!(a.file_name(), b.file_name());
+            assert!(std::fs::read(a).unwrap() == std::fs::read(b).unwrap(), "{}", a.display());
+        }
+        let page = std::fs::read_to_string(a.last().unwrap()).unwrap();
+        for file in &a[..a.len() - 1] {
+            let name = file.file_name().unwrap().to_str().unwrap();
+            assert!(page.contains(&format!("href=\"{name}\"")), "{name}");
+        }
+        let json = std::fs::read_to_string(first.join("summary.json")).unwrap();
+        let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(value["comparison"]["engines"][1]["engine"], "smart");
+        assert_eq!(value["incoherence_sweep"][0]["x"], 0.61);
+    }
+
+    #[test]
+    fn empty_and_short_comparisons_are_reported_too() {
+        let title = title();
+        let folder = tempfile::tempdir().unwrap();
+        for frames in [0, 1, 2] {
+            with_report(frames, |r| r.write(folder.path()).unwrap());
+        }
+        let report = ComparisonReport {
+            title: &title,
+            comparison: &Comparison::of(&[]),
+            runs: &[],
+            tolerance_sweep: &[],
+            incoherence_sweep: &[],
+        };
+        let written = report.write(folder.path()).unwrap();
+        assert!(written.last().unwrap().ends_with("report.html"));
+    }
+
+    #[test]
+    fn a_directory_that_cannot_be_made_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "x").unwrap();
+        let error = with_report(2, |r| r.write(&file.join("below")).unwrap_err());
+        assert!(
+            matches!(error, ReportError::Directory { .. }) && error.to_string().contains("file"),
+            "{error}"
+        );
+        std::fs::create_dir(folder.path().join("summary.json")).unwrap();
+        let error = with_report(2, |r| r.write(folder.path()).unwrap_err()).to_string();
+        assert!(error.contains("summary.json"), "{error}");
+    }
+
+    #[test]
+    fn engine_names_become_different_safe_file_names() {
+        assert_eq!(
+            file_parts(&["soar", "SOAR", "a/../b", "", "a b"]),
+            ["soar", "soar-2", "a----b", "engine", "a-b"]
+        );
+    }
+}
