@@ -6,8 +6,9 @@
 //! octave down to the single sample adds relief (`landscape` the large forms, `detail` the rest).
 //! Every sample is a function of seed and place alone: the file is the same for any number of threads.
 //!
-//! Against Puget Sound at 160 m (mean |z - mean of 4 neighbours| in metres at 1, 2, 4, 8, 16 samples;
-//! share of zeros): @@COMPARISON@@
+//! Mean |z - mean of 4 neighbours| at 160, 320, 640, 1280, 2560 m, seed 1 (Puget Sound in brackets): above
+//! 1,000 m 13.4, 27.5, 52.4, 103, 200 m (14.3, 32.6, 68.2, 122, 178 m); below 200 m 3.9, 6.0, 9.2, 14.1, 20.9 m
+//! (4.4, 8.4, 14.2, 22.2, 31.8 m); zero samples 12 % (4 %). At 20 m it is 3.3 m in the mountains, 1.0 m below 200 m.
 //!
 //! Rows are made in bands, in parallel, while the band before is written: memory is some 20 MB.
 
@@ -71,7 +72,9 @@ pub fn write(options: &SynthOptions, out: &Path, progress: &(dyn Fn(u64) + Sync)
         )));
     }
     if !(spacing_m.is_finite() && spacing_m > 0.0) {
-        return Err(LayoutError::Usage(format!("a spacing of {spacing_m} m is no distance; the default is 20")));
+        return Err(LayoutError::Usage(format!(
+            "a spacing of {spacing_m} m is no distance; the default is 20"
+        )));
     }
     let mut output = Output::create(out, size, spacing_m)?;
     let terrain = Terrain::new(size, seed, spacing_m);
@@ -85,9 +88,12 @@ pub fn write(options: &SynthOptions, out: &Path, progress: &(dyn Fn(u64) + Sync)
         let rows = band_rows.min(size - first);
         made.resize(width * rows as usize, 0);
         let make = || {
-            made.par_chunks_mut(width * TASK_ROWS).enumerate().for_each_init(detail::Scratch::default, |scratch, (task, rows)| {
-                terrain.rows(first + (task * TASK_ROWS) as u32, rows, scratch);
-            });
+            made.par_chunks_mut(width * TASK_ROWS).enumerate().for_each_init(
+                detail::Scratch::default,
+                |scratch, (task, rows)| {
+                    terrain.rows(first + (task * TASK_ROWS) as u32, rows, scratch);
+                },
+            );
         };
         let ((), result) = rayon::join(make, || output.write_rows(&written));
         result?;

@@ -11,8 +11,8 @@ use super::HEIGHT_SCALE;
 use super::landscape::{CELLS, Landscape, POINTS};
 use super::noise::{hash, signed_unit};
 
-/// Hurst exponent: dimension 2.2.
-const H: f64 = 0.8;
+/// Hurst exponent: dimension 2.15, as rough mountains are.
+const H: f64 = 0.85;
 /// Amplitude of the octave of wavelength [`REFERENCE_M`] at roughness 1.
 const AMPLITUDE_M: f64 = 60.0;
 /// Wavelength of the finest large forms at the extent they are made for.
@@ -67,7 +67,9 @@ impl Terrain {
             self.octave(cells, first, width, octave, lattice, column);
             if cells <= CELLS * 4 {
                 // The crests of the large forms go on into the first octaves, and make the next ones stronger.
-                for ((height, rough), noise) in heights.iter_mut().zip(roughness.iter_mut()).zip(octave.iter()) {
+                for ((height, rough), noise) in
+                    heights.iter_mut().zip(roughness.iter_mut()).zip(octave.iter())
+                {
                     let crest = 0.5 - 1.4 * noise.abs();
                     *height += amplitude_m * *rough * crest;
                     *rough *= 1.0 + 0.5 * crest;
@@ -152,7 +154,8 @@ impl Weights {
         let at = |phase: u32| {
             let t = f64::from(phase) / f64::from(samples);
             let (t2, t3) = (t * t, t * t * t);
-            [-t3 + 2.0 * t2 - t, 3.0 * t3 - 5.0 * t2 + 2.0, -3.0 * t3 + 4.0 * t2 + t, t3 - t2].map(|w| (0.5 * w) as f32)
+            [-t3 + 2.0 * t2 - t, 3.0 * t3 - 5.0 * t2 + 2.0, -3.0 * t3 + 4.0 * t2 + t, t3 - t2]
+                .map(|w| (0.5 * w) as f32)
         };
         Self((0..samples).map(at).collect())
     }

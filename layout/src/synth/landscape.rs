@@ -32,7 +32,12 @@ impl Landscape {
         let plan = Plan::new(seed);
         let points: Vec<(f64, f32)> = (0..POINTS * POINTS)
             .into_par_iter()
-            .map(|point| plan.at((point % POINTS) as f64 / f64::from(CELLS), (point / POINTS) as f64 / f64::from(CELLS)))
+            .map(|point| {
+                plan.at(
+                    (point % POINTS) as f64 / f64::from(CELLS),
+                    (point / POINTS) as f64 / f64::from(CELLS),
+                )
+            })
             .collect();
         let mut sorted: Vec<f64> = points.iter().map(|point| point.0).collect();
         sorted.sort_by(f64::total_cmp);
@@ -87,7 +92,8 @@ impl Plan {
 
         // An inlet winds from north to south between the ranges, with arms.
         let arms = ridged(seed(6), x * 6.0, y * 2.5, 4, 0.5);
-        let inlet = smoothstep(0.16, 0.02, (x - 0.44 + 0.05 * (y * 9.0).sin()).abs()) * smoothstep(0.35, 0.75, arms);
+        let inlet =
+            smoothstep(0.16, 0.02, (x - 0.44 + 0.05 * (y * 9.0).sin()).abs()) * smoothstep(0.35, 0.75, arms);
         let plain = 130.0 + 110.0 * broad + 85.0 * hills - 330.0 * inlet * (1.0 - mountains);
 
         let relief = mountains * (150.0 + 450.0 * (broad + 0.3).max(0.0) + 1500.0 * crests.powf(1.2));

@@ -25,7 +25,8 @@ pub(super) fn gradient(seed: u32, x: f64, y: f64) -> f64 {
     let (fx, fy) = (x - cell_x, y - cell_y);
     let (ix, iy) = (cell_x as i64 as u32, cell_y as i64 as u32);
     let corner = |dx: u32, dy: u32| {
-        let turn = f64::from(hash(seed, ix.wrapping_add(dx), iy.wrapping_add(dy))) * (std::f64::consts::TAU / 4_294_967_296.0);
+        let turn = f64::from(hash(seed, ix.wrapping_add(dx), iy.wrapping_add(dy)))
+            * (std::f64::consts::TAU / 4_294_967_296.0);
         turn.cos() * (fx - f64::from(dx)) + turn.sin() * (fy - f64::from(dy))
     };
     let (wx, wy) = (fade(fx), fade(fy));
@@ -54,7 +55,8 @@ pub(super) fn fractal(seed: u32, x: f64, y: f64, octaves: u32, gain: f64) -> f64
 pub(super) fn ridged(seed: u32, x: f64, y: f64, octaves: u32, gain: f64) -> f64 {
     let (mut sum, mut amplitude, mut scale, mut weight, mut total) = (0.0, 1.0, 1.0, 1.0, 0.0);
     for octave in 0..octaves {
-        let signal = 1.0 - (1.6 * gradient(seed.wrapping_add(octave.wrapping_mul(0x85EB)), x * scale, y * scale)).abs();
+        let signal = 1.0
+            - (1.6 * gradient(seed.wrapping_add(octave.wrapping_mul(0x85EB)), x * scale, y * scale)).abs();
         let signal = signal * signal;
         sum += amplitude * weight * signal;
         total += amplitude;

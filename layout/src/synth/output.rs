@@ -23,7 +23,7 @@ pub(super) struct Output {
 
 enum Encoding {
     Tiff(BufWriter<File>),
-    Png(StreamWriter<'static, BufWriter<File>>),
+    Png(Box<StreamWriter<'static, BufWriter<File>>>),
 }
 
 impl Output {
@@ -42,7 +42,8 @@ impl Output {
         };
         let failed = |source| LayoutError::io(out, CANNOT_WRITE, source);
         let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let temporary = builder().prefix(".terrasoar-").suffix(".part").tempfile_in(folder).map_err(failed)?;
+        let temporary =
+            builder().prefix(".terrasoar-").suffix(".part").tempfile_in(folder).map_err(failed)?;
         let mut file = BufWriter::with_capacity(1 << 18, temporary.reopen().map_err(failed)?);
         let encoder = if png {
             let mut encoder = Encoder::new(file, size, size);
@@ -54,7 +55,7 @@ impl Output {
                 .and_then(|()| encoder.add_text_chunk(PNG_HEIGHT_SCALE_KEY.into(), HEIGHT_SCALE.to_string()))
                 .and_then(|()| encoder.write_header())
                 .and_then(|writer| writer.into_stream_writer_with_size(1 << 18));
-            Encoding::Png(writer.map_err(|error| failed(png_error(error)))?)
+            Encoding::Png(Box::new(writer.map_err(|error| failed(png_error(error)))?))
         } else {
             file.write_all(&tiff_header::header(size, spacing_m)).map_err(failed)?;
             Encoding::Tiff(file)

@@ -8,7 +8,7 @@ use super::tags::{self, Directory, TiffFile};
 use crate::dem::{SampleType, Window};
 use crate::error::LayoutError;
 
-/// Largest decoded chunk: the decoders need it in memory at once.
+/// Largest decoded chunk: the codecs need it in memory at once.
 const MAX_CHUNK_BYTES: u64 = 512 << 20;
 
 /// How chunks are packed.
@@ -47,33 +47,33 @@ impl Compression {
     }
 }
 
+/// What was stored instead of the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Predictor {
+    None,
+    Horizontal,
+    Floating,
+}
+
 /// Where the samples of an image are.
 #[derive(Debug)]
 pub(super) struct Chunks {
-    /// Number of the image in its file.
-    pub(super) image: usize,
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) sample_type: SampleType,
     pub(super) big_endian: bool,
     pub(super) compression: Compression,
-    /// Whether a decoder that honours "white is zero" has inverted the samples.
-    pub(super) inverted: bool,
+    pub(super) predictor: Predictor,
     pub(super) chunk_width: u32,
     pub(super) chunk_height: u32,
     tiled: bool,
     across: u32,
     places: Vec<(u64, u64)>,
-    predictor: u64,
 }
 
 impl Chunks {
-    /// Reads and checks the table of the image `directory`, number `image` in `file`.
-    pub(super) fn read(
-        file: &mut TiffFile,
-        directory: &Directory,
-        image: usize,
-    ) -> Result<Self, LayoutError> {
+    /// Reads and checks the table of the image `directory`.
+    pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<Self, LayoutError> {
         let width = side(file, directory, tags::IMAGE_WIDTH, "width")?;
         let height = side(file, directory, tags::IMAGE_LENGTH, "height")?;
         if width < 2 || height < 2 {
@@ -99,19 +99,18 @@ impl Chunks {
         let sample_type = sample_type(file, directory)?;
         let compression = compression(file, directory)?;
         let predictor = file.number(directory, tags::PREDICTOR)?.unwrap_or(1);
-        if compression != Compression::None && !(1..=3).contains(&predictor) {
-            return Err(file.damaged(format!(
-                "predictor {predictor} is unknown; write the file again with PREDICTOR=2"
-            )));
-        }
-        let inverted = photometric == 0 && compression != Compression::None;
-        if inverted && !matches!(sample_type, SampleType::U8 | SampleType::U16 | SampleType::U32) {
-            return Err(LayoutError::unsupported(
-                file.path(),
-                "\"white is zero\" makes no sense for signed or real heights; write the file again: \
-                 gdal_translate -co PHOTOMETRIC=MINISBLACK INPUT output.tif",
-            ));
-        }
+        let predictor = match (predictor, sample_type) {
+            _ if compression == Compression::None => Predictor::None,
+            (1, _) => Predictor::None,
+            (2, _) => Predictor::Horizontal,
+            (3, SampleType::F32 | SampleType::F64) => Predictor::Floating,
+            _ => {
+                return Err(file.damaged(format!(
+                    "predictor {predictor} is unknown or does not go with its samples; fetch the file again, or write \
+                     it again with PREDICTOR=2"
+                )));
+            }
+        };
         let tile_width = file.number(directory, tags::TILE_WIDTH)?;
         let tiled = tile_width.is_some();
         let (chunk_width, chunk_height) = if tiled {
@@ -144,19 +143,17 @@ impl Chunks {
             )));
         }
         let this = Self {
-            image,
             width,
             height,
             sample_type,
             big_endian: file.is_big_endian(),
             compression,
-            inverted,
+            predictor,
             chunk_width,
             chunk_height,
             tiled,
             across,
             places: offsets.into_iter().zip(counts).collect(),
-            predictor: if compression == Compression::None { 1 } else { predictor },
         };
         this.check_places(file)?;
         Ok(this)
@@ -225,9 +222,9 @@ impl Chunks {
         }
     }
 
-    /// Whether the chunks can be read piecewise: neither compressed nor predicted.
+    /// Whether the chunks can be read piecewise: they are not compressed.
     pub(super) fn is_raw(&self) -> bool {
-        self.compression == Compression::None && self.predictor == 1
+        self.compression == Compression::None
     }
 
     /// Bytes of a sample in the file.

@@ -2,19 +2,21 @@
 //!
 //! [`tags`] reads the directory and holds every declared size against the file, [`chunks`] makes the
 //! table of chunks of it, [`geokeys`] and [`metadata`] say where the grid lies and what a unit is.
-//! Uncompressed chunks are read piecewise by [`raw`], however large; compressed ones are decoded whole
-//! by the `tiff` crate in [`packed`], each worker with its own decoder. [`convert`] turns bytes into
-//! samples. Of a file with several images the first full-resolution one is read. Memory: 16 bytes a
-//! chunk, and a decoded chunk a worker.
+//! Uncompressed chunks are read piecewise by [`raw`], however large; compressed ones are unpacked whole by
+//! [`packed`] with [`codec`] and [`predictor`]. [`convert`] turns bytes into samples. Of a file with
+//! several images the first full-resolution one is read. Memory: 16 bytes a chunk, and an unpacked
+//! chunk a worker.
 //!
 //! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
 //! are not inverted for "white is zero" files. Masks in images of their own are not applied.
 
 mod chunks;
+mod codec;
 mod convert;
 mod geokeys;
 mod metadata;
 mod packed;
+mod predictor;
 mod raw;
 mod tags;
 
@@ -41,8 +43,8 @@ impl TiffDem {
     /// Reads the directory of the first full-resolution image.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
         let mut file = TiffFile::open(path)?;
-        let (index, directory) = file.first_full_image()?;
-        let chunks = Chunks::read(&mut file, &directory, index)?;
+        let directory = file.first_full_image()?;
+        let chunks = Chunks::read(&mut file, &directory)?;
         let nodata = file.text(&directory, tags::GDAL_NODATA)?;
         let void = Void::parse(path, nodata.as_deref(), chunks.sample_type)?;
         let (georeference, vertical_unit_m) = geokeys::read(&mut file, &directory)?;

@@ -114,8 +114,8 @@ impl TiffFile {
         LayoutError::damaged(&self.path, "tag directory", problem)
     }
 
-    /// The first image that is neither an overview (bit 0 of its kind) nor a mask (bit 2), and its number.
-    pub(super) fn first_full_image(&mut self) -> Result<(usize, Directory), LayoutError> {
+    /// The first image that is neither an overview (bit 0 of its kind) nor a mask (bit 2).
+    pub(super) fn first_full_image(&mut self) -> Result<Directory, LayoutError> {
         let mut at = if self.big {
             let head = self.read_at(0, 16, "header")?;
             if self.u16(&head[4..]) != 8 {
@@ -129,14 +129,14 @@ impl TiffFile {
             u64::from(self.u32(&head[4..]))
         };
         let mut seen = HashSet::new();
-        for index in 0..MAX_DIRECTORIES {
+        for _ in 0..MAX_DIRECTORIES {
             if at == 0 || !seen.insert(at) {
                 break;
             }
             let (directory, next) = self.directory(at)?;
             let kind = self.number(&directory, NEW_SUBFILE_TYPE)?.unwrap_or(0);
             if kind & 0b101 == 0 {
-                return Ok((index, directory));
+                return Ok(directory);
             }
             at = next;
         }

@@ -167,24 +167,23 @@ impl Mosaic {
             }
         }
         let last = self.side - 1;
-        if first == 0 && heights[..width].contains(&VOID) {
-            if let Some(north) = self.rows_of(down.checked_sub(1), Some(across), last, 1)? {
-                heights[..width].iter_mut().zip(&north).for_each(|(to, from)| fill(to, *from));
-            }
+        if first == 0
+            && heights[..width].contains(&VOID)
+            && let Some(north) = self.rows_of(down.checked_sub(1), Some(across), last, 1)?
+        {
+            heights[..width].iter_mut().zip(&north).for_each(|(to, from)| fill(to, *from));
         }
-        if heights.iter().step_by(width).any(|height| *height == VOID) {
-            if let Some(west) = self.rows_of(Some(down), across.checked_sub(1), first, rows)? {
-                heights
-                    .iter_mut()
-                    .step_by(width)
-                    .zip(west.chunks_exact(side))
-                    .for_each(|(to, from)| fill(to, from[side - 1]));
-            }
+        if heights.iter().step_by(width).any(|height| *height == VOID)
+            && let Some(west) = self.rows_of(Some(down), across.checked_sub(1), first, rows)?
+        {
+            let borders = west.chunks_exact(side).map(|row| row[side - 1]);
+            heights.iter_mut().step_by(width).zip(borders).for_each(|(to, from)| fill(to, from));
         }
-        if first == 0 && heights[0] == VOID {
-            if let Some(corner) = self.rows_of(down.checked_sub(1), across.checked_sub(1), last, 1)? {
-                heights[0] = corner[side - 1];
-            }
+        if first == 0
+            && heights[0] == VOID
+            && let Some(corner) = self.rows_of(down.checked_sub(1), across.checked_sub(1), last, 1)?
+        {
+            heights[0] = corner[side - 1];
         }
         let to_sample = |height: i16| if height == VOID { f64::NAN } else { f64::from(height) };
         Ok(heights.into_iter().map(to_sample).collect())
