@@ -125,3 +125,62 @@ pub trait DemSource: Sync {
     /// Damage in the data, naming the file and the place; or the sink's own error.
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError>;
 }
+
+/// Elevation data held in memory: generated terrain, tests, data from elsewhere in a program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MemoryDem {
+    info: DemInfo,
+    /// Raw samples, rows from the south.
+    samples: Vec<f64>,
+}
+
+impl MemoryDem {
+    /// A DEM of `samples` (wide, high) whose raw sample at column x east and row y north is `sample(x, y)`, NaN for a void. It has
+    /// no georeference and its raw unit is a metre; see [`MemoryDem::info_mut`].
+    pub fn from_fn(
+        samples: [u32; 2],
+        sample_type: SampleType,
+        mut sample: impl FnMut(u32, u32) -> f64,
+    ) -> Self {
+        let [samples_wide, samples_high] = samples;
+        let info = DemInfo {
+            samples_wide,
+            samples_high,
+            sample_type,
+            height_scale: 1.0,
+            height_offset_m: 0.0,
+            georeference: Georeference::default(),
+            format: "memory".into(),
+        };
+        let points = (0..samples_high).flat_map(|y| (0..samples_wide).map(move |x| (x, y)));
+        Self { info, samples: points.map(|(x, y)| sample(x, y)).collect() }
+    }
+
+    /// The raw sample at column `x` east and row `y` north.
+    ///
+    /// # Panics
+    /// Outside the DEM.
+    pub fn sample(&self, x: u32, y: u32) -> f64 {
+        self.samples[y as usize * self.info.samples_wide as usize + x as usize]
+    }
+
+    /// What the DEM says about itself, to be changed. Its size must stay as it is.
+    pub fn info_mut(&mut self) -> &mut DemInfo {
+        &mut self.info
+    }
+}
+
+impl DemSource for MemoryDem {
+    fn info(&self) -> &DemInfo {
+        &self.info
+    }
+
+    fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let width = self.info.samples_wide;
+        for (y, samples) in self.samples.chunks_exact(width as usize).enumerate() {
+            let row = self.info.samples_high - 1 - y as u32;
+            sink.put(Window { col: 0, row, width, height: 1 }, samples)?;
+        }
+        Ok(())
+    }
+}

@@ -50,7 +50,7 @@ fn check(dem: &MemoryDem, terrain: &Terrain, precision_m: f64) {
     let [wide, high] = grid.samples();
     let sample = |p: GridPoint| {
         let q = grid.fold(p);
-        dem.height(q.x(), q.y())
+        dem.sample(q.x(), q.y())
     };
     for p in all_points(&grid) {
         let v = vertex(terrain, p);
@@ -140,7 +140,7 @@ fn terrain_of(dem: &MemoryDem, options: &BuildOptions) -> Terrain {
 fn every_shape_keeps_its_promises() {
     for samples in [[33, 33], [17, 9], [20, 33], [33, 18], [25, 27], [2, 2], [3, 2], [2, 40], [64, 65]] {
         for error in [ErrorKind::Bounded, ErrorKind::Step] {
-            let dem = MemoryDem::new(samples, SampleType::I16, |x, y| rugged(7, x, y));
+            let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| rugged(7, x, y));
             let options = BuildOptions { error, spacing_m: Some([10.0, 13.5]), ..Default::default() };
             let terrain = terrain_of(&dem, &options);
             assert_eq!(terrain.header().record_kind, RecordKind::Compact);
@@ -157,7 +157,7 @@ fn voids_are_masked_and_do_not_spread() {
             d(20, 12) < 20 || (x, y) == (5, 5) || x + 3 > samples[0] || noise(3, x, y) < 0.004
         };
         for sample_type in [SampleType::I16, SampleType::F32, SampleType::F64] {
-            let dem = MemoryDem::new(samples, sample_type, |x, y| {
+            let dem = MemoryDem::from_fn(samples, sample_type, |x, y| {
                 if holes(x, y) {
                     f64::NAN
                 } else {
@@ -165,7 +165,7 @@ fn voids_are_masked_and_do_not_spread() {
                 }
             });
             let dem = if sample_type == SampleType::F32 {
-                MemoryDem::new(samples, sample_type, |x, y| f64::from(dem.height(x, y) as f32))
+                MemoryDem::from_fn(samples, sample_type, |x, y| f64::from(dem.sample(x, y) as f32))
             } else {
                 dem
             };
@@ -180,15 +180,16 @@ fn voids_are_masked_and_do_not_spread() {
 
 #[test]
 fn exact_records_keep_every_bit() {
-    let dem = MemoryDem::new([33, 30], SampleType::F32, |x, y| f64::from((rugged(1, x, y) * 1.000_1) as f32));
+    let dem =
+        MemoryDem::from_fn([33, 30], SampleType::F32, |x, y| f64::from((rugged(1, x, y) * 1.000_1) as f32));
     let terrain = terrain_of(&dem, &BuildOptions::default());
     assert_eq!(terrain.header().record_kind, RecordKind::Exact8);
     check(&dem, &terrain, 0.0);
-    let dem = MemoryDem::new([33, 30], SampleType::F64, |x, y| rugged(1, x, y) * 1.000_1);
+    let dem = MemoryDem::from_fn([33, 30], SampleType::F64, |x, y| rugged(1, x, y) * 1.000_1);
     let terrain = terrain_of(&dem, &BuildOptions::default());
     assert_eq!(terrain.header().record_kind, RecordKind::Exact16);
     check(&dem, &terrain, 0.0);
-    let dem = MemoryDem::new([33, 30], SampleType::I32, |x, y| rugged(1, x, y) * 1e6 + 1.0);
+    let dem = MemoryDem::from_fn([33, 30], SampleType::I32, |x, y| rugged(1, x, y) * 1e6 + 1.0);
     let terrain = terrain_of(&dem, &BuildOptions::default());
     assert_eq!(terrain.header().record_kind, RecordKind::Exact16, "beyond 2^24 single precision has gaps");
     check(&dem, &terrain, 0.0);
@@ -196,7 +197,8 @@ fn exact_records_keep_every_bit() {
 
 #[test]
 fn floats_of_even_steps_stay_compact_and_forced_compact_rounds() {
-    let dem = MemoryDem::new([33, 30], SampleType::F32, |x, y| f64::from((rugged(1, x, y) / 10.0) as f32));
+    let dem =
+        MemoryDem::from_fn([33, 30], SampleType::F32, |x, y| f64::from((rugged(1, x, y) / 10.0) as f32));
     let terrain = terrain_of(&dem, &BuildOptions::default());
     assert_eq!(
         (terrain.header().record_kind, terrain.header().heights_rounded),
@@ -204,7 +206,7 @@ fn floats_of_even_steps_stay_compact_and_forced_compact_rounds() {
     );
     assert_eq!(terrain.header().scale.height_step_m, 0.1);
     check(&dem, &terrain, 1e-4);
-    let dem = MemoryDem::new([33, 30], SampleType::F64, |x, y| rugged(1, x, y) * 1.000_1);
+    let dem = MemoryDem::from_fn([33, 30], SampleType::F64, |x, y| rugged(1, x, y) * 1.000_1);
     let options = BuildOptions { record: Some(RecordKind::Compact), ..Default::default() };
     let terrain = terrain_of(&dem, &options);
     assert!(terrain.header().heights_rounded);
@@ -218,7 +220,7 @@ fn cliffs_spikes_and_flats_fit_the_records() {
     let flat = |_, _| 17.0;
     for shape in [&cliff as &dyn Fn(u32, u32) -> f64, &spike, &flat] {
         for spacing in [0.01, 1.0, 1000.0] {
-            let dem = MemoryDem::new([33, 33], SampleType::I32, shape);
+            let dem = MemoryDem::from_fn([33, 33], SampleType::I32, shape);
             let options = BuildOptions { spacing_m: Some([spacing, spacing * 3.0]), ..Default::default() };
             let terrain = terrain_of(&dem, &options);
             assert_eq!(terrain.header().record_kind, RecordKind::Compact);
@@ -230,7 +232,7 @@ fn cliffs_spikes_and_flats_fit_the_records() {
 #[test]
 fn tiles_threads_and_memory_do_not_show() {
     for (samples, holes) in [([130, 200], true), ([257, 257], false)] {
-        let dem = MemoryDem::new(samples, SampleType::F32, |x, y| {
+        let dem = MemoryDem::from_fn(samples, SampleType::F32, |x, y| {
             if holes && x.abs_diff(70) + y.abs_diff(90) < 12 {
                 f64::NAN
             } else {
@@ -260,7 +262,7 @@ proptest! {
         wide in 2u32..40, high in 2u32..40, seed in 0u64..1000, void_share in prop_oneof![Just(0.0), 0.0..0.3],
         tile in 1u32..6, spacing in 0.5f64..200.0, exact: bool, step: bool,
     ) {
-        let dem = MemoryDem::new([wide, high], SampleType::I16, |x, y| {
+        let dem = MemoryDem::from_fn([wide, high], SampleType::I16, |x, y| {
             if noise(seed + 1, x, y) < void_share && (x, y) != (0, 0) { f64::NAN } else { rugged(seed, x, y) }
         });
         let options = BuildOptions {

@@ -4,7 +4,7 @@
 //! Incoherence grows about as a power of the speed, so the search is false position in the logarithms of both,
 //! with the Illinois correction and halving where noise stalls it. **Every trial lies inside the bracket of those
 //! before it**, so a measure that is not quite monotone costs trials and not correctness. Costs at most 24 trials
-//! of 24 pairs of frames, and a check of other pairs.
+//! of 24 pairs of frames, and a check of other pairs; two more trials where an error has to state the range.
 
 use super::generate::{FlightPlan, GenerateError, Ground, generate};
 use super::{Flight, FlightFrame};
@@ -393,6 +393,17 @@ mod tests {
             prop_assume!(law(fastest) > 1.2 * wanted && law(1e-9 * 163_840.0) < 0.8 * wanted);
             let solution = solved(FlightKind::Orbit, wanted, law).unwrap();
             prop_assert!((solution.best.percent / wanted - 1.0).abs() <= TOLERANCE + 1e-9, "{:?}", solution.trials);
+        }
+
+        #[test]
+        fn noise_costs_trials_and_not_the_answer(seed in any::<u64>(), wanted in 0.2..20.0f64) {
+            let law = |v: f64| {
+                let mixed = (v.to_bits() ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                0.05 * v.powf(0.9) * (0.95 + 0.1 * (mixed >> 40) as f64 / f64::from(1 << 24))
+            };
+            let solution = solved(FlightKind::Orbit, wanted, law).unwrap();
+            prop_assert!((solution.best.percent / wanted - 1.0).abs() <= ACCEPTED, "{:?}", solution.trials);
+            prop_assert!(solution.trials.len() <= MAX_TRIALS);
         }
     }
 }

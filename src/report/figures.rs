@@ -1,4 +1,4 @@
-//! Which charts a report has: those of the SMART paper (Bao, Pajarola et al. 2004, figures 8 to 10) and two of what frames cost.
+//! Which charts a report has: those of the SMART paper (Bao, Pajarola and Shafae 2004, figures 8 to 10) and two of what frames cost.
 //!
 //! An engine has the same colour in all of them.
 
@@ -58,11 +58,17 @@ fn base_name<'a>(report: &ComparisonReport<'a>) -> &'a str {
 
 fn subtitle(report: &ComparisonReport<'_>, with_tolerance: bool) -> String {
     let title = report.title;
+    // Shortened, so that a long name leaves room for the figures behind it.
+    let short = |name: &str| match name.char_indices().nth(45) {
+        Some((end, _)) => format!("{}…", name.get(..end).unwrap_or_default().trim_end()),
+        None => name.to_owned(),
+    };
+    let (terrain, flight) = (short(&title.terrain), short(&title.flight));
     let picture = format!("{} × {} px", title.viewport.width_px, title.viewport.height_px);
     if with_tolerance {
-        format!("{}; {}; tolerance {} px; {picture}", title.terrain, title.flight, exact(title.tolerance_px))
+        format!("{terrain}; {flight}; tolerance {} px; {picture}", exact(title.tolerance_px))
     } else {
-        format!("{}; {}; {picture}", title.terrain, title.flight)
+        format!("{terrain}; {flight}; {picture}")
     }
 }
 
@@ -71,7 +77,7 @@ fn frame_axis() -> AxisPlan {
         name: "Frame of the flight".into(),
         scale: Scale::Linear,
         ticks: Ticks::Round,
-        shows: Vec::new(),
+        shows: vec![0.0],
     }
 }
 
@@ -99,7 +105,10 @@ fn vertex_tests(report: &ComparisonReport<'_>) -> Chart {
         x: frame_axis(),
         y: y_axis(format!("Vertex tests, % of those of {}", base_name(report)), &[22.0]),
         series: series.collect(),
-        references: vec![(10.0, "10 %: the paper's".into()), (20.0, "20 %: the paper's".into())],
+        references: vec![
+            (10.0, "10 %: paper, most frames".into()),
+            (20.0, "20 %: paper, worst frame".into()),
+        ],
         marked: false,
     }
 }

@@ -152,7 +152,7 @@ impl Stage {
             }
         }
         for (what, found) in [("lowest height", lowest_m), ("highest height", highest_m)] {
-            if !(found.abs() <= 1e8) {
+            if !(-1e8..=1e8).contains(&found) {
                 return Err(GenerateError::Ground { what, found, allowed: "from -1e8 to 1e8" });
             }
         }

@@ -1,0 +1,120 @@
+//! Triangles of a refined mesh: their identity, which of them are drawn, and strips of them.
+//!
+//! A triangle is named by its longest edge and the side its apex lies on ([`TriangleKey`]), so meshes of different engines compare as
+//! sets. Not drawn are triangles that the fold of padding leaves without area, and triangles that void touches (FORMAT.md,
+//! section 1).
+
+use terrasoar_layout::grid::{Grid, GridPoint};
+use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::terrain::Records;
+
+/// A triangle's corners in counter-clockwise order seen from above.
+pub type Triangle = [GridPoint; 3];
+
+/// Identity of a bin-tree triangle: the doubled midpoint of its longest edge and the side of its apex.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TriangleKey(u64);
+
+impl TriangleKey {
+    /// The key of a triangle (apex; base).
+    #[inline]
+    pub fn new(apex: GridPoint, b: GridPoint, d: GridPoint) -> Self {
+        let (x2, y2) = (u64::from(b.x() + d.x()), u64::from(b.y() + d.y()));
+        let (ax2, ay2) = (2 * u64::from(apex.x()), 2 * u64::from(apex.y()));
+        let side = ay2 > y2 || (ay2 == y2 && ax2 > x2);
+        Self((y2 << 18 | x2) << 1 | u64::from(side))
+    }
+
+    /// The key of a triangle whose apex is not known: the corner opposite the longest edge.
+    pub fn of(triangle: Triangle) -> Self {
+        let [apex, b, d] = with_apex_first(triangle);
+        Self::new(apex, b, d)
+    }
+
+    /// A well-mixed hash of the key; sums of these identify sets.
+    #[inline]
+    pub fn hash(self) -> u64 {
+        // The finaliser of splitmix64.
+        let mut h = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        h = (h ^ h >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        h = (h ^ h >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        h ^ h >> 31
+    }
+}
+
+/// Rotates a bin-tree triangle so that the corner opposite its longest edge comes first.
+pub fn with_apex_first([p, q, r]: Triangle) -> Triangle {
+    let length2 = |a: GridPoint, b: GridPoint| {
+        let (dx, dy) = (i64::from(a.x()) - i64::from(b.x()), i64::from(a.y()) - i64::from(b.y()));
+        dx * dx + dy * dy
+    };
+    let (pq, qr, rp) = (length2(p, q), length2(q, r), length2(r, p));
+    if qr > pq && qr > rp {
+        [p, q, r]
+    } else if rp > pq {
+        [q, r, p]
+    } else {
+        [r, p, q]
+    }
+}
+
+/// Twice the signed area in grid steps, padding not folded; positive if counter-clockwise.
+pub fn twice_area([a, b, c]: Triangle) -> i64 {
+    let (ax, ay) = (i64::from(a.x()), i64::from(a.y()));
+    (i64::from(b.x()) - ax) * (i64::from(c.y()) - ay) - (i64::from(b.y()) - ay) * (i64::from(c.x()) - ax)
+}
+
+/// Whether a triangle keeps area when padding is folded onto the data.
+pub fn has_area(grid: &Grid, triangle: Triangle) -> bool {
+    twice_area(triangle.map(|p| grid.fold(p))) != 0
+}
+
+/// Whether an unsplit triangle is drawn.
+pub fn is_drawn<C: RecordCodec>(records: &Records<'_, C>, triangle: Triangle) -> bool {
+    let grid = records.grid();
+    if grid.has_padding() && !has_area(grid, triangle) {
+        return false;
+    }
+    if !records.has_voids() {
+        return true;
+    }
+    let [_, b, d] = with_apex_first(triangle);
+    // The longest edge of the smallest triangles is a cell's diagonal: its midpoint is no grid point.
+    if (b.x() + d.x()) & 1 == 1 {
+        triangle.iter().all(|p| !records.vertex_at(*p).class.is_void())
+    } else {
+        records.vertex_at(b.midpoint(d)).class.is_plain()
+    }
+}
+
+/// Calls `visit` with the triangles of a strip in counter-clockwise order. Vertices repeated to turn the strip make no triangle.
+pub fn for_each_in_strip(strip: impl Iterator<Item = GridPoint>, mut visit: impl FnMut(Triangle)) {
+    let mut last: [Option<GridPoint>; 2] = [None; 2];
+    let mut odd = true;
+    for p in strip {
+        if let [Some(a), Some(b)] = last
+            && a != b
+            && b != p
+            && a != p
+        {
+            visit(if odd { [b, a, p] } else { [a, b, p] });
+        }
+        last = [last[1], Some(p)];
+        odd = !odd;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_do_not_depend_on_rotation_and_tell_sides_apart() {
+        let [a, b, c] = [GridPoint::new(4, 4), GridPoint::new(0, 8), GridPoint::new(8, 8)];
+        let keys = [[a, b, c], [b, c, a], [c, a, b]].map(TriangleKey::of);
+        assert!(keys.iter().all(|k| *k == keys[0]));
+        assert_eq!(keys[0], TriangleKey::new(a, b, c));
+        assert_ne!(keys[0], TriangleKey::new(GridPoint::new(4, 12), b, c));
+        assert_eq!(with_apex_first([b, c, a])[0], a);
+    }
+}

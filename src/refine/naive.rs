@@ -1,0 +1,81 @@
+//! The definition, by brute force: test every vertex of the terrain against the view, then split every triangle whose vertex passed.
+//!
+//! No tree is walked to decide, no answer is inherited or remembered. Cost: one test a vertex of the terrain a frame; for tests and
+//! small terrains.
+
+use super::{Engine, Probe};
+use crate::mesh::Triangle;
+use crate::metric::{ALL_PLANES, Metric};
+use crate::view::View;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::order::{corners, slot_of};
+use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::terrain::Records;
+
+/// Brute-force refinement.
+#[derive(Debug)]
+pub struct Naive<'a, C: RecordCodec> {
+    records: Records<'a, C>,
+    /// Whether each vertex is active, row by row.
+    active: Vec<bool>,
+    triangles: Vec<Triangle>,
+}
+
+impl<'a, C: RecordCodec> Naive<'a, C> {
+    /// An engine over `records`.
+    pub fn new(records: Records<'a, C>) -> Self {
+        let side = records.grid().side_steps() as usize + 1;
+        Self { active: vec![false; side * side], records, triangles: Vec::new() }
+    }
+
+    fn index(&self, p: GridPoint) -> usize {
+        p.y() as usize * (self.records.grid().side_steps() as usize + 1) + p.x() as usize
+    }
+
+    fn split<P: Probe>(&mut self, [a, b, d]: Triangle, probe: &mut P) {
+        // The smallest triangles have no vertex to split at.
+        let smallest = (b.x() + d.x()) & 1 == 1 || (b.y() + d.y()) & 1 == 1;
+        if !smallest && self.active[self.index(b.midpoint(d))] {
+            probe.split(a, b, d);
+            let v = b.midpoint(d);
+            // (v; b, a) and (v; a, d) with the winding of (a; b, d) kept.
+            self.split([v, a, b], probe);
+            self.split([v, d, a], probe);
+        } else {
+            self.triangles.push([a, b, d]);
+        }
+    }
+}
+
+impl<C: RecordCodec> Engine for Naive<'_, C> {
+    fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
+        let metric = Metric::new(view);
+        let grid = *self.records.grid();
+        let n = grid.side_steps();
+        let mut tests = 0;
+        for y in 0..=n {
+            for x in 0..=n {
+                let p = GridPoint::new(x, y);
+                if grid.is_corner(p) || (x, y) == (n / 2, n / 2) {
+                    continue;
+                }
+                tests += 1;
+                probe.read(slot_of(grid.k(), p));
+                let sighting = metric.sight(grid.position_m(p), &self.records.vertex_at(p));
+                let index = self.index(p);
+                self.active[index] = sighting.is_selected() && metric.cull(&sighting, ALL_PLANES).is_some();
+            }
+        }
+        self.triangles.clear();
+        let [sw, se, ne, nw] = corners(grid.k());
+        let centre = sw.midpoint(ne);
+        for (b, d) in [(sw, se), (se, ne), (ne, nw), (nw, sw)] {
+            self.split([centre, b, d], probe);
+        }
+        tests
+    }
+
+    fn for_each_triangle(&self, visit: &mut dyn FnMut(Triangle)) {
+        self.triangles.iter().for_each(|t| visit(*t));
+    }
+}
