@@ -273,7 +273,10 @@ fn a_page_used_twice_and_a_lost_page_are_found() {
     let leaf = Forger { bytes: bytes.clone() }.leaf();
     let stored = open_bytes(bytes.clone()).unwrap().header().stored_pages as u32;
     let first = u32_at(&bytes, leaf) as u32;
-    says(&report(&|f| f.put(leaf + 16, first)), &format!("file page {first} is also that of the record page 0"));
+    says(
+        &report(&|f| f.put(leaf + 16, first)),
+        &format!("file page {first} is also that of the record page 0"),
+    );
     says(&report(&|f| f.put(leaf + 16, (leaf / PAGE) as u32)), "is also that of the record page 1");
     says(&report(&|f| f.put(leaf + 8, 7)), "generation 7 wrote it");
     says(&report(&|f| f.put(leaf + 8, 0)), "generation 0 wrote it");

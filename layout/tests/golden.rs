@@ -17,8 +17,7 @@ const HEIGHTS: [[f64; 5]; 4] = [
 ];
 
 fn dem() -> MemoryDem {
-    let mut dem =
-        MemoryDem::from_fn([5, 4], SampleType::I16, |x, y| HEIGHTS[3 - y as usize][x as usize]);
+    let mut dem = MemoryDem::from_fn([5, 4], SampleType::I16, |x, y| HEIGHTS[3 - y as usize][x as usize]);
     let info = dem.info_mut();
     info.format = "golden".into();
     info.georeference = Georeference {
@@ -71,7 +70,11 @@ fn the_file_is_as_stated_byte_for_byte() {
     let differs = built.iter().zip(&stated).position(|(a, b)| a != b);
     if let Some(at) = differs {
         let line = at / 16 * 16;
-        panic!("byte {at:#x} differs: built {:02x?}, stated {:02x?}", &built[line..line + 16], &stated[line..line + 16]);
+        panic!(
+            "byte {at:#x} differs: built {:02x?}, stated {:02x?}",
+            &built[line..line + 16],
+            &stated[line..line + 16]
+        );
     }
 }
 
@@ -153,7 +156,10 @@ fn every_record_decodes_by_hand() {
             };
             let radius = flat_radius_by_the_text(dx, dy, level) * radius;
             let close = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-12 * b.abs();
-            assert!(close(v.error_m, error) && close(v.radius_m, radius), "({x}, {y}): {v:?} {error} {radius}");
+            assert!(
+                close(v.error_m, error) && close(v.radius_m, radius),
+                "({x}, {y}): {v:?} {error} {radius}"
+            );
             assert_eq!(v.class, class, "({x}, {y})");
         }
     }

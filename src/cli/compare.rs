@@ -50,7 +50,9 @@ impl Args {
         let names: Vec<&str> = self.engines.iter().map(|e| e.name()).collect();
         let twice = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name));
         match twice {
-            Some((_, name)) => Err(WrongUsage(format!("--engines names {name} twice; name each engine once"))),
+            Some((_, name)) => {
+                Err(WrongUsage(format!("--engines names {name} twice; name each engine once")))
+            }
             None => Ok(()),
         }
     }

@@ -66,7 +66,9 @@ impl Args {
                 plan.turn_rate_deg_per_frame = rate;
             }
             Some(rate) if self.kind == FlightKind::Turn => {
-                return Err(WrongUsage(format!("--turn-rate is {rate}; give 0.000001 to 90 degrees to either side")));
+                return Err(WrongUsage(format!(
+                    "--turn-rate is {rate}; give 0.000001 to 90 degrees to either side"
+                )));
             }
             Some(_) => {
                 return Err(WrongUsage(format!(
@@ -103,7 +105,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
                     .map(|v| decimal(v, 4));
             let mut flight = solution.flight;
             flight.notes.push(("incoherence-percent".into(), percent.clone()));
-            (flight, format!(", {speed} m a frame for {percent} % new triangles ({checked} % on other frames)"))
+            (
+                flight,
+                format!(", {speed} m a frame for {percent} % new triangles ({checked} % on other frames)"),
+            )
         }
     };
     ground.check()?;

@@ -87,10 +87,7 @@ impl Info {
         table(&[
             ("file", self.path.clone()),
             ("made from", self.source.clone()),
-            (
-                "samples",
-                format!("{} x {}", grouped(self.samples[0].into()), grouped(self.samples[1].into())),
-            ),
+            ("samples", format!("{} x {}", grouped(self.samples[0].into()), grouped(self.samples[1].into()))),
             ("k", format!("{} (a square of 2^{} steps)", self.k, self.k)),
             ("spacing", format!("{} m, {}", pair(self.spacing_m, 4), self.spacing_origin)),
             ("extent", format!("{} m", pair(self.extent_m, 1))),

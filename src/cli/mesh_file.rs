@@ -95,7 +95,10 @@ mod tests {
         let obj = String::from_utf8(written(Format::Obj)).unwrap();
         assert!(obj.ends_with("v 0 0 1.5\nv 10 0 2\nv 0 10 3.25\nf 1 2 3\n"));
         let ply = String::from_utf8(written(Format::PlyText)).unwrap();
-        assert!(ply.starts_with("ply\nformat ascii 1.0\n") && ply.ends_with("end_header\n0 0 1.5\n10 0 2\n0 10 3.25\n3 0 1 2\n"));
+        assert!(
+            ply.starts_with("ply\nformat ascii 1.0\n")
+                && ply.ends_with("end_header\n0 0 1.5\n10 0 2\n0 10 3.25\n3 0 1 2\n")
+        );
     }
 
     #[test]

@@ -30,7 +30,10 @@ use std::process::ExitCode;
 /// A DEM goes in (16-bit PNG, VTP BT, SRTM .hgt, GeoTIFF), a terrain file (.iqt) comes out, and recorded flights are replayed over it, out of
 /// core, with every visible sample within a tolerance in pixels.
 #[derive(Debug, Parser)]
-#[command(name = "terrasoar", version, after_help = "\
+#[command(
+    name = "terrasoar",
+    version,
+    after_help = "\
 Examples, in the order of the work:
   terrasoar build alps.tif -o alps.iqt
   terrasoar info alps.iqt
@@ -38,7 +41,8 @@ Examples, in the order of the work:
   terrasoar compare alps.iqt --flight alps.flight --engines soar,smart -o report
 
 No elevation data at hand: terrasoar synth --size 4097 --seed 1 -o land.tif
-Exit codes: 0 done, 1 failed, 2 wrong command line.")]
+Exit codes: 0 done, 1 failed, 2 wrong command line."
+)]
 struct Typed {
     #[command(subcommand)]
     verb: Verb,

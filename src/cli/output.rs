@@ -41,7 +41,10 @@ pub(super) fn check_output(out: &Path, inputs: &[&Path]) -> Result<()> {
         bail!("{}: the output is a folder; name a file in it", out.display());
     }
     if !meta.is_file() {
-        bail!("{}: the output is a device or pipe, which would be replaced by a file; name a file", out.display());
+        bail!(
+            "{}: the output is a device or pipe, which would be replaced by a file; name a file",
+            out.display()
+        );
     }
     let real = std::fs::canonicalize(out);
     for input in inputs {

@@ -36,7 +36,11 @@ pub(super) fn percent(text: &str) -> Result<f64, String> {
 /// A tolerance in pixels.
 pub(super) fn tolerance_px(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| {
-        if (0.01..=10_000.0).contains(&v) { Ok(v) } else { Err("it must be from 0.01 to 10000 pixels".into()) }
+        if (0.01..=10_000.0).contains(&v) {
+            Ok(v)
+        } else {
+            Err("it must be from 0.01 to 10000 pixels".into())
+        }
     })
 }
 
@@ -44,7 +48,11 @@ pub(super) fn tolerance_px(text: &str) -> Result<f64, String> {
 pub(super) fn spacing_m(text: &str) -> Result<[f64; 2], String> {
     let length = |word: &str| {
         let metres = positive(word)?;
-        if (1e-3..=1e6).contains(&metres) { Ok(metres) } else { Err("it must be from 0.001 to 1000000".to_owned()) }
+        if (1e-3..=1e6).contains(&metres) {
+            Ok(metres)
+        } else {
+            Err("it must be from 0.001 to 1000000".to_owned())
+        }
     };
     match text.split_once(',') {
         None => length(text).map(|m| [m, m]),
@@ -92,12 +100,14 @@ pub(super) fn with_extension(text: &str, allowed: &[&str]) -> Result<PathBuf, St
 
 /// An engine by name.
 pub(super) fn engine() -> impl TypedValueParser<Value = EngineKind> {
-    PossibleValuesParser::new(EngineKind::ALL.map(EngineKind::name)).try_map(|word| word.parse::<EngineKind>())
+    PossibleValuesParser::new(EngineKind::ALL.map(EngineKind::name))
+        .try_map(|word| word.parse::<EngineKind>())
 }
 
 /// A kind of flight by name.
 pub(super) fn flight_kind() -> impl TypedValueParser<Value = FlightKind> {
-    PossibleValuesParser::new(FlightKind::ALL.map(FlightKind::name)).try_map(|word| word.parse::<FlightKind>())
+    PossibleValuesParser::new(FlightKind::ALL.map(FlightKind::name))
+        .try_map(|word| word.parse::<FlightKind>())
 }
 
 #[cfg(test)]

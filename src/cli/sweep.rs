@@ -71,9 +71,8 @@ impl Sweep<'_> {
 
     /// A short flight of the kind that the flight says it is.
     fn plan(&self) -> FlightPlan {
-        let note = |name: &str| {
-            self.flight.notes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
-        };
+        let note =
+            |name: &str| self.flight.notes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str());
         let kind = note("flight").and_then(|kind| kind.parse().ok()).unwrap_or(FlightKind::Straight);
         let mut plan = FlightPlan::new(kind, FRAMES as u64, 0.0);
         if let Some(rate) = note("turn-rate-deg-per-frame").and_then(|rate| rate.parse().ok()) {

@@ -16,10 +16,9 @@ pub(super) fn open(path: &Path) -> Result<Terrain> {
 pub(super) fn spacing_origin(header: &Header) -> String {
     match header.spacing_origin {
         SpacingOrigin::Dem => "from the elevation model".into(),
-        SpacingOrigin::Degrees { centre_latitude_deg } => format!(
-            "converted from degrees at the centre latitude {}",
-            decimal(centre_latitude_deg, 4)
-        ),
+        SpacingOrigin::Degrees { centre_latitude_deg } => {
+            format!("converted from degrees at the centre latitude {}", decimal(centre_latitude_deg, 4))
+        }
         SpacingOrigin::User => "stated with --spacing".into(),
         SpacingOrigin::Assumed => "assumed, the elevation model does not say".into(),
     }

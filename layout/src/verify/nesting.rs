@@ -175,7 +175,8 @@ impl<C: RecordCodec> Walk<'_, C> {
             }
         }
         if let Some(first) = first {
-            let more = if count > 1 { format!(", and {} more on this page", count - 1) } else { String::new() };
+            let more =
+                if count > 1 { format!(", and {} more on this page", count - 1) } else { String::new() };
             tally.findings.add(record_page(self.records.terrain, page as usize), format!("{first}{more}"));
         }
         Ok(())
