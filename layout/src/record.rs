@@ -107,7 +107,7 @@ pub trait RecordCodec: Clone + Send + Sync + 'static {
     fn decode(&self, raw: Self::Raw, level: u32) -> Vertex;
 
     /// The record of a vertex with raw height `value` (metres = base + value * step), error and radius rounded up.
-    /// `None` if the radius is beyond what a plain record can say, or the height does not fit.
+    /// The value is one that [`RecordCodec::round_height`] gives. `None` if the radius is beyond what a plain record can say, or the height does not fit.
     fn encode(
         &self,
         level: u32,
@@ -140,9 +140,11 @@ const BELOW: f64 = 1.0 - 1e-12;
 pub struct Compact {
     height_base_m: f64,
     height_step_m: f64,
+    per_least_error: f64,
     errors: [f64; 256],
     radii: [f64; 256],
     flat_radius_m: [f64; 2 * MAX_K as usize],
+    per_flat_radius: [f64; 2 * MAX_K as usize],
     edge_m: [f64; 2 * MAX_K as usize],
     error_steps: OctaveTable,
     radius_steps: OctaveTable,
@@ -161,12 +163,14 @@ impl Compact {
         Self {
             height_base_m: scale.height_base_m,
             height_step_m: scale.height_step_m,
+            per_least_error: BELOW / bottom,
             errors: std::array::from_fn(|i| match i as u8 {
                 0 => 0.0,
                 code => bottom * error_steps.power(code - 1),
             }),
             radii: std::array::from_fn(|i| if i == 255 { 0.0 } else { radius_steps.power(i as u8) }),
             flat_radius_m: per_level(&|l| grid.flat_radius_m(l)),
+            per_flat_radius: per_level(&|l| BELOW / grid.flat_radius_m(l)),
             edge_m: per_level(&|l| grid.edge_m(l)),
             error_steps,
             radius_steps,
@@ -227,13 +231,13 @@ impl RecordCodec for Compact {
         if !(0.0..=65535.0).contains(&value) {
             return None;
         }
-        let [low, high] = (value.round_ties_even() as u16).to_le_bytes();
+        let [low, high] = (value as u16).to_le_bytes();
         let flat = self.flat_radius_m[level as usize];
         let radius_code = |table: &OctaveTable| {
             if radius_m <= flat {
                 return Some(0);
             }
-            let guess = table.index_at_least(radius_m / flat * BELOW)?;
+            let guess = table.index_at_least(radius_m * self.per_flat_radius[level as usize])?;
             (guess..=255).find(|code| flat * table.power(*code) >= radius_m)
         };
         let (error_code, radius_code) = match class {
@@ -242,7 +246,7 @@ impl RecordCodec for Compact {
                     0
                 } else {
                     let guess =
-                        self.error_steps.index_at_least(error_m / self.errors[1] * BELOW)?.checked_add(1)?;
+                        self.error_steps.index_at_least(error_m * self.per_least_error)?.checked_add(1)?;
                     (guess..FRINGE).find(|code| self.errors[usize::from(*code)] >= error_m)?
                 };
                 (error_code, radius_code(&self.radius_steps).filter(|code| *code < 255)?)

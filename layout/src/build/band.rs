@@ -157,6 +157,11 @@ impl Band {
         &self.rows[(y - self.first) as usize].codes
     }
 
+    /// Row `y` of codes, if it is in the window.
+    pub(super) fn find_row(&self, y: u32) -> Option<&[f64]> {
+        Some(&self.rows.get(y.checked_sub(self.first)? as usize)?.codes)
+    }
+
     /// Which samples of row `y` are void; empty if none is.
     pub(super) fn row_voids(&self, y: u32) -> &[bool] {
         &self.rows[(y - self.first) as usize].voids

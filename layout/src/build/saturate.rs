@@ -10,7 +10,8 @@ use super::scan::{FIRST_SCANNED, OwnErrors};
 use crate::error::LayoutError;
 use crate::grid::{Grid, GridPoint};
 use crate::header::ErrorKind;
-use crate::record::{RecordCodec, RecordScale, VertexClass};
+use crate::record::{RecordCodec, RecordScale, Vertex, VertexClass};
+use std::sync::atomic::Ordering;
 
 /// Factor on nested radii: twice the margin that FORMAT.md promises.
 const MARGIN: f64 = 1.0 + 1.0 / (1 << 19) as f64;
@@ -34,25 +35,38 @@ impl<C: RecordCodec> Saturator<C> {
         own: &OwnErrors,
         records: &Levels<C::Raw>,
     ) -> Result<Box<[C::Raw]>, LayoutError> {
-        let (y, step) = (shape.row_y(row), shape.step());
+        let (y, step, level) = (shape.row_y(row), shape.step(), shape.level());
         let [wide, high] = self.grid.samples();
         let voids_near = self.has_voids
             && band.may_have_voids(y.saturating_sub(step).min(high - 1)..=(y + step).min(high - 1));
-        let own_row = if shape.level() >= FIRST_SCANNED { own.row(shape.level(), row) } else { None };
-        let child_shape = (shape.level() > 0).then(|| LevelShape::new(&self.grid, shape.level() - 1));
-        (0..shape.columns(row))
-            .map(|column| {
-                let v = shape.point(row, column);
-                let folded = v.x() + step >= wide || y + step >= high;
-                let own_m = match (self.error_kind, own_row) {
-                    (ErrorKind::Bounded, Some(cells)) if !folded => {
-                        f64::from(f32::from_bits(cells[column].load(std::sync::atomic::Ordering::Relaxed)))
-                    }
-                    _ => self.own_error_m(v, shape, band, folded),
-                };
-                self.record(v, shape, child_shape.as_ref(), own_m, folded, voids_near, band, records)
-            })
-            .collect()
+        let scanned = if self.error_kind == ErrorKind::Bounded && level >= FIRST_SCANNED {
+            own.row(level, row)
+        } else {
+            None
+        };
+        let around = Surroundings { shape, band, records };
+        let columns = shape.columns(row);
+        let mut made = Vec::with_capacity(columns);
+        let row_is_open = !voids_near && y >= step && y + step < high;
+        let open_row = row_is_open.then(|| OpenRow::new(self, &around, y)).flatten();
+        for column in 0..columns {
+            let v = shape.point(row, column);
+            let folded = v.x() + step >= wide || y + step >= high;
+            let own_m = match scanned {
+                Some(cells) if !folded => f64::from(f32::from_bits(cells[column].load(Ordering::Relaxed))),
+                _ => f64::NAN,
+            };
+            // Nearly every vertex: all around it is there, nothing folds, nothing is void.
+            if let Some(open) = open_row.as_ref().filter(|_| !folded && v.x() >= step)
+                && let Some(raw) = open.record(v.x(), column, own_m)
+            {
+                made.push(raw);
+                continue;
+            }
+            let own_m = if own_m.is_nan() { self.own_error_m(v, shape, band, folded) } else { own_m };
+            made.push(self.record(v, &around, own_m, folded, voids_near)?);
+        }
+        Ok(made.into())
     }
 
     /// Position in metres and height in metres of a grid point, folded.
@@ -91,73 +105,199 @@ impl<C: RecordCodec> Saturator<C> {
         }
     }
 
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "one vertex's whole surroundings; a struct would be built for every vertex"
-    )]
-    #[inline]
+    /// The record of any vertex, wherever it lies.
     fn record(
         &self,
         v: GridPoint,
-        shape: &LevelShape,
-        child_shape: Option<&LevelShape>,
+        around: &Surroundings<'_, C>,
         own_m: f64,
         folded: bool,
         voids_near: bool,
-        band: &Band,
-        records: &Levels<C::Raw>,
     ) -> Result<C::Raw, LayoutError> {
+        let Surroundings { shape, band, records } = *around;
         let level = shape.level();
         let code = band.code(v);
         let is_void = voids_near && band.is_void(v);
-        let mut fringe = false;
-        let mut all_inert = true;
-        let (mut error_m, mut radius_m) = (0.0f64, 0.0f64);
-        match child_shape {
-            None => {
-                fringe = voids_near
-                    && self.grid.edge_ends(v).into_iter().chain(self.grid.apexes(v)).any(|p| band.is_void(p));
-            }
-            Some(child_shape) => {
-                let [x, y] = self.grid.position_m(v);
-                let height_m = code * self.scale.height_step_m;
-                for child in children(v, shape, self.grid.side_steps()).into_iter().flatten() {
-                    if child_shape.is_beyond(child) {
-                        continue;
-                    }
-                    let (row, column) = child_shape.index(child);
-                    let Some(raw) = records.row(child_shape.level(), row).and_then(|r| r.get(column)) else {
-                        return Err(internal(child));
-                    };
-                    let c = self.codec.decode(*raw, child_shape.level());
-                    match c.class {
-                        VertexClass::Inert => {
-                            fringe = true;
-                            continue;
-                        }
-                        VertexClass::Plain => {}
-                        VertexClass::Fringe | VertexClass::FringeVoid => fringe = true,
-                    }
-                    all_inert = false;
-                    let [cx, cy] = self.grid.position_m(child);
-                    let dz = height_m - (c.height_m - self.scale.height_base_m);
-                    let distance_m = ((x - cx) * (x - cx) + (y - cy) * (y - cy) + dz * dz).sqrt();
-                    radius_m = radius_m.max((distance_m + c.radius_m) * MARGIN);
-                    error_m = error_m.max(c.error_m);
+        let mut below = Below::default();
+        if level == 0 {
+            below.fringe = voids_near
+                && self.grid.edge_ends(v).into_iter().chain(self.grid.apexes(v)).any(|p| band.is_void(p));
+        } else {
+            let child_shape = LevelShape::new(&self.grid, level - 1);
+            let [x, y] = self.grid.position_m(v);
+            let height_m = code * self.scale.height_step_m;
+            for child in children(v, shape, self.grid.side_steps()).into_iter().flatten() {
+                if child_shape.is_beyond(child) {
+                    continue;
                 }
+                let (row, column) = child_shape.index(child);
+                let Some(raw) = records.row(level - 1, row).and_then(|r| r.get(column)) else {
+                    return Err(internal(child));
+                };
+                let [cx, cy] = self.grid.position_m(child);
+                let ground2 = (x - cx) * (x - cx) + (y - cy) * (y - cy);
+                below.add(&self.codec.decode(*raw, level - 1), ground2, height_m, self.scale.height_base_m);
             }
         }
-        let class = match (is_void, all_inert, fringe) {
-            (true, true, _) => VertexClass::Inert,
-            (true, false, _) => VertexClass::FringeVoid,
+        let class = match (is_void, below.any_alive, below.fringe) {
+            (true, false, _) => VertexClass::Inert,
+            (true, true, _) => VertexClass::FringeVoid,
             (false, _, true) => VertexClass::Fringe,
             (false, _, false) => VertexClass::Plain,
         };
         // A deformed diamond's children are drawn in other places than their parents: the bound is the sum.
-        let own_m = if folded && self.error_kind == ErrorKind::Bounded { own_m + error_m } else { own_m };
+        let own_m =
+            if folded && self.error_kind == ErrorKind::Bounded { own_m + below.error_m } else { own_m };
+        self.encode(level, code, class, own_m, &below).ok_or_else(|| internal(v))
+    }
+
+    #[inline(always)]
+    fn encode(&self, level: u32, code: f64, class: VertexClass, own_m: f64, below: &Below) -> Option<C::Raw> {
         // No triangle is farther from a sample than the range of heights, which lies a millionth below the top.
-        let error_m = error_m.max(own_m.min(self.scale.error_top_m * (1.0 - 1e-7)));
-        self.codec.encode(level, code, class, error_m, radius_m).ok_or_else(|| internal(v))
+        let error_m = below.error_m.max(own_m.min(self.scale.error_top_m * (1.0 - 1e-7)));
+        self.codec.encode(level, code, class, error_m, below.radius_m)
+    }
+}
+
+/// Where a row's vertices find what they depend on.
+struct Surroundings<'r, C: RecordCodec> {
+    shape: &'r LevelShape,
+    band: &'r Band,
+    records: &'r Levels<C::Raw>,
+}
+
+/// What a vertex's children add up to.
+#[derive(Debug, Default)]
+struct Below {
+    error_m: f64,
+    radius_m: f64,
+    /// Whether a child is next to a void or void throughout.
+    fringe: bool,
+    /// Whether a child can ever be refined.
+    any_alive: bool,
+}
+
+impl Below {
+    /// Adds a child `ground2` square metres away over the ground from a vertex at `height_m` above `base_m`.
+    #[inline(always)]
+    fn add(&mut self, child: &Vertex, ground2: f64, height_m: f64, base_m: f64) {
+        if child.class != VertexClass::Plain {
+            self.fringe = true;
+            if child.class == VertexClass::Inert {
+                return;
+            }
+        }
+        self.any_alive = true;
+        let dz = height_m - (child.height_m - base_m);
+        self.radius_m = self.radius_m.max(((ground2 + dz * dz).sqrt() + child.radius_m) * MARGIN);
+        self.error_m = self.error_m.max(child.error_m);
+    }
+}
+
+/// A row away from the data's borders and from voids, with the rows it depends on at hand.
+struct OpenRow<'r, C: RecordCodec> {
+    saturator: &'r Saturator<C>,
+    level: u32,
+    step: usize,
+    codes: &'r [f64],
+    /// Rows of codes that hold the ends of the edges that this row's vertices split.
+    ends: [&'r [f64]; 2],
+    /// Offsets of those ends in x; white vertices have their own rule.
+    end_offsets: [isize; 2],
+    /// Whether the vertices are white: their diagonal edges alternate from cell to cell.
+    alternates: bool,
+    /// Whether the row's cells are the southern ones of their parents.
+    south_cell: bool,
+    /// Rows of children south of, level with and north of the vertices.
+    children: [&'r [C::Raw]; 3],
+    /// Square metres over the ground to the children beside, and to those north and south.
+    ground2: [f64; 2],
+}
+
+impl<'r, C: RecordCodec> OpenRow<'r, C> {
+    /// `None` if the rows are no longer in the band, as for levels larger than a tile.
+    fn new(saturator: &'r Saturator<C>, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
+        let Surroundings { shape, band, records } = *around;
+        let (s, level) = (shape.step(), shape.level());
+        let codes = band.find_row(y)?;
+        let (ends, end_offsets) = if shape.is_white() || y & s != 0 {
+            ([band.find_row(y - s)?, band.find_row(y + s)?], [0; 2])
+        } else {
+            ([codes; 2], [-(s as isize), s as isize])
+        };
+        let child = |y: u32| {
+            let shape = LevelShape::new(&saturator.grid, level - 1);
+            records.row(level - 1, shape.index(GridPoint::new(0, y)).0)
+        };
+        let [dx, dy] = saturator.grid.spacing_m().map(|d| d * f64::from(s));
+        let (children, ground2) = match (level, shape.is_white()) {
+            (0, _) => ([&[][..]; 3], [0.0; 2]),
+            (_, true) => ([child(y - s)?, child(y)?, child(y + s)?], [dx * dx, dy * dy]),
+            (_, false) => {
+                let diagonal = (0.5 * dx) * (0.5 * dx) + (0.5 * dy) * (0.5 * dy);
+                ([child(y - s / 2)?, &[], child(y + s / 2)?], [diagonal; 2])
+            }
+        };
+        Some(Self {
+            saturator,
+            level,
+            step: s as usize,
+            codes,
+            ends,
+            end_offsets,
+            alternates: shape.is_white(),
+            south_cell: (y / s) & 2 == 0,
+            children,
+            ground2,
+        })
+    }
+
+    /// Codes at the ends of the edge that the vertex at `x` splits.
+    #[inline(always)]
+    fn end_codes(&self, x: usize) -> [f64; 2] {
+        if !self.alternates {
+            return [0, 1].map(|i| self.ends[i][x.wrapping_add_signed(self.end_offsets[i])]);
+        }
+        // See Grid::edge_ends: the diagonal climbs where the cell is its parent's south-west or north-east one.
+        let climbs = ((x / self.step) & 2 == 0) == self.south_cell;
+        let (west, east) = (x - self.step, x + self.step);
+        let [south, north] = self.ends;
+        if climbs { [south[west], north[east]] } else { [south[east], north[west]] }
+    }
+
+    /// The record of the vertex at `x`; `None` if it is not an ordinary one after all. `own_m` is NaN where it is the distance from the
+    /// edge.
+    #[inline(always)]
+    fn record(&self, x: u32, column: usize, own_m: f64) -> Option<C::Raw> {
+        let x = x as usize;
+        let code = self.codes[x];
+        let scale = &self.saturator.scale;
+        let own_m = if own_m.is_nan() {
+            let [b, d] = self.end_codes(x);
+            (code - 0.5 * (b + d)).abs() * scale.height_step_m * (1.0 + 1e-9)
+        } else {
+            own_m
+        };
+        let mut below = Below::default();
+        if self.level > 0 {
+            let height_m = code * scale.height_step_m;
+            let [south, beside, north] = self.children;
+            let children = if self.alternates {
+                [*beside.get(column)?, *beside.get(column + 1)?, *south.get(column)?, *north.get(column)?]
+            } else {
+                let west = (x - self.step / 2) >> self.step.trailing_zeros();
+                let (south, north) = (south.get(west..west + 2)?, north.get(west..west + 2)?);
+                [south[0], south[1], north[0], north[1]]
+            };
+            for (i, raw) in children.into_iter().enumerate() {
+                let child = self.saturator.codec.decode(raw, self.level - 1);
+                below.add(&child, self.ground2[i / 2], height_m, scale.height_base_m);
+            }
+        }
+        if below.fringe {
+            return None;
+        }
+        self.saturator.encode(self.level, code, VertexClass::Plain, own_m, &below)
     }
 }
 

@@ -114,14 +114,14 @@ impl<'a> Tile<'a> {
                     if let Some(c) = x.checked_sub(s).and_then(|w| self.corners([[w, y], ends[0], ends[1]])) {
                         let plane = Plane::of(c);
                         for row in y - s + 1..y + s {
-                            let reach = s - row.abs_diff(y);
+                            let reach = s - 1 - row.abs_diff(y);
                             farthest = farthest.max(self.row(&plane, x - reach, x, row));
                         }
                     }
                     if let Some(c) = self.corners([[x + s, y], ends[0], ends[1]]) {
                         let plane = Plane::of(c);
                         for row in y - s + 1..y + s {
-                            let reach = s - row.abs_diff(y);
+                            let reach = s - 1 - row.abs_diff(y);
                             farthest = farthest.max(self.row(&plane, x, x + reach, row));
                         }
                     }
@@ -130,14 +130,14 @@ impl<'a> Tile<'a> {
                     if let Some(c) = y.checked_sub(s).and_then(|w| self.corners([[x, w], ends[0], ends[1]])) {
                         let plane = Plane::of(c);
                         for row in y - s + 1..=y {
-                            let reach = s - (y - row);
+                            let reach = s - 1 - (y - row);
                             farthest = farthest.max(self.row(&plane, x - reach, x + reach, row));
                         }
                     }
                     if let Some(c) = self.corners([[x, y + s], ends[0], ends[1]]) {
                         let plane = Plane::of(c);
                         for row in y..y + s {
-                            let reach = s - (row - y);
+                            let reach = s - 1 - (row - y);
                             farthest = farthest.max(self.row(&plane, x - reach, x + reach, row));
                         }
                     }
@@ -162,10 +162,10 @@ impl<'a> Tile<'a> {
                         [if apex_east { x + s } else { x - s }, if apex_south { y - s } else { y + s }];
                     let Some(corners) = self.corners([apex, b, d]) else { continue };
                     let plane = Plane::of(corners);
-                    for row in y - s..=y + s {
-                        let along = row + s - y; // 0..=2s from the south
+                    for row in y - s + 1..y + s {
+                        let along = row + s - y; // 1..2s from the south
                         let diagonal = if rising { x - s + along } else { x + s - along };
-                        let (from, to) = if apex_east { (diagonal, x + s) } else { (x - s, diagonal) };
+                        let (from, to) = if apex_east { (diagonal, x + s - 1) } else { (x - s + 1, diagonal) };
                         farthest = farthest.max(self.row(&plane, from, to, row));
                     }
                 }
