@@ -126,7 +126,8 @@ impl ReplaySummary {
         let later = frames.get(1..).unwrap_or_default();
         let sum = |f: fn(&FrameStats) -> u64| frames.iter().map(f).sum::<u64>();
         let mean = |total: f64, count: usize| total / (count.max(1) as f64);
-        let incoherence = later.iter().map(|f| 100.0 * f.new_triangles as f64 / (f.triangles.max(1) as f64)).sum();
+        let incoherence =
+            later.iter().map(|f| 100.0 * f.new_triangles as f64 / (f.triangles.max(1) as f64)).sum();
         // FNV-1a over the frames' hashes: the order of frames counts, that of triangles within one does not.
         let hash = frames.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, f| {
             (hash ^ f.mesh_hash).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(23)
@@ -206,7 +207,10 @@ mod tests {
         assert_eq!(c.engines[1].speedup_median, 2.0);
         assert_eq!(c.engines[0].summary.incoherence_percent, 2.0);
         assert_eq!(c.engines[0].summary.update_ms.max, 4.0);
-        assert!(!Comparison::of(&[("a".into(), a.clone()), ("b".into(), frames(&[1, 1, 1], &[1.0; 3], 8))]).same_mesh);
+        assert!(
+            !Comparison::of(&[("a".into(), a.clone()), ("b".into(), frames(&[1, 1, 1], &[1.0; 3], 8))])
+                .same_mesh
+        );
     }
 
     #[test]

@@ -129,20 +129,10 @@ pub fn point_of(k: u32, slot: u64) -> Option<GridPoint> {
     let t = k - 1 - d;
     if slot < black_base(d) {
         let m = slot - white_base(d);
-        let cy = gather(m >> 1);
-        let cx = gather(m) ^ cy;
-        return Some(GridPoint::new(((2 * cx + 1) << t) as u32, ((2 * cy + 1) << t) as u32));
+        return Some(white_point(t, gather(m >> 1), gather(m)));
     }
     let m = slot - black_base(d);
-    let a = gather(m >> 1) ^ ((1 << d) - 1);
-    let b = a ^ gather(m) ^ (1 << d);
-    // u + w = 2A + 1 and w - u = 2B + 1 - 2^(d+1).
-    let sum = 2 * a as i64 + 1;
-    let difference = 2 * b as i64 + 1 - (2i64 << d);
-    let (u, w) = ((sum - difference) / 2, (sum + difference) / 2);
-    let side = 2i64 << d;
-    ((0..=side).contains(&u) && (0..=side).contains(&w))
-        .then(|| GridPoint::new((u as u32) << t, (w as u32) << t))
+    black_point(d, t, gather(m >> 1), gather(m))
 }
 
 /// Least cell coordinates (X, Y) of the block of 4^order white slots that starts `offset` into its level.
@@ -157,6 +147,72 @@ pub(crate) const fn black_block_at(d: u32, offset: u64, order: u32) -> [u64; 2] 
     let a = gather(offset >> 1) ^ ((1 << d) - 1);
     let b = a ^ gather(offset) ^ (1 << d);
     [a >> order << order, b >> order << order]
+}
+
+/// Slots of a block whose points [`BlockPoints`] enumerates.
+pub(crate) const BLOCK_SLOTS: u64 = 1024;
+
+/// Even bits of each 10-bit number, gathered.
+const GATHERED: [u8; BLOCK_SLOTS as usize] = {
+    let mut table = [0; BLOCK_SLOTS as usize];
+    let mut i = 0;
+    while i < table.len() {
+        table[i] = gather(i as u64) as u8;
+        i += 1;
+    }
+    table
+};
+
+/// The grid points of one aligned block of a level's slots: [`point_of`] with the work for the block done once.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BlockPoints {
+    k: u32,
+    level: u32,
+    /// Gathered bits of the block's offset: even ones, odd ones.
+    even: u64,
+    odd: u64,
+}
+
+impl BlockPoints {
+    /// The block of `level` that starts `offset` slots into it, a multiple of [`BLOCK_SLOTS`].
+    pub(crate) fn new(k: u32, level: u32, offset: u64) -> Self {
+        debug_assert!(offset % BLOCK_SLOTS == 0);
+        Self { k, level, even: gather(offset), odd: gather(offset >> 1) }
+    }
+
+    /// The point of the block's `i`-th slot; `None` for a ghost.
+    #[inline(always)]
+    pub(crate) fn point(&self, i: usize) -> Option<GridPoint> {
+        let t = self.level / 2;
+        let d = self.k - 1 - t;
+        let even = self.even | u64::from(GATHERED[i % BLOCK_SLOTS as usize]);
+        let odd = self.odd | u64::from(GATHERED[i / 2 % BLOCK_SLOTS as usize]);
+        if self.level & 1 == 1 {
+            return Some(white_point(t, odd, even));
+        }
+        black_point(d, t, odd, even)
+    }
+}
+
+/// The white vertex with these gathered bits of its offset in its level.
+#[inline(always)]
+const fn white_point(t: u32, odd: u64, even: u64) -> GridPoint {
+    let (cx, cy) = (even ^ odd, odd);
+    GridPoint::new(((2 * cx + 1) << t) as u32, ((2 * cy + 1) << t) as u32)
+}
+
+/// The black vertex with these gathered bits of its offset in its level at depth `d`; `None` for a ghost.
+#[inline(always)]
+fn black_point(d: u32, t: u32, odd: u64, even: u64) -> Option<GridPoint> {
+    let a = odd ^ ((1 << d) - 1);
+    let b = a ^ even ^ (1 << d);
+    // u + w = 2A + 1 and w - u = 2B + 1 - 2^(d+1).
+    let sum = 2 * a as i64 + 1;
+    let difference = 2 * b as i64 + 1 - (2i64 << d);
+    let (u, w) = ((sum - difference) / 2, (sum + difference) / 2);
+    let side = 2i64 << d;
+    ((0..=side).contains(&u) && (0..=side).contains(&w))
+        .then(|| GridPoint::new((u as u32) << t, (w as u32) << t))
 }
 
 #[cfg(test)]
@@ -185,6 +241,22 @@ mod tests {
                 assert_eq!(point_of(k, slot as u64).is_some(), *seen, "slot {slot}, k {k}");
             }
             assert_eq!(point_of(k, slot_count(k)), None);
+        }
+    }
+
+    #[test]
+    fn blocks_enumerate_what_the_closed_form_says() {
+        for k in 1..=8 {
+            for level in 0..2 * k {
+                let slots = level_slots(k, level);
+                for offset in (0..slots.end - slots.start).step_by(BLOCK_SLOTS as usize) {
+                    let block = BlockPoints::new(k, level, offset);
+                    let count = (slots.end - slots.start - offset).min(BLOCK_SLOTS);
+                    for i in 0..count {
+                        assert_eq!(block.point(i as usize), point_of(k, slots.start + offset + i));
+                    }
+                }
+            }
         }
     }
 

@@ -135,6 +135,16 @@ const FRINGE_RADIUS_STEPS: u32 = 8;
 /// Makes a rounded quotient a lower bound; comparing products then decides.
 const BELOW: f64 = 1.0 - 1e-12;
 
+/// The first code from `guess` on that stands for at least `value`.
+#[inline(always)]
+fn first_at_least(guess: u8, value: f64, stands_for: impl Fn(u8) -> f64) -> Option<u8> {
+    let mut code = guess;
+    while stands_for(code) < value {
+        code = code.checked_add(1)?;
+    }
+    Some(code)
+}
+
 /// Codec of 4-byte records.
 #[derive(Debug, Clone)]
 pub struct Compact {
@@ -238,7 +248,7 @@ impl RecordCodec for Compact {
                 return Some(0);
             }
             let guess = table.index_at_least(radius_m * self.per_flat_radius[level as usize])?;
-            (guess..=255).find(|code| flat * table.power(*code) >= radius_m)
+            first_at_least(guess, radius_m, |code| flat * table.power(code))
         };
         let (error_code, radius_code) = match class {
             VertexClass::Plain => {
@@ -247,7 +257,8 @@ impl RecordCodec for Compact {
                 } else {
                     let guess =
                         self.error_steps.index_at_least(error_m * self.per_least_error)?.checked_add(1)?;
-                    (guess..FRINGE).find(|code| self.errors[usize::from(*code)] >= error_m)?
+                    first_at_least(guess, error_m, |code| self.errors[usize::from(code)])
+                        .filter(|code| *code < FRINGE)?
                 };
                 (error_code, radius_code(&self.radius_steps).filter(|code| *code < 255)?)
             }

@@ -253,16 +253,31 @@ impl<'a, C: RecordCodec> Records<'a, C> {
         slot >> Self::PAGE_SHIFT
     }
 
+    /// The record at `slot`, not yet decoded. Reading records early, before they are needed, hides the time memory takes.
+    ///
+    /// # Panics
+    /// For a slot past the last page.
+    #[inline(always)]
+    pub fn raw(&self, slot: u64) -> C::Raw {
+        let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize;
+        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        let at = page * PAGE_BYTES + within;
+        C::read(&self.bytes[at..at + C::BYTES])
+    }
+
+    /// The vertex of a record at `level` (0 for corners).
+    #[inline(always)]
+    pub fn decode(&self, raw: C::Raw, level: u32) -> Vertex {
+        self.codec.decode(raw, level)
+    }
+
     /// The vertex at `slot`, whose level is `level` (0 for corners).
     ///
     /// # Panics
     /// For a slot past the last page.
     #[inline(always)]
     pub fn vertex(&self, slot: u64, level: u32) -> Vertex {
-        let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize;
-        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
-        let at = page * PAGE_BYTES + within;
-        self.codec.decode(C::read(&self.bytes[at..at + C::BYTES]), level)
+        self.decode(self.raw(slot), level)
     }
 
     /// The vertex at a grid point.

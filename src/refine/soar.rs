@@ -74,10 +74,6 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
     /// Refines the triangle (apex; b, d) whose split vertex has slot `split` and level `height - 1`; `planes` are those its ancestors
     /// cross.
     fn refine(&mut self, height: u32, apex: Apex, split: u64, b: GridPoint, d: GridPoint, planes: u8) {
-        if height == 0 {
-            self.append(apex, 0);
-            return;
-        }
         let v = b.midpoint(d);
         let vertex = self.records.vertex(split, height - 1);
         self.probe.read(split);
@@ -93,8 +89,15 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
             return;
         };
         self.probe.split(apex.at, b, d);
-        let [left, right] = child_slots(apex.slot, split);
         let here = Apex { slot: split, at: v, height_m: vertex.height_m };
+        if height == 1 {
+            // The smallest triangles have no vertex to split at.
+            self.append(here, 0);
+            self.append(apex, 1);
+            self.append(here, 0);
+            return;
+        }
+        let [left, right] = child_slots(apex.slot, split);
         self.refine(height - 1, here, left, b, apex.at, planes);
         self.append(apex, height & 1);
         self.refine(height - 1, here, right, apex.at, d, planes);

@@ -363,12 +363,12 @@ impl<C: RecordCodec> State<'_, C> {
     }
 
     fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
-        for (slot, corner) in corners(self.grid.k()).into_iter().enumerate() {
+        let records = corners(self.grid.k()).map(|corner| {
             let class = if self.band.is_void(corner) { VertexClass::FringeVoid } else { VertexClass::Plain };
             let code = self.band.code(corner);
-            let raw = self.saturator.codec.encode(0, code, class, 0.0, 0.0).unwrap_or(C::INERT);
-            self.writer.set(slot as u64, raw);
-        }
+            self.saturator.codec.encode(0, code, class, 0.0, 0.0).unwrap_or(C::INERT)
+        });
+        self.writer.set_corners(records)?;
         self.writer.finish(header)
     }
 }

@@ -1,37 +1,32 @@
 //! Which record pages the file will have, where each will lie, and when its last record is known.
 //!
+//! A level's slots are cut into blocks of the quadtree, whose rows lie close together, and blocks at page borders: a page is made of parts.
 //! Presence follows from the grid alone: a page is planned if one of its slots holds a vertex that is not beyond the data. Pages that turn out
-//! to be all void are taken out at the end. Cost: a few blocks a page, single slots only along the data's outline.
+//! to be all void are taken out at the end. Cost: a few blocks a part, single slots only along the data's outline.
 
 use super::levels::LevelShape;
 use crate::bytes::to_usize;
 use crate::error::LayoutError;
 use crate::grid::Grid;
-use crate::order::{level_slots, point_of, slot_count};
+use crate::order::{BLOCK_SLOTS, level_slots, point_of, slot_count};
 use rayon::prelude::*;
 
-/// A page all of whose slots belong to one level.
+/// The slots of one page that lie in one block of one level: gathered together once the last of their rows is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct PageTask {
-    /// Logical page.
-    pub(super) page: u64,
+pub(super) struct PagePart {
+    /// First slot.
+    pub(super) first: u64,
+    /// Number of slots.
+    pub(super) count: u32,
     /// Least and largest y of its vertices.
     pub(super) y: [u32; 2],
-}
-
-/// A single slot in a page shared by several levels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct SlotTask {
-    pub(super) y: u32,
-    pub(super) slot: u64,
 }
 
 /// What one level contributes, in order of the row at which it becomes complete.
 #[derive(Debug, Default)]
 pub(super) struct LevelPlan {
-    pub(super) pages: Vec<PageTask>,
-    pub(super) slots: Vec<SlotTask>,
-    /// Largest difference between a page's least and largest y.
+    pub(super) parts: Vec<PagePart>,
+    /// Largest difference between a part's least and largest y.
     pub(super) span: u32,
 }
 
@@ -39,51 +34,44 @@ pub(super) struct LevelPlan {
 #[derive(Debug)]
 pub(super) struct Plan {
     pub(super) levels: Vec<LevelPlan>,
-    /// Whether each logical page is planned to be present.
-    pub(super) present: Vec<bool>,
+    /// Parts of each logical page; a page without any is absent.
+    pub(super) parts: Vec<u8>,
 }
 
 impl Plan {
     pub(super) fn new(grid: &Grid, records_per_page: u64) -> Result<Self, LayoutError> {
         let k = grid.k();
         let pages = slot_count(k).div_ceil(records_per_page);
-        let mut present = vec![false; to_usize(pages)?];
-        // The corners' page.
-        present[0] = true;
+        let mut parts = vec![0u8; to_usize(pages)?];
+        // The corners.
+        parts[0] = 1;
         let mut levels = Vec::new();
         for level in 0..grid.levels() {
             let shape = LevelShape::new(grid, level);
             let slots = level_slots(k, level);
-            let first_whole = slots.start.div_ceil(records_per_page);
-            let end_whole = (slots.end / records_per_page).max(first_whole);
-            let mut tasks: Vec<PageTask> = (first_whole..end_whole)
+            let blocks = (slots.end - slots.start).div_ceil(BLOCK_SLOTS);
+            let mut level_parts: Vec<PagePart> = (0..blocks)
                 .into_par_iter()
-                .filter_map(|page| {
-                    let first = page * records_per_page;
-                    rows_of(k, &shape, first..first + records_per_page).map(|y| PageTask { page, y })
+                .flat_map_iter(|block| {
+                    let start = slots.start + block * BLOCK_SLOTS;
+                    let end = (start + BLOCK_SLOTS).min(slots.end);
+                    let pages = start / records_per_page..(end - 1) / records_per_page + 1;
+                    pages.filter_map(move |page| {
+                        let first = start.max(page * records_per_page);
+                        let last = end.min((page + 1) * records_per_page);
+                        let y = rows_of(k, &shape, first..last)?;
+                        Some(PagePart { first, count: (last - first) as u32, y })
+                    })
                 })
                 .collect();
-            tasks.sort_unstable_by_key(|t| (t.y[1], t.page));
-            for task in &tasks {
-                present[task.page as usize] = true;
+            level_parts.sort_unstable_by_key(|p| (p.y[1], p.first));
+            for part in &level_parts {
+                parts[(part.first / records_per_page) as usize] += 1;
             }
-            let edges = if first_whole == end_whole {
-                [slots.start..slots.end, 0..0]
-            } else {
-                [slots.start..first_whole * records_per_page, end_whole * records_per_page..slots.end]
-            };
-            let mut singles = Vec::new();
-            for slot in edges.into_iter().flatten() {
-                if let Some(p) = point_of(k, slot).filter(|p| !shape.is_beyond(*p)) {
-                    present[(slot / records_per_page) as usize] = true;
-                    singles.push(SlotTask { y: p.y(), slot });
-                }
-            }
-            singles.sort_unstable_by_key(|t| (t.y, t.slot));
-            let span = tasks.iter().map(|t| t.y[1] - t.y[0]).max().unwrap_or(0);
-            levels.push(LevelPlan { pages: tasks, slots: singles, span });
+            let span = level_parts.iter().map(|p| p.y[1] - p.y[0]).max().unwrap_or(0);
+            levels.push(LevelPlan { parts: level_parts, span });
         }
-        Ok(Self { levels, present })
+        Ok(Self { levels, parts })
     }
 }
 
@@ -168,29 +156,26 @@ mod tests {
             let grid = Grid::new(samples, [1.0, 1.0]).unwrap();
             let k = grid.k();
             let plan = Plan::new(&grid, per_page).unwrap();
-            let mut tasks = 0;
-            for (page, present) in plan.present.iter().enumerate() {
-                let slots = page as u64 * per_page..(page as u64 + 1) * per_page;
-                let points: Vec<GridPoint> = slots
-                    .clone()
+            let mut planned = 4;
+            let mut seen = vec![0u8; plan.parts.len()];
+            seen[0] = 1;
+            for part in plan.levels.iter().flat_map(|l| &l.parts) {
+                seen[(part.first / per_page) as usize] += 1;
+                assert_eq!(part.first / per_page, (part.first + u64::from(part.count) - 1) / per_page);
+                let rows: Vec<u32> = (part.first..part.first + u64::from(part.count))
                     .filter_map(|s| point_of(k, s))
-                    .filter(|p| grid.is_corner(*p) || !grid.is_beyond(*p, grid.level(*p)))
+                    .filter(|p| !grid.is_beyond(*p, grid.level(*p)))
+                    .map(GridPoint::y)
                     .collect();
-                assert_eq!(*present, !points.is_empty(), "page {page} of {samples:?}");
-                let task = plan.levels.iter().flat_map(|l| &l.pages).find(|t| t.page == page as u64);
-                if let Some(task) = task {
-                    let low = points.iter().map(|p| p.y()).min().unwrap();
-                    let high = points.iter().map(|p| p.y()).max().unwrap();
-                    assert!(task.y[0] <= low && task.y[1] >= high, "{task:?} {low} {high}");
-                    tasks += points.len();
-                }
+                assert!(rows.iter().all(|y| (part.y[0]..=part.y[1]).contains(y)) && !rows.is_empty());
+                planned += rows.len();
             }
-            let singles: usize = plan.levels.iter().map(|l| l.slots.len()).sum();
+            assert_eq!(seen, plan.parts);
             let all = (0..slot_count(k))
                 .filter_map(|s| point_of(k, s))
-                .filter(|p| !grid.is_corner(*p) && !grid.is_beyond(*p, grid.level(*p)))
+                .filter(|p| grid.is_corner(*p) || !grid.is_beyond(*p, grid.level(*p)))
                 .count();
-            assert_eq!(tasks + singles, all);
+            assert_eq!(planned, all);
         }
     }
 }

@@ -165,7 +165,8 @@ impl<'a> Tile<'a> {
                     for row in y - s + 1..y + s {
                         let along = row + s - y; // 1..2s from the south
                         let diagonal = if rising { x - s + along } else { x + s - along };
-                        let (from, to) = if apex_east { (diagonal, x + s - 1) } else { (x - s + 1, diagonal) };
+                        let (from, to) =
+                            if apex_east { (diagonal, x + s - 1) } else { (x - s + 1, diagonal) };
                         farthest = farthest.max(self.row(&plane, from, to, row));
                     }
                 }

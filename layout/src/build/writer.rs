@@ -1,56 +1,62 @@
-//! Records into pages, pages into the file: gathers each planned page once its last row is known, then closes the gaps that
+//! Records into pages, pages into the file: gathers the parts of each planned page once their last row is known, then closes the gaps that
 //! all-void pages left and writes directory and header.
 //!
 //! Pages are gathered in parallel and land at places fixed by the plan, so threads and order do not show in the bytes.
 
 use super::levels::{LevelShape, Levels};
-use super::plan::{LevelPlan, Plan};
+use super::plan::{LevelPlan, PagePart, Plan};
 use crate::atomic_file::{AtomicFile, read_at, write_at};
 use crate::bytes::{PAGE_BYTES, Page, checksum};
 use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::header::{Header, INERT_PAGE};
-use crate::order::point_of;
-use crate::record::RecordCodec;
+use crate::order::{BLOCK_SLOTS, BlockPoints, level_slots};
+use crate::record::{RecordCodec, RecordKind};
 use crate::terrain::inert_page;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
 const PAGE: u64 = PAGE_BYTES as u64;
+/// Parts gathered before their pages are written.
+const PAGES_AT_ONCE: usize = 1024;
 
 /// Writes the pages of one file.
 pub(super) struct PageWriter<'a, C: RecordCodec> {
     file: &'a AtomicFile,
     grid: Grid,
     levels: Vec<LevelPlan>,
-    next: Vec<[usize; 2]>,
+    /// Next part of each level.
+    next: Vec<usize>,
     /// Place of each logical page as planned, then as written.
     entries: Vec<Entry>,
-    /// Pages shared by several levels, until all is known.
-    shared: BTreeMap<u64, Box<Page>>,
+    /// Parts that each logical page still lacks.
+    lacking: Vec<u8>,
+    /// Pages of which some parts are known.
+    open: HashMap<u64, Box<Page>>,
     inert: Box<Page>,
     codec: std::marker::PhantomData<C>,
 }
 
 impl<'a, C: RecordCodec> PageWriter<'a, C> {
-    pub(super) fn new(file: &'a AtomicFile, grid: Grid, plan: Plan, kind: crate::record::RecordKind) -> Self {
+    pub(super) fn new(file: &'a AtomicFile, grid: Grid, plan: Plan, kind: RecordKind) -> Self {
         let mut page = INERT_PAGE;
         let entries = plan
-            .present
+            .parts
             .iter()
-            .map(|present| {
-                page += u32::from(*present);
-                Entry { page: if *present { page } else { 0 }, ..Entry::default() }
+            .map(|parts| {
+                page += u32::from(*parts > 0);
+                Entry { page: if *parts > 0 { page } else { 0 }, ..Entry::default() }
             })
             .collect();
         Self {
             file,
             grid,
-            next: vec![[0; 2]; plan.levels.len()],
+            next: vec![0; plan.levels.len()],
             levels: plan.levels,
             entries,
-            shared: BTreeMap::new(),
+            lacking: plan.parts,
+            open: HashMap::new(),
             inert: inert_page(kind),
             codec: std::marker::PhantomData,
         }
@@ -60,8 +66,8 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         LayoutError::io(self.file.target(), "cannot write the terrain file", e)
     }
 
-    /// Writes the pages of `level` that are complete now that all its rows up to `done_y` are; returns the least y whose rows later pages
-    /// need.
+    /// Gathers the parts of `level` that are complete now that all its rows up to `done_y` are, and writes the pages that are; returns the
+    /// least y whose rows later parts need.
     pub(super) fn advance(
         &mut self,
         level: u32,
@@ -70,76 +76,65 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     ) -> Result<i64, LayoutError> {
         let shape = LevelShape::new(&self.grid, level);
         let plan = &self.levels[level as usize];
-        let [next_page, next_slot] = self.next[level as usize];
-        let pages = plan.pages[next_page..].partition_point(|t| i64::from(t.y[1]) <= done_y);
-        let slots = plan.slots[next_slot..].partition_point(|t| i64::from(t.y) <= done_y);
-        // The checksum of each page written; none for one that is inert after all.
-        let written: Vec<(u64, Option<u32>)> = plan.pages[next_page..next_page + pages]
-            .par_iter()
-            .with_min_len(16)
-            .map(|task| {
-                let page = self.gather(task.page, &shape, records);
-                if *page == *self.inert {
-                    return Ok((task.page, None));
-                }
-                let place = self.entries[task.page as usize].page;
-                write_at(self.file.file(), &page[..], u64::from(place) * PAGE).map_err(|e| self.failed(e))?;
-                Ok((task.page, Some(checksum(&page[..]))))
-            })
-            .collect::<Result<_, LayoutError>>()?;
-        for task in &plan.slots[next_slot..next_slot + slots] {
-            let raw = self.record(task.slot, &shape, records);
-            put_shared::<C>(&mut self.shared, &self.inert, task.slot, raw);
-        }
-        for (page, sum) in written {
-            if let Some(sum) = sum {
-                let entry = &mut self.entries[page as usize];
-                (entry.checksum, entry.generation) = (sum, 1);
+        let waiting = &plan.parts[self.next[level as usize]..];
+        let ready = waiting.partition_point(|p| i64::from(p.y[1]) <= done_y);
+        // Batches bound the memory of pages on their way to the file.
+        for batch in waiting[..ready].chunks(PAGES_AT_ONCE) {
+            let gathered: Vec<Vec<u8>> =
+                batch.par_iter().with_min_len(16).map(|part| self.gather(part, &shape, records)).collect();
+            let mut complete = Vec::new();
+            for (part, bytes) in batch.iter().zip(gathered) {
+                complete.extend(put(
+                    &mut self.open,
+                    &mut self.lacking,
+                    &self.inert,
+                    C::BYTES,
+                    part.first,
+                    &bytes,
+                ));
             }
+            let file = self.file;
+            write_pages(file, &mut self.entries, &self.inert, complete)
+                .map_err(|e| LayoutError::io(file.target(), "cannot write the terrain file", e))?;
         }
-        self.next[level as usize] = [next_page + pages, next_slot + slots];
-        let plan = &self.levels[level as usize];
-        let waiting_page =
-            plan.pages.get(next_page + pages).map(|t| i64::from(t.y[1]) - i64::from(plan.span));
-        let waiting_slot = plan.slots.get(next_slot + slots).map(|t| i64::from(t.y));
-        Ok(waiting_page.into_iter().chain(waiting_slot).min().unwrap_or(i64::MAX))
+        self.next[level as usize] += ready;
+        let later = waiting.get(ready).map(|p| i64::from(p.y[1]) - i64::from(plan.span));
+        Ok(later.unwrap_or(i64::MAX))
     }
 
-    fn record(&self, slot: u64, shape: &LevelShape, records: &Levels<C::Raw>) -> C::Raw {
-        point_of(self.grid.k(), slot)
-            .filter(|p| !shape.is_beyond(*p))
-            .and_then(|p| {
-                let (row, column) = shape.index(p);
-                records.row(shape.level(), row)?.get(column).copied()
-            })
-            .unwrap_or(C::INERT)
-    }
-
-    fn gather(&self, page: u64, shape: &LevelShape, records: &Levels<C::Raw>) -> Box<Page> {
-        let mut bytes = Box::new([0; PAGE_BYTES]);
-        let first = page * (PAGE_BYTES / C::BYTES) as u64;
+    /// The bytes of a part's records.
+    fn gather(&self, part: &PagePart, shape: &LevelShape, records: &Levels<C::Raw>) -> Vec<u8> {
+        let mut bytes = vec![0; part.count as usize * C::BYTES];
+        let offset = part.first - level_slots(self.grid.k(), shape.level()).start;
+        let within = (offset % BLOCK_SLOTS) as usize;
+        let block = BlockPoints::new(self.grid.k(), shape.level(), offset - within as u64);
         for (i, place) in bytes.chunks_exact_mut(C::BYTES).enumerate() {
-            C::write(self.record(first + i as u64, shape, records), place);
+            let raw = block
+                .point(within + i)
+                .filter(|p| !shape.is_beyond(*p))
+                .and_then(|p| {
+                    let (row, column) = shape.index(p);
+                    records.row(shape.level(), row)?.get(column).copied()
+                })
+                .unwrap_or(C::INERT);
+            C::write(raw, place);
         }
         bytes
     }
 
-    /// Sets a record outside the levels: a corner's.
-    pub(super) fn set(&mut self, slot: u64, raw: C::Raw) {
-        put_shared::<C>(&mut self.shared, &self.inert, slot, raw);
+    /// Sets the records of the corners, slots 0 to 3.
+    pub(super) fn set_corners(&mut self, corners: [C::Raw; 4]) -> Result<(), LayoutError> {
+        let mut bytes = vec![0; 4 * C::BYTES];
+        for (raw, place) in corners.into_iter().zip(bytes.chunks_exact_mut(C::BYTES)) {
+            C::write(raw, place);
+        }
+        let complete = put(&mut self.open, &mut self.lacking, &self.inert, C::BYTES, 0, &bytes);
+        write_pages(self.file, &mut self.entries, &self.inert, complete.into_iter().collect())
+            .map_err(|e| self.failed(e))
     }
 
     /// Writes what remains, closes gaps, and gives `header` its places.
     pub(super) fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
-        let shared = std::mem::take(&mut self.shared);
-        for (page, bytes) in shared {
-            let entry = &mut self.entries[page as usize];
-            if *bytes != *self.inert {
-                (entry.checksum, entry.generation) = (checksum(&bytes[..]), 1);
-                let place = u64::from(entry.page) * PAGE;
-                write_at(self.file.file(), &bytes[..], place).map_err(|e| self.failed(e))?;
-            }
-        }
         let end = self.close_gaps()?;
         let mut root = vec![0; self.entries.len().div_ceil(ENTRIES_PER_LEAF) * ENTRY_BYTES];
         let mut page = end;
@@ -188,9 +183,43 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     }
 }
 
-/// Sets the record of a slot in a shared page.
-fn put_shared<C: RecordCodec>(shared: &mut BTreeMap<u64, Box<Page>>, inert: &Page, slot: u64, raw: C::Raw) {
-    let per_page = (PAGE_BYTES / C::BYTES) as u64;
-    let page = shared.entry(slot / per_page).or_insert_with(|| Box::new(*inert));
-    C::write(raw, &mut page[(slot % per_page) as usize * C::BYTES..]);
+/// Puts the bytes of records of `record` bytes from slot `first` into their page; returns the page if that completes it.
+fn put(
+    open: &mut HashMap<u64, Box<Page>>,
+    lacking: &mut [u8],
+    inert: &Page,
+    record: usize,
+    first: u64,
+    bytes: &[u8],
+) -> Option<(u64, Box<Page>)> {
+    let per_page = (PAGE_BYTES / record) as u64;
+    let number = first / per_page;
+    let at = (first % per_page) as usize * record;
+    let page = open.entry(number).or_insert_with(|| Box::new(*inert));
+    page[at..at + bytes.len()].copy_from_slice(bytes);
+    lacking[number as usize] -= 1;
+    if lacking[number as usize] > 0 {
+        return None;
+    }
+    open.remove(&number).map(|page| (number, page))
+}
+
+/// Writes complete pages to their planned places and notes their checksums; pages that are inert after all are left out.
+fn write_pages(
+    file: &AtomicFile,
+    entries: &mut [Entry],
+    inert: &Page,
+    pages: Vec<(u64, Box<Page>)>,
+) -> std::io::Result<()> {
+    let sums: Vec<Option<u32>> =
+        pages.par_iter().map(|(_, page)| (**page != *inert).then(|| checksum(&page[..]))).collect();
+    // One after the other: writers to one file would only wait for each other.
+    for ((number, page), sum) in pages.iter().zip(sums) {
+        if let Some(sum) = sum {
+            let entry = &mut entries[*number as usize];
+            write_at(file.file(), &page[..], u64::from(entry.page) * PAGE)?;
+            (entry.checksum, entry.generation) = (sum, 1);
+        }
+    }
+    Ok(())
 }
