@@ -17,5 +17,6 @@ pub mod record;
 pub mod source;
 pub mod synth;
 pub mod terrain;
+pub mod verify;
 
 pub use error::LayoutError;

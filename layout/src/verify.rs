@@ -1,0 +1,154 @@
+//! Whether a terrain file is sound: every page against its checksum, every page number used once, and what section 3 of FORMAT.md
+//! promises of the records.
+//!
+//! Opening checks header, directory and inert page; this checks the rest, in three passes. [`structure`] looks at page numbers,
+//! `checksums` below reads every record page once, [`nesting`] decodes every record of every sound page and looks at its children.
+//! Cost: each page is read some ten times, never more than a few hundred kilobytes a thread are held. Not covered, for nothing depends
+//! on them: the header slot that is not current, the bytes after the directory root's last entry, pages that no directory reaches.
+//!
+//! Invariant: a report without problems means that every promise refinement relies on holds for the bytes as they were read.
+
+mod nesting;
+mod structure;
+
+use crate::bytes::{PAGE_BYTES, checksum};
+use crate::error::LayoutError;
+use crate::record::{Compact, Exact8, Exact16, RecordKind};
+use crate::terrain::Terrain;
+use rayon::prelude::*;
+use std::fmt;
+
+/// Problems that a report lists one by one.
+pub const LISTED_PROBLEMS: usize = 20;
+
+/// Pages that one task works through.
+const TASK_PAGES: usize = 64;
+
+/// Something in a file that is not as FORMAT.md says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Problem {
+    /// Where: "record page 17 (file page 20)", "directory leaf 3", "header".
+    pub place: String,
+    /// What is wrong there.
+    pub problem: String,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.place, self.problem)
+    }
+}
+
+/// What [`verify`] found.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct VerifyReport {
+    /// Record pages read and held against their checksum.
+    pub pages_checked: u64,
+    /// Vertices whose records were decoded and compared with their children's.
+    pub vertices_checked: u64,
+    /// The first [`LISTED_PROBLEMS`] problems, in file order within each pass; at most one a page and pass.
+    pub problems: Vec<Problem>,
+    /// All problems.
+    pub problem_count: u64,
+}
+
+impl VerifyReport {
+    /// Whether the file is sound.
+    pub fn is_sound(&self) -> bool {
+        self.problem_count == 0
+    }
+}
+
+/// Problems as they are found: the first ones kept, all counted. Merging in file order keeps the first in file order.
+#[derive(Debug, Default)]
+struct Findings {
+    listed: Vec<Problem>,
+    count: u64,
+}
+
+impl Findings {
+    fn add(&mut self, place: String, problem: impl Into<String>) {
+        self.count += 1;
+        if self.listed.len() < LISTED_PROBLEMS {
+            self.listed.push(Problem { place, problem: problem.into() });
+        }
+    }
+
+    fn merge(mut self, other: Self) -> Self {
+        self.count += other.count;
+        let room = LISTED_PROBLEMS - self.listed.len();
+        self.listed.extend(other.listed.into_iter().take(room));
+        self
+    }
+}
+
+/// What is told apart when a page is named.
+fn record_page(terrain: &Terrain, page: usize) -> String {
+    match terrain.entries().get(page) {
+        Some(entry) if entry.is_present() => format!("record page {page} (file page {})", entry.page),
+        _ => format!("record page {page} (absent)"),
+    }
+}
+
+/// Pages of work that [`verify`] reports to its `progress`, in sum.
+pub fn verify_pages(terrain: &Terrain) -> u64 {
+    2 * terrain.header().stored_pages
+}
+
+/// Checks the whole file on the current rayon pool. `progress` hears how many more pages are done, [`verify_pages`] in sum.
+///
+/// # Errors
+/// Only if the file cannot be read; what is wrong in it is the report's business.
+pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<VerifyReport, LayoutError> {
+    let findings = structure::check(terrain)?;
+    let present: Vec<u32> =
+        (0u32..).zip(terrain.entries()).filter(|(_, e)| e.is_present()).map(|(page, _)| page).collect();
+    let (damaged, wrong_sums) = checksums(terrain, &present, progress)?;
+    let (grid, scale) = (terrain.grid(), &terrain.header().scale);
+    let (records, vertices) = match terrain.header().record_kind {
+        RecordKind::Compact => {
+            nesting::check(terrain, &Compact::new(grid, scale), &present, &damaged, progress)?
+        }
+        RecordKind::Exact8 => {
+            nesting::check(terrain, &Exact8::new(grid, scale), &present, &damaged, progress)?
+        }
+        RecordKind::Exact16 => {
+            nesting::check(terrain, &Exact16::new(grid, scale), &present, &damaged, progress)?
+        }
+    };
+    let Findings { listed, count } = findings.merge(wrong_sums).merge(records);
+    Ok(VerifyReport {
+        pages_checked: present.len() as u64,
+        vertices_checked: vertices,
+        problems: listed,
+        problem_count: count,
+    })
+}
+
+/// Reads every record page and holds it against its checksum; gives the pages that do not match, sorted.
+fn checksums(
+    terrain: &Terrain,
+    present: &[u32],
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<(Vec<u32>, Findings), LayoutError> {
+    let task = |pages: &[u32]| {
+        let mut bytes = Box::new([0; PAGE_BYTES]);
+        let mut damaged = Vec::new();
+        for &page in pages {
+            let entry = terrain.entries()[page as usize];
+            terrain.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, &mut bytes[..])?;
+            if checksum(&bytes[..]) != entry.checksum {
+                damaged.push(page);
+            }
+        }
+        progress(pages.len() as u64);
+        Ok::<_, LayoutError>(damaged)
+    };
+    let damaged: Vec<Vec<u32>> = present.par_chunks(TASK_PAGES).map(task).collect::<Result<_, _>>()?;
+    let damaged = damaged.concat();
+    let mut findings = Findings::default();
+    for &page in &damaged {
+        findings.add(record_page(terrain, page as usize), "the checksum does not match");
+    }
+    Ok((damaged, findings))
+}

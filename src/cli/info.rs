@@ -1,0 +1,113 @@
+//! `terrasoar info`: what a terrain file says about itself.
+
+use super::output::{decimal, grouped, print, print_json, table};
+use super::terrain;
+use anyhow::Result;
+use serde::Serialize;
+use std::path::PathBuf;
+use terrasoar_layout::terrain::Terrain;
+
+/// Show what a terrain file says about itself.
+///
+/// Reads header and directory only, so it takes no time however large the file.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar info alps.iqt
+  terrasoar info alps.iqt --json | jq .spacing_m")]
+pub(super) struct Args {
+    /// Terrain file (.iqt)
+    file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Info {
+    path: String,
+    /// Format of the DEM.
+    source: String,
+    samples: [u32; 2],
+    k: u32,
+    spacing_m: [f64; 2],
+    spacing_origin: String,
+    extent_m: [f64; 2],
+    height_range_m: [f64; 2],
+    height_step_m: f64,
+    heights_rounded: bool,
+    nodata_samples: u64,
+    crs: Option<String>,
+    epsg: Option<u32>,
+    /// Samples east and north of the south-west one to coordinates: x = m0 + m1 x + m2 y, y = m3 + m4 x + m5 y.
+    sample_to_crs: Option<[f64; 6]>,
+    record: &'static str,
+    record_bytes: usize,
+    error: &'static str,
+    /// Record pages stored; pages of nothing but padding and void are left out.
+    pages: u64,
+    logical_pages: u64,
+    generation: u32,
+    file_bytes: u64,
+    bytes_per_sample: f64,
+}
+
+impl Info {
+    fn of(terrain: &Terrain) -> Self {
+        let header = terrain.header();
+        Self {
+            path: terrain.path().display().to_string(),
+            source: header.source.clone(),
+            samples: header.grid.samples(),
+            k: header.grid.k(),
+            spacing_m: header.grid.spacing_m(),
+            spacing_origin: terrain::spacing_origin(header),
+            extent_m: header.grid.extent_m(),
+            height_range_m: header.height_range_m,
+            height_step_m: header.scale.height_step_m,
+            heights_rounded: header.heights_rounded,
+            nodata_samples: header.nodata_samples,
+            crs: terrain::crs(header),
+            epsg: header.epsg,
+            sample_to_crs: header.sample_to_crs,
+            record: header.record_kind.name(),
+            record_bytes: header.record_kind.bytes(),
+            error: header.error_kind.name(),
+            pages: header.stored_pages,
+            logical_pages: header.record_pages(),
+            generation: header.generation,
+            file_bytes: header.file_bytes,
+            bytes_per_sample: terrain.bytes_per_sample(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let pair = |[a, b]: [f64; 2], digits| format!("{} x {}", decimal(a, digits), decimal(b, digits));
+        let rounded = if self.heights_rounded { ", heights rounded to it" } else { "" };
+        table(&[
+            ("file", self.path.clone()),
+            ("made from", self.source.clone()),
+            ("samples", format!("{} x {}", grouped(self.samples[0].into()), grouped(self.samples[1].into()))),
+            ("k", format!("{} (a square of 2^{} steps)", self.k, self.k)),
+            ("spacing", format!("{} m, {}", pair(self.spacing_m, 4), self.spacing_origin)),
+            ("extent", format!("{} m", pair(self.extent_m, 1))),
+            (
+                "heights",
+                format!("{} to {} m", decimal(self.height_range_m[0], 3), decimal(self.height_range_m[1], 3)),
+            ),
+            ("height step", format!("{} m{rounded}", decimal(self.height_step_m, 6))),
+            ("no data", format!("{} samples", grouped(self.nodata_samples))),
+            ("reference system", self.crs.clone().unwrap_or_else(|| "unknown".into())),
+            ("records", format!("{}, {} bytes each", self.record, self.record_bytes)),
+            ("error", self.error.to_owned()),
+            ("pages", format!("{} of {} stored", grouped(self.pages), grouped(self.logical_pages))),
+            ("file size", format!("{} bytes", grouped(self.file_bytes))),
+            ("a sample", format!("{:.2} bytes", self.bytes_per_sample)),
+        ])
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    let info = Info::of(&terrain::open(&args.file)?);
+    if args.json { print_json(&info) } else { print(&info.text()) }
+}

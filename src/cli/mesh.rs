@@ -1,0 +1,60 @@
+//! `terrasoar mesh`: one frame's triangles as a file that other programs read.
+
+use super::mesh_file::{self, Format};
+use super::output::{check_output, grouped, print};
+use super::replay::QualityArgs;
+use super::{parse, terrain};
+use anyhow::Result;
+use std::path::PathBuf;
+use terrasoar::flight::Flight;
+use terrasoar::flyover::{EngineKind, frame_mesh};
+
+/// Write the triangles of one frame of a flight as PLY or OBJ.
+///
+/// Coordinates are metres east, north and up of the south-west sample. The engine flies all frames before it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar mesh alps.iqt --flight low.flight --frame 0 --engine smart -o frame.ply
+  terrasoar mesh alps.iqt --flight low.flight --frame 99 --engine soar --tolerance-px 4 -o frame.obj")]
+pub(super) struct Args {
+    /// Terrain file (.iqt)
+    file: PathBuf,
+    /// Flight file
+    #[arg(long, value_name = "F")]
+    flight: PathBuf,
+    /// Frame, from 0
+    #[arg(long, value_name = "N")]
+    frame: usize,
+    /// Engine
+    #[arg(long, value_name = "ENGINE", value_parser = parse::engine())]
+    engine: EngineKind,
+    #[command(flatten)]
+    quality: QualityArgs,
+    /// File to write: binary PLY or OBJ by its extension
+    #[arg(short, long, value_name = "OUT.(ply|obj)", value_parser = |text: &str| parse::with_extension(text, &["ply", "obj"]))]
+    output: PathBuf,
+    /// Write PLY as text
+    #[arg(long)]
+    ascii: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    check_output(&args.output, &[&args.file, &args.flight])?;
+    let is_obj = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+    let format = match (is_obj, args.ascii) {
+        (true, _) => Format::Obj,
+        (false, true) => Format::PlyText,
+        (false, false) => Format::PlyBinary,
+    };
+    let terrain = terrain::open(&args.file)?;
+    let flight = Flight::read(&args.flight)?;
+    let mesh = frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine)?;
+    mesh_file::write(&args.output, &mesh, format)?;
+    print(&format!(
+        "{}: {} triangles, {} vertices",
+        args.output.display(),
+        grouped(mesh.triangles.len() as u64),
+        grouped(mesh.positions.len() as u64)
+    ))
+}

@@ -1,0 +1,126 @@
+//! The command line: what was typed becomes a checked plan, and one match hands it to one function a verb.
+//!
+//! Each verb is a file with its arguments, help and function; clap and the value parsers in [`parse`] check what can be checked without
+//! opening a file. Results go to standard output, everything else to standard error. **Exit codes: 0 done, 1 failed, 2 the command line
+//! itself is wrong.** A reader that closes our output early ends the program quietly.
+
+mod build;
+mod compare;
+mod flight;
+mod ground;
+mod height;
+mod info;
+mod mesh;
+mod mesh_file;
+mod output;
+mod parse;
+mod progress;
+mod replay;
+mod sweep;
+mod synth;
+mod terrain;
+mod verify;
+
+use clap::{Parser, Subcommand};
+use std::fmt;
+use std::process::ExitCode;
+
+/// Fly over terrain far larger than memory.
+///
+/// A DEM goes in (16-bit PNG, VTP BT, SRTM .hgt, GeoTIFF), a terrain file (.iqt) comes out, and recorded flights are replayed over it, out of
+/// core, with every visible sample within a tolerance in pixels.
+#[derive(Debug, Parser)]
+#[command(
+    name = "terrasoar",
+    version,
+    after_help = "\
+Examples, in the order of the work:
+  terrasoar build alps.tif -o alps.iqt
+  terrasoar info alps.iqt
+  terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
+  terrasoar compare alps.iqt --flight alps.flight --engines soar,smart -o report
+
+No elevation data at hand: terrasoar synth --size 4097 --seed 1 -o land.tif
+Exit codes: 0 done, 1 failed, 2 wrong command line."
+)]
+struct Typed {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    Build(build::Args),
+    Info(info::Args),
+    Verify(verify::Args),
+    Height(height::Args),
+    Synth(synth::Args),
+    Flight(flight::Args),
+    Replay(replay::Args),
+    Compare(compare::Args),
+    Mesh(mesh::Args),
+}
+
+/// A command line that clap accepts and that still makes no sense.
+#[derive(Debug)]
+struct WrongUsage(String);
+
+impl fmt::Display for WrongUsage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for WrongUsage {}
+
+/// The whole program.
+pub(crate) fn run() -> ExitCode {
+    let done = match Typed::parse().verb {
+        Verb::Build(args) => build::run(&args),
+        Verb::Info(args) => info::run(&args),
+        Verb::Verify(args) => verify::run(&args),
+        Verb::Height(args) => height::run(&args),
+        Verb::Synth(args) => synth::run(&args),
+        Verb::Flight(args) => flight::run(&args),
+        Verb::Replay(args) => replay::run(&args),
+        Verb::Compare(args) => compare::run(&args),
+        Verb::Mesh(args) => mesh::run(&args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::complain(&format!("error: {}", message(&error)));
+            ExitCode::from(if error.is::<WrongUsage>() { 2 } else { 1 })
+        }
+    }
+}
+
+/// The chain of causes in one line; causes that their effect already spells out are not repeated.
+fn message(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if text.is_empty() {
+            text = cause;
+        } else if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        <Typed as clap::CommandFactory>::command().debug_assert();
+    }
+
+    #[test]
+    fn causes_are_told_once() {
+        let error = anyhow::anyhow!("disk full").context("f: cannot write: disk full").context("no report");
+        assert_eq!(message(&error), "no report: f: cannot write: disk full");
+    }
+}

@@ -1,0 +1,128 @@
+//! What a verb prints: text or one JSON object on standard output, complaints on standard error, and checks of where files may go.
+
+use anyhow::{Context, Result, bail};
+use serde::Serialize;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// What fails when standard output does.
+const TO_STDOUT: &str = "cannot write to standard output";
+
+/// Prints lines to standard output.
+pub(super) fn print(text: &str) -> Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes())
+        .and_then(|()| if text.ends_with('\n') { Ok(()) } else { out.write_all(b"\n") })
+        .and_then(|()| out.flush())
+        .context(TO_STDOUT)
+}
+
+/// Prints one JSON object to standard output.
+pub(super) fn print_json(value: &impl Serialize) -> Result<()> {
+    print(&serde_json::to_string_pretty(value).context("cannot put the result into JSON")?)
+}
+
+/// Prints a line to standard error. If nobody can read it there is nobody to tell.
+pub(super) fn complain(line: &str) {
+    let _ = writeln!(io::stderr().lock(), "{line}");
+}
+
+/// Whether an error is that the reader of our output has gone. A broken pipe elsewhere is a failure like any other.
+pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let is_pipe = |e: &io::Error| e.kind() == io::ErrorKind::BrokenPipe;
+    error.to_string() == TO_STDOUT
+        && error.chain().any(|cause| cause.downcast_ref::<io::Error>().is_some_and(is_pipe))
+}
+
+/// Refuses an output that would replace one of the inputs, or something that is not a plain file.
+pub(super) fn check_output(out: &Path, inputs: &[&Path]) -> Result<()> {
+    let Ok(meta) = std::fs::metadata(out) else { return Ok(()) };
+    if meta.is_dir() {
+        bail!("{}: the output is a folder; name a file in it", out.display());
+    }
+    if !meta.is_file() {
+        bail!(
+            "{}: the output is a device or pipe, which would be replaced by a file; name a file",
+            out.display()
+        );
+    }
+    let real = std::fs::canonicalize(out);
+    for input in inputs {
+        if let (Ok(real), Ok(input)) = (&real, std::fs::canonicalize(input))
+            && *real == input
+        {
+            bail!("{}: the output is the input, which would be lost; name another file", out.display());
+        }
+    }
+    Ok(())
+}
+
+/// Lines of names and values, the values aligned.
+pub(super) fn table(rows: &[(&str, String)]) -> String {
+    let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0) + 2;
+    rows.iter().map(|(name, value)| format!("{name:width$}{value}\n")).collect()
+}
+
+/// Rows of cells in columns: the first aligned left, the others right.
+pub(super) fn columns(rows: &[Vec<String>]) -> String {
+    let count = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |i: usize| rows.iter().filter_map(|row| row.get(i)).map(String::len).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..count).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells: Vec<String> = row
+            .iter()
+            .zip(&widths)
+            .enumerate()
+            .map(|(i, (cell, w))| if i == 0 { format!("{cell:w$}") } else { format!("{cell:>w$}") })
+            .collect();
+        format!("{}\n", cells.join("  ").trim_end())
+    };
+    rows.iter().map(line).collect()
+}
+
+/// A whole number with its thousands set apart.
+pub(super) fn grouped(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A number of at most `digits` decimals, without zeros at its end.
+pub(super) fn decimal(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    if !text.contains('.') {
+        return text;
+    }
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!(
+            [0, 12, 999, 1000, 1_234_567].map(grouped),
+            ["0", "12", "999", "1,000", "1,234,567"].map(String::from)
+        );
+        assert_eq!(decimal(1234.5, 3), "1234.5");
+        assert_eq!(decimal(-0.0001, 3), "0");
+        assert_eq!(decimal(20.0, 0), "20");
+        assert_eq!(decimal(12.000_000_1, 6), "12");
+    }
+
+    #[test]
+    fn columns_line_up() {
+        let rows = [vec!["engine".to_owned(), "tests".to_owned()], vec!["soar".to_owned(), "5".to_owned()]];
+        assert_eq!(columns(&rows), "engine  tests\nsoar        5\n");
+        assert_eq!(table(&[("k", "10".into()), ("error", "step".into())]), "k      10\nerror  step\n");
+    }
+}

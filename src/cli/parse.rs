@@ -1,0 +1,140 @@
+//! Words of the command line that are more than a number: each parser says what it takes when it refuses.
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use std::path::PathBuf;
+use terrasoar::flight::generate::FlightKind;
+use terrasoar::flyover::EngineKind;
+use terrasoar::view::Viewport;
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("`{text}` is not a finite decimal number")),
+    }
+}
+
+/// A number above 0.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("it must be above 0".into()) })
+}
+
+/// A number that is 0 or more.
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("it must not be negative".into()) })
+}
+
+/// Any number.
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    number(text)
+}
+
+/// A percentage above 0, at most 100.
+pub(super) fn percent(text: &str) -> Result<f64, String> {
+    positive(text).and_then(|v| if v <= 100.0 { Ok(v) } else { Err("it must be at most 100".into()) })
+}
+
+/// A tolerance in pixels.
+pub(super) fn tolerance_px(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| {
+        if (0.01..=10_000.0).contains(&v) {
+            Ok(v)
+        } else {
+            Err("it must be from 0.01 to 10000 pixels".into())
+        }
+    })
+}
+
+/// `M` or `MX,MY`: metres between samples, east and north.
+pub(super) fn spacing_m(text: &str) -> Result<[f64; 2], String> {
+    let length = |word: &str| {
+        let metres = positive(word)?;
+        if (1e-3..=1e6).contains(&metres) {
+            Ok(metres)
+        } else {
+            Err("it must be from 0.001 to 1000000".to_owned())
+        }
+    };
+    match text.split_once(',') {
+        None => length(text).map(|m| [m, m]),
+        Some((east, north)) => Ok([length(east)?, length(north)?]),
+    }
+}
+
+/// `X,Y`: metres east and north.
+pub(super) fn place_m(text: &str) -> Result<[f64; 2], String> {
+    let (east, north) =
+        text.split_once(',').ok_or("give two numbers, metres east and north, such as 1500,820.5")?;
+    Ok([number(east)?, number(north)?])
+}
+
+/// `WIDTHxHEIGHT` in pixels.
+pub(super) fn viewport(text: &str) -> Result<Viewport, String> {
+    let side = |word: &str| match word.parse::<u32>() {
+        Ok(pixels) if (1..=65_536).contains(&pixels) => Ok(pixels),
+        _ => Err("give width and height in pixels, each from 1 to 65536, such as 800x600".to_owned()),
+    };
+    let (width, height) = text.split_once(['x', 'X']).ok_or("give width and height, such as 800x600")?;
+    Ok(Viewport { width_px: side(width)?, height_px: side(height)? })
+}
+
+/// Samples a side of synthetic terrain: 2^k + 1.
+pub(super) fn synth_size(text: &str) -> Result<u32, String> {
+    let size: u32 = text.parse().map_err(|_| format!("`{text}` is not a whole number"))?;
+    if (3..=65_537).contains(&size) && (size - 1).is_power_of_two() {
+        Ok(size)
+    } else {
+        Err("it must be 2^k + 1: 3, 5, 9, ... 1025, 2049, 4097, 8193, ... 65537".into())
+    }
+}
+
+/// A path whose extension is one of `allowed`, in lower case.
+pub(super) fn with_extension(text: &str, allowed: &[&str]) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if allowed.contains(&extension.as_str()) {
+        Ok(path)
+    } else {
+        Err(format!("the name must end in .{}", allowed.join(" or .")))
+    }
+}
+
+/// An engine by name.
+pub(super) fn engine() -> impl TypedValueParser<Value = EngineKind> {
+    PossibleValuesParser::new(EngineKind::ALL.map(EngineKind::name))
+        .try_map(|word| word.parse::<EngineKind>())
+}
+
+/// A kind of flight by name.
+pub(super) fn flight_kind() -> impl TypedValueParser<Value = FlightKind> {
+    PossibleValuesParser::new(FlightKind::ALL.map(FlightKind::name))
+        .try_map(|word| word.parse::<FlightKind>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_understood_or_refused() {
+        assert_eq!(spacing_m("10").unwrap(), [10.0, 10.0]);
+        assert_eq!(spacing_m("10.08,13.64").unwrap(), [10.08, 13.64]);
+        assert_eq!(place_m("-3,4e2").unwrap(), [-3.0, 400.0]);
+        assert_eq!(viewport("800x600").unwrap(), Viewport::default());
+        assert_eq!(synth_size("1025").unwrap(), 1025);
+        assert!(with_extension("a.b/c.TIF", &["tif", "png"]).is_ok());
+        for wrong in ["", "0", "-1", "nan", "inf", "1,2,3", "10,", "1e9"] {
+            assert!(spacing_m(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["", "5", "1,x", "1,nan"] {
+            assert!(place_m(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["800", "0x600", "800x", "800x600x3", "99999999x1"] {
+            assert!(viewport(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["1024", "2", "131073", "x"] {
+            assert!(synth_size(wrong).is_err(), "{wrong}");
+        }
+        assert!(percent("100.5").is_err() && tolerance_px("0").is_err() && not_negative("-1").is_err());
+        assert!(with_extension("a", &["ply"]).is_err());
+    }
+}

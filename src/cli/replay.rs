@@ -1,0 +1,110 @@
+//! `terrasoar replay`: a recorded flight through one engine.
+
+use super::output::{check_output, columns, grouped, print, print_json};
+use super::progress::Progress;
+use super::{parse, terrain};
+use anyhow::Result;
+use std::path::PathBuf;
+use terrasoar::flight::{Flight, FlightFrame};
+use terrasoar::flyover::{EngineKind, Quality, replay};
+use terrasoar::report::write_frames_csv;
+use terrasoar::stats::{FrameStats, ReplaySummary};
+use terrasoar::view::Viewport;
+use terrasoar_layout::terrain::Terrain;
+
+/// Fly a recorded flight with one engine and print what it cost.
+///
+/// naive: every triangle from scratch, by definition. soar: top-down refinement, every frame anew. smart: only what can have changed since
+/// the frame before. All give the same mesh. Everything printed but the times is the same in every replay.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar replay alps.iqt --flight low.flight --engine smart
+  terrasoar replay alps.iqt --flight low.flight --engine soar --tolerance-px 2 --stats frames.csv --json")]
+pub(super) struct Args {
+    /// Terrain file (.iqt)
+    file: PathBuf,
+    /// Flight file
+    #[arg(long, value_name = "F")]
+    flight: PathBuf,
+    /// Engine
+    #[arg(long, value_name = "ENGINE", value_parser = parse::engine())]
+    engine: EngineKind,
+    #[command(flatten)]
+    quality: QualityArgs,
+    /// Also write every frame's figures to this file
+    #[arg(long, value_name = "CSV")]
+    stats: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Picture and precision.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct QualityArgs {
+    /// Largest error on the screen in pixels
+    #[arg(long, value_name = "PX", default_value = "1", value_parser = parse::tolerance_px)]
+    tolerance_px: f64,
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = parse::viewport)]
+    viewport: Viewport,
+}
+
+impl QualityArgs {
+    pub(super) fn quality(self) -> Quality {
+        Quality { viewport: self.viewport, tolerance_px: self.tolerance_px }
+    }
+}
+
+/// Flies `frames` with one engine, showing progress under `title`.
+pub(super) fn fly(
+    terrain: &Terrain,
+    frames: &[FlightFrame],
+    quality: Quality,
+    engine: EngineKind,
+    title: &str,
+    progress: &Progress,
+) -> Result<Vec<FrameStats>> {
+    // One pass times, one counts.
+    progress.begin(title, 2 * frames.len() as u64);
+    Ok(replay(terrain, frames, quality, engine, &mut |done| progress.set(done))?)
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    if let Some(stats) = &args.stats {
+        check_output(stats, &[&args.file, &args.flight])?;
+    }
+    let terrain = terrain::open(&args.file)?;
+    let flight = Flight::read(&args.flight)?;
+    let progress = Progress::new("frames");
+    let name = args.engine.name();
+    let frames = fly(&terrain, &flight.frames, args.quality.quality(), args.engine, name, &progress)?;
+    drop(progress);
+    if let Some(path) = &args.stats {
+        write_frames_csv(path, &frames)?;
+    }
+    let summary = ReplaySummary::of(name, &frames);
+    if args.json { print_json(&summary) } else { print(&text(&summary)) }
+}
+
+fn text(s: &ReplaySummary) -> String {
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let head = format!("{}, {} frames\n", s.engine, grouped(s.frames));
+    let t = s.update_ms;
+    head + &columns(&[
+        row("triangles a frame", format!("{:.0}", s.triangles_mean)),
+        row("incoherence", format!("{:.3} %", s.incoherence_percent)),
+        row("vertex tests", grouped(s.vertex_tests_total)),
+        row("splits", grouped(s.splits_total)),
+        row("merges", grouped(s.merges_total)),
+        row("pages touched", grouped(s.pages_touched_total)),
+        row("record bytes read", grouped(s.record_bytes_touched_total)),
+        row("update, median", format!("{:.3} ms", t.p50)),
+        row("update, 95 %", format!("{:.3} ms", t.p95)),
+        row("update, 99 %", format!("{:.3} ms", t.p99)),
+        row("update, worst", format!("{:.3} ms", t.max)),
+        row("update, mean", format!("{:.3} ms", t.mean)),
+        row("mesh hash", s.mesh_hash.clone()),
+    ])
+}

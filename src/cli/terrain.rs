@@ -1,0 +1,41 @@
+//! The terrain file as an argument, and the words for what it says about itself.
+
+use anyhow::Result;
+use std::path::Path;
+use terrasoar_layout::header::{Header, SpacingOrigin};
+use terrasoar_layout::terrain::Terrain;
+
+use super::output::decimal;
+
+/// Opens a terrain file, naming what to do when it is elevation data instead.
+pub(super) fn open(path: &Path) -> Result<Terrain> {
+    Ok(Terrain::open(path)?)
+}
+
+/// Where the spacing came from, in words.
+pub(super) fn spacing_origin(header: &Header) -> String {
+    match header.spacing_origin {
+        SpacingOrigin::Dem => "from the elevation model".into(),
+        SpacingOrigin::Degrees { centre_latitude_deg } => {
+            format!("converted from degrees at the centre latitude {}", decimal(centre_latitude_deg, 4))
+        }
+        SpacingOrigin::User => "stated with --spacing".into(),
+        SpacingOrigin::Assumed => "assumed, the elevation model does not say".into(),
+    }
+}
+
+/// Spacing in words, such as `10.08 x 13.64 m`.
+pub(super) fn spacing(header: &Header) -> String {
+    let [east, north] = header.grid.spacing_m().map(|m| decimal(m, 4));
+    if east == north { format!("{east} m") } else { format!("{east} x {north} m") }
+}
+
+/// Name and code of the reference system, if known.
+pub(super) fn crs(header: &Header) -> Option<String> {
+    match (header.crs_name.as_str(), header.epsg) {
+        ("", None) => None,
+        ("", Some(code)) => Some(format!("EPSG:{code}")),
+        (name, Some(code)) if !name.contains(&code.to_string()) => Some(format!("{name} (EPSG:{code})")),
+        (name, _) => Some(name.to_owned()),
+    }
+}

@@ -1,0 +1,7 @@
+//! The real program in a temporary folder: what it prints, what it leaves, how it ends.
+
+mod build;
+mod engines;
+mod support;
+mod usage;
+mod verbs;

@@ -1,0 +1,79 @@
+//! Help that teaches, command lines that make no sense, readers that leave.
+
+use crate::support::{Bench, text};
+
+const VERBS: [&str; 9] =
+    ["build", "info", "verify", "height", "synth", "flight", "replay", "compare", "mesh"];
+
+#[test]
+fn every_verb_has_help_with_an_example() {
+    let bench = Bench::new();
+    let all = bench.good(&["--help"]);
+    for verb in VERBS {
+        assert!(all.contains(&format!("\n  {verb} ")), "{verb}");
+        for flag in ["--help", "-h"] {
+            let help = bench.good(&[verb, flag]);
+            assert!(help.contains("Example") && help.contains(&format!("terrasoar {verb} ")), "{help}");
+        }
+    }
+    assert!(bench.good(&["--version"]).starts_with("terrasoar "));
+}
+
+#[test]
+fn wrong_command_lines_end_with_2() {
+    let bench = Bench::with_terrain();
+    let wrong: [&[&str]; 27] = [
+        &["fly"],
+        &["info"],
+        &["info", "a.iqt", "b.iqt"],
+        &["info", "a.iqt", "--jsn"],
+        &["build", "land.tif"],
+        &["build", "-o", "x.iqt"],
+        &["build", "land.tif", "-o", "x.iqt", "--spacing", "0"],
+        &["build", "land.tif", "-o", "x.iqt", "--spacing", "1,2,3"],
+        &["build", "land.tif", "-o", "x.iqt", "--z-scale", "nan"],
+        &["build", "land.tif", "-o", "x.iqt", "--memory", "7"],
+        &["build", "land.tif", "-o", "x.iqt", "--record", "exactly"],
+        &["build", "land.tif", "-o", "x.iqt", "--threads", "0"],
+        &["height", "land.iqt", "--at", "5"],
+        &["height", "land.iqt"],
+        &["synth", "--size", "1000", "--seed", "1", "-o", "x.tif"],
+        &["synth", "--size", "129", "--seed", "1", "-o", "x.jpg"],
+        &["flight", "zigzag", "land.iqt", "-o", "x.flight", "--frames", "9", "--speed", "1"],
+        &["flight", "straight", "land.iqt", "-o", "x.flight", "--frames", "9"],
+        &["flight", "straight", "land.iqt", "-o", "x", "--frames", "9", "--speed", "1", "--incoherence", "1"],
+        &["flight", "straight", "land.iqt", "-o", "x", "--frames", "0", "--speed", "1"],
+        &["flight", "straight", "land.iqt", "-o", "x", "--frames", "9", "--speed", "1", "--turn-rate", "1"],
+        &["flight", "turn", "land.iqt", "-o", "x", "--frames", "9", "--speed", "1", "--turn-rate", "0"],
+        &["flight", "orbit", "land.iqt", "-o", "x", "--frames", "1", "--incoherence", "1"],
+        &["replay", "land.iqt", "--flight", "f", "--engine", "roam"],
+        &["replay", "land.iqt", "--flight", "f", "--engine", "soar", "--viewport", "800"],
+        &["compare", "land.iqt", "--flight", "f", "--engines", "soar,soar", "-o", "r"],
+        &["mesh", "land.iqt", "--flight", "f", "--frame", "0", "--engine", "soar", "-o", "x.stl"],
+    ];
+    for args in wrong {
+        bench.bad(2, args);
+    }
+    assert_eq!(bench.names(), ["land.iqt", "land.tif"], "nothing is written for a wrong command line");
+}
+
+#[test]
+fn a_reader_that_leaves_ends_the_program_quietly() {
+    let bench = Bench::with_terrain();
+    for args in [&["info", "land.iqt"][..], &["info", "land.iqt", "--json"], &["verify", "land.iqt"]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = bench.command(args).stdout(writer).output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        assert_eq!(text(&output.stderr), "");
+    }
+}
+
+#[test]
+fn no_progress_where_there_is_no_terminal() {
+    let bench = Bench::new();
+    let output = bench.run(&["synth", "--size", "257", "--seed", "1", "-o", "a.tif"]);
+    assert_eq!(text(&output.stderr), "");
+    let output = bench.run(&["build", "a.tif", "-o", "a.iqt"]);
+    assert_eq!(text(&output.stderr), "");
+}
