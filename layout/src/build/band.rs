@@ -11,101 +11,40 @@ use std::collections::VecDeque;
 
 /// One row of the window.
 #[derive(Debug)]
-struct Row {
+pub(super) struct Row {
     codes: Vec<f64>,
     /// Which samples are void; empty if none is.
     voids: Vec<bool>,
 }
 
-/// Height codes of rows `first..first + rows.len()`, and of every `coarse_step`-th sample of all rows read so far.
-#[derive(Debug)]
-pub(super) struct Band {
-    grid: Grid,
-    first: u32,
-    rows: VecDeque<Row>,
-    coarse_step: u32,
-    coarse: Vec<f64>,
-    coarse_voids: Vec<bool>,
+/// Reads rows of codes from the south, voids filled in; apart from the window, so that rows ahead of it can be read meanwhile.
+pub(super) struct RowReader<'s> {
+    spool: &'s Spool<'s>,
+    code: HeightCode,
+    next: u32,
     /// Filled codes of the row last read, which a wholly void row repeats.
     last: Vec<f64>,
 }
 
-impl Band {
-    /// An empty window that will keep every `coarse_step`-th sample for good.
-    pub(super) fn new(grid: Grid, coarse_step: u32, fallback_code: f64) -> Self {
-        let last = vec![fallback_code; grid.samples()[0] as usize];
-        let side = Self::coarse_side(&grid, coarse_step);
-        Self {
-            grid,
-            first: 0,
-            rows: VecDeque::new(),
-            coarse_step,
-            coarse: vec![fallback_code; side[0] * side[1]],
-            coarse_voids: vec![false; side[0] * side[1]],
-            last,
-        }
+impl<'s> RowReader<'s> {
+    /// A reader at the southernmost row; rows of voids before any height have `fallback_code`.
+    pub(super) fn new(spool: &'s Spool<'s>, code: HeightCode, wide: u32, fallback_code: f64) -> Self {
+        Self { spool, code, next: 0, last: vec![fallback_code; wide as usize] }
     }
 
-    /// Coarse samples east and north: those of the data on the coarse grid, and one for the data's far border.
-    fn coarse_side(grid: &Grid, step: u32) -> [usize; 2] {
-        grid.samples().map(|s| ((s - 1).div_ceil(step) + 1) as usize)
-    }
-
-    /// Reads the coarse samples of all rows ahead of the window, so that triangles larger than it have their corners.
-    pub(super) fn preload_coarse(&mut self, spool: &Spool<'_>, code: &HeightCode) -> Result<(), LayoutError> {
-        let [wide, high] = self.grid.samples();
-        let mut codes = vec![0.0; wide as usize];
-        for y in (0..high).step_by(self.coarse_step as usize).chain([high - 1]) {
-            spool.read_row(y, &mut codes)?;
-            codes.iter_mut().for_each(|v| *v = code.code(*v));
-            let voids: Vec<bool> = codes.iter().map(|v| v.is_nan()).collect();
-            self.keep_coarse(y, &codes, &voids);
-        }
-        Ok(())
-    }
-
-    /// Code of a coarse sample that is not void.
-    pub(super) fn coarse_code(&self, p: GridPoint) -> Option<f64> {
-        self.coarse_index(self.grid.fold(p)).filter(|i| !self.coarse_voids[*i]).map(|i| self.coarse[i])
-    }
-
-    /// Rows read so far.
-    pub(super) fn rows_read(&self) -> u32 {
-        self.first + self.rows.len() as u32
-    }
-
-    /// Reads rows up to and including `last_row`.
-    pub(super) fn read_through(
-        &mut self,
-        last_row: u32,
-        spool: &Spool<'_>,
-        code: &HeightCode,
-    ) -> Result<(), LayoutError> {
-        while self.rows_read() <= last_row {
-            let y = self.rows_read();
-            let mut codes = vec![0.0; self.grid.samples()[0] as usize];
-            spool.read_row(y, &mut codes)?;
-            codes.iter_mut().for_each(|v| *v = code.code(*v));
+    /// Reads on up to and including row `through`.
+    pub(super) fn read(&mut self, through: u32) -> Result<Vec<Row>, LayoutError> {
+        let mut rows = Vec::new();
+        while self.next <= through {
+            let mut codes = vec![0.0; self.last.len()];
+            self.spool.read_row(self.next, &mut codes)?;
+            codes.iter_mut().for_each(|v| *v = self.code.code(*v));
             let voids = self.fill(&mut codes);
-            self.keep_coarse(y, &codes, &voids);
             self.last.copy_from_slice(&codes);
-            self.rows.push_back(Row { codes, voids });
+            rows.push(Row { codes, voids });
+            self.next += 1;
         }
-        Ok(())
-    }
-
-    fn keep_coarse(&mut self, y: u32, codes: &[f64], voids: &[bool]) {
-        let [wide, high] = self.grid.samples();
-        if y % self.coarse_step != 0 && y != high - 1 {
-            return;
-        }
-        let [side, _] = Self::coarse_side(&self.grid, self.coarse_step);
-        let row = y.div_ceil(self.coarse_step) as usize * side;
-        for i in 0..side {
-            let x = (i * self.coarse_step as usize).min(wide as usize - 1);
-            self.coarse[row + i] = codes[x];
-            self.coarse_voids[row + i] = voids.get(x).copied().unwrap_or(false);
-        }
+        Ok(rows)
     }
 
     /// Fills voids (NaN) along a row; says which were void.
@@ -142,6 +81,82 @@ impl Band {
             at = end;
         }
         voids
+    }
+}
+
+/// Height codes of rows `first..first + rows.len()`, and of every `coarse_step`-th sample of all rows read so far.
+#[derive(Debug)]
+pub(super) struct Band {
+    grid: Grid,
+    first: u32,
+    rows: VecDeque<Row>,
+    coarse_step: u32,
+    coarse: Vec<f64>,
+    coarse_voids: Vec<bool>,
+}
+
+impl Band {
+    /// An empty window that will keep every `coarse_step`-th sample for good.
+    pub(super) fn new(grid: Grid, coarse_step: u32, fallback_code: f64) -> Self {
+        let side = Self::coarse_side(&grid, coarse_step);
+        Self {
+            grid,
+            first: 0,
+            rows: VecDeque::new(),
+            coarse_step,
+            coarse: vec![fallback_code; side[0] * side[1]],
+            coarse_voids: vec![false; side[0] * side[1]],
+        }
+    }
+
+    /// Coarse samples east and north: those of the data on the coarse grid, and one for the data's far border.
+    fn coarse_side(grid: &Grid, step: u32) -> [usize; 2] {
+        grid.samples().map(|s| ((s - 1).div_ceil(step) + 1) as usize)
+    }
+
+    /// Reads the coarse samples of all rows ahead of the window, so that triangles larger than it have their corners.
+    pub(super) fn preload_coarse(&mut self, spool: &Spool<'_>, code: &HeightCode) -> Result<(), LayoutError> {
+        let [wide, high] = self.grid.samples();
+        let mut codes = vec![0.0; wide as usize];
+        for y in (0..high).step_by(self.coarse_step as usize).chain([high - 1]) {
+            spool.read_row(y, &mut codes)?;
+            codes.iter_mut().for_each(|v| *v = code.code(*v));
+            let voids: Vec<bool> = codes.iter().map(|v| v.is_nan()).collect();
+            self.keep_coarse(y, &codes, &voids);
+        }
+        Ok(())
+    }
+
+    /// Code of a coarse sample that is not void.
+    pub(super) fn coarse_code(&self, p: GridPoint) -> Option<f64> {
+        self.coarse_index(self.grid.fold(p)).filter(|i| !self.coarse_voids[*i]).map(|i| self.coarse[i])
+    }
+
+    /// Rows read so far.
+    pub(super) fn rows_read(&self) -> u32 {
+        self.first + self.rows.len() as u32
+    }
+
+    /// Adds the rows north of those in the window.
+    pub(super) fn push(&mut self, rows: Vec<Row>) {
+        for row in rows {
+            self.keep_coarse(self.rows_read(), &row.codes, &row.voids);
+            self.rows.push_back(row);
+        }
+    }
+
+    fn keep_coarse(&mut self, y: u32, codes: &[f64], voids: &[bool]) {
+        let [wide, high] = self.grid.samples();
+        if y % self.coarse_step != 0 && y != high - 1 {
+            return;
+        }
+        let [side, _] = Self::coarse_side(&self.grid, self.coarse_step);
+        let row = y.div_ceil(self.coarse_step) as usize * side;
+        for i in 0..side {
+            let x = (i * self.coarse_step as usize).min(wide as usize - 1);
+            self.coarse[row + i] = codes[x];
+            self.coarse_voids[row + i] = voids.get(x).copied().unwrap_or(false);
+        }
     }
 
     /// Forgets rows south of `row`.

@@ -26,7 +26,7 @@ use crate::grid::Grid;
 use crate::header::{ErrorKind, Header};
 use crate::order::corners;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
-use band::Band;
+use band::{Band, RowReader};
 use levels::{LevelShape, Levels};
 use rayon::prelude::*;
 use saturate::Saturator;
@@ -34,8 +34,9 @@ use scan::{FIRST_SCANNED, OwnErrors, scan_tile_row};
 use spool::Spool;
 use std::path::Path;
 use std::sync::atomic::AtomicU32;
+use std::sync::mpsc::SyncSender;
 use survey::HeightCode;
-use writer::PageWriter;
+use writer::{PageWriter, PlacedPage, page_queue, write_pages};
 
 /// Mebibyte.
 const MIB: u64 = 1 << 20;
@@ -187,8 +188,8 @@ impl MemoryPlan {
         let threads = rayon::current_num_threads() as u64;
         let work = |tile: u32| {
             let tile = u64::from(tile);
-            // Codes and voids of some 2.5 tile rows, records and own errors beside them, 128 rows of records a level that wait for their pages.
-            wide * (5 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
+            // Codes and voids of some 3.5 tile rows, records and own errors beside them, 128 rows of records a level that wait for their pages.
+            wide * (7 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
                 + wide * 200 * record_bytes
                 + threads * (tile + 1) * (tile + 1) * 8
         };
@@ -229,9 +230,28 @@ struct Work<'a> {
 
 impl Work<'_> {
     fn run<C: RecordCodec>(&self, codec: C, header: &mut Header) -> Result<(), LayoutError> {
+        let (outgoing, incoming) = page_queue();
+        let writer = std::thread::scope(|scope| {
+            let writing = scope.spawn(|| write_pages(self.file, incoming));
+            let made = self.make_pages(codec, header, outgoing);
+            let written = writing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            // What the disk said is the cause of whatever followed.
+            written.and(made)
+        })?;
+        writer.finish(header)
+    }
+
+    /// Makes all pages and sends them off; returns what knows their places.
+    fn make_pages<C: RecordCodec>(
+        &self,
+        codec: C,
+        header: &Header,
+        outgoing: SyncSender<PlacedPage>,
+    ) -> Result<PageWriter<'_, C>, LayoutError> {
         let grid = header.grid;
         let [wide, high] = grid.samples();
         let plan = plan::Plan::new(&grid, header.records_per_page())?;
+        let lowest = self.code.code(self.spool.stats().range[0]);
         let mut state = State {
             grid,
             tile: self.tile,
@@ -243,28 +263,40 @@ impl Work<'_> {
                 has_voids: header.has_voids,
             },
             shapes: (0..grid.levels()).map(|l| LevelShape::new(&grid, l)).collect(),
-            band: Band::new(grid, self.tile, self.code.code(self.spool.stats().range[0])),
+            band: Band::new(grid, self.tile, lowest),
             own: Levels::new(grid),
             records: Levels::new(grid),
-            writer: PageWriter::new(self.file, grid, plan, header.record_kind),
+            writer: PageWriter::new(self.file, grid, plan, header.record_kind, outgoing),
             scanned: 0,
         };
         state.band.preload_coarse(self.spool, &self.code)?;
         state.make_own_rows(0);
         let tile_rows = (high - 1).div_ceil(self.tile).max(1);
+        let last_row = |tile_y: u32| ((tile_y + 1) * self.tile).min(high - 1);
+        let mut reader = RowReader::new(self.spool, self.code, wide, lowest);
+        let mut rows = reader.read(last_row(0))?;
         for tile_y in 0..tile_rows {
-            let last = ((tile_y + 1) * self.tile).min(high - 1);
-            let before = state.band.rows_read();
-            state.band.read_through(last, self.spool, &self.code)?;
+            let count = rows.len() as u64;
+            state.band.push(rows);
             state.make_own_rows((tile_y + 1) * self.tile);
-            if header.error_kind == ErrorKind::Bounded {
-                scan_tile_row(&grid, &state.band, &state.own, tile_y, self.tile, self.scale.height_step_m);
-            }
-            state.scanned = if tile_y + 1 == tile_rows { u32::MAX } else { (tile_y + 1) * self.tile };
-            state.advance()?;
-            (self.advance)(u64::from(state.band.rows_read() - before) * u64::from(wide));
+            let is_last = tile_y + 1 == tile_rows;
+            state.scanned = if is_last { u32::MAX } else { (tile_y + 1) * self.tile };
+            // The next rows are read while these are worked on.
+            let (ahead, worked) = rayon::join(
+                || if is_last { Ok(Vec::new()) } else { reader.read(last_row(tile_y + 1)) },
+                || {
+                    if header.error_kind == ErrorKind::Bounded {
+                        let step_m = self.scale.height_step_m;
+                        scan_tile_row(&grid, &state.band, &state.own, tile_y, self.tile, step_m);
+                    }
+                    state.advance()
+                },
+            );
+            worked?;
+            rows = ahead?;
+            (self.advance)(count * u64::from(wide));
         }
-        state.finish(header)
+        state.finish()
     }
 }
 
@@ -282,7 +314,7 @@ struct State<'a, C: RecordCodec> {
     scanned: u32,
 }
 
-impl<C: RecordCodec> State<'_, C> {
+impl<'a, C: RecordCodec> State<'a, C> {
     /// Levels whose triangles fit a tile.
     fn tile_levels(&self) -> u32 {
         2 * self.tile.trailing_zeros()
@@ -362,14 +394,15 @@ impl<C: RecordCodec> State<'_, C> {
         Ok(())
     }
 
-    fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
+    fn finish(mut self) -> Result<PageWriter<'a, C>, LayoutError> {
         let records = corners(self.grid.k()).map(|corner| {
             let class = if self.band.is_void(corner) { VertexClass::FringeVoid } else { VertexClass::Plain };
             let code = self.band.code(corner);
             self.saturator.codec.encode(0, code, class, 0.0, 0.0).unwrap_or(C::INERT)
         });
         self.writer.set_corners(records)?;
-        self.writer.finish(header)
+        self.writer.close_queue();
+        Ok(self.writer)
     }
 }
 

@@ -16,6 +16,7 @@ use crate::record::{RecordCodec, RecordKind};
 use crate::terrain::inert_page;
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 const PAGE: u64 = PAGE_BYTES as u64;
 /// Parts gathered before their pages are written.
@@ -35,11 +36,39 @@ pub(super) struct PageWriter<'a, C: RecordCodec> {
     /// Pages of which some parts are known.
     open: HashMap<u64, Box<Page>>,
     inert: Box<Page>,
+    /// Complete pages on their way to the thread that writes them.
+    outgoing: Option<SyncSender<PlacedPage>>,
     codec: std::marker::PhantomData<C>,
 }
 
+/// A page and its place in the file.
+pub(super) type PlacedPage = (u32, Box<Page>);
+
+/// Pages that may wait to be written.
+const QUEUE: usize = 512;
+
+/// The two ends of the way from gathering pages to writing them.
+pub(super) fn page_queue() -> (SyncSender<PlacedPage>, Receiver<PlacedPage>) {
+    sync_channel(QUEUE)
+}
+
+/// Writes pages as they arrive, until there will be no more: the work of a thread of its own, so that nobody waits for the disk.
+pub(super) fn write_pages(file: &AtomicFile, pages: Receiver<PlacedPage>) -> Result<(), LayoutError> {
+    for (place, page) in pages {
+        write_at(file.file(), &page[..], u64::from(place) * PAGE)
+            .map_err(|e| LayoutError::io(file.target(), "cannot write the terrain file", e))?;
+    }
+    Ok(())
+}
+
 impl<'a, C: RecordCodec> PageWriter<'a, C> {
-    pub(super) fn new(file: &'a AtomicFile, grid: Grid, plan: Plan, kind: RecordKind) -> Self {
+    pub(super) fn new(
+        file: &'a AtomicFile,
+        grid: Grid,
+        plan: Plan,
+        kind: RecordKind,
+        outgoing: SyncSender<PlacedPage>,
+    ) -> Self {
         let mut page = INERT_PAGE;
         let entries = plan
             .parts
@@ -58,6 +87,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             lacking: plan.parts,
             open: HashMap::new(),
             inert: inert_page(kind),
+            outgoing: Some(outgoing),
             codec: std::marker::PhantomData,
         }
     }
@@ -93,9 +123,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
                     &bytes,
                 ));
             }
-            let file = self.file;
-            write_pages(file, &mut self.entries, &self.inert, complete)
-                .map_err(|e| LayoutError::io(file.target(), "cannot write the terrain file", e))?;
+            send_pages(self.outgoing.as_ref(), &mut self.entries, &self.inert, complete)?;
         }
         self.next[level as usize] += ready;
         let later = waiting.get(ready).map(|p| i64::from(p.y[1]) - i64::from(plan.span));
@@ -129,8 +157,12 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             C::write(raw, place);
         }
         let complete = put(&mut self.open, &mut self.lacking, &self.inert, C::BYTES, 0, &bytes);
-        write_pages(self.file, &mut self.entries, &self.inert, complete.into_iter().collect())
-            .map_err(|e| self.failed(e))
+        send_pages(self.outgoing.as_ref(), &mut self.entries, &self.inert, complete.into_iter().collect())
+    }
+
+    /// No more pages will come.
+    pub(super) fn close_queue(&mut self) {
+        self.outgoing = None;
     }
 
     /// Writes what remains, closes gaps, and gives `header` its places.
@@ -204,21 +236,23 @@ fn put(
     open.remove(&number).map(|page| (number, page))
 }
 
-/// Writes complete pages to their planned places and notes their checksums; pages that are inert after all are left out.
-fn write_pages(
-    file: &AtomicFile,
+/// Sends complete pages to be written and notes their checksums; pages that are inert after all are left out.
+fn send_pages(
+    outgoing: Option<&SyncSender<PlacedPage>>,
     entries: &mut [Entry],
     inert: &Page,
     pages: Vec<(u64, Box<Page>)>,
-) -> std::io::Result<()> {
+) -> Result<(), LayoutError> {
     let sums: Vec<Option<u32>> =
         pages.par_iter().map(|(_, page)| (**page != *inert).then(|| checksum(&page[..]))).collect();
-    // One after the other: writers to one file would only wait for each other.
-    for ((number, page), sum) in pages.iter().zip(sums) {
+    for ((number, page), sum) in pages.into_iter().zip(sums) {
         if let Some(sum) = sum {
-            let entry = &mut entries[*number as usize];
-            write_at(file.file(), &page[..], u64::from(entry.page) * PAGE)?;
+            let entry = &mut entries[number as usize];
             (entry.checksum, entry.generation) = (sum, 1);
+            // The writer hangs up only after an error, which it reports itself.
+            if outgoing.is_none_or(|queue| queue.send((entry.page, page)).is_err()) {
+                return Err(LayoutError::Usage("the terrain file could not be written".into()));
+            }
         }
     }
     Ok(())
