@@ -164,15 +164,25 @@ struct Walk<'w, 'a, C: RecordCodec, P> {
 }
 
 impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
-    fn refine(&mut self, height: u32, node: u32, apex: Apex, b: GridPoint, d: GridPoint, inside: bool) {
+    /// Visits the triangle (apex; b, d) of `node`. Inlined, so that only triangles that are split cost a call.
+    #[inline(always)]
+    fn visit(&mut self, height: u32, node: u32, apex: Apex, b: GridPoint, d: GridPoint, inside: bool) {
         let at = node as usize;
         let word = self.status(at, height, b, d, inside);
-        if word & ACTIVE == 0 {
-            self.nodes.children[at] = NONE;
-            self.append(apex, height & 1);
+        if word & ACTIVE != 0 {
+            self.split(height, node, apex, b, d, inside || word & INSIDE != 0);
             return;
         }
+        if self.nodes.children[at] != NONE {
+            self.nodes.children[at] = NONE;
+        }
+        self.append(apex, height & 1);
+    }
+
+    /// Visits the two children of the triangle (apex; b, d) of `node`.
+    fn split(&mut self, height: u32, node: u32, apex: Apex, b: GridPoint, d: GridPoint, inside: bool) {
         self.probe.split(apex.at, b, d);
+        let at = node as usize;
         let here = Apex { index: (FIRST_NODE_VERTEX + at) as u32, at: b.midpoint(d) };
         if height == 1 {
             // The smallest triangles have no vertex of their own and no node.
@@ -186,10 +196,9 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
             children = self.nodes.push_untested(2);
             self.nodes.children[at] = children;
         }
-        let inside = inside || word & INSIDE != 0;
-        self.refine(height - 1, children, here, b, apex.at, inside);
+        self.visit(height - 1, children, here, b, apex.at, inside);
         self.append(apex, height & 1);
-        self.refine(height - 1, children + 1, here, apex.at, d, inside);
+        self.visit(height - 1, children + 1, here, apex.at, d, inside);
     }
 
     /// The word of a node, tested again if it must be.
@@ -217,6 +226,7 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
         self.test(node, height, b.midpoint(d), inside)
     }
 
+    #[inline(never)]
     fn test(&mut self, node: usize, height: u32, v: GridPoint, inside: bool) -> u32 {
         self.tests += 1;
         let grid = self.records.grid();
@@ -304,7 +314,7 @@ impl<C: RecordCodec> Engine for Smart<'_, C> {
         let centre = Apex { index: 4, at: c[0].midpoint(c[2]) };
         let height = grid.levels() - 1;
         for (root, (_, [b, d])) in ROOTS.into_iter().enumerate() {
-            walk.refine(height, root as u32, centre, c[b], c[d], false);
+            walk.visit(height, root as u32, centre, c[b], c[d], false);
             if root < 3 {
                 walk.append(Apex { index: root as u32 + 1, at: c[root + 1] }, 0);
             }

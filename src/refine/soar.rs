@@ -71,9 +71,10 @@ struct Walk<'w, 'a, C: RecordCodec, P> {
 }
 
 impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
-    /// Refines the triangle (apex; b, d) whose split vertex has slot `split` and level `height - 1`; `planes` are those its ancestors
-    /// cross.
-    fn refine(&mut self, height: u32, apex: Apex, split: u64, b: GridPoint, d: GridPoint, planes: u8) {
+    /// Visits the triangle (apex; b, d) whose split vertex has slot `split` and level `height - 1`; `planes` are those its ancestors cross.
+    /// Inlined, so that only triangles that are split cost a call.
+    #[inline(always)]
+    fn visit(&mut self, height: u32, apex: Apex, split: u64, b: GridPoint, d: GridPoint, planes: u8) {
         let v = b.midpoint(d);
         let vertex = self.records.vertex(split, height - 1);
         self.probe.read(split);
@@ -84,12 +85,18 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
             0 => Some(0),
             crossing => self.metric.cull(&sighting, crossing),
         };
-        let Some(planes) = planes else {
-            self.append(apex, height & 1);
-            return;
-        };
+        match planes {
+            Some(planes) => {
+                let here = Apex { slot: split, at: v, height_m: vertex.height_m };
+                self.split(height, apex, here, b, d, planes);
+            }
+            None => self.append(apex, height & 1),
+        }
+    }
+
+    /// Visits the two children of the triangle (apex; b, d), split at `here`.
+    fn split(&mut self, height: u32, apex: Apex, here: Apex, b: GridPoint, d: GridPoint, planes: u8) {
         self.probe.split(apex.at, b, d);
-        let here = Apex { slot: split, at: v, height_m: vertex.height_m };
         if height == 1 {
             // The smallest triangles have no vertex to split at.
             self.append(here, 0);
@@ -97,10 +104,10 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
             self.append(here, 0);
             return;
         }
-        let [left, right] = child_slots(apex.slot, split);
-        self.refine(height - 1, here, left, b, apex.at, planes);
+        let [left, right] = child_slots(apex.slot, here.slot);
+        self.visit(height - 1, here, left, b, apex.at, planes);
         self.append(apex, height & 1);
-        self.refine(height - 1, here, right, apex.at, d, planes);
+        self.visit(height - 1, here, right, apex.at, d, planes);
     }
 
     /// Continues the strip to `apex`, turning it where two vertices of the same parity meet.
@@ -148,7 +155,7 @@ impl<C: RecordCodec> Engine for Soar<'_, C> {
         };
         let height = grid.levels() - 1;
         for ((split, [b, d]), next) in ROOTS.into_iter().zip([Some(se), Some(ne), Some(nw), None]) {
-            walk.refine(height, centre, split, c[b], c[d], ALL_PLANES);
+            walk.visit(height, centre, split, c[b], c[d], ALL_PLANES);
             if let Some(next) = next {
                 walk.append(next, 0);
             }

@@ -1,6 +1,8 @@
 //! Small terrains held in memory, for tests of the engines.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
+pub mod checks;
+
 use terrasoar::flight::FlightFrame;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};

@@ -21,7 +21,11 @@ pub(super) fn resolve(
     let Some(map) = reference.pixel_to_crs else { return Ok(([1.0; 2], SpacingOrigin::Assumed)) };
     let step = [map[1].hypot(map[4]), map[2].hypot(map[5])];
     let metres = |unit_m: f64| Ok((step.map(|s| s * unit_m), SpacingOrigin::Dem));
-    match reference.unit {
+    let unit = match reference.unit {
+        HorizontalUnit::Unknown if looks_like_degrees(info, &map) => HorizontalUnit::Degree,
+        unit => unit,
+    };
+    match unit {
         HorizontalUnit::Unknown | HorizontalUnit::Metre => metres(1.0),
         HorizontalUnit::Foot => metres(0.3048),
         HorizontalUnit::UsSurveyFoot => metres(1200.0 / 3937.0),
@@ -40,6 +44,18 @@ pub(super) fn resolve(
             Ok((spacing, SpacingOrigin::Degrees { centre_latitude_deg: latitude }))
         }
     }
+}
+
+/// Whether coordinates of unknown unit are degrees: they lie on the globe, and their steps would be centimetres if they were metres.
+fn looks_like_degrees(info: &DemInfo, map: &[f64; 6]) -> bool {
+    let corners = [0, info.samples_wide - 1]
+        .into_iter()
+        .flat_map(|col| [0, info.samples_high - 1].map(|row| (f64::from(col), f64::from(row))));
+    let on_globe = corners.into_iter().all(|(col, row)| {
+        (-181.0..=361.0).contains(&(map[0] + map[1] * col + map[2] * row))
+            && (-91.0..=91.0).contains(&(map[3] + map[4] * col + map[5] * row))
+    });
+    on_globe && map[1].hypot(map[4]).max(map[2].hypot(map[5])) <= 0.05
 }
 
 /// Metres a degree of longitude and of latitude: on the WGS 84 ellipsoid, or on a sphere of the body's radius.
@@ -103,6 +119,15 @@ mod tests {
         let mut pole = degrees;
         pole.georeference.pixel_to_crs = Some([0.0, 1.0, 0.0, 100.0, 0.0, -1.0]);
         assert!(resolve(&pole, None).is_err());
+    }
+
+    #[test]
+    fn unknown_units_are_degrees_only_where_nothing_else_makes_sense() {
+        let tiny = [86.0, 0.004, 0.0, 60.0, 0.0, -0.004];
+        let origin = |map| resolve(&info(HorizontalUnit::Unknown, map), None).unwrap().1;
+        assert!(matches!(origin(tiny), SpacingOrigin::Degrees { .. }));
+        assert_eq!(origin([86.0, 4.0, 0.0, 60.0, 0.0, -4.0]), SpacingOrigin::Dem);
+        assert_eq!(origin([500_000.0, 0.01, 0.0, 60.0, 0.0, -0.01]), SpacingOrigin::Dem);
     }
 
     #[test]
