@@ -1,8 +1,8 @@
 //! Whether a terrain file is sound: every page against its checksum, every page number used once, and what section 3 of FORMAT.md
 //! promises of the records.
 //!
-//! Opening checks header, directory and inert page; this checks the rest, in three passes. [`structure`] looks at page numbers,
-//! `checksums` below reads every record page once, [`nesting`] decodes every record of every sound page and looks at its children.
+//! Opening checks header, directory and inert page; this checks the rest, in three passes. `structure` looks at page numbers,
+//! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children.
 //! Cost: each page is read some ten times, never more than a few hundred kilobytes a thread are held. Not covered, for nothing depends
 //! on them: the header slot that is not current, the bytes after the directory root's last entry, pages that no directory reaches.
 //!

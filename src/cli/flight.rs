@@ -1,7 +1,7 @@
 //! `terrasoar flight`: a recorded flight over a terrain, at a speed given or found.
 
 use super::ground::TerrainGround;
-use super::output::{check_output, decimal, print};
+use super::output::{check_stream, complain, decimal, print};
 use super::progress::Progress;
 use super::replay::QualityArgs;
 use super::{WrongUsage, parse, terrain};
@@ -86,7 +86,7 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let plan = args.plan()?;
-    check_output(&args.output, &[&args.file])?;
+    check_stream(&args.output, &[&args.file])?;
     let terrain = terrain::open(&args.file)?;
     let ground = TerrainGround::new(&terrain);
     let (mut flight, told) = match args.pace.incoherence {
@@ -114,7 +114,14 @@ pub(super) fn run(args: &Args) -> Result<()> {
     ground.check()?;
     note_terrain(&mut flight, args);
     flight.write(&args.output)?;
-    print(&format!("{}: {} flight of {} frames{told}", args.output.display(), args.kind.name(), args.frames))
+    let told =
+        format!("{}: {} flight of {} frames{told}", args.output.display(), args.kind.name(), args.frames);
+    // A flight piped on to another program stays alone in the pipe.
+    if args.output.is_file() {
+        return print(&told);
+    }
+    complain(&told);
+    Ok(())
 }
 
 /// Adds the terrain's name, if it is one that a note can hold.

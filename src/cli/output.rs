@@ -34,23 +34,28 @@ pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
         && error.chain().any(|cause| cause.downcast_ref::<io::Error>().is_some_and(is_pipe))
 }
 
-/// Refuses an output that would replace one of the inputs, or something that is not a plain file.
+/// Refuses an output file that would replace one of the inputs, a folder, or something that is not a plain file.
 pub(super) fn check_output(out: &Path, inputs: &[&Path]) -> Result<()> {
-    let Ok(meta) = std::fs::metadata(out) else { return Ok(()) };
-    if meta.is_dir() {
-        bail!("{}: the output is a folder; name a file in it", out.display());
-    }
-    if !meta.is_file() {
+    if let Ok(meta) = std::fs::metadata(out)
+        && !meta.is_file()
+        && !meta.is_dir()
+    {
         bail!(
             "{}: the output is a device or pipe, which would be replaced by a file; name a file",
             out.display()
         );
     }
-    let real = std::fs::canonicalize(out);
+    check_stream(out, inputs)
+}
+
+/// Refuses an output that would replace one of the inputs or a folder; devices and pipes may be written to.
+pub(super) fn check_stream(out: &Path, inputs: &[&Path]) -> Result<()> {
+    if out.is_dir() {
+        bail!("{}: the output is a folder; name a file in it", out.display());
+    }
+    let Ok(real) = std::fs::canonicalize(out) else { return Ok(()) };
     for input in inputs {
-        if let (Ok(real), Ok(input)) = (&real, std::fs::canonicalize(input))
-            && *real == input
-        {
+        if std::fs::canonicalize(input).is_ok_and(|input| input == real) {
             bail!("{}: the output is the input, which would be lost; name another file", out.display());
         }
     }

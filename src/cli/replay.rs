@@ -1,6 +1,6 @@
 //! `terrasoar replay`: a recorded flight through one engine.
 
-use super::output::{check_output, columns, grouped, print, print_json};
+use super::output::{check_stream, columns, grouped, print, print_json};
 use super::progress::Progress;
 use super::{parse, terrain};
 use anyhow::Result;
@@ -73,7 +73,7 @@ pub(super) fn fly(
 
 pub(super) fn run(args: &Args) -> Result<()> {
     if let Some(stats) = &args.stats {
-        check_output(stats, &[&args.file, &args.flight])?;
+        check_stream(stats, &[&args.file, &args.flight])?;
     }
     let terrain = terrain::open(&args.file)?;
     let flight = Flight::read(&args.flight)?;
