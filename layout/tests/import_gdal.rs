@@ -68,7 +68,8 @@ fn file_agrees(path: &Path, places: &[(u32, u32)], answers: &[f64]) {
         let vertex = terrain.checked_vertex(GridPoint::new(*col, info.samples_high - 1 - row)).unwrap();
         let wanted_m = wanted * info.height_scale + info.height_offset_m;
         let void = vertex.class.is_void() && (wanted.is_nan() || *wanted == -32768.0 || wanted.abs() > 3e38);
-        let near = (vertex.height_m - wanted_m).abs() <= 1e-12 * wanted_m.abs().max(info.height_offset_m.abs());
+        let near =
+            (vertex.height_m - wanted_m).abs() <= 1e-12 * wanted_m.abs().max(info.height_offset_m.abs());
         let shown = path.display();
         assert!(near || void, "{shown}: ({col}, {row}) is {} m, GDAL says {wanted_m} m", vertex.height_m);
     }

@@ -20,7 +20,7 @@ mod survey;
 mod writer;
 
 use crate::atomic_file::AtomicFile;
-use crate::dem::DemSource;
+use crate::dem::{DemSource, SampleType};
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::header::{ErrorKind, Header};
@@ -41,7 +41,7 @@ use writer::{PageWriter, PlacedPage, page_queue, write_pages};
 /// Mebibyte.
 const MIB: u64 = 1 << 20;
 /// Memory kept aside for decoders, threads and the program itself.
-const RESERVED_BYTES: u64 = 36 * MIB;
+const RESERVED_BYTES: u64 = 24 * MIB;
 /// Largest tile: beyond this a tile no longer fits a core's cache.
 const LARGEST_TILE: u32 = 256;
 
@@ -113,7 +113,7 @@ pub fn build(
     let (spacing_m, spacing_origin) = spacing::resolve(info, options.spacing_m)?;
     let grid = Grid::new([info.samples_wide, info.samples_high], spacing_m)?;
     let samples = u64::from(info.samples_wide) * u64::from(info.samples_high);
-    let memory = MemoryPlan::new(&grid, info.sample_type.fits_f32(), options)?;
+    let memory = MemoryPlan::new(&grid, info.sample_type, options)?;
     let file = AtomicFile::create(out)?;
     let advance = |n| progress.advance(n);
 
@@ -176,21 +176,27 @@ struct MemoryPlan {
 }
 
 impl MemoryPlan {
-    fn new(grid: &Grid, single: bool, options: &BuildOptions) -> Result<Self, LayoutError> {
+    fn new(grid: &Grid, sample_type: SampleType, options: &BuildOptions) -> Result<Self, LayoutError> {
         let memory_mib = options.memory_mib;
         let budget = memory_mib * MIB;
         let [wide, high] = grid.samples().map(u64::from);
         let n = grid.side_steps();
-        // Pages of the directory and their plan, some 48 bytes each, for the widest record the samples may need.
-        let record_bytes = if single { 8 } else { 16 };
+        let single = sample_type.fits_f32();
+        // The widest record the samples may need; the range of 16-bit integers always fits the compact one.
+        let record_bytes = match (sample_type.is_integer(), single) {
+            (true, true) if options.record.is_none_or(|kind| kind == RecordKind::Compact) => 4,
+            (_, true) => 8,
+            (_, false) => 16,
+        };
+        // Pages of the directory and their plan, some 48 bytes each.
         let directory = crate::order::slot_count(grid.k()) * record_bytes / 4096 * 48;
         let fixed = RESERVED_BYTES + directory;
         let threads = rayon::current_num_threads() as u64;
         let work = |tile: u32| {
             let tile = u64::from(tile);
-            // Codes and voids of some 3.5 tile rows, records and own errors beside them, 128 rows of records a level that wait for their pages.
+            // Codes and voids of some 3.5 tile rows, records and own errors beside them, rows of records that wait for their pages.
             wide * (7 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
-                + wide * 200 * record_bytes
+                + wide * 128 * record_bytes
                 + threads * (tile + 1) * (tile + 1) * 8
         };
         let largest = n.min(options.largest_tile.clamp(2, LARGEST_TILE));
