@@ -1,4 +1,9 @@
-//! Terrasoar: fly over terrain far larger than memory.
+//! Terrasoar: fly over terrain far larger than memory, every visible sample within a tolerance in pixels.
+//!
+//! The engine half of the project: a [`view::View`] and a terrain file (package `terrasoar-layout`) go in, a conforming triangle mesh comes
+//! out. [`refine`] has the engines, [`flyover`] replays recorded [`flight`]s through them and counts, [`report`] shows what
+//! they cost. EMBEDDING.md shows how to use it in a program, ARCHITECTURE.md how it is built.
+
 pub mod flight;
 pub mod flyover;
 pub mod mesh;
@@ -7,3 +12,8 @@ pub mod refine;
 pub mod report;
 pub mod stats;
 pub mod view;
+
+/// The program in EMBEDDING.md, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../EMBEDDING.md")]
+struct Embedding;
