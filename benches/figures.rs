@@ -100,7 +100,7 @@ fn build_and_report(error: &str) -> Result<(), Failure> {
         spacing_m: spacing_m.map(|s| [s, s]),
         ..Default::default()
     };
-    build(&*terrasoar_layout::import::open(&[dem.clone()])?, out, &options, &Silent)?;
+    build(&*terrasoar_layout::import::open(std::slice::from_ref(dem))?, out, &options, &Silent)?;
     if let Ok(status) = std::fs::read_to_string("/proc/self/status")
         && let Some(line) = status.lines().find(|l| l.starts_with("VmHWM"))
     {

@@ -152,7 +152,7 @@ impl Grid {
     /// Whether the point is one of the square's four corners, which have no level.
     pub fn is_corner(&self, p: GridPoint) -> bool {
         let n = self.side_steps();
-        p.x() % n == 0 && p.y() % n == 0
+        p.x().is_multiple_of(n) && p.y().is_multiple_of(n)
     }
 
     /// Metres of the longest edge that a vertex of `level` splits.

@@ -22,8 +22,11 @@ impl OctaveTable {
         let mut powers = [1.0; 256];
         for i in 1..powers.len() {
             // Whole octaves are set exactly, so that errors do not add up beyond one.
-            powers[i] =
-                if i as u32 % steps == 0 { 2.0 * powers[i - steps as usize] } else { powers[i - 1] * root };
+            powers[i] = if (i as u32).is_multiple_of(steps) {
+                2.0 * powers[i - steps as usize]
+            } else {
+                powers[i - 1] * root
+            };
         }
         Self { steps, powers }
     }

@@ -176,7 +176,7 @@ pub(crate) struct BlockPoints {
 impl BlockPoints {
     /// The block of `level` that starts `offset` slots into it, a multiple of [`BLOCK_SLOTS`].
     pub(crate) fn new(k: u32, level: u32, offset: u64) -> Self {
-        debug_assert!(offset % BLOCK_SLOTS == 0);
+        debug_assert!(offset.is_multiple_of(BLOCK_SLOTS));
         Self { k, level, even: gather(offset), odd: gather(offset >> 1) }
     }
 

@@ -191,6 +191,7 @@ fn snap(v: f64) -> f64 {
 
 /// The records of a terrain, of whichever kind.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "one a terrain, taken apart before the first vertex is read")]
 pub enum AnyRecords<'a> {
     /// 4-byte records.
     Compact(Records<'a, Compact>),

@@ -74,9 +74,9 @@ impl<'s> RowReader<'s> {
                 (None, None) => break,
             };
             let gap = (end - at + 1) as f64;
-            for i in at..end {
+            for (i, code) in codes[at..end].iter_mut().enumerate() {
                 // Rounded, for compact records keep whole codes only.
-                codes[i] = (a + (b - a) * ((i - at + 1) as f64 / gap)).round_ties_even();
+                *code = (a + (b - a) * ((i + 1) as f64 / gap)).round_ties_even();
             }
             at = end;
         }
@@ -147,7 +147,7 @@ impl Band {
 
     fn keep_coarse(&mut self, y: u32, codes: &[f64], voids: &[bool]) {
         let [wide, high] = self.grid.samples();
-        if y % self.coarse_step != 0 && y != high - 1 {
+        if !y.is_multiple_of(self.coarse_step) && y != high - 1 {
             return;
         }
         let [side, _] = Self::coarse_side(&self.grid, self.coarse_step);
@@ -193,7 +193,7 @@ impl Band {
     /// Index of a folded point in the coarse arrays, if it is there.
     fn coarse_index(&self, p: GridPoint) -> Option<usize> {
         let [wide, high] = self.grid.samples();
-        let on = |v: u32, count: u32| v % self.coarse_step == 0 || v == count - 1;
+        let on = |v: u32, count: u32| v.is_multiple_of(self.coarse_step) || v == count - 1;
         (on(p.x(), wide) && on(p.y(), high)).then(|| {
             let [side, _] = Self::coarse_side(&self.grid, self.coarse_step);
             p.y().div_ceil(self.coarse_step) as usize * side + p.x().div_ceil(self.coarse_step) as usize

@@ -1,8 +1,8 @@
 //! From a DEM to a terrain file, out of core: spool the samples, survey them, then work north in bands, computing error, radius and
 //! saturation bottom-up and writing pages as they fill.
 //!
-//! The order of work: a row of tiles is scanned for own errors ([`scan`]); then every level, finest first, makes the records of the rows whose
-//! children and own errors are complete ([`saturate`]); then pages whose rows are complete are written ([`writer`]). Each level lags a little
+//! The order of work: a row of tiles is scanned for own errors (`scan`); then every level, finest first, makes the records of the rows whose
+//! children and own errors are complete (`saturate`); then pages whose rows are complete are written (`writer`). Each level lags a little
 //! behind the one below, so a few rows a level are all that is held. Cost: one pass over the samples to spool them, one to survey, one to build.
 //!
 //! Invariant: neither threads nor the memory budget change a byte of the file.
