@@ -8,7 +8,10 @@
 #[derive(Debug, Clone)]
 pub struct OctaveTable {
     steps: u32,
-    powers: [f64; 256],
+    /// 256 powers, then infinity three times, so that a search may look ahead.
+    powers: [f64; 259],
+    /// For each 64th of an octave, the first index whose power is not below it.
+    firsts: [u16; 64],
 }
 
 impl OctaveTable {
@@ -19,8 +22,8 @@ impl OctaveTable {
         for _ in 0..steps.trailing_zeros() {
             root = root.sqrt();
         }
-        let mut powers = [1.0; 256];
-        for i in 1..powers.len() {
+        let mut powers = [1.0; 259];
+        for i in 1..256 {
             // Whole octaves are set exactly, so that errors do not add up beyond one.
             powers[i] = if (i as u32).is_multiple_of(steps) {
                 2.0 * powers[i - steps as usize]
@@ -28,7 +31,12 @@ impl OctaveTable {
                 powers[i - 1] * root
             };
         }
-        Self { steps, powers }
+        powers[256..].fill(f64::INFINITY);
+        let first = |i: usize| {
+            let part = 1.0 + i as f64 / 64.0;
+            powers.iter().position(|p| *p >= part).map_or(0, |index| index as u16)
+        };
+        Self { steps, powers, firsts: std::array::from_fn(first) }
     }
 
     /// Entries an octave.
@@ -48,20 +56,17 @@ impl OctaveTable {
         if value <= 1.0 {
             return Some(0);
         }
-        // The exponent and the leading bits of the mantissa give a lower bound, for log2(1 + m) >= m on 0..=1.
-        let bits = value.to_bits();
-        let octave = (bits >> 52) as i64 - 1023;
-        let shift = 52 - self.steps.trailing_zeros();
-        let within = (bits >> shift) & u64::from(self.steps - 1);
-        let guess = octave * i64::from(self.steps) + within as i64;
-        let mut index = usize::try_from(guess).ok().filter(|i| *i < 256)?;
-        while self.powers[index] < value {
-            index += 1;
-            if index == 256 {
-                return None;
-            }
+        if value.is_nan() {
+            return None;
         }
-        Some(index as u8)
+        // Exponent and leading bits of the mantissa find a 64th of an octave, which holds at most two powers; comparing with three
+        // and adding up the answers costs less than a branch that is guessed wrong.
+        let bits = value.to_bits();
+        let octave = (bits >> 52) as usize - 1023;
+        let first = octave * self.steps as usize + usize::from(self.firsts[(bits >> 46) as usize & 63]);
+        let ahead = self.powers.get(first..first + 3)?;
+        let index = first + ahead.iter().map(|p| usize::from(*p < value)).sum::<usize>();
+        u8::try_from(index).ok()
     }
 }
 

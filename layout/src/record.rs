@@ -138,11 +138,8 @@ const BELOW: f64 = 1.0 - 1e-12;
 /// The first code from `guess` on that stands for at least `value`.
 #[inline(always)]
 fn first_at_least(guess: u8, value: f64, stands_for: impl Fn(u8) -> f64) -> Option<u8> {
-    let mut code = guess;
-    while stands_for(code) < value {
-        code = code.checked_add(1)?;
-    }
-    Some(code)
+    // The guess came from a product rounded down: it is the answer or the code before it.
+    if stands_for(guess) >= value { Some(guess) } else { guess.checked_add(1).filter(|c| stands_for(*c) >= value) }
 }
 
 /// Codec of 4-byte records.
