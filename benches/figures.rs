@@ -169,6 +169,15 @@ fn main() -> Result<(), Failure> {
     };
     timed_build(&dem, &path("bounded.iqt"), arguments.spacing_m, "bounded")?;
     timed_build(&dem, &path("step.iqt"), arguments.spacing_m, "step")?;
+    // SOAR's authors flew over 4,097 x 4,097 samples; a DEM that is given serves as it is.
+    let small = match arguments.dem {
+        Some(_) => path("step.iqt"),
+        None => {
+            let out = path("step-small.iqt");
+            timed_build(&synthesised(arguments.size / 2 + 1)?, &out, None, "step")?;
+            out
+        }
+    };
 
     println!("\n## SMART against SOAR, straight flight, 800x600, bounded error\n");
     println!(
@@ -199,14 +208,6 @@ fn main() -> Result<(), Failure> {
     println!(
         "| samples | tolerance px | triangles | ms | million triangles/s | ns a vertex test |\n|---|---|---|---|---|---|"
     );
-    let small = match &arguments.dem {
-        Some(_) => path("step.iqt"),
-        None => {
-            let out = path("step-small.iqt");
-            timed_build(&synthesised(arguments.size / 2 + 1)?, &out, None, "step")?;
-            out
-        }
-    };
     let small = Terrain::open(&small)?;
     let (frames, _) = flight(&small, FlightKind::Straight, 60, 0.61, 1.0)?;
     let tolerance_px = tolerance_for(&small, &frames, 346_000.0)?;
@@ -219,11 +220,13 @@ fn main() -> Result<(), Failure> {
         })
         .collect();
     per_triangle.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let [ns_triangle, ns_test, ms, triangles] = per_triangle[per_triangle.len() / 2];
-    println!(
-        "| {} | {tolerance_px:.2} | {triangles:.0} | {ms:.2} | {:.1} | {ns_test:.1} |",
-        small.grid().samples()[0],
-        1e3 / ns_triangle,
-    );
+    for (name, at) in [("fastest", 0), ("median", per_triangle.len() / 2)] {
+        let [ns_triangle, ns_test, ms, triangles] = per_triangle[at];
+        println!(
+            "| {} | {tolerance_px:.2} | {name} | {triangles:.0} | {ms:.2} | {:.1} | {ns_test:.1} |",
+            small.grid().samples()[0],
+            1e3 / ns_triangle,
+        );
+    }
     Ok(())
 }

@@ -139,7 +139,11 @@ const BELOW: f64 = 1.0 - 1e-12;
 #[inline(always)]
 fn first_at_least(guess: u8, value: f64, stands_for: impl Fn(u8) -> f64) -> Option<u8> {
     // The guess came from a product rounded down: it is the answer or the code before it.
-    if stands_for(guess) >= value { Some(guess) } else { guess.checked_add(1).filter(|c| stands_for(*c) >= value) }
+    if stands_for(guess) >= value {
+        Some(guess)
+    } else {
+        guess.checked_add(1).filter(|c| stands_for(*c) >= value)
+    }
 }
 
 /// Codec of 4-byte records.
