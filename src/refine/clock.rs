@@ -10,7 +10,7 @@
 /// Fixed-point units a metre: 2^20.
 const UNITS_PER_M: f64 = (1u64 << 20) as f64;
 /// Expiries are counted in so many bits; the rest of a word are status bits.
-pub(super) const EXPIRY_BITS: u32 = 29;
+pub(super) const EXPIRY_BITS: u32 = 28;
 /// Bits of a word that hold its expiry.
 pub(super) const EXPIRY_MASK: u32 = (1 << EXPIRY_BITS) - 1;
 /// Most ticks that one live range may last, and the tick at which words are swept.

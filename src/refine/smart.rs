@@ -29,6 +29,8 @@ const ACTIVE: u32 = 1 << 31;
 const OWN_PLANES: u32 = 1 << 30;
 /// Status bit: the sphere is wholly inside all planes. Without [`OWN_PLANES`] an ancestor vouches for it.
 const INSIDE: u32 = 1 << 29;
+/// Status bit: the node has children in the array.
+const SPLIT: u32 = 1 << 28;
 
 /// Vertex array entries before those of nodes: the four corners and the centre.
 const FIRST_NODE_VERTEX: usize = 5;
@@ -173,8 +175,9 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
             self.split(height, node, apex, b, d, inside || word & INSIDE != 0);
             return;
         }
-        if self.nodes.children[at] != NONE {
+        if word & SPLIT != 0 {
             self.nodes.children[at] = NONE;
+            self.nodes.words[at] = word & !SPLIT;
         }
         self.append(apex, height & 1);
     }
@@ -195,6 +198,7 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
         if children == NONE {
             children = self.nodes.push_untested(2);
             self.nodes.children[at] = children;
+            self.nodes.words[at] |= SPLIT;
         }
         self.visit(height - 1, children, here, b, apex.at, inside);
         self.append(apex, height & 1);
@@ -209,11 +213,9 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
         if inside {
             // An ancestor answers the question of culling; a vertex that rested on itself rests on the ancestor from now on.
             if alive && word & (ACTIVE | OWN_PLANES) != OWN_PLANES {
-                let word = match word & (ACTIVE | OWN_PLANES) {
-                    0 => word,
-                    _ => (word & !OWN_PLANES) | INSIDE,
-                };
-                self.nodes.words[node] = word;
+                if word & (ACTIVE | OWN_PLANES) == ACTIVE | OWN_PLANES {
+                    self.nodes.words[node] = (word & !OWN_PLANES) | INSIDE;
+                }
                 return word;
             }
         } else {
@@ -254,7 +256,7 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
                 (false, _) => (0, -margin_m),
             }
         };
-        let word = bits | self.clock.expiry(safe_m - guard_m);
+        let word = bits | (self.nodes.words[node] & SPLIT) | self.clock.expiry(safe_m - guard_m);
         self.nodes.words[node] = word;
         self.nodes.vertices[FIRST_NODE_VERTEX + node] =
             StripVertex { x: v.x(), y: v.y(), height_m: vertex.height_m as f32 };
@@ -285,7 +287,7 @@ impl<C: RecordCodec> Engine for Smart<'_, C> {
         let rotated = self.last.is_none_or(|last| last.normals() != metric.normals());
         // A change of nu scales every margin by its own error: no word outlives it.
         if self.last.is_some_and(|last| last.nu() != metric.nu()) {
-            self.nodes.words.fill(0);
+            self.nodes.words.iter_mut().for_each(|word| *word &= SPLIT);
         }
         self.last = Some(metric);
         self.clock.move_to(metric.eye_m());
