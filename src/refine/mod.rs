@@ -8,6 +8,7 @@ mod clock;
 pub mod naive;
 pub mod smart;
 pub mod soar;
+mod strip;
 
 use crate::mesh::Triangle;
 use crate::view::View;

@@ -14,6 +14,7 @@
 
 use super::clock::{EXPIRY_MASK, PathClock};
 use super::soar::StripVertex;
+use super::strip::StripBuilder;
 use super::{Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::Metric;
@@ -158,9 +159,7 @@ struct Walk<'w, 'a, C: RecordCodec, P> {
     metric: Metric,
     now: u32,
     rotated: bool,
-    strip: &'w mut Vec<u32>,
-    last: [GridPoint; 2],
-    parity: u32,
+    strip: StripBuilder<'w, u32>,
     tests: u64,
     probe: &'w mut P,
 }
@@ -263,20 +262,10 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
         word
     }
 
-    /// As in SOAR.
+    /// Continues the strip to `apex`.
     #[inline(always)]
     fn append(&mut self, apex: Apex, parity: u32) {
-        if apex.at == self.last[0] || apex.at == self.last[1] {
-            return;
-        }
-        if parity == self.parity {
-            let turn = self.strip[self.strip.len() - 2];
-            self.strip.push(turn);
-            self.last = [self.last[1], self.last[0]];
-        }
-        self.strip.push(apex.index);
-        self.last = [self.last[1], apex.at];
-        self.parity = parity;
+        self.strip.append(apex.at, parity, apex.index);
     }
 }
 
@@ -297,8 +286,6 @@ impl<C: RecordCodec> Engine for Smart<'_, C> {
         if self.nodes.words.len() > self.capacity {
             self.rebuild();
         }
-        self.strip.clear();
-        self.strip.extend([0, 0]);
         let c = corners(grid.k());
         let mut walk = Walk {
             records: &self.records,
@@ -307,9 +294,7 @@ impl<C: RecordCodec> Engine for Smart<'_, C> {
             metric,
             now: self.clock.now() as u32,
             rotated,
-            strip: &mut self.strip,
-            last: [c[0]; 2],
-            parity: 1,
+            strip: StripBuilder::start(&mut self.strip, c[0], 0),
             tests: 0,
             probe,
         };

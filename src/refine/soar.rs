@@ -5,6 +5,7 @@
 //!
 //! Cost: 2T - 1 nodes for T triangles, a record read and a test each. Allocates nothing once the strip has grown.
 
+use super::strip::StripBuilder;
 use super::{Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::{ALL_PLANES, Metric};
@@ -63,9 +64,7 @@ struct Apex {
 struct Walk<'w, 'a, C: RecordCodec, P> {
     records: &'w Records<'a, C>,
     metric: Metric,
-    strip: &'w mut Vec<StripVertex>,
-    last: [GridPoint; 2],
-    parity: u32,
+    strip: StripBuilder<'w, StripVertex>,
     tests: u64,
     probe: &'w mut P,
 }
@@ -110,21 +109,10 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
         self.visit(height - 1, here, right, apex.at, d, planes);
     }
 
-    /// Continues the strip to `apex`, turning it where two vertices of the same parity meet.
+    /// Continues the strip to `apex`.
     #[inline(always)]
     fn append(&mut self, apex: Apex, parity: u32) {
-        if apex.at == self.last[0] || apex.at == self.last[1] {
-            return;
-        }
-        if parity == self.parity {
-            // The second-last vertex again turns the strip.
-            let turn = self.strip[self.strip.len() - 2];
-            self.strip.push(turn);
-            self.last = [self.last[1], self.last[0]];
-        }
-        self.strip.push(StripVertex::new(apex.at, apex.height_m));
-        self.last = [self.last[1], apex.at];
-        self.parity = parity;
+        self.strip.append(apex.at, parity, StripVertex::new(apex.at, apex.height_m));
     }
 }
 
@@ -142,14 +130,10 @@ impl<C: RecordCodec> Engine for Soar<'_, C> {
             height_m: self.records.vertex(CENTRE_SLOT, grid.levels() - 1).height_m,
         };
         (0..=CENTRE_SLOT).for_each(|slot| probe.read(slot));
-        self.strip.clear();
-        self.strip.extend([StripVertex::new(sw.at, sw.height_m); 2]);
         let mut walk = Walk {
             records: &self.records,
             metric: Metric::new(view),
-            strip: &mut self.strip,
-            last: [sw.at; 2],
-            parity: 1,
+            strip: StripBuilder::start(&mut self.strip, sw.at, StripVertex::new(sw.at, sw.height_m)),
             tests: 0,
             probe,
         };
