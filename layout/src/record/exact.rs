@@ -43,20 +43,45 @@ fn signs(class: VertexClass) -> (bool, bool) {
     }
 }
 
-/// Codec of 8-byte records.
+/// What both kinds need of their file.
 #[derive(Debug, Clone)]
-pub struct Exact8 {
+struct Scale {
     height_base_m: f64,
     height_step_m: f64,
     edge_m: [f64; 2 * MAX_K as usize],
 }
 
-impl Exact8 {
-    /// The codec of a file with this grid and scale.
-    pub fn new(grid: &Grid, scale: &RecordScale) -> Self {
+impl Scale {
+    fn new(grid: &Grid, scale: &RecordScale) -> Self {
         let edge_m =
             std::array::from_fn(|l| if (l as u32) < grid.levels() { grid.edge_m(l as u32) } else { 0.0 });
         Self { height_base_m: scale.height_base_m, height_step_m: scale.height_step_m, edge_m }
+    }
+
+    #[inline(always)]
+    fn vertex(&self, value: f64, error: f32, radius: f32, inert: bool) -> Vertex {
+        Vertex {
+            height_m: self.height_base_m + finite(value) * self.height_step_m,
+            error_m: magnitude(error),
+            radius_m: magnitude(radius),
+            class: signed_class(error, radius, inert),
+        }
+    }
+
+    /// The error to store: on fringe vertices at least the length of the edge that they split.
+    fn error_m(&self, level: u32, class: VertexClass, error_m: f64) -> f64 {
+        if class == VertexClass::Plain { error_m } else { error_m.max(self.edge_m[level as usize]) }
+    }
+}
+
+/// Codec of 8-byte records.
+#[derive(Debug, Clone)]
+pub struct Exact8(Scale);
+
+impl Exact8 {
+    /// The codec of a file with this grid and scale.
+    pub fn new(grid: &Grid, scale: &RecordScale) -> Self {
+        Self(Scale::new(grid, scale))
     }
 }
 
@@ -79,22 +104,16 @@ impl RecordCodec for Exact8 {
     fn decode(&self, raw: u64, _level: u32) -> Vertex {
         let error = f32::from_bits(((raw >> 32) as u32 & 0xffff) << 16);
         let radius_bits = (raw >> 48) as u32;
-        let radius = f32::from_bits(radius_bits << 16);
-        Vertex {
-            height_m: self.height_base_m + finite(f64::from(f32::from_bits(raw as u32))) * self.height_step_m,
-            error_m: magnitude(error),
-            radius_m: magnitude(radius),
-            class: signed_class(error, radius, radius_bits == 0xffff && error.to_bits() == 0),
-        }
+        let inert = radius_bits == 0xffff && error.to_bits() == 0;
+        self.0.vertex(f64::from(f32::from_bits(raw as u32)), error, f32::from_bits(radius_bits << 16), inert)
     }
 
     fn encode(&self, level: u32, value: f64, class: VertexClass, error_m: f64, radius_m: f64) -> Option<u64> {
         if class == VertexClass::Inert {
             return Some(Self::INERT);
         }
-        let edge = if class == VertexClass::Plain { 0.0 } else { self.edge_m[level as usize] };
         let (error_sign, radius_sign) = signs(class);
-        let error = half_at_least(error_m.max(edge)) | u16::from(error_sign) << 15;
+        let error = half_at_least(self.0.error_m(level, class, error_m)) | u16::from(error_sign) << 15;
         let radius = half_at_least(radius_m) | u16::from(radius_sign) << 15;
         Some(u64::from((value as f32).to_bits()) | u64::from(error) << 32 | u64::from(radius) << 48)
     }
@@ -106,17 +125,12 @@ impl RecordCodec for Exact8 {
 
 /// Codec of 16-byte records.
 #[derive(Debug, Clone)]
-pub struct Exact16 {
-    height_base_m: f64,
-    height_step_m: f64,
-    edge_m: [f64; 2 * MAX_K as usize],
-}
+pub struct Exact16(Scale);
 
 impl Exact16 {
     /// The codec of a file with this grid and scale.
     pub fn new(grid: &Grid, scale: &RecordScale) -> Self {
-        let Exact8 { height_base_m, height_step_m, edge_m } = Exact8::new(grid, scale);
-        Self { height_base_m, height_step_m, edge_m }
+        Self(Scale::new(grid, scale))
     }
 }
 
@@ -141,12 +155,8 @@ impl RecordCodec for Exact16 {
     fn decode(&self, raw: u128, _level: u32) -> Vertex {
         let error = f32::from_bits((raw >> 64) as u32);
         let radius = f32::from_bits((raw >> 96) as u32);
-        Vertex {
-            height_m: self.height_base_m + finite(f64::from_bits(raw as u64)) * self.height_step_m,
-            error_m: magnitude(error),
-            radius_m: magnitude(radius),
-            class: signed_class(error, radius, radius.to_bits() == u32::MAX && error.to_bits() == 0),
-        }
+        let inert = radius.to_bits() == u32::MAX && error.to_bits() == 0;
+        self.0.vertex(f64::from_bits(raw as u64), error, radius, inert)
     }
 
     fn encode(
@@ -160,9 +170,9 @@ impl RecordCodec for Exact16 {
         if class == VertexClass::Inert {
             return Some(Self::INERT);
         }
-        let edge = if class == VertexClass::Plain { 0.0 } else { self.edge_m[level as usize] };
         let (error_sign, radius_sign) = signs(class);
-        let error = f32_at_least(error_m.max(edge)).to_bits() | u32::from(error_sign) << 31;
+        let error =
+            f32_at_least(self.0.error_m(level, class, error_m)).to_bits() | u32::from(error_sign) << 31;
         let radius = f32_at_least(radius_m).to_bits() | u32::from(radius_sign) << 31;
         Some(u128::from(value.to_bits()) | u128::from(error) << 64 | u128::from(radius) << 96)
     }
