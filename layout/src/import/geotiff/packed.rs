@@ -15,8 +15,8 @@ use super::{parts, predictor, put_constant, rows_at_once};
 use crate::dem::SampleSink;
 use crate::error::LayoutError;
 
-/// Memory for unpacked chunks, all workers together.
-const BUDGET_BYTES: u64 = 1 << 30;
+/// Memory for unpacked chunks, all workers together; a single chunk may be larger, for it is unpacked whole.
+const BUDGET_BYTES: u64 = 16 << 20;
 
 struct Worker {
     file: File,
@@ -33,7 +33,7 @@ pub(super) fn stream(
     void: &Void,
     sink: &dyn SampleSink,
 ) -> Result<(), LayoutError> {
-    let workers = usize::try_from(BUDGET_BYTES / chunks.decoded_bytes().max(1)).unwrap_or(usize::MAX);
+    let workers = usize::try_from(BUDGET_BYTES / chunks.decoded_bytes().max(1)).unwrap_or(usize::MAX).max(1);
     let open = || {
         let file =
             File::open(path).map_err(|source| LayoutError::io(path, "cannot open the TIFF file", source))?;
