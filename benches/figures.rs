@@ -14,7 +14,6 @@ use terrasoar::flight::generate::{FlightKind, FlightPlan, Ground};
 use terrasoar::flight::{FlightFrame, incoherence};
 use terrasoar::flyover::{EngineKind, Quality, mean_incoherence_percent, replay};
 use terrasoar::stats::Comparison;
-use terrasoar::view::Viewport;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::header::ErrorKind;
 use terrasoar_layout::synth::{SynthOptions, write};
@@ -110,7 +109,7 @@ fn build_and_report(error: &str) -> Result<(), Failure> {
 }
 
 fn quality(tolerance_px: f64) -> Quality {
-    Quality { viewport: Viewport::default(), tolerance_px }
+    Quality { tolerance_px, ..Default::default() }
 }
 
 fn flight(

@@ -8,7 +8,7 @@ mod common;
 use criterion::{Criterion, criterion_group, criterion_main};
 use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
-use terrasoar::refine::{Engine, Unobserved};
+use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::Viewport;
 use terrasoar_layout::with_records;
 
@@ -20,10 +20,10 @@ fn updates(criterion: &mut Criterion) {
     };
     with_records!(terrain.records().expect("in memory"), records => {
         let mut group = criterion.benchmark_group("update");
-        let mut soar = Soar::new(records.clone());
+        let mut soar = Soar::new(records.clone(), Culling::Vertices);
         let mut step = 0;
         group.bench_function("soar", |b| b.iter(|| { step += 1; soar.update(&view(step), &mut Unobserved) }));
-        let mut smart = Smart::new(records.clone());
+        let mut smart = Smart::new(records.clone(), Culling::Vertices);
         step = 0;
         group.bench_function("smart", |b| b.iter(|| { step += 1; smart.update(&view(step), &mut Unobserved) }));
         group.finish();

@@ -4,34 +4,38 @@
 //! compares each frame with the one before. Everything but the times is the same in every replay.
 
 use crate::flight::FlightFrame;
-use crate::mesh::{Triangle, TriangleKey, is_drawn};
+use crate::mesh::{Triangle, TriangleKey, is_drawn, parent, with_apex_first};
+use crate::refine::kinetic::Kinetic;
 use crate::refine::naive::Naive;
 use crate::refine::smart::Smart;
 use crate::refine::soar::Soar;
-use crate::refine::{Engine, Probe, Unobserved};
+use crate::refine::{Culling, Engine, Phase, Probe, Unobserved};
 use crate::stats::FrameStats;
-use crate::view::Viewport;
-use std::collections::HashMap;
+use crate::view::{View, Viewport};
+use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasherDefault, Hasher};
 use std::time::Instant;
-use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::record::RecordCodec;
 use terrasoar_layout::terrain::{Records, Terrain};
 use terrasoar_layout::with_records;
 
 /// The engines, by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum EngineKind {
     /// Brute force.
     Naive,
     /// Full refinement every frame.
     Soar,
-    /// Live ranges.
+    /// Live ranges, looked at every frame.
     Smart,
+    /// Live ranges in a queue: only what is over is looked at.
+    #[default]
+    Kinetic,
 }
 
 impl EngineKind {
     /// All engines.
-    pub const ALL: [Self; 3] = [Self::Naive, Self::Soar, Self::Smart];
+    pub const ALL: [Self; 4] = [Self::Naive, Self::Soar, Self::Smart, Self::Kinetic];
 
     /// The word the command line uses.
     pub const fn name(self) -> &'static str {
@@ -39,6 +43,7 @@ impl EngineKind {
             Self::Naive => "naive",
             Self::Soar => "soar",
             Self::Smart => "smart",
+            Self::Kinetic => "kinetic",
         }
     }
 }
@@ -59,7 +64,7 @@ impl std::str::FromStr for EngineKind {
 #[non_exhaustive]
 pub enum ReplayError {
     /// No engine has that name.
-    #[error("there is no engine called {0:?}; the engines are naive, soar and smart")]
+    #[error("there is no engine called {0:?}; the engines are naive, soar, smart and kinetic")]
     UnknownEngine(String),
     /// The tolerance is not usable.
     #[error("a tolerance is a number of pixels from 0.01 to 10000, not {0}")]
@@ -67,6 +72,9 @@ pub enum ReplayError {
     /// The viewport is not usable.
     #[error("a viewport is 1 to 65536 pixels wide and high, not {}x{}", .0.width_px, .0.height_px)]
     Viewport(Viewport),
+    /// The vertical exaggeration is not usable.
+    #[error("a vertical exaggeration is a number from 0.01 to 100, not {0}")]
+    Exaggeration(f64),
     /// The terrain's source does not lend its bytes.
     #[error("{0}: refinement needs a mapped or in-memory terrain")]
     NotInAddressSpace(String),
@@ -87,6 +95,21 @@ pub struct Quality {
     pub viewport: Viewport,
     /// Tolerance in pixels, 0.01 to 10,000.
     pub tolerance_px: f64,
+    /// What heights are multiplied by, 0.01 to 100.
+    pub vertical_exaggeration: f64,
+    /// Where what lies out of view is left out.
+    pub culling: Culling,
+}
+
+impl Default for Quality {
+    fn default() -> Self {
+        Self {
+            viewport: Viewport::default(),
+            tolerance_px: 1.0,
+            vertical_exaggeration: 1.0,
+            culling: Culling::default(),
+        }
+    }
 }
 
 impl Quality {
@@ -94,28 +117,40 @@ impl Quality {
         if !(0.01..=10_000.0).contains(&self.tolerance_px) {
             return Err(ReplayError::Tolerance(self.tolerance_px));
         }
+        if !(0.01..=100.0).contains(&self.vertical_exaggeration) {
+            return Err(ReplayError::Exaggeration(self.vertical_exaggeration));
+        }
         let Viewport { width_px, height_px } = self.viewport;
         if [width_px, height_px].iter().any(|p| !(1..=65_536).contains(p)) {
             return Err(ReplayError::Viewport(self.viewport));
         }
         Ok(self)
     }
+
+    fn view(self, frame: &FlightFrame) -> View {
+        let view = frame.view(self.viewport, self.tolerance_px);
+        View { vertical_exaggeration: self.vertical_exaggeration, ..view }
+    }
 }
 
-/// Runs `$body` with `$engine` bound to a new engine of `$kind` over `$records`.
+/// Runs `$body` with `$engine` bound to a new engine of `$kind` over `$records` that culls as `$culling` says.
 macro_rules! with_engine {
-    ($kind:expr, $records:expr, $engine:ident => $body:expr) => {
+    ($kind:expr, $records:expr, $culling:expr, $engine:ident => $body:expr) => {
         match $kind {
             EngineKind::Naive => {
-                let $engine = Naive::new($records);
+                let $engine = Naive::new($records, $culling);
                 $body
             }
             EngineKind::Soar => {
-                let $engine = Soar::new($records);
+                let $engine = Soar::new($records, $culling);
                 $body
             }
             EngineKind::Smart => {
-                let $engine = Smart::new($records);
+                let $engine = Smart::new($records, $culling);
+                $body
+            }
+            EngineKind::Kinetic => {
+                let $engine = Kinetic::new($records, $culling);
                 $body
             }
         }
@@ -135,10 +170,11 @@ pub fn replay(
 ) -> Result<Vec<FrameStats>, ReplayError> {
     let quality = quality.check()?;
     with_records!(records_of(terrain)?, records => {
-        let times = with_engine!(kind, records.clone(), engine => time_updates(engine, frames, quality, done));
-        let mut stats = with_engine!(kind, records.clone(), engine => count_frames(engine, &records, frames, quality, done));
-        for (stats, update_ms) in stats.iter_mut().zip(times) {
-            stats.update_ms = update_ms;
+        let times = with_engine!(kind, records.clone(), quality.culling, engine => time_updates(engine, frames, quality, done));
+        let mut stats = with_engine!(kind, records.clone(), quality.culling, engine => count_frames(engine, &records, frames, quality, done));
+        for (stats, times) in stats.iter_mut().zip(times) {
+            stats.update_ms = times.update_ms;
+            [stats.scan_us, stats.test_us, stats.apply_us] = times.phases_us;
         }
         Ok(stats)
     })
@@ -148,21 +184,48 @@ fn records_of(terrain: &Terrain) -> Result<terrasoar_layout::terrain::AnyRecords
     terrain.records().ok_or_else(|| ReplayError::NotInAddressSpace(terrain.path().display().to_string()))
 }
 
+/// Times of one frame.
+struct FrameTimes {
+    update_ms: f64,
+    /// Scan, test, apply.
+    phases_us: [f64; 3],
+}
+
+/// Reads the clock at the seams of an update.
+struct PhaseTimer {
+    since: Instant,
+    /// Scan, test, apply.
+    phase: usize,
+    phases_us: [f64; 3],
+}
+
+impl Probe for PhaseTimer {
+    fn phase(&mut self, phase: Phase) {
+        let now = Instant::now();
+        if let Some(spent) = self.phases_us.get_mut(self.phase) {
+            *spent += (now - self.since).as_secs_f64() * 1e6;
+        }
+        self.since = now;
+        self.phase = phase as usize;
+    }
+}
+
 fn time_updates(
     mut engine: impl Engine,
     frames: &[FlightFrame],
     quality: Quality,
     done: &mut dyn FnMut(u64),
-) -> Vec<f64> {
-    let mut times_ms = Vec::with_capacity(frames.len());
+) -> Vec<FrameTimes> {
+    let mut times = Vec::with_capacity(frames.len());
     for (i, frame) in frames.iter().enumerate() {
-        let view = frame.view(quality.viewport, quality.tolerance_px);
+        let view = quality.view(frame);
         let start = Instant::now();
-        engine.update(&view, &mut Unobserved);
-        times_ms.push(start.elapsed().as_secs_f64() * 1e3);
+        let mut timer = PhaseTimer { since: start, phase: Phase::Done as usize, phases_us: [0.0; 3] };
+        engine.update(&view, &mut timer);
+        times.push(FrameTimes { update_ms: start.elapsed().as_secs_f64() * 1e3, phases_us: timer.phases_us });
         done(i as u64 + 1);
     }
-    times_ms
+    times
 }
 
 fn count_frames<C: RecordCodec>(
@@ -176,9 +239,10 @@ fn count_frames<C: RecordCodec>(
     let mut stats = Vec::with_capacity(frames.len());
     for (i, frame) in frames.iter().enumerate() {
         let mut counter = Counter::<C>::default();
-        let vertex_tests = engine.update(&frame.view(quality.viewport, quality.tolerance_px), &mut counter);
+        let vertex_tests = engine.update(&quality.view(frame), &mut counter);
         let pages_touched = distinct(&mut counter.pages);
-        let sets = FrameSets::of(&engine, records, counter.split);
+        let sets = FrameSets::of(&engine, records);
+        let work = engine.work();
         stats.push(FrameStats {
             frame: i as u64,
             triangles: sets.triangles.len() as u64,
@@ -186,10 +250,15 @@ fn count_frames<C: RecordCodec>(
             vertex_tests,
             splits: not_in(&sets.split, &before.split),
             merges: not_in(&before.split, &sets.split),
+            expired: work.expired,
+            slots_written: work.slots_written,
+            patch_bytes: work.patch_bytes,
+            late: work.late,
+            late_error_px: work.late_error_px,
             pages_touched,
             record_bytes_touched: counter.reads * C::BYTES as u64,
-            update_ms: 0.0,
             mesh_hash: sets.hash(),
+            ..FrameStats::default()
         });
         before = sets;
         done((frames.len() + i + 1) as u64);
@@ -197,17 +266,16 @@ fn count_frames<C: RecordCodec>(
     stats
 }
 
-/// Counts reads and remembers pages and split triangles.
+/// Counts reads and remembers pages.
 struct Counter<C> {
     reads: u64,
     pages: Vec<u64>,
-    split: Vec<TriangleKey>,
     codec: std::marker::PhantomData<C>,
 }
 
 impl<C> Default for Counter<C> {
     fn default() -> Self {
-        Self { reads: 0, pages: Vec::new(), split: Vec::new(), codec: std::marker::PhantomData }
+        Self { reads: 0, pages: Vec::new(), codec: std::marker::PhantomData }
     }
 }
 
@@ -219,10 +287,6 @@ impl<C: RecordCodec> Probe for Counter<C> {
         if self.pages.last() != Some(&page) {
             self.pages.push(page);
         }
-    }
-
-    fn split(&mut self, apex: GridPoint, b: GridPoint, d: GridPoint) {
-        self.split.push(TriangleKey::new(apex, b, d));
     }
 }
 
@@ -251,18 +315,41 @@ struct FrameSets {
     split: Vec<TriangleKey>,
 }
 
+/// Hands on the hash that a key has of its own.
+#[derive(Default)]
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|b| self.0 = self.0.rotate_left(8) ^ u64::from(*b));
+    }
+
+    fn write_u64(&mut self, value: u64) {
+        self.0 = value.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+    }
+}
+
 impl FrameSets {
-    fn of<C: RecordCodec>(
-        engine: &impl Engine,
-        records: &Records<'_, C>,
-        mut split: Vec<TriangleKey>,
-    ) -> Self {
+    fn of<C: RecordCodec>(engine: &impl Engine, records: &Records<'_, C>) -> Self {
         let mut triangles = Vec::new();
+        // What is split are the ancestors of what is not.
+        let mut split: HashSet<TriangleKey, BuildHasherDefault<KeyHasher>> = HashSet::default();
         engine.for_each_triangle(&mut |t| {
             if is_drawn(records, t) {
                 triangles.push(TriangleKey::of(t));
             }
+            let mut above = parent(records.grid(), with_apex_first(t));
+            while let Some([apex, b, d]) = above
+                && split.insert(TriangleKey::new(apex, b, d))
+            {
+                above = parent(records.grid(), [apex, b, d]);
+            }
         });
+        let mut split: Vec<TriangleKey> = split.into_iter().collect();
         triangles.sort_unstable();
         split.sort_unstable();
         Self { triangles, split }
@@ -284,10 +371,10 @@ pub fn mean_incoherence_percent(
 ) -> Result<f64, ReplayError> {
     let quality = quality.check()?;
     with_records!(records_of(terrain)?, records => {
-        let mut engine = Soar::new(records.clone());
+        let mut engine = Soar::new(records.clone(), quality.culling);
         let mut sets = |frame: &FlightFrame| {
-            engine.update(&frame.view(quality.viewport, quality.tolerance_px), &mut Unobserved);
-            FrameSets::of(&engine, &records, Vec::new())
+            engine.update(&quality.view(frame), &mut Unobserved);
+            FrameSets::of(&engine, &records)
         };
         let mut sum = 0.0;
         for (first, second) in pairs {
@@ -322,10 +409,10 @@ pub fn frame_mesh(
     let Some(flown) = frames.get(..=frame) else {
         return Err(ReplayError::NoSuchFrame { asked: frame, last: frames.len().saturating_sub(1) });
     };
-    with_records!(records_of(terrain)?, records => with_engine!(kind, records.clone(), engine => {
+    with_records!(records_of(terrain)?, records => with_engine!(kind, records.clone(), quality.culling, engine => {
         let mut engine = engine;
         for frame in flown {
-            engine.update(&frame.view(quality.viewport, quality.tolerance_px), &mut Unobserved);
+            engine.update(&quality.view(frame), &mut Unobserved);
         }
         Ok(collect_mesh(&engine, &records))
     }))

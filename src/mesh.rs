@@ -58,6 +58,18 @@ pub fn with_apex_first([p, q, r]: Triangle) -> Triangle {
     }
 }
 
+/// The triangle that a bin-tree triangle is a half of; `None` for the four that have the square's centre for apex.
+pub fn parent(grid: &Grid, [apex, b, d]: Triangle) -> Option<Triangle> {
+    let n = grid.side_steps();
+    if apex == GridPoint::new(n / 2, n / 2) {
+        return None;
+    }
+    // The apex is the middle of the parent's longest edge, one of whose ends is a corner here; the other corner is the parent's apex.
+    let ends = grid.edge_ends(apex);
+    let other = |end: GridPoint| if ends[0] == end { ends[1] } else { ends[0] };
+    Some(if ends.contains(&b) { [d, other(b), b] } else { [b, d, other(d)] })
+}
+
 /// Twice the signed area in grid steps, padding not folded; positive if counter-clockwise.
 pub fn twice_area([a, b, c]: Triangle) -> i64 {
     let (ax, ay) = (i64::from(a.x()), i64::from(a.y()));
@@ -107,6 +119,21 @@ pub fn for_each_in_strip(strip: impl Iterator<Item = GridPoint>, mut visit: impl
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_parent_is_twice_as_large_and_turns_the_same_way() {
+        let grid = Grid::new([17, 17], [1.0, 1.0]).unwrap();
+        let mut triangle = [GridPoint::new(3, 5), GridPoint::new(3, 4), GridPoint::new(4, 5)];
+        assert!(twice_area(triangle) > 0);
+        let mut steps = 0;
+        while let Some(above) = parent(&grid, with_apex_first(triangle)) {
+            assert_eq!(twice_area(above), 2 * twice_area(triangle));
+            assert_eq!(with_apex_first(above), above);
+            triangle = above;
+            steps += 1;
+        }
+        assert_eq!(steps, 7);
+    }
 
     #[test]
     fn keys_do_not_depend_on_rotation_and_tell_sides_apart() {

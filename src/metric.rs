@@ -20,6 +20,10 @@ pub struct Metric {
     eye_m: [f64; 3],
     /// alpha / tau: metres of distance a metre of error is visible over.
     nu: f64,
+    /// Vertical exaggeration: what heights and errors are multiplied by.
+    exaggeration: f64,
+    /// What radii are multiplied by, so that spheres stay nested when heights are stretched.
+    radius_factor: f64,
     normals: [[f64; 3]; PLANES],
 }
 
@@ -41,6 +45,8 @@ impl Metric {
         Self {
             eye_m: view.eye_m.to_array(),
             nu: view.pixels_per_radian() / view.tolerance_px,
+            exaggeration: view.vertical_exaggeration,
+            radius_factor: view.vertical_exaggeration.max(1.0),
             normals: view.side_normals().map(|n| n.to_array()),
         }
     }
@@ -55,6 +61,11 @@ impl Metric {
         self.nu
     }
 
+    /// Vertical exaggeration.
+    pub fn exaggeration(&self) -> f64 {
+        self.exaggeration
+    }
+
     /// Outward normals of the side planes.
     pub fn normals(&self) -> &[[f64; 3]; PLANES] {
         &self.normals
@@ -63,19 +74,21 @@ impl Metric {
     /// The vertex at horizontal position `at_m` as seen from the eye.
     #[inline(always)]
     pub fn sight(&self, at_m: [f64; 2], vertex: &Vertex) -> Sighting {
-        let offset_m = [at_m[0] - self.eye_m[0], at_m[1] - self.eye_m[1], vertex.height_m - self.eye_m[2]];
+        let height_m = vertex.height_m * self.exaggeration;
+        let offset_m = [at_m[0] - self.eye_m[0], at_m[1] - self.eye_m[1], height_m - self.eye_m[2]];
         let [x, y, z] = offset_m;
+        let radius_m = vertex.radius_m * self.radius_factor;
         Sighting {
             offset_m,
             distance2: x * x + y * y + z * z,
-            reach_m: self.nu * vertex.error_m + vertex.radius_m,
-            radius_m: vertex.radius_m,
+            reach_m: self.nu * (vertex.error_m * self.exaggeration) + radius_m,
+            radius_m,
         }
     }
 
     /// Signed distance of the vertex from plane `i`, positive outside.
     #[inline(always)]
-    fn height_over_plane(&self, i: usize, sighting: &Sighting) -> f64 {
+    pub fn height_over_plane(&self, i: usize, sighting: &Sighting) -> f64 {
         let [a, b, c] = self.normals[i];
         let [x, y, z] = sighting.offset_m;
         a * x + b * y + c * z
@@ -105,6 +118,20 @@ impl Metric {
     pub fn outermost(&self, sighting: &Sighting) -> f64 {
         (0..PLANES).map(|i| self.height_over_plane(i, sighting)).fold(f64::NEG_INFINITY, f64::max)
     }
+
+    /// Whether a box, given in grid steps east and north and metres of height, lies wholly outside one of the planes.
+    #[inline]
+    pub fn culls_box(&self, least: [f32; 3], largest: [f32; 3], spacing_m: [f64; 2]) -> bool {
+        let factors = [spacing_m[0], spacing_m[1], self.exaggeration];
+        self.normals.iter().any(|normal| {
+            // The corner farthest inside.
+            let inmost = |i: usize| {
+                let side = if normal[i] < 0.0 { largest[i] } else { least[i] };
+                normal[i] * (f64::from(side) * factors[i] - self.eye_m[i])
+            };
+            inmost(0) + inmost(1) + inmost(2) > 0.0
+        })
+    }
 }
 
 impl Sighting {
@@ -120,10 +147,41 @@ impl Sighting {
         self.reach_m - self.distance2.sqrt()
     }
 
+    /// From the eye to the vertex, metres.
+    #[inline(always)]
+    pub fn offset_m(&self) -> [f64; 3] {
+        self.offset_m
+    }
+
+    /// Squared distance from the eye.
+    #[inline(always)]
+    pub fn distance2(&self) -> f64 {
+        self.distance2
+    }
+
+    /// Distance from the eye.
+    #[inline(always)]
+    pub fn distance_m(&self) -> f64 {
+        self.distance2.sqrt()
+    }
+
+    /// nu e + r: within this distance the vertex is selected.
+    #[inline(always)]
+    pub fn reach_m(&self) -> f64 {
+        self.reach_m
+    }
+
     /// Radius of the nested sphere.
     #[inline(always)]
     pub fn radius_m(&self) -> f64 {
         self.radius_m
+    }
+
+    /// The error of a vertex as it may show on the screen, in pixels: infinite for an eye inside its sphere. `tolerance_px` is the metric's.
+    pub fn error_px(&self, tolerance_px: f64) -> f64 {
+        let clear_m = self.distance_m() - self.radius_m;
+        let seen = if clear_m > 0.0 { (self.reach_m - self.radius_m) / clear_m } else { f64::INFINITY };
+        seen * tolerance_px
     }
 
     /// A bound on twice the rounding error of the margins: a status cannot change while the exact margin exceeds it.

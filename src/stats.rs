@@ -17,12 +17,28 @@ pub struct FrameStats {
     pub splits: u64,
     /// Bin-tree nodes that were split in the frame before and are no longer.
     pub merges: u64,
+    /// Live ranges that were over; 0 for engines that keep none in a queue.
+    pub expired: u64,
+    /// Triangle slots written; 0 for engines that keep no slots.
+    pub slots_written: u64,
+    /// Bytes of vertices and triangles that a GPU receives; 0 for engines that make no patches.
+    pub patch_bytes: u64,
+    /// Vertices left for later frames for want of budget.
+    pub late: u64,
+    /// Largest error on the screen that they leave, in pixels; 0 if none exceeds the tolerance.
+    pub late_error_px: f64,
     /// Distinct 4 KiB record pages read.
     pub pages_touched: u64,
     /// Bytes of records read, every read counted.
     pub record_bytes_touched: u64,
-    /// Time the mesh update took, in milliseconds; the only figure that differs between two replays.
+    /// Time the mesh update took, in milliseconds. Times are the only figures that differ between two replays.
     pub update_ms: f64,
+    /// The part of it spent on finding what is over, in microseconds; this and the next two are 0 for engines without such parts.
+    pub scan_us: f64,
+    /// The part of it spent on testing, in microseconds.
+    pub test_us: f64,
+    /// The part of it spent on splitting, merging and telling, in microseconds.
+    pub apply_us: f64,
     /// Hash of the set of triangles drawn, independent of their order.
     pub mesh_hash: u64,
 }
@@ -60,8 +76,24 @@ pub struct ReplaySummary {
     pub splits_total: u64,
     /// Sum over all frames but the first.
     pub merges_total: u64,
+    /// Sum over all frames but the first.
+    pub expired_total: u64,
+    /// Sum over all frames but the first.
+    pub slots_written_total: u64,
+    /// Sum over all frames but the first.
+    pub patch_bytes_total: u64,
+    /// Sum over all frames.
+    pub late_total: u64,
+    /// Largest of all frames, in pixels.
+    pub late_error_px_max: f64,
     /// Spread of the update times.
     pub update_ms: TimeSpread,
+    /// Median, in microseconds.
+    pub scan_us_p50: f64,
+    /// Median, in microseconds.
+    pub test_us_p50: f64,
+    /// Median, in microseconds.
+    pub apply_us_p50: f64,
     /// Hash over all frames, 16 hexadecimal digits.
     pub mesh_hash: String,
     /// Sum over all frames of the distinct pages of each.
@@ -140,7 +172,15 @@ impl ReplaySummary {
             vertex_tests_total: sum(|f| f.vertex_tests),
             splits_total: later.iter().map(|f| f.splits).sum(),
             merges_total: later.iter().map(|f| f.merges).sum(),
+            expired_total: later.iter().map(|f| f.expired).sum(),
+            slots_written_total: later.iter().map(|f| f.slots_written).sum(),
+            patch_bytes_total: later.iter().map(|f| f.patch_bytes).sum(),
+            late_total: sum(|f| f.late),
+            late_error_px_max: frames.iter().map(|f| f.late_error_px).fold(0.0, f64::max),
             update_ms: TimeSpread::of(later.iter().map(|f| f.update_ms)),
+            scan_us_p50: TimeSpread::of(later.iter().map(|f| f.scan_us)).p50,
+            test_us_p50: TimeSpread::of(later.iter().map(|f| f.test_us)).p50,
+            apply_us_p50: TimeSpread::of(later.iter().map(|f| f.apply_us)).p50,
             mesh_hash: format!("{hash:016x}"),
             pages_touched_total: sum(|f| f.pages_touched),
             record_bytes_touched_total: sum(|f| f.record_bytes_touched),

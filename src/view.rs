@@ -37,6 +37,8 @@ pub struct View {
     pub viewport: Viewport,
     /// Largest error on the screen that the mesh may show, in pixels; above 0.
     pub tolerance_px: f64,
+    /// What heights are multiplied by when drawn; above 0, 1 for true scale. The eye's height is not affected.
+    pub vertical_exaggeration: f64,
 }
 
 impl View {
@@ -87,6 +89,7 @@ mod tests {
                 vertical_fov_rad: 0.8,
                 viewport: Viewport::default(),
                 tolerance_px: 1.0,
+                vertical_exaggeration: 1.0,
             };
             let [right, up, forward] = view.axes();
             assert!((right.cross(up) + forward).length() < 1e-12, "right-handed, looking along forward");
@@ -111,6 +114,7 @@ mod tests {
             vertical_fov_rad: 0.8,
             viewport: Viewport::default(),
             tolerance_px: 1.0,
+            vertical_exaggeration: 1.0,
         };
         assert!((view.axes()[2] - DVec3::X).length() < 1e-12, "yaw 90 degrees looks east");
         let up = View { pitch_rad: 0.5, ..view };

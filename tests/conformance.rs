@@ -4,40 +4,100 @@
 mod common;
 
 use common::checks::{VIEWPORT, check_conforming, check_tolerance, keys, triangles, views};
+use common::mirror::{Mirror, check_clusters, drawn};
 use common::{frame, noise, rugged_terrain};
 use proptest::prelude::*;
 use terrasoar::flight::FlightFrame;
-use terrasoar::mesh::twice_area;
+use terrasoar::mesh::{Triangle, TriangleKey, twice_area};
+use terrasoar::metric::Metric;
+use terrasoar::refine::kinetic::Kinetic;
 use terrasoar::refine::naive::Naive;
 use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
-use terrasoar::refine::{Engine, Unobserved};
+use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::View;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::terrain::{Records, Terrain};
 use terrasoar_layout::with_records;
 
 /// Flies `views` with all engines and checks every frame.
 fn fly(terrain: &Terrain, views: &[View], check_samples: bool) {
+    fly_culling(terrain, views, Culling::Vertices, check_samples);
+    fly_culling(terrain, views, Culling::Clusters, false);
+}
+
+fn fly_culling(terrain: &Terrain, views: &[View], culling: Culling, check_samples: bool) {
     with_records!(terrain.records().unwrap(), records => {
-        let mut naive = Naive::new(records.clone());
-        let mut soar = Soar::new(records.clone());
-        let mut smart = Smart::new(records.clone());
+        let mut naive = Naive::new(records.clone(), culling);
+        let mut soar = Soar::new(records.clone(), culling);
+        let mut smart = Smart::new(records.clone(), culling);
+        let mut kinetic = Kinetic::new(records.clone(), culling);
+        let mut mirror = Mirror::default();
         for (i, view) in views.iter().enumerate() {
             naive.update(view, &mut Unobserved);
             soar.update(view, &mut Unobserved);
             smart.update(view, &mut Unobserved);
+            kinetic.update(view, &mut Unobserved);
             let expected = triangles(&naive);
             check_conforming(&records, &expected);
             if check_samples {
                 check_tolerance(&records, view, &expected);
             }
-            for (name, got) in [("soar", triangles(&soar)), ("smart", triangles(&smart))] {
+            let engines = [("soar", triangles(&soar)), ("smart", triangles(&smart)), ("kinetic", triangles(&kinetic))];
+            for (name, got) in engines {
                 assert_eq!(got.len(), expected.len(), "{name}, frame {i}");
                 assert!(got.iter().all(|t| twice_area(*t) > 0), "{name}, frame {i}: winding");
                 assert!(keys(&got) == keys(&expected), "{name} draws another mesh than naive in frame {i}");
             }
+            mirror.apply(kinetic.patch());
+            check_mirror(&records, &kinetic, &soar, &mirror, &expected, (culling, view, i));
+            assert_eq!(kinetic.work().late, 0, "nothing is late without a budget");
         }
     });
+}
+
+/// What the patches made, all of them, and the strip on demand, against the full mesh.
+fn check_mirror<C: RecordCodec>(
+    records: &Records<'_, C>,
+    kinetic: &Kinetic<'_, C>,
+    soar: &Soar<'_, C>,
+    mirror: &Mirror,
+    expected: &[Triangle],
+    (culling, view, i): (Culling, &View, usize),
+) {
+    let whole = kinetic.whole_patch();
+    let mut anew = Mirror::default();
+    anew.apply(&whole);
+    let (mirrored, full) = (mirror.triangles(), drawn(records, expected));
+    assert!(mirrored == anew.triangles(), "frame {i}: the patches so far and the whole one differ");
+    mirror.check_vertices(records);
+    anew.check_vertices(records);
+    match culling {
+        Culling::Vertices => assert!(mirrored == full, "the patches make another mesh in frame {i}"),
+        // Whole clusters may be left out, but no triangle that shows.
+        Culling::Clusters => {
+            assert!(mirrored.iter().all(|t| full.binary_search(t).is_ok()));
+            let metric = Metric::new(view);
+            for t in full.iter().filter(|t| mirrored.binary_search(t).is_err()) {
+                let outside = |plane: usize| {
+                    t.iter().all(|p| {
+                        let p = GridPoint::new(*p as u32, (*p >> 32) as u32);
+                        let sighting = metric.sight(records.grid().position_m(p), &records.vertex_at(p));
+                        metric.height_over_plane(plane, &sighting) > -1e-3
+                    })
+                };
+                assert!((0..4).any(outside), "frame {i}: {t:?} may show and is left out");
+            }
+        }
+    }
+    if i % 8 == 0 {
+        let all: Vec<TriangleKey> = expected.iter().map(|t| TriangleKey::of(*t)).collect();
+        check_clusters(kinetic, &whole, &all);
+        let mut strip = Vec::new();
+        kinetic.strip(&mut strip);
+        assert!(strip == soar.strip(), "frame {i}: the strip is not SOAR's");
+    }
 }
 
 fn terrains() -> Vec<Terrain> {
@@ -145,8 +205,8 @@ fn tolerance_holds_at_every_sample() {
 fn smart_tests_little_of_what_soar_tests() {
     let terrain = rugged_terrain([257, 257], 3, false);
     with_records!(terrain.records().unwrap(), records => {
-        let mut soar = Soar::new(records.clone());
-        let mut smart = Smart::new(records.clone());
+        let mut soar = Soar::new(records.clone(), Culling::Vertices);
+        let mut smart = Smart::new(records.clone(), Culling::Vertices);
         let path = (0..60).map(|i| frame(&terrain, [0.5, 0.2 + 0.0005 * f64::from(i)], 1400.0, 0.0, -20.0));
         let tests: Vec<[u64; 2]> =
             views(path, 1.0).iter().map(|v| [soar.update(v, &mut Unobserved), smart.update(v, &mut Unobserved)]).collect();

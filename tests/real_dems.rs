@@ -8,7 +8,7 @@ use std::path::Path;
 use terrasoar::refine::naive::Naive;
 use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
-use terrasoar::refine::{Engine, Unobserved};
+use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::import;
 use terrasoar_layout::terrain::Terrain;
@@ -32,9 +32,9 @@ fn fly(terrain: &Terrain, tolerance_px: f64) {
     let far = (0..2)
         .map(|i| frame(terrain, [0.05, 0.05], high + 3.0 * (high - low), 40.0 + 5.0 * f64::from(i), -15.0));
     with_records!(terrain.records().unwrap(), records => {
-        let mut naive = Naive::new(records.clone());
-        let mut soar = Soar::new(records.clone());
-        let mut smart = Smart::new(records.clone());
+        let mut naive = Naive::new(records.clone(), Culling::Vertices);
+        let mut soar = Soar::new(records.clone(), Culling::Vertices);
+        let mut smart = Smart::new(records.clone(), Culling::Vertices);
         for view in views(near.chain(far), tolerance_px) {
             naive.update(&view, &mut Unobserved);
             soar.update(&view, &mut Unobserved);

@@ -220,6 +220,7 @@ pub struct Records<'a, C: RecordCodec> {
     pages: &'a [u32],
     codec: C,
     grid: Grid,
+    height_range_m: [f64; 2],
     has_voids: bool,
 }
 
@@ -229,13 +230,20 @@ impl<'a, C: RecordCodec> Records<'a, C> {
 
     fn new(terrain: &'a Terrain, bytes: &'a [u8], codec: C) -> Self {
         let header = terrain.header();
-        Self { bytes, pages: &terrain.pages, codec, grid: header.grid, has_voids: header.has_voids }
+        let height_range_m = header.height_range_m;
+        let (grid, has_voids) = (header.grid, header.has_voids);
+        Self { bytes, pages: &terrain.pages, codec, grid, height_range_m, has_voids }
     }
 
     /// Grid shape and spacing.
     #[inline(always)]
     pub fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    /// Lowest and highest height in metres.
+    pub fn height_range_m(&self) -> [f64; 2] {
+        self.height_range_m
     }
 
     /// Whether any sample is void.

@@ -15,7 +15,7 @@ use terrasoar::flyover::{EngineKind, frame_mesh};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  terrasoar mesh alps.iqt --flight low.flight --frame 0 --engine smart -o frame.ply
+  terrasoar mesh alps.iqt --flight low.flight --frame 0 -o frame.ply
   terrasoar mesh alps.iqt --flight low.flight --frame 99 --engine soar --tolerance-px 4 -o frame.obj")]
 pub(super) struct Args {
     /// Terrain file (.iqt)
@@ -27,7 +27,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N")]
     frame: usize,
     /// Engine
-    #[arg(long, value_name = "ENGINE", value_parser = parse::engine())]
+    #[arg(long, value_name = "ENGINE", default_value = EngineKind::default().name(), value_parser = parse::engine())]
     engine: EngineKind,
     #[command(flatten)]
     quality: QualityArgs,

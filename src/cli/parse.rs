@@ -4,6 +4,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 use terrasoar::flight::generate::FlightKind;
 use terrasoar::flyover::EngineKind;
+use terrasoar::refine::Culling;
 use terrasoar::view::Viewport;
 
 fn number(text: &str) -> Result<f64, String> {
@@ -41,6 +42,13 @@ pub(super) fn tolerance_px(text: &str) -> Result<f64, String> {
         } else {
             Err("it must be from 0.01 to 10000 pixels".into())
         }
+    })
+}
+
+/// A vertical exaggeration.
+pub(super) fn exaggeration(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| {
+        if (0.01..=100.0).contains(&v) { Ok(v) } else { Err("it must be from 0.01 to 100".into()) }
     })
 }
 
@@ -102,6 +110,12 @@ pub(super) fn with_extension(text: &str, allowed: &[&str]) -> Result<PathBuf, St
 pub(super) fn engine() -> impl TypedValueParser<Value = EngineKind> {
     PossibleValuesParser::new(EngineKind::ALL.map(EngineKind::name))
         .try_map(|word| word.parse::<EngineKind>())
+}
+
+/// A way of culling by name.
+pub(super) fn culling() -> impl TypedValueParser<Value = Culling> {
+    PossibleValuesParser::new(Culling::ALL.map(Culling::name))
+        .map(|word| Culling::ALL.into_iter().find(|culling| culling.name() == word).unwrap_or_default())
 }
 
 /// A kind of flight by name.

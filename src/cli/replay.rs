@@ -7,6 +7,7 @@ use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::{EngineKind, Quality, replay};
+use terrasoar::refine::Culling;
 use terrasoar::report::write_frames_csv;
 use terrasoar::stats::{FrameStats, ReplaySummary};
 use terrasoar::view::Viewport;
@@ -14,12 +15,12 @@ use terrasoar_layout::terrain::Terrain;
 
 /// Fly a recorded flight with one engine and print what it cost.
 ///
-/// naive: every triangle from scratch, by definition. soar: top-down refinement, every frame anew. smart: only what can have changed since
-/// the frame before. All give the same mesh. Everything printed but the times is the same in every replay.
+/// kinetic: only what can have changed, without looking at the rest. smart: only what can have changed is tested, all is looked at. soar:
+/// top-down refinement, every frame anew. naive: every triangle from scratch, by definition. All give the same mesh. Everything printed but the times is the same in every replay.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  terrasoar replay alps.iqt --flight low.flight --engine smart
+  terrasoar replay alps.iqt --flight low.flight
   terrasoar replay alps.iqt --flight low.flight --engine soar --tolerance-px 2 --stats frames.csv --json")]
 pub(super) struct Args {
     /// Terrain file (.iqt)
@@ -28,7 +29,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "F")]
     flight: PathBuf,
     /// Engine
-    #[arg(long, value_name = "ENGINE", value_parser = parse::engine())]
+    #[arg(long, value_name = "ENGINE", default_value = EngineKind::default().name(), value_parser = parse::engine())]
     engine: EngineKind,
     #[command(flatten)]
     quality: QualityArgs,
@@ -49,11 +50,22 @@ pub(super) struct QualityArgs {
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = parse::viewport)]
     viewport: Viewport,
+    /// Multiply heights by this factor
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::exaggeration)]
+    exaggeration: f64,
+    /// What is left out of view: vertices (the mesh is coarse there) or clusters (the mesh is refined all around, clusters are not drawn)
+    #[arg(long, value_name = "WHAT", default_value = Culling::default().name(), value_parser = parse::culling())]
+    culling: Culling,
 }
 
 impl QualityArgs {
     pub(super) fn quality(self) -> Quality {
-        Quality { viewport: self.viewport, tolerance_px: self.tolerance_px }
+        Quality {
+            viewport: self.viewport,
+            tolerance_px: self.tolerance_px,
+            vertical_exaggeration: self.exaggeration,
+            culling: self.culling,
+        }
     }
 }
 
@@ -98,6 +110,9 @@ fn text(s: &ReplaySummary) -> String {
         row("vertex tests", grouped(s.vertex_tests_total)),
         row("splits", grouped(s.splits_total)),
         row("merges", grouped(s.merges_total)),
+        row("live ranges over", grouped(s.expired_total)),
+        row("triangle slots written", grouped(s.slots_written_total)),
+        row("patch bytes", grouped(s.patch_bytes_total)),
         row("pages touched", grouped(s.pages_touched_total)),
         row("record bytes read", grouped(s.record_bytes_touched_total)),
         row("update, median", format!("{:.3} ms", t.p50)),
@@ -105,6 +120,9 @@ fn text(s: &ReplaySummary) -> String {
         row("update, 99 %", format!("{:.3} ms", t.p99)),
         row("update, worst", format!("{:.3} ms", t.max)),
         row("update, mean", format!("{:.3} ms", t.mean)),
+        row("scan, median", format!("{:.1} us", s.scan_us_p50)),
+        row("test, median", format!("{:.1} us", s.test_us_p50)),
+        row("apply, median", format!("{:.1} us", s.apply_us_p50)),
         row("mesh hash", s.mesh_hash.clone()),
     ])
 }

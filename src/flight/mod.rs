@@ -46,6 +46,7 @@ impl FlightFrame {
             vertical_fov_rad: self.vertical_fov_deg.to_radians(),
             viewport,
             tolerance_px,
+            vertical_exaggeration: 1.0,
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Engines that turn a view into a conforming mesh: [`naive`] is the definition, [`soar`] visits the whole active tree every frame,
-//! [`smart`] remembers how long each vertex's status holds.
+//! [`smart`] remembers how long each vertex's status holds, [`kinetic`] keeps the mesh and looks only at what is over.
 //!
 //! All engines draw the same triangles for the same view. They read records and nothing else, and report what they
 //! read to a [`Probe`] that costs nothing when nobody listens.
 
 mod clock;
+pub mod kinetic;
 pub mod naive;
 pub mod smart;
 pub mod soar;
@@ -12,7 +13,62 @@ mod strip;
 
 use crate::mesh::Triangle;
 use crate::view::View;
-use terrasoar_layout::grid::GridPoint;
+/// Where what lies out of view is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Culling {
+    /// Vertices whose sphere lies outside the view are not refined: the mesh is SOAR's, coarse where it is not seen.
+    #[default]
+    Vertices,
+    /// The mesh is refined all around; clusters of triangles outside the view are not drawn. Turning changes nothing in the mesh.
+    Clusters,
+}
+
+impl Culling {
+    /// Both ways.
+    pub const ALL: [Self; 2] = [Self::Vertices, Self::Clusters];
+
+    /// The word the command line uses.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Vertices => "vertices",
+            Self::Clusters => "clusters",
+        }
+    }
+}
+
+/// What an update did, beyond its vertex tests. Engines that keep no mesh from frame to frame leave it at 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Work {
+    /// Live ranges that were over.
+    pub expired: u64,
+    /// Vertex tests.
+    pub tests: u64,
+    /// Vertices split: one or two triangles each.
+    pub splits: u64,
+    /// Vertices merged.
+    pub merges: u64,
+    /// Triangle slots written.
+    pub slots_written: u64,
+    /// Bytes of vertices and triangles that a GPU receives.
+    pub patch_bytes: u64,
+    /// Vertices that are to be tested or split and were not, for want of budget; 0 without a budget.
+    pub late: u64,
+    /// Largest error on the screen that late vertices leave, in pixels; 0 if none exceeds the tolerance.
+    pub late_error_px: f64,
+}
+
+/// The parts of an update, for those who time them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Finding out what is over.
+    Scan,
+    /// Testing it.
+    Test,
+    /// Splitting, merging and telling.
+    Apply,
+    /// After the last part.
+    Done,
+}
 
 /// Hears what a refinement does. The methods are empty unless a listener wants them.
 pub trait Probe {
@@ -22,10 +78,10 @@ pub trait Probe {
         let _ = slot;
     }
 
-    /// The triangle (apex; b, d) is split in this frame.
+    /// The update goes on to its next part.
     #[inline(always)]
-    fn split(&mut self, apex: GridPoint, b: GridPoint, d: GridPoint) {
-        let _ = (apex, b, d);
+    fn phase(&mut self, phase: Phase) {
+        let _ = phase;
     }
 }
 
@@ -43,4 +99,9 @@ pub trait Engine {
     /// Calls `visit` with every triangle of the mesh, counter-clockwise, also those that are not drawn
     /// (see [`crate::mesh::is_drawn`]).
     fn for_each_triangle(&self, visit: &mut dyn FnMut(Triangle));
+
+    /// What the last update did.
+    fn work(&self) -> Work {
+        Work::default()
+    }
 }

@@ -3,7 +3,7 @@
 //! No tree is walked to decide, no answer is inherited or remembered. Cost: one test a vertex of the terrain a frame; for tests and
 //! small terrains.
 
-use super::{Engine, Probe};
+use super::{Culling, Engine, Probe};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
@@ -16,31 +16,31 @@ use terrasoar_layout::terrain::Records;
 #[derive(Debug)]
 pub struct Naive<'a, C: RecordCodec> {
     records: Records<'a, C>,
+    culling: Culling,
     /// Whether each vertex is active, row by row.
     active: Vec<bool>,
     triangles: Vec<Triangle>,
 }
 
 impl<'a, C: RecordCodec> Naive<'a, C> {
-    /// An engine over `records`.
-    pub fn new(records: Records<'a, C>) -> Self {
+    /// An engine over `records` that culls as `culling` says.
+    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
         let side = records.grid().side_steps() as usize + 1;
-        Self { active: vec![false; side * side], records, triangles: Vec::new() }
+        Self { active: vec![false; side * side], culling, records, triangles: Vec::new() }
     }
 
     fn index(&self, p: GridPoint) -> usize {
         p.y() as usize * (self.records.grid().side_steps() as usize + 1) + p.x() as usize
     }
 
-    fn split<P: Probe>(&mut self, [a, b, d]: Triangle, probe: &mut P) {
+    fn split(&mut self, [a, b, d]: Triangle) {
         // The smallest triangles have no vertex to split at.
         let smallest = (b.x() + d.x()) & 1 == 1 || (b.y() + d.y()) & 1 == 1;
         if !smallest && self.active[self.index(b.midpoint(d))] {
-            probe.split(a, b, d);
             let v = b.midpoint(d);
             // (v; b, a) and (v; a, d) with the winding of (a; b, d) kept.
-            self.split([v, a, b], probe);
-            self.split([v, d, a], probe);
+            self.split([v, a, b]);
+            self.split([v, d, a]);
         } else {
             self.triangles.push([a, b, d]);
         }
@@ -63,14 +63,15 @@ impl<C: RecordCodec> Engine for Naive<'_, C> {
                 probe.read(slot_of(grid.k(), p));
                 let sighting = metric.sight(grid.position_m(p), &self.records.vertex_at(p));
                 let index = self.index(p);
-                self.active[index] = sighting.is_selected() && metric.cull(&sighting, ALL_PLANES).is_some();
+                let planes = if self.culling == Culling::Vertices { ALL_PLANES } else { 0 };
+                self.active[index] = sighting.is_selected() && metric.cull(&sighting, planes).is_some();
             }
         }
         self.triangles.clear();
         let [sw, se, ne, nw] = corners(grid.k());
         let centre = sw.midpoint(ne);
         for (b, d) in [(sw, se), (se, ne), (ne, nw), (nw, sw)] {
-            self.split([centre, b, d], probe);
+            self.split([centre, b, d]);
         }
         tests
     }

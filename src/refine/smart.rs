@@ -15,7 +15,7 @@
 use super::clock::{EXPIRY_MASK, PathClock};
 use super::soar::StripVertex;
 use super::strip::StripBuilder;
-use super::{Engine, Probe};
+use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::Metric;
 use crate::view::View;
@@ -87,6 +87,7 @@ impl NodeArray {
 #[derive(Debug)]
 pub struct Smart<'a, C: RecordCodec> {
     records: Records<'a, C>,
+    culling: Culling,
     nodes: NodeArray,
     /// Where the next rebuild copies to.
     spare: NodeArray,
@@ -98,8 +99,8 @@ pub struct Smart<'a, C: RecordCodec> {
 }
 
 impl<'a, C: RecordCodec> Smart<'a, C> {
-    /// An engine over `records`, with nothing tested yet.
-    pub fn new(records: Records<'a, C>) -> Self {
+    /// An engine over `records` that culls as `culling` says, with nothing tested yet.
+    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
         let grid = *records.grid();
         let c = corners(grid.k());
         let centre = (c[0].midpoint(c[2]), records.vertex(CENTRE_SLOT, grid.levels() - 1));
@@ -112,6 +113,7 @@ impl<'a, C: RecordCodec> Smart<'a, C> {
         let mut nodes = NodeArray { vertices: vertices.clone(), ..Default::default() };
         nodes.push_untested(ROOTS.len());
         Self {
+            culling,
             nodes,
             spare: NodeArray { vertices, ..Default::default() },
             capacity: LEAST_CAPACITY,
@@ -183,7 +185,6 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
 
     /// Visits the two children of the triangle (apex; b, d) of `node`.
     fn split(&mut self, height: u32, node: u32, apex: Apex, b: GridPoint, d: GridPoint, inside: bool) {
-        self.probe.split(apex.at, b, d);
         let at = node as usize;
         let here = Apex { index: (FIRST_NODE_VERTEX + at) as u32, at: b.midpoint(d) };
         if height == 1 {
@@ -274,8 +275,9 @@ impl<C: RecordCodec> Engine for Smart<'_, C> {
         let grid = *self.records.grid();
         let metric = Metric::new(view);
         let rotated = self.last.is_none_or(|last| last.normals() != metric.normals());
-        // A change of nu scales every margin by its own error: no word outlives it.
-        if self.last.is_some_and(|last| last.nu() != metric.nu()) {
+        // A change of nu or of exaggeration scales every margin by its own error: no word outlives it.
+        let scale = |m: &Metric| (m.nu(), m.exaggeration());
+        if self.last.is_some_and(|last| scale(&last) != scale(&metric)) {
             self.nodes.words.iter_mut().for_each(|word| *word &= SPLIT);
         }
         self.last = Some(metric);
@@ -301,7 +303,9 @@ impl<C: RecordCodec> Engine for Smart<'_, C> {
         let centre = Apex { index: 4, at: c[0].midpoint(c[2]) };
         let height = grid.levels() - 1;
         for (root, (_, [b, d])) in ROOTS.into_iter().enumerate() {
-            walk.visit(height, root as u32, centre, c[b], c[d], false);
+            // Where nothing is culled, all lies inside.
+            let inside = self.culling == Culling::Clusters;
+            walk.visit(height, root as u32, centre, c[b], c[d], inside);
             if root < 3 {
                 walk.append(Apex { index: root as u32 + 1, at: c[root + 1] }, 0);
             }

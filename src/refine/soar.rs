@@ -6,7 +6,7 @@
 //! Cost: 2T - 1 nodes for T triangles, a record read and a test each. Allocates nothing once the strip has grown.
 
 use super::strip::StripBuilder;
-use super::{Engine, Probe};
+use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
@@ -37,13 +37,14 @@ impl StripVertex {
 #[derive(Debug)]
 pub struct Soar<'a, C: RecordCodec> {
     records: Records<'a, C>,
+    culling: Culling,
     strip: Vec<StripVertex>,
 }
 
 impl<'a, C: RecordCodec> Soar<'a, C> {
-    /// An engine over `records`.
-    pub fn new(records: Records<'a, C>) -> Self {
-        Self { records, strip: Vec::new() }
+    /// An engine over `records` that culls as `culling` says.
+    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
+        Self { records, culling, strip: Vec::new() }
     }
 
     /// The strip of the last update. Consecutive triples are triangles; repeated vertices turn it.
@@ -95,7 +96,6 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
 
     /// Visits the two children of the triangle (apex; b, d), split at `here`.
     fn split(&mut self, height: u32, apex: Apex, here: Apex, b: GridPoint, d: GridPoint, planes: u8) {
-        self.probe.split(apex.at, b, d);
         if height == 1 {
             // The smallest triangles have no vertex to split at.
             self.append(here, 0);
@@ -138,8 +138,9 @@ impl<C: RecordCodec> Engine for Soar<'_, C> {
             probe,
         };
         let height = grid.levels() - 1;
+        let planes = if self.culling == Culling::Vertices { ALL_PLANES } else { 0 };
         for ((split, [b, d]), next) in ROOTS.into_iter().zip([Some(se), Some(ne), Some(nw), None]) {
-            walk.visit(height, centre, split, c[b], c[d], ALL_PLANES);
+            walk.visit(height, centre, split, c[b], c[d], planes);
             if let Some(next) = next {
                 walk.append(next, 0);
             }

@@ -239,6 +239,7 @@ mod tests {
                         record_bytes_touched: 1_234_567,
                         update_ms: ms(t) * (0.9 + 0.3 * noise * noise),
                         mesh_hash: 0x1234_5678_9abc ^ i,
+                        ..FrameStats::default()
                     }
                 };
                 (name.to_owned(), (0..frames).map(frame).collect())

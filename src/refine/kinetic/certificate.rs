@@ -1,0 +1,287 @@
+//! How long a status will hold: the certificate that a live-range word states.
+//!
+//! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART", sections 4.1 and 4.2, whose safe distance assumes that the eye may turn against the
+//! vertex at once. Here the eye has a course, a straight line from where it is now along u. A margin m(s) is known for
+//! every point s metres along it; a clock (`super::clocks`) counts rho s plus the way off the course. The word lives on as long as its clock has
+//! counted less than the largest L with
+//!
+//! ```text
+//! m(s) >= L - rho s    for all s in [0, L / rho]
+//! ```
+//!
+//! since a way of s along the course and x off it takes at most m(0) - m(s) + x from the margin. With b the way along the course to the foot of the
+//! vertex, h its distance from the course, R = nu e + r and D = |P - p|:
+//!
+//! * selected, m = R - sqrt(h^2 + (s - b)^2) is concave: L = min(m(0), rho s1), s1 where the course leaves the sphere of radius R;
+//! * not selected, m = sqrt(h^2 + (s - b)^2) - R is convex: L = m(0) if it falls by less than rho a metre from the start; else rho s1,
+//!   s1 where the course enters the sphere, if it falls faster than rho until there; else the tangent of slope -rho, L = rho b + sqrt(1 - rho^2) h - R;
+//! * planes: m is linear, with slope k: L = m(0) rho / max(rho, -k).
+//!
+//! Course 0 has no direction and rho = 1: L = m(0). Everything is rounded towards a shorter life.
+//! Cost: two square roots a vertex.
+
+use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, RATE, band_of, clock_id};
+use crate::metric::{Metric, PLANES, Sighting};
+
+/// Status bit: the vertex is selected and not culled.
+pub(super) const ACTIVE: u32 = 1 << 31;
+/// Where the clock's number starts in a word; one bit between it and [`ACTIVE`] is the tree's own.
+const CLOCK_SHIFT: u32 = EXPIRY_BITS;
+
+/// The clock of a word.
+pub(super) fn clock_of(word: u32) -> usize {
+    (word >> CLOCK_SHIFT) as usize % CLOCKS
+}
+
+/// The expiry of a word in ticks of its clock; 0 if it has none.
+pub(super) fn expiry_of(word: u32) -> u32 {
+    word & ((1 << EXPIRY_BITS) - 1)
+}
+
+/// A word's status and a new certificate.
+pub(super) fn with_certificate(word: u32, clock: usize, expiry: u32) -> u32 {
+    (word & ACTIVE) | (clock as u32) << CLOCK_SHIFT | expiry
+}
+
+/// A bound on the error of squares, relative to them.
+const SQUARE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
+
+/// Tests vertices of one frame and states how long the answers hold.
+#[derive(Debug, Clone)]
+pub(super) struct Judge {
+    metric: Metric,
+    culls: bool,
+    course: usize,
+    direction: [f64; 3],
+    /// Share of a margin to each plane that counts: from inside, from outside.
+    from_inside: [f64; PLANES],
+    from_outside: [f64; PLANES],
+    now: [u32; CLOCKS],
+    ticks_per_m: f64,
+    bands_per_m: f64,
+}
+
+/// What a margin rests on.
+#[derive(Debug, Clone, Copy)]
+struct Life {
+    active: bool,
+    kind: Kind,
+    /// Margin in metres on the course's clock.
+    margin_m: f64,
+    /// Metres that turning and zooming act on.
+    scale_m: f64,
+}
+
+impl Judge {
+    /// The judge of a frame, after the clocks have moved to it. Without `culls` the view's planes are not asked.
+    pub(super) fn new(metric: Metric, clocks: &Clocks, culls: bool) -> Self {
+        let (course, direction) = clocks.course();
+        let slopes = metric.normals().map(|[a, b, c]| a * direction.x + b * direction.y + c * direction.z);
+        let share = |falls: f64| if course == 0 { 1.0 } else { RATE / RATE.max(falls) };
+        Self {
+            culls,
+            course,
+            direction: direction.to_array(),
+            // A plane moves with the eye: m = r - h grows by the slope inside, m = h - r falls by it outside.
+            from_inside: slopes.map(|k| share(-k)),
+            from_outside: slopes.map(share),
+            now: clocks.all_now(),
+            ticks_per_m: clocks.ticks_per_m(),
+            bands_per_m: clocks.bands_per_m(),
+            metric,
+        }
+    }
+
+    /// The frame's metric.
+    pub(super) fn metric(&self) -> &Metric {
+        &self.metric
+    }
+
+    /// The word of a vertex: its status by the same operations as every engine's, and its certificate.
+    #[inline(always)]
+    pub(super) fn word(&self, sighting: &Sighting) -> u32 {
+        let life = self.life(sighting);
+        let margin_m = life.margin_m - sighting.guard_m();
+        let band = band_of(life.scale_m * self.bands_per_m);
+        // Beyond half a band zooming would no longer be bounded by its first order.
+        let band_m = f64::from(1u32 << band) / self.bands_per_m;
+        let margin_m = if band < BANDS - 1 { margin_m.min(0.5 * band_m) } else { margin_m };
+        let clock = clock_id(self.course, life.kind, band);
+        // Negative and NaN margins saturate to 0.
+        let ticks = ((margin_m * self.ticks_per_m) as u32).min(HORIZON);
+        u32::from(life.active) << 31 | (clock as u32) << CLOCK_SHIFT | (self.now[clock] + ticks)
+    }
+
+    #[inline(always)]
+    fn life(&self, sighting: &Sighting) -> Life {
+        let distance_m = sighting.distance_m();
+        let reach_m = sighting.reach_m();
+        if !sighting.is_selected() {
+            let margin_m = self.unselected_margin_m(sighting, distance_m, reach_m);
+            return Life { active: false, kind: Kind::Error, margin_m, scale_m: distance_m };
+        }
+        if !self.culls {
+            let margin_m = self.selected_margin_m(sighting, distance_m, reach_m);
+            return Life { active: true, kind: Kind::Error, margin_m, scale_m: reach_m };
+        }
+        let radius_m = sighting.radius_m();
+        let (mut inside_m, mut outside_m) = (f64::INFINITY, f64::NEG_INFINITY);
+        for i in 0..PLANES {
+            let h = self.metric.height_over_plane(i, sighting);
+            // One difference for both, so that its sign is the status: h > r culls.
+            let beyond = h - radius_m;
+            inside_m = inside_m.min(-beyond * self.from_inside[i]);
+            outside_m = outside_m.max(beyond * self.from_outside[i]);
+        }
+        // While the eye moves on by what the margin allows, turning acts on a longer arm.
+        let arm_m = |margin_m: f64| if self.course == 0 { 0.0 } else { margin_m / RATE };
+        if outside_m > 0.0 {
+            let scale_m = distance_m + arm_m(outside_m);
+            return Life { active: false, kind: Kind::Planes, margin_m: outside_m, scale_m };
+        }
+        let margin_m = inside_m.min(self.selected_margin_m(sighting, distance_m, reach_m));
+        Life { active: true, kind: Kind::Planes, margin_m, scale_m: reach_m + arm_m(margin_m) }
+    }
+
+    /// Way along the course to the foot of the vertex.
+    #[inline(always)]
+    fn along_m(&self, sighting: &Sighting) -> f64 {
+        let ([x, y, z], [u, v, w]) = (sighting.offset_m(), self.direction);
+        x * u + y * v + z * w
+    }
+
+    #[inline(always)]
+    fn selected_margin_m(&self, sighting: &Sighting, distance_m: f64, reach_m: f64) -> f64 {
+        let now_m = reach_m - distance_m;
+        if self.course == 0 {
+            return now_m;
+        }
+        let b = self.along_m(sighting);
+        let (reach2, distance2) = (reach_m * reach_m, sighting.distance2());
+        let half_chord2 = reach2 - distance2 + b * b - (reach2 + distance2) * SQUARE_ERROR;
+        now_m.min(RATE * (b + half_chord2.max(0.0).sqrt()))
+    }
+
+    #[inline(always)]
+    fn unselected_margin_m(&self, sighting: &Sighting, distance_m: f64, reach_m: f64) -> f64 {
+        const ACROSS2: f64 = 1.0 - RATE * RATE;
+        let now_m = distance_m - reach_m;
+        if self.course == 0 {
+            return now_m;
+        }
+        let b = self.along_m(sighting);
+        if b <= RATE * distance_m {
+            return now_m;
+        }
+        let distance2 = sighting.distance2();
+        let off2 = (distance2 - b * b - distance2 * SQUARE_ERROR).max(0.0);
+        let reach2 = reach_m * reach_m;
+        let margin_m = if off2 <= ACROSS2 * reach2 {
+            RATE * (b - (reach2 - off2).sqrt())
+        } else {
+            RATE * b + (ACROSS2 * off2).sqrt() - reach_m
+        };
+        margin_m.min(now_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::clocks::Pose;
+    use super::*;
+    use crate::view::{View, Viewport};
+    use glam::DVec3;
+    use proptest::prelude::*;
+    use terrasoar_layout::record::{Vertex, VertexClass};
+
+    fn view(eye_m: DVec3, yaw: f64, pitch: f64, fov: f64, exaggeration: f64) -> View {
+        View {
+            eye_m,
+            yaw_rad: yaw,
+            pitch_rad: pitch,
+            roll_rad: 0.1 * yaw,
+            vertical_fov_rad: fov,
+            viewport: Viewport::default(),
+            tolerance_px: 1.0,
+            vertical_exaggeration: exaggeration,
+        }
+    }
+
+    fn pose(metric: &Metric, view: &View) -> Pose {
+        Pose {
+            eye_m: view.eye_m,
+            normals: metric.normals().map(DVec3::from_array),
+            nu: metric.nu(),
+            exaggeration: view.vertical_exaggeration,
+        }
+    }
+
+    fn direction() -> impl Strategy<Value = DVec3> {
+        (-1.0f64..1.0, -1.0f64..1.0, -1.0f64..1.0)
+            .prop_map(|(x, y, z)| (DVec3::new(x, y, z) + DVec3::X * 1e-3).normalize())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(3000))]
+        /// Whatever the camera does, a word that is alive has the status that a new test gives.
+        #[test]
+        fn a_live_word_is_a_true_word(
+            course in direction(), speed in 0.01f64..80.0,
+            away in direction(), distance in 1.0f64..20_000.0,
+            closeness in 0.2f64..2.0, radius in 0.0f64..300.0,
+            steps in prop::collection::vec((direction(), 0.0f64..0.5, -0.01f64..0.01, 0.98f64..1.02, 0.99f64..1.01), 1..80),
+            turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool,
+        ) {
+            let mut clocks = Clocks::new(10.0, 3000.0);
+            let mut now = view(DVec3::new(100.0, 200.0, 1000.0), 0.3, -0.2, 0.8, 1.0);
+            if start_course {
+                clocks.take_course(2, course);
+            }
+            let mut metric = Metric::new(&now);
+            clocks.move_to(pose(&metric, &now));
+            let at = now.eye_m + away * distance;
+            // An error that puts the vertex near the boundary of selection.
+            let error_m = ((distance * closeness - radius) / metric.nu()).max(0.0);
+            let vertex = Vertex { height_m: at.z.clamp(-3000.0, 3000.0), error_m, radius_m: radius, class: VertexClass::Plain };
+            let sight = |metric: &Metric| metric.sight([at.x, at.y], &vertex);
+            let word = Judge::new(metric, &clocks, culls).word(&sight(&metric));
+            for (side, off, turn, zoom, stretch) in steps {
+                now.eye_m += speed * (course + off * side);
+                if turning { now.yaw_rad += turn; now.pitch_rad += 0.3 * turn; }
+                if zooming { now.vertical_fov_rad = (now.vertical_fov_rad * zoom).clamp(0.05, 2.0); }
+                if stretching { now.vertical_exaggeration = (now.vertical_exaggeration * stretch).clamp(0.2, 5.0); }
+                metric = Metric::new(&now);
+                clocks.move_to(pose(&metric, &now));
+                if clocks.now(clock_of(word)) >= u64::from(expiry_of(word)) {
+                    break;
+                }
+                let s = sight(&metric);
+                let active = s.is_selected() && (!culls || metric.cull(&s, crate::metric::ALL_PLANES).is_some());
+                prop_assert_eq!(word & ACTIVE != 0, active);
+            }
+        }
+    }
+
+    /// On course, a word lasts until its vertex changes if its margin falls at all fast, not a fraction of the way.
+    #[test]
+    fn on_course_words_last_until_the_change() {
+        let mut clocks = Clocks::new(10.0, 0.0);
+        let start = view(DVec3::ZERO, 0.0, 0.0, 0.8, 1.0);
+        clocks.take_course(1, DVec3::Y);
+        let metric = Metric::new(&start);
+        clocks.move_to(pose(&metric, &start));
+        // Not selected, 30 degrees off the course; SMART would look again after 400 m, then 330 m more, ...
+        let vertex =
+            Vertex { height_m: 0.0, error_m: 600.0 / metric.nu(), radius_m: 0.0, class: VertexClass::Plain };
+        let at = [500.0, 866.0];
+        let word = Judge::new(metric, &clocks, false).word(&metric.sight(at, &vertex));
+        let mut way = 0.0;
+        while clocks.now(clock_of(word)) < u64::from(expiry_of(word)) {
+            way += 1.0;
+            let moved = View { eye_m: DVec3::Y * way, ..start };
+            clocks.move_to(pose(&Metric::new(&moved), &moved));
+        }
+        let crossing = 866.0 - (600.0f64.powi(2) - 500.0f64.powi(2)).sqrt();
+        assert!(way > crossing - 3.0 && way <= crossing + 1.0, "{way} {crossing}");
+    }
+}

@@ -1,0 +1,306 @@
+//! How far every live range has been used up: clocks that run on what the camera does, in margin metres.
+//!
+//! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART", section 4 (eq. 11 and 12), corrected and widened. A status holds while its margin is
+//! positive; a clock adds up, rounded up, what the camera can have taken from the margin since. There is one clock for every combination of
+//!
+//! * a *course*: the direction the eye is expected to keep. Course 0 expects nothing and counts the whole path. Any other counts
+//!   [`RATE`] times the way along its direction and all of the way off it; what lies ahead was taken into account when
+//!   the margin was made (`super::certificate`). A word made on one course stays on it when the eye takes another;
+//! * a *kind*: whether the status rests on the view's planes, so that turning uses it up too;
+//! * a *band*: a power of two that bounds the distances which turning (by an angle) and zooming (by a ratio) act on.
+//!
+//! Claim: with L = f0 + floor(m / q), m metres of margin made at tick f0 and ticks of q metres, `f < L` implies that less than m has been used.
+//! Proof: a rounding down rho of the total has rho(x) - rho(y) > x - y - 1 in ticks. Cost: some hundred additions a frame.
+
+use glam::DVec3;
+
+/// Share of the way along the course that is counted. A smaller one lets words last longer on course and shorter off it.
+pub(super) const RATE: f64 = 0.2;
+/// Courses, the one without direction included.
+pub(super) const COURSES: usize = 4;
+/// Bands: powers of two.
+pub(super) const BANDS: usize = 16;
+/// All clocks.
+pub(super) const CLOCKS: usize = COURSES * 2 * BANDS;
+/// Bits of a word that hold its expiry in ticks.
+pub(super) const EXPIRY_BITS: u32 = 23;
+/// Longest life in ticks, and the tick at which a clock is set back.
+pub(super) const HORIZON: u32 = (1 << (EXPIRY_BITS - 1)) - 1;
+
+/// Fixed-point units a metre.
+const UNITS_PER_M: f64 = (1u64 << 20) as f64;
+/// A course is left when more than this share of the recent way was counted.
+const LEAVE_RATE: f64 = 0.45;
+/// A course is taken only if the recent way leads this straight.
+const STRAIGHT: f64 = 0.9;
+/// Share of the newest frame in what "recent" means.
+const RECENT: f64 = 0.2;
+/// (e^x - 1) / x stays below this for x up to 1/2, which margins of at most half a band see to.
+const EXP_SLOPE: f64 = 1.3;
+
+/// What a status rests on besides the distance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The error test alone.
+    Error,
+    /// The view's planes as well.
+    Planes,
+}
+
+/// Number of a clock.
+pub(super) const fn clock_id(course: usize, kind: Kind, band: usize) -> usize {
+    course * 2 * BANDS + (kind as usize) * BANDS + band
+}
+
+/// What of a view moves the clocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pose {
+    pub eye_m: DVec3,
+    pub normals: [DVec3; 4],
+    pub nu: f64,
+    pub exaggeration: f64,
+}
+
+/// The clocks of one engine.
+#[derive(Debug)]
+pub(super) struct Clocks {
+    /// Used since a clock was last set back, in units.
+    totals: [u64; CLOCKS],
+    /// Units a tick: 2^shift.
+    shift: u32,
+    least_band_m: f64,
+    /// Largest height or depth in metres: what a change of exaggeration moves.
+    tallest_m: f64,
+    last: Option<Pose>,
+    directions: [DVec3; COURSES],
+    current: usize,
+    /// The course that was taken last, to be succeeded by the next number.
+    newest: usize,
+    recent_way: DVec3,
+    recent_length: f64,
+    recent_used: f64,
+}
+
+/// What [`Clocks::move_to`] has done.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Moved {
+    /// Bit c: clock c has advanced.
+    pub clocks: u128,
+    /// A course whose words are to be moved to course 0, after which [`Clocks::take_course`] is called.
+    pub next_course: Option<(usize, DVec3)>,
+}
+
+impl Clocks {
+    /// Clocks for a terrain whose samples are `spacing_m` apart and at most `tallest_m` from height 0.
+    pub(super) fn new(spacing_m: f64, tallest_m: f64) -> Self {
+        let shift = (spacing_m / 256.0 * UNITS_PER_M).log2().floor().clamp(0.0, 40.0) as u32;
+        Self {
+            // Expiry 0 is kept for words that are not in the queue.
+            totals: [1 << shift; CLOCKS],
+            shift,
+            least_band_m: 4.0 * spacing_m,
+            tallest_m,
+            last: None,
+            directions: [DVec3::ZERO; COURSES],
+            current: 0,
+            newest: 0,
+            recent_way: DVec3::ZERO,
+            recent_length: 0.0,
+            recent_used: 0.0,
+        }
+    }
+
+    /// Counts the way from the last pose to `pose`.
+    pub(super) fn move_to(&mut self, pose: Pose) -> Moved {
+        let Some(last) = self.last.replace(pose) else { return Moved::default() };
+        let step = pose.eye_m - last.eye_m;
+        let raised_m = self.tallest_m * (pose.exaggeration - last.exaggeration).abs();
+        let ratio = |now: f64, then: f64| if now == then { 0.0 } else { (now / then).ln().abs() };
+        let zoomed = EXP_SLOPE * (ratio(pose.nu, last.nu) + ratio(pose.exaggeration, last.exaggeration));
+        let turned = (0..4).map(|i| (pose.normals[i] - last.normals[i]).length()).fold(0.0, f64::max);
+        let mut moved = Moved::default();
+        if step == DVec3::ZERO && raised_m + zoomed + turned == 0.0 {
+            return moved;
+        }
+        let beyond = (u64::from(HORIZON) + 1) << self.shift;
+        for course in 0..COURSES {
+            let used_m = self.used_m(course, step) + raised_m;
+            for (kind, angle) in [(Kind::Error, zoomed), (Kind::Planes, zoomed + turned)] {
+                if used_m + angle == 0.0 {
+                    continue;
+                }
+                for band in 0..BANDS {
+                    let clock = clock_id(course, kind, band);
+                    let metres = used_m + if angle > 0.0 { self.band_m(band) * angle } else { 0.0 };
+                    // One unit more covers the rounding of the sum itself; beyond the horizon nothing is alive.
+                    let units = ((metres * UNITS_PER_M).ceil() as u64).min(beyond) + 1;
+                    self.totals[clock] += units;
+                    moved.clocks |= 1 << clock;
+                }
+            }
+        }
+        moved.next_course = self.follow(step);
+        moved
+    }
+
+    /// Metres that a step uses up on a course.
+    fn used_m(&self, course: usize, step: DVec3) -> f64 {
+        let direction = self.directions[course];
+        let along = step.dot(direction).max(0.0);
+        RATE * along + (step - direction * along).length()
+    }
+
+    /// Decides whether new words should be made on another course.
+    fn follow(&mut self, step: DVec3) -> Option<(usize, DVec3)> {
+        let length = step.length();
+        if length == 0.0 {
+            return None;
+        }
+        // The first step, and one that dwarfs all before it, is all there is to go by.
+        let share = if length > 16.0 * self.recent_length { 1.0 } else { RECENT };
+        let blend = |old: f64, new: f64| old + share * (new - old);
+        self.recent_way += share * (step - self.recent_way);
+        self.recent_length = blend(self.recent_length, length);
+        self.recent_used = blend(self.recent_used, self.used_m(self.current, step));
+        if self.recent_used <= LEAVE_RATE * self.recent_length {
+            return None;
+        }
+        if self.recent_way.length() < STRAIGHT * self.recent_length {
+            self.current = 0;
+            return None;
+        }
+        Some((self.newest % (COURSES - 1) + 1, self.recent_way.normalize()))
+    }
+
+    /// Makes new words on course `course` from now on, which leads along `direction`. No word may be left on it.
+    pub(super) fn take_course(&mut self, course: usize, direction: DVec3) {
+        self.directions[course] = direction;
+        self.current = course;
+        self.newest = course;
+        self.recent_used = RATE * self.recent_length;
+    }
+
+    /// The course that new words are made on, and its direction (zero for course 0).
+    pub(super) fn course(&self) -> (usize, DVec3) {
+        (self.current, self.directions[self.current])
+    }
+
+    /// Current tick of a clock; may exceed the horizon until [`Clocks::set_back`] is called.
+    pub(super) fn now(&self, clock: usize) -> u64 {
+        self.totals[clock] >> self.shift
+    }
+
+    /// Ticks of all clocks, once none exceeds the horizon.
+    pub(super) fn all_now(&self) -> [u32; CLOCKS] {
+        std::array::from_fn(|c| self.now(c) as u32)
+    }
+
+    /// Starts clock `clock` again at tick 1; returns the ticks that expiries must be set back by, or `None` if it is not time.
+    pub(super) fn set_back(&mut self, clock: usize) -> Option<u64> {
+        let now = self.now(clock);
+        if now < u64::from(HORIZON) {
+            return None;
+        }
+        self.totals[clock] -= (now - 1) << self.shift;
+        Some(now - 1)
+    }
+
+    /// Ticks a metre.
+    pub(super) fn ticks_per_m(&self) -> f64 {
+        UNITS_PER_M / (1u64 << self.shift) as f64
+    }
+
+    /// The metres that band `band` stands for. The last one stands for any distance.
+    fn band_m(&self, band: usize) -> f64 {
+        if band == BANDS - 1 { f64::INFINITY } else { self.least_band_m * f64::from(1u32 << band) }
+    }
+
+    /// Reciprocal of the metres of band 0.
+    pub(super) fn bands_per_m(&self) -> f64 {
+        1.0 / self.least_band_m
+    }
+}
+
+/// The smallest band that covers `scale` times the metres of band 0.
+#[inline(always)]
+pub(super) fn band_of(scale: f64) -> usize {
+    // The binary exponent, rounded up; NaN and infinity end in the last band.
+    let bits = scale.to_bits() + ((1 << 52) - 1);
+    ((bits >> 52) as i64 - 1023).clamp(0, BANDS as i64 - 1) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_what_they_stand_for() {
+        for scale in [
+            0.0,
+            1e-9,
+            0.5,
+            1.0,
+            1.0001,
+            2.0,
+            2.5,
+            4.0,
+            1000.0,
+            16384.0,
+            16385.0,
+            1e9,
+            f64::INFINITY,
+            f64::NAN,
+        ] {
+            let band = band_of(scale);
+            assert!(band == BANDS - 1 || scale <= f64::from(1u32 << band), "{scale} {band}");
+            assert!(band == 0 || band == BANDS - 1 || scale > f64::from(1u32 << (band - 1)));
+        }
+    }
+
+    fn pose(eye_m: DVec3) -> Pose {
+        Pose { eye_m, normals: [DVec3::X; 4], nu: 100.0, exaggeration: 1.0 }
+    }
+
+    #[test]
+    fn slow_flight_advances_the_clocks() {
+        let mut clocks = Clocks::new(256.0, 0.0);
+        let start = clocks.now(0);
+        for i in 0..4096 {
+            clocks.move_to(pose(DVec3::X * (f64::from(i) / 1024.0)));
+        }
+        assert!(clocks.now(0) >= start + 3, "{}", clocks.now(0));
+    }
+
+    #[test]
+    fn a_straight_flight_takes_its_course_and_uses_little_of_it() {
+        let mut clocks = Clocks::new(256.0, 0.0);
+        let mut taken = 0;
+        for i in 0..100 {
+            let moved = clocks.move_to(pose(DVec3::Y * f64::from(10 * i)));
+            if let Some((course, direction)) = moved.next_course {
+                clocks.take_course(course, direction);
+                taken += 1;
+            }
+        }
+        assert_eq!((taken, clocks.course().0), (1, 1));
+        let (of_course, of_path) =
+            (clocks.now(clock_id(1, Kind::Error, 3)), clocks.now(clock_id(0, Kind::Error, 3)));
+        assert!(of_path > 980 && of_course < 220, "{of_path} {of_course}");
+    }
+
+    #[test]
+    fn turning_uses_up_words_that_rest_on_planes_and_zooming_all() {
+        let mut clocks = Clocks::new(1.0, 0.0);
+        clocks.move_to(pose(DVec3::ZERO));
+        let turned = Pose { normals: [DVec3::Y; 4], ..pose(DVec3::ZERO) };
+        let moved = clocks.move_to(turned);
+        for course in 0..COURSES {
+            for band in 0..BANDS {
+                assert_eq!(moved.clocks >> clock_id(course, Kind::Error, band) & 1, 0);
+                assert_eq!(moved.clocks >> clock_id(course, Kind::Planes, band) & 1, 1);
+            }
+        }
+        assert_eq!(clocks.move_to(turned).clocks, 0, "standing still uses up nothing");
+        assert_eq!(clocks.move_to(Pose { nu: 200.0, ..turned }).clocks, u128::MAX);
+    }
+}

@@ -1,0 +1,518 @@
+//! Kinetic: refinement whose cost follows the change, not the mesh.
+//!
+//! The mesh of the frame before is kept. Every vertex in it has a live-range word, a certificate of how long its status holds
+//! ([`certificate`]), and lies in a queue by the tick at which that ends ([`queue`], [`clocks`]). A frame takes the words that are over, tests their
+//! vertices again and splits or merges those whose status has changed ([`tree`]); nothing else is looked at. Triangles and vertices
+//! keep their slots ([`triangles`], [`vertices`]), so what changed is a short [`Patch`].
+//!
+//! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART" (live ranges, the bin-tree array); P. Lindstrom, V. Pascucci, "Visualization of Large Terrains Made
+//! Easy", IEEE Visualization 2001 (the mesh, which is SOAR's in every frame); J. Basch, L. Guibas, J. Hershberger, "Data Structures for Mobile Data",
+//! SODA 1997 (certificates that fail one by one).
+//!
+//! One word a vertex serves both its triangles. That mesh and words agree needs no bookkeeping: errors and radii are saturated, so an active vertex's
+//! parents are active in the same frame; splits go from coarse to fine, merges from fine to coarse. Where a word is late, because a
+//! [`Budget`] ran out, its vertex stays as it is, and no vertex is split before its parents: the mesh conforms whatever is late.
+//!
+//! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
+
+mod budget;
+mod certificate;
+mod clocks;
+mod nodes;
+mod patch;
+mod queue;
+mod rebuild;
+mod tree;
+mod triangles;
+mod vertices;
+
+pub use budget::Budget;
+pub use patch::{Patch, PatchVertex};
+pub use triangles::Bounds;
+
+use super::strip::StripBuilder;
+use super::{Culling, Engine, Phase, Probe, Work};
+use crate::mesh::{Triangle, is_drawn};
+use crate::metric::{ALL_PLANES, Metric};
+use crate::refine::soar::StripVertex;
+use crate::view::View;
+use budget::Allowance;
+use certificate::{ACTIVE, Judge, clock_of, expiry_of, with_certificate};
+use clocks::{BANDS, Clocks, HORIZON, Kind, Pose, clock_id};
+use glam::DVec3;
+use nodes::{CENTRE, Nodes, SPLIT, STATUS, level_of};
+use queue::{Entry, Queue};
+use rayon::prelude::*;
+use rebuild::Rebuild;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::order::{ROOTS, corners, slot_of};
+use terrasoar_layout::record::{RecordCodec, Vertex};
+use terrasoar_layout::terrain::Records;
+use triangles::Triangles;
+use vertices::Vertices;
+
+/// From so many tests on they are shared among threads.
+const PARALLEL: usize = 4096;
+/// Levels of the largest terrain.
+const LEVELS: usize = 32;
+
+/// Refinement by certificates.
+#[derive(Debug)]
+pub struct Kinetic<'a, C: RecordCodec> {
+    records: Records<'a, C>,
+    culling: Culling,
+    nodes: Nodes<C::Raw>,
+    triangles: Triangles,
+    vertices: Vertices,
+    clocks: Clocks,
+    queue: Queue,
+    rebuild: Rebuild,
+    budget: Budget,
+    /// Nodes whose certificate is over and that are in no queue.
+    due: Vec<u32>,
+    /// Those that the budget or their parents left for the next frame.
+    late: Vec<u32>,
+    /// Children made by splits, untested yet.
+    fresh: Vec<u32>,
+    to_split: [Vec<u32>; LEVELS],
+    to_merge: [Vec<u32>; LEVELS],
+    verdicts: Vec<(C::Raw, u32)>,
+    /// Entries on their way from one clock to another.
+    waiting: Vec<Entry>,
+    patch: Patch,
+    work: Work,
+}
+
+impl<'a, C: RecordCodec> Kinetic<'a, C> {
+    /// An engine over `records` that culls as `culling` says.
+    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
+        let grid = *records.grid();
+        let [dx, dy] = grid.spacing_m();
+        let [low, high] = records.height_range_m();
+        Self {
+            culling,
+            nodes: Nodes::new(),
+            triangles: Triangles::new(&grid),
+            vertices: Vertices::default(),
+            clocks: Clocks::new(dx.min(dy), low.abs().max(high.abs())),
+            queue: Queue::new(),
+            rebuild: Rebuild::default(),
+            budget: Budget::default(),
+            due: Vec::new(),
+            late: Vec::new(),
+            fresh: Vec::new(),
+            to_split: Default::default(),
+            to_merge: Default::default(),
+            verdicts: Vec::new(),
+            waiting: Vec::new(),
+            patch: Patch::default(),
+            work: Work::default(),
+            records,
+        }
+    }
+
+    /// Bounds what a frame may do from now on. What it leaves undone stays coarse, conforming, and is told by [`Work::late`].
+    pub fn set_budget(&mut self, budget: Budget) {
+        self.budget = budget;
+    }
+
+    /// What the last update changed in the mesh.
+    pub fn patch(&self) -> &Patch {
+        &self.patch
+    }
+
+    /// The whole mesh as a patch to an empty one, for a GPU that has lost its copy. Reads the records of all vertices in the mesh.
+    pub fn whole_patch(&self) -> Patch {
+        let mut patch = Patch { draws: self.patch.draws.clone(), ..Default::default() };
+        let mut in_use = vec![false; self.vertices.slots().len()];
+        self.triangles.for_each(|slot, t| {
+            t.corners.iter().for_each(|v| in_use[*v as usize] = true);
+            patch.triangles.push((slot, if t.hidden { [0; 3] } else { t.corners }));
+        });
+        let grid = self.records.grid();
+        let slot_at: std::collections::HashMap<GridPoint, u32> = (0..in_use.len() as u32)
+            .filter(|v| in_use[*v as usize])
+            .map(|v| (self.vertices.point(v), v))
+            .collect();
+        for (point, slot) in &slot_at {
+            let own = grid.is_corner(*point) || self.nodes.points[CENTRE as usize] == *point;
+            let ends = if own {
+                [*slot; 2]
+            } else {
+                grid.edge_ends(*point).map(|p| slot_at.get(&p).copied().unwrap_or(*slot))
+            };
+            patch.vertices.push((*slot, self.patch_vertex(*point, &self.records.vertex_at(*point), ends)));
+        }
+        patch.vertices.sort_unstable_by_key(|(slot, _)| *slot);
+        patch
+    }
+
+    /// Bounds and triangle slots of the clusters of the mesh.
+    pub fn clusters(&self) -> impl Iterator<Item = (&Bounds, std::ops::Range<u32>)> {
+        self.triangles.clusters()
+    }
+
+    /// Triangles in the mesh, also those that are not drawn.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.live()
+    }
+
+    /// Live-range words, of free nodes too: a column that a scan would have to read.
+    pub fn words(&self) -> &[u32] {
+        &self.nodes.words
+    }
+
+    /// Vertices under watch: those in the mesh and those that the next splits would add.
+    pub fn node_count(&self) -> usize {
+        self.nodes.live()
+    }
+
+    /// Bytes held by all arrays, spare capacity included.
+    pub fn bytes(&self) -> usize {
+        let lists = [&self.due, &self.late, &self.fresh];
+        let by_level = self.to_split.iter().chain(&self.to_merge);
+        self.nodes.bytes()
+            + self.triangles.bytes()
+            + self.vertices.bytes()
+            + self.queue.bytes()
+            + lists.into_iter().chain(by_level).map(|l| l.capacity() * size_of::<u32>()).sum::<usize>()
+            + self.verdicts.capacity() * size_of::<(C::Raw, u32)>()
+            + self.waiting.capacity() * size_of::<Entry>()
+            + self.patch.vertices.capacity() * size_of::<(u32, PatchVertex)>()
+            + self.patch.triangles.capacity() * size_of::<(u32, [u32; 3])>()
+            + self.patch.draws.capacity() * size_of::<std::ops::Range<u32>>()
+    }
+
+    /// The mesh as one triangle strip, SOAR's, from scratch. For those who want a strip; updates do not need it.
+    pub fn strip(&self, strip: &mut Vec<StripVertex>) {
+        strip.clear();
+        if self.nodes.len() == 0 {
+            return;
+        }
+        let grid = self.records.grid();
+        let c = corners(grid.k());
+        let vertex = |i: usize| *self.vertices.get(i as u32);
+        let mut walk = StripWalk { engine: self, strip: StripBuilder::start(strip, c[0], vertex(0)) };
+        let centre = (self.nodes.points[CENTRE as usize], vertex(4));
+        for (root, (side, [b, d])) in ROOTS.into_iter().enumerate() {
+            let node = self.nodes.links[CENTRE as usize][root_label(side)];
+            walk.visit(grid.levels() - 1, Some(node), centre, c[b], c[d]);
+            if root < 3 {
+                walk.strip.append(c[root + 1], 0, vertex(root + 1));
+            }
+        }
+        strip.push(*self.vertices.get(0));
+    }
+
+    fn patch_vertex(&self, point: GridPoint, vertex: &Vertex, ends: [u32; 2]) -> PatchVertex {
+        let folded = self.records.grid().fold(point);
+        PatchVertex {
+            x: folded.x(),
+            y: folded.y(),
+            height_m: vertex.height_m as f32,
+            error_m: vertex.error_m as f32,
+            radius_m: vertex.radius_m as f32,
+            ends,
+            flags: 0,
+        }
+    }
+
+    /// The vertex of a node, from the record it holds.
+    #[inline(always)]
+    fn vertex_of(&self, node: u32) -> Vertex {
+        let at = node as usize;
+        self.records.decode(self.nodes.raws[at], level_of(self.nodes.points[at]))
+    }
+
+    /// Takes from the queue what is over, and brings clocks and courses in order.
+    fn collect<P: Probe>(&mut self, pose: Pose, probe: &mut P) {
+        let moved = self.clocks.move_to(pose);
+        self.due.clear();
+        // Late nodes may have gone since, or be another's by now, which then is in the queue.
+        let is_late = |node: &u32| self.nodes.words[*node as usize] & !STATUS == 0;
+        self.due.extend(self.late.drain(..).filter(is_late));
+        let mut clocks = moved.clocks;
+        while clocks != 0 {
+            let clock = clocks.trailing_zeros() as usize;
+            clocks &= clocks - 1;
+            let (words, due) = (&mut self.nodes.words, &mut self.due);
+            self.queue.advance(clock, self.clocks.now(clock), |entry| {
+                let word = &mut words[entry.node as usize];
+                if *word & !SPLIT == entry.word {
+                    *word &= STATUS;
+                    due.push(entry.node);
+                }
+            });
+            if let Some(by) = self.clocks.set_back(clock) {
+                self.move_words(clock, clock, |expiry| u64::from(expiry).saturating_sub(by) as u32);
+            }
+        }
+        if let Some((course, direction)) = moved.next_course {
+            for kind in [Kind::Error, Kind::Planes] {
+                for band in 0..BANDS {
+                    let (from, to) = (clock_id(course, kind, band), clock_id(0, kind, band));
+                    let (then, now) = (self.clocks.now(from) as u32, self.clocks.now(to) as u32);
+                    // A tick less, for the two clocks' ticks begin at different points.
+                    self.move_words(from, to, |expiry| now + expiry.saturating_sub(then + 1).min(HORIZON));
+                }
+            }
+            self.clocks.take_course(course, direction);
+        }
+        self.work.expired = self.due.len() as u64;
+        probe.phase(Phase::Test);
+    }
+
+    /// Gives all words on clock `from` an expiry on clock `to`.
+    fn move_words(&mut self, from: usize, to: usize, expiry: impl Fn(u32) -> u32) {
+        let mut waiting = std::mem::take(&mut self.waiting);
+        let words = &mut self.nodes.words;
+        self.queue.drain(from, |entry| {
+            let word = &mut words[entry.node as usize];
+            if *word & !SPLIT == entry.word {
+                let moved = with_certificate(entry.word, to, expiry(expiry_of(entry.word)));
+                *word = moved | (*word & SPLIT);
+                waiting.push(Entry { node: entry.node, word: moved });
+            }
+        });
+        self.queue.restart(from, self.clocks.now(from) as u32);
+        for entry in waiting.drain(..) {
+            self.queue.enter(to, entry);
+        }
+        self.waiting = waiting;
+    }
+
+    /// Tests nodes and sorts out those that are to be split or merged. Fresh ones have their records read first.
+    fn test<P: Probe>(&mut self, fresh: bool, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+        let mut nodes = std::mem::take(if fresh { &mut self.fresh } else { &mut self.due });
+        if !fresh {
+            let allowed = allowance.tests(nodes.len());
+            self.late.extend(nodes.drain(allowed..));
+        }
+        let k = self.records.grid().k();
+        let mut verdicts = std::mem::take(&mut self.verdicts);
+        let verdict = |node: &u32| {
+            let at = *node as usize;
+            let point = self.nodes.points[at];
+            let raw = if fresh { self.records.raw(slot_of(k, point)) } else { self.nodes.raws[at] };
+            let vertex = self.records.decode(raw, level_of(point));
+            (raw, judge.word(&judge.metric().sight(self.records.grid().position_m(point), &vertex)))
+        };
+        if nodes.len() >= PARALLEL && rayon::current_num_threads() > 1 {
+            nodes.par_iter().with_min_len(PARALLEL / 8).map(verdict).collect_into_vec(&mut verdicts);
+        } else {
+            verdicts.clear();
+            verdicts.extend(nodes.iter().map(verdict));
+        }
+        self.work.tests += nodes.len() as u64;
+        for (node, (raw, word)) in nodes.iter().zip(&verdicts) {
+            let at = *node as usize;
+            let old = self.nodes.words[at];
+            let point = self.nodes.points[at];
+            if fresh {
+                probe.read(slot_of(k, point));
+                self.nodes.raws[at] = *raw;
+            } else if expiry_of(old) != 0 {
+                // Twice in the list: it had been late, then gone, then come back.
+                continue;
+            }
+            self.nodes.words[at] = *word | (old & SPLIT);
+            self.queue.enter(clock_of(*word), Entry { node: *node, word: *word });
+            match (*word & ACTIVE != 0, old & SPLIT != 0) {
+                (true, false) => self.to_split[level_of(point) as usize].push(*node),
+                (false, true) => self.to_merge[level_of(point) as usize].push(*node),
+                _ => {}
+            }
+        }
+        self.verdicts = verdicts;
+        nodes.clear();
+        *(if fresh { &mut self.fresh } else { &mut self.due }) = nodes;
+    }
+
+    /// Splits and merges what is to be, until no child made on the way is left untested.
+    fn apply<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+        for level in 0..LEVELS {
+            let mut nodes = std::mem::take(&mut self.to_merge[level]);
+            for node in nodes.drain(..) {
+                if self.nodes.is_live(node) && self.nodes.words[node as usize] & STATUS == SPLIT {
+                    self.merge(node);
+                }
+            }
+            self.to_merge[level] = nodes;
+        }
+        loop {
+            let mut waiting = 0;
+            for level in (0..LEVELS).rev() {
+                let mut nodes = std::mem::take(&mut self.to_split[level]);
+                nodes.retain(|node| {
+                    let wanted =
+                        self.nodes.is_live(*node) && self.nodes.words[*node as usize] & STATUS == ACTIVE;
+                    // Its other parent may be among the untested.
+                    wanted && !(allowance.split() && self.split(*node))
+                });
+                waiting += nodes.len();
+                self.to_split[level] = nodes;
+            }
+            if self.fresh.is_empty() {
+                if waiting > 0 {
+                    self.postpone();
+                }
+                return;
+            }
+            probe.phase(Phase::Test);
+            self.test(true, judge, allowance, probe);
+            probe.phase(Phase::Apply);
+        }
+    }
+
+    /// Leaves the splits that could not be made to the next frame.
+    fn postpone(&mut self) {
+        for nodes in &mut self.to_split {
+            for node in nodes.drain(..) {
+                self.nodes.words[node as usize] &= STATUS;
+                self.late.push(node);
+            }
+        }
+    }
+
+    /// Counts what is late and how far the largest error of it exceeds the tolerance.
+    fn assess_late(&mut self, metric: &Metric, view: &View) {
+        self.work.late = self.late.len() as u64;
+        for node in &self.late {
+            let vertex = self.vertex_of(*node);
+            let at_m = self.records.grid().position_m(self.nodes.points[*node as usize]);
+            let sighting = metric.sight(at_m, &vertex);
+            let culled = self.culling == Culling::Vertices && metric.cull(&sighting, ALL_PLANES).is_none();
+            if !self.nodes.is_split(*node) && sighting.is_selected() && !culled {
+                let error_px = sighting.error_px(view.tolerance_px);
+                self.work.late_error_px = self.work.late_error_px.max(error_px);
+            }
+        }
+    }
+
+    /// Lists what there is to draw: all clusters, or those that the view's planes do not cull.
+    fn list_draws(&mut self, metric: &Metric) {
+        let [dx, dy] = self.records.grid().spacing_m();
+        let draws = &mut self.patch.draws;
+        for (bounds, range) in self.triangles.clusters() {
+            if self.culling == Culling::Vertices || !metric.culls_box(bounds.least, bounds.largest, [dx, dy])
+            {
+                draws.push(range);
+            }
+        }
+    }
+
+    /// Makes the mesh of four triangles that every other grows from.
+    fn plant<P: Probe>(&mut self, probe: &mut P) {
+        let grid = *self.records.grid();
+        let square = corners(grid.k());
+        for (slot, at) in square.into_iter().enumerate() {
+            probe.read(slot as u64);
+            let vertex = self.records.vertex_at(at);
+            self.vertices.place(at, vertex.height_m);
+            self.patch.vertices.push((slot as u32, self.patch_vertex(at, &vertex, [slot as u32; 2])));
+        }
+        let centre_at = square[0].midpoint(square[2]);
+        let centre_slot = slot_of(grid.k(), centre_at);
+        probe.read(centre_slot);
+        let raw = self.records.raw(centre_slot);
+        let centre = self.nodes.create(centre_at, raw);
+        self.nodes.words[centre as usize] = STATUS;
+        let vertex = self.vertex_of(centre);
+        let slot = self.vertices.place(centre_at, vertex.height_m);
+        self.patch.vertices.push((slot, self.patch_vertex(centre_at, &vertex, [slot; 2])));
+        for (side, [b, d]) in ROOTS {
+            self.plant_root(root_label(side), [slot, b as u32, d as u32], raw);
+        }
+    }
+}
+
+/// The centre's label for the root whose side has this slot in the file: W, S, E, N are 5 to 8.
+fn root_label(side_slot: u64) -> usize {
+    [2, 3, 0, 1][side_slot as usize - 5]
+}
+
+impl<C: RecordCodec> Engine for Kinetic<'_, C> {
+    fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
+        let metric = Metric::new(view);
+        let pose = Pose {
+            eye_m: view.eye_m,
+            normals: metric.normals().map(DVec3::from_array),
+            nu: metric.nu(),
+            exaggeration: metric.exaggeration(),
+        };
+        self.work = Work::default();
+        self.patch.clear();
+        probe.phase(Phase::Scan);
+        if self.nodes.len() == 0 {
+            self.plant(probe);
+        }
+        self.collect(pose, probe);
+        let judge = Judge::new(metric, &self.clocks, self.culling == Culling::Vertices);
+        let mut allowance = Allowance::new(self.budget);
+        if !self.fresh.is_empty() {
+            self.test(true, &judge, &mut allowance, probe);
+        }
+        self.test(false, &judge, &mut allowance, probe);
+        probe.phase(Phase::Apply);
+        self.apply(&judge, &mut allowance, probe);
+        self.step_rebuild();
+        if !self.late.is_empty() {
+            self.assess_late(&metric, view);
+        }
+        let triangles = &mut self.patch.triangles;
+        self.triangles.take_written(|slot, corners| triangles.push((slot, corners)));
+        self.triangles.tighten_one(&self.vertices);
+        self.list_draws(&metric);
+        self.work.slots_written = self.patch.triangles.len() as u64;
+        self.work.patch_bytes = self.patch.bytes();
+        probe.phase(Phase::Done);
+        self.work.tests
+    }
+
+    fn for_each_triangle(&self, visit: &mut dyn FnMut(Triangle)) {
+        self.triangles.for_each(|_, t| visit(t.corners.map(|v| self.vertices.point(v))));
+    }
+
+    fn work(&self) -> Work {
+        self.work
+    }
+}
+
+/// The walk that makes a strip.
+struct StripWalk<'w, 'a, C: RecordCodec> {
+    engine: &'w Kinetic<'a, C>,
+    strip: StripBuilder<'w, StripVertex>,
+}
+
+impl<C: RecordCodec> StripWalk<'_, '_, C> {
+    /// Visits the triangle (apex; b, d), whose split vertex is `node` unless it is one of the smallest.
+    fn visit(
+        &mut self,
+        height: u32,
+        node: Option<u32>,
+        apex: (GridPoint, StripVertex),
+        b: GridPoint,
+        d: GridPoint,
+    ) {
+        if let Some(node) = node.filter(|node| self.engine.nodes.is_split(*node)) {
+            let at = b.midpoint(d);
+            let height_m = self.engine.vertex_of(node).height_m as f32;
+            let here = (at, StripVertex { x: at.x(), y: at.y(), height_m });
+            // At the finest level edges have no middle, and triangles no vertex to split at.
+            let child = |end: GridPoint| {
+                if height > 1 { self.engine.child_at(node, end.midpoint(apex.0)) } else { None }
+            };
+            let (left, right) = (child(b), child(d));
+            self.visit(height - 1, left, here, b, apex.0);
+            self.strip.append(apex.0, height & 1, apex.1);
+            self.visit(height - 1, right, here, apex.0, d);
+        } else {
+            self.strip.append(apex.0, height & 1, apex.1);
+        }
+    }
+}
+
+/// Whether a triangle is left out of the picture; asked only where padding or voids are.
+fn is_hidden<C: RecordCodec>(records: &Records<'_, C>, corners: [GridPoint; 3]) -> bool {
+    (records.grid().has_padding() || records.has_voids()) && !is_drawn(records, corners)
+}

@@ -1,0 +1,92 @@
+//! A mesh that knows nothing but the patches it was sent, as a GPU does.
+
+use terrasoar::mesh::{Triangle, TriangleKey, is_drawn};
+use terrasoar::refine::kinetic::{Kinetic, Patch, PatchVertex};
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::terrain::Records;
+
+#[derive(Default)]
+pub struct Mirror {
+    vertices: Vec<Option<PatchVertex>>,
+    triangles: Vec<[u32; 3]>,
+    draws: Vec<std::ops::Range<u32>>,
+}
+
+impl Mirror {
+    pub fn apply(&mut self, patch: &Patch) {
+        for (slot, vertex) in &patch.vertices {
+            let slot = *slot as usize;
+            self.vertices.resize(self.vertices.len().max(slot + 1), None);
+            self.vertices[slot] = Some(*vertex);
+        }
+        for (slot, corners) in &patch.triangles {
+            let slot = *slot as usize;
+            self.triangles.resize(self.triangles.len().max(slot + 1), [0; 3]);
+            self.triangles[slot] = *corners;
+        }
+        self.draws = patch.draws.clone();
+    }
+
+    fn drawn(&self) -> impl Iterator<Item = [PatchVertex; 3]> {
+        let slots = self.draws.iter().flat_map(|r| r.clone()).map(|slot| self.triangles[slot as usize]);
+        slots
+            .filter(|[a, b, _]| a != b)
+            .map(|t| t.map(|v| self.vertices[v as usize].expect("a vertex that was sent")))
+    }
+
+    /// The drawn triangles' folded corners, rotated to begin with the least, in order.
+    pub fn triangles(&self) -> Vec<[u64; 3]> {
+        sorted(self.drawn().map(|t| t.map(|v| GridPoint::new(v.x, v.y).packed())))
+    }
+
+    /// Every vertex is where the terrain says, and on the edge between its ends.
+    pub fn check_vertices<C: RecordCodec>(&self, records: &Records<'_, C>) {
+        for v in self.drawn().flatten() {
+            let vertex = records.vertex_at(GridPoint::new(v.x, v.y));
+            assert_eq!((v.height_m, v.flags), (vertex.height_m as f32, 0));
+            assert!(v.error_m >= 0.0 && v.radius_m >= 0.0);
+            assert!(v.ends.iter().all(|end| self.vertices[*end as usize].is_some()));
+        }
+    }
+}
+
+fn sorted(triangles: impl Iterator<Item = [u64; 3]>) -> Vec<[u64; 3]> {
+    let mut all: Vec<[u64; 3]> = triangles
+        .map(|mut t| {
+            let least = (0..3).min_by_key(|i| t[*i]).unwrap_or(0);
+            t.rotate_left(least);
+            t
+        })
+        .collect();
+    all.sort_unstable();
+    all
+}
+
+/// What of a full mesh is drawn, in the form of [`Mirror::triangles`].
+pub fn drawn<C: RecordCodec>(records: &Records<'_, C>, triangles: &[Triangle]) -> Vec<[u64; 3]> {
+    let grid = records.grid();
+    sorted(triangles.iter().filter(|t| is_drawn(records, **t)).map(|t| t.map(|p| grid.fold(p).packed())))
+}
+
+/// Clusters lie around their triangles, and each triangle of the mesh is in one of them.
+pub fn check_clusters<C: RecordCodec>(engine: &Kinetic<'_, C>, whole: &Patch, expected: &[TriangleKey]) {
+    let mut found = 0;
+    for (bounds, range) in engine.clusters() {
+        for (slot, corners) in &whole.triangles {
+            if range.contains(slot) {
+                found += 1;
+                for corner in corners.iter().filter(|_| corners[0] != corners[1]) {
+                    let at =
+                        whole.vertices.binary_search_by_key(corner, |(slot, _)| *slot).expect("in the patch");
+                    let v = whole.vertices[at].1;
+                    for (i, x) in [v.x as f32, v.y as f32, v.height_m].into_iter().enumerate() {
+                        assert!((bounds.least[i]..=bounds.largest[i]).contains(&x), "{v:?} {bounds:?}");
+                    }
+                }
+            }
+        }
+    }
+    assert_eq!(found, expected.len());
+    assert_eq!(engine.triangle_count(), expected.len());
+}
