@@ -13,6 +13,7 @@ pub mod header;
 pub mod import;
 pub mod octave;
 pub mod order;
+pub mod prefetch;
 pub mod record;
 pub mod source;
 pub mod synth;

@@ -11,6 +11,7 @@ use crate::error::LayoutError;
 use crate::grid::{Grid, GridPoint};
 use crate::header::{Header, INERT_PAGE, LEAF_ENTRIES};
 use crate::order::slot_of;
+use crate::prefetch::prefetch;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
 use crate::source::{MapSource, PreadSource, Source};
 use std::path::Path;
@@ -272,6 +273,15 @@ impl<'a, C: RecordCodec> Records<'a, C> {
         let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
         let at = page * PAGE_BYTES + within;
         C::read(&self.bytes[at..at + C::BYTES])
+    }
+
+    /// Asks memory for the record at `slot`. A hint: reads nothing, and does nothing for a slot past the last page.
+    #[inline(always)]
+    pub fn prefetch(&self, slot: u64) {
+        if let Some(page) = self.pages.get((slot >> Self::PAGE_SHIFT) as usize) {
+            let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+            prefetch(self.bytes, *page as usize * PAGE_BYTES + within);
+        }
     }
 
     /// The vertex of a record at `level` (0 for corners).

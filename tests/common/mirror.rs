@@ -29,7 +29,8 @@ impl Mirror {
     }
 
     fn drawn(&self) -> impl Iterator<Item = [PatchVertex; 3]> {
-        let slots = self.draws.iter().flat_map(|r| r.clone()).map(|slot| self.triangles[slot as usize]);
+        let shown = |slot: u32| self.triangles.get(slot as usize).copied().unwrap_or_default();
+        let slots = self.draws.iter().flat_map(|r| r.clone()).map(shown);
         slots
             .filter(|[a, b, _]| a != b)
             .map(|t| t.map(|v| self.vertices[v as usize].expect("a vertex that was sent")))

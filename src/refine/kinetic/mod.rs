@@ -18,17 +18,17 @@
 mod budget;
 mod certificate;
 mod clocks;
+mod labels;
 mod nodes;
+mod pages;
 mod patch;
 mod queue;
-mod rebuild;
 mod tree;
-mod triangles;
 mod vertices;
 
 pub use budget::Budget;
+pub use pages::Bounds;
 pub use patch::{Patch, PatchVertex};
-pub use triangles::Bounds;
 
 use super::strip::StripBuilder;
 use super::{Culling, Engine, Phase, Probe, Work};
@@ -40,15 +40,15 @@ use budget::Allowance;
 use certificate::{ACTIVE, Judge, clock_of, expiry_of, with_certificate};
 use clocks::{BANDS, Clocks, HORIZON, Kind, Pose, clock_id};
 use glam::DVec3;
-use nodes::{CENTRE, Nodes, SPLIT, STATUS, level_of};
+use labels::level_of;
+use nodes::{CENTRE, Nodes, SPLIT, STATUS, body};
+use pages::{Dealing, Pages};
 use queue::{Entry, Queue};
 use rayon::prelude::*;
-use rebuild::Rebuild;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{ROOTS, corners, slot_of};
 use terrasoar_layout::record::{RecordCodec, Vertex};
 use terrasoar_layout::terrain::Records;
-use triangles::Triangles;
 use vertices::Vertices;
 
 /// From so many tests on they are shared among threads.
@@ -62,11 +62,13 @@ pub struct Kinetic<'a, C: RecordCodec> {
     records: Records<'a, C>,
     culling: Culling,
     nodes: Nodes<C::Raw>,
-    triangles: Triangles,
     vertices: Vertices,
+    /// Triangles in the mesh.
+    triangles: usize,
+    /// The page whose bounds are due to be made anew.
+    stale: usize,
     clocks: Clocks,
     queue: Queue,
-    rebuild: Rebuild,
     budget: Budget,
     /// Nodes whose certificate is over and that are in no queue.
     due: Vec<u32>,
@@ -89,14 +91,15 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         let grid = *records.grid();
         let [dx, dy] = grid.spacing_m();
         let [low, high] = records.height_range_m();
+        let dealing = if culling == Culling::Clusters { Dealing::Near } else { Dealing::Packed };
         Self {
             culling,
-            nodes: Nodes::new(),
-            triangles: Triangles::new(&grid),
+            nodes: Nodes::new(Pages::new(dealing)),
             vertices: Vertices::default(),
+            triangles: 0,
+            stale: 0,
             clocks: Clocks::new(dx.min(dy), low.abs().max(high.abs())),
             queue: Queue::new(),
-            rebuild: Rebuild::default(),
             budget: Budget::default(),
             due: Vec::new(),
             late: Vec::new(),
@@ -125,9 +128,9 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
     pub fn whole_patch(&self) -> Patch {
         let mut patch = Patch { draws: self.patch.draws.clone(), ..Default::default() };
         let mut in_use = vec![false; self.vertices.slots().len()];
-        self.triangles.for_each(|slot, t| {
-            t.corners.iter().for_each(|v| in_use[*v as usize] = true);
-            patch.triangles.push((slot, if t.hidden { [0; 3] } else { t.corners }));
+        self.for_each_slot(|slot, corners| {
+            corners.iter().for_each(|v| in_use[*v as usize] = true);
+            patch.triangles.push((slot, self.shown(Some(corners))));
         });
         let grid = self.records.grid();
         let slot_at: std::collections::HashMap<GridPoint, u32> = (0..in_use.len() as u32)
@@ -135,7 +138,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             .map(|v| (self.vertices.point(v), v))
             .collect();
         for (point, slot) in &slot_at {
-            let own = grid.is_corner(*point) || self.nodes.points[CENTRE as usize] == *point;
+            let own = grid.is_corner(*point) || self.nodes.get(CENTRE).point == *point;
             let ends = if own {
                 [*slot; 2]
             } else {
@@ -149,22 +152,17 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
 
     /// Bounds and triangle slots of the clusters of the mesh.
     pub fn clusters(&self) -> impl Iterator<Item = (&Bounds, std::ops::Range<u32>)> {
-        self.triangles.clusters()
+        self.nodes.pages.clusters()
     }
 
     /// Triangles in the mesh, also those that are not drawn.
     pub fn triangle_count(&self) -> usize {
-        self.triangles.live()
-    }
-
-    /// Live-range words, of free nodes too: a column that a scan would have to read.
-    pub fn words(&self) -> &[u32] {
-        &self.nodes.words
+        self.triangles
     }
 
     /// Vertices under watch: those in the mesh and those that the next splits would add.
     pub fn node_count(&self) -> usize {
-        self.nodes.live()
+        self.nodes.pages.taken()
     }
 
     /// Bytes held by all arrays, spare capacity included.
@@ -172,7 +170,6 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         let lists = [&self.due, &self.late, &self.fresh];
         let by_level = self.to_split.iter().chain(&self.to_merge);
         self.nodes.bytes()
-            + self.triangles.bytes()
             + self.vertices.bytes()
             + self.queue.bytes()
             + lists.into_iter().chain(by_level).map(|l| l.capacity() * size_of::<u32>()).sum::<usize>()
@@ -186,16 +183,16 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
     /// The mesh as one triangle strip, SOAR's, from scratch. For those who want a strip; updates do not need it.
     pub fn strip(&self, strip: &mut Vec<StripVertex>) {
         strip.clear();
-        if self.nodes.len() == 0 {
+        if self.nodes.is_empty() {
             return;
         }
         let grid = self.records.grid();
         let c = corners(grid.k());
         let vertex = |i: usize| *self.vertices.get(i as u32);
         let mut walk = StripWalk { engine: self, strip: StripBuilder::start(strip, c[0], vertex(0)) };
-        let centre = (self.nodes.points[CENTRE as usize], vertex(4));
+        let centre = (self.nodes.get(CENTRE).point, vertex(4));
         for (root, (side, [b, d])) in ROOTS.into_iter().enumerate() {
-            let node = self.nodes.links[CENTRE as usize][root_label(side)];
+            let node = self.nodes.get(CENTRE).body[root_label(side)];
             walk.visit(grid.levels() - 1, Some(node), centre, c[b], c[d]);
             if root < 3 {
                 walk.strip.append(c[root + 1], 0, vertex(root + 1));
@@ -220,8 +217,27 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
     /// The vertex of a node, from the record it holds.
     #[inline(always)]
     fn vertex_of(&self, node: u32) -> Vertex {
-        let at = node as usize;
-        self.records.decode(self.nodes.raws[at], level_of(self.nodes.points[at]))
+        let node = self.nodes.get(node);
+        self.records.decode(node.raw, level_of(node.point))
+    }
+
+    /// Calls `visit` with every triangle of the mesh and its slot.
+    fn for_each_slot(&self, mut visit: impl FnMut(u32, [u32; 3])) {
+        for node in (0..self.nodes.pages.len()).flat_map(|page| self.nodes.pages.places_of(page)) {
+            for (side, corners) in self.nodes.triangles(node).into_iter().enumerate() {
+                if let Some(corners) = corners {
+                    visit(2 * node + side as u32, corners);
+                }
+            }
+        }
+    }
+
+    /// What a slot sends to the GPU: nothing where voids touch or padding takes the area.
+    #[inline(always)]
+    fn shown(&self, corners: Option<[u32; 3]>) -> [u32; 3] {
+        let partial = self.records.grid().has_padding() || self.records.has_voids();
+        let drawn = |t: &[u32; 3]| !partial || is_drawn(&self.records, t.map(|v| self.vertices.point(v)));
+        corners.filter(drawn).unwrap_or([0; 3])
     }
 
     /// Takes from the queue what is over, and brings clocks and courses in order.
@@ -229,15 +245,15 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         let moved = self.clocks.move_to(pose);
         self.due.clear();
         // Late nodes may have gone since, or be another's by now, which then is in the queue.
-        let is_late = |node: &u32| self.nodes.words[*node as usize] & !STATUS == 0;
+        let is_late = |node: &u32| self.nodes.get(*node).word & !STATUS == 0;
         self.due.extend(self.late.drain(..).filter(is_late));
         let mut clocks = moved.clocks;
         while clocks != 0 {
             let clock = clocks.trailing_zeros() as usize;
             clocks &= clocks - 1;
-            let (words, due) = (&mut self.nodes.words, &mut self.due);
+            let (nodes, due) = (&mut self.nodes.all, &mut self.due);
             self.queue.advance(clock, self.clocks.now(clock), |entry| {
-                let word = &mut words[entry.node as usize];
+                let word = &mut nodes[entry.node as usize].word;
                 if *word & !SPLIT == entry.word {
                     *word &= STATUS;
                     due.push(entry.node);
@@ -265,9 +281,9 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
     /// Gives all words on clock `from` an expiry on clock `to`.
     fn move_words(&mut self, from: usize, to: usize, expiry: impl Fn(u32) -> u32) {
         let mut waiting = std::mem::take(&mut self.waiting);
-        let words = &mut self.nodes.words;
+        let nodes = &mut self.nodes.all;
         self.queue.drain(from, |entry| {
-            let word = &mut words[entry.node as usize];
+            let word = &mut nodes[entry.node as usize].word;
             if *word & !SPLIT == entry.word {
                 let moved = with_certificate(entry.word, to, expiry(expiry_of(entry.word)));
                 *word = moved | (*word & SPLIT);
@@ -291,9 +307,9 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         let k = self.records.grid().k();
         let mut verdicts = std::mem::take(&mut self.verdicts);
         let verdict = |node: &u32| {
-            let at = *node as usize;
-            let point = self.nodes.points[at];
-            let raw = if fresh { self.records.raw(slot_of(k, point)) } else { self.nodes.raws[at] };
+            let node = self.nodes.get(*node);
+            let point = node.point;
+            let raw = if fresh { self.records.raw(slot_of(k, point)) } else { node.raw };
             let vertex = self.records.decode(raw, level_of(point));
             (raw, judge.word(&judge.metric().sight(self.records.grid().position_m(point), &vertex)))
         };
@@ -305,17 +321,16 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         }
         self.work.tests += nodes.len() as u64;
         for (node, (raw, word)) in nodes.iter().zip(&verdicts) {
-            let at = *node as usize;
-            let old = self.nodes.words[at];
-            let point = self.nodes.points[at];
+            let record = self.nodes.get_mut(*node);
+            let (old, point) = (record.word, record.point);
             if fresh {
                 probe.read(slot_of(k, point));
-                self.nodes.raws[at] = *raw;
+                record.raw = *raw;
             } else if expiry_of(old) != 0 {
                 // Twice in the list: it had been late, then gone, then come back.
                 continue;
             }
-            self.nodes.words[at] = *word | (old & SPLIT);
+            record.word = *word | (old & SPLIT);
             self.queue.enter(clock_of(*word), Entry { node: *node, word: *word });
             match (*word & ACTIVE != 0, old & SPLIT != 0) {
                 (true, false) => self.to_split[level_of(point) as usize].push(*node),
@@ -333,7 +348,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         for level in 0..LEVELS {
             let mut nodes = std::mem::take(&mut self.to_merge[level]);
             for node in nodes.drain(..) {
-                if self.nodes.is_live(node) && self.nodes.words[node as usize] & STATUS == SPLIT {
+                if self.nodes.is_live(node) && self.nodes.get(node).word & STATUS == SPLIT {
                     self.merge(node);
                 }
             }
@@ -344,8 +359,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             for level in (0..LEVELS).rev() {
                 let mut nodes = std::mem::take(&mut self.to_split[level]);
                 nodes.retain(|node| {
-                    let wanted =
-                        self.nodes.is_live(*node) && self.nodes.words[*node as usize] & STATUS == ACTIVE;
+                    let wanted = self.nodes.is_live(*node) && self.nodes.get(*node).word & STATUS == ACTIVE;
                     // Its other parent may be among the untested.
                     wanted && !(allowance.split() && self.split(*node))
                 });
@@ -368,7 +382,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
     fn postpone(&mut self) {
         for nodes in &mut self.to_split {
             for node in nodes.drain(..) {
-                self.nodes.words[node as usize] &= STATUS;
+                self.nodes.get_mut(node).word &= STATUS;
                 self.late.push(node);
             }
         }
@@ -379,7 +393,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         self.work.late = self.late.len() as u64;
         for node in &self.late {
             let vertex = self.vertex_of(*node);
-            let at_m = self.records.grid().position_m(self.nodes.points[*node as usize]);
+            let at_m = self.records.grid().position_m(self.nodes.get(*node).point);
             let sighting = metric.sight(at_m, &vertex);
             let culled = self.culling == Culling::Vertices && metric.cull(&sighting, ALL_PLANES).is_none();
             if !self.nodes.is_split(*node) && sighting.is_selected() && !culled {
@@ -389,11 +403,22 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         }
     }
 
+    /// Lists the slots that show something else than in the frame before.
+    fn list_written(&mut self) {
+        let mut written = std::mem::take(&mut self.patch.triangles);
+        let mut pages = std::mem::replace(&mut self.nodes.pages, Pages::new(Dealing::Packed));
+        pages.take_written(|node, side| {
+            written.push((2 * node + side as u32, self.shown(self.nodes.triangles(node)[side])));
+        });
+        self.nodes.pages = pages;
+        self.patch.triangles = written;
+    }
+
     /// Lists what there is to draw: all clusters, or those that the view's planes do not cull.
     fn list_draws(&mut self, metric: &Metric) {
         let [dx, dy] = self.records.grid().spacing_m();
         let draws = &mut self.patch.draws;
-        for (bounds, range) in self.triangles.clusters() {
+        for (bounds, range) in self.nodes.pages.clusters() {
             if self.culling == Culling::Vertices || !metric.culls_box(bounds.least, bounds.largest, [dx, dy])
             {
                 draws.push(range);
@@ -415,14 +440,16 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         let centre_slot = slot_of(grid.k(), centre_at);
         probe.read(centre_slot);
         let raw = self.records.raw(centre_slot);
-        let centre = self.nodes.create(centre_at, raw);
-        self.nodes.words[centre as usize] = STATUS;
+        let centre = self.nodes.create(CENTRE, centre_at, raw);
+        self.nodes.get_mut(centre).word = STATUS;
         let vertex = self.vertex_of(centre);
         let slot = self.vertices.place(centre_at, vertex.height_m);
         self.patch.vertices.push((slot, self.patch_vertex(centre_at, &vertex, [slot; 2])));
+        self.nodes.get_mut(centre).body[body::HERE] = slot;
         for (side, [b, d]) in ROOTS {
-            self.plant_root(root_label(side), [slot, b as u32, d as u32], raw);
+            self.plant_root(root_label(side), [slot, b as u32, d as u32]);
         }
+        self.triangles = ROOTS.len();
     }
 }
 
@@ -443,7 +470,7 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
         self.work = Work::default();
         self.patch.clear();
         probe.phase(Phase::Scan);
-        if self.nodes.len() == 0 {
+        if self.nodes.is_empty() {
             self.plant(probe);
         }
         self.collect(pose, probe);
@@ -455,13 +482,12 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
         self.test(false, &judge, &mut allowance, probe);
         probe.phase(Phase::Apply);
         self.apply(&judge, &mut allowance, probe);
-        self.step_rebuild();
         if !self.late.is_empty() {
             self.assess_late(&metric, view);
         }
-        let triangles = &mut self.patch.triangles;
-        self.triangles.take_written(|slot, corners| triangles.push((slot, corners)));
-        self.triangles.tighten_one(&self.vertices);
+        self.list_written();
+        self.stale = (self.stale + 1) % self.nodes.pages.len();
+        self.tighten(self.stale);
         self.list_draws(&metric);
         self.work.slots_written = self.patch.triangles.len() as u64;
         self.work.patch_bytes = self.patch.bytes();
@@ -470,7 +496,7 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
     }
 
     fn for_each_triangle(&self, visit: &mut dyn FnMut(Triangle)) {
-        self.triangles.for_each(|_, t| visit(t.corners.map(|v| self.vertices.point(v))));
+        self.for_each_slot(|_, corners| visit(corners.map(|v| self.vertices.point(v))));
     }
 
     fn work(&self) -> Work {
@@ -510,9 +536,4 @@ impl<C: RecordCodec> StripWalk<'_, '_, C> {
             self.strip.append(apex.0, height & 1, apex.1);
         }
     }
-}
-
-/// Whether a triangle is left out of the picture; asked only where padding or voids are.
-fn is_hidden<C: RecordCodec>(records: &Records<'_, C>, corners: [GridPoint; 3]) -> bool {
-    (records.grid().has_padding() || records.has_voids()) && !is_drawn(records, corners)
 }

@@ -29,7 +29,7 @@ pub struct Patch {
     pub vertices: Vec<(u32, PatchVertex)>,
     /// Triangle slots and the vertex slots of their corners, counter-clockwise from above, apex first; three equal ones draw nothing.
     pub triangles: Vec<(u32, [u32; 3])>,
-    /// Ranges of triangle slots to draw in this frame. Slots outside all clusters hold remains.
+    /// Ranges of triangle slots to draw in this frame. A slot that was never sent holds three equal corners.
     pub draws: Vec<Range<u32>>,
 }
 

@@ -1,63 +1,97 @@
-//! Splitting and merging nodes: links, triangles and vertices kept in step.
+//! Splitting and merging nodes: relatives, triangles and vertices kept in step.
 //!
-//! Invariant: after each call all of `super::nodes` and `super::triangles` holds. A split makes two triangles of each of a node's one or two,
-//! a merge the reverse. Cost: four slots written, at most four nodes made or freed.
+//! Invariant: after each call all of `super::nodes` holds, and the slots that show something else have been noted. A split makes two triangles of
+//! each of a node's one or two, a merge the reverse. Cost: six slots, at most four nodes made or freed; what it costs is the wait for memory, which
+//! [`Kinetic::fetch`] shortens by asking for a node's relatives some splits ahead.
 
-use super::nodes::{CENTRE, NONE, SPLIT, STATUS, child_point, first_child, level_of};
-use super::triangles::{Corners, Owner};
-use super::{Kinetic, is_hidden};
+use super::Kinetic;
+use super::labels::{child_point, level_of};
+use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
+use super::pages::Bounds;
 use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::order::slot_of;
+use terrasoar_layout::prefetch::prefetch;
 use terrasoar_layout::record::RecordCodec;
 
-/// One side of a node: its parent there, and the labels of the two children that side's triangle has.
-#[derive(Clone, Copy)]
-struct Side {
-    parent: u32,
-    /// Between parent and edge end p, counter-clockwise: child triangle (v; parent, p).
-    first: usize,
-    /// Between edge end q and parent: child triangle (v; q, parent).
-    last: usize,
-}
-
 impl<C: RecordCodec> Kinetic<'_, C> {
-    /// The sides of a node that have a triangle.
-    fn sides(&self, node: u32, level: u32) -> [Option<Side>; 2] {
-        let parents = self.nodes.parents[node as usize];
-        [0, 1].map(|side| {
-            (parents[side] != NONE).then(|| {
-                let first = first_child(self.nodes.label(node, side), level);
-                Side { parent: parents[side], first, last: (first + 3) & 3 }
-            })
-        })
-    }
-
     /// The child of a split node that lies at `at`; `None` at the finest level, where there are none.
     pub(super) fn child_at(&self, node: u32, at: GridPoint) -> Option<u32> {
-        let point = self.nodes.points[node as usize];
-        let level = level_of(point);
-        let label = (0..4).find(|label| level > 0 && child_point(point, level, *label) == at)?;
-        Some(self.nodes.links[node as usize][label])
+        let node = self.nodes.get(node);
+        let level = level_of(node.point);
+        (0..4)
+            .find(|label| level > 0 && child_point(node.point, level, *label) == at)
+            .map(|label| node.body[label])
     }
 
-    /// Makes the root with `label` at the centre: a triangle whose split vertex is the middle of a side of the square.
-    pub(super) fn plant_root(&mut self, label: usize, corners: [u32; 3], blank: C::Raw) {
-        let centre_at = self.nodes.points[CENTRE as usize];
-        let node = self.nodes.create(child_point(centre_at, level_of(centre_at), label), blank);
-        self.nodes.links[CENTRE as usize][label] = node;
-        self.nodes.parents[node as usize][label >> 1] = CENTRE;
+    /// Makes the root with `label` at the centre: the triangle (centre; p, q), whose split vertex is the middle of a side of the square.
+    pub(super) fn plant_root(&mut self, label: usize, [apex, p, q]: [u32; 3]) {
+        let centre = *self.nodes.get(CENTRE);
+        let point = child_point(centre.point, level_of(centre.point), label);
+        let node = self.nodes.create(CENTRE, point, centre.raw);
+        self.nodes.get_mut(CENTRE).body[label] = node;
+        self.adopt(node, CENTRE, label, [apex, p, q]);
+        self.cover(node, &[apex, p, q]);
         self.fresh.push(node);
-        let triangle = Corners { corners, hidden: self.hides(corners) };
-        self.triangles.insert(
-            0,
-            triangle,
-            Owner::new(node, label >> 1),
-            &mut self.nodes.links,
-            &self.vertices,
-        );
     }
 
-    fn hides(&self, corners: [u32; 3]) -> bool {
-        is_hidden(&self.records, corners.map(|v| self.vertices.point(v)))
+    /// Gives a leaf the triangle (apex; p, q) on the side of its parent, at which it has `label`.
+    #[inline(always)]
+    fn adopt(&mut self, node: u32, parent: u32, label: usize, [apex, p, q]: [u32; 3]) {
+        let side = label >> 1;
+        let child = self.nodes.get_mut(node);
+        child.parents[side] = parent;
+        let [p, q] = if side == 0 { [p, q] } else { [q, p] };
+        child.body[body::P] = p;
+        child.body[body::Q] = q;
+        child.body[body::APEX + side] = apex;
+        self.nodes.pages.touch(node, side);
+    }
+
+    /// Folded position and height of a vertex.
+    #[inline(always)]
+    fn place_of(&self, vertex: u32) -> [f32; 3] {
+        let v = self.vertices.get(vertex);
+        let folded = self.records.grid().fold(GridPoint::new(v.x, v.y));
+        // Columns and rows are below 2^24: exact.
+        [folded.x() as f32, folded.y() as f32, v.height_m]
+    }
+
+    /// Widens the bounds of a node's page to contain vertices.
+    #[inline(always)]
+    fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
+        let places = vertices.map(|v| self.place_of(v));
+        self.nodes.pages.cover(node, &places);
+    }
+
+    /// Makes the bounds of a page anew, which merges leave too large.
+    pub(super) fn tighten(&mut self, page: usize) {
+        let mut bounds = Bounds::EMPTY;
+        for node in self.nodes.pages.places_of(page) {
+            for vertex in self.nodes.triangles(node).into_iter().flatten().flatten() {
+                bounds.include(self.place_of(vertex));
+            }
+        }
+        self.nodes.pages.set_bounds(page, bounds);
+    }
+
+    /// Asks memory for what splitting or merging a node will look at. `ahead` 2: itself; 1: its vertices and parents; 0: its neighbours.
+    #[inline(always)]
+    pub(super) fn fetch(&self, node: u32, ahead: u32) {
+        if ahead == 2 {
+            return prefetch(&self.nodes.all, node as usize);
+        }
+        let record = self.nodes.get(node);
+        let parents = record.parents.into_iter().filter(|parent| *parent != NONE);
+        if ahead == 1 {
+            parents.for_each(|parent| prefetch(&self.nodes.all, parent as usize));
+            record.body[..4].iter().for_each(|slot| self.vertices.fetch(*slot));
+        } else {
+            // Two neighbours around each parent; its children's links lie in its body.
+            for parent in parents {
+                let links = self.nodes.get(parent).body;
+                links[..4].iter().for_each(|child| prefetch(&self.nodes.all, *child as usize));
+            }
+        }
     }
 
     /// Splits a node. `false`, and nothing done, if a triangle on one of its sides is yet to come.
@@ -65,160 +99,144 @@ impl<C: RecordCodec> Kinetic<'_, C> {
         if !self.nodes.is_complete(node, self.records.grid().side_steps()) {
             return false;
         }
-        let at = node as usize;
-        let point = self.nodes.points[at];
-        let level = level_of(point);
-        let sides = self.sides(node, level);
-        let slots = self.nodes.links[at];
-        let vertex = self.vertex_of(node);
-        let here = self.vertices.place(point, vertex.height_m);
-        self.nodes.words[at] |= SPLIT;
-        self.nodes.links[at] = [NONE; 4];
-        // Children and first halves for both sides, so that whatever moves when second halves come in has an owner that stands.
-        let mut seconds = [None; 2];
-        let mut ends = [here; 2];
-        for (side, second) in
-            sides.into_iter().zip(&mut seconds).enumerate().filter_map(|(i, (s, b))| Some(((i, s?), b)))
+        let leaf = *self.nodes.get(node);
+        let level = level_of(leaf.point);
+        let sides = self.nodes.sides(node, level);
+        let vertex = self.records.decode(leaf.raw, level);
+        let here = self.vertices.place(leaf.point, vertex.height_m);
         {
-            let (i, side) = side;
-            let slot = slots[i];
-            let [apex, p, q] = self.triangles.get(slot).corners;
-            ends = [p, q];
-            let first = self.owner_of_half(node, level, side, side.first);
-            let last = self.owner_of_half(node, level, side, side.last);
-            let corners = [here, apex, p];
-            let triangle = Corners { corners, hidden: self.hides(corners) };
-            self.triangles.set(slot, triangle, first, &mut self.nodes.links, &self.vertices);
-            *second = Some((side.first, [here, q, apex], last));
+            let split = self.nodes.get_mut(node);
+            split.word |= SPLIT;
+            split.body[body::HERE] = here;
+            if level > 0 {
+                split.body[..4].fill(NONE);
+            }
         }
-        for (beside, corners, owner) in seconds.into_iter().flatten() {
-            // The first half's slot, wherever it is by now.
-            let beside = self.half_slot(node, level, beside);
-            let triangle = Corners { corners, hidden: self.hides(corners) };
-            self.triangles.insert(beside, triangle, owner, &mut self.nodes.links, &self.vertices);
+        for (i, side) in sides.into_iter().enumerate() {
+            let Some(side) = side else { continue };
+            let [_, apex, p, q] = half(&leaf, i);
+            self.nodes.pages.touch(node, i);
+            self.triangles += 1;
+            if level == 0 {
+                self.cover(node, &[here, apex, p, q]);
+                continue;
+            }
+            self.halve(node, &leaf.point, level, side, side.first, [here, apex, p]);
+            self.halve(node, &leaf.point, level, side, side.last, [here, q, apex]);
         }
-        let patched = self.patch_vertex(point, &vertex, ends);
+        if level == 0 {
+            let annex = self.nodes.create_annex(node);
+            self.nodes.get_mut(node).body[body::ANNEX] = annex;
+            self.nodes.pages.touch(annex, 0);
+            self.nodes.pages.touch(annex, 1);
+            let corners = [here, leaf.body[body::P], leaf.body[body::Q]];
+            self.cover(annex, &corners);
+            for apex in [0, 1].into_iter().filter(|i| leaf.parents[*i] != NONE) {
+                self.cover(annex, &[leaf.body[body::APEX + apex]]);
+            }
+        }
+        let patched = self.patch_vertex(leaf.point, &vertex, [leaf.body[body::P], leaf.body[body::Q]]);
         self.patch.vertices.push((here, patched));
         self.work.splits += 1;
         true
     }
 
-    /// Who is to own the half triangle of a split node in direction `label`: the child that splits it, made or found, or at the finest level the node.
-    fn owner_of_half(&mut self, node: u32, level: u32, side: Side, label: usize) -> Owner {
-        if level == 0 {
-            return Owner::new(node, label);
-        }
+    /// Gives the half triangle of a node in direction `label` to the child that splits it, made or found.
+    #[inline(always)]
+    fn halve(
+        &mut self,
+        node: u32,
+        point: &GridPoint,
+        level: u32,
+        side: Side,
+        label: usize,
+        corners: [u32; 3],
+    ) {
         // The neighbour around the parent that shares the child.
-        let own = self.nodes.label(node, usize::from(self.nodes.parents[node as usize][1] == side.parent));
+        let own = self.nodes.label(node, usize::from(self.nodes.get(node).parents[1] == side.parent));
         let turn = if label == side.first { 3 } else { 1 };
-        let neighbour = self.nodes.links[side.parent as usize][(own + turn) & 3];
+        let neighbour = self.nodes.get(side.parent).body[(own + turn) & 3];
         let shared = if neighbour != NONE && self.nodes.is_split(neighbour) {
-            self.nodes.links[neighbour as usize][(label + 2) & 3]
+            self.nodes.get(neighbour).body[(label + 2) & 3]
         } else {
             NONE
         };
         let child = if shared == NONE {
-            let point = child_point(self.nodes.points[node as usize], level, label);
-            let blank = self.nodes.raws[node as usize];
-            let child = self.nodes.create(point, blank);
+            let at = child_point(*point, level, label);
+            self.records.prefetch(slot_of(self.records.grid().k(), at));
+            let child = self.nodes.create(node, at, self.nodes.get(node).raw);
             self.fresh.push(child);
             child
         } else {
             shared
         };
-        self.nodes.links[node as usize][label] = child;
-        self.nodes.parents[child as usize][label >> 1] = node;
-        Owner::new(child, label >> 1)
-    }
-
-    /// The slot of a split node's half triangle in direction `label`, which is not split itself.
-    fn half_slot(&self, node: u32, level: u32, label: usize) -> u32 {
-        let link = self.nodes.links[node as usize][label];
-        if level == 0 { link } else { self.nodes.links[link as usize][label >> 1] }
+        self.nodes.get_mut(node).body[label] = child;
+        self.adopt(child, node, label, corners);
+        self.cover(child, &corners);
     }
 
     /// Merges a split node. Children that are still split are merged before it.
     pub(super) fn merge(&mut self, node: u32) {
-        let at = node as usize;
-        let level = level_of(self.nodes.points[at]);
-        let sides = self.sides(node, level);
-        if level > 0 {
-            for child in self.nodes.links[at] {
-                if child != NONE && self.nodes.is_split(child) {
-                    // Only if it is late: in time it has merged already.
-                    self.merge(child);
-                    if self.nodes.words[child as usize] & STATUS != 0 {
-                        self.nodes.words[child as usize] &= STATUS;
-                        self.late.push(child);
-                    }
+        let split = *self.nodes.get(node);
+        let level = level_of(split.point);
+        let sides = self.nodes.sides(node, level);
+        self.nodes.get_mut(node).word &= !SPLIT;
+        if level == 0 {
+            let annex = split.body[body::ANNEX];
+            self.nodes.pages.touch(annex, 0);
+            self.nodes.pages.touch(annex, 1);
+            self.nodes.get_mut(annex).parents = [NONE; 2];
+            self.nodes.free(annex);
+        } else {
+            self.merge_children(&split.body[..4]);
+            let mut leaf = [NONE; 6];
+            for (i, side) in sides.into_iter().enumerate() {
+                let Some(side) = side else { continue };
+                // From the first half (v; parent, p) and the last one (v; q, parent).
+                let child = |label: usize| half(self.nodes.get(split.body[label]), label >> 1);
+                let ([_, _, apex, p], [_, _, q, _]) = (child(side.first), child(side.last));
+                leaf[body::APEX + i] = apex;
+                [leaf[body::P], leaf[body::Q]] = if i == 0 { [p, q] } else { [q, p] };
+            }
+            self.nodes.get_mut(node).body = leaf;
+            for (label, child) in split.body[..4].iter().enumerate() {
+                if *child != NONE {
+                    self.desert(*child, label >> 1);
                 }
             }
         }
-        let mut here = NONE;
-        let mut whole = [[NONE; 3]; 2];
-        for (side, whole) in sides.into_iter().zip(&mut whole) {
-            let Some(side) = side else { continue };
-            let [v, apex, p] = self.triangles.get(self.half_slot(node, level, side.first)).corners;
-            let second = self.half_slot(node, level, side.last);
-            let [_, q, _] = self.triangles.get(second).corners;
-            here = v;
-            *whole = [apex, p, q];
-            self.triangles.remove(second, &mut self.nodes.links, &self.vertices);
-        }
-        let children = self.nodes.links[at];
-        let firsts = sides.map(|side| side.map(|side| self.half_slot(node, level, side.first)));
-        self.nodes.words[at] &= !SPLIT;
-        self.nodes.links[at] = [NONE; 4];
-        for (i, (slot, corners)) in firsts.into_iter().zip(whole).enumerate() {
-            let Some(slot) = slot else { continue };
-            let triangle = Corners { corners, hidden: self.hides(corners) };
-            self.triangles.set(slot, triangle, Owner::new(node, i), &mut self.nodes.links, &self.vertices);
-        }
-        if level > 0 {
-            for (label, child) in children.into_iter().enumerate() {
-                if child != NONE {
-                    self.desert(child, label >> 1);
-                }
+        for i in 0..2 {
+            if split.parents[i] != NONE {
+                self.nodes.pages.touch(node, i);
+                self.triangles -= 1;
+                let [_, apex, p, q] = half(self.nodes.get(node), i);
+                self.cover(node, &[apex, p, q]);
             }
         }
-        self.vertices.remove(here);
+        self.vertices.remove(split.body[body::HERE]);
         self.work.merges += 1;
     }
 
-    /// Takes a leaf's parent on `side` from it; frees it if that was the last.
-    fn desert(&mut self, node: u32, side: usize) {
-        let at = node as usize;
-        self.nodes.parents[at][side] = NONE;
-        self.nodes.links[at][side] = NONE;
-        if self.nodes.parents[at] == [NONE; 2] {
-            self.nodes.free(node);
+    /// Merges those children of a node that are late: in time they have merged before it.
+    fn merge_children(&mut self, children: &[u32]) {
+        for child in children.iter().copied().filter(|child| *child != NONE) {
+            if self.nodes.is_split(child) {
+                self.merge(child);
+                let word = &mut self.nodes.get_mut(child).word;
+                *word &= STATUS;
+                self.late.push(child);
+            }
         }
     }
 
-    /// Moves a node to a free place in the array, and tells all that know it.
-    pub(super) fn relocate(&mut self, from: u32, to: u32) {
-        self.nodes.move_record(from, to);
-        let at = to as usize;
-        let level = level_of(self.nodes.points[at]);
-        for side in 0..2 {
-            let parent = self.nodes.parents[at][side];
-            if parent != NONE {
-                let label = self.nodes.label(to, side);
-                self.nodes.links[parent as usize][label] = to;
-            }
-        }
-        let links = self.nodes.links[at];
-        let split = self.nodes.is_split(to);
-        for (place, link) in links.into_iter().enumerate().filter(|(_, link)| *link != NONE) {
-            if split && level > 0 {
-                self.nodes.parents[link as usize][place >> 1] = to;
-            } else if split || place < 2 {
-                self.triangles.set_owner(link, Owner::new(to, place));
-            }
-        }
-        let word = self.nodes.words[at] & !SPLIT;
-        if to != CENTRE && super::expiry_of(word) != 0 {
-            self.queue.enter(super::clock_of(word), super::Entry { node: to, word });
+    /// Takes a leaf's parent on `side` from it; frees it if that was the last.
+    #[inline(always)]
+    fn desert(&mut self, node: u32, side: usize) {
+        self.nodes.pages.touch(node, side);
+        let leaf = self.nodes.get_mut(node);
+        leaf.parents[side] = NONE;
+        if leaf.parents == [NONE; 2] {
+            self.nodes.free(node);
         }
     }
 }
