@@ -4,10 +4,10 @@
 //! incoherences, while turning, on the spot, and with a million triangles? What do the other ways to find expired words cost, and how
 //! much memory does it hold? Data: terrain files named on the command line. Command:
 //!
-//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 300] [--profile INCOHERENCE]
+//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 600] [--profile INCOHERENCE]
 //!
-//! Both engines fly the same frames in the same process, each on its own, in turns, three times; a frame's time is the least of its three. Prints Markdown. One
-//! thread. Keep runs under benches/runs/.
+//! All engines fly the same frames in the same process, one after the other, three times over; a frame's time is the least of its three, and figures are
+//! medians over the last two thirds of the frames. One thread. Prints Markdown. Keep runs under benches/runs/.
 
 #[path = "support/ground.rs"]
 mod ground;
@@ -17,12 +17,12 @@ mod scan;
 use ground::OverTerrain;
 use std::path::PathBuf;
 use std::time::Instant;
-use terrasoar::flight::generate::{FlightKind, FlightPlan};
+use terrasoar::flight::generate::{FlightKind, FlightPlan, generate};
 use terrasoar::flight::{FlightFrame, incoherence};
 use terrasoar::flyover::{Quality, mean_incoherence_percent};
 use terrasoar::refine::kinetic::Kinetic;
 use terrasoar::refine::soar::Soar;
-use terrasoar::refine::{Culling, Engine, Unobserved, Work};
+use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::record::RecordCodec;
 use terrasoar_layout::terrain::{Records, Terrain};
@@ -30,13 +30,13 @@ use terrasoar_layout::with_records;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Frames at the start that no median counts: courses and caches settle.
-const WARM_UP: usize = 60;
+/// Passes over each flight.
+const PASSES: usize = 3;
 
 fn main() -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
-    let (mut path, mut frames, mut profile) = (None, 300, None);
+    let (mut path, mut frames, mut profile) = (None, 600, None);
     while let Some(word) = words.next() {
         match word.as_str() {
             "--frames" => frames = words.next().ok_or("--frames wants a number")?.parse()?,
@@ -61,7 +61,7 @@ fn main() -> Result<(), Failure> {
     })
 }
 
-/// Flies with `kinetic` alone for half a minute, for a profiler.
+/// Flies with `kinetic` alone for a while, there and back again, for a profiler.
 fn fly_only<C: RecordCodec>(
     terrain: &Terrain,
     records: &Records<'_, C>,
@@ -69,35 +69,16 @@ fn fly_only<C: RecordCodec>(
     percent: f64,
 ) -> Result<(), Failure> {
     let views = views(&straight(terrain, frames, percent, 1.0)?.0, 1.0);
-    let (mut us, mut work) = (Vec::new(), Work::default());
+    let mut engine = Kinetic::new(records.clone(), Culling::Vertices);
     let start = Instant::now();
+    let mut updates = 0u64;
     while start.elapsed().as_secs() < 10 {
-        let mut engine = Kinetic::new(records.clone(), Culling::Vertices);
-        for (i, view) in views.iter().enumerate() {
-            let start = Instant::now();
+        for view in views.iter().chain(views.iter().rev()) {
             engine.update(view, &mut Unobserved);
-            if i >= WARM_UP {
-                us.push(start.elapsed().as_secs_f64() * 1e6);
-                let w = engine.work();
-                work.tests += w.tests;
-                work.splits += w.splits;
-                work.merges += w.merges;
-                work.slots_written += w.slots_written;
-            }
+            updates += 1;
         }
     }
-    us.sort_by(f64::total_cmp);
-    let n = us.len() as f64;
-    println!(
-        "median {:.1} us, mean {:.1} us, fastest {:.1}; a frame: {:.0} tests, {:.0} splits, {:.0} merges, {:.0} slots",
-        us[us.len() / 2],
-        us.iter().sum::<f64>() / n,
-        us[0],
-        work.tests as f64 / n,
-        work.splits as f64 / n,
-        work.merges as f64 / n,
-        work.slots_written as f64 / n
-    );
+    println!("{updates} updates in {:.1} s", start.elapsed().as_secs_f64());
     Ok(())
 }
 
@@ -116,14 +97,186 @@ fn straight(
     Ok((solution.flight.frames, solution.best.speed_m_per_frame))
 }
 
+/// A flight at a given speed, turning by `rate_deg` a frame if that is not 0.
+fn plain(terrain: &Terrain, frames: u64, speed_m: f64, rate_deg: f64) -> Result<Vec<FlightFrame>, Failure> {
+    let kind = if rate_deg == 0.0 { FlightKind::Straight } else { FlightKind::Turn };
+    let mut plan = FlightPlan::new(kind, frames, speed_m);
+    if rate_deg != 0.0 {
+        plan.turn_rate_deg_per_frame = rate_deg;
+    }
+    Ok(generate(&OverTerrain(terrain), &plan)?.frames)
+}
+
 fn views(frames: &[FlightFrame], tolerance_px: f64) -> Vec<View> {
     frames.iter().map(|f| f.view(Viewport::default(), tolerance_px)).collect()
 }
 
-fn report<C: RecordCodec>(
-    _terrain: &Terrain,
-    _records: &Records<'_, C>,
-    _frames: u64,
-) -> Result<(), Failure> {
+/// What one engine did in the frames that count.
+struct Run {
+    /// Each frame's least time over all passes, in microseconds.
+    times_us: Vec<f64>,
+    tests: f64,
+    triangles: f64,
+    changes: f64,
+    slots: f64,
+    patch_bytes: f64,
+    bytes_a_triangle: f64,
+}
+
+/// Flies `views` with a new engine each pass; `observe` hears of the engine after each frame that counts.
+fn fly<E: Engine>(views: &[View], new: impl Fn() -> E, mut observe: impl FnMut(&E, u64, &mut Run)) -> Run {
+    let counted = views.len() - views.len() / 3;
+    let skipped = views.len() / 3;
+    let mut run = Run {
+        times_us: vec![f64::INFINITY; counted],
+        tests: 0.0,
+        triangles: 0.0,
+        changes: 0.0,
+        slots: 0.0,
+        patch_bytes: 0.0,
+        bytes_a_triangle: 0.0,
+    };
+    for _ in 0..PASSES {
+        let mut engine = new();
+        for (i, view) in views.iter().enumerate() {
+            let start = Instant::now();
+            let tests = engine.update(view, &mut Unobserved);
+            let us = start.elapsed().as_secs_f64() * 1e6;
+            if i >= skipped {
+                let least = &mut run.times_us[i - skipped];
+                *least = least.min(us);
+                observe(&engine, tests, &mut run);
+            }
+        }
+    }
+    let frames = (counted * PASSES) as f64;
+    for sum in [&mut run.tests, &mut run.triangles, &mut run.changes, &mut run.slots, &mut run.patch_bytes] {
+        *sum /= frames;
+    }
+    run
+}
+
+fn fly_soar<C: RecordCodec>(records: &Records<'_, C>, views: &[View], culling: Culling) -> Run {
+    fly(views, || Soar::new(records.clone(), culling), |_, tests, run| run.tests += tests as f64)
+}
+
+fn fly_kinetic<C: RecordCodec>(records: &Records<'_, C>, views: &[View], culling: Culling) -> Run {
+    fly(
+        views,
+        || Kinetic::new(records.clone(), culling),
+        |engine, tests, run| {
+            let work = engine.work();
+            run.tests += tests as f64;
+            run.triangles += engine.triangle_count() as f64;
+            run.changes += (work.splits + work.merges) as f64;
+            run.slots += work.slots_written as f64;
+            run.patch_bytes += work.patch_bytes as f64;
+            run.bytes_a_triangle =
+                run.bytes_a_triangle.max(engine.bytes() as f64 / engine.triangle_count() as f64);
+        },
+    )
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Median over the frames of how many times faster `run` is than `base`.
+fn speed_up(base: &Run, run: &Run) -> f64 {
+    median(base.times_us.iter().zip(&run.times_us).map(|(b, r)| b / r).collect())
+}
+
+fn report<C: RecordCodec>(terrain: &Terrain, records: &Records<'_, C>, frames: u64) -> Result<(), Failure> {
+    println!("{}, 800x600, 1 px\n", terrain.path().file_name().unwrap_or_default().display());
+    let mut flights = Vec::new();
+    let mut speed_of_0_61 = 0.0;
+    for percent in [0.1, 0.61, 1.4, 5.3] {
+        // The fastest flight would leave the terrain.
+        let frames = if percent > 5.0 { frames.min(300) } else { frames };
+        let (path, speed) = straight(terrain, frames, percent, 1.0)?;
+        if percent == 0.61 {
+            speed_of_0_61 = speed;
+        }
+        flights.push((format!("straight, {percent} %, {speed:.1} m a frame"), path));
+    }
+    // 30 degrees a second, 60 frames a second.
+    flights.push((
+        "turning 0.5 degrees a frame at the speed of 0.61 %".into(),
+        plain(terrain, frames, speed_of_0_61, 0.5)?,
+    ));
+    flights.push(("turning 0.5 degrees a frame on the spot".into(), plain(terrain, frames, 0.0, 0.5)?));
+    println!(
+        "| flight | culling | triangles | tests, % of soar's | tests a split or merge | us, soar | us, kinetic | times faster | slots | patch bytes | bytes a triangle |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for (name, path) in &flights {
+        let views = views(path, 1.0);
+        let soar = fly_soar(records, &views, Culling::Vertices);
+        for culling in Culling::ALL {
+            let kinetic = fly_kinetic(records, &views, culling);
+            println!(
+                "| {name} | {} | {:.0} | {:.3} | {:.2} | {:.0} | {:.1} | {:.1} | {:.0} | {:.0} | {:.0} |",
+                culling.name(),
+                kinetic.triangles,
+                100.0 * kinetic.tests / soar.tests,
+                kinetic.tests / kinetic.changes.max(1.0),
+                median(soar.times_us.clone()),
+                median(kinetic.times_us.clone()),
+                speed_up(&soar, &kinetic),
+                kinetic.slots,
+                kinetic.patch_bytes,
+                kinetic.bytes_a_triangle,
+            );
+        }
+        let uncropped = fly_soar(records, &views, Culling::Clusters);
+        println!(
+            "| | soar, uncropped | | {:.0} | | {:.0} | | | | | |",
+            100.0 * uncropped.tests / soar.tests,
+            median(uncropped.times_us)
+        );
+    }
+    walking(terrain, records)?;
+    scan::report(fly_kinetic_nodes(records, &views(&flights[0].1[..2], 1.0)));
+    Ok(())
+}
+
+/// Live nodes after a flight.
+fn fly_kinetic_nodes<C: RecordCodec>(records: &Records<'_, C>, views: &[View]) -> usize {
+    let mut engine = Kinetic::new(records.clone(), Culling::Vertices);
+    for view in views {
+        engine.update(view, &mut Unobserved);
+    }
+    engine.node_count()
+}
+
+/// A million triangles at walking speed.
+fn walking<C: RecordCodec>(terrain: &Terrain, records: &Records<'_, C>) -> Result<(), Failure> {
+    // 1.5 m a second, 60 frames a second.
+    let path = plain(terrain, 200, 0.025, 0.0)?;
+    println!("\n## Walking: 0.025 m a frame\n");
+    println!(
+        "| tolerance px | triangles | nodes a triangle | first frame ms | us, median | us, worst | bytes a triangle |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    for tolerance_px in [1.0, 0.5, 0.25] {
+        let mut engine = Kinetic::new(records.clone(), Culling::Vertices);
+        let mut times: Vec<f64> = Vec::new();
+        for view in views(&path, tolerance_px) {
+            let start = Instant::now();
+            engine.update(&view, &mut Unobserved);
+            times.push(start.elapsed().as_secs_f64() * 1e6);
+        }
+        let (first, later) = (times[0], times[1..].to_vec());
+        println!(
+            "| {tolerance_px} | {} | {:.2} | {:.1} | {:.1} | {:.1} | {:.0} |",
+            engine.triangle_count(),
+            engine.node_count() as f64 / engine.triangle_count() as f64,
+            first / 1e3,
+            median(later.clone()),
+            later.iter().copied().fold(0.0, f64::max),
+            engine.bytes() as f64 / engine.triangle_count() as f64,
+        );
+    }
     Ok(())
 }

@@ -47,12 +47,15 @@ use queue::{Entry, Queue};
 use rayon::prelude::*;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{ROOTS, corners, slot_of};
+use terrasoar_layout::prefetch::prefetch;
 use terrasoar_layout::record::{RecordCodec, Vertex};
 use terrasoar_layout::terrain::Records;
 use vertices::Vertices;
 
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
+/// How many splits or merges ahead memory is asked for what: see [`Kinetic::fetch`].
+const FETCH_AHEAD: [(u32, usize); 3] = [(2, 6), (1, 4), (0, 2)];
 /// Levels of the largest terrain.
 const LEVELS: usize = 32;
 
@@ -76,9 +79,13 @@ pub struct Kinetic<'a, C: RecordCodec> {
     late: Vec<u32>,
     /// Children made by splits, untested yet.
     fresh: Vec<u32>,
+    /// Nodes to be split or merged, in order.
+    list: Vec<u32>,
     to_split: [Vec<u32>; LEVELS],
     to_merge: [Vec<u32>; LEVELS],
     verdicts: Vec<(C::Raw, u32)>,
+    /// Entries that are over, of words that may have changed since.
+    over: Vec<Entry>,
     /// Entries on their way from one clock to another.
     waiting: Vec<Entry>,
     patch: Patch,
@@ -104,9 +111,11 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             due: Vec::new(),
             late: Vec::new(),
             fresh: Vec::new(),
+            list: Vec::new(),
             to_split: Default::default(),
             to_merge: Default::default(),
             verdicts: Vec::new(),
+            over: Vec::new(),
             waiting: Vec::new(),
             patch: Patch::default(),
             work: Work::default(),
@@ -167,14 +176,14 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
 
     /// Bytes held by all arrays, spare capacity included.
     pub fn bytes(&self) -> usize {
-        let lists = [&self.due, &self.late, &self.fresh];
+        let lists = [&self.due, &self.late, &self.fresh, &self.list];
         let by_level = self.to_split.iter().chain(&self.to_merge);
         self.nodes.bytes()
             + self.vertices.bytes()
             + self.queue.bytes()
             + lists.into_iter().chain(by_level).map(|l| l.capacity() * size_of::<u32>()).sum::<usize>()
             + self.verdicts.capacity() * size_of::<(C::Raw, u32)>()
-            + self.waiting.capacity() * size_of::<Entry>()
+            + (self.over.capacity() + self.waiting.capacity()) * size_of::<Entry>()
             + self.patch.vertices.capacity() * size_of::<(u32, PatchVertex)>()
             + self.patch.triangles.capacity() * size_of::<(u32, [u32; 3])>()
             + self.patch.draws.capacity() * size_of::<std::ops::Range<u32>>()
@@ -251,18 +260,16 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         while clocks != 0 {
             let clock = clocks.trailing_zeros() as usize;
             clocks &= clocks - 1;
-            let (nodes, due) = (&mut self.nodes.all, &mut self.due);
+            let over = &mut self.over;
             self.queue.advance(clock, self.clocks.now(clock), |entry| {
-                let word = &mut nodes[entry.node as usize].word;
-                if *word & !SPLIT == entry.word {
-                    *word &= STATUS;
-                    due.push(entry.node);
-                }
+                prefetch(&self.nodes.all, entry.node as usize);
+                over.push(entry);
             });
             if let Some(by) = self.clocks.set_back(clock) {
                 self.move_words(clock, clock, |expiry| u64::from(expiry).saturating_sub(by) as u32);
             }
         }
+        self.keep_true_entries();
         if let Some((course, direction)) = moved.next_course {
             for kind in [Kind::Error, Kind::Planes] {
                 for band in 0..BANDS {
@@ -276,6 +283,17 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         }
         self.work.expired = self.due.len() as u64;
         probe.phase(Phase::Test);
+    }
+
+    /// Makes due those nodes whose word still is the one that was entered.
+    fn keep_true_entries(&mut self) {
+        for entry in self.over.drain(..) {
+            let word = &mut self.nodes.get_mut(entry.node).word;
+            if *word & !SPLIT == entry.word {
+                *word &= STATUS;
+                self.due.push(entry.node);
+            }
+        }
     }
 
     /// Gives all words on clock `from` an expiry on clock `to`.
@@ -345,36 +363,48 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
 
     /// Splits and merges what is to be, until no child made on the way is left untested.
     fn apply<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
-        for level in 0..LEVELS {
-            let mut nodes = std::mem::take(&mut self.to_merge[level]);
-            for node in nodes.drain(..) {
-                if self.nodes.is_live(node) && self.nodes.get(node).word & STATUS == SPLIT {
-                    self.merge(node);
-                }
+        let mut list = std::mem::take(&mut self.list);
+        // From fine to coarse, so that children have merged before their parents.
+        list.extend(self.to_merge.iter_mut().flat_map(|nodes| nodes.drain(..)));
+        self.in_order(&list, |engine, node| {
+            if engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == SPLIT {
+                engine.merge(node);
             }
-            self.to_merge[level] = nodes;
-        }
+        });
         loop {
-            let mut waiting = 0;
-            for level in (0..LEVELS).rev() {
-                let mut nodes = std::mem::take(&mut self.to_split[level]);
-                nodes.retain(|node| {
-                    let wanted = self.nodes.is_live(*node) && self.nodes.get(*node).word & STATUS == ACTIVE;
+            list.clear();
+            // From coarse to fine, so that parents have split before their children.
+            list.extend(self.to_split.iter_mut().rev().flat_map(|nodes| nodes.drain(..)));
+            self.in_order(&list, |engine, node| {
+                let wanted = engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == ACTIVE;
+                if wanted && !(allowance.split() && engine.split(node)) {
                     // Its other parent may be among the untested.
-                    wanted && !(allowance.split() && self.split(*node))
-                });
-                waiting += nodes.len();
-                self.to_split[level] = nodes;
-            }
-            if self.fresh.is_empty() {
-                if waiting > 0 {
-                    self.postpone();
+                    let level = level_of(engine.nodes.get(node).point);
+                    engine.to_split[level as usize].push(node);
                 }
-                return;
+            });
+            if self.fresh.is_empty() {
+                break;
             }
             probe.phase(Phase::Test);
             self.test(true, judge, allowance, probe);
             probe.phase(Phase::Apply);
+        }
+        self.postpone();
+        list.clear();
+        self.list = list;
+    }
+
+    /// Does something to each node, and asks memory for what comes after it meanwhile.
+    #[inline(always)]
+    fn in_order(&mut self, nodes: &[u32], mut each: impl FnMut(&mut Self, u32)) {
+        for (i, node) in nodes.iter().enumerate() {
+            for (ahead, distance) in FETCH_AHEAD {
+                if let Some(later) = nodes.get(i + distance) {
+                    self.fetch(*later, ahead);
+                }
+            }
+            each(self, *node);
         }
     }
 
