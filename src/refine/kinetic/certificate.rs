@@ -17,11 +17,15 @@
 //!   s1 where the course enters the sphere, if it falls faster than rho until there; else the tangent of slope -rho, L = rho b + sqrt(1 - rho^2) h - R;
 //! * planes: m is linear, with slope k: L = m(0) rho / max(rho, -k).
 //!
-//! Course 0 has no direction and rho = 1: L = m(0). Everything is rounded towards a shorter life.
-//! Cost: two square roots a vertex.
+//! A course may also turn about an axis through the eye. The clock then counts rho G t for an angle t, G being the band; a plane's distance h changes by at
+//! most B t + d t^2 / 2, B = (axis x normal) . offset and d the distance from the axis, and by another s t for way and turn together, s being at most S = L / rho.
+//! With the root T of m(0) = (B + S) t + d t^2 / 2 the condition is L <= rho G T, since the bound is concave in (s, t).
+//!
+//! Where a course has no direction, L = m(0). Everything is rounded towards a shorter life. Cost: two square roots a vertex, and one a plane while turning.
 
-use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, RATE, band_of, clock_id};
+use super::clocks::{BANDS, CLOCKS, Clocks, Course, EXPIRY_BITS, HORIZON, Kind, RATE, band_of, clock_id};
 use crate::metric::{Metric, PLANES, Sighting};
+use glam::DVec3;
 
 /// Status bit: the vertex is selected and not culled.
 pub(super) const ACTIVE: u32 = 1 << 31;
@@ -52,7 +56,12 @@ pub(super) struct Judge {
     metric: Metric,
     culls: bool,
     course: usize,
+    moves: bool,
+    turns: bool,
     direction: [f64; 3],
+    axis: [f64; 3],
+    /// Axis x normal of each plane.
+    sweeps: [[f64; 3]; PLANES],
     /// Share of a margin to each plane that counts: from inside, from outside.
     from_inside: [f64; PLANES],
     from_outside: [f64; PLANES],
@@ -75,13 +84,19 @@ struct Life {
 impl Judge {
     /// The judge of a frame, after the clocks have moved to it. Without `culls` the view's planes are not asked.
     pub(super) fn new(metric: Metric, clocks: &Clocks, culls: bool) -> Self {
-        let (course, direction) = clocks.course();
-        let slopes = metric.normals().map(|[a, b, c]| a * direction.x + b * direction.y + c * direction.z);
-        let share = |falls: f64| if course == 0 { 1.0 } else { RATE / RATE.max(falls) };
+        let (course, Course { direction, axis }) = clocks.course();
+        let normals = metric.normals().map(DVec3::from_array);
+        let slopes = normals.map(|n| n.dot(direction));
+        let moves = direction != DVec3::ZERO;
+        let share = |falls: f64| if moves { RATE / RATE.max(falls) } else { 1.0 };
         Self {
             culls,
             course,
+            moves,
+            turns: axis != DVec3::ZERO,
             direction: direction.to_array(),
+            axis: axis.to_array(),
+            sweeps: normals.map(|n| axis.cross(n).to_array()),
             // A plane moves with the eye: m = r - h grows by the slope inside, m = h - r falls by it outside.
             from_inside: slopes.map(|k| share(-k)),
             from_outside: slopes.map(share),
@@ -103,8 +118,13 @@ impl Judge {
         let life = self.life(sighting);
         let margin_m = life.margin_m - sighting.guard_m();
         let band = band_of(life.scale_m * self.bands_per_m);
-        // Beyond half a band zooming would no longer be bounded by its first order.
         let band_m = f64::from(1u32 << band) / self.bands_per_m;
+        let margin_m = if self.turns && life.kind == Kind::Planes {
+            margin_m.min(self.turning_margin_m(sighting, &life, band_m))
+        } else {
+            margin_m
+        };
+        // Beyond half a band zooming would no longer be bounded by its first order.
         let margin_m = if band < BANDS - 1 { margin_m.min(0.5 * band_m) } else { margin_m };
         let clock = clock_id(self.course, life.kind, band);
         // Negative and NaN margins saturate to 0.
@@ -116,13 +136,11 @@ impl Judge {
     fn life(&self, sighting: &Sighting) -> Life {
         let distance_m = sighting.distance_m();
         let reach_m = sighting.reach_m();
-        if !sighting.is_selected() {
-            let margin_m = self.unselected_margin_m(sighting, distance_m, reach_m);
-            return Life { active: false, kind: Kind::Error, margin_m, scale_m: distance_m };
-        }
+        let selected = sighting.is_selected();
+        let margin_m = self.error_margin_m(sighting, selected, distance_m, reach_m);
+        let scale_m = if selected { reach_m } else { distance_m };
         if !self.culls {
-            let margin_m = self.selected_margin_m(sighting, distance_m, reach_m);
-            return Life { active: true, kind: Kind::Error, margin_m, scale_m: reach_m };
+            return Life { active: selected, kind: Kind::Error, margin_m, scale_m };
         }
         let radius_m = sighting.radius_m();
         let (mut inside_m, mut outside_m) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -133,55 +151,76 @@ impl Judge {
             inside_m = inside_m.min(-beyond * self.from_inside[i]);
             outside_m = outside_m.max(beyond * self.from_outside[i]);
         }
+        let culled = outside_m > 0.0;
+        let planes_m = if culled { outside_m } else { margin_m.min(inside_m) };
+        // While turning, a long way ahead would weigh on every turn.
+        let planes_m = if self.turns & self.moves { planes_m.min(0.5 * RATE * distance_m) } else { planes_m };
         // While the eye moves on by what the margin allows, turning acts on a longer arm.
-        let arm_m = |margin_m: f64| if self.course == 0 { 0.0 } else { margin_m / RATE };
-        if outside_m > 0.0 {
-            let scale_m = distance_m + arm_m(outside_m);
-            return Life { active: false, kind: Kind::Planes, margin_m: outside_m, scale_m };
+        let arm_m = if self.moves { planes_m / RATE } else { 0.0 };
+        let arm_m = if culled { distance_m } else { reach_m } + arm_m;
+        Life {
+            active: selected & !culled,
+            kind: if selected { Kind::Planes } else { Kind::Error },
+            margin_m: if selected { planes_m } else { margin_m },
+            scale_m: if selected { arm_m } else { scale_m },
         }
-        let margin_m = inside_m.min(self.selected_margin_m(sighting, distance_m, reach_m));
-        Life { active: true, kind: Kind::Planes, margin_m, scale_m: reach_m + arm_m(margin_m) }
     }
 
-    /// Way along the course to the foot of the vertex.
-    #[inline(always)]
-    fn along_m(&self, sighting: &Sighting) -> f64 {
-        let ([x, y, z], [u, v, w]) = (sighting.offset_m(), self.direction);
-        x * u + y * v + z * w
-    }
-
-    #[inline(always)]
-    fn selected_margin_m(&self, sighting: &Sighting, distance_m: f64, reach_m: f64) -> f64 {
-        let now_m = reach_m - distance_m;
-        if self.course == 0 {
-            return now_m;
-        }
-        let b = self.along_m(sighting);
-        let (reach2, distance2) = (reach_m * reach_m, sighting.distance2());
-        let half_chord2 = reach2 - distance2 + b * b - (reach2 + distance2) * SQUARE_ERROR;
-        now_m.min(RATE * (b + half_chord2.max(0.0).sqrt()))
-    }
-
-    #[inline(always)]
-    fn unselected_margin_m(&self, sighting: &Sighting, distance_m: f64, reach_m: f64) -> f64 {
-        const ACROSS2: f64 = 1.0 - RATE * RATE;
-        let now_m = distance_m - reach_m;
-        if self.course == 0 {
-            return now_m;
-        }
-        let b = self.along_m(sighting);
-        if b <= RATE * distance_m {
-            return now_m;
-        }
-        let distance2 = sighting.distance2();
-        let off2 = (distance2 - b * b - distance2 * SQUARE_ERROR).max(0.0);
-        let reach2 = reach_m * reach_m;
-        let margin_m = if off2 <= ACROSS2 * reach2 {
-            RATE * (b - (reach2 - off2).sqrt())
-        } else {
-            RATE * b + (ACROSS2 * off2).sqrt() - reach_m
+    /// What a margin that rests on the planes may be if the view turns about the course's axis.
+    #[inline(never)]
+    fn turning_margin_m(&self, sighting: &Sighting, life: &Life, band_m: f64) -> f64 {
+        let dot = |[a, b, c]: [f64; 3], [x, y, z]: [f64; 3]| a * x + b * y + c * z;
+        let offset_m = sighting.offset_m();
+        let along_m = dot(self.axis, offset_m);
+        // From the axis, rounded up.
+        let arm_m = (sighting.distance2() - along_m * along_m).max(0.0).sqrt()
+            + sighting.distance_m() * SQUARE_ERROR.sqrt();
+        let way_m = if self.moves { life.margin_m / RATE } else { 0.0 };
+        let angle = |margin_m: f64, nearing_m: f64| {
+            let b = nearing_m + way_m;
+            let root = (b * b + 2.0 * arm_m * margin_m).sqrt();
+            if b > 0.0 { 2.0 * margin_m / (b + root) } else { (root - b) / arm_m }
         };
-        margin_m.min(now_m)
+        let (mut inside, mut outside_m) = (f64::INFINITY, 0.0f64);
+        for i in 0..PLANES {
+            let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
+            let sweep_m = dot(self.sweeps[i], offset_m);
+            if life.active {
+                inside = inside.min(angle((-beyond).max(0.0), sweep_m));
+            } else if beyond > 0.0 {
+                // Each plane may vouch by itself.
+                let margin_m = life.margin_m.min(beyond * self.from_outside[i]);
+                outside_m = outside_m.max(margin_m.min(RATE * band_m * angle(beyond, -sweep_m)));
+            }
+        }
+        if life.active { RATE * band_m * inside } else { outside_m }
+    }
+
+    /// The margin of the error test. Written without branches, for which answer is right is anybody's guess.
+    #[inline(always)]
+    fn error_margin_m(&self, sighting: &Sighting, selected: bool, distance_m: f64, reach_m: f64) -> f64 {
+        const ACROSS2: f64 = 1.0 - RATE * RATE;
+        let now_m = (reach_m - distance_m).abs();
+        if !self.moves {
+            return now_m;
+        }
+        let ([x, y, z], [u, v, w]) = (sighting.offset_m(), self.direction);
+        // Way along the course to the foot of the vertex, and squares of the distances.
+        let b = x * u + y * v + z * w;
+        let (reach2, distance2) = (reach_m * reach_m, sighting.distance2());
+        let off2 = (distance2 - b * b - distance2 * SQUARE_ERROR).max(0.0);
+        let half_chord2 = reach2 - distance2 + b * b - (reach2 + distance2) * SQUARE_ERROR;
+        let enters = off2 <= ACROSS2 * reach2;
+        let (square, sign, less) = if selected {
+            (half_chord2, RATE, 0.0)
+        } else if enters {
+            (reach2 - off2, -RATE, 0.0)
+        } else {
+            (ACROSS2 * off2, 1.0, reach_m)
+        };
+        let ahead_m = RATE * b + sign * square.max(0.0).sqrt() - less;
+        let falls_slowly = !selected & (b <= RATE * distance_m);
+        if falls_slowly { now_m } else { ahead_m.min(now_m) }
     }
 }
 
@@ -210,6 +249,7 @@ mod tests {
     fn pose(metric: &Metric, view: &View) -> Pose {
         Pose {
             eye_m: view.eye_m,
+            axes: view.axes(),
             normals: metric.normals().map(DVec3::from_array),
             nu: metric.nu(),
             exaggeration: view.vertical_exaggeration,
@@ -230,12 +270,12 @@ mod tests {
             away in direction(), distance in 1.0f64..20_000.0,
             closeness in 0.2f64..2.0, radius in 0.0f64..300.0,
             steps in prop::collection::vec((direction(), 0.0f64..0.5, -0.01f64..0.01, 0.98f64..1.02, 0.99f64..1.01), 1..80),
-            turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool,
+            turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in -0.01f64..0.02,
         ) {
             let mut clocks = Clocks::new(10.0, 3000.0);
             let mut now = view(DVec3::new(100.0, 200.0, 1000.0), 0.3, -0.2, 0.8, 1.0);
             if start_course {
-                clocks.take_course(2, course);
+                clocks.take_course(2, Course { direction: if speed > 1.0 { course } else { DVec3::ZERO }, axis });
             }
             let mut metric = Metric::new(&now);
             clocks.move_to(pose(&metric, &now));
@@ -247,7 +287,7 @@ mod tests {
             let word = Judge::new(metric, &clocks, culls).word(&sight(&metric));
             for (side, off, turn, zoom, stretch) in steps {
                 now.eye_m += speed * (course + off * side);
-                if turning { now.yaw_rad += turn; now.pitch_rad += 0.3 * turn; }
+                if turning { now.yaw_rad += spin + 0.1 * turn; now.pitch_rad += 0.1 * turn; }
                 if zooming { now.vertical_fov_rad = (now.vertical_fov_rad * zoom).clamp(0.05, 2.0); }
                 if stretching { now.vertical_exaggeration = (now.vertical_exaggeration * stretch).clamp(0.2, 5.0); }
                 metric = Metric::new(&now);
@@ -267,7 +307,7 @@ mod tests {
     fn on_course_words_last_until_the_change() {
         let mut clocks = Clocks::new(10.0, 0.0);
         let start = view(DVec3::ZERO, 0.0, 0.0, 0.8, 1.0);
-        clocks.take_course(1, DVec3::Y);
+        clocks.take_course(1, Course { direction: DVec3::Y, axis: DVec3::ZERO });
         let metric = Metric::new(&start);
         clocks.move_to(pose(&metric, &start));
         // Not selected, 30 degrees off the course; SMART would look again after 400 m, then 330 m more, ...

@@ -159,7 +159,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         patch
     }
 
-    /// Bounds and triangle slots of the clusters of the mesh.
+    /// Bounds and triangle slots of the clusters of the mesh. Bounds are kept with [`Culling::Clusters`] only; without it they are empty.
     pub fn clusters(&self) -> impl Iterator<Item = (&Bounds, std::ops::Range<u32>)> {
         self.nodes.pages.clusters()
     }
@@ -270,16 +270,16 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             }
         }
         self.keep_true_entries();
-        if let Some((course, direction)) = moved.next_course {
+        if let Some((number, course)) = moved.next_course {
             for kind in [Kind::Error, Kind::Planes] {
                 for band in 0..BANDS {
-                    let (from, to) = (clock_id(course, kind, band), clock_id(0, kind, band));
+                    let (from, to) = (clock_id(number, kind, band), clock_id(0, kind, band));
                     let (then, now) = (self.clocks.now(from) as u32, self.clocks.now(to) as u32);
                     // A tick less, for the two clocks' ticks begin at different points.
                     self.move_words(from, to, |expiry| now + expiry.saturating_sub(then + 1).min(HORIZON));
                 }
             }
-            self.clocks.take_course(course, direction);
+            self.clocks.take_course(number, course);
         }
         self.work.expired = self.due.len() as u64;
         probe.phase(Phase::Test);
@@ -444,13 +444,18 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         self.patch.triangles = written;
     }
 
-    /// Lists what there is to draw: all clusters, or those that the view's planes do not cull.
+    /// Lists what there is to draw: all slots, or those of the clusters that the view's planes do not cull.
     fn list_draws(&mut self, metric: &Metric) {
+        if self.culling == Culling::Vertices {
+            self.patch.draws.push(0..2 * self.nodes.pages.places() as u32);
+            return;
+        }
+        self.stale = (self.stale + 1) % self.nodes.pages.len();
+        self.tighten(self.stale);
         let [dx, dy] = self.records.grid().spacing_m();
         let draws = &mut self.patch.draws;
         for (bounds, range) in self.nodes.pages.clusters() {
-            if self.culling == Culling::Vertices || !metric.culls_box(bounds.least, bounds.largest, [dx, dy])
-            {
+            if !metric.culls_box(bounds.least, bounds.largest, [dx, dy]) {
                 draws.push(range);
             }
         }
@@ -493,6 +498,7 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
         let metric = Metric::new(view);
         let pose = Pose {
             eye_m: view.eye_m,
+            axes: view.axes(),
             normals: metric.normals().map(DVec3::from_array),
             nu: metric.nu(),
             exaggeration: metric.exaggeration(),
@@ -516,8 +522,6 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
             self.assess_late(&metric, view);
         }
         self.list_written();
-        self.stale = (self.stale + 1) % self.nodes.pages.len();
-        self.tighten(self.stale);
         self.list_draws(&metric);
         self.work.slots_written = self.patch.triangles.len() as u64;
         self.work.patch_bytes = self.patch.bytes();

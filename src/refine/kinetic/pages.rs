@@ -200,6 +200,12 @@ impl Pages {
         }
     }
 
+    /// Whether bounds are kept: packed pages lie anywhere.
+    #[inline(always)]
+    pub(super) fn has_bounds(&self) -> bool {
+        self.dealing == Dealing::Near
+    }
+
     /// Widens the bounds of a place's page.
     #[inline(always)]
     pub(super) fn cover(&mut self, place: u32, points: &[[f32; 3]]) {

@@ -59,8 +59,10 @@ impl<C: RecordCodec> Kinetic<'_, C> {
     /// Widens the bounds of a node's page to contain vertices.
     #[inline(always)]
     fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
-        let places = vertices.map(|v| self.place_of(v));
-        self.nodes.pages.cover(node, &places);
+        if self.nodes.pages.has_bounds() {
+            let places = vertices.map(|v| self.place_of(v));
+            self.nodes.pages.cover(node, &places);
+        }
     }
 
     /// Makes the bounds of a page anew, which merges leave too large.
@@ -77,20 +79,19 @@ impl<C: RecordCodec> Kinetic<'_, C> {
     /// Asks memory for what splitting or merging a node will look at. `ahead` 2: itself; 1: its vertices and parents; 0: its neighbours.
     #[inline(always)]
     pub(super) fn fetch(&self, node: u32, ahead: u32) {
+        // A record may begin in one cache line and end in the next.
+        let both_lines = |node: u32| [0, 1].iter().for_each(|i| prefetch(&self.nodes.all, node as usize + i));
         if ahead == 2 {
-            return prefetch(&self.nodes.all, node as usize);
+            return both_lines(node);
         }
-        let record = self.nodes.get(node);
-        let parents = record.parents.into_iter().filter(|parent| *parent != NONE);
+        let parents = self.nodes.get(node).parents.into_iter().filter(|parent| *parent != NONE);
         if ahead == 1 {
-            parents.for_each(|parent| prefetch(&self.nodes.all, parent as usize));
-            record.body[..4].iter().for_each(|slot| self.vertices.fetch(*slot));
+            parents.for_each(both_lines);
         } else {
-            // Two neighbours around each parent; its children's links lie in its body.
-            for parent in parents {
-                let links = self.nodes.get(parent).body;
-                links[..4].iter().for_each(|child| prefetch(&self.nodes.all, *child as usize));
-            }
+            // The neighbours around each parent, which its body names.
+            parents.for_each(|parent| {
+                self.nodes.get(parent).body[..4].iter().for_each(|child| both_lines(*child))
+            });
         }
     }
 

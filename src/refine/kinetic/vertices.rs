@@ -5,7 +5,6 @@
 
 use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::prefetch::prefetch;
 
 #[derive(Debug, Default)]
 pub(super) struct Vertices {
@@ -39,12 +38,6 @@ impl Vertices {
     #[inline(always)]
     pub(super) fn get(&self, slot: u32) -> &StripVertex {
         &self.all[slot as usize]
-    }
-
-    /// Asks memory for a slot that may not exist.
-    #[inline(always)]
-    pub(super) fn fetch(&self, slot: u32) {
-        prefetch(&self.all, slot as usize);
     }
 
     /// Slots, free ones included.
