@@ -154,7 +154,7 @@ impl Judge {
         let culled = outside_m > 0.0;
         let planes_m = if culled { outside_m } else { margin_m.min(inside_m) };
         // While turning, a long way ahead would weigh on every turn.
-        let planes_m = if self.turns & self.moves { planes_m.min(0.5 * RATE * distance_m) } else { planes_m };
+        let planes_m = if self.turns & self.moves { planes_m.min(RATE * distance_m) } else { planes_m };
         // While the eye moves on by what the margin allows, turning acts on a longer arm.
         let arm_m = if self.moves { planes_m / RATE } else { 0.0 };
         let arm_m = if culled { distance_m } else { reach_m } + arm_m;

@@ -31,7 +31,7 @@ pub(super) const HORIZON: u32 = (1 << (EXPIRY_BITS - 1)) - 1;
 /// Fixed-point units a metre.
 const UNITS_PER_M: f64 = (1u64 << 20) as f64;
 /// A course is left when more than this share of the recent way was counted.
-const LEAVE_RATE: f64 = 0.45;
+const LEAVE_RATE: f64 = 0.3;
 /// A course is taken only if the recent way leads this straight.
 const STRAIGHT: f64 = 0.9;
 /// Share of the newest frame in what "recent" means.

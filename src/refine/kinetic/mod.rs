@@ -16,6 +16,7 @@
 //! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
 
 mod budget;
+mod capacity;
 mod certificate;
 mod clocks;
 mod labels;
@@ -23,12 +24,13 @@ mod nodes;
 mod pages;
 mod patch;
 mod queue;
+mod rebuild;
 mod tree;
 mod vertices;
 
 pub use budget::Budget;
 pub use pages::Bounds;
-pub use patch::{Patch, PatchVertex};
+pub use patch::{NO_LEVEL, Patch, PatchVertex};
 
 use super::strip::StripBuilder;
 use super::{Culling, Engine, Phase, Probe, Work};
@@ -37,6 +39,7 @@ use crate::metric::{ALL_PLANES, Metric};
 use crate::refine::soar::StripVertex;
 use crate::view::View;
 use budget::Allowance;
+use capacity::settle;
 use certificate::{ACTIVE, Judge, clock_of, expiry_of, with_certificate};
 use clocks::{BANDS, Clocks, HORIZON, Kind, Pose, clock_id};
 use glam::DVec3;
@@ -45,6 +48,7 @@ use nodes::{CENTRE, Nodes, SPLIT, STATUS, body};
 use pages::{Dealing, Pages};
 use queue::{Entry, Queue};
 use rayon::prelude::*;
+use rebuild::Rebuild;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{ROOTS, corners, slot_of};
 use terrasoar_layout::prefetch::prefetch;
@@ -72,6 +76,7 @@ pub struct Kinetic<'a, C: RecordCodec> {
     stale: usize,
     clocks: Clocks,
     queue: Queue,
+    rebuild: Rebuild,
     budget: Budget,
     /// Nodes whose certificate is over and that are in no queue.
     due: Vec<u32>,
@@ -107,6 +112,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             stale: 0,
             clocks: Clocks::new(dx.min(dy), low.abs().max(high.abs())),
             queue: Queue::new(),
+            rebuild: Rebuild::default(),
             budget: Budget::default(),
             due: Vec::new(),
             late: Vec::new(),
@@ -219,7 +225,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             error_m: vertex.error_m as f32,
             radius_m: vertex.radius_m as f32,
             ends,
-            flags: 0,
+            flags: if self.records.grid().is_corner(point) { NO_LEVEL } else { level_of(point) },
         }
     }
 
@@ -461,6 +467,23 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         }
     }
 
+    /// Gives back what only a large frame before this one has needed.
+    fn settle(&mut self) {
+        // A frame that made most of the mesh says nothing about the next ones.
+        let made_anew = self.work.tests as usize > self.nodes.pages.taken() / 2;
+        let used = if made_anew { 0 } else { (self.work.tests + self.work.slots_written) as usize };
+        let lists = [&mut self.due, &mut self.late, &mut self.fresh, &mut self.list];
+        lists
+            .into_iter()
+            .chain(&mut self.to_split)
+            .chain(&mut self.to_merge)
+            .for_each(|list| settle(list, used));
+        [&mut self.over, &mut self.waiting].into_iter().for_each(|list| settle(list, used));
+        settle(&mut self.verdicts, used);
+        settle(&mut self.patch.vertices, used);
+        settle(&mut self.patch.triangles, used);
+    }
+
     /// Makes the mesh of four triangles that every other grows from.
     fn plant<P: Probe>(&mut self, probe: &mut P) {
         let grid = *self.records.grid();
@@ -518,6 +541,7 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
         self.test(false, &judge, &mut allowance, probe);
         probe.phase(Phase::Apply);
         self.apply(&judge, &mut allowance, probe);
+        self.step_rebuild();
         if !self.late.is_empty() {
             self.assess_late(&metric, view);
         }
@@ -525,6 +549,7 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
         self.list_draws(&metric);
         self.work.slots_written = self.patch.triangles.len() as u64;
         self.work.patch_bytes = self.patch.bytes();
+        self.settle();
         probe.phase(Phase::Done);
         self.work.tests
     }

@@ -10,9 +10,10 @@
 //! parents is free. The word's own bits ([`ACTIVE`] and the certificate) say what is wanted, [`SPLIT`] what is.
 //! Cost: 48 bytes a node with compact records, and a little more than a node a triangle.
 
+use super::capacity::grow;
 use super::certificate::ACTIVE;
 use super::labels::{first_child, is_on_border, level_of, orientation};
-use super::pages::Pages;
+use super::pages::{PAGE, Pages};
 use terrasoar_layout::grid::GridPoint;
 
 /// Tree bit of a word: the node's triangles are split.
@@ -124,6 +125,7 @@ impl<R: Copy> Nodes<R> {
                 parents: [NONE; 2],
                 body: [NONE; 6],
             };
+            grow(&mut self.all, PAGE);
             self.all.resize(self.pages.places(), free);
         }
         *self.get_mut(node) = record;
@@ -134,6 +136,12 @@ impl<R: Copy> Nodes<R> {
     pub(super) fn free(&mut self, node: u32) {
         self.get_mut(node).word = NO_VERTEX;
         self.pages.give_back(node);
+    }
+
+    /// Frees a place whose record has moved elsewhere.
+    pub(super) fn vacate(&mut self, node: u32) {
+        self.get_mut(node).parents = [NONE; 2];
+        self.free(node);
     }
 
     /// The label of a node at its parent on `side`.

@@ -110,6 +110,18 @@ impl Pages {
         (page * PAGE) as u32 + place
     }
 
+    /// Takes the place `place`. If somebody is there, takes another place for him and returns it.
+    pub(super) fn clear(&mut self, place: u32) -> Option<u32> {
+        let (page, bit) = (place as usize / PAGE, 1 << (place as usize % PAGE));
+        if self.pages[page].taken & bit == 0 {
+            self.pages[page].taken |= bit;
+            self.taken += 1;
+            return None;
+        }
+        // Moving him gives the place back, so it is taken twice over until then: once for him, once for who comes.
+        Some(self.take(place))
+    }
+
     fn page_with_room(&mut self) -> usize {
         while let Some(page) = self.open.last() {
             if self.pages[*page as usize].taken != u128::MAX {
@@ -198,6 +210,11 @@ impl Pages {
                 }
             }
         }
+    }
+
+    /// How places are dealt out.
+    pub(super) fn dealing(&self) -> Dealing {
+        self.dealing
     }
 
     /// Whether bounds are kept: packed pages lie anywhere.

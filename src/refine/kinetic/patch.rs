@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+/// The level of vertices that have none.
+pub const NO_LEVEL: u32 = 255;
+
 /// A vertex as the GPU holds it: 32 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)]
@@ -18,7 +21,7 @@ pub struct PatchVertex {
     pub radius_m: f32,
     /// Slots of the ends of the edge that the vertex splits; its own for the corners and the centre.
     pub ends: [u32; 2],
-    /// Always 0.
+    /// The vertex's level, from 0 for the finest; [`NO_LEVEL`] for the corners of the square.
     pub flags: u32,
 }
 

@@ -8,6 +8,7 @@
 //! Invariant: an entry's expiry is not below its wheel's tick, and differs from it in no digit above its level. Cost: a few nanoseconds to
 //! enter, the same for each level on the way out, nothing for entries whose turn has not come. All entries lie in chunks of one pool.
 
+use super::capacity::grow;
 use super::clocks::{CLOCKS, EXPIRY_BITS};
 
 /// Bits of a digit.
@@ -18,8 +19,8 @@ const SLOTS: usize = 1 << DIGIT;
 const LEVELS: usize = EXPIRY_BITS.div_ceil(DIGIT) as usize;
 /// No chunk.
 const NONE: u32 = u32::MAX;
-/// Entries a chunk, which is 128 bytes.
-const CHUNK_ENTRIES: usize = 15;
+/// Entries a chunk, which is a cache line of 64 bytes.
+const CHUNK_ENTRIES: usize = 7;
 
 /// A node and the word it had when it was entered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -35,6 +36,7 @@ impl Entry {
 }
 
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 struct Chunk {
     next: u32,
     used: u32,
@@ -97,6 +99,7 @@ impl Queue {
         let fresh = Chunk { next: *head, used: 1, entries };
         if self.free == NONE {
             *head = self.chunks.len() as u32;
+            grow(&mut self.chunks, 1);
             self.chunks.push(fresh);
         } else {
             *head = self.free;

@@ -3,6 +3,7 @@
 //! It lies beside the bin-tree array but has an order of its own, so that rebuilding that array moves nothing on the GPU. The first
 //! five slots are the square's corners and its centre. Cost: 12 bytes a vertex, half a vertex a triangle.
 
+use super::capacity::grow;
 use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
 
@@ -20,12 +21,14 @@ impl Vertices {
             self.all[slot as usize] = vertex;
             return slot;
         }
+        grow(&mut self.all, 1);
         self.all.push(vertex);
         self.all.len() as u32 - 1
     }
 
     /// Gives a slot back.
     pub(super) fn remove(&mut self, slot: u32) {
+        grow(&mut self.free, 1);
         self.free.push(slot);
     }
 
