@@ -1,0 +1,134 @@
+//! The pipelines of one target format and sample count, and the one layout that all of them share.
+
+use crate::shaders;
+
+/// Depth of the picture: 32-bit float, reversed, so that precision is even in the logarithm of distance.
+pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// What every pipeline binds.
+pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, visibility, ty| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None };
+    let storage = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only: true },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    let texture = |view_dimension| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension,
+        multisampled: false,
+    };
+    let (vertex, fragment) = (wgpu::ShaderStages::VERTEX, wgpu::ShaderStages::FRAGMENT);
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("frame"),
+        entries: &[
+            entry(
+                0,
+                vertex | fragment,
+                wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: true,
+                    min_binding_size: None,
+                },
+            ),
+            entry(1, vertex, storage),
+            entry(2, vertex, storage),
+            entry(3, fragment, storage),
+            entry(4, fragment, texture(wgpu::TextureViewDimension::D2Array)),
+            entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+            entry(6, fragment, texture(wgpu::TextureViewDimension::D2)),
+        ],
+    })
+}
+
+/// Compiled programs, whatever the target.
+#[derive(Debug)]
+pub(crate) struct Modules {
+    terrain: wgpu::ShaderModule,
+    sky: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+}
+
+impl Modules {
+    pub(crate) fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Self {
+        Self {
+            terrain: shaders::module(device, shaders::Program::Terrain),
+            sky: shaders::module(device, shaders::Program::Sky),
+            layout: device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("frame"),
+                bind_group_layouts: &[Some(layout)],
+                immediate_size: 0,
+            }),
+        }
+    }
+}
+
+/// Pipelines of one kind of target.
+#[derive(Debug)]
+pub(crate) struct Pipelines {
+    /// Terrain, indexed.
+    pub shared: wgpu::RenderPipeline,
+    /// Terrain, three vertices a triangle.
+    pub own: wgpu::RenderPipeline,
+    /// Walls, an instance an edge.
+    pub wall: wgpu::RenderPipeline,
+    /// The sky, last.
+    pub sky: wgpu::RenderPipeline,
+}
+
+impl Pipelines {
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        modules: &Modules,
+        format: wgpu::TextureFormat,
+        samples: u32,
+    ) -> Self {
+        let wall_edges = [Some(wgpu::VertexBufferLayout {
+            array_stride: 8,
+            step_mode: wgpu::VertexStepMode::Instance,
+            attributes: &wgpu::vertex_attr_array![0 => Uint32x2],
+        })];
+        let pipeline =
+            |name: &str, module, buffers: &[Option<wgpu::VertexBufferLayout<'_>>], ground: bool| {
+                device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                    label: Some(name),
+                    layout: Some(&modules.layout),
+                    vertex: wgpu::VertexState {
+                        module,
+                        entry_point: Some(&format!("{name}_vertex")),
+                        compilation_options: Default::default(),
+                        buffers,
+                    },
+                    // Nothing is culled by its winding: triangles deformed at the data's edge may turn over.
+                    primitive: wgpu::PrimitiveState::default(),
+                    depth_stencil: Some(wgpu::DepthStencilState {
+                        format: DEPTH_FORMAT,
+                        depth_write_enabled: Some(ground),
+                        // The sky is at depth 0, which only untouched pixels have.
+                        depth_compare: Some(if ground {
+                            wgpu::CompareFunction::Greater
+                        } else {
+                            wgpu::CompareFunction::GreaterEqual
+                        }),
+                        stencil: Default::default(),
+                        bias: Default::default(),
+                    }),
+                    multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
+                    fragment: Some(wgpu::FragmentState {
+                        module,
+                        entry_point: Some(&format!("{name}_fragment")),
+                        compilation_options: Default::default(),
+                        targets: &[Some(format.into())],
+                    }),
+                    multiview_mask: None,
+                    cache: None,
+                })
+            };
+        Self {
+            shared: pipeline("shared", &modules.terrain, &[], true),
+            own: pipeline("own", &modules.terrain, &[], true),
+            wall: pipeline("wall", &modules.terrain, &wall_edges, true),
+            sky: pipeline("sky", &modules.sky, &[], false),
+        }
+    }
+}

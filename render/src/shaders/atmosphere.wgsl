@@ -1,0 +1,27 @@
+// The sky, and what air does to things far away. Both take the colour of the air from one function, so a terrain that ends in
+// haze ends in the sky behind it.
+
+// Light of the air in a direction; below the horizon as at the horizon.
+fn air(direction: vec3<f32>) -> vec3<f32> {
+    let up = clamp(direction.z, 0.0, 1.0);
+    let height = 1.0 - pow(1.0 - up, 4.0);
+    let base = mix(frame.horizon.rgb, frame.zenith.rgb, height);
+    // Forward scattering: the air is brighter and of the sun's colour around it, more so when the sun is low.
+    let flat_direction = normalize(vec3(direction.xy, max(direction.z, 0.0)) + vec3(0.0, 0.0, 1e-6));
+    let towards = max(dot(flat_direction, frame.sun.xyz), 0.0);
+    let low = 1.0 - clamp(frame.sun.z, 0.0, 1.0);
+    let glow = 0.22 * pow(towards, 6.0) * low + 0.25 * pow(towards, 48.0);
+    return base + glow * frame.sun_colour.rgb * clamp(frame.sun.w, 0.0, 1.0);
+}
+
+fn sky(direction: vec3<f32>) -> vec3<f32> {
+    let towards = dot(direction, frame.sun.xyz);
+    let disc = smoothstep(0.99985, 0.99993, towards) * step(0.0, direction.z) * clamp(frame.sun.w, 0.0, 1.0);
+    return air(direction) + disc * vec3(1.0, 0.96, 0.88);
+}
+
+// What is left of `colour` after so many metres of air, and the air's own light added. Blue is scattered soonest.
+fn through_air(colour: vec3<f32>, direction: vec3<f32>, distance_m: f32) -> vec3<f32> {
+    let left = exp(-distance_m * frame.horizon.w * vec3(0.75, 1.0, 1.4));
+    return mix(air(direction), colour, left);
+}

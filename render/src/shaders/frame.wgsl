@@ -1,0 +1,68 @@
+// What all stages know of the frame. The same fields stand in uniforms.rs.
+
+struct Frame {
+    clip_from_eye: mat4x4<f32>,
+    // Through the picture's right and top edge, and along the line of sight.
+    ray_right: vec4<f32>,
+    ray_up: vec4<f32>,
+    ray_forward: vec4<f32>,
+    // Column and row of the cell the eye is over; flags; unused.
+    grid: vec4<i32>,
+    // Metres a sample east and north; the eye's place in its cell.
+    spacing: vec4<f32>,
+    // Height origin, eye above the exaggerated origin, exaggeration, metres of the near plane.
+    height: vec4<f32>,
+    // Eye the mesh was refined for, from the eye; nu.
+    lod: vec4<f32>,
+    // Factor on radii; 1 when morphing; pixels a radian; bottom of side walls, metres before exaggeration.
+    lod_more: vec4<f32>,
+    // Towards the sun; strength of its light.
+    sun: vec4<f32>,
+    sun_colour: vec4<f32>,
+    // Light of the sky on level ground; share of shading that shows (0 leaves the bare tint).
+    ambient: vec4<f32>,
+    zenith: vec4<f32>,
+    // Colour at the horizon; 1 over the haze's distance.
+    horizon: vec4<f32>,
+    // Lowest height, 1 over the range; steepness from which rock shows, strength of it.
+    tint: vec4<f32>,
+    rock: vec4<f32>,
+    // Interval, lines from index line to index line, width in pixels, opacity.
+    contour: vec4<f32>,
+    contour_colour: vec4<f32>,
+    // Width in pixels, opacity.
+    wire: vec4<f32>,
+    wire_colour: vec4<f32>,
+    // Levels, log2 of the cells of a tile, texels of a layer, 1 when tiles are used.
+    tiles: vec4<u32>,
+    // Samples east and north; 1 when the target does not encode sRGB itself; kind of surface.
+    terrain: vec4<u32>,
+}
+
+const PI: f32 = 3.14159265;
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+
+fn encode_srgb(linear: vec3<f32>) -> vec3<f32> {
+    let c = clamp(linear, vec3(0.0), vec3(1.0));
+    return select(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c, c <= vec3(0.0031308));
+}
+
+// A hash without pattern over pixels, for noise below the quantisation step: smooth skies show no bands.
+fn dither(at: vec2<f32>) -> f32 {
+    return fract(52.9829189 * fract(dot(floor(at), vec2(0.06711056, 0.00583715)))) - 0.5;
+}
+
+fn to_target(linear: vec3<f32>, at: vec2<f32>) -> vec4<f32> {
+    // Shoulder: highlights approach 1 instead of being cut off.
+    let knee = 0.8;
+    let over = max(linear - knee, vec3(0.0));
+    let soft = min(linear, vec3(knee)) + (1.0 - knee) * (over / (over + (1.0 - knee)));
+    let encoded = encode_srgb(soft) + dither(at) / 255.0;
+    if frame.terrain.z == 1u {
+        return vec4(encoded, 1.0);
+    }
+    let c = clamp(encoded, vec3(0.0), vec3(1.0));
+    let decoded = select(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, c <= vec3(0.04045));
+    return vec4(decoded, 1.0);
+}

@@ -1,0 +1,186 @@
+//! Layers of an array texture, and the page table that says what is in them.
+//!
+//! Knows bytes a texel block, not their meaning. An upload is one texture write and one or two words of the
+//! page table; nothing else moves.
+
+use super::{Pyramid, Residency, TileId};
+use crate::error::{RenderError, Result};
+
+/// How a content kind is laid out in a layer.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TileLayout {
+    pub format: wgpu::TextureFormat,
+    /// Texels a side of a layer.
+    pub texels: u32,
+}
+
+impl TileLayout {
+    /// Bytes of one layer: whole blocks.
+    pub(crate) fn layer_bytes(&self) -> u64 {
+        u64::from(self.row_bytes()) * u64::from(self.texels.div_ceil(self.format.block_dimensions().1))
+    }
+
+    fn row_bytes(&self) -> u32 {
+        self.texels.div_ceil(self.format.block_dimensions().0)
+            * self.format.block_copy_size(None).unwrap_or(0)
+    }
+}
+
+/// What the tiles did.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct TileStats {
+    /// Tiles on the device.
+    pub resident: u32,
+    /// Tiles there is room for.
+    pub capacity: u32,
+    /// Tiles the last view wanted and lacks.
+    pub missing: u32,
+    /// Tiles uploaded since the renderer was made.
+    pub uploads: u64,
+    /// Their bytes.
+    pub uploaded_bytes: u64,
+    /// Tiles that made room for others.
+    pub evictions: u64,
+    /// Tiles that came when they were no longer wanted and found no room.
+    pub dropped: u64,
+}
+
+/// Words of the page table's head: four for each level: its first entry, tiles east, tiles north, 0. Entries follow.
+const HEAD_WORDS: usize = 4 * 32;
+
+/// Tiles on the device.
+#[derive(Debug)]
+pub(crate) struct TilePool {
+    pub pyramid: Pyramid,
+    pub residency: Residency,
+    pub view: wgpu::TextureView,
+    pub page_table: wgpu::Buffer,
+    texture: wgpu::Texture,
+    layout: TileLayout,
+    stats: TileStats,
+}
+
+impl TilePool {
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        pyramid: Pyramid,
+        layout: TileLayout,
+        budget_bytes: u64,
+    ) -> Self {
+        let limits = device.limits();
+        let most = u64::from(limits.max_texture_array_layers).min(pyramid.len() as u64);
+        let capacity = (budget_bytes / layout.layer_bytes().max(1)).clamp(1, most) as u32;
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("tiles"),
+            // With one layer the view would not be an array on every backend.
+            size: wgpu::Extent3d {
+                width: layout.texels,
+                height: layout.texels,
+                depth_or_array_layers: capacity.max(2),
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: layout.format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
+        let page_table = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("page table"),
+            size: 4 * (HEAD_WORDS + pyramid.len()) as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut head = [0u32; HEAD_WORDS];
+        for level in 0..pyramid.levels() {
+            let [east, north] = pyramid.across(level);
+            let first = HEAD_WORDS + pyramid.index(TileId { level, x: 0, y: 0 });
+            head[4 * level as usize..][..3].copy_from_slice(&[first as u32, east, north]);
+        }
+        queue.write_buffer(&page_table, 0, bytemuck::cast_slice(&head));
+        Self {
+            residency: Residency::new(&pyramid, capacity),
+            pyramid,
+            view,
+            page_table,
+            texture,
+            layout,
+            stats: TileStats::default(),
+        }
+    }
+
+    /// Puts a tile on the device. Returns the bytes sent: none where no layer was free for it.
+    pub(crate) fn upload(&mut self, queue: &wgpu::Queue, tile: TileId, bytes: &[u8]) -> Result<u64> {
+        if !self.pyramid.contains(tile) {
+            return Err(RenderError::NoSuchTile { tile: tile.to_string() });
+        }
+        let expected = self.layout.layer_bytes() as usize;
+        if bytes.len() != expected {
+            return Err(RenderError::TileSize { tile: tile.to_string(), expected, got: bytes.len() });
+        }
+        let Some(place) = self.residency.insert(tile) else {
+            self.stats.dropped += 1;
+            return Ok(0);
+        };
+        queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &self.texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: 0, z: place.layer },
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytes,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(self.layout.row_bytes()),
+                rows_per_image: None,
+            },
+            wgpu::Extent3d {
+                width: self.layout.texels,
+                height: self.layout.texels,
+                depth_or_array_layers: 1,
+            },
+        );
+        let mut sent = bytes.len() as u64;
+        if let Some(gone) = place.evicted {
+            self.stats.evictions += 1;
+            sent += self.set_entry(queue, gone, 0);
+        }
+        sent += self.set_entry(queue, tile, place.layer + 1);
+        self.stats.uploads += 1;
+        self.stats.uploaded_bytes += sent;
+        Ok(sent)
+    }
+
+    /// Forgets a tile whose content changed.
+    pub(crate) fn forget(&mut self, queue: &wgpu::Queue, tile: TileId) {
+        if self.pyramid.contains(tile) && self.residency.forget(tile) {
+            self.set_entry(queue, tile, 0);
+        }
+    }
+
+    fn set_entry(&self, queue: &wgpu::Queue, tile: TileId, value: u32) -> u64 {
+        let word = HEAD_WORDS + self.pyramid.index(tile);
+        queue.write_buffer(&self.page_table, 4 * word as u64, bytemuck::bytes_of(&value));
+        4
+    }
+
+    pub(crate) fn stats(&self) -> TileStats {
+        TileStats {
+            resident: self.residency.resident(),
+            capacity: self.residency.capacity(),
+            missing: self.residency.missing().len() as u32,
+            ..self.stats
+        }
+    }
+
+    /// Bytes of device memory held.
+    pub(crate) fn device_bytes(&self) -> u64 {
+        self.layout.layer_bytes() * u64::from(self.texture.depth_or_array_layers()) + self.page_table.size()
+    }
+}

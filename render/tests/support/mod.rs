@@ -1,0 +1,5 @@
+//! What the tests share.
+
+pub mod landscape;
+pub mod refiner;
+pub mod scene;
