@@ -14,7 +14,7 @@ pub enum Surface {
     Slope,
     /// Level of detail: the level of each triangle's finest corner.
     Level,
-    /// Screen error: by how many octaves each triangle's finest corner exceeded the tolerance when it was inserted.
+    /// Screen error: by how much each triangle's finest corner is above the tolerance it had to exceed to be in the mesh, by the ramp from none to four octaves.
     ScreenError,
 }
 
@@ -98,7 +98,7 @@ impl Default for Wireframe {
 pub struct Look {
     /// What the ground's colour says.
     pub surface: Surface,
-    /// Colours of heights or slopes.
+    /// Colours of heights, slopes or errors.
     pub ramp: &'static Ramp,
     /// Heights in metres of the ramp's two ends; by default the terrain's lowest and highest.
     pub tint_range_m: Option<[f32; 2]>,
@@ -133,7 +133,7 @@ impl Default for Look {
             rock: 0.7,
             shading: 1.0,
             sun: Sun::default(),
-            sky: [linear_of(0x3f74b5), linear_of(0xc9d8e6)],
+            sky: [linear_of(0x2f68b0), linear_of(0xcfdce8)],
             haze: Haze::Auto,
             contours: None,
             wireframe: None,
@@ -173,7 +173,13 @@ impl Look {
             },
             "wireframe" => Self { wireframe: Some(Wireframe::default()), ..relief },
             "levels" => Self { surface: Surface::Level, wireframe: Some(thin), shading: 0.6, ..survey },
-            "error" => Self { surface: Surface::ScreenError, wireframe: Some(thin), shading: 0.5, ..survey },
+            "error" => Self {
+                surface: Surface::ScreenError,
+                ramp: Ramp::named("viridis").unwrap_or(relief.ramp),
+                wireframe: Some(thin),
+                shading: 0.5,
+                ..survey
+            },
             _ => return None,
         })
     }

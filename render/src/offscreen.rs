@@ -36,6 +36,23 @@ impl Offscreen {
         Ok(Self { view: texture.create_view(&Default::default()), texture })
     }
 
+    /// A picture in a texture of the caller's, which must have four bytes a pixel and allow copies from it.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Usage`] where it does not.
+    pub fn of(texture: wgpu::Texture) -> Result<Self> {
+        let fits = texture.format().block_copy_size(None) == Some(4)
+            && texture.usage().contains(wgpu::TextureUsages::COPY_SRC)
+            && texture.sample_count() == 1;
+        if !fits {
+            return Err(RenderError::Usage(
+                "a picture needs four bytes a pixel, one sample and copies from it",
+            ));
+        }
+        Ok(Self { view: texture.create_view(&Default::default()), texture })
+    }
+
     /// What to render to.
     pub fn target(&self) -> Target<'_> {
         Target {

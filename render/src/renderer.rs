@@ -11,6 +11,7 @@ use wgpu::util::DeviceExt;
 
 use crate::attachments::{Attachments, Key};
 use crate::error::{RenderError, Result};
+use crate::gpu::Capabilities;
 use crate::look::Look;
 use crate::mesh::{MeshBuffers, MeshPatch, UploadStats};
 use crate::pipelines::{Modules, Pipelines, bind_group_layout};
@@ -45,6 +46,13 @@ impl Default for RendererOptions {
     }
 }
 
+impl From<&Capabilities> for RendererOptions {
+    /// Everything the device can do.
+    fn from(capabilities: &Capabilities) -> Self {
+        Self { multi_draw: capabilities.multi_draw, timestamps: capabilities.timestamps, ..Self::default() }
+    }
+}
+
 /// Where a frame goes.
 #[derive(Debug, Clone, Copy)]
 pub struct Target<'a> {
@@ -61,7 +69,8 @@ pub struct Target<'a> {
 pub struct Frame<'a> {
     /// The camera.
     pub view: &'a FrameView,
-    /// The camera that the mesh was refined for, where it is another (frozen refinement): vertices move by it.
+    /// The camera that the mesh was refined for, where it is another (frozen refinement): vertices move by its eye, field of
+    /// view and tolerance. Its exaggeration is taken to be that of `view`.
     pub refined_for: Option<&'a FrameView>,
     /// How it looks.
     pub look: &'a Look,

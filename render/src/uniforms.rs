@@ -25,6 +25,7 @@ pub(crate) struct Uniforms {
     ambient: [f32; 4],
     zenith: [f32; 4],
     horizon: [f32; 4],
+    air: [f32; 4],
     tint: [f32; 4],
     rock: [f32; 4],
     contour: [f32; 4],
@@ -68,12 +69,18 @@ impl Uniforms {
         let horizon_warm = [horizon[0], horizon[1] * (1.0 - 0.10 * low), horizon[2] * (1.0 - 0.28 * low)];
         // The sky's light is its colour, half as saturated, at the given strength.
         let strongest = zenith.iter().fold(1e-6_f32, |m, c| m.max(*c));
-        let sky_light = zenith.map(|c| look.sun.ambient * day * (0.62 + 0.38 * c / strongest));
-        let clear = match look.haze {
-            Haze::Off => 0.0,
-            Haze::Auto => 1.0 / (1.6 * terrain.diagonal_m().max(1e-3)) as f32,
-            Haze::Distance(m) => 1.0 / m.max(1e-3),
+        let sky_light = zenith.map(|c| look.sun.ambient * day * (0.74 + 0.26 * c / strongest));
+        let auto_m = 3.0 * terrain.diagonal_m();
+        let (haze, haze_m) = match look.haze {
+            Haze::Off => (0.0, auto_m),
+            Haze::Auto => (1.0, auto_m),
+            Haze::Distance(m) => (1.0, f64::from(m)),
         };
+        let haze_m = haze_m.max(1e-3);
+        // Thin enough that a map seen from above is clear, thick enough that valleys are hazier than summits; never
+        // thicker than the Earth's.
+        let scale_height_m = (0.12 * haze_m).min(8000.0);
+        let eye_in_air = ((view.eye_m.z - g * terrain.height_range_m[0]) / scale_height_m).clamp(-2.0, 60.0);
 
         let [low_m, high_m] = look.tint_range_m.unwrap_or(terrain.height_range_m.map(|h| h as f32));
         let contour = look.contours.unwrap_or_default();
@@ -93,7 +100,7 @@ impl Uniforms {
             height: [local.height_origin_m, local.eye_above_origin_m, g as f32, near_m as f32],
             lod: with((refined_for.eye_m - view.eye_m).as_vec3(), refined_for.nu() as f32),
             lod_more: [
-                refined_for.vertical_exaggeration.max(1.0) as f32,
+                g.max(1.0) as f32,
                 f32::from(u8::from(look.morph)),
                 view.pixels_per_radian() as f32,
                 inputs.wall_bottom_m,
@@ -102,8 +109,9 @@ impl Uniforms {
             sun_colour: rgb(sun_colour, 0.0),
             ambient: rgb(sky_light, look.shading.clamp(0.0, 1.0)),
             zenith: rgb(zenith, 0.0),
-            horizon: rgb(horizon_warm, clear),
-            tint: [low_m, 1.0 / (high_m - low_m).max(1e-6), 0.10, look.rock.clamp(0.0, 1.0)],
+            horizon: rgb(horizon_warm, haze / haze_m as f32),
+            air: [eye_in_air as f32, (1.0 / scale_height_m) as f32, 0.0, 0.0],
+            tint: [low_m, 1.0 / (high_m - low_m).max(1e-6), 0.17, look.rock.clamp(0.0, 1.0)],
             rock: rgb(linear_of(0x7d756c), 0.0),
             contour: [
                 if look.contours.is_some() { contour.interval_m } else { 0.0 },

@@ -20,8 +20,17 @@ fn sky(direction: vec3<f32>) -> vec3<f32> {
     return air(direction) + disc * vec3(1.0, 0.96, 0.88);
 }
 
-// What is left of `colour` after so many metres of air, and the air's own light added. Blue is scattered soonest.
+// Metres of the densest air that so many metres of a straight line through ever thinner air amount to: density falls by e
+// with every scale height above the lowest ground.
+fn air_m(direction: vec3<f32>, distance_m: f32) -> f32 {
+    let start = frame.air.x;
+    let rise = direction.z * distance_m * frame.air.y;
+    let mean = select((1.0 - exp(-rise)) / rise, 1.0 - 0.5 * rise, abs(rise) < 1e-3);
+    return distance_m * exp(-start) * mean;
+}
+
+// What is left of `colour` after so many metres, and the air's own light added. Blue is scattered soonest.
 fn through_air(colour: vec3<f32>, direction: vec3<f32>, distance_m: f32) -> vec3<f32> {
-    let left = exp(-distance_m * frame.horizon.w * vec3(0.75, 1.0, 1.4));
+    let left = exp(-air_m(direction, distance_m) * frame.horizon.w * vec3(0.75, 1.0, 1.4));
     return mix(air(direction), colour, left);
 }

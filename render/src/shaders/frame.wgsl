@@ -24,6 +24,8 @@ struct Frame {
     zenith: vec4<f32>,
     // Colour at the horizon; 1 over the haze's distance.
     horizon: vec4<f32>,
+    // Eye above the lowest ground in scale heights of the air; 1 over a scale height.
+    air: vec4<f32>,
     // Lowest height, 1 over the range; steepness from which rock shows, strength of it.
     tint: vec4<f32>,
     rock: vec4<f32>,

@@ -34,12 +34,6 @@ fn hue(t: f32) -> vec3<f32> {
     return 0.5 + 0.5 * cos(2.0 * PI * (t + vec3(0.0, 0.33, 0.67)));
 }
 
-// Blue through green and yellow to red and white.
-fn heat(t: f32) -> vec3<f32> {
-    let x = clamp(t, 0.0, 1.0);
-    return clamp(vec3(3.0 * x - 1.2, 1.6 * sin(PI * min(x, 0.9)) - 0.25, 1.1 - 3.2 * x) + max(x - 0.8, 0.0) * 3.0, vec3(0.02), vec3(1.0));
-}
-
 fn bare_colour(g: Ground, normal: vec3<f32>) -> vec3<f32> {
     switch frame.terrain.w {
         case PLAIN: {
@@ -49,10 +43,11 @@ fn bare_colour(g: Ground, normal: vec3<f32>) -> vec3<f32> {
             return ramp_at(acos(clamp(normal.z, -1.0, 1.0)) / (PI / 3.0));
         }
         case LEVEL: {
-            return 0.12 + 0.75 * hue(g.level * 0.382) * (0.75 + 0.25 * f32(i32(g.level) % 2));
+            // Neighbouring levels are far apart on the circle of hues, by the golden ratio.
+            return 0.16 + 0.6 * hue(g.level * 0.382);
         }
         case SCREEN_ERROR: {
-            return heat(0.25 * g.demand);
+            return ramp_at(0.25 * g.demand);
         }
         default: {
             let tint = ramp_at((g.height_m - frame.tint.x) * frame.tint.y);

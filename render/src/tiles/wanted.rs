@@ -31,35 +31,53 @@ impl WantedTiles {
     /// The tiles that `view` wants, coarse before fine and near before far.
     pub fn find(&mut self, pyramid: &Pyramid, terrain: &TerrainShape, view: &FrameView) -> &[TileId] {
         self.found.clear();
-        self.visit(pyramid, terrain, view, pyramid.root());
+        let search = Search {
+            pyramid,
+            terrain,
+            view,
+            side_normals: view.side_normals(),
+            spacing_m: (terrain.spacing_m[0] * terrain.spacing_m[1]).sqrt(),
+            pixels_per_radian: view.pixels_per_radian(),
+        };
+        search.visit(&mut self.found, pyramid.root());
         self.found
             .sort_by(|(a, near), (b, far)| b.level.cmp(&a.level).then(near.total_cmp(far)).then(a.cmp(b)));
         self.tiles.clear();
         self.tiles.extend(self.found.iter().map(|(tile, _)| *tile));
         &self.tiles
     }
+}
 
-    fn visit(&mut self, pyramid: &Pyramid, terrain: &TerrainShape, view: &FrameView, tile: TileId) {
-        let (low, high) = bounds_m(terrain, view.vertical_exaggeration, tile);
-        // The root is always wanted: what turns into view must not wait for it.
-        let culled = view.side_normals().iter().any(|n| {
+/// What every step of the descent asks.
+struct Search<'a> {
+    pyramid: &'a Pyramid,
+    terrain: &'a TerrainShape,
+    view: &'a FrameView,
+    side_normals: [DVec3; 4],
+    spacing_m: f64,
+    pixels_per_radian: f64,
+}
+
+impl Search<'_> {
+    fn visit(&self, found: &mut Vec<(TileId, f64)>, tile: TileId) {
+        let (low, high) = bounds_m(self.terrain, self.view.vertical_exaggeration, tile);
+        let eye = self.view.eye_m;
+        let culled = self.side_normals.iter().any(|n| {
             let nearest = DVec3::select(n.cmplt(DVec3::ZERO), high, low);
-            n.dot(nearest - view.eye_m) > 0.0
+            n.dot(nearest - eye) > 0.0
         });
-        if culled && tile != pyramid.root() {
+        // The root is always wanted: what turns into view must not wait for it.
+        if culled && tile != self.pyramid.root() {
             return;
         }
-        let distance_m = (view.eye_m.clamp(low, high) - view.eye_m).length();
-        self.found.push((tile, distance_m));
-        let height_m = (view.eye_m.z - low.z).abs().max((view.eye_m.z - high.z).abs());
-        let spacing_m = (terrain.spacing_m[0] * terrain.spacing_m[1]).sqrt();
+        let distance_m = (eye.clamp(low, high) - eye).length();
+        found.push((tile, distance_m));
+        let height_m = (eye.z - low.z).abs().max((eye.z - high.z).abs());
         let steepness = height_m / distance_m.max(1e-9);
-        if !culled
-            && needed_level(distance_m, steepness, spacing_m, view.pixels_per_radian())
-                < f64::from(tile.level)
-        {
-            for child in pyramid.children(tile) {
-                self.visit(pyramid, terrain, view, child);
+        let needed = needed_level(distance_m, steepness, self.spacing_m, self.pixels_per_radian);
+        if !culled && needed < f64::from(tile.level) {
+            for child in self.pyramid.children(tile) {
+                self.visit(found, child);
             }
         }
     }

@@ -3,12 +3,12 @@
 /// Hills of several sizes, ridged, without any randomness but the formula's: metres for cells.
 pub fn hills(x: f64, y: f64) -> f64 {
     let mut height = 0.0;
-    let mut size = 600.0;
-    let mut wave = 1.0 / 41.0;
+    let mut size = 420.0;
+    let mut wave = 1.0 / 61.0;
     let (mut u, mut v) = (x + 13.7, y - 5.3);
     for i in 0..6 {
         let ridge = 1.0 - noise(u * wave, v * wave, i).abs() * 2.0;
-        height += size * ridge;
+        height += size * ridge.powf(1.4);
         size *= 0.47;
         wave *= 2.03;
         // Turned a little each time, so that no direction is favoured.
@@ -20,7 +20,9 @@ pub fn hills(x: f64, y: f64) -> f64 {
 /// Smooth noise from -0.5 to 0.5.
 fn noise(x: f64, y: f64, seed: i64) -> f64 {
     let at = |i: f64, j: f64| {
-        let mut h = (i as i64).wrapping_mul(374_761_393) ^ (j as i64).wrapping_mul(668_265_263) ^ seed.wrapping_mul(69_069);
+        let mut h = (i as i64).wrapping_mul(374_761_393)
+            ^ (j as i64).wrapping_mul(668_265_263)
+            ^ seed.wrapping_mul(69_069);
         h = (h ^ (h >> 13)).wrapping_mul(1_274_126_177);
         ((h ^ (h >> 16)) & 0xffff) as f64 / 65_535.0 - 0.5
     };

@@ -6,9 +6,6 @@
 use glam::DVec3;
 use terrasoar_render::{FrameView, MeshVertex, TerrainShape};
 
-/// Where a fine sample is, in cells of the square's corner.
-pub type Height = fn(f64, f64) -> f64;
-
 /// All vertices of a square, and what refinement needs to know of them.
 pub struct Square {
     /// Samples a side.
@@ -88,7 +85,8 @@ impl Square {
         let v = self.split(b, d);
         let middle = 0.5 * (self.place(b).z + self.place(d).z);
         let own = (self.place(v).z - middle).abs() as f32;
-        let (mut error, mut radius) = (own.max(self.vertices[v as usize].error_m), self.vertices[v as usize].radius_m);
+        let (mut error, mut radius) =
+            (own.max(self.vertices[v as usize].error_m), self.vertices[v as usize].radius_m);
         // The legs of the smallest triangles are single cells.
         if levels > 1 {
             for [b, d] in [[a, b], [d, a]] {

@@ -1,18 +1,12 @@
 //! A device, a renderer and a picture in one: what most tests need.
 
 use terrasoar_render::{
-    DrawStats, Frame, FrameView, Gpu, HEIGHTS_PER_TILE, Look, MeshPatch, Offscreen, Renderer, RendererOptions, TILE_CELLS,
-    TileId, UploadStats, read_depth_m,
+    DrawStats, Frame, FrameView, Gpu, HEIGHTS_PER_TILE, Look, MeshPatch, Offscreen, Renderer,
+    RendererOptions, TILE_CELLS, TileId, UploadStats, read_depth_m,
 };
 
+use super::picture::Picture;
 use super::refiner::{Mesh, Square};
-
-/// A picture: four bytes a pixel.
-#[derive(Clone, PartialEq)]
-pub struct Picture {
-    pub size_px: [u32; 2],
-    pub rgba: Vec<u8>,
-}
 
 /// A square on a device.
 pub struct Scene<'a> {
@@ -66,14 +60,18 @@ impl<'a> Scene<'a> {
     }
 
     pub fn draw_counted(&mut self, view: &FrameView, look: &Look) -> (Picture, DrawStats) {
-        let picture = Offscreen::new(&self.gpu.device, view.viewport_px).unwrap();
+        self.draw_frame(Frame { view, refined_for: None, look })
+    }
+
+    pub fn draw_frame(&mut self, frame: Frame<'_>) -> (Picture, DrawStats) {
+        let size_px = frame.view.viewport_px;
+        let picture = Offscreen::new(&self.gpu.device, size_px).unwrap();
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let frame = Frame { view, refined_for: None, look };
         let stats = self.renderer.render(&mut encoder, picture.target(), frame).unwrap();
         self.gpu.queue.submit([encoder.finish()]);
         let rgba = picture.read_rgba(&self.gpu.device, &self.gpu.queue).unwrap();
         self.gpu.watch.check().unwrap();
-        (Picture { size_px: view.viewport_px, rgba }, stats)
+        (Picture { size_px, rgba }, stats)
     }
 
     /// Metres along the line of sight of the last picture.
