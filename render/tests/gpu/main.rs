@@ -1,6 +1,8 @@
 //! Tests that need a graphics adapter; a software one does. Where there is none they count as ignored and say why;
 //! with TERRASOAR_NEED_ADAPTER=1, as continuous integration sets it, that is a failure.
 
+#![expect(clippy::single_range_in_vec_init, reason = "a list of one range is meant: what is drawn")]
+
 mod cover;
 mod device;
 mod patches;
