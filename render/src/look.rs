@@ -3,7 +3,7 @@
 use crate::ramps::{RAMPS, Ramp, linear_of};
 
 /// What the ground's colour says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Surface {
     /// Height, by the ramp, with bare rock on steep ground.
     #[default]

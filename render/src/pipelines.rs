@@ -1,5 +1,6 @@
-//! The pipelines of one target format and sample count, and the one layout that all of them share.
+//! Pipelines, one set for each target format and each combination of what a look shows, and the one layout that all share.
 
+use crate::look::{Look, Surface};
 use crate::shaders;
 
 /// Depth of the picture: 32-bit float, reversed, so that precision is even in the logarithm of distance.
@@ -13,8 +14,8 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
         has_dynamic_offset: false,
         min_binding_size: None,
     };
-    let texture = |view_dimension| wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+    let texture = |view_dimension, filterable| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable },
         view_dimension,
         multisampled: false,
     };
@@ -34,11 +35,53 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
             entry(1, vertex, storage),
             entry(2, vertex, storage),
             entry(3, fragment, storage),
-            entry(4, fragment, texture(wgpu::TextureViewDimension::D2Array)),
+            entry(4, fragment, texture(wgpu::TextureViewDimension::D2Array, true)),
             entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-            entry(6, fragment, texture(wgpu::TextureViewDimension::D2)),
+            entry(6, fragment, texture(wgpu::TextureViewDimension::D2, false)),
         ],
     })
+}
+
+/// What is fixed in a pipeline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Variant {
+    pub format: wgpu::TextureFormat,
+    pub samples: u32,
+    pub surface: Surface,
+    pub contours: bool,
+    pub tiles: bool,
+    pub morph: bool,
+}
+
+impl Variant {
+    pub(crate) fn of(look: &Look, format: wgpu::TextureFormat) -> Self {
+        Self {
+            format,
+            samples: if look.multisample { 4 } else { 1 },
+            surface: look.surface,
+            contours: look.contours.is_some(),
+            tiles: look.tile_normals,
+            morph: look.morph,
+        }
+    }
+
+    /// Values for the shaders' overrides.
+    fn constants(&self) -> [(&'static str, f64); 5] {
+        let surface = match self.surface {
+            Surface::Tint => 0,
+            Surface::Plain => 1,
+            Surface::Slope => 2,
+            Surface::Level => 3,
+            Surface::ScreenError => 4,
+        };
+        [
+            ("SURFACE", f64::from(surface)),
+            ("CONTOURS", f64::from(u8::from(self.contours))),
+            ("TILES", f64::from(u8::from(self.tiles))),
+            ("MORPH", f64::from(u8::from(self.morph))),
+            ("ENCODES", f64::from(u8::from(self.format.is_srgb()))),
+        ]
+    }
 }
 
 /// Compiled programs, whatever the target.
@@ -63,7 +106,7 @@ impl Modules {
     }
 }
 
-/// Pipelines of one kind of target.
+/// Pipelines of one variant; each costs its compilation when a frame first needs it.
 #[derive(Debug)]
 pub(crate) struct Pipelines {
     /// Terrain, indexed.
@@ -77,17 +120,14 @@ pub(crate) struct Pipelines {
 }
 
 impl Pipelines {
-    pub(crate) fn new(
-        device: &wgpu::Device,
-        modules: &Modules,
-        format: wgpu::TextureFormat,
-        samples: u32,
-    ) -> Self {
+    pub(crate) fn new(device: &wgpu::Device, modules: &Modules, variant: Variant) -> Self {
         let wall_edges = [Some(wgpu::VertexBufferLayout {
             array_stride: 8,
             step_mode: wgpu::VertexStepMode::Instance,
             attributes: &wgpu::vertex_attr_array![0 => Uint32x2],
         })];
+        let constants = variant.constants();
+        let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
         let pipeline =
             |name: &str, module, buffers: &[Option<wgpu::VertexBufferLayout<'_>>], ground: bool| {
                 device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -96,7 +136,7 @@ impl Pipelines {
                     vertex: wgpu::VertexState {
                         module,
                         entry_point: Some(&format!("{name}_vertex")),
-                        compilation_options: Default::default(),
+                        compilation_options: options.clone(),
                         buffers,
                     },
                     // Nothing is culled by its winding: triangles deformed at the data's edge may turn over.
@@ -113,12 +153,12 @@ impl Pipelines {
                         stencil: Default::default(),
                         bias: Default::default(),
                     }),
-                    multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
+                    multisample: wgpu::MultisampleState { count: variant.samples, ..Default::default() },
                     fragment: Some(wgpu::FragmentState {
                         module,
                         entry_point: Some(&format!("{name}_fragment")),
-                        compilation_options: Default::default(),
-                        targets: &[Some(format.into())],
+                        compilation_options: options.clone(),
+                        targets: &[Some(variant.format.into())],
                     }),
                     multiview_mask: None,
                     cache: None,

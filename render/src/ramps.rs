@@ -101,7 +101,14 @@ impl Ramp {
         linear_of_oklab([0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * share))
     }
 
-    /// Evenly spaced RGBA pixels in sRGB, as a texture or a legend shows them.
+    /// Evenly spaced colours in linear light, opaque.
+    pub(crate) fn linear(&self, count: usize) -> Vec<[f32; 4]> {
+        let last = count.saturating_sub(1).max(1) as f32;
+        let opaque = |[r, g, b]: [f32; 3]| [r, g, b, 1.0];
+        (0..count).map(|i| opaque(self.linear_at(i as f32 / last))).collect()
+    }
+
+    /// Evenly spaced RGBA pixels in sRGB, as a legend shows them.
     pub fn pixels(&self, count: usize) -> Vec<[u8; 4]> {
         let last = count.saturating_sub(1).max(1) as f32;
         (0..count)

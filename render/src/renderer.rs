@@ -14,7 +14,7 @@ use crate::error::{RenderError, Result};
 use crate::gpu::Capabilities;
 use crate::look::Look;
 use crate::mesh::{MeshBuffers, MeshPatch, UploadStats};
-use crate::pipelines::{Modules, Pipelines, bind_group_layout};
+use crate::pipelines::{Modules, Pipelines, Variant, bind_group_layout};
 use crate::ramps::Ramp;
 use crate::tiles::{
     GRADIENT_FORMAT, Pyramid, TILE_CELLS, TileId, TilePool, TileStats, WantedTiles, pack_gradients,
@@ -25,7 +25,7 @@ use crate::view::{FrameView, TerrainShape, near_m};
 
 /// Frames whose commands may wait in one submission.
 const UNIFORM_PLACES: u64 = 16;
-const RAMP_TEXELS: u32 = 512;
+const RAMP_TEXELS: u32 = 1024;
 /// From so many ranges on, one indirect call is cheaper than as many direct ones.
 const INDIRECT_FROM: usize = 64;
 
@@ -102,7 +102,7 @@ pub struct Renderer {
     wanted: WantedTiles,
     layout: wgpu::BindGroupLayout,
     modules: Modules,
-    pipelines: HashMap<(wgpu::TextureFormat, u32), Pipelines>,
+    pipelines: HashMap<Variant, Pipelines>,
     attachments: Option<Attachments>,
     uniforms: wgpu::Buffer,
     uniform_stride: u64,
@@ -225,12 +225,11 @@ impl Renderer {
         if target.size_px.contains(&0) {
             return Err(RenderError::Usage("a target needs at least one pixel"));
         }
-        let samples = if frame.look.multisample { 4 } else { 1 };
+        let variant = Variant::of(frame.look, target.format);
+        let samples = variant.samples;
         let key = Key { size_px: target.size_px, format: target.format, samples };
         self.attachments = Some(Attachments::keep_or_make(self.attachments.take(), &self.device, key));
-        self.pipelines
-            .entry((target.format, samples))
-            .or_insert_with(|| Pipelines::new(&self.device, &self.modules, target.format, samples));
+        self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(&self.device, &self.modules, variant));
         self.set_ramp(frame.look.ramp);
         self.bind();
 
@@ -241,7 +240,6 @@ impl Renderer {
             refined_for,
             look: frame.look,
             wall_bottom_m: self.walls.as_ref().map_or(0.0, |w| w.bottom_m),
-            encode_srgb: !target.format.is_srgb(),
         });
         let place = self.uniform_stride * self.next_place;
         self.next_place = (self.next_place + 1) % UNIFORM_PLACES;
@@ -264,7 +262,7 @@ impl Renderer {
         };
 
         let (Some(attachments), Some((_, group)), Some(pipelines)) =
-            (&self.attachments, &self.bind_group, self.pipelines.get(&(target.format, samples)))
+            (&self.attachments, &self.bind_group, self.pipelines.get(&variant))
         else {
             return Err(RenderError::Usage("a frame was begun without its parts"));
         };
@@ -407,12 +405,12 @@ impl Renderer {
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba8UnormSrgb,
+                format: wgpu::TextureFormat::Rgba32Float,
                 usage: wgpu::TextureUsages::TEXTURE_BINDING,
                 view_formats: &[],
             },
             wgpu::util::TextureDataOrder::LayerMajor,
-            ramp.pixels(RAMP_TEXELS as usize).as_flattened(),
+            bytemuck::cast_slice(ramp.linear(RAMP_TEXELS as usize).as_flattened()),
         );
         self.ramp = Some((ramp, texture.create_view(&Default::default())));
         self.bind_group = None;

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::look::{Haze, Look, Surface};
+use crate::look::{Haze, Look};
 use crate::ramps::linear_of;
 use crate::tiles::{Pyramid, TILE_CELLS};
 use crate::view::{FrameView, LocalView, TerrainShape, clip_from_eye, near_m};
@@ -44,7 +44,6 @@ pub(crate) struct Inputs<'a> {
     pub refined_for: &'a FrameView,
     pub look: &'a Look,
     pub wall_bottom_m: f32,
-    pub encode_srgb: bool,
 }
 
 impl Uniforms {
@@ -70,7 +69,8 @@ impl Uniforms {
         // The sky's light is its colour, half as saturated, at the given strength.
         let strongest = zenith.iter().fold(1e-6_f32, |m, c| m.max(*c));
         let sky_light = zenith.map(|c| look.sun.ambient * day * (0.74 + 0.26 * c / strongest));
-        let auto_m = 3.0 * terrain.diagonal_m();
+        // A small terrain keeps its far side; a large one ends in the air of a clear day.
+        let auto_m = (3.0 * terrain.diagonal_m()).min(110_000.0);
         let (haze, haze_m) = match look.haze {
             Haze::Off => (0.0, auto_m),
             Haze::Auto => (1.0, auto_m),
@@ -99,12 +99,7 @@ impl Uniforms {
             ],
             height: [local.height_origin_m, local.eye_above_origin_m, g as f32, near_m as f32],
             lod: with((refined_for.eye_m - view.eye_m).as_vec3(), refined_for.nu() as f32),
-            lod_more: [
-                g.max(1.0) as f32,
-                f32::from(u8::from(look.morph)),
-                view.pixels_per_radian() as f32,
-                inputs.wall_bottom_m,
-            ],
+            lod_more: [g.max(1.0) as f32, 0.0, view.pixels_per_radian() as f32, inputs.wall_bottom_m],
             sun: with(to_sun, look.sun.strength),
             sun_colour: rgb(sun_colour, 0.0),
             ambient: rgb(sky_light, look.shading.clamp(0.0, 1.0)),
@@ -114,7 +109,7 @@ impl Uniforms {
             tint: [low_m, 1.0 / (high_m - low_m).max(1e-6), 0.17, look.rock.clamp(0.0, 1.0)],
             rock: rgb(linear_of(0x7d756c), 0.0),
             contour: [
-                if look.contours.is_some() { contour.interval_m } else { 0.0 },
+                contour.interval_m,
                 contour.index_every.max(1) as f32,
                 contour.width_px,
                 contour.opacity,
@@ -122,19 +117,8 @@ impl Uniforms {
             contour_colour: rgb(contour.colour, 0.0),
             wire: [wire.width_px, if look.wireframe.is_some() { wire.opacity } else { 0.0 }, 0.0, 0.0],
             wire_colour: rgb(wire.colour, 0.0),
-            tiles: [pyramid.levels(), TILE_CELLS.ilog2(), TILE_CELLS + 1, u32::from(look.tile_normals)],
-            terrain: [
-                terrain.samples[0],
-                terrain.samples[1],
-                u32::from(inputs.encode_srgb),
-                match look.surface {
-                    Surface::Tint => 0,
-                    Surface::Plain => 1,
-                    Surface::Slope => 2,
-                    Surface::Level => 3,
-                    Surface::ScreenError => 4,
-                },
-            ],
+            tiles: [pyramid.levels(), TILE_CELLS.ilog2(), TILE_CELLS + 1, 0],
+            terrain: [terrain.samples[0], terrain.samples[1], 0, 0],
         }
     }
 }

@@ -4,13 +4,17 @@
 // Light of the air in a direction; below the horizon as at the horizon.
 fn air(direction: vec3<f32>) -> vec3<f32> {
     let up = clamp(direction.z, 0.0, 1.0);
-    let height = 1.0 - pow(1.0 - up, 4.0);
+    let down = (1.0 - up) * (1.0 - up);
+    let height = 1.0 - down * down;
     let base = mix(frame.horizon.rgb, frame.zenith.rgb, height);
     // Forward scattering: the air is brighter and of the sun's colour around it, more so when the sun is low.
     let flat_direction = normalize(vec3(direction.xy, max(direction.z, 0.0)) + vec3(0.0, 0.0, 1e-6));
     let towards = max(dot(flat_direction, frame.sun.xyz), 0.0);
     let low = 1.0 - clamp(frame.sun.z, 0.0, 1.0);
-    let glow = 0.22 * pow(towards, 6.0) * low + 0.25 * pow(towards, 48.0);
+    let t3 = towards * towards * towards;
+    let t6 = t3 * t3;
+    let t24 = t6 * t6 * t6 * t6;
+    let glow = 0.22 * t6 * low + 0.25 * t24 * t24;
     return base + glow * frame.sun_colour.rgb * clamp(frame.sun.w, 0.0, 1.0);
 }
 

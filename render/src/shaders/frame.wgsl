@@ -14,7 +14,7 @@ struct Frame {
     height: vec4<f32>,
     // Eye the mesh was refined for, from the eye; nu.
     lod: vec4<f32>,
-    // Factor on radii; 1 when morphing; pixels a radian; bottom of side walls, metres before exaggeration.
+    // Factor on radii; unused; pixels a radian; bottom of side walls, metres before exaggeration.
     lod_more: vec4<f32>,
     // Towards the sun; strength of its light.
     sun: vec4<f32>,
@@ -35,13 +35,21 @@ struct Frame {
     // Width in pixels, opacity.
     wire: vec4<f32>,
     wire_colour: vec4<f32>,
-    // Levels, log2 of the cells of a tile, texels of a layer, 1 when tiles are used.
+    // Levels, log2 of the cells of a tile, texels of a layer.
     tiles: vec4<u32>,
-    // Samples east and north; 1 when the target does not encode sRGB itself; kind of surface.
+    // Samples east and north.
     terrain: vec4<u32>,
 }
 
 const PI: f32 = 3.14159265;
+
+// Fixed when a pipeline is made, so that what a look does not show costs nothing: software drivers run both sides of a branch.
+override SURFACE: u32 = 0u;
+override CONTOURS: bool = false;
+override TILES: bool = true;
+override MORPH: bool = true;
+// Whether the target encodes sRGB itself.
+override ENCODES: bool = true;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
@@ -60,11 +68,10 @@ fn to_target(linear: vec3<f32>, at: vec2<f32>) -> vec4<f32> {
     let knee = 0.8;
     let over = max(linear - knee, vec3(0.0));
     let soft = min(linear, vec3(knee)) + (1.0 - knee) * (over / (over + (1.0 - knee)));
-    let encoded = encode_srgb(soft) + dither(at) / 255.0;
-    if frame.terrain.z == 1u {
-        return vec4(encoded, 1.0);
+    let step = dither(at) / 255.0;
+    if ENCODES {
+        // A step of the code is about twice the root of linear light.
+        return vec4(soft + 2.0 * step * sqrt(max(soft, vec3(0.0))), 1.0);
     }
-    let c = clamp(encoded, vec3(0.0), vec3(1.0));
-    let decoded = select(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, c <= vec3(0.04045));
-    return vec4(decoded, 1.0);
+    return vec4(encode_srgb(soft) + step, 1.0);
 }

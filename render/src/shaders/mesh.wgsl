@@ -38,7 +38,7 @@ fn weight(v: Vertex) -> f32 {
     let reach = frame.lod.w * v.error_m * frame.height.z;
     let inside = reach + v.radius_m * frame.lod_more.x - distance_m;
     // An endless error has no middle of the way.
-    if frame.lod_more.y == 0.0 || reach > 1e30 {
+    if reach > 1e30 {
         return 1.0;
     }
     return clamp(inside / max(0.5 * reach, 1e-6), 0.0, 1.0);
@@ -81,6 +81,9 @@ fn moved_3(slot: u32) -> f32 {
 }
 
 fn moved(v: Vertex) -> f32 {
+    if !MORPH {
+        return own(v);
+    }
     let w = weight(v);
     if w >= 1.0 {
         return own(v);

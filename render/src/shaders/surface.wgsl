@@ -2,7 +2,6 @@
 
 @group(0) @binding(6) var ramp: texture_2d<f32>;
 
-const TINT: u32 = 0u;
 const PLAIN: u32 = 1u;
 const SLOPE: u32 = 2u;
 const LEVEL: u32 = 3u;
@@ -27,7 +26,7 @@ struct Ground {
 }
 
 fn ramp_at(t: f32) -> vec3<f32> {
-    return textureSampleLevel(ramp, smooth_sampler, vec2(clamp(t, 0.0, 1.0) * (511.0 / 512.0) + 0.5 / 512.0, 0.5), 0.0).rgb;
+    return textureLoad(ramp, vec2(i32(clamp(t, 0.0, 1.0) * 1023.0 + 0.5), 0), 0).rgb;
 }
 
 fn hue(t: f32) -> vec3<f32> {
@@ -35,27 +34,23 @@ fn hue(t: f32) -> vec3<f32> {
 }
 
 fn bare_colour(g: Ground, normal: vec3<f32>) -> vec3<f32> {
-    switch frame.terrain.w {
-        case PLAIN: {
-            return vec3(0.52, 0.51, 0.49);
-        }
-        case SLOPE: {
-            return ramp_at(acos(clamp(normal.z, -1.0, 1.0)) / (PI / 3.0));
-        }
-        case LEVEL: {
-            // Neighbouring levels are far apart on the circle of hues, by the golden ratio.
-            return 0.16 + 0.6 * hue(g.level * 0.382);
-        }
-        case SCREEN_ERROR: {
-            return ramp_at(0.25 * g.demand);
-        }
-        default: {
-            let tint = ramp_at((g.height_m - frame.tint.x) * frame.tint.y);
-            // Rock shows where nothing holds on; a share of the tint stays so that bands remain readable.
-            let steep = smoothstep(frame.tint.z, frame.tint.z + 0.28, 1.0 - normal.z);
-            return mix(tint, mix(frame.rock.rgb, tint, 0.25), steep * frame.tint.w);
-        }
+    if SURFACE == PLAIN {
+        return vec3(0.52, 0.51, 0.49);
     }
+    if SURFACE == SLOPE {
+        return ramp_at(acos(clamp(normal.z, -1.0, 1.0)) / (PI / 3.0));
+    }
+    if SURFACE == LEVEL {
+        // Neighbouring levels are far apart on the circle of hues, by the golden ratio.
+        return 0.16 + 0.6 * hue(g.level * 0.382);
+    }
+    if SURFACE == SCREEN_ERROR {
+        return ramp_at(0.25 * g.demand);
+    }
+    let tint = ramp_at((g.height_m - frame.tint.x) * frame.tint.y);
+    // Rock shows where nothing holds on; a share of the tint stays so that bands remain readable.
+    let steep = smoothstep(frame.tint.z, frame.tint.z + 0.28, 1.0 - normal.z);
+    return mix(tint, mix(frame.rock.rgb, tint, 0.25), steep * frame.tint.w);
 }
 
 fn lit(colour: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
@@ -80,7 +75,7 @@ fn ground(g: Ground, at: vec2<f32>) -> vec4<f32> {
     let drape = normalize(vec3(-slopes.xy * frame.height.z, 1.0));
     let normal = select(g.facet, drape, slopes.z > 0.5);
     var colour = bare_colour(g, normal);
-    if frame.contour.x > 0.0 {
+    if CONTOURS {
         let plain = line(g.height_m, g.height_step_m, frame.contour.x, frame.contour.z);
         let index = line(g.height_m, g.height_step_m, frame.contour.x * frame.contour.y, 2.0 * frame.contour.z);
         colour = mix(colour, frame.contour_colour.rgb, max(0.7 * plain, index) * frame.contour.w);

@@ -32,7 +32,7 @@ fn tile_at(cell: vec2<i32>, within: vec2<f32>, from_level: u32) -> vec3<f32> {
 
 // Slopes at a place given in samples from the eye's cell, blended between the two nearest levels.
 fn slopes_at(cells: vec2<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
-    if frame.tiles.w == 0u {
+    if !TILES {
         return vec3(0.0);
     }
     let last = vec2<i32>(frame.terrain.xy) - 1;
