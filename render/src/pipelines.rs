@@ -38,6 +38,7 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
             entry(4, fragment, texture(wgpu::TextureViewDimension::D2Array, true)),
             entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
             entry(6, fragment, texture(wgpu::TextureViewDimension::D2, false)),
+            entry(7, vertex, storage),
         ],
     })
 }

@@ -13,7 +13,7 @@ use crate::attachments::{Attachments, Key};
 use crate::error::{RenderError, Result};
 use crate::gpu::Capabilities;
 use crate::look::Look;
-use crate::mesh::{MeshBuffers, MeshPatch, UploadStats};
+use crate::mesh::{MeshBuffers, MeshPatch, Morph, UploadStats};
 use crate::pipelines::{Modules, Pipelines, Variant, bind_group_layout};
 use crate::ramps::Ramp;
 use crate::tiles::{
@@ -97,6 +97,7 @@ pub struct Renderer {
     terrain: TerrainShape,
     multi_draw: bool,
     mesh: MeshBuffers,
+    morph: Morph,
     walls: Option<Walls>,
     tiles: TilePool,
     wanted: WantedTiles,
@@ -141,6 +142,7 @@ impl Renderer {
         let tile_layout = crate::tiles::TileLayout { format: GRADIENT_FORMAT, texels: TILE_CELLS + 1 };
         Ok(Self {
             mesh: MeshBuffers::new(device),
+            morph: Morph::new(device),
             walls: None,
             tiles: TilePool::new(
                 device,
@@ -267,6 +269,13 @@ impl Renderer {
             return Err(RenderError::Usage("a frame was begun without its parts"));
         };
         let timed = self.timer.as_ref().and_then(|t| t.begin().map(|place| (t, place)));
+        if frame.look.morph {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("morph"),
+                timestamp_writes: timed.map(|(timer, place)| timer.begins_with_compute(place)),
+            });
+            self.morph.record(&mut pass, self.mesh.vertex_slots, place as u32);
+        }
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("terrain"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -286,7 +295,7 @@ impl Renderer {
                 }),
                 stencil_ops: None,
             }),
-            timestamp_writes: timed.map(|(timer, place)| timer.writes(place)),
+            timestamp_writes: timed.map(|(timer, place)| timer.ends_with_render(place, !frame.look.morph)),
             occlusion_query_set: None,
             multiview_mask: None,
         });
@@ -377,7 +386,10 @@ impl Renderer {
 
     /// Device memory held in buffers and tiles, bytes; targets apart.
     pub fn device_bytes(&self) -> u64 {
-        self.mesh.device_bytes() + self.tiles.device_bytes() + self.uniforms.size()
+        self.mesh.device_bytes()
+            + self.morph.device_bytes()
+            + self.tiles.device_bytes()
+            + self.uniforms.size()
     }
 
     /// Time the device took for the newest frame that is known, milliseconds. To be called after submission. None where the device or the
@@ -427,6 +439,7 @@ impl Renderer {
             offset: 0,
             size: wgpu::BufferSize::new(size_of::<Uniforms>() as u64),
         };
+        self.morph.fit(&self.device, &self.mesh, uniform.clone());
         let resources = [
             wgpu::BindingResource::Buffer(uniform),
             self.mesh.vertices.as_entire_binding(),
@@ -435,6 +448,7 @@ impl Renderer {
             wgpu::BindingResource::TextureView(&self.tiles.view),
             wgpu::BindingResource::Sampler(&self.sampler),
             wgpu::BindingResource::TextureView(ramp),
+            self.morph.moved_heights().as_entire_binding(),
         ];
         let entries: Vec<_> = (0..)
             .zip(resources)

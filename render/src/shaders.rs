@@ -11,11 +11,13 @@ pub enum Program {
     Sky,
     /// Patches into slots.
     Scatter,
+    /// Heights of moving vertices.
+    Morph,
 }
 
 impl Program {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Terrain, Self::Sky, Self::Scatter];
+    pub const ALL: [Self; 4] = [Self::Terrain, Self::Sky, Self::Scatter, Self::Morph];
 
     /// Its text.
     pub fn source(self) -> &'static str {
@@ -33,6 +35,11 @@ impl Program {
                 include_str!("shaders/atmosphere.wgsl"),
                 include_str!("shaders/sky.wgsl"),
             ),
+            Self::Morph => concat!(
+                include_str!("shaders/frame.wgsl"),
+                include_str!("shaders/mesh.wgsl"),
+                include_str!("shaders/morph.wgsl"),
+            ),
             Self::Scatter => include_str!("shaders/scatter.wgsl"),
         }
     }
@@ -44,6 +51,7 @@ pub(crate) fn module(device: &wgpu::Device, program: Program) -> wgpu::ShaderMod
             Program::Terrain => "terrain",
             Program::Sky => "sky",
             Program::Scatter => "scatter",
+            Program::Morph => "morph",
         }),
         source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(program.source())),
     })

@@ -68,10 +68,22 @@ impl GpuTimer {
         self.places.iter().position(|p| p.state.load(Ordering::Acquire) == FREE)
     }
 
-    pub(crate) fn writes(&self, place: usize) -> wgpu::RenderPassTimestampWrites<'_> {
-        wgpu::RenderPassTimestampWrites {
+    pub(crate) fn begins_with_compute(&self, place: usize) -> wgpu::ComputePassTimestampWrites<'_> {
+        wgpu::ComputePassTimestampWrites {
             query_set: &self.places[place].queries,
             beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: None,
+        }
+    }
+
+    pub(crate) fn ends_with_render(
+        &self,
+        place: usize,
+        begins_too: bool,
+    ) -> wgpu::RenderPassTimestampWrites<'_> {
+        wgpu::RenderPassTimestampWrites {
+            query_set: &self.places[place].queries,
+            beginning_of_pass_write_index: begins_too.then_some(0),
             end_of_pass_write_index: Some(1),
         }
     }

@@ -33,6 +33,8 @@ fn every_entry_point_is_there() {
         "sky_fragment",
         "scatter_vertices",
         "scatter_triangles",
+        "morph_start",
+        "morph_step",
     ] {
         assert!(names.iter().any(|n| n == name), "{name}");
     }

@@ -24,6 +24,8 @@ pub(crate) struct MeshBuffers {
     pub vertices: wgpu::Buffer,
     pub indices: wgpu::Buffer,
     pub draws: DrawList,
+    /// Vertex slots that may be in use.
+    pub vertex_slots: u32,
     /// Triangle slots that a draw may name.
     triangle_slots: u32,
     /// Counts growth, so that bind groups know when they are stale.
@@ -74,6 +76,7 @@ impl MeshBuffers {
             vertices: create(device, Kind::Vertices, FIRST_SLOTS * VERTEX_BYTES),
             indices: create(device, Kind::Triangles, FIRST_SLOTS * TRIANGLE_BYTES),
             draws: DrawList::default(),
+            vertex_slots: 0,
             triangle_slots: 0,
             generation: 0,
             limit_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
@@ -109,6 +112,7 @@ impl MeshBuffers {
         let slots = self.triangle_slots.max(u32::try_from(triangle_end).unwrap_or(u32::MAX));
         self.draws.set(patch.draws, slots)?;
         self.triangle_slots = slots;
+        self.vertex_slots = self.vertex_slots.max(u32::try_from(vertex_end).unwrap_or(u32::MAX));
 
         let mut stats = UploadStats { vertices, triangles, bytes, grown_bytes: 0 };
         if let Some(capacity) = vertex_capacity {
@@ -181,6 +185,11 @@ impl MeshBuffers {
         }
         // Multiples of 96 hold whole vertices and whole triangles.
         Ok(Some(needs.max(has + has / 2).next_multiple_of(96).min(self.limit_bytes / 96 * 96).max(needs)))
+    }
+
+    /// Vertex slots there is room for.
+    pub(crate) fn vertex_slots_held(&self) -> u64 {
+        self.vertices.size() / VERTEX_BYTES
     }
 
     /// Bytes of device memory held.

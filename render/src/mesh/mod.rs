@@ -5,9 +5,11 @@
 
 mod buffers;
 mod draws;
+mod morph;
 mod patch;
 
 pub(crate) use buffers::MeshBuffers;
+pub(crate) use morph::Morph;
 
 use std::ops::Range;
 

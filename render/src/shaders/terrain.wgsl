@@ -1,6 +1,17 @@
 // The mesh drawn with shared vertices (indexed), or with three of its own for every triangle, where edges or
 // levels are to be seen; and the walls along its border.
 
+@group(0) @binding(2) var<storage, read> triangles: array<u32>;
+@group(0) @binding(7) var<storage, read> moved_heights: array<f32>;
+
+// Height of a vertex as drawn, relative to the height origin.
+fn moved(slot: u32) -> f32 {
+    if MORPH {
+        return moved_heights[slot];
+    }
+    return own(vertices[slot]);
+}
+
 struct SharedPoint {
     @builtin(position) position: vec4<f32>,
     @location(0) from_eye_m: vec3<f32>,
@@ -8,8 +19,9 @@ struct SharedPoint {
     @location(2) height_from_origin_m: f32,
 }
 
-fn place(v: Vertex) -> SharedPoint {
-    let height = moved(v);
+fn place(slot: u32) -> SharedPoint {
+    let v = vertices[slot];
+    let height = moved(slot);
     let cells = cells_from_eye(v);
     let from_eye_m = metres_from_eye(cells, height);
     return SharedPoint(frame.clip_from_eye * vec4(from_eye_m, 1.0), from_eye_m, cells, height);
@@ -17,7 +29,7 @@ fn place(v: Vertex) -> SharedPoint {
 
 @vertex
 fn shared_vertex(@builtin(vertex_index) slot: u32) -> SharedPoint {
-    return place(vertices[slot]);
+    return place(slot);
 }
 
 // Upward normal of the triangle a pixel lies in, from its own derivatives.
@@ -64,7 +76,7 @@ fn own_vertex(@builtin(vertex_index) i: u32) -> OwnPoint {
             finest = other;
         }
     }
-    let p = place(vertices[triangles[i]]);
+    let p = place(triangles[i]);
     let corner = vec3(f32(i % 3u == 0u), f32(i % 3u == 1u), f32(i % 3u == 2u));
     return OwnPoint(p.position, p.from_eye_m, p.cells, p.height_from_origin_m, corner, f32(finest.bits & 255u), demand_of(finest));
 }
@@ -98,8 +110,9 @@ fn wall_vertex(
     // 0 1 2, 2 1 3 with the upper corners even.
     var corners = array<u32, 6>(0u, 1u, 2u, 2u, 1u, 3u);
     let which = corners[corner];
-    let v = vertices[select(ends.x, ends.y, which >= 2u)];
-    let top = moved(v);
+    let slot = select(ends.x, ends.y, which >= 2u);
+    let v = vertices[slot];
+    let top = moved(slot);
     let bottom = min(frame.lod_more.w - frame.height.x, top);
     let height = select(top, bottom, (which & 1u) == 1u);
     let from_eye_m = metres_from_eye(cells_from_eye(v), height);

@@ -30,7 +30,7 @@ fn tile_at(cell: vec2<i32>, within: vec2<f32>, from_level: u32) -> vec3<f32> {
     return vec3(0.0);
 }
 
-// Slopes at a place given in samples from the eye's cell, blended between the two nearest levels.
+// Slopes at a place given in samples from the eye's cell.
 fn slopes_at(cells: vec2<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
     if !TILES {
         return vec3(0.0);
@@ -41,7 +41,12 @@ fn slopes_at(cells: vec2<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
     let cell = clamp(unclamped, vec2(0), last);
     let within = select(cells - whole, vec2(0.0), (unclamped != cell) | (cell == last));
     let level = clamp(needed_level(from_eye_m), 0.0, f32(frame.tiles.x - 1u));
-    let fine = tile_at(cell, within, u32(level));
-    let coarse = tile_at(cell, within, min(u32(level) + 1u, frame.tiles.x - 1u));
-    return mix(fine, coarse, fract(level));
+    var slopes = tile_at(cell, within, u32(level));
+    // The last third of a level passes into the next. A loop, not a branch: software drivers leave a loop that no pixel
+    // needs, but run both sides of a branch.
+    let blend = smoothstep(0.67, 1.0, fract(level));
+    for (var i = 0; i < i32(ceil(blend)); i++) {
+        slopes = mix(slopes, tile_at(cell, within, min(u32(level) + 1u, frame.tiles.x - 1u)), blend);
+    }
+    return slopes;
 }
