@@ -23,6 +23,8 @@ pub struct Capabilities {
     pub timestamps: bool,
     /// Whether many ranges may be drawn by one indirect call.
     pub multi_draw: bool,
+    /// Whether depth can be read back ([`crate::read_depth_m`]); OpenGL cannot.
+    pub depth_copies: bool,
     /// Largest storage binding in bytes: bounds vertices (32 bytes) and triangles (12 bytes).
     pub max_binding_bytes: u64,
 }
@@ -41,6 +43,7 @@ impl Capabilities {
             texture_compression_bc: features.contains(wgpu::Features::TEXTURE_COMPRESSION_BC),
             timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             multi_draw: downlevel.flags.contains(wgpu::DownlevelFlags::INDIRECT_EXECUTION),
+            depth_copies: downlevel.flags.contains(wgpu::DownlevelFlags::DEPTH_TEXTURE_AND_BUFFER_COPIES),
             max_binding_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
         }
     }
@@ -114,15 +117,26 @@ impl Gpu {
     ///
     /// [`RenderError::NoAdapter`] says what to install; [`RenderError::NoDevice`].
     pub async fn headless() -> Result<Self> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-        let adapter = instance
-            .request_adapter(&wgpu::RequestAdapterOptions {
+        // OpenGL is asked only where nothing better answers: looking for it may start a display connection.
+        let choices = match wgpu::Backends::from_env() {
+            Some(backends) => vec![backends],
+            None => vec![wgpu::Backends::PRIMARY, wgpu::Backends::SECONDARY],
+        };
+        let mut detail = String::new();
+        for backends in choices {
+            let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+            descriptor.backends = backends;
+            let options = wgpu::RequestAdapterOptions {
                 power_preference: wgpu::PowerPreference::HighPerformance,
                 ..Default::default()
-            })
-            .await
-            .map_err(|e| RenderError::NoAdapter { detail: e.to_string() })?;
-        Self::on(adapter).await
+            };
+            match wgpu::Instance::new(descriptor).request_adapter(&options).await {
+                Ok(adapter) => return Self::on(adapter).await,
+                Err(error) if detail.is_empty() => detail = error.to_string(),
+                Err(_) => {}
+            }
+        }
+        Err(RenderError::NoAdapter { detail })
     }
 
     /// [`Gpu::headless`], waiting for it.

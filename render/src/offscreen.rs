@@ -73,7 +73,7 @@ impl Offscreen {
 }
 
 /// Distances along the line of sight of the renderer's last frame in metres, row by row from the top; infinite where
-/// there is sky. Waits for all submitted work.
+/// there is sky. Waits for all submitted work. Only where [`crate::Capabilities::depth_copies`] says so.
 ///
 /// # Errors
 ///

@@ -30,7 +30,7 @@ pub struct MeshVertex {
     /// Nested-sphere radius in metres.
     pub radius_m: f32,
     /// Vertex slots of the two ends of the edge that this vertex splits: where it comes from when it appears. Its own slot, twice, for
-    /// corners and the centre. Both must hold vertices whenever this one is drawn.
+    /// corners and the centre. Both must hold vertices whenever this one is drawn, as in a conforming mesh they do.
     pub ends: [u32; 2],
     /// Bits 0 to 7: level, 0 the finest, [`MeshVertex::NO_LEVEL`] for corners. Other bits are reserved, 0.
     pub flags: u32,

@@ -1,7 +1,7 @@
 //! The device itself: repeatable, timed, lost and made anew.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Gpu, Look, RenderError, RendererOptions};
+use terrasoar_render::{FrameView, Gpu, Look, RenderError, RendererOptions, wgpu};
 
 use crate::support::landscape::hills;
 use crate::support::picture::Picture;

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    FrameView, Gpu, HEIGHTS_PER_TILE, Look, Offscreen, RenderError, RendererOptions, Surface, Target, TileId,
+    Frame, FrameView, Gpu, HEIGHTS_PER_TILE, Look, Offscreen, RenderError, RendererOptions, Surface, TileId,
+    wgpu,
 };
 
 use crate::support::landscape::hills;
@@ -110,25 +111,22 @@ fn formats(gpu: &Gpu) -> Outcome {
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.refine(&view));
     let encoded = scene.draw(&view, &Look::default());
+    let format = wgpu::TextureFormat::Rgba8Unorm;
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d { width: 120, height: 90, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        format,
         usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[wgpu::TextureFormat::Rgba8Unorm],
+        view_formats: &[],
     });
-    let format = wgpu::TextureFormat::Rgba8Unorm;
-    let plain =
-        texture.create_view(&wgpu::TextureViewDescriptor { format: Some(format), ..Default::default() });
-    let target = Target { view: &plain, size_px: [120, 90], format };
-    let picture = Offscreen::of(texture.clone()).map_err(|e| e.to_string())?;
+    let picture = Offscreen::of(texture).map_err(|e| e.to_string())?;
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let look = Look::default();
-    let frame = terrasoar_render::Frame { view: &view, refined_for: None, look: &look };
-    scene.renderer.render(&mut encoder, target, frame).map_err(|e| e.to_string())?;
+    let frame = Frame { view: &view, refined_for: None, look: &look };
+    scene.renderer.render(&mut encoder, picture.target(), frame).map_err(|e| e.to_string())?;
     gpu.queue.submit([encoder.finish()]);
     let rgba = picture.read_rgba(&gpu.device, &gpu.queue).map_err(|e| e.to_string())?;
     let most = encoded.rgba.iter().zip(&rgba).map(|(a, b)| a.abs_diff(*b)).max();
