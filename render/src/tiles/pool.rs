@@ -69,15 +69,16 @@ impl TilePool {
         budget_bytes: u64,
     ) -> Self {
         let limits = device.limits();
-        let most = u64::from(limits.max_texture_array_layers).min(pyramid.len() as u64);
+        let most = u64::from(limits.max_texture_array_layers.saturating_sub(1)).min(pyramid.len() as u64);
         let capacity = (budget_bytes / layout.layer_bytes().max(1)).clamp(1, most) as u32;
+        // OpenGL takes one layer for no array, and a multiple of six for cubes.
+        let layers = if capacity == 1 || capacity.is_multiple_of(6) { capacity + 1 } else { capacity };
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("tiles"),
-            // With one layer the view would not be an array on every backend.
             size: wgpu::Extent3d {
                 width: layout.texels,
                 height: layout.texels,
-                depth_or_array_layers: capacity.max(2),
+                depth_or_array_layers: layers,
             },
             mip_level_count: 1,
             sample_count: 1,
@@ -182,5 +183,19 @@ impl TilePool {
     /// Bytes of device memory held.
     pub(crate) fn device_bytes(&self) -> u64 {
         self.layout.layer_bytes() * u64::from(self.texture.depth_or_array_layers()) + self.page_table.size()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Layers of whole blocks, for pixels one by one and for blocks of four by four.
+    #[test]
+    fn layers_hold_whole_blocks() {
+        let layout = |format, texels| TileLayout { format, texels };
+        assert_eq!(layout(wgpu::TextureFormat::Rg16Float, 129).layer_bytes(), 129 * 129 * 4);
+        assert_eq!(layout(wgpu::TextureFormat::Rgba8UnormSrgb, 132).layer_bytes(), 132 * 132 * 4);
+        assert_eq!(layout(wgpu::TextureFormat::Bc1RgbaUnormSrgb, 132).layer_bytes(), 33 * 33 * 8);
     }
 }
