@@ -34,7 +34,15 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
             ),
             entry(1, vertex, storage),
             entry(2, vertex, storage),
-            entry(3, fragment, storage),
+            entry(
+                3,
+                fragment,
+                wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Uint,
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
+            ),
             entry(4, fragment, texture(wgpu::TextureViewDimension::D2Array, true)),
             entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
             entry(6, fragment, texture(wgpu::TextureViewDimension::D2, false)),

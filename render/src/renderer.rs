@@ -146,7 +146,6 @@ impl Renderer {
             walls: None,
             tiles: TilePool::new(
                 device,
-                queue,
                 Pyramid::over(terrain.samples),
                 tile_layout,
                 options.tile_budget_bytes,
@@ -444,7 +443,7 @@ impl Renderer {
             wgpu::BindingResource::Buffer(uniform),
             self.mesh.vertices.as_entire_binding(),
             self.mesh.indices.as_entire_binding(),
-            self.tiles.page_table.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&self.tiles.page_table_view),
             wgpu::BindingResource::TextureView(&self.tiles.view),
             wgpu::BindingResource::Sampler(&self.sampler),
             wgpu::BindingResource::TextureView(ramp),

@@ -1,6 +1,6 @@
 // The finest resident tile at a place that is not finer than needed, found through the page table.
 
-@group(0) @binding(3) var<storage, read> page_table: array<u32>;
+@group(0) @binding(3) var page_table: texture_2d<u32>;
 @group(0) @binding(4) var tile_layers: texture_2d_array<f32>;
 @group(0) @binding(5) var smooth_sampler: sampler;
 
@@ -13,13 +13,13 @@ fn needed_level(from_eye_m: vec3<f32>) -> f32 {
 }
 
 // Slopes east and north, and 1 if a tile was found.
-fn tile_at(cell: vec2<i32>, within: vec2<f32>, from_level: u32) -> vec3<f32> {
+fn tile_at(cell: vec2<i32>, last_inside: vec2<i32>, within: vec2<f32>, from_level: u32) -> vec3<f32> {
     for (var level = from_level; level < frame.tiles.x; level++) {
         let shift = frame.tiles.y + level;
-        let head = 4u * level;
-        let across = vec2<i32>(i32(page_table[head + 1u]), i32(page_table[head + 2u]));
-        let tile = min(cell >> vec2(shift), across - 1);
-        let entry = page_table[page_table[head] + u32(tile.y * across.x + tile.x)];
+        // The last sample belongs to the last tile; its neighbours beyond do not exist.
+        let tile = min(cell, last_inside) >> vec2(shift);
+        // A signed level: OpenGL takes no other.
+        let entry = textureLoad(page_table, tile, i32(level)).r;
         if entry != 0u {
             let samples = vec2<f32>(cell - (tile << vec2(shift))) + within;
             let texel = samples * exp2(-f32(level)) + 0.5;
@@ -41,12 +41,12 @@ fn slopes_at(cells: vec2<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
     let cell = clamp(unclamped, vec2(0), last);
     let within = select(cells - whole, vec2(0.0), (unclamped != cell) | (cell == last));
     let level = clamp(needed_level(from_eye_m), 0.0, f32(frame.tiles.x - 1u));
-    var slopes = tile_at(cell, within, u32(level));
+    var slopes = tile_at(cell, last - 1, within, u32(level));
     // The last third of a level passes into the next. A loop, not a branch: software drivers leave a loop that no pixel
     // needs, but run both sides of a branch.
     let blend = smoothstep(0.67, 1.0, fract(level));
     for (var i = 0; i < i32(ceil(blend)); i++) {
-        slopes = mix(slopes, tile_at(cell, within, min(u32(level) + 1u, frame.tiles.x - 1u)), blend);
+        slopes = mix(slopes, tile_at(cell, last - 1, within, min(u32(level) + 1u, frame.tiles.x - 1u)), blend);
     }
     return slopes;
 }

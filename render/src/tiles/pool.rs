@@ -1,6 +1,6 @@
 //! Layers of an array texture, and the page table that says what is in them.
 //!
-//! Knows bytes a texel block, not their meaning. An upload is one texture write and one or two words of the
+//! Knows bytes a texel block, not their meaning. An upload is one texture write and one or two texels of the
 //! page table; nothing else moves.
 
 use super::{Pyramid, Residency, TileId};
@@ -45,8 +45,8 @@ pub struct TileStats {
     pub dropped: u64,
 }
 
-/// Words of the page table's head: four for each level: its first entry, tiles east, tiles north, 0. Entries follow.
-const HEAD_WORDS: usize = 4 * 32;
+/// An entry of the page table: the layer of a tile and 1, or 0 where there is none. A level of the pyramid is a mip level.
+const PAGE_TABLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
 /// Tiles on the device.
 #[derive(Debug)]
@@ -54,7 +54,8 @@ pub(crate) struct TilePool {
     pub pyramid: Pyramid,
     pub residency: Residency,
     pub view: wgpu::TextureView,
-    pub page_table: wgpu::Buffer,
+    pub page_table_view: wgpu::TextureView,
+    page_table: wgpu::Texture,
     texture: wgpu::Texture,
     layout: TileLayout,
     stats: TileStats,
@@ -63,7 +64,6 @@ pub(crate) struct TilePool {
 impl TilePool {
     pub(crate) fn new(
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
         pyramid: Pyramid,
         layout: TileLayout,
         budget_bytes: u64,
@@ -91,23 +91,23 @@ impl TilePool {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..Default::default()
         });
-        let page_table = device.create_buffer(&wgpu::BufferDescriptor {
+        // A mip level for each of the pyramid's: powers of two halve evenly, and are at least the tiles across.
+        let [width, height] = pyramid.across(0).map(u32::next_power_of_two);
+        let page_table = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("page table"),
-            size: 4 * (HEAD_WORDS + pyramid.len()) as u64,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: pyramid.levels(),
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: PAGE_TABLE_FORMAT,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
         });
-        let mut head = [0u32; HEAD_WORDS];
-        for level in 0..pyramid.levels() {
-            let [east, north] = pyramid.across(level);
-            let first = HEAD_WORDS + pyramid.index(TileId { level, x: 0, y: 0 });
-            head[4 * level as usize..][..3].copy_from_slice(&[first as u32, east, north]);
-        }
-        queue.write_buffer(&page_table, 0, bytemuck::cast_slice(&head));
         Self {
             residency: Residency::new(&pyramid, capacity),
             pyramid,
             view,
+            page_table_view: page_table.create_view(&Default::default()),
             page_table,
             texture,
             layout,
@@ -166,8 +166,17 @@ impl TilePool {
     }
 
     fn set_entry(&self, queue: &wgpu::Queue, tile: TileId, value: u32) -> u64 {
-        let word = HEAD_WORDS + self.pyramid.index(tile);
-        queue.write_buffer(&self.page_table, 4 * word as u64, bytemuck::bytes_of(&value));
+        queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &self.page_table,
+                mip_level: tile.level,
+                origin: wgpu::Origin3d { x: tile.x, y: tile.y, z: 0 },
+                aspect: wgpu::TextureAspect::All,
+            },
+            &value.to_le_bytes(),
+            wgpu::TexelCopyBufferLayout::default(),
+            wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        );
         4
     }
 
@@ -182,7 +191,8 @@ impl TilePool {
 
     /// Bytes of device memory held.
     pub(crate) fn device_bytes(&self) -> u64 {
-        self.layout.layer_bytes() * u64::from(self.texture.depth_or_array_layers()) + self.page_table.size()
+        self.layout.layer_bytes() * u64::from(self.texture.depth_or_array_layers())
+            + 4 * self.pyramid.len() as u64
     }
 }
 
