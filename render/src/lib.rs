@@ -71,6 +71,7 @@
 
 mod attachments;
 mod error;
+mod frame;
 mod gpu;
 mod look;
 mod mesh;
@@ -85,11 +86,12 @@ mod uniforms;
 mod view;
 
 pub use error::{RenderError, Result};
+pub use frame::{DrawStats, Frame, RendererOptions, Target};
 pub use gpu::{Capabilities, DeviceWatch, Gpu};
 pub use look::{Contours, Haze, LOOKS, Look, Sun, Surface, Wireframe};
 pub use mesh::{MeshPatch, MeshVertex, UploadStats};
 pub use offscreen::{Offscreen, read_depth_m};
-pub use renderer::{DrawStats, Frame, Renderer, RendererOptions, Target};
+pub use renderer::Renderer;
 pub use tiles::{
     HEIGHTS_PER_TILE, Placement, Pyramid, Residency, TILE_BORDER, TILE_CELLS, TileId, TileStats, WantedTiles,
     pack_gradients,

@@ -1,7 +1,8 @@
 //! Pictures without a window: a texture to render to, and reading it back.
 
 use crate::error::{RenderError, Result};
-use crate::renderer::{Renderer, Target};
+use crate::frame::Target;
+use crate::renderer::Renderer;
 
 /// A picture on the device, 8-bit sRGB with alpha.
 #[derive(Debug)]
