@@ -1,0 +1,88 @@
+//! What a frame costs the processor in this crate, apart from the drawing itself: recording a patch by its size, recording
+//! a frame by its visible ranges, finding wanted tiles. `cargo bench -p terrasoar-render`
+
+use std::hint::black_box;
+use std::ops::Range;
+
+use criterion::{BatchSize, BenchmarkId, Criterion};
+use glam::DVec3;
+use terrasoar_render::{
+    Frame, FrameView, Gpu, Look, MeshPatch, MeshVertex, Offscreen, Pyramid, Renderer, RendererOptions,
+    TerrainShape, WantedTiles,
+};
+
+const TERRAIN: TerrainShape =
+    TerrainShape { spacing_m: [10.0, 10.0], samples: [16_385, 16_385], height_range_m: [0.0, 4000.0] };
+
+fn view() -> FrameView {
+    let eye = DVec3::new(80_000.0, 80_000.0, 5000.0);
+    FrameView::look_at(eye, eye + DVec3::new(1.0, 2.0, -0.5), [1920, 1080])
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    let pyramid = Pyramid::over(TERRAIN.samples);
+    let mut wanted = WantedTiles::default();
+    criterion.bench_function("wanted tiles, 1920 x 1080", |b| {
+        b.iter(|| wanted.find(black_box(&pyramid), &TERRAIN, &view()).len());
+    });
+    match Gpu::headless_blocking() {
+        Ok(gpu) => on_device(&mut criterion, &gpu),
+        Err(error) => println!("without a device: {error}"),
+    }
+    criterion.final_summary();
+}
+
+fn on_device(criterion: &mut Criterion, gpu: &Gpu) {
+    let options = RendererOptions::from(&gpu.capabilities);
+    let Ok(mut renderer) = Renderer::new(&gpu.device, &gpu.queue, TERRAIN, options) else { return };
+    let encoder = || gpu.device.create_command_encoder(&Default::default());
+    let vertex = MeshVertex {
+        x: 1,
+        y: 1,
+        height_m: 0.0,
+        error_m: 0.0,
+        radius_m: 0.0,
+        ends: [0; 2],
+        flags: MeshVertex::NO_LEVEL,
+    };
+    for triangles in [100_u32, 1000, 10_000] {
+        // Slots scattered as splits and merges leave them, half as many vertices as triangles.
+        let slot = |i: u32| i.wrapping_mul(2_654_435_761) % 200_000;
+        let vertices: Vec<_> = (0..triangles / 2).map(|i| (slot(i), vertex)).collect();
+        let changed: Vec<_> = (0..triangles).map(|i| (slot(i), [slot(i); 3])).collect();
+        let patch = MeshPatch { vertices: &vertices, triangles: &changed, draws: &[] };
+        criterion.bench_function(&format!("patch of {triangles} triangles"), |b| {
+            b.iter_batched(
+                encoder,
+                |mut encoder| {
+                    let _ = black_box(renderer.apply(&mut encoder, &patch));
+                    // Not submitted: only the recording is timed.
+                    encoder.finish()
+                },
+                BatchSize::PerIteration,
+            );
+        });
+        gpu.queue.submit([]);
+    }
+    let Ok(picture) = Offscreen::new(&gpu.device, [64, 64]) else { return };
+    let (view, look) = (view(), Look::default());
+    for ranges in [1_u32, 50, 500] {
+        let draws: Vec<Range<u32>> = (0..ranges).map(|i| 2 * i..2 * i + 1).collect();
+        let mut first = encoder();
+        let _ = renderer.apply(&mut first, &MeshPatch { draws: &draws, ..Default::default() });
+        gpu.queue.submit([first.finish()]);
+        criterion.bench_with_input(BenchmarkId::new("frame, ranges", ranges), &ranges, |b, _| {
+            b.iter_batched(
+                encoder,
+                |mut encoder| {
+                    let frame = Frame { view: &view, refined_for: None, look: &look };
+                    let _ = black_box(renderer.render(&mut encoder, picture.target(), frame));
+                    encoder.finish()
+                },
+                BatchSize::PerIteration,
+            );
+        });
+        gpu.queue.submit([]);
+    }
+}

@@ -1,0 +1,81 @@
+//! What can go wrong, told apart by what the caller can do about it.
+
+/// Errors of this crate.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// No graphics adapter, neither hardware nor software. Install one and try again.
+    #[error(
+        "no graphics adapter found ({detail}). Install a driver; without graphics hardware a software one does \
+         (Debian and Ubuntu: apt install mesa-vulkan-drivers libvulkan1; Fedora: dnf install mesa-vulkan-drivers)"
+    )]
+    NoAdapter {
+        /// What the driver layer said.
+        detail: String,
+    },
+    /// The adapter gave no device.
+    #[error("adapter {adapter} gave no device: {detail}")]
+    NoDevice {
+        /// The adapter's name.
+        adapter: String,
+        /// What the driver layer said.
+        detail: String,
+    },
+    /// The device went away: driver reset, unplugged, put to sleep. Make a new one, a new renderer on it, and apply
+    /// one patch with everything.
+    #[error("the graphics device was lost ({reason}); a new device and renderer are needed")]
+    DeviceLost {
+        /// What the driver layer said.
+        reason: String,
+    },
+    /// The driver layer refused a command; the picture may be incomplete.
+    #[error("graphics error: {message}")]
+    Device {
+        /// What the driver layer said.
+        message: String,
+    },
+    /// More than the device can hold. A larger tolerance makes a smaller mesh.
+    #[error(
+        "{what} would need {needed_bytes} bytes where the device allows {limit_bytes}; a larger tolerance needs less"
+    )]
+    TooLarge {
+        /// Which buffer.
+        what: &'static str,
+        /// Bytes asked for.
+        needed_bytes: u64,
+        /// Bytes the device allows in one binding.
+        limit_bytes: u64,
+    },
+    /// A draw range names triangles that were never uploaded.
+    #[error("triangles {start}..{end} are to be drawn where {uploaded} were uploaded")]
+    RangeOutside {
+        /// First triangle slot.
+        start: u32,
+        /// One past the last.
+        end: u32,
+        /// Triangle slots that exist.
+        uploaded: u32,
+    },
+    /// A tile's content does not have the number of values its kind asks for.
+    #[error("tile {tile} has {got} values, {expected} are needed")]
+    TileSize {
+        /// Level and position.
+        tile: String,
+        /// Values needed.
+        expected: usize,
+        /// Values given.
+        got: usize,
+    },
+    /// A tile outside the pyramid.
+    #[error("tile {tile} is not of this terrain")]
+    NoSuchTile {
+        /// Level and position.
+        tile: String,
+    },
+    /// Wrong use that is none of the above.
+    #[error("{0}")]
+    Usage(&'static str),
+}
+
+/// Result with this crate's error.
+pub type Result<T> = std::result::Result<T, RenderError>;

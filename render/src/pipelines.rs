@@ -1,0 +1,183 @@
+//! Pipelines, one set for each target format and each combination of what a look shows, and the one layout that all share.
+
+use crate::look::{Look, Surface};
+use crate::shaders;
+
+/// Depth of the picture: 32-bit float, reversed, so that precision is even in the logarithm of distance.
+pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// What every pipeline binds.
+pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, visibility, ty| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None };
+    let storage = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only: true },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    let texture = |view_dimension, filterable| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable },
+        view_dimension,
+        multisampled: false,
+    };
+    let (vertex, fragment) = (wgpu::ShaderStages::VERTEX, wgpu::ShaderStages::FRAGMENT);
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("frame"),
+        entries: &[
+            entry(
+                0,
+                vertex | fragment,
+                wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: true,
+                    min_binding_size: None,
+                },
+            ),
+            entry(1, vertex, storage),
+            entry(2, vertex, storage),
+            entry(
+                3,
+                fragment,
+                wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Uint,
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
+            ),
+            entry(4, fragment, texture(wgpu::TextureViewDimension::D2Array, true)),
+            entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+            entry(6, fragment, texture(wgpu::TextureViewDimension::D2, false)),
+            entry(7, vertex, storage),
+        ],
+    })
+}
+
+/// What is fixed in a pipeline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Variant {
+    pub format: wgpu::TextureFormat,
+    pub samples: u32,
+    pub surface: Surface,
+    pub contours: bool,
+    pub tiles: bool,
+    pub morph: bool,
+}
+
+impl Variant {
+    pub(crate) fn of(look: &Look, format: wgpu::TextureFormat) -> Self {
+        Self {
+            format,
+            samples: if look.multisample { 4 } else { 1 },
+            surface: look.surface,
+            contours: look.contours.is_some(),
+            tiles: look.tile_normals,
+            morph: look.morph,
+        }
+    }
+
+    /// Values for the shaders' overrides.
+    fn constants(&self) -> [(&'static str, f64); 5] {
+        let surface = match self.surface {
+            Surface::Tint => 0,
+            Surface::Plain => 1,
+            Surface::Slope => 2,
+            Surface::Level => 3,
+            Surface::ScreenError => 4,
+        };
+        [
+            ("SURFACE", f64::from(surface)),
+            ("CONTOURS", f64::from(u8::from(self.contours))),
+            ("TILES", f64::from(u8::from(self.tiles))),
+            ("MORPH", f64::from(u8::from(self.morph))),
+            ("ENCODES", f64::from(u8::from(self.format.is_srgb()))),
+        ]
+    }
+}
+
+/// Compiled programs, whatever the target.
+#[derive(Debug)]
+pub(crate) struct Modules {
+    terrain: wgpu::ShaderModule,
+    sky: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+}
+
+impl Modules {
+    pub(crate) fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Self {
+        Self {
+            terrain: shaders::module(device, shaders::Program::Terrain),
+            sky: shaders::module(device, shaders::Program::Sky),
+            layout: device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("frame"),
+                bind_group_layouts: &[Some(layout)],
+                immediate_size: 0,
+            }),
+        }
+    }
+}
+
+/// Pipelines of one variant; each costs its compilation when a frame first needs it.
+#[derive(Debug)]
+pub(crate) struct Pipelines {
+    /// Terrain, indexed.
+    pub shared: wgpu::RenderPipeline,
+    /// Terrain, three vertices a triangle.
+    pub own: wgpu::RenderPipeline,
+    /// Walls, an instance an edge.
+    pub wall: wgpu::RenderPipeline,
+    /// The sky, last.
+    pub sky: wgpu::RenderPipeline,
+}
+
+impl Pipelines {
+    pub(crate) fn new(device: &wgpu::Device, modules: &Modules, variant: Variant) -> Self {
+        let wall_edges = [Some(wgpu::VertexBufferLayout {
+            array_stride: 8,
+            step_mode: wgpu::VertexStepMode::Instance,
+            attributes: &wgpu::vertex_attr_array![0 => Uint32x2],
+        })];
+        let constants = variant.constants();
+        let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
+        let pipeline =
+            |name: &str, module, buffers: &[Option<wgpu::VertexBufferLayout<'_>>], ground: bool| {
+                device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                    label: Some(name),
+                    layout: Some(&modules.layout),
+                    vertex: wgpu::VertexState {
+                        module,
+                        entry_point: Some(&format!("{name}_vertex")),
+                        compilation_options: options.clone(),
+                        buffers,
+                    },
+                    // Nothing is culled by its winding: triangles deformed at the data's edge may turn over.
+                    primitive: wgpu::PrimitiveState::default(),
+                    depth_stencil: Some(wgpu::DepthStencilState {
+                        format: DEPTH_FORMAT,
+                        depth_write_enabled: Some(ground),
+                        // The sky is at depth 0, which only untouched pixels have.
+                        depth_compare: Some(if ground {
+                            wgpu::CompareFunction::Greater
+                        } else {
+                            wgpu::CompareFunction::GreaterEqual
+                        }),
+                        stencil: Default::default(),
+                        bias: Default::default(),
+                    }),
+                    multisample: wgpu::MultisampleState { count: variant.samples, ..Default::default() },
+                    fragment: Some(wgpu::FragmentState {
+                        module,
+                        entry_point: Some(&format!("{name}_fragment")),
+                        compilation_options: options.clone(),
+                        targets: &[Some(variant.format.into())],
+                    }),
+                    multiview_mask: None,
+                    cache: None,
+                })
+            };
+        Self {
+            shared: pipeline("shared", &modules.terrain, &[], true),
+            own: pipeline("own", &modules.terrain, &[], true),
+            wall: pipeline("wall", &modules.terrain, &wall_edges, true),
+            sky: pipeline("sky", &modules.sky, &[], false),
+        }
+    }
+}

@@ -1,0 +1,402 @@
+//! From patches to a frame: the one place that orders commands.
+//!
+//! A renderer holds device memory and nothing that the caller does not have: after the loss of a device it is made anew and
+//! given one patch with the whole mesh and the tiles it then asks for. Cost of a frame on the processor: the patch,
+//! one block of uniforms, a handful of commands and one draw a visible range (or one for all of them).
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use wgpu::util::DeviceExt;
+
+use crate::attachments::{Attachments, Key};
+use crate::error::{RenderError, Result};
+use crate::frame::{DrawStats, Frame, RendererOptions, Target};
+use crate::mesh::{MeshBuffers, MeshPatch, Morph, UploadStats};
+use crate::pipelines::{Modules, Pipelines, Variant, bind_group_layout};
+use crate::ramps::Ramp;
+use crate::tiles::{
+    GRADIENT_FORMAT, Pyramid, TILE_CELLS, TileId, TilePool, TileStats, WantedTiles, pack_gradients,
+};
+use crate::timing::GpuTimer;
+use crate::uniforms::{Inputs, Uniforms};
+use crate::view::{FrameView, TerrainShape, near_m};
+
+/// Frames whose commands may wait in one submission.
+const UNIFORM_PLACES: u64 = 16;
+const RAMP_TEXELS: u32 = 1024;
+/// From so many ranges on, one indirect call is cheaper than as many direct ones.
+const INDIRECT_FROM: usize = 64;
+
+/// Draws one terrain on one device.
+#[derive(Debug)]
+pub struct Renderer {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    terrain: TerrainShape,
+    multi_draw: bool,
+    mesh: MeshBuffers,
+    morph: Morph,
+    walls: Option<Walls>,
+    tiles: TilePool,
+    wanted: WantedTiles,
+    layout: wgpu::BindGroupLayout,
+    modules: Modules,
+    pipelines: HashMap<Variant, Pipelines>,
+    attachments: Option<Attachments>,
+    uniforms: wgpu::Buffer,
+    uniform_stride: u64,
+    next_place: u64,
+    sampler: wgpu::Sampler,
+    ramp: Option<(&'static Ramp, wgpu::TextureView)>,
+    bind_group: Option<(u64, wgpu::BindGroup)>,
+    timer: Option<GpuTimer>,
+    near_m: f64,
+}
+
+#[derive(Debug)]
+struct Walls {
+    edges: wgpu::Buffer,
+    count: u32,
+    bottom_m: f32,
+}
+
+impl Renderer {
+    /// A renderer without a mesh. Takes a few milliseconds, the compilation of shaders apart, which the first frame of
+    /// each target format pays for.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Usage`] for a terrain without extent.
+    pub fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        terrain: TerrainShape,
+        options: RendererOptions,
+    ) -> Result<Self> {
+        terrain.check()?;
+        let layout = bind_group_layout(device);
+        let uniform_stride = (size_of::<Uniforms>() as u64)
+            .next_multiple_of(u64::from(device.limits().min_uniform_buffer_offset_alignment));
+        let tile_layout = crate::tiles::TileLayout { format: GRADIENT_FORMAT, texels: TILE_CELLS + 1 };
+        Ok(Self {
+            mesh: MeshBuffers::new(device),
+            morph: Morph::new(device),
+            walls: None,
+            tiles: TilePool::new(
+                device,
+                Pyramid::over(terrain.samples),
+                tile_layout,
+                options.tile_budget_bytes,
+            ),
+            wanted: WantedTiles::default(),
+            modules: Modules::new(device, &layout),
+            layout,
+            pipelines: HashMap::new(),
+            attachments: None,
+            uniforms: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("uniforms"),
+                size: uniform_stride * UNIFORM_PLACES,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            uniform_stride,
+            next_place: 0,
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("smooth"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            }),
+            ramp: None,
+            bind_group: None,
+            timer: if options.timestamps { GpuTimer::new(device, queue) } else { None },
+            near_m: near_m(&terrain),
+            multi_draw: options.multi_draw,
+            device: device.clone(),
+            queue: queue.clone(),
+            terrain,
+        })
+    }
+
+    /// Records the changes of the mesh into `encoder`, before the frame that shows them. Bytes sent follow the
+    /// patch, not the mesh.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::TooLarge`], [`RenderError::RangeOutside`]; the mesh is then unchanged.
+    pub fn apply(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        patch: &MeshPatch<'_>,
+    ) -> Result<UploadStats> {
+        self.mesh.apply(&self.device, encoder, patch)
+    }
+
+    /// Replaces the walls along the terrain's edge: pairs of vertex slots along its border, from which walls go down to
+    /// `bottom_m` (metres before exaggeration). They move with the mesh, so they never gape. None by default.
+    pub fn set_walls(&mut self, edges: &[[u32; 2]], bottom_m: f32) {
+        self.walls = (!edges.is_empty()).then(|| Walls {
+            edges: self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("walls"),
+                contents: bytemuck::cast_slice(edges),
+                usage: wgpu::BufferUsages::VERTEX,
+            }),
+            count: edges.len() as u32,
+            bottom_m,
+        });
+    }
+
+    /// Records the frame into `encoder`: clears the target, draws ground, walls and sky. What the caller records after
+    /// it, such as an overlay, comes on top. At most 16 frames may lie in one submission.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Usage`] for a view that is none.
+    pub fn render(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: Target<'_>,
+        frame: Frame<'_>,
+    ) -> Result<DrawStats> {
+        let refined_for = frame.refined_for.unwrap_or(frame.view);
+        frame.view.check()?;
+        refined_for.check()?;
+        if target.size_px.contains(&0) {
+            return Err(RenderError::Usage("a target needs at least one pixel"));
+        }
+        let variant = Variant::of(frame.look, target.format);
+        let samples = variant.samples;
+        let key = Key { size_px: target.size_px, format: target.format, samples };
+        self.attachments = Some(Attachments::keep_or_make(self.attachments.take(), &self.device, key));
+        self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(&self.device, &self.modules, variant));
+        self.set_ramp(frame.look.ramp);
+        self.bind();
+
+        let uniforms = Uniforms::new(&Inputs {
+            terrain: &self.terrain,
+            pyramid: &self.tiles.pyramid,
+            view: frame.view,
+            refined_for,
+            look: frame.look,
+            wall_bottom_m: self.walls.as_ref().map_or(0.0, |w| w.bottom_m),
+        });
+        let place = self.uniform_stride * self.next_place;
+        self.next_place = (self.next_place + 1) % UNIFORM_PLACES;
+        self.queue.write_buffer(&self.uniforms, place, bytemuck::bytes_of(&uniforms));
+
+        let own_vertices = frame.look.needs_own_vertices();
+        let ranges = &self.mesh.draws.ranges;
+        let arguments = (self.multi_draw && !own_vertices && ranges.len() >= INDIRECT_FROM).then(|| {
+            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("draws"),
+                contents: bytemuck::cast_slice(&self.mesh.draws.indirect_words()),
+                usage: wgpu::BufferUsages::INDIRECT,
+            })
+        });
+        let mut stats = DrawStats {
+            triangles: self.mesh.draws.triangles(),
+            ranges: ranges.len() as u32,
+            draw_calls: 0,
+            bytes: size_of::<Uniforms>() as u64 + arguments.as_ref().map_or(0, wgpu::Buffer::size),
+        };
+
+        let (Some(attachments), Some((_, group)), Some(pipelines)) =
+            (&self.attachments, &self.bind_group, self.pipelines.get(&variant))
+        else {
+            return Err(RenderError::Usage("a frame was begun without its parts"));
+        };
+        let timed = self.timer.as_ref().and_then(|t| t.begin().map(|place| (t, place)));
+        if frame.look.morph {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("morph"),
+                timestamp_writes: timed.map(|(timer, place)| timer.begins_with_compute(place)),
+            });
+            self.morph.record(&mut pass, self.mesh.vertex_slots, place as u32);
+        }
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("terrain"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: attachments.samples.as_ref().unwrap_or(target.view),
+                depth_slice: None,
+                resolve_target: attachments.samples.as_ref().map(|_| target.view),
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: if samples == 1 { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard },
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &attachments.depth_view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: if samples == 1 { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard },
+                }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: timed.map(|(timer, place)| timer.ends_with_render(place, !frame.look.morph)),
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        pass.set_bind_group(0, group, &[place as u32]);
+        if own_vertices {
+            pass.set_pipeline(&pipelines.own);
+            for Range { start, end } in ranges {
+                pass.draw(3 * start..3 * end, 0..1);
+                stats.draw_calls += 1;
+            }
+        } else {
+            pass.set_pipeline(&pipelines.shared);
+            pass.set_index_buffer(self.mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+            if let Some(arguments) = &arguments {
+                pass.multi_draw_indexed_indirect(arguments, 0, ranges.len() as u32);
+                stats.draw_calls += 1;
+            } else {
+                for Range { start, end } in ranges {
+                    pass.draw_indexed(3 * start..3 * end, 0, 0..1);
+                    stats.draw_calls += 1;
+                }
+            }
+        }
+        if let Some(walls) = &self.walls {
+            pass.set_pipeline(&pipelines.wall);
+            pass.set_vertex_buffer(0, walls.edges.slice(..));
+            pass.draw(0..6, 0..walls.count);
+            stats.draw_calls += 1;
+        }
+        pass.set_pipeline(&pipelines.sky);
+        pass.draw(0..3, 0..1);
+        stats.draw_calls += 1;
+        drop(pass);
+        if let Some((timer, place)) = timed {
+            timer.end(place, encoder);
+        }
+        Ok(stats)
+    }
+
+    /// Finds out which normal tiles a view wants and returns those that are not on the device, most urgent first, at most
+    /// `most`. To be called once a frame; tiles not wanted for longest make room for new ones.
+    pub fn want_tiles(&mut self, view: &FrameView, most: usize) -> &[TileId] {
+        let wanted = self.wanted.find(&self.tiles.pyramid, &self.terrain, view);
+        self.tiles.residency.want(wanted);
+        let missing = self.tiles.residency.missing();
+        &missing[..missing.len().min(most)]
+    }
+
+    /// Gives a tile by its heights, [`crate::HEIGHTS_PER_TILE`] of them as [`pack_gradients`] wants them. Returns the bytes sent; none where
+    /// all room is taken by tiles of the current view.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::TileSize`], [`RenderError::NoSuchTile`].
+    pub fn give_tile(&mut self, tile: TileId, heights_m: &[f32]) -> Result<u64> {
+        let bytes = pack_gradients(&self.terrain, tile, heights_m)?;
+        self.tiles.upload(&self.queue, tile, &bytes)
+    }
+
+    /// Gives a tile as [`pack_gradients`] made it, on another thread perhaps.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::TileSize`], [`RenderError::NoSuchTile`].
+    pub fn give_packed_tile(&mut self, tile: TileId, bytes: &[u8]) -> Result<u64> {
+        self.tiles.upload(&self.queue, tile, bytes)
+    }
+
+    /// Forgets a tile whose heights changed; it will be wanted again.
+    pub fn forget_tile(&mut self, tile: TileId) {
+        self.tiles.forget(&self.queue, tile);
+    }
+
+    /// All tiles there are.
+    pub fn pyramid(&self) -> &Pyramid {
+        &self.tiles.pyramid
+    }
+
+    /// What the tiles did.
+    pub fn tile_stats(&self) -> TileStats {
+        self.tiles.stats()
+    }
+
+    /// The terrain it was made for.
+    pub fn terrain(&self) -> &TerrainShape {
+        &self.terrain
+    }
+
+    /// Device memory held in buffers and tiles, bytes; targets apart.
+    pub fn device_bytes(&self) -> u64 {
+        self.mesh.device_bytes()
+            + self.morph.device_bytes()
+            + self.tiles.device_bytes()
+            + self.uniforms.size()
+    }
+
+    /// Time the device took for the newest frame that is known, milliseconds. To be called after submission. None where the device or the
+    /// options say no, or nothing is known yet.
+    pub fn gpu_time_ms(&mut self) -> Option<f64> {
+        self.timer.as_mut().and_then(|timer| timer.collect_ms(&self.device))
+    }
+
+    /// Depth of the last frame and its near plane in metres: a texel d is `near / d` metres along the line of sight, 0
+    /// is sky. None before the first frame and with smoothed edges.
+    pub fn depth(&self) -> Option<(&wgpu::Texture, f64)> {
+        let depth = &self.attachments.as_ref()?.depth;
+        (depth.sample_count() == 1).then_some((depth, self.near_m))
+    }
+
+    fn set_ramp(&mut self, ramp: &'static Ramp) {
+        if self.ramp.as_ref().is_some_and(|(is, _)| std::ptr::eq(*is, ramp)) {
+            return;
+        }
+        let texture = self.device.create_texture_with_data(
+            &self.queue,
+            &wgpu::TextureDescriptor {
+                label: Some("ramp"),
+                size: wgpu::Extent3d { width: RAMP_TEXELS, height: 1, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba32Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            },
+            wgpu::util::TextureDataOrder::LayerMajor,
+            bytemuck::cast_slice(ramp.linear(RAMP_TEXELS as usize).as_flattened()),
+        );
+        self.ramp = Some((ramp, texture.create_view(&Default::default())));
+        self.bind_group = None;
+    }
+
+    fn bind(&mut self) {
+        let generation = self.mesh.generation;
+        let Some((_, ramp)) = &self.ramp else { return };
+        if self.bind_group.as_ref().is_some_and(|(made_for, _)| *made_for == generation) {
+            return;
+        }
+        let uniform = wgpu::BufferBinding {
+            buffer: &self.uniforms,
+            offset: 0,
+            size: wgpu::BufferSize::new(size_of::<Uniforms>() as u64),
+        };
+        self.morph.fit(&self.device, &self.mesh, uniform.clone());
+        let resources = [
+            wgpu::BindingResource::Buffer(uniform),
+            self.mesh.vertices.as_entire_binding(),
+            self.mesh.indices.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&self.tiles.page_table_view),
+            wgpu::BindingResource::TextureView(&self.tiles.view),
+            wgpu::BindingResource::Sampler(&self.sampler),
+            wgpu::BindingResource::TextureView(ramp),
+            self.morph.moved_heights().as_entire_binding(),
+        ];
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("frame"),
+            layout: &self.layout,
+            entries: &entries,
+        });
+        self.bind_group = Some((generation, group));
+    }
+}

@@ -1,0 +1,87 @@
+// What the ground looks like: bare colour, light, lines, air.
+
+@group(0) @binding(6) var ramp: texture_2d<f32>;
+
+const PLAIN: u32 = 1u;
+const SLOPE: u32 = 2u;
+const LEVEL: u32 = 3u;
+const SCREEN_ERROR: u32 = 4u;
+
+struct Ground {
+    // Metres from the eye, as drawn.
+    from_eye_m: vec3<f32>,
+    // Samples from the eye's cell.
+    cells: vec2<f32>,
+    // Height before exaggeration.
+    height_m: f32,
+    // How the height changes from pixel to pixel.
+    height_step_m: f32,
+    // Upward unit normal of the drawn triangle.
+    facet: vec3<f32>,
+    // Level and screen error over tolerance of the finest corner, for the views that show them.
+    level: f32,
+    demand: f32,
+    // Nearness to an edge of the triangle, 1 on it.
+    edge: f32,
+}
+
+fn ramp_at(t: f32) -> vec3<f32> {
+    return textureLoad(ramp, vec2(i32(clamp(t, 0.0, 1.0) * 1023.0 + 0.5), 0), 0).rgb;
+}
+
+fn hue(t: f32) -> vec3<f32> {
+    return 0.5 + 0.5 * cos(2.0 * PI * (t + vec3(0.0, 0.33, 0.67)));
+}
+
+fn bare_colour(g: Ground, normal: vec3<f32>) -> vec3<f32> {
+    if SURFACE == PLAIN {
+        return vec3(0.52, 0.51, 0.49);
+    }
+    if SURFACE == SLOPE {
+        return ramp_at(acos(clamp(normal.z, -1.0, 1.0)) / (PI / 3.0));
+    }
+    if SURFACE == LEVEL {
+        // Neighbouring levels are far apart on the circle of hues, by the golden ratio.
+        return 0.16 + 0.6 * hue(g.level * 0.382);
+    }
+    if SURFACE == SCREEN_ERROR {
+        return ramp_at(0.25 * g.demand);
+    }
+    let tint = ramp_at((g.height_m - frame.tint.x) * frame.tint.y);
+    // Rock shows where nothing holds on; a share of the tint stays so that bands remain readable.
+    let steep = smoothstep(frame.tint.z, frame.tint.z + 0.28, 1.0 - normal.z);
+    return mix(tint, mix(frame.rock.rgb, tint, 0.25), steep * frame.tint.w);
+}
+
+fn lit(colour: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    let direct = max(dot(normal, frame.sun.xyz), 0.0) * frame.sun.w * clamp(frame.sun.z * 12.0 + 0.6, 0.0, 1.0);
+    // The upper half of the sky lights more than the horizon, and the ground opposite sends a little back.
+    let open = 0.5 + 0.5 * normal.z;
+    let bounce = (1.0 - open) * 0.35 * vec3(1.0, 0.9, 0.75);
+    let light = direct * frame.sun_colour.rgb + frame.ambient.rgb * (open * open + bounce);
+    return colour * mix(vec3(1.0), light, frame.ambient.w);
+}
+
+// Coverage of the nearest line among multiples of `interval`, fading where lines would run together.
+fn line(height_m: f32, step_m: f32, interval_m: f32, width_px: f32) -> f32 {
+    let in_intervals = height_m / interval_m;
+    let away_px = abs(fract(in_intervals + 0.5) - 0.5) * interval_m / max(step_m, 1e-9);
+    let crowded = smoothstep(0.12, 0.45, step_m * width_px / interval_m);
+    return clamp(0.5 * width_px + 0.5 - away_px, 0.0, 1.0) * (1.0 - crowded);
+}
+
+fn ground(g: Ground, at: vec2<f32>) -> vec4<f32> {
+    let slopes = slopes_at(g.cells, g.from_eye_m);
+    let drape = normalize(vec3(-slopes.xy * frame.height.z, 1.0));
+    let normal = select(g.facet, drape, slopes.z > 0.5);
+    var colour = bare_colour(g, normal);
+    if CONTOURS {
+        let plain = line(g.height_m, g.height_step_m, frame.contour.x, frame.contour.z);
+        let index = line(g.height_m, g.height_step_m, frame.contour.x * frame.contour.y, 2.0 * frame.contour.z);
+        colour = mix(colour, frame.contour_colour.rgb, max(0.7 * plain, index) * frame.contour.w);
+    }
+    colour = lit(colour, normal);
+    colour = mix(colour, frame.wire_colour.rgb, g.edge * frame.wire.y);
+    let distance_m = length(g.from_eye_m);
+    return to_target(through_air(colour, g.from_eye_m / max(distance_m, 1e-6), distance_m), at);
+}

@@ -1,0 +1,52 @@
+// The finest resident tile at a place that is not finer than needed, found through the page table.
+
+@group(0) @binding(3) var page_table: texture_2d<u32>;
+@group(0) @binding(4) var tile_layers: texture_2d_array<f32>;
+@group(0) @binding(5) var smooth_sampler: sampler;
+
+// Level at which a cell covers about a pixel; wanted.rs computes the same.
+fn needed_level(from_eye_m: vec3<f32>) -> f32 {
+    let distance_m = max(length(from_eye_m), 1e-6);
+    let steepness = clamp(abs(from_eye_m.z) / distance_m, 0.15, 1.0);
+    let sample_m = sqrt(frame.spacing.x * frame.spacing.y);
+    return log2(distance_m / (frame.lod_more.z * sample_m * sqrt(steepness)));
+}
+
+// Slopes east and north, and 1 if a tile was found.
+fn tile_at(cell: vec2<i32>, last_inside: vec2<i32>, within: vec2<f32>, from_level: u32) -> vec3<f32> {
+    for (var level = from_level; level < frame.tiles.x; level++) {
+        let shift = frame.tiles.y + level;
+        // The last sample belongs to the last tile; its neighbours beyond do not exist.
+        let tile = min(cell, last_inside) >> vec2(shift);
+        // A signed level: OpenGL takes no other.
+        let entry = textureLoad(page_table, tile, i32(level)).r;
+        if entry != 0u {
+            let samples = vec2<f32>(cell - (tile << vec2(shift))) + within;
+            let texel = samples * exp2(-f32(level)) + 0.5;
+            let at = texel / f32(frame.tiles.z);
+            return vec3(textureSampleLevel(tile_layers, smooth_sampler, at, entry - 1u, 0.0).rg, 1.0);
+        }
+    }
+    return vec3(0.0);
+}
+
+// Slopes at a place given in samples from the eye's cell.
+fn slopes_at(cells: vec2<f32>, from_eye_m: vec3<f32>) -> vec3<f32> {
+    if !TILES {
+        return vec3(0.0);
+    }
+    let last = vec2<i32>(frame.terrain.xy) - 1;
+    let whole = floor(cells);
+    let unclamped = frame.grid.xy + vec2<i32>(whole);
+    let cell = clamp(unclamped, vec2(0), last);
+    let within = select(cells - whole, vec2(0.0), (unclamped != cell) | (cell == last));
+    let level = clamp(needed_level(from_eye_m), 0.0, f32(frame.tiles.x - 1u));
+    var slopes = tile_at(cell, last - 1, within, u32(level));
+    // The last third of a level passes into the next. A loop, not a branch: software drivers leave a loop that no pixel
+    // needs, but run both sides of a branch.
+    let blend = smoothstep(0.67, 1.0, fract(level));
+    for (var i = 0; i < i32(ceil(blend)); i++) {
+        slopes = mix(slopes, tile_at(cell, last - 1, within, min(u32(level) + 1u, frame.tiles.x - 1u)), blend);
+    }
+    return slopes;
+}

@@ -1,0 +1,211 @@
+//! Layers of an array texture, and the page table that says what is in them.
+//!
+//! Knows bytes a texel block, not their meaning. An upload is one texture write and one or two texels of the
+//! page table; nothing else moves.
+
+use super::{Pyramid, Residency, TileId};
+use crate::error::{RenderError, Result};
+
+/// How a content kind is laid out in a layer.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TileLayout {
+    pub format: wgpu::TextureFormat,
+    /// Texels a side of a layer.
+    pub texels: u32,
+}
+
+impl TileLayout {
+    /// Bytes of one layer: whole blocks.
+    pub(crate) fn layer_bytes(&self) -> u64 {
+        u64::from(self.row_bytes()) * u64::from(self.texels.div_ceil(self.format.block_dimensions().1))
+    }
+
+    fn row_bytes(&self) -> u32 {
+        self.texels.div_ceil(self.format.block_dimensions().0)
+            * self.format.block_copy_size(None).unwrap_or(0)
+    }
+}
+
+/// What the tiles did.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct TileStats {
+    /// Tiles on the device.
+    pub resident: u32,
+    /// Tiles there is room for.
+    pub capacity: u32,
+    /// Tiles the last view wanted and lacks.
+    pub missing: u32,
+    /// Tiles uploaded since the renderer was made.
+    pub uploads: u64,
+    /// Their bytes.
+    pub uploaded_bytes: u64,
+    /// Tiles that made room for others.
+    pub evictions: u64,
+    /// Tiles that came when they were no longer wanted and found no room.
+    pub dropped: u64,
+}
+
+/// An entry of the page table: the layer of a tile and 1, or 0 where there is none. A level of the pyramid is a mip level.
+const PAGE_TABLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+
+/// Tiles on the device.
+#[derive(Debug)]
+pub(crate) struct TilePool {
+    pub pyramid: Pyramid,
+    pub residency: Residency,
+    pub view: wgpu::TextureView,
+    pub page_table_view: wgpu::TextureView,
+    page_table: wgpu::Texture,
+    texture: wgpu::Texture,
+    layout: TileLayout,
+    stats: TileStats,
+}
+
+impl TilePool {
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        pyramid: Pyramid,
+        layout: TileLayout,
+        budget_bytes: u64,
+    ) -> Self {
+        let limits = device.limits();
+        let most = u64::from(limits.max_texture_array_layers.saturating_sub(1)).min(pyramid.len() as u64);
+        let capacity = (budget_bytes / layout.layer_bytes().max(1)).clamp(1, most) as u32;
+        // OpenGL takes one layer for no array, and a multiple of six for cubes.
+        let layers = if capacity == 1 || capacity.is_multiple_of(6) { capacity + 1 } else { capacity };
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("tiles"),
+            size: wgpu::Extent3d {
+                width: layout.texels,
+                height: layout.texels,
+                depth_or_array_layers: layers,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: layout.format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
+        // A mip level for each of the pyramid's: powers of two halve evenly, and are at least the tiles across.
+        let [width, height] = pyramid.across(0).map(u32::next_power_of_two);
+        let page_table = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("page table"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: pyramid.levels(),
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: PAGE_TABLE_FORMAT,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        Self {
+            residency: Residency::new(&pyramid, capacity),
+            pyramid,
+            view,
+            page_table_view: page_table.create_view(&Default::default()),
+            page_table,
+            texture,
+            layout,
+            stats: TileStats::default(),
+        }
+    }
+
+    /// Puts a tile on the device. Returns the bytes sent: none where no layer was free for it.
+    pub(crate) fn upload(&mut self, queue: &wgpu::Queue, tile: TileId, bytes: &[u8]) -> Result<u64> {
+        if !self.pyramid.contains(tile) {
+            return Err(RenderError::NoSuchTile { tile: tile.to_string() });
+        }
+        let expected = self.layout.layer_bytes() as usize;
+        if bytes.len() != expected {
+            return Err(RenderError::TileSize { tile: tile.to_string(), expected, got: bytes.len() });
+        }
+        let Some(place) = self.residency.insert(tile) else {
+            self.stats.dropped += 1;
+            return Ok(0);
+        };
+        queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &self.texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: 0, z: place.layer },
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytes,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(self.layout.row_bytes()),
+                rows_per_image: None,
+            },
+            wgpu::Extent3d {
+                width: self.layout.texels,
+                height: self.layout.texels,
+                depth_or_array_layers: 1,
+            },
+        );
+        let mut sent = bytes.len() as u64;
+        if let Some(gone) = place.evicted {
+            self.stats.evictions += 1;
+            sent += self.set_entry(queue, gone, 0);
+        }
+        sent += self.set_entry(queue, tile, place.layer + 1);
+        self.stats.uploads += 1;
+        self.stats.uploaded_bytes += sent;
+        Ok(sent)
+    }
+
+    /// Forgets a tile whose content changed.
+    pub(crate) fn forget(&mut self, queue: &wgpu::Queue, tile: TileId) {
+        if self.pyramid.contains(tile) && self.residency.forget(tile) {
+            self.set_entry(queue, tile, 0);
+        }
+    }
+
+    fn set_entry(&self, queue: &wgpu::Queue, tile: TileId, value: u32) -> u64 {
+        queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &self.page_table,
+                mip_level: tile.level,
+                origin: wgpu::Origin3d { x: tile.x, y: tile.y, z: 0 },
+                aspect: wgpu::TextureAspect::All,
+            },
+            &value.to_le_bytes(),
+            wgpu::TexelCopyBufferLayout::default(),
+            wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        );
+        4
+    }
+
+    pub(crate) fn stats(&self) -> TileStats {
+        TileStats {
+            resident: self.residency.resident(),
+            capacity: self.residency.capacity(),
+            missing: self.residency.missing().len() as u32,
+            ..self.stats
+        }
+    }
+
+    /// Bytes of device memory held.
+    pub(crate) fn device_bytes(&self) -> u64 {
+        self.layout.layer_bytes() * u64::from(self.texture.depth_or_array_layers())
+            + 4 * self.pyramid.len() as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Layers of whole blocks, for pixels one by one and for blocks of four by four.
+    #[test]
+    fn layers_hold_whole_blocks() {
+        let layout = |format, texels| TileLayout { format, texels };
+        assert_eq!(layout(wgpu::TextureFormat::Rg16Float, 129).layer_bytes(), 129 * 129 * 4);
+        assert_eq!(layout(wgpu::TextureFormat::Rgba8UnormSrgb, 132).layer_bytes(), 132 * 132 * 4);
+        assert_eq!(layout(wgpu::TextureFormat::Bc1RgbaUnormSrgb, 132).layer_bytes(), 33 * 33 * 8);
+    }
+}

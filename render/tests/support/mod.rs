@@ -1,0 +1,7 @@
+//! What the tests share.
+
+pub mod landscape;
+pub mod picture;
+pub mod refiner;
+pub mod scene;
+pub mod stream;
