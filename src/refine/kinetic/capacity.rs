@@ -1,7 +1,7 @@
 //! How arrays grow and lists shrink, so that what is held follows the mesh and not the largest frame ever.
 
 /// Lists below this many bytes are left as they are.
-const SMALL_BYTES: usize = 256 << 10;
+const SMALL_BYTES: usize = 32 << 10;
 /// A list is cut down when a frame uses less than one part in so many of it.
 const UNUSED: usize = 32;
 

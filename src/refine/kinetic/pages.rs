@@ -62,8 +62,10 @@ pub(super) struct Pages {
     pages: Vec<Page>,
     /// Bounds of each page.
     bounds: Vec<Bounds>,
-    /// Packed: pages with room, newest last; near: empty pages. May hold others as well.
-    open: Vec<u32>,
+    /// Packed: no page before this one has room.
+    first_open: usize,
+    /// Near: empty pages. May hold others as well.
+    empty: Vec<u32>,
     /// Pages with slots that have changed.
     written: Vec<u32>,
     taken: usize,
@@ -75,7 +77,8 @@ impl Pages {
             dealing,
             pages: Vec::new(),
             bounds: Vec::new(),
-            open: Vec::new(),
+            first_open: 0,
+            empty: Vec::new(),
             written: Vec::new(),
             taken: 0,
         }
@@ -85,7 +88,7 @@ impl Pages {
     pub(super) fn bytes(&self) -> usize {
         self.pages.capacity() * size_of::<Page>()
             + self.bounds.capacity() * size_of::<Bounds>()
-            + (self.open.capacity() + self.written.capacity()) * size_of::<u32>()
+            + (self.empty.capacity() + self.written.capacity()) * size_of::<u32>()
     }
 
     /// Places in all pages.
@@ -104,34 +107,27 @@ impl Pages {
             Dealing::Packed => self.page_with_room(),
             Dealing::Near => self.page_near(beside as usize / PAGE),
         };
+        self.take_in(page)
+    }
+
+    /// Takes a place in the page of the place `beside`, if it has room and is not page `other`.
+    pub(super) fn take_in_page_of(&mut self, beside: u32, other: usize) -> Option<u32> {
+        let page = beside as usize / PAGE;
+        (page != other && self.pages.get(page)?.taken != u128::MAX).then(|| self.take_in(page))
+    }
+
+    fn take_in(&mut self, page: usize) -> u32 {
         let place = (!self.pages[page].taken).trailing_zeros();
         self.pages[page].taken |= 1 << place;
         self.taken += 1;
         (page * PAGE) as u32 + place
     }
 
-    /// Takes the place `place`. If somebody is there, takes another place for him and returns it.
-    pub(super) fn clear(&mut self, place: u32) -> Option<u32> {
-        let (page, bit) = (place as usize / PAGE, 1 << (place as usize % PAGE));
-        if self.pages[page].taken & bit == 0 {
-            self.pages[page].taken |= bit;
-            self.taken += 1;
-            return None;
-        }
-        // Moving him gives the place back, so it is taken twice over until then: once for him, once for who comes.
-        Some(self.take(place))
-    }
-
+    /// The first page with room.
     fn page_with_room(&mut self) -> usize {
-        while let Some(page) = self.open.last() {
-            if self.pages[*page as usize].taken != u128::MAX {
-                return *page as usize;
-            }
-            self.open.pop();
-        }
-        let page = self.new_page();
-        self.open.push(page as u32);
-        page
+        let full = self.pages[self.first_open..].iter().take_while(|page| page.taken == u128::MAX).count();
+        self.first_open += full;
+        if self.first_open == self.pages.len() { self.new_page() } else { self.first_open }
     }
 
     fn page_near(&mut self, page: usize) -> usize {
@@ -153,8 +149,8 @@ impl Pages {
     }
 
     fn empty_page(&mut self) -> usize {
-        while let Some(page) = self.open.pop() {
-            if self.pages[page as usize].taken == 0 {
+        while let Some(page) = self.empty.pop() {
+            if self.pages.get(page as usize).is_some_and(|page| page.taken == 0) {
                 return page as usize;
             }
         }
@@ -171,17 +167,28 @@ impl Pages {
     pub(super) fn give_back(&mut self, place: u32) {
         let index = place as usize / PAGE;
         let page = &mut self.pages[index];
-        let was_full = page.taken == u128::MAX;
         page.taken &= !(1 << (place as usize % PAGE));
         self.taken -= 1;
         if page.taken == 0 {
             page.use_count = page.use_count.wrapping_add(1);
             self.bounds[index] = Bounds::EMPTY;
         }
-        if (self.dealing == Dealing::Packed && was_full) || (self.dealing == Dealing::Near && page.taken == 0)
-        {
-            self.open.push(index as u32);
+        if self.dealing == Dealing::Packed {
+            self.first_open = self.first_open.min(index);
+        } else if page.taken == 0 {
+            self.empty.push(index as u32);
         }
+    }
+
+    /// Gives up empty pages at the end whose slots have been told; whether there were any.
+    pub(super) fn give_up_empty_end(&mut self) -> bool {
+        let before = self.pages.len();
+        while self.pages.last().is_some_and(|page| page.taken == 0 && page.written == [0; 2]) {
+            self.pages.pop();
+            self.bounds.pop();
+        }
+        self.first_open = self.first_open.min(self.pages.len());
+        self.pages.len() < before
     }
 
     /// Notes that the slot of a place's side shows something else now.

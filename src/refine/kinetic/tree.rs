@@ -58,7 +58,7 @@ impl<C: RecordCodec> Kinetic<'_, C> {
 
     /// Widens the bounds of a node's page to contain vertices.
     #[inline(always)]
-    fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
+    pub(super) fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
         if self.nodes.pages.has_bounds() {
             let places = vertices.map(|v| self.place_of(v));
             self.nodes.pages.cover(node, &places);
