@@ -267,8 +267,8 @@ mod tests {
         #[test]
         fn a_live_word_is_a_true_word(
             course in direction(), speed in 0.01f64..80.0,
-            away in direction(), distance in 1.0f64..20_000.0,
-            closeness in 0.2f64..2.0, radius in 0.0f64..300.0,
+            away in direction(), distance in (0.0f64..10.0).prop_map(f64::exp), edge in prop::option::weighted(0.7, (-1.3f64..1.3, -1.3f64..1.3)),
+            closeness in prop_oneof![0.2f64..2.0, 2.0f64..20.0], radius in 0.0f64..300.0,
             steps in prop::collection::vec((direction(), 0.0f64..0.5, -0.01f64..0.01, 0.98f64..1.02, 0.99f64..1.01), 1..80),
             turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in -0.01f64..0.02,
         ) {
@@ -279,8 +279,14 @@ mod tests {
             }
             let mut metric = Metric::new(&now);
             clocks.move_to(pose(&metric, &now));
+            // Where vertices enter and leave the view, or anywhere.
+            let away = edge.map_or(away, |(x, y)| {
+                let [right, up, forward] = now.axes();
+                (forward + 0.42 * (4.0 / 3.0 * x * right + y * up)).normalize()
+            });
             let at = now.eye_m + away * distance;
             // An error that puts the vertex near the boundary of selection.
+            let radius = radius.min(0.5 * distance);
             let error_m = ((distance * closeness - radius) / metric.nu()).max(0.0);
             let vertex = Vertex { height_m: at.z.clamp(-3000.0, 3000.0), error_m, radius_m: radius, class: VertexClass::Plain };
             let sight = |metric: &Metric| metric.sight([at.x, at.y], &vertex);
