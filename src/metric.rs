@@ -177,11 +177,10 @@ impl Sighting {
         self.radius_m
     }
 
-    /// The error of a vertex as it may show on the screen, in pixels: infinite for an eye inside its sphere. `tolerance_px` is the metric's.
-    pub fn error_px(&self, tolerance_px: f64) -> f64 {
-        let clear_m = self.distance_m() - self.radius_m;
-        let seen = if clear_m > 0.0 { (self.reach_m - self.radius_m) / clear_m } else { f64::INFINITY };
-        seen * tolerance_px
+    /// The error of a vertex as it may show on the screen, in pixels, seen from `nearest_m` at the least: inside the vertex's sphere the ground may be as near as
+    /// can be. `tolerance_px` is the metric's.
+    pub fn error_px(&self, tolerance_px: f64, nearest_m: f64) -> f64 {
+        (self.reach_m - self.radius_m) / (self.distance_m() - self.radius_m).max(nearest_m) * tolerance_px
     }
 
     /// A bound on twice the rounding error of the margins: a status cannot change while the exact margin exceeds it.

@@ -314,6 +314,8 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
 
     /// Counts what is late and how far the largest error of it exceeds the tolerance.
     fn assess_late(&mut self, metric: &Metric, view: &View) {
+        let [dx, dy] = self.records.grid().spacing_m();
+        let nearest_m = dx.min(dy);
         for node in
             self.late.iter().chain(self.to_split.iter().flatten()).filter(|node| self.nodes.is_live(**node))
         {
@@ -323,7 +325,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             let sighting = metric.sight(at_m, &vertex);
             let culled = self.culling == Culling::Vertices && metric.cull(&sighting, ALL_PLANES).is_none();
             if !self.nodes.is_split(*node) && sighting.is_selected() && !culled {
-                let error_px = sighting.error_px(view.tolerance_px);
+                let error_px = sighting.error_px(view.tolerance_px, nearest_m);
                 self.work.late_error_px = self.work.late_error_px.max(error_px);
             }
         }
