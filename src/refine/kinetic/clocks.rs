@@ -71,6 +71,8 @@ pub(super) struct Course {
     pub direction: DVec3,
     /// Unit vector it turns about, right-handed, or zero.
     pub axis: DVec3,
+    /// Radians it turns about the axis a metre of way, if it has both.
+    pub turn_per_m: f64,
 }
 
 /// How something has been going of late.
@@ -172,7 +174,9 @@ impl Clocks {
         let beyond = (u64::from(HORIZON) + 1) << self.shift;
         for course in 0..COURSES {
             let used_m = self.courses[course].used_m(step) + raised_m;
-            let used_rad = if turned { self.courses[course].used_rad(&last, &pose) } else { 0.0 };
+            let expects_turn = self.courses[course].turn_per_m > 0.0;
+            let used_rad =
+                if turned || expects_turn { self.courses[course].used_rad(&last, &pose) } else { 0.0 };
             for (kind, angle) in [(Kind::Error, zoomed), (Kind::Planes, zoomed + used_rad)] {
                 if used_m + angle == 0.0 {
                     continue;
@@ -191,7 +195,7 @@ impl Clocks {
         self.way.follow(step, current.used_m(step));
         self.turn.follow(last.turn_to(&pose), current.used_rad(&last, &pose));
         if self.way.is_off() || self.turn.is_off() {
-            let next = Course { direction: self.way.direction(), axis: self.turn.direction() };
+            let next = Course::of(&self.way, &self.turn);
             // Once is enough where no better one is to be had.
             if (next.direction, next.axis) == (DVec3::ZERO, DVec3::ZERO) {
                 self.current = 0;
@@ -254,6 +258,13 @@ impl Clocks {
 }
 
 impl Course {
+    /// The course that goes on as it has been going.
+    fn of(way: &Trend, turn: &Trend) -> Self {
+        let (direction, axis) = (way.direction(), turn.direction());
+        let has_both = direction != DVec3::ZERO && axis != DVec3::ZERO;
+        Self { direction, axis, turn_per_m: if has_both { turn.length / way.length } else { 0.0 } }
+    }
+
     /// Metres that a step uses up.
     fn used_m(&self, step: DVec3) -> f64 {
         let along = step.dot(self.direction).max(0.0);
@@ -262,7 +273,11 @@ impl Course {
 
     /// Radians that a turn uses up: a bound on how far the planes' normals are from where the counted angle would take them.
     fn used_rad(&self, last: &Pose, pose: &Pose) -> f64 {
-        let about = last.turn_to(pose).dot(self.axis).clamp(0.0, 1.0).asin();
+        let about = if self.turn_per_m > 0.0 {
+            self.turn_per_m * (pose.eye_m - last.eye_m).dot(self.direction).max(0.0)
+        } else {
+            last.turn_to(pose).dot(self.axis).clamp(0.0, 1.0).asin()
+        };
         let expected = DQuat::from_axis_angle(if about > 0.0 { self.axis } else { DVec3::Z }, about);
         let off = |i: usize| (pose.normals[i] - expected * last.normals[i]).length();
         RATE * about + (0..4).map(off).fold(0.0, f64::max)
