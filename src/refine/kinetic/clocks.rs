@@ -31,9 +31,11 @@ pub(super) const HORIZON: u32 = (1 << (EXPIRY_BITS - 1)) - 1;
 /// Fixed-point units a metre.
 const UNITS_PER_M: f64 = (1u64 << 20) as f64;
 /// A course is left when more than this share of the recent way was counted.
-const LEAVE_RATE: f64 = 0.3;
+const LEAVE_RATE: f64 = 0.25;
 /// A course is taken only if the recent way leads this straight.
 const STRAIGHT: f64 = 0.9;
+/// How far ahead of a bend its course points.
+const LEAD_RAD: f64 = 0.12;
 /// Share of the newest frame in what "recent" means.
 const RECENT: f64 = 0.2;
 /// (e^x - 1) / x stays below this for x up to 1/2, which margins of at most half a band see to.
@@ -261,8 +263,12 @@ impl Course {
     /// The course that goes on as it has been going.
     fn of(way: &Trend, turn: &Trend) -> Self {
         let (direction, axis) = (way.direction(), turn.direction());
-        let has_both = direction != DVec3::ZERO && axis != DVec3::ZERO;
-        Self { direction, axis, turn_per_m: if has_both { turn.length / way.length } else { 0.0 } }
+        if direction == DVec3::ZERO || axis == DVec3::ZERO {
+            return Self { direction, axis, turn_per_m: 0.0 };
+        }
+        // Who turns flies a bend: straight ahead of where the trend, which lags behind, will have led in a while.
+        let lead = DQuat::from_axis_angle(axis, turn.length / RECENT + LEAD_RAD);
+        Self { direction: (lead * direction).normalize(), axis, turn_per_m: turn.length / way.length }
     }
 
     /// Metres that a step uses up.
