@@ -171,7 +171,7 @@ fn a_warm_frame_allocates_nothing() {
                     assert!(i == 0 || kinetic.work().tests > 0);
                 }
             };
-            (0..3).for_each(|_| round(&mut kinetic));
+            (0..8).for_each(|_| round(&mut kinetic));
             let counted = allocation_counter::measure(|| round(&mut kinetic));
             assert_eq!(counted.count_total, 0, "{culling:?}: {counted:?}");
         }

@@ -370,7 +370,11 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             .chain(&mut self.to_split)
             .chain(&mut self.to_merge)
             .for_each(|list| settle(list, used));
-        [&mut self.over, &mut self.waiting].into_iter().for_each(|list| settle(list, used));
+        settle(&mut self.over, used);
+        if made_anew {
+            // Filled whenever a course ends, however little else there is to do.
+            settle(&mut self.waiting, 0);
+        }
         settle(&mut self.verdicts, used);
         settle(&mut self.patch.vertices, used);
         settle(&mut self.patch.triangles, used);
