@@ -196,10 +196,14 @@ impl Clocks {
         let current = self.courses[self.current];
         self.way.follow(step, current.used_m(step));
         self.turn.follow(last.turn_to(&pose), current.used_rad(&last, &pose));
-        if self.way.is_off() || self.turn.is_off() {
-            let next = Course::of(&self.way, &self.turn);
-            // Once is enough where no better one is to be had.
-            if (next.direction, next.axis) == (DVec3::ZERO, DVec3::ZERO) {
+        let next = Course::of(&self.way, &self.turn);
+        // Whoever keeps no direction is on no course that could be better.
+        let changes =
+            |off: bool, current: DVec3, next: DVec3| off && (current != DVec3::ZERO || next != DVec3::ZERO);
+        if changes(self.way.is_off(), current.direction, next.direction)
+            || changes(self.turn.is_off(), current.axis, next.axis)
+        {
+            if next.direction == DVec3::ZERO && next.axis == DVec3::ZERO {
                 self.current = 0;
             } else {
                 moved.next_course = Some((self.newest % (COURSES - 1) + 1, next));
