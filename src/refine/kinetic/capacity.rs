@@ -15,6 +15,6 @@ pub(super) fn grow<T>(array: &mut Vec<T>, more: usize) {
 /// Gives back most of a list's memory if a frame that used `used` of it has no need of it: after the first frame, or a jump.
 pub(super) fn settle<T>(list: &mut Vec<T>, used: usize) {
     if list.capacity() * size_of::<T>() > SMALL_BYTES && used < list.capacity() / UNUSED {
-        list.shrink_to(list.capacity() / 8);
+        list.shrink_to((4 * used).max(SMALL_BYTES / size_of::<T>()));
     }
 }

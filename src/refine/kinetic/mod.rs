@@ -363,7 +363,11 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
     fn settle(&mut self) {
         // A frame that made most of the mesh says nothing about the next ones.
         let made_anew = self.work.tests as usize > self.nodes.pages.taken() / 2;
-        let used = if made_anew { 0 } else { (self.work.tests + self.work.slots_written) as usize };
+        let used = if made_anew {
+            self.nodes.pages.taken() / 128
+        } else {
+            (self.work.tests + self.work.slots_written) as usize
+        };
         let lists = [&mut self.due, &mut self.late, &mut self.fresh, &mut self.list];
         lists
             .into_iter()
