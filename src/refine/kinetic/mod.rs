@@ -15,6 +15,7 @@
 //!
 //! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
 
+mod bounds;
 mod budget;
 mod capacity;
 mod certificate;
@@ -30,8 +31,8 @@ mod tree;
 mod vertices;
 mod whole;
 
+pub use bounds::Bounds;
 pub use budget::Budget;
-pub use pages::Bounds;
 pub use patch::{NO_LEVEL, Patch, PatchVertex};
 
 use super::{Culling, Engine, Phase, Probe, Work};
@@ -141,7 +142,7 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
     }
 
     /// Bounds and triangle slots of the clusters of the mesh. Bounds are kept with [`Culling::Clusters`] only; without it they are empty.
-    pub fn clusters(&self) -> impl Iterator<Item = (&Bounds, std::ops::Range<u32>)> {
+    pub fn clusters(&self) -> impl Iterator<Item = (Bounds, std::ops::Range<u32>)> {
         self.nodes.pages.clusters()
     }
 
@@ -350,13 +351,11 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         }
         self.stale = (self.stale + 1) % self.nodes.pages.len();
         self.tighten(self.stale);
-        let [dx, dy] = self.records.grid().spacing_m();
+        let grid = self.records.grid();
+        let [low, high] = self.records.height_range_m();
+        let largest = f64::from(grid.side_steps()).max(low.abs()).max(high.abs());
         let draws = &mut self.patch.draws;
-        for (bounds, range) in self.nodes.pages.clusters() {
-            if !metric.culls_box(bounds.least, bounds.largest, [dx, dy]) {
-                draws.push(range);
-            }
-        }
+        self.nodes.pages.cull(&metric.box_planes(grid.spacing_m(), largest), |range| draws.push(range));
     }
 
     /// Gives back what only a large frame before this one has needed.

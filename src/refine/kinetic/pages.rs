@@ -6,35 +6,14 @@
 //!
 //! Invariant: a page's bounds contain all triangles that its slots show. Cost: a few bit operations a node.
 
+use super::bounds::{Bounds, BoundsColumns};
+use crate::metric::{BoxPlane, PLANES};
 use std::ops::Range;
 
 /// Nodes of a page.
 pub(super) const PAGE: usize = 128;
 /// No page.
 const NONE: u32 = u32::MAX;
-
-/// A box around a cluster, in grid steps (padding folded) and metres of height.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds {
-    /// Least column, row and height.
-    pub least: [f32; 3],
-    /// Largest column, row and height.
-    pub largest: [f32; 3],
-}
-
-impl Bounds {
-    /// The box around nothing.
-    pub(super) const EMPTY: Self = Self { least: [f32::INFINITY; 3], largest: [f32::NEG_INFINITY; 3] };
-
-    /// Widens the box to contain a point.
-    #[inline(always)]
-    pub(super) fn include(&mut self, p: [f32; 3]) {
-        for (i, p) in p.into_iter().enumerate() {
-            self.least[i] = self.least[i].min(p);
-            self.largest[i] = self.largest[i].max(p);
-        }
-    }
-}
 
 #[derive(Debug, Clone, Copy)]
 struct Page {
@@ -61,7 +40,7 @@ pub(super) struct Pages {
     dealing: Dealing,
     pages: Vec<Page>,
     /// Bounds of each page.
-    bounds: Vec<Bounds>,
+    bounds: BoundsColumns,
     /// Packed: no page before this one has room.
     first_open: usize,
     /// Near: empty pages. May hold others as well.
@@ -76,7 +55,7 @@ impl Pages {
         Self {
             dealing,
             pages: Vec::new(),
-            bounds: Vec::new(),
+            bounds: BoundsColumns::default(),
             first_open: 0,
             empty: Vec::new(),
             written: Vec::new(),
@@ -87,7 +66,7 @@ impl Pages {
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
         self.pages.capacity() * size_of::<Page>()
-            + self.bounds.capacity() * size_of::<Bounds>()
+            + self.bounds.bytes()
             + (self.empty.capacity() + self.written.capacity()) * size_of::<u32>()
     }
 
@@ -159,7 +138,7 @@ impl Pages {
 
     fn new_page(&mut self) -> usize {
         self.pages.push(Page { taken: 0, written: [0; 2], spill: (NONE, 0), use_count: 0 });
-        self.bounds.push(Bounds::EMPTY);
+        self.bounds.push_empty();
         self.pages.len() - 1
     }
 
@@ -171,7 +150,7 @@ impl Pages {
         self.taken -= 1;
         if page.taken == 0 {
             page.use_count = page.use_count.wrapping_add(1);
-            self.bounds[index] = Bounds::EMPTY;
+            self.bounds.set(index, Bounds::EMPTY);
         }
         if self.dealing == Dealing::Packed {
             self.first_open = self.first_open.min(index);
@@ -233,13 +212,15 @@ impl Pages {
     /// Widens the bounds of a place's page.
     #[inline(always)]
     pub(super) fn cover(&mut self, place: u32, points: &[[f32; 3]]) {
-        let bounds = &mut self.bounds[place as usize / PAGE];
+        let page = place as usize / PAGE;
+        let mut bounds = self.bounds.get(page);
         points.iter().for_each(|p| bounds.include(*p));
+        self.bounds.set(page, bounds);
     }
 
     /// Sets the bounds of a page.
     pub(super) fn set_bounds(&mut self, page: usize, bounds: Bounds) {
-        self.bounds[page] = bounds;
+        self.bounds.set(page, bounds);
     }
 
     /// Number of pages.
@@ -260,13 +241,25 @@ impl Pages {
     }
 
     /// Bounds and triangle slots of every page that is in use.
-    pub(super) fn clusters(&self) -> impl Iterator<Item = (&Bounds, Range<u32>)> {
-        self.pages.iter().zip(&self.bounds).enumerate().filter(|(_, (page, _))| page.taken != 0).map(
-            |(index, (page, bounds))| {
-                let first = (index * PAGE) as u32;
-                let (from, to) = (page.taken.trailing_zeros(), PAGE as u32 - page.taken.leading_zeros());
-                (bounds, 2 * (first + from)..2 * (first + to))
-            },
-        )
+    pub(super) fn clusters(&self) -> impl Iterator<Item = (Bounds, Range<u32>)> {
+        let used = self.pages.iter().enumerate().filter(|(_, page)| page.taken != 0);
+        used.map(|(index, page)| (self.bounds.get(index), slots_of(index, page)))
     }
+
+    /// Calls `draw` with the triangle slots of every page that is in use and may be seen.
+    pub(super) fn cull(&mut self, planes: &[BoxPlane; PLANES], mut draw: impl FnMut(Range<u32>)) {
+        let is_seen = self.bounds.cull(planes);
+        for (index, page) in self.pages.iter().enumerate() {
+            if page.taken != 0 && is_seen(index) {
+                draw(slots_of(index, page));
+            }
+        }
+    }
+}
+
+/// The triangle slots from a page's first place taken to its last.
+fn slots_of(index: usize, page: &Page) -> Range<u32> {
+    let first = (index * PAGE) as u32;
+    let (from, to) = (page.taken.trailing_zeros(), PAGE as u32 - page.taken.leading_zeros());
+    2 * (first + from)..2 * (first + to)
 }

@@ -5,9 +5,9 @@
 //! [`Kinetic::fetch`] shortens by asking for a node's relatives some splits ahead.
 
 use super::Kinetic;
+use super::bounds::Bounds;
 use super::labels::{child_point, level_of};
 use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
-use super::pages::Bounds;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::slot_of;
 use terrasoar_layout::prefetch::prefetch;
