@@ -349,8 +349,10 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             self.patch.draws.push(0..2 * self.nodes.pages.places() as u32);
             return;
         }
-        self.stale = (self.stale + 1) % self.nodes.pages.len();
-        self.tighten(self.stale);
+        if self.work.merges > 0 {
+            self.stale = (self.stale + 1) % self.nodes.pages.len();
+            self.tighten(self.stale);
+        }
         let grid = self.records.grid();
         let [low, high] = self.records.height_range_m();
         let largest = f64::from(grid.side_steps()).max(low.abs()).max(high.abs());
