@@ -1,0 +1,106 @@
+//! Views that nobody has to think of: a whole terrain in the picture, from obliquely above.
+
+use glam::DVec3;
+use terrasoar::view::{View, Viewport};
+use terrasoar_layout::terrain::Terrain;
+
+/// Heading of the overview, degrees: the light comes from the left, as on maps.
+const YAW_DEG: f64 = 16.0;
+/// Its climb, degrees.
+const PITCH_DEG: f64 = -38.0;
+/// How much more room than the terrain needs.
+const MARGIN: f64 = 1.03;
+
+/// Vertical field of view where none is asked for, degrees.
+pub(crate) const FOV_DEG: f64 = 45.0;
+
+/// A view from `eye_m` with a heading and a climb in radians, at a tolerance of a pixel and true scale.
+pub(crate) fn view_from(
+    eye_m: DVec3,
+    [yaw_rad, pitch_rad]: [f64; 2],
+    fov_deg: f64,
+    viewport: Viewport,
+) -> View {
+    View {
+        eye_m,
+        yaw_rad,
+        pitch_rad,
+        roll_rad: 0.0,
+        vertical_fov_rad: fov_deg.to_radians(),
+        viewport,
+        tolerance_px: 1.0,
+        vertical_exaggeration: 1.0,
+    }
+}
+
+/// Middle of the terrain's box and half its extent, heights exaggerated, in metres.
+fn box_of(terrain: &Terrain, exaggeration: f64) -> [DVec3; 2] {
+    let [east_m, north_m] = terrain.grid().extent_m();
+    let [low_m, high_m] = terrain.header().height_range_m.map(|h| h * exaggeration);
+    let (low, high) = (DVec3::new(0.0, 0.0, low_m), DVec3::new(east_m, north_m, high_m));
+    [0.5 * (low + high), 0.5 * (high - low)]
+}
+
+/// Heading and climb in radians from a place to the terrain's middle.
+pub(crate) fn towards_middle(terrain: &Terrain, exaggeration: f64, eye_m: DVec3) -> [f64; 2] {
+    let [middle, _] = box_of(terrain, exaggeration);
+    let to = middle - eye_m;
+    [to.x.atan2(to.y), to.z.atan2(to.truncate().length())]
+}
+
+/// The nearest view in a fixed direction that has the terrain's whole box in the picture.
+pub(crate) fn overview(terrain: &Terrain, exaggeration: f64, fov_deg: f64, viewport: Viewport) -> View {
+    let angles = [YAW_DEG.to_radians(), PITCH_DEG.to_radians()];
+    let view = view_from(DVec3::ZERO, angles, fov_deg, viewport);
+    let [middle, half] = box_of(terrain, exaggeration);
+    let [right, up, forward] = view.axes();
+    let tan_y = (0.5 * view.vertical_fov_rad).tan();
+    let tan_x = tan_y * f64::from(viewport.width_px) / f64::from(viewport.height_px);
+    let corners =
+        (0..8).map(|i| half * DVec3::from([0, 1, 2].map(|bit| f64::from(i >> bit & 1) * 2.0 - 1.0)));
+    // A corner c is between two opposite planes from distance d and a step s aside if |c . axis - s| <= tan (d + c . forward). The least d and
+    // its s:
+    let between = |axis: DVec3, tan: f64| {
+        let reach = |sign: f64| {
+            corners
+                .clone()
+                .map(|c| sign * c.dot(axis) - tan * c.dot(forward))
+                .fold(f64::NEG_INFINITY, f64::max)
+        };
+        let [one, other] = [reach(1.0), reach(-1.0)];
+        [0.5 * (one + other) / tan, 0.5 * (one - other)]
+    };
+    let [[far_x, aside_x], [far_y, aside_y]] = [between(right, tan_x), between(up, tan_y)];
+    let eye_m = middle + right * aside_x + up * aside_y - forward * (MARGIN * far_x.max(far_y));
+    View { eye_m, vertical_exaggeration: exaggeration, ..view }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use terrasoar_layout::build::{BuildOptions, Silent, build};
+    use terrasoar_layout::dem::{MemoryDem, SampleType};
+
+    #[test]
+    fn the_whole_box_is_in_the_picture_and_fills_it_one_way() {
+        let dem = MemoryDem::from_fn([65, 33], SampleType::I16, |x, y| f64::from((x * 7) ^ (y * 5)));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("land.iqt");
+        build(&dem, &path, &BuildOptions { spacing_m: Some([30.0, 20.0]), ..Default::default() }, &Silent)
+            .unwrap();
+        let terrain = Terrain::open(&path).unwrap();
+        for (width_px, height_px) in [(1280, 720), (300, 900)] {
+            let view = overview(&terrain, 2.0, FOV_DEG, Viewport { width_px, height_px });
+            let [middle, half] = box_of(&terrain, 2.0);
+            let least = |n: DVec3| {
+                let corner =
+                    |i: u8| half * DVec3::from([0, 1, 2].map(|bit| f64::from(i >> bit & 1) * 2.0 - 1.0));
+                let beyond = |c: DVec3| n.dot(middle + c - view.eye_m);
+                (0..8).map(|i| -beyond(corner(i))).fold(f64::INFINITY, f64::min)
+            };
+            let room = view.side_normals().map(least);
+            assert!(room.iter().all(|r| *r > 0.0), "{room:?}");
+            assert!(room.iter().any(|r| *r < 0.06 * half.length()), "{room:?}");
+        }
+    }
+}
