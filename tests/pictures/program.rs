@@ -84,8 +84,9 @@ fn every_style(_: &Gpu) -> Outcome {
     keep("another sun", &["--sun", "90,10"])?;
     keep("lines", &["--contours", "20"])?;
     keep("exaggerated", &["--exaggeration", "2"])?;
-    keep("coarse", &["--tolerance-px", "30", "--style", "wireframe"])?;
-    keep("at rest", &["--tolerance-px", "30", "--style", "wireframe", "--morph", "off"])
+    let near = ["--at", "1280,-200,900", "--tolerance-px", "6", "--style", "wireframe"];
+    keep("coarse", &near)?;
+    keep("at rest", &[&near[..], &["--morph", "off"]].concat())
 }
 
 fn movies(_: &Gpu) -> Outcome {
