@@ -1,5 +1,7 @@
 //! The program `terrasoar`. What it does is in the library; how it is asked to is in [`cli`].
 
+#[cfg(feature = "view")]
+mod app;
 mod cli;
 
 fn main() -> std::process::ExitCode {

@@ -1,0 +1,85 @@
+//! SOAR's mesh as one patch a frame: every triangle sent, nothing remembered. The reference for pictures of an engine that sends changes.
+//!
+//! Vertices are numbered in the order of their grid points, so equal meshes give equal patches. Cost: the whole mesh, and a sort of its vertices.
+
+use super::feed::{Feed, Refined, tile_heights_m};
+use terrasoar::mesh::{Triangle, is_drawn, with_apex_first};
+use terrasoar::refine::kinetic::{NO_LEVEL, Patch, PatchVertex};
+use terrasoar::refine::soar::Soar;
+use terrasoar::refine::{Culling, Engine, Unobserved, Work};
+use terrasoar::view::View;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::terrain::Records;
+use terrasoar_render::TileId;
+
+/// SOAR and its mesh.
+pub(crate) struct FullMesh<'a, C: RecordCodec> {
+    engine: Soar<'a, C>,
+    records: Records<'a, C>,
+    patch: Patch,
+}
+
+impl<'a, C: RecordCodec> FullMesh<'a, C> {
+    /// Over `records`, culled as `culling` says.
+    pub(crate) fn new(records: Records<'a, C>, culling: Culling) -> Self {
+        Self { engine: Soar::new(records.clone(), culling), records, patch: Patch::default() }
+    }
+
+    fn vertex(&self, point: GridPoint, slot: u32, slot_of: impl Fn(GridPoint) -> Option<u32>) -> PatchVertex {
+        let grid = self.records.grid();
+        let (vertex, folded, middle) =
+            (self.records.vertex_at(point), grid.fold(point), grid.side_steps() / 2);
+        // Corners and the centre split no edge.
+        let own = grid.is_corner(point) || point == GridPoint::new(middle, middle);
+        let ends =
+            if own { [slot; 2] } else { grid.edge_ends(point).map(|end| slot_of(end).unwrap_or(slot)) };
+        PatchVertex {
+            x: folded.x(),
+            y: folded.y(),
+            height_m: vertex.height_m as f32,
+            error_m: vertex.error_m as f32,
+            radius_m: vertex.radius_m as f32,
+            ends,
+            flags: if grid.is_corner(point) { NO_LEVEL } else { grid.level(point) },
+        }
+    }
+}
+
+impl<C: RecordCodec> Feed for FullMesh<'_, C> {
+    fn update(&mut self, view: &View) -> Refined {
+        let tests = self.engine.update(view, &mut Unobserved);
+        let mut triangles: Vec<Triangle> = Vec::new();
+        self.engine.for_each_triangle(&mut |t| triangles.push(with_apex_first(t)));
+        let mut points: Vec<GridPoint> = triangles.iter().flatten().copied().collect();
+        points.sort_unstable_by_key(|p| p.packed());
+        points.dedup();
+        let slot_of = |p: GridPoint| {
+            points.binary_search_by_key(&p.packed(), |q| q.packed()).ok().map(|slot| slot as u32)
+        };
+        let mut patch = std::mem::take(&mut self.patch);
+        patch.vertices.clear();
+        patch.vertices.extend((0..).zip(&points).map(|(slot, p)| (slot, self.vertex(*p, slot, slot_of))));
+        patch.triangles.clear();
+        let drawn = triangles.iter().filter(|t| is_drawn(&self.records, **t));
+        patch
+            .triangles
+            .extend((0..).zip(drawn).map(|(slot, t)| (slot, t.map(|p| slot_of(p).unwrap_or_default()))));
+        patch.draws.clear();
+        patch.draws.push(0..patch.triangles.len() as u32);
+        self.patch = patch;
+        Refined { work: Work { tests, ..Work::default() }, triangles: triangles.len() as u64 }
+    }
+
+    fn patch(&self) -> &Patch {
+        &self.patch
+    }
+
+    fn whole(&self) -> Patch {
+        self.patch.clone()
+    }
+
+    fn heights_m(&self, tile: TileId, heights_m: &mut Vec<f32>) {
+        tile_heights_m(&self.records, tile, heights_m);
+    }
+}

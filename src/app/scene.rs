@@ -1,0 +1,264 @@
+//! A terrain in sight: an engine that refines it and a renderer that holds its mesh, kept in step.
+//!
+//! A frame is [`Scene::update`], which brings the mesh to a view, and [`Scene::draw`], which sends what changed and records the picture. They
+//! come one by one, so refinement may be frozen while the eye goes on: draw without update, and say which view the mesh is for. Updates that
+//! are not drawn cost nothing but memory for their changes; before the first picture not even that.
+//!
+//! **The device holds nothing that is not here.** After its loss [`Scene::recover`] takes a new one, and the next picture is the same. Light comes
+//! from tiles of heights: a bounded number a frame for a window, all of them for a picture that must repeat byte by byte.
+//!
+//! Cost on the processor: the engine's update, a copy of its patch, some 2 ms a tile.
+
+use super::feed::{Feed, PictureEngine, Refined, feed, mesh_vertex};
+use std::ops::Range;
+use terrasoar::refine::Culling;
+use terrasoar::refine::kinetic::Patch;
+use terrasoar::view::View;
+use terrasoar_layout::terrain::Terrain;
+use terrasoar_render::{
+    DrawStats, Frame, FrameView, Gpu, Look, MeshPatch, MeshVertex, RenderError, Renderer, RendererOptions,
+    Target, TerrainShape, TileId, TileStats, UploadStats, wgpu,
+};
+
+/// How a scene is made.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct SceneOptions {
+    /// What makes the mesh.
+    pub engine: PictureEngine,
+    /// Where what lies out of view is left out.
+    pub culling: Culling,
+    /// Normal tiles given a frame.
+    pub tiles: TileService,
+    /// Whether frames are timed on the device, where it can ([`Scene::gpu_time_ms`]).
+    pub timestamps: bool,
+}
+
+/// How many of the normal tiles that a view lacks it is given before it is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TileService {
+    /// All: the picture depends on the view alone.
+    All,
+    /// So many a frame, the coarsest first; what is missing shows coarser shading for some frames.
+    AFrame(usize),
+}
+
+impl Default for TileService {
+    fn default() -> Self {
+        Self::All
+    }
+}
+
+/// Why there is no scene or picture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum SceneError {
+    /// The terrain's source does not lend its bytes.
+    #[error("{0}: pictures need a mapped or in-memory terrain")]
+    NotInAddressSpace(String),
+    /// The renderer or its device failed. [`RenderError::DeviceLost`] is over with [`Scene::recover`].
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+/// What a picture cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Drawn {
+    /// Mesh sent to the device.
+    pub upload: UploadStats,
+    /// Draw calls.
+    pub draw: DrawStats,
+    /// Tiles given and their bytes.
+    pub tiles: [u64; 2],
+    /// Tiles that the view still lacks.
+    pub tiles_missing: u32,
+}
+
+/// An opened terrain, its engine and its renderer.
+pub(crate) struct Scene<'a> {
+    feed: Box<dyn Feed + 'a>,
+    renderer: Renderer,
+    options: SceneOptions,
+    pending: Pending,
+    heights_m: Vec<f32>,
+    wanted: Vec<TileId>,
+}
+
+/// What the engine changed and the device has not heard of.
+#[derive(Debug, Default)]
+struct Pending {
+    /// Whether the device has a mesh at all. While it has none nothing is kept: it gets the whole.
+    begun: bool,
+    /// Whether anything changed since the last picture, the visible ranges included.
+    changed: bool,
+    vertices: Vec<(u32, MeshVertex)>,
+    triangles: Vec<(u32, [u32; 3])>,
+    draws: Vec<Range<u32>>,
+}
+
+impl Pending {
+    /// Adds a patch to those before it.
+    fn take(&mut self, patch: &Patch) {
+        self.vertices.extend(patch.vertices.iter().map(|(slot, vertex)| (*slot, mesh_vertex(vertex))));
+        self.triangles.extend_from_slice(&patch.triangles);
+        self.draws.clone_from(&patch.draws);
+    }
+
+    fn clear(&mut self) {
+        self.vertices.clear();
+        self.triangles.clear();
+        self.changed = false;
+    }
+}
+
+impl<'a> Scene<'a> {
+    /// A scene without a mesh; the first [`Scene::update`] makes it. Reads nothing but the terrain's header.
+    ///
+    /// # Errors
+    /// [`SceneError::NotInAddressSpace`], and what [`Renderer::new`] says.
+    pub(crate) fn new(terrain: &'a Terrain, gpu: &Gpu, options: SceneOptions) -> Result<Self, SceneError> {
+        let feed = feed(terrain, options.engine, options.culling)
+            .ok_or_else(|| SceneError::NotInAddressSpace(terrain.path().display().to_string()))?;
+        let renderer = new_renderer(shape(terrain), gpu, options)?;
+        Ok(Self {
+            feed,
+            renderer,
+            options,
+            pending: Pending::default(),
+            heights_m: Vec::new(),
+            wanted: Vec::new(),
+        })
+    }
+
+    /// Brings the mesh to a view. Touches no device.
+    pub(crate) fn update(&mut self, view: &View) -> Refined {
+        let refined = self.feed.update(view);
+        self.pending.changed = true;
+        if self.pending.begun {
+            self.pending.take(self.feed.patch());
+        }
+        refined
+    }
+
+    /// Records what changed and a picture into `encoder`. `refined_for` is the view of the last update where that is another than `view`
+    /// (frozen refinement). Submit the encoder before the next draw, and ask the device's watch whether all went well.
+    ///
+    /// # Errors
+    /// [`SceneError::Render`]: a mesh too large for the device, or a view that is none.
+    pub(crate) fn draw(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: Target<'_>,
+        view: &View,
+        look: &Look,
+        refined_for: Option<&View>,
+    ) -> Result<Drawn, SceneError> {
+        let view = frame_view(view);
+        let refined_for = refined_for.map(frame_view);
+        let mut drawn = Drawn { upload: self.send(encoder)?, ..Drawn::default() };
+        if look.tile_normals {
+            self.give_tiles(&view, &mut drawn)?;
+        }
+        let frame = Frame { view: &view, refined_for: refined_for.as_ref(), look };
+        drawn.draw = self.renderer.render(encoder, target, frame)?;
+        Ok(drawn)
+    }
+
+    /// Records what changed in the mesh; [`Scene::draw`] does so by itself.
+    pub(crate) fn send(&mut self, encoder: &mut wgpu::CommandEncoder) -> Result<UploadStats, SceneError> {
+        let pending = &mut self.pending;
+        if !pending.changed {
+            return Ok(UploadStats::default());
+        }
+        if !pending.begun {
+            pending.clear();
+            pending.take(&self.feed.whole());
+        }
+        let patch =
+            MeshPatch { vertices: &pending.vertices, triangles: &pending.triangles, draws: &pending.draws };
+        let sent = self.renderer.apply(encoder, &patch)?;
+        pending.begun = true;
+        pending.clear();
+        Ok(sent)
+    }
+
+    fn give_tiles(&mut self, view: &FrameView, drawn: &mut Drawn) -> Result<(), SceneError> {
+        let most = match self.options.tiles {
+            TileService::All => usize::MAX,
+            TileService::AFrame(most) => most,
+        };
+        loop {
+            self.wanted.clear();
+            self.wanted.extend_from_slice(self.renderer.want_tiles(view, most));
+            let mut given = 0;
+            for tile in &self.wanted {
+                self.feed.heights_m(*tile, &mut self.heights_m);
+                let bytes = self.renderer.give_tile(*tile, &self.heights_m)?;
+                given += u64::from(bytes > 0);
+                drawn.tiles[1] += bytes;
+            }
+            drawn.tiles[0] += given;
+            // Where no room is left for a wanted tile a coarser one stands in for good.
+            if most < usize::MAX || given == 0 {
+                break;
+            }
+        }
+        drawn.tiles_missing = self.renderer.tile_stats().missing;
+        Ok(())
+    }
+
+    /// Goes on with another device, after the loss of the old one: the next picture is as if nothing had happened. The engine is not touched.
+    ///
+    /// # Errors
+    /// What [`Renderer::new`] says.
+    pub(crate) fn recover(&mut self, gpu: &Gpu) -> Result<(), SceneError> {
+        self.renderer = new_renderer(*self.renderer.terrain(), gpu, self.options)?;
+        self.pending = Pending { changed: true, ..Pending::default() };
+        Ok(())
+    }
+
+    /// The renderer, for what it counts: tiles, bytes, depth, time.
+    pub(crate) fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// What the tiles did so far.
+    pub(crate) fn tile_stats(&self) -> TileStats {
+        self.renderer.tile_stats()
+    }
+
+    /// The device's time for the newest frame that is known, milliseconds.
+    pub(crate) fn gpu_time_ms(&mut self) -> Option<f64> {
+        self.renderer.gpu_time_ms()
+    }
+}
+
+fn new_renderer(shape: TerrainShape, gpu: &Gpu, options: SceneOptions) -> Result<Renderer, RenderError> {
+    let mut renderer_options = RendererOptions::from(&gpu.capabilities);
+    renderer_options.timestamps &= options.timestamps;
+    Renderer::new(&gpu.device, &gpu.queue, shape, renderer_options)
+}
+
+/// What the renderer needs to know of a terrain.
+pub(crate) fn shape(terrain: &Terrain) -> TerrainShape {
+    let grid = terrain.grid();
+    TerrainShape {
+        spacing_m: grid.spacing_m(),
+        samples: grid.samples(),
+        height_range_m: terrain.header().height_range_m,
+    }
+}
+
+/// A view as the renderer takes it.
+pub(crate) fn frame_view(view: &View) -> FrameView {
+    let [right, up, forward] = view.axes();
+    FrameView {
+        eye_m: view.eye_m,
+        right,
+        up,
+        forward,
+        vertical_fov_rad: view.vertical_fov_rad,
+        viewport_px: [view.viewport.width_px, view.viewport.height_px],
+        tolerance_px: view.tolerance_px,
+        vertical_exaggeration: view.vertical_exaggeration,
+    }
+}
