@@ -20,6 +20,8 @@ mod sweep;
 mod synth;
 mod terrain;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::fmt;
@@ -59,6 +61,8 @@ enum Verb {
     Replay(replay::Args),
     Compare(compare::Args),
     Mesh(mesh::Args),
+    #[cfg(feature = "view")]
+    View(view::Args),
 }
 
 /// A command line that clap accepts and that still makes no sense.
@@ -85,6 +89,8 @@ pub(crate) fn run() -> ExitCode {
         Verb::Replay(args) => replay::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Mesh(args) => mesh::run(&args),
+        #[cfg(feature = "view")]
+        Verb::View(args) => view::run(args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

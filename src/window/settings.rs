@@ -97,10 +97,9 @@ impl Settings {
         look.ramp = self.ramp.as_deref().and_then(Ramp::named).unwrap_or(style.ramp);
         look.sun.azimuth_rad = self.sun_azimuth_deg.to_radians();
         look.sun.elevation_rad = self.sun_elevation_deg.to_radians();
-        look.contours = self.contours.then(|| Contours {
-            interval_m: self.contour_interval_m,
-            ..style.contours.unwrap_or_default()
-        });
+        look.contours = self
+            .contours
+            .then(|| Contours { interval_m: self.contour_interval_m, ..style.contours.unwrap_or_default() });
         look.wireframe = self.wireframe.then(|| style.wireframe.unwrap_or_else(Wireframe::default));
         look.morph = self.morph;
         look.haze = if self.haze { Haze::Auto } else { Haze::Off };
@@ -158,7 +157,8 @@ impl Settings {
         self.exaggeration = keep(self.exaggeration, EXAGGERATION, own.exaggeration);
         self.sun_azimuth_deg = keep_f32(self.sun_azimuth_deg, [0.0, 360.0], own.sun_azimuth_deg);
         self.sun_elevation_deg = keep_f32(self.sun_elevation_deg, [0.0, 90.0], own.sun_elevation_deg);
-        self.contour_interval_m = keep_f32(self.contour_interval_m, CONTOUR_INTERVAL_M, own.contour_interval_m);
+        self.contour_interval_m =
+            keep_f32(self.contour_interval_m, CONTOUR_INTERVAL_M, own.contour_interval_m);
         if Look::named(&self.style).is_none() {
             self.style = own.style;
         }
@@ -189,7 +189,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new/view.toml");
         assert_eq!(Settings::load(&path), (Settings::default(), None), "no file, no word");
-        let mut settings = Settings { exaggeration: 2.5, figures: false, window: [800, 600], ..Default::default() };
+        let mut settings =
+            Settings { exaggeration: 2.5, figures: false, window: [800, 600], ..Default::default() };
         settings.set_style("contours");
         settings.ramp = Some("viridis".into());
         settings.save(&path).unwrap();

@@ -1,7 +1,7 @@
 //! What flying must keep to: the same way at any frame rate, clear of the ground, round the pivot.
 
 use super::*;
-use crate::app::pick::tests::Hills;
+use crate::window::pick::tests::Hills;
 
 fn fly(rig: &mut Rig, steps: u32, span_s: f64, controls: Controls) {
     for _ in 0..steps {

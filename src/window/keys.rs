@@ -88,6 +88,11 @@ pub(crate) fn action(code: KeyCode, ctrl: bool) -> Option<Action> {
     }
 }
 
+/// How the keys of an action are written.
+pub(crate) fn name(action: Action) -> &'static str {
+    ROWS.iter().find(|row| row.action == Some(action)).map_or("", |row| row.keys)
+}
+
 /// Right, forward and up of a key that is held; none for other keys.
 pub(crate) fn thrust(code: KeyCode) -> Option<[f64; 3]> {
     Some(match code {
@@ -125,8 +130,7 @@ mod tests {
 
     #[test]
     fn the_manual_lists_the_same_keys() {
-        let table: String =
-            ROWS.iter().map(|row| format!("| {} | {} |\n", row.keys, row.does)).collect();
+        let table: String = ROWS.iter().map(|row| format!("| {} | {} |\n", row.keys, row.does)).collect();
         let readme = include_str!("../../README.md");
         assert!(readme.contains(&table), "README.md needs this table:\n{table}");
     }

@@ -207,7 +207,13 @@ impl Rig {
     }
 
     /// Moves on by `span_s` seconds.
-    pub(crate) fn advance(&mut self, span_s: f64, controls: &Controls, ground: &dyn Ground, exaggeration: f64) {
+    pub(crate) fn advance(
+        &mut self,
+        span_s: f64,
+        controls: &Controls,
+        ground: &dyn Ground,
+        exaggeration: f64,
+    ) {
         if !controls.is_idle() {
             self.glide = None;
         }

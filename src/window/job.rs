@@ -93,8 +93,7 @@ fn make(input: &Path, progress: &Progress) -> Result<Built, String> {
     let dem = terrasoar_layout::import::open(std::slice::from_ref(&input.to_path_buf()))
         .map_err(|e| e.to_string())?;
     let path = output_for(input);
-    let header =
-        build(&*dem, &path, &BuildOptions::default(), progress).map_err(|e| e.to_string())?;
+    let header = build(&*dem, &path, &BuildOptions::default(), progress).map_err(|e| e.to_string())?;
     let note = match header.spacing_origin {
         SpacingOrigin::Assumed => Some(format!(
             "{}: the samples were taken to be 1 m apart, for the file does not say; `terrasoar build` takes --spacing and --z-scale",
@@ -115,10 +114,7 @@ fn output_for(input: &Path) -> PathBuf {
     }
     let stem = input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let elsewhere = if writable { folder.to_path_buf() } else { std::env::temp_dir() };
-    (2..)
-        .map(|n| elsewhere.join(format!("{stem}-{n}.iqt")))
-        .find(|path| !path.exists())
-        .unwrap_or(beside)
+    (2..).map(|n| elsewhere.join(format!("{stem}-{n}.iqt"))).find(|path| !path.exists()).unwrap_or(beside)
 }
 
 #[cfg(test)]
@@ -143,7 +139,8 @@ mod tests {
     fn a_dem_becomes_a_terrain_file_beside_it() {
         let folder = tempfile::tempdir().unwrap();
         let input = folder.path().join("puget.png");
-        std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/puget_sound_1025.png"), &input).unwrap();
+        std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/puget_sound_1025.png"), &input)
+            .unwrap();
         let built = run(&input).unwrap();
         assert_eq!(built.path, folder.path().join("puget.iqt"));
         assert!(built.note.unwrap().contains("--spacing"));

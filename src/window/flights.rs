@@ -173,8 +173,8 @@ impl Player {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::camera::{Controls, Rig};
-    use crate::app::pick::tests::Hills;
+    use crate::window::camera::{Controls, Rig};
+    use crate::window::pick::tests::Hills;
     use terrasoar::view::Viewport;
 
     #[test]
