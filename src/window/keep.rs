@@ -9,7 +9,7 @@ use terrasoar_render::{Offscreen, wgpu};
 /// A free name such as `alps-2026-03-01-142233.png` for what belongs to a terrain.
 pub(crate) fn free_name(folder: &Path, terrain: &Path, extension: &str) -> PathBuf {
     let stem = terrain.file_stem().map_or_else(|| "terrain".into(), |stem| stem.to_string_lossy());
-    let time = jiff::Zoned::now().strftime("%Y-%m-%d-%H%M%S").to_string();
+    let time = jiff::ZonedDateTime::now().strftime("%Y-%m-%d-%H%M%S").to_string();
     let first = folder.join(format!("{stem}-{time}.{extension}"));
     if !first.exists() {
         return first;

@@ -344,6 +344,8 @@ impl Viewer {
 
     fn tell_motion(&mut self, moving: bool) {
         let [width, height] = self.screen.size_px();
+        let flying = self.rig.is_moving() || self.hand.is_dragging();
+        self.tell_state("moving", flying.to_string());
         self.tell_state("size", format!("{width}x{height}"));
         self.tell_state("panel", self.settings.panel.to_string());
         self.tell_state("help", self.memory.help.to_string());

@@ -10,7 +10,7 @@ const HEIGHT: f32 = 30.0;
 
 /// All graphs in the lower right corner of `room`.
 pub(super) fn show(context: &Context, history: &History, room: Rect) {
-    let at = Area::new(Id::new("figures")).pivot(Align2::RIGHT_BOTTOM);
+    let at = Area::new(Id::unique("figures")).pivot(Align2::RIGHT_BOTTOM);
     at.fixed_pos(room.right_bottom() - vec2(12.0, 12.0)).interactable(false).show(context, |ui| {
         let frame =
             Frame::new().fill(crate::window::overlay::PANEL).corner_radius(8).inner_margin(Margin::same(8));

@@ -34,7 +34,7 @@ impl Note {
 /// Everything in the upper right corner of `room`.
 pub(super) fn show(context: &Context, facts: &Facts<'_>, room: Rect, wishes: &mut Vec<Wish>) {
     let width = (room.width() - 24.0).clamp(120.0, 400.0);
-    let area = Area::new(Id::new("notes")).pivot(Align2::RIGHT_TOP).default_width(width);
+    let area = Area::new(Id::unique("notes")).pivot(Align2::RIGHT_TOP).default_width(width);
     area.fixed_pos(room.right_top() + vec2(-12.0, 12.0)).show(context, |ui| {
         ui.set_max_width(width);
         if let Some((file, stage, part)) = &facts.job {

@@ -107,7 +107,9 @@ impl Viewer {
         } else {
             let proxy = self.proxy.clone();
             // A window that has gone needs no waking.
-            match Job::start(path, move || drop(proxy.send_event(Wake))) {
+            match Job::start(path, move || {
+                let _ = proxy.send_event(Wake);
+            }) {
                 Ok(job) => self.job = Some(job),
                 Err(words) => self.trouble(words),
             }
