@@ -5,4 +5,7 @@
 
 pub(crate) mod feed;
 pub(crate) mod full_mesh;
+pub(crate) mod overview;
+#[allow(dead_code, reason = "windows and tests use more of a scene than pictures do")]
 pub(crate) mod scene;
+pub(crate) mod studio;

@@ -93,6 +93,8 @@ struct Pending {
     vertices: Vec<(u32, MeshVertex)>,
     triangles: Vec<(u32, [u32; 3])>,
     draws: Vec<Range<u32>>,
+    /// One past the highest triangle slot ever sent. Slots past it are empty, and the device has not heard of them.
+    end: u32,
 }
 
 impl Pending {
@@ -100,7 +102,10 @@ impl Pending {
     fn take(&mut self, patch: &Patch) {
         self.vertices.extend(patch.vertices.iter().map(|(slot, vertex)| (*slot, mesh_vertex(vertex))));
         self.triangles.extend_from_slice(&patch.triangles);
-        self.draws.clone_from(&patch.draws);
+        self.end = patch.triangles.iter().fold(self.end, |end, (slot, _)| end.max(slot + 1));
+        let end = self.end;
+        self.draws.clear();
+        self.draws.extend(patch.draws.iter().map(|r| r.start.min(end)..r.end.min(end)));
     }
 
     fn clear(&mut self) {
@@ -170,7 +175,6 @@ impl<'a> Scene<'a> {
             return Ok(UploadStats::default());
         }
         if !pending.begun {
-            pending.clear();
             pending.take(&self.feed.whole());
         }
         let patch =

@@ -8,13 +8,14 @@ use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
-use terrasoar::report::{ComparisonReport, ReportTitle};
+use terrasoar::report::{ComparisonReport, FlightPicture, ReportTitle};
 use terrasoar::stats::{Comparison, FrameStats};
+use terrasoar_layout::terrain::Terrain;
 
 /// Fly a recorded flight with several engines, compare them and write a report.
 ///
 /// The first engine named is the one that the others are measured against; the first frame, which starts from nothing, is left out of the ratios. The
-/// report has a CSV file an engine, a JSON summary, plots and one page, report.html. Exit code 1 if the engines' meshes differ.
+/// report has a CSV file an engine, a JSON summary, plots, a picture where there is a graphics driver, and one page, report.html. Exit code 1 if the engines' meshes differ.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -87,6 +88,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         (sweep.by_tolerance()?, sweep.by_incoherence()?)
     };
     drop(progress);
+    let picture = middle_frame(args, &terrain, &flight);
     let title = ReportTitle {
         terrain: name(&args.file),
         flight: name(&args.flight),
@@ -99,6 +101,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
         comparison: &comparison,
         tolerance_sweep: &by_tolerance,
         incoherence_sweep: &by_incoherence,
+        picture: match &picture {
+            Ok(caption) => FlightPicture::File { name: PICTURE, caption },
+            Err(why) => FlightPicture::Missing(why),
+        },
     };
     let written = report.write(&args.output)?;
     if args.json {
@@ -118,6 +124,36 @@ pub(super) fn run(args: &Args) -> Result<()> {
         ),
         None => Ok(()),
     }
+}
+
+/// The picture's name in the report's folder.
+const PICTURE: &str = "flight.png";
+
+/// Draws the flight's middle frame into the report's folder; gives a caption, or says why there is none. A report without a picture is a report.
+#[cfg(feature = "view")]
+fn middle_frame(args: &Args, terrain: &Terrain, flight: &Flight) -> Result<String, String> {
+    let frame = flight.frames.len() / 2;
+    let draw = || -> Result<String> {
+        std::fs::create_dir_all(&args.output)?;
+        super::picture::write_frame(
+            terrain,
+            flight,
+            frame,
+            args.quality.quality(),
+            &args.output.join(PICTURE),
+        )
+    };
+    let drawn_by = draw().map_err(|error| {
+        // An older report's picture shows another flight.
+        let _ = std::fs::remove_file(args.output.join(PICTURE));
+        super::message(&error)
+    })?;
+    Ok(format!("Frame {frame} of {}, drawn by {drawn_by}.", flight.frames.len()))
+}
+
+#[cfg(not(feature = "view"))]
+fn middle_frame(_: &Args, _: &Terrain, _: &Flight) -> Result<String, String> {
+    Err("this program was built without the feature view".into())
 }
 
 fn name(path: &Path) -> String {

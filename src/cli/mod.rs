@@ -12,16 +12,29 @@ mod height;
 mod info;
 mod mesh;
 mod mesh_file;
+#[cfg(feature = "view")]
+mod movie;
+#[cfg(feature = "view")]
+mod movie_file;
 mod output;
 mod parse;
+#[cfg(feature = "view")]
+mod picture;
+#[cfg(not(feature = "view"))]
+mod pictureless;
 mod progress;
 mod replay;
+#[cfg(feature = "view")]
+mod snapshot;
 mod sweep;
 mod synth;
 mod terrain;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+
+#[cfg(not(feature = "view"))]
+use pictureless::{movie, snapshot, view};
 
 use clap::{Parser, Subcommand};
 use std::fmt;
@@ -39,6 +52,7 @@ use std::process::ExitCode;
 Examples, in the order of the work:
   terrasoar build alps.tif -o alps.iqt
   terrasoar info alps.iqt
+  terrasoar snapshot alps.iqt -o alps.png
   terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
   terrasoar compare alps.iqt --flight alps.flight --engines soar,smart -o report
 
@@ -61,8 +75,9 @@ enum Verb {
     Replay(replay::Args),
     Compare(compare::Args),
     Mesh(mesh::Args),
-    #[cfg(feature = "view")]
     View(view::Args),
+    Snapshot(snapshot::Args),
+    Movie(movie::Args),
 }
 
 /// A command line that clap accepts and that still makes no sense.
@@ -89,8 +104,9 @@ pub(crate) fn run() -> ExitCode {
         Verb::Replay(args) => replay::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Mesh(args) => mesh::run(&args),
-        #[cfg(feature = "view")]
-        Verb::View(args) => view::run(args),
+        Verb::View(args) => view::run(&args),
+        Verb::Snapshot(args) => snapshot::run(&args),
+        Verb::Movie(args) => movie::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

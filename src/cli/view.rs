@@ -1,13 +1,11 @@
 //! `terrasoar view`: a window to fly over a terrain in.
 
-use super::parse;
+use super::{parse, picture};
 use crate::window::{self, Plan};
 use anyhow::Result;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 use terrasoar::view::Viewport;
-use terrasoar_render::LOOKS;
-use terrasoar_render::ramps::RAMPS;
+use terrasoar_render::ramps::Ramp;
 
 /// Fly over a terrain in a window.
 ///
@@ -23,11 +21,11 @@ pub(super) struct Args {
     #[arg(long, value_name = "F")]
     flight: Option<PathBuf>,
     /// Style to begin with, instead of the last one
-    #[arg(long, value_name = "STYLE", value_parser = style())]
+    #[arg(long, value_name = "STYLE", value_parser = picture::style())]
     style: Option<String>,
     /// Colours to begin with, instead of the style's
-    #[arg(long, value_name = "RAMP", value_parser = ramp())]
-    ramp: Option<String>,
+    #[arg(long, value_name = "RAMP", value_parser = picture::ramp())]
+    ramp: Option<&'static Ramp>,
     /// Largest error on the screen in pixels, instead of the last one
     #[arg(long, value_name = "PX", value_parser = parse::tolerance_px)]
     tolerance_px: Option<f64>,
@@ -55,20 +53,12 @@ fn after_help() -> String {
     )
 }
 
-fn style() -> impl TypedValueParser<Value = String> {
-    PossibleValuesParser::new(LOOKS.iter().map(|(name, _)| *name)).map(String::from)
-}
-
-fn ramp() -> impl TypedValueParser<Value = String> {
-    PossibleValuesParser::new(RAMPS.iter().map(|ramp| ramp.name)).map(String::from)
-}
-
-pub(super) fn run(args: Args) -> Result<()> {
+pub(super) fn run(args: &Args) -> Result<()> {
     window::run(Plan {
-        file: args.file,
-        flight: args.flight,
-        style: args.style,
-        ramp: args.ramp,
+        file: args.file.clone(),
+        flight: args.flight.clone(),
+        style: args.style.clone(),
+        ramp: args.ramp.map(|ramp| ramp.name.to_owned()),
         tolerance_px: args.tolerance_px,
         exaggeration: args.exaggeration,
         size_px: args.size.map(|size| [size.width_px, size.height_px]),

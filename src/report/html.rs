@@ -4,7 +4,7 @@
 //! All text that comes from outside is escaped.
 
 use super::number::{exact, grouped, rounded};
-use super::{ComparisonReport, PlotFile, SweepPoint};
+use super::{ComparisonReport, FlightPicture, PlotFile, SweepPoint};
 use std::fmt::Write as _;
 
 const STYLE: &str = "\
@@ -15,7 +15,7 @@ h1{font-size:1.7rem;margin:0 0 .2rem}h2{font-size:1.25rem;margin:2.2rem 0 .6rem}
 .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums;min-width:50%}\
 th,td{padding:.35rem .8rem;text-align:right;border-bottom:1px solid #ddd}th{font-weight:600;vertical-align:bottom}\
 th:first-child,td:first-child{text-align:left}thead th{border-bottom:2px solid #888}\
-figure{margin:1.2rem 0 2rem}figure svg{width:100%;height:auto;border:1px solid #e4e4e4}figcaption{color:#444}";
+figure{margin:1.2rem 0 2rem}figure svg,figure img{width:100%;height:auto;border:1px solid #e4e4e4}figcaption{color:#444}";
 
 /// The whole page.
 pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots: &[PlotFile]) -> String {
@@ -34,6 +34,7 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
     push(&mut out, format_args!("<h1>{heading}</h1>\n<p class=\"of\">{of}</p>\n"));
     verdict(&mut out, report);
     engines(&mut out, report);
+    picture(&mut out, report.picture);
     sweep(&mut out, "By tolerance", "Tolerance, px", report.tolerance_sweep);
     sweep(&mut out, "By incoherence", "Incoherence, %", report.incoherence_sweep);
     push(&mut out, format_args!("<h2>Plots</h2>\n"));
@@ -78,6 +79,21 @@ fn verdict(out: &mut String, report: &ComparisonReport<'_>) {
         ),
     };
     push(out, format_args!("<p class=\"{class}\">{text}</p>\n"));
+}
+
+fn picture(out: &mut String, picture: FlightPicture<'_>) {
+    push(out, format_args!("<h2>Picture</h2>\n"));
+    match picture {
+        FlightPicture::File { name, caption } => {
+            let (name, caption) = (escaped(name), escaped(caption));
+            push(
+                out,
+                format_args!("<figure>\n<a href=\"{name}\"><img src=\"{name}\" alt=\"{caption}\"></a>\n"),
+            );
+            push(out, format_args!("<figcaption>{caption}</figcaption>\n</figure>\n"));
+        }
+        FlightPicture::Missing(why) => push(out, format_args!("<p>None: {}.</p>\n", escaped(why))),
+    }
 }
 
 fn engines(out: &mut String, report: &ComparisonReport<'_>) {
@@ -196,9 +212,15 @@ mod tests {
             runs: &runs,
             tolerance_sweep: &sweep,
             incoherence_sweep: &[],
+            picture: FlightPicture::File { name: "a\"><img>.png", caption: "<b>" },
         };
         let page = page(&report, &["a.csv".into(), "b.csv".into(), "c.csv".into()], &[]);
-        assert!(!page.contains("<script") && !page.contains("<img") && !page.contains("<c>"));
+        assert!(
+            !page.contains("<script")
+                && !page.contains("<img>")
+                && !page.contains("<b>")
+                && !page.contains("<c>")
+        );
         assert!(page.contains("a &amp; b &quot;&lt;c&gt;&quot;"));
         assert!(page.contains("without the feature"));
         for tag in ["table", "tr", "td", "th", "div", "p", "h2", "ul", "li"] {

@@ -104,6 +104,22 @@ pub struct ComparisonReport<'a> {
     pub tolerance_sweep: &'a [SweepPoint],
     /// Figures by incoherence; empty if none were taken.
     pub incoherence_sweep: &'a [SweepPoint],
+    /// What the flight looks like.
+    pub picture: FlightPicture<'a>,
+}
+
+/// A picture of the flight.
+#[derive(Debug, Clone, Copy)]
+pub enum FlightPicture<'a> {
+    /// A file in the report's directory, written by the caller.
+    File {
+        /// Its name.
+        name: &'a str,
+        /// What it shows, in a sentence.
+        caption: &'a str,
+    },
+    /// None could be drawn, and why.
+    Missing(&'a str),
 }
 
 /// A plot as the page shows it.
@@ -286,6 +302,7 @@ mod tests {
             runs: &runs,
             tolerance_sweep: &made_up_sweep(&[0.5, 1.0, 2.0, 4.0, 8.0]),
             incoherence_sweep: &made_up_sweep(&[0.61, 1.36, 5.29]),
+            picture: FlightPicture::Missing("no adapter"),
         })
     }
 
@@ -324,6 +341,7 @@ mod tests {
             runs: &[],
             tolerance_sweep: &[],
             incoherence_sweep: &[],
+            picture: FlightPicture::Missing("no adapter"),
         };
         let written = report.write(folder.path()).unwrap();
         assert!(written.last().unwrap().ends_with("report.html"));

@@ -94,7 +94,7 @@ impl Overlay {
         screen: &Screen,
         encoder: &mut wgpu::CommandEncoder,
         target: &wgpu::TextureView,
-        layer: &Layer,
+        layer: &mut Layer,
     ) -> Vec<wgpu::CommandBuffer> {
         let (device, queue) = (&screen.gpu.device, &screen.gpu.queue);
         self.take_textures(screen, layer);
@@ -121,18 +121,18 @@ impl Overlay {
     }
 
     /// Takes a layer's textures to the device, painted or not: they come once.
-    pub(crate) fn take_textures(&mut self, screen: &Screen, layer: &Layer) {
-        for (id, deltas) in &layer.textures.set {
-            for delta in deltas {
-                self.painter.update_texture(&screen.gpu.device, &screen.gpu.queue, *id, delta);
+    pub(crate) fn take_textures(&mut self, screen: &Screen, layer: &mut Layer) {
+        for (id, deltas) in layer.textures.set.drain() {
+            for delta in &deltas {
+                self.painter.update_texture(&screen.gpu.device, &screen.gpu.queue, id, delta);
             }
         }
     }
 
     /// Lets go of textures after the frame that used them last.
-    pub(crate) fn settle(&mut self, layer: &Layer) {
-        for id in &layer.textures.free {
-            self.painter.free_texture(id);
+    pub(crate) fn settle(&mut self, layer: &mut Layer) {
+        for id in layer.textures.free.drain() {
+            self.painter.free_texture(&id);
         }
     }
 }

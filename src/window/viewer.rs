@@ -313,9 +313,9 @@ impl Viewer {
         }
         let pointer = self.hand.pointer.filter(|_| !self.overlay.has_pointer());
         self.under = self.pick(pointer);
-        let layer = self.lay_out();
+        let mut layer = self.lay_out();
         let again = layer.again;
-        self.show(&layer, passed, now);
+        self.show(&mut layer, passed, now);
         if self.plan.exit_after_frames.is_some_and(|frames| self.frames >= frames) {
             self.ending = true;
         }

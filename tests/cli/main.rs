@@ -2,6 +2,7 @@
 
 mod build;
 mod engines;
+mod pictures;
 mod support;
 mod usage;
 mod verbs;

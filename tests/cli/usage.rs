@@ -4,12 +4,14 @@ use crate::support::{Bench, text};
 
 const VERBS: [&str; 9] =
     ["build", "info", "verify", "height", "synth", "flight", "replay", "compare", "mesh"];
+/// Verbs of the feature `view`.
+const DRAWING: &[&str] = if cfg!(feature = "view") { &["snapshot", "movie"] } else { &[] };
 
 #[test]
 fn every_verb_has_help_with_an_example() {
     let bench = Bench::new();
     let all = bench.good(&["--help"]);
-    for verb in VERBS {
+    for verb in VERBS.iter().chain(DRAWING).copied() {
         assert!(all.contains(&format!("\n  {verb} ")), "{verb}");
         for flag in ["--help", "-h"] {
             let help = bench.good(&[verb, flag]);
@@ -50,6 +52,36 @@ fn wrong_command_lines_end_with_2() {
         &["replay", "land.iqt", "--flight", "f", "--engine", "soar", "--viewport", "800"],
         &["compare", "land.iqt", "--flight", "f", "--engines", "soar,soar", "-o", "r"],
         &["mesh", "land.iqt", "--flight", "f", "--frame", "0", "--engine", "soar", "-o", "x.stl"],
+    ];
+    for args in wrong {
+        bench.bad(2, args);
+    }
+    assert_eq!(bench.names(), ["land.iqt", "land.tif"], "nothing is written for a wrong command line");
+}
+
+#[test]
+#[cfg(feature = "view")]
+fn pictures_that_make_no_sense_end_with_2() {
+    let bench = Bench::with_terrain();
+    let wrong: [&[&str]; 18] = [
+        &["snapshot", "land.iqt"],
+        &["snapshot", "land.iqt", "-o", "a.jpg"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--style", "cubist"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--ramp", "rainbow"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--size", "0x9"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--sun", "90"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--sun", "90,91"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--contours", "0"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--morph", "yes"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--engine", "smart"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--flight", "f"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--flight", "f", "--frame", "1", "--at", "1,2,3"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--at", "1,2"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--look", "1,2"],
+        &["movie", "land.iqt", "-o", "a.gif"],
+        &["movie", "land.iqt", "--flight", "f", "-o", "a.avi"],
+        &["movie", "land.iqt", "--flight", "f", "-o", "a.gif", "--every", "0"],
+        &["movie", "land.iqt", "--flight", "f", "-o", "a.gif", "--fps", "0"],
     ];
     for args in wrong {
         bench.bad(2, args);

@@ -8,12 +8,16 @@ use terrasoar_render::{Offscreen, RenderError, Target, wgpu};
 
 impl Viewer {
     /// Refines, draws and shows a frame. What goes wrong becomes a note.
-    pub(super) fn show(&mut self, layer: &Layer, passed: Option<Duration>, begun: Instant) {
+    pub(super) fn show(&mut self, layer: &mut Layer, passed: Option<Duration>, begun: Instant) {
         if self.plan.lose_device_after_frames == Some(self.frames) {
             self.plan.lose_device_after_frames = None;
             self.screen.gpu.device.destroy();
         }
-        if let Err(error) = self.try_show(layer, passed, begun) {
+        let shown = self.try_show(layer, passed, begun);
+        // Whatever became of the frame: textures come once, and are the overlay's by now or gone with it.
+        self.overlay.take_textures(&self.screen, layer);
+        self.overlay.settle(layer);
+        if let Err(error) = shown {
             let is_lost = error
                 .downcast_ref::<RenderError>()
                 .is_some_and(|e| matches!(e, RenderError::DeviceLost { .. }));
@@ -26,7 +30,7 @@ impl Viewer {
         self.frames += 1;
     }
 
-    fn try_show(&mut self, layer: &Layer, passed: Option<Duration>, begun: Instant) -> Result<()> {
+    fn try_show(&mut self, layer: &mut Layer, passed: Option<Duration>, begun: Instant) -> Result<()> {
         let before = Instant::now();
         let view = self.view();
         let refined = match self.frozen {
@@ -36,7 +40,6 @@ impl Viewer {
         let update = before.elapsed();
         self.screen.gpu.watch.check()?;
         let Some(picture) = self.screen.acquire()? else {
-            self.overlay.take_textures(&self.screen, layer);
             return Ok(());
         };
         let target = picture.texture.create_view(&wgpu::TextureViewDescriptor::default());
@@ -48,7 +51,6 @@ impl Viewer {
         self.screen.gpu.queue.submit(first.into_iter().chain([encoder.finish()]));
         self.window.pre_present_notify();
         self.screen.gpu.queue.present(picture);
-        self.overlay.settle(layer);
         self.screen.gpu.watch.check()?;
         self.tiles_missing = drawn.tiles_missing > 0 && drawn.tiles[0] > 0;
         self.count(refined, drawn, update, passed.unwrap_or_else(|| begun.elapsed()));

@@ -1,0 +1,76 @@
+//! Pictures without a window: a device, a scene and a texture to draw to.
+//!
+//! **Equal views give equal bytes on one driver**, whatever was drawn before: all tiles are given before a picture is taken. A device that is lost
+//! on the way is replaced once; the picture is drawn again on the new one.
+
+use super::feed::Refined;
+use super::scene::{Scene, SceneError, SceneOptions};
+use terrasoar::view::{View, Viewport};
+use terrasoar_layout::terrain::Terrain;
+use terrasoar_render::{Capabilities, Gpu, Look, Offscreen, RenderError};
+
+/// Takes pictures of one terrain, all of one size.
+pub(crate) struct Studio<'a> {
+    gpu: Gpu,
+    scene: Scene<'a>,
+    offscreen: Offscreen,
+    viewport: Viewport,
+}
+
+impl<'a> Studio<'a> {
+    /// A studio on the best adapter there is.
+    ///
+    /// # Errors
+    /// [`SceneError::Render`] with [`RenderError::NoAdapter`] where there is none, which says what to install; a size that the device cannot have.
+    pub(crate) fn new(
+        terrain: &'a Terrain,
+        options: SceneOptions,
+        viewport: Viewport,
+    ) -> Result<Self, SceneError> {
+        let gpu = Gpu::headless_blocking()?;
+        let scene = Scene::new(terrain, &gpu, options)?;
+        let offscreen = offscreen(&gpu, viewport)?;
+        Ok(Self { gpu, scene, offscreen, viewport })
+    }
+
+    /// Brings the mesh to a view, without a picture.
+    pub(crate) fn fly(&mut self, view: &View) -> Refined {
+        self.scene.update(view)
+    }
+
+    /// A picture of the mesh as it is: three bytes a pixel, row by row from the top.
+    ///
+    /// # Errors
+    /// [`SceneError::Render`].
+    pub(crate) fn picture(&mut self, view: &View, look: &Look) -> Result<Vec<u8>, SceneError> {
+        match self.try_picture(view, look) {
+            Err(SceneError::Render(RenderError::DeviceLost { .. })) => {
+                self.gpu = Gpu::headless_blocking()?;
+                self.offscreen = offscreen(&self.gpu, self.viewport)?;
+                self.scene.recover(&self.gpu)?;
+                self.try_picture(view, look)
+            }
+            done => done,
+        }
+    }
+
+    fn try_picture(&mut self, view: &View, look: &Look) -> Result<Vec<u8>, SceneError> {
+        let Gpu { device, queue, watch, .. } = &self.gpu;
+        let mut encoder = device.create_command_encoder(&Default::default());
+        self.scene.draw(&mut encoder, self.offscreen.target(), view, look, None)?;
+        queue.submit([encoder.finish()]);
+        let rgba = self.offscreen.read_rgba(device, queue);
+        // What the watch has seen is the cause, where reading failed too.
+        watch.check()?;
+        Ok(rgba?.as_chunks::<4>().0.iter().flat_map(|[r, g, b, _]| [*r, *g, *b]).collect())
+    }
+
+    /// The device's adapter.
+    pub(crate) fn capabilities(&self) -> &Capabilities {
+        &self.gpu.capabilities
+    }
+}
+
+fn offscreen(gpu: &Gpu, viewport: Viewport) -> Result<Offscreen, RenderError> {
+    Offscreen::new(&gpu.device, [viewport.width_px, viewport.height_px])
+}

@@ -1,0 +1,173 @@
+//! How a picture is made: the flags that `snapshot` and `movie` share.
+
+use super::parse;
+use crate::app::feed::PictureEngine;
+use crate::app::scene::SceneOptions;
+use crate::app::studio::Studio;
+use anyhow::{Result, bail};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use image::ExtendedColorType;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use terrasoar::flight::{Flight, FlightFrame};
+use terrasoar::flyover::Quality;
+use terrasoar::refine::Culling;
+use terrasoar::view::{View, Viewport};
+use terrasoar_layout::atomic_file::AtomicFile;
+use terrasoar_layout::terrain::Terrain;
+use terrasoar_render::ramps::{RAMPS, Ramp};
+use terrasoar_render::{Contours, LOOKS, Look, Sun};
+
+/// Size, precision and looks.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct PictureArgs {
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse::viewport)]
+    pub size: Viewport,
+    /// How the ground looks
+    #[arg(long, value_name = "STYLE", default_value = LOOKS[0].0, value_parser = style())]
+    pub style: String,
+    /// Colours of heights, slopes or errors; the style has its own without it
+    #[arg(long, value_name = "RAMP", value_parser = ramp())]
+    pub ramp: Option<&'static Ramp>,
+    /// Multiply heights by this factor
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::exaggeration)]
+    pub exaggeration: f64,
+    /// Largest error on the screen in pixels
+    #[arg(long, value_name = "PX", default_value = "1", value_parser = parse::tolerance_px)]
+    pub tolerance_px: f64,
+    /// Whether vertices move into place as the eye comes nearer, or appear there
+    #[arg(long, value_name = "ON|OFF", default_value = "on", value_parser = switch())]
+    pub morph: bool,
+    /// Where the light comes from: degrees clockwise from north, and above the horizon
+    #[arg(long, value_name = "AZ,EL", value_parser = sun, allow_hyphen_values = true)]
+    pub sun: Option<[f64; 2]>,
+    /// Draw contour lines so many metres apart
+    #[arg(long, value_name = "METRES", value_parser = parse::positive)]
+    pub contours: Option<f64>,
+    /// Engine: kinetic (the mesh changes from frame to frame) or soar (the whole mesh anew); the pictures are the same
+    #[arg(long, value_name = "ENGINE", default_value = "kinetic", value_parser = engine())]
+    pub engine: PictureEngine,
+    /// What is left out of view: vertices (the mesh is coarse there) or clusters (the mesh is refined all around, clusters are not drawn)
+    #[arg(long, value_name = "WHAT", default_value = Culling::default().name(), value_parser = parse::culling())]
+    pub culling: Culling,
+}
+
+impl PictureArgs {
+    /// How it looks. Edges are smooth.
+    pub(super) fn look(&self) -> Look {
+        let mut look = Look::named(&self.style).unwrap_or_default();
+        look.ramp = self.ramp.unwrap_or(look.ramp);
+        look.morph = self.morph;
+        look.multisample = true;
+        if let Some([azimuth_deg, elevation_deg]) = self.sun {
+            look.sun = Sun {
+                azimuth_rad: azimuth_deg.to_radians() as f32,
+                elevation_rad: elevation_deg.to_radians() as f32,
+                ..look.sun
+            };
+        }
+        if let Some(metres) = self.contours {
+            let lines = look.contours.unwrap_or_default();
+            look.contours = Some(Contours { interval_m: metres as f32, ..lines });
+        }
+        look
+    }
+
+    /// A view at this tolerance and exaggeration.
+    pub(super) fn refine(&self, view: View) -> View {
+        View { tolerance_px: self.tolerance_px, vertical_exaggeration: self.exaggeration, ..view }
+    }
+
+    /// How the scene is made.
+    pub(super) fn scene(&self) -> SceneOptions {
+        SceneOptions { engine: self.engine, culling: self.culling, ..SceneOptions::default() }
+    }
+
+    /// The engine's word.
+    pub(super) fn engine_name(&self) -> &'static str {
+        match self.engine {
+            PictureEngine::Kinetic => "kinetic",
+            PictureEngine::Soar => "soar",
+        }
+    }
+}
+
+pub(super) fn style() -> impl TypedValueParser<Value = String> {
+    PossibleValuesParser::new(LOOKS.iter().map(|(name, about)| PossibleValue::new(*name).help(*about)))
+}
+
+pub(super) fn ramp() -> impl TypedValueParser<Value = &'static Ramp> {
+    PossibleValuesParser::new(RAMPS.iter().map(|ramp| ramp.name))
+        .map(|name| Ramp::named(&name).unwrap_or(&RAMPS[0]))
+}
+
+fn engine() -> impl TypedValueParser<Value = PictureEngine> {
+    PossibleValuesParser::new(["kinetic", "soar"])
+        .map(|name| if name == "soar" { PictureEngine::Soar } else { PictureEngine::Kinetic })
+}
+
+fn switch() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|word| word == "on")
+}
+
+/// Two angles: an azimuth of any turn and an elevation from -90 to 90 degrees.
+fn sun(text: &str) -> Result<[f64; 2], String> {
+    let [azimuth, elevation] = angles(text)?;
+    if (-90.0..=90.0).contains(&elevation) {
+        Ok([azimuth, elevation])
+    } else {
+        Err("the second number, degrees above the horizon, must be from -90 to 90".into())
+    }
+}
+
+/// Two numbers of degrees.
+pub(super) fn angles(text: &str) -> Result<[f64; 2], String> {
+    let (first, second) = text.split_once(',').ok_or("give two numbers of degrees, such as 312,38")?;
+    Ok([parse::finite(first)?, parse::finite(second)?])
+}
+
+/// Three bytes a pixel as PNG.
+pub(super) fn write_png(path: &Path, rgb: &[u8], size: Viewport) -> Result<()> {
+    let file = AtomicFile::create(path)?;
+    let mut out = BufWriter::new(file.file());
+    let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Default, FilterType::Adaptive);
+    let encoded = image::ImageEncoder::write_image(
+        encoder,
+        rgb,
+        size.width_px,
+        size.height_px,
+        ExtendedColorType::Rgb8,
+    );
+    if let Err(error) = encoded {
+        bail!("{}: cannot write the picture: {error}", path.display());
+    }
+    out.flush()?;
+    drop(out);
+    Ok(file.publish()?)
+}
+
+/// Draws a frame of a flight, flown to it, as PNG; gives the adapter's name.
+pub(super) fn write_frame(
+    terrain: &Terrain,
+    flight: &Flight,
+    frame: usize,
+    quality: Quality,
+    path: &Path,
+) -> Result<String> {
+    let options = SceneOptions { culling: quality.culling, ..SceneOptions::default() };
+    let mut studio = Studio::new(terrain, options, quality.viewport)?;
+    let view = |frame: &FlightFrame| View {
+        vertical_exaggeration: quality.vertical_exaggeration,
+        ..frame.view(quality.viewport, quality.tolerance_px)
+    };
+    let Some(asked) = flight.frames.get(frame) else { bail!("the flight has no frame {frame}") };
+    for flown in &flight.frames[..=frame] {
+        studio.fly(&view(flown));
+    }
+    let look = Look { multisample: true, ..Look::default() };
+    let rgb = studio.picture(&view(asked), &look)?;
+    write_png(path, &rgb, quality.viewport)?;
+    Ok(studio.capabilities().adapter.clone())
+}

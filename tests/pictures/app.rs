@@ -1,0 +1,10 @@
+//! The program's own scene, taken in as it is.
+
+#![allow(dead_code, reason = "tests use a part of it")]
+
+#[path = "../../src/app/feed.rs"]
+pub mod feed;
+#[path = "../../src/app/full_mesh.rs"]
+pub mod full_mesh;
+#[path = "../../src/app/scene.rs"]
+pub mod scene;

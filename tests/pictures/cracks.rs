@@ -1,0 +1,60 @@
+//! Where ground covers the whole picture no pixel shows what is behind it, at any frame: the mesh has no cracks.
+
+use super::app::feed::PictureEngine;
+use super::app::scene::SceneOptions;
+use super::rig::{Rig, view};
+use super::{Outcome, Test, ensure};
+use terrasoar::refine::Culling;
+use terrasoar::view::View;
+use terrasoar_render::{Gpu, Look};
+
+pub const TESTS: &[Test] = &[
+    ("cracks::none_along_a_flight", along_a_flight),
+    ("cracks::none_where_clusters_are_culled", clusters),
+    ("cracks::none_with_exaggeration", exaggerated),
+];
+
+const SIZE_PX: [u32; 2] = [400, 300];
+const FRAMES: u32 = 14;
+
+/// A frame of a flight that descends, turns, rolls and zooms, and never sees beyond the terrain: its highest line of sight is 12 degrees down.
+fn frame(i: u32) -> View {
+    let t = f64::from(i) / f64::from(FRAMES - 1);
+    let fov_deg = 24.0 + 22.0 * (5.0 * t).cos();
+    let roll_deg = 50.0 * (3.0 * t).sin();
+    let eye_km = [70.0 + 18.0 * t, 64.0 + 9.0 * t, 9.0 - 3.4 * t];
+    // Half the diagonal of the picture.
+    let reach_deg = (5.0 / 3.0 * (0.5 * fov_deg.to_radians()).tan()).atan().to_degrees();
+    view(eye_km, [70.0 * t, -13.0 - reach_deg - 20.0 * t, roll_deg], fov_deg, SIZE_PX)
+}
+
+fn check(gpu: &Gpu, options: SceneOptions, exaggeration: f64, tolerance_px: f64) -> Outcome {
+    let mut rig = Rig::new(gpu, options, SIZE_PX);
+    for i in 0..FRAMES {
+        let mut view = View { tolerance_px, vertical_exaggeration: exaggeration, ..frame(i) };
+        // The ground comes nearer by as much as it grows; the eye keeps its height above it.
+        view.eye_m.z += 4400.0 * (exaggeration - 1.0);
+        rig.scene.update(&view);
+        for morph in [true, false] {
+            rig.draw(&view, &Look { morph, ..Look::default() });
+            let holes = rig.depth_m().iter().filter(|d| d.is_infinite()).count();
+            ensure(holes == 0, || format!("frame {i}, morph {morph}: {holes} pixels show the sky"))?;
+        }
+    }
+    Ok(())
+}
+
+fn along_a_flight(gpu: &Gpu) -> Outcome {
+    check(gpu, SceneOptions::default(), 1.0, 1.0)?;
+    // Large triangles move farthest.
+    check(gpu, SceneOptions::default(), 1.0, 12.0)?;
+    check(gpu, SceneOptions { engine: PictureEngine::Soar, ..SceneOptions::default() }, 1.0, 4.0)
+}
+
+fn clusters(gpu: &Gpu) -> Outcome {
+    check(gpu, SceneOptions { culling: Culling::Clusters, ..SceneOptions::default() }, 1.0, 4.0)
+}
+
+fn exaggerated(gpu: &Gpu) -> Outcome {
+    check(gpu, SceneOptions::default(), 2.5, 2.0)
+}

@@ -1,0 +1,153 @@
+//! The verbs `snapshot` and `movie` of the real program.
+
+use super::support::{Bench, fields, text};
+use super::{Outcome, Test, ensure};
+use terrasoar_render::{Gpu, LOOKS};
+
+pub const TESTS: &[Test] = &[
+    ("program::a_snapshot_repeats", snapshot_repeats),
+    ("program::every_style_draws", every_style),
+    ("program::movies_repeat_and_leave_nothing_else", movies),
+    ("program::a_film_needs_ffmpeg", film),
+    ("program::compare_has_a_picture", report),
+];
+
+/// Width and height of a PNG file.
+fn png_size(bytes: &[u8]) -> Option<[u32; 2]> {
+    let picture = image::load_from_memory(bytes).ok()?;
+    Some([picture.width(), picture.height()])
+}
+
+fn read(bench: &Bench, name: &str) -> Vec<u8> {
+    std::fs::read(bench.path(name)).unwrap()
+}
+
+fn snapshot_repeats(_: &Gpu) -> Outcome {
+    let bench = Bench::with_flight();
+    let frame = ["--flight", "land.flight", "--frame", "25", "--size", "200x150"];
+    let snapshot = |name: &str, more: &[&str]| {
+        bench.json(&[&["snapshot", "land.iqt", "-o", name, "--json"][..], &frame, more].concat())
+    };
+    let told = snapshot("a.png", &[]);
+    let names = [
+        "output",
+        "size_px",
+        "style",
+        "ramp",
+        "frame",
+        "eye_m",
+        "yaw_deg",
+        "pitch_deg",
+        "vertical_fov_deg",
+        "tolerance_px",
+        "exaggeration",
+        "engine",
+        "triangles",
+        "adapter",
+        "backend",
+    ];
+    let mut sorted = names;
+    sorted.sort_unstable();
+    let mut said = fields(&told);
+    said.sort_unstable();
+    ensure(said == sorted, || format!("{told}"))?;
+    snapshot("b.png", &[]);
+    snapshot("soar.png", &["--engine", "soar"]);
+    snapshot("clusters.png", &["--culling", "clusters"]);
+    let a = read(&bench, "a.png");
+    ensure(png_size(&a) == Some([200, 150]), || "the size is another".into())?;
+    for other in ["b.png", "soar.png", "clusters.png"] {
+        ensure(a == read(&bench, other), || format!("{other} is another picture"))?;
+    }
+    let said = bench.good(&["snapshot", "land.iqt", "-o", "all.png", "--size", "160x120"]);
+    ensure(said.starts_with("all.png: 160 x 120 pixels, "), || said)?;
+    bench.good(&["snapshot", "land.iqt", "-o", "at.png", "--at", "-500,200,900", "--size", "160x120"]);
+    bench.bad(1, &["snapshot", "land.iqt", "-o", "c.png", "--flight", "land.flight", "--frame", "40"]);
+    let expected = [
+        "a.png",
+        "all.png",
+        "at.png",
+        "b.png",
+        "clusters.png",
+        "land.flight",
+        "land.iqt",
+        "land.tif",
+        "soar.png",
+    ];
+    ensure(bench.names() == expected, || format!("{:?}", bench.names()))
+}
+
+fn every_style(_: &Gpu) -> Outcome {
+    let bench = Bench::with_terrain();
+    let mut pictures: Vec<(String, Vec<u8>)> = Vec::new();
+    let mut keep = |name: &str, more: &[&str]| -> Outcome {
+        bench.good(&[&["snapshot", "land.iqt", "-o", "a.png", "--size", "160x120"][..], more].concat());
+        let picture = read(&bench, "a.png");
+        let like = pictures.iter().find(|(_, p)| *p == picture).map(|(n, _)| n.clone());
+        ensure(like.is_none(), || format!("{name} looks as {}", like.unwrap_or_default()))?;
+        pictures.push((name.to_owned(), picture));
+        Ok(())
+    };
+    for (style, _) in LOOKS {
+        keep(style, &["--style", style])?;
+    }
+    keep("another ramp", &["--ramp", "mars"])?;
+    keep("another sun", &["--sun", "90,10"])?;
+    keep("lines", &["--contours", "20"])?;
+    keep("exaggerated", &["--exaggeration", "2"])?;
+    keep("coarse", &["--tolerance-px", "30", "--style", "wireframe"])?;
+    keep("at rest", &["--tolerance-px", "30", "--style", "wireframe", "--morph", "off"])
+}
+
+fn movies(_: &Gpu) -> Outcome {
+    let bench = Bench::with_flight();
+    let movie = |out: &str| {
+        let size = ["--size", "120x90", "--every", "10", "--fps", "10"];
+        bench.good(&[&["movie", "land.iqt", "--flight", "land.flight", "-o", out][..], &size].concat())
+    };
+    for (a, b) in [("a.gif", "b.gif"), ("a", "b")] {
+        let said = movie(a);
+        ensure(said.contains(": 4 pictures of 120 x 90 pixels"), || said)?;
+        movie(b);
+    }
+    ensure(read(&bench, "a.gif") == read(&bench, "b.gif"), || "two GIFs differ".into())?;
+    for i in 0..4 {
+        let [a, b] = ["a", "b"].map(|folder| read(&bench, &format!("{folder}/frame-{i:05}.png")));
+        ensure(a == b && png_size(&a) == Some([120, 90]), || format!("frame {i} differs"))?;
+        let frame = (10 * i).to_string();
+        let args = ["--flight", "land.flight", "--frame", &frame, "--size", "120x90"];
+        bench.good(&[&["snapshot", "land.iqt", "-o", "s.png"][..], &args].concat());
+        ensure(a == read(&bench, "s.png"), || format!("frame {i} is not the snapshot's"))?;
+    }
+    let again = bench.bad(1, &["movie", "land.iqt", "--flight", "land.flight", "-o", "a"]);
+    ensure(again.contains("not empty"), || again)?;
+    let expected = ["a", "a.gif", "b", "b.gif", "land.flight", "land.iqt", "land.tif", "s.png"];
+    ensure(bench.names() == expected, || format!("{:?}", bench.names()))
+}
+
+/// Without an ffmpeg it says what to install and leaves nothing; with one that works the film is there.
+fn film(_: &Gpu) -> Outcome {
+    let bench = Bench::with_flight();
+    let args =
+        ["movie", "land.iqt", "--flight", "land.flight", "-o", "a.mp4", "--size", "121x90", "--every", "20"];
+    let output = bench.command(&args).env("PATH", bench.folder()).output().unwrap();
+    let said = text(&output.stderr);
+    ensure(output.status.code() == Some(1) && said.contains("apt install ffmpeg"), || said)?;
+    ensure(!bench.path("a.mp4").exists(), || "something was left".into())?;
+    if std::process::Command::new("ffmpeg").arg("-version").output().is_ok() {
+        bench.good(&args);
+        let film = read(&bench, "a.mp4");
+        ensure(film.get(4..8) == Some(b"ftyp"), || "no film".into())?;
+    }
+    Ok(())
+}
+
+fn report(_: &Gpu) -> Outcome {
+    let bench = Bench::with_flight();
+    let args =
+        ["compare", "land.iqt", "--flight", "land.flight", "--no-sweeps", "--viewport", "160x120", "-o", "r"];
+    bench.good(&args);
+    ensure(png_size(&read(&bench, "r/flight.png")) == Some([160, 120]), || "no picture".into())?;
+    let page = text(&read(&bench, "r/report.html"));
+    ensure(page.contains("<img src=\"flight.png\"") && page.contains("Frame 20 of 40"), || page)
+}
