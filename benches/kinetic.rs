@@ -172,8 +172,7 @@ fn fly_kinetic<C: RecordCodec>(records: &Records<'_, C>, views: &[View], culling
             run.changes += (work.splits + work.merges) as f64;
             run.slots += work.slots_written as f64;
             run.patch_bytes += work.patch_bytes as f64;
-            run.bytes_a_triangle =
-                run.bytes_a_triangle.max(engine.bytes() as f64 / engine.triangle_count() as f64);
+            run.bytes_a_triangle += engine.bytes() as f64 / engine.triangle_count() as f64;
         },
     )
 }

@@ -6,6 +6,7 @@
 mod common;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use terrasoar::refine::kinetic::Kinetic;
 use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
@@ -26,6 +27,9 @@ fn updates(criterion: &mut Criterion) {
         let mut smart = Smart::new(records.clone(), Culling::Vertices);
         step = 0;
         group.bench_function("smart", |b| b.iter(|| { step += 1; smart.update(&view(step), &mut Unobserved) }));
+        let mut kinetic = Kinetic::new(records.clone(), Culling::Vertices);
+        step = 0;
+        group.bench_function("kinetic", |b| b.iter(|| { step += 1; kinetic.update(&view(step), &mut Unobserved) }));
         group.finish();
     });
 }

@@ -5,7 +5,7 @@
 
 use crate::flight::FlightFrame;
 use crate::mesh::{Triangle, TriangleKey, is_drawn, parent, with_apex_first};
-use crate::refine::kinetic::Kinetic;
+use crate::refine::kinetic::{Budget, Kinetic};
 use crate::refine::naive::Naive;
 use crate::refine::smart::Smart;
 use crate::refine::soar::Soar;
@@ -99,6 +99,8 @@ pub struct Quality {
     pub vertical_exaggeration: f64,
     /// Where what lies out of view is left out.
     pub culling: Culling,
+    /// Vertex tests of one frame that [`EngineKind::Kinetic`] may make; other engines know no bounds.
+    pub budget_tests: Option<u64>,
 }
 
 impl Default for Quality {
@@ -108,6 +110,7 @@ impl Default for Quality {
             tolerance_px: 1.0,
             vertical_exaggeration: 1.0,
             culling: Culling::default(),
+            budget_tests: None,
         }
     }
 }
@@ -133,24 +136,25 @@ impl Quality {
     }
 }
 
-/// Runs `$body` with `$engine` bound to a new engine of `$kind` over `$records` that culls as `$culling` says.
+/// Runs `$body` with `$engine` bound to a new engine of `$kind` over `$records`, as `$quality` wants it.
 macro_rules! with_engine {
-    ($kind:expr, $records:expr, $culling:expr, $engine:ident => $body:expr) => {
+    ($kind:expr, $records:expr, $quality:expr, $engine:ident => $body:expr) => {
         match $kind {
             EngineKind::Naive => {
-                let $engine = Naive::new($records, $culling);
+                let $engine = Naive::new($records, $quality.culling);
                 $body
             }
             EngineKind::Soar => {
-                let $engine = Soar::new($records, $culling);
+                let $engine = Soar::new($records, $quality.culling);
                 $body
             }
             EngineKind::Smart => {
-                let $engine = Smart::new($records, $culling);
+                let $engine = Smart::new($records, $quality.culling);
                 $body
             }
             EngineKind::Kinetic => {
-                let $engine = Kinetic::new($records, $culling);
+                let mut $engine = Kinetic::new($records, $quality.culling);
+                $engine.set_budget(Budget { tests: $quality.budget_tests, time: None });
                 $body
             }
         }
@@ -170,8 +174,8 @@ pub fn replay(
 ) -> Result<Vec<FrameStats>, ReplayError> {
     let quality = quality.check()?;
     with_records!(records_of(terrain)?, records => {
-        let times = with_engine!(kind, records.clone(), quality.culling, engine => time_updates(engine, frames, quality, done));
-        let mut stats = with_engine!(kind, records.clone(), quality.culling, engine => count_frames(engine, &records, frames, quality, done));
+        let times = with_engine!(kind, records.clone(), quality, engine => time_updates(engine, frames, quality, done));
+        let mut stats = with_engine!(kind, records.clone(), quality, engine => count_frames(engine, &records, frames, quality, done));
         for (stats, times) in stats.iter_mut().zip(times) {
             stats.update_ms = times.update_ms;
             [stats.scan_us, stats.test_us, stats.apply_us] = times.phases_us;
@@ -409,7 +413,7 @@ pub fn frame_mesh(
     let Some(flown) = frames.get(..=frame) else {
         return Err(ReplayError::NoSuchFrame { asked: frame, last: frames.len().saturating_sub(1) });
     };
-    with_records!(records_of(terrain)?, records => with_engine!(kind, records.clone(), quality.culling, engine => {
+    with_records!(records_of(terrain)?, records => with_engine!(kind, records.clone(), quality, engine => {
         let mut engine = engine;
         for frame in flown {
             engine.update(&quality.view(frame), &mut Unobserved);

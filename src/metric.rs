@@ -27,6 +27,16 @@ pub struct Metric {
     normals: [[f64; 3]; PLANES],
 }
 
+/// A side plane of the view pyramid in single precision, moved outwards by more than the rounding of a test: a corner is beyond it if
+/// `normal . corner + offset` is above 0.
+#[derive(Debug, Clone, Copy)]
+pub struct BoxPlane {
+    /// Metres a unit of each axis, signed.
+    pub normal: [f32; 3],
+    /// Metres.
+    pub offset: f32,
+}
+
 /// A vertex relative to the eye: what both tests work on.
 #[derive(Debug, Clone, Copy)]
 pub struct Sighting {
@@ -119,17 +129,16 @@ impl Metric {
         (0..PLANES).map(|i| self.height_over_plane(i, sighting)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Whether a box, given in grid steps east and north and metres of height, lies wholly outside one of the planes.
-    #[inline]
-    pub fn culls_box(&self, least: [f32; 3], largest: [f32; 3], spacing_m: [f64; 2]) -> bool {
+    /// The planes as boxes are tested against them: in grid steps east and north and metres of height, none of which exceeds `largest`.
+    pub fn box_planes(&self, spacing_m: [f64; 2], largest: f64) -> [BoxPlane; PLANES] {
         let factors = [spacing_m[0], spacing_m[1], self.exaggeration];
-        self.normals.iter().any(|normal| {
-            // The corner farthest inside.
-            let inmost = |i: usize| {
-                let side = if normal[i] < 0.0 { largest[i] } else { least[i] };
-                normal[i] * (f64::from(side) * factors[i] - self.eye_m[i])
-            };
-            inmost(0) + inmost(1) + inmost(2) > 0.0
+        self.normals.map(|n| {
+            let normal = [0, 1, 2].map(|i| n[i] * factors[i]);
+            let offset: f64 = -(0..3).map(|i| n[i] * self.eye_m[i]).sum::<f64>();
+            // Four roundings of sums no larger than this, each by half a unit in the last of 24 bits.
+            let size: f64 = normal.iter().map(|n| n.abs() * largest).sum::<f64>() + offset.abs();
+            let slack = size * 4.0 * f64::from(f32::EPSILON);
+            BoxPlane { normal: normal.map(|n| n as f32), offset: (offset - slack) as f32 }
         })
     }
 }
@@ -177,11 +186,10 @@ impl Sighting {
         self.radius_m
     }
 
-    /// The error of a vertex as it may show on the screen, in pixels: infinite for an eye inside its sphere. `tolerance_px` is the metric's.
-    pub fn error_px(&self, tolerance_px: f64) -> f64 {
-        let clear_m = self.distance_m() - self.radius_m;
-        let seen = if clear_m > 0.0 { (self.reach_m - self.radius_m) / clear_m } else { f64::INFINITY };
-        seen * tolerance_px
+    /// The error of a vertex as it may show on the screen, in pixels, seen from `nearest_m` at the least: inside the vertex's sphere the ground may be as near as
+    /// can be. `tolerance_px` is the metric's.
+    pub fn error_px(&self, tolerance_px: f64, nearest_m: f64) -> f64 {
+        (self.reach_m - self.radius_m) / (self.distance_m() - self.radius_m).max(nearest_m) * tolerance_px
     }
 
     /// A bound on twice the rounding error of the margins: a status cannot change while the exact margin exceeds it.

@@ -159,6 +159,78 @@ fn zoom_and_tolerance() {
 }
 
 #[test]
+fn spinning_and_rolling() {
+    for terrain in terrains() {
+        let spin = (0..60).map(|i| frame(&terrain, [0.5, 0.5], 1200.0, 4.0 * f64::from(i), -20.0));
+        let roll = (0..40).map(|i| FlightFrame {
+            roll_deg: 5.0 * f64::from(i),
+            ..frame(&terrain, [0.5, 0.5], 1200.0, 240.0 + 2.0 * f64::from(i), -20.0 - 0.5 * f64::from(i))
+        });
+        fly(&terrain, &views(spin.chain(roll), 3.0), false);
+    }
+}
+
+#[test]
+fn orbit_and_terrain_following() {
+    for terrain in terrains() {
+        let [width_m, height_m] = terrain.grid().extent_m();
+        let orbit = (0..50).map(|i| {
+            let angle = f64::from(i) * 0.06;
+            let at = [0.5 + 0.4 * angle.cos(), 0.5 + 0.4 * angle.sin()];
+            frame(&terrain, at, 1300.0, 270.0 - angle.to_degrees(), -25.0)
+        });
+        let low = (0..50).map(|i| {
+            let at = [0.2 + 0.01 * f64::from(i), 0.3 + 0.008 * f64::from(i)];
+            let ground_m = terrain.height_m(at[0] * width_m, at[1] * height_m).unwrap().unwrap_or(800.0);
+            frame(&terrain, at, ground_m + 25.0, 50.0, -8.0)
+        });
+        fly(&terrain, &views(orbit.chain(low), 3.0), false);
+    }
+}
+
+#[test]
+fn vertical_exaggeration() {
+    for terrain in terrains() {
+        let flown: Vec<View> = (0..50)
+            .map(|i| {
+                let at = frame(
+                    &terrain,
+                    [0.3 + 0.004 * f64::from(i), 0.3],
+                    2200.0,
+                    20.0 + f64::from(i % 7),
+                    -25.0,
+                );
+                let factor = if i < 10 { 1.0 } else { 0.4 + 0.05 * f64::from(i) };
+                View { vertical_exaggeration: factor, ..at.view(VIEWPORT, 2.0) }
+            })
+            .collect();
+        fly(&terrain, &flown, false);
+    }
+}
+
+/// Round and round until every clock has run out of ticks many times over.
+#[test]
+fn longer_than_the_clocks() {
+    let terrain = rugged_terrain([65, 65], 2, false);
+    with_records!(terrain.records().unwrap(), records => {
+        for culling in Culling::ALL {
+            let mut soar = Soar::new(records.clone(), culling);
+            let mut kinetic = Kinetic::new(records.clone(), culling);
+            // A tick is 10 m / 256 and a clock has 2^22 of them: 164 km, of which each frame takes some.
+            for i in 0..1500 {
+                let angle = f64::from(i) * 0.4;
+                let wide = 1.0 + 0.9 * (f64::from(i) * 0.013).sin();
+                let at = [0.5 + 3.0 * wide * angle.cos(), 0.5 + 3.0 * wide * angle.sin()];
+                let view = frame(&terrain, at, 2000.0, 90.0 - angle.to_degrees() + f64::from(i % 11), -20.0).view(VIEWPORT, 0.4);
+                soar.update(&view, &mut Unobserved);
+                kinetic.update(&view, &mut Unobserved);
+                assert!(keys(&triangles(&soar)) == keys(&triangles(&kinetic)), "{culling:?}, frame {i}");
+            }
+        }
+    });
+}
+
+#[test]
 fn slower_than_a_tick() {
     let terrain = rugged_terrain([129, 129], 8, false);
     // A tick is spacing / 64, some 0.16 m; each frame moves a hundredth of that.
@@ -223,15 +295,25 @@ proptest! {
     #[test]
     fn random_walks(
         wide in 2u32..90, high in 2u32..90, seed in 0u64..100, holes: bool, tolerance_px in 0.3f64..6.0,
-        steps in prop::collection::vec((-0.1f64..0.1, -0.1f64..0.1, -80.0f64..80.0, -30.0f64..30.0, any::<bool>()), 3..25),
+        steps in prop::collection::vec((-0.1f64..0.1, -0.1f64..0.1, -80.0f64..80.0, -30.0f64..30.0, any::<bool>(), 0u8..8), 3..25),
     ) {
         let terrain = rugged_terrain([wide, high], seed, holes);
         let (mut x, mut y, mut up, mut yaw) = (0.5, 0.5, 1200.0, 0.0);
-        let path: Vec<FlightFrame> = steps.iter().map(|(dx, dy, dz, turn, turning)| {
+        let (mut tolerance_px, mut exaggeration, mut fov, mut roll) = (tolerance_px, 1.0, 45.0, 0.0);
+        let flown: Vec<View> = steps.iter().map(|(dx, dy, dz, turn, turning, other)| {
             (x, y, up) = (x + dx, y + dy, up + dz);
             if *turning { yaw += turn; }
-            frame(&terrain, [x, y], up, yaw, -25.0)
+            match other {
+                0 => tolerance_px = (tolerance_px * (1.0 + dx)).max(0.2),
+                1 => exaggeration *= 1.0 + dy,
+                2 => fov *= 1.0 + dx,
+                3 => roll += turn,
+                _ => {}
+            }
+            let at = FlightFrame { vertical_fov_deg: fov, roll_deg: roll, ..frame(&terrain, [x, y], up, yaw, -25.0) };
+            View { vertical_exaggeration: exaggeration, ..at.view(VIEWPORT, tolerance_px) }
         }).collect();
-        fly(&terrain, &views(path, tolerance_px), true);
+        let plain = flown.iter().all(|view| view.vertical_exaggeration == 1.0);
+        fly(&terrain, &flown, plain);
     }
 }

@@ -5,11 +5,11 @@ use terrasoar::view::{View, Viewport};
 use terrasoar_layout::terrain::Terrain;
 
 /// Heading of the overview, degrees: the light comes from the left, as on maps.
-const YAW_DEG: f64 = 22.0;
+const YAW_DEG: f64 = 16.0;
 /// Its climb, degrees.
-const PITCH_DEG: f64 = -33.0;
+const PITCH_DEG: f64 = -38.0;
 /// How much more room than the terrain needs.
-const MARGIN: f64 = 1.02;
+const MARGIN: f64 = 1.03;
 
 /// Vertical field of view where none is asked for, degrees.
 pub(crate) const FOV_DEG: f64 = 45.0;
@@ -58,9 +58,49 @@ pub(crate) fn overview(terrain: &Terrain, exaggeration: f64, fov_deg: f64, viewp
     let tan_x = tan_y * f64::from(viewport.width_px) / f64::from(viewport.height_px);
     let corners =
         (0..8).map(|i| half * DVec3::from([0, 1, 2].map(|bit| f64::from(i >> bit & 1) * 2.0 - 1.0)));
-    // A corner c is in the picture from distance d if |c . right| <= tan_x (d + c . forward), and likewise upwards.
-    let distance_m = corners
-        .map(|c| ((c.dot(right).abs() / tan_x).max(c.dot(up).abs() / tan_y)) - c.dot(forward))
-        .fold(0.0, f64::max);
-    View { eye_m: middle - forward * (MARGIN * distance_m), vertical_exaggeration: exaggeration, ..view }
+    // A corner c is between two opposite planes from distance d and a step s aside if |c . axis - s| <= tan (d + c . forward). The least d and
+    // its s:
+    let between = |axis: DVec3, tan: f64| {
+        let reach = |sign: f64| {
+            corners
+                .clone()
+                .map(|c| sign * c.dot(axis) - tan * c.dot(forward))
+                .fold(f64::NEG_INFINITY, f64::max)
+        };
+        let [one, other] = [reach(1.0), reach(-1.0)];
+        [0.5 * (one + other) / tan, 0.5 * (one - other)]
+    };
+    let [[far_x, aside_x], [far_y, aside_y]] = [between(right, tan_x), between(up, tan_y)];
+    let eye_m = middle + right * aside_x + up * aside_y - forward * (MARGIN * far_x.max(far_y));
+    View { eye_m, vertical_exaggeration: exaggeration, ..view }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use terrasoar_layout::build::{BuildOptions, Silent, build};
+    use terrasoar_layout::dem::{MemoryDem, SampleType};
+
+    #[test]
+    fn the_whole_box_is_in_the_picture_and_fills_it_one_way() {
+        let dem = MemoryDem::from_fn([65, 33], SampleType::I16, |x, y| f64::from((x * 7) ^ (y * 5)));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("land.iqt");
+        build(&dem, &path, &BuildOptions { spacing_m: Some([30.0, 20.0]), ..Default::default() }, &Silent)
+            .unwrap();
+        let terrain = Terrain::open(&path).unwrap();
+        for (width_px, height_px) in [(1280, 720), (300, 900)] {
+            let view = overview(&terrain, 2.0, FOV_DEG, Viewport { width_px, height_px });
+            let [middle, half] = box_of(&terrain, 2.0);
+            let least = |n: DVec3| {
+                let corner =
+                    |i: u8| half * DVec3::from([0, 1, 2].map(|bit| f64::from(i >> bit & 1) * 2.0 - 1.0));
+                let beyond = |c: DVec3| n.dot(middle + c - view.eye_m);
+                (0..8).map(|i| -beyond(corner(i))).fold(f64::INFINITY, f64::min)
+            };
+            let room = view.side_normals().map(least);
+            assert!(room.iter().all(|r| *r > 0.0), "{room:?}");
+            assert!(room.iter().any(|r| *r < 0.06 * half.length()), "{room:?}");
+        }
+    }
 }

@@ -10,6 +10,7 @@
 //! Cost on the processor: the engine's update, a copy of its patch, some 2 ms a tile.
 
 use super::feed::{Feed, PictureEngine, Refined, feed, mesh_vertex};
+use std::collections::HashMap;
 use std::ops::Range;
 use terrasoar::refine::Culling;
 use terrasoar::refine::kinetic::Patch;
@@ -79,6 +80,8 @@ pub(crate) struct Scene<'a> {
     renderer: Renderer,
     options: SceneOptions,
     pending: Pending,
+    /// Border edges, as vertex slots, and how far down walls go from them.
+    walls: Option<(Vec<[u32; 2]>, f32)>,
     heights_m: Vec<f32>,
     wanted: Vec<TileId>,
 }
@@ -129,6 +132,7 @@ impl<'a> Scene<'a> {
             renderer,
             options,
             pending: Pending::default(),
+            walls: None,
             heights_m: Vec::new(),
             wanted: Vec::new(),
         })
@@ -210,6 +214,14 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
+    /// Puts walls below the terrain's border, down to `bottom_m` (before exaggeration), so that it stands as a block. They go along the mesh of the
+    /// last update: after another one raise them anew. Costs a walk over the mesh.
+    pub(crate) fn raise_walls(&mut self, bottom_m: f32) {
+        let edges = border(&self.feed.whole(), self.renderer.terrain().samples);
+        self.renderer.set_walls(&edges, bottom_m);
+        self.walls = Some((edges, bottom_m));
+    }
+
     /// Goes on with another device, after the loss of the old one: the next picture is as if nothing had happened. The engine is not touched.
     ///
     /// # Errors
@@ -217,6 +229,9 @@ impl<'a> Scene<'a> {
     pub(crate) fn recover(&mut self, gpu: &Gpu) -> Result<(), SceneError> {
         self.renderer = new_renderer(*self.renderer.terrain(), gpu, self.options)?;
         self.pending = Pending { changed: true, ..Pending::default() };
+        if let Some((edges, bottom_m)) = &self.walls {
+            self.renderer.set_walls(edges, *bottom_m);
+        }
         Ok(())
     }
 
@@ -234,6 +249,22 @@ impl<'a> Scene<'a> {
     pub(crate) fn gpu_time_ms(&mut self) -> Option<f64> {
         self.renderer.gpu_time_ms()
     }
+}
+
+/// Edges of drawn triangles that lie on the border of the data, as vertex slots.
+fn border(whole: &Patch, samples: [u32; 2]) -> Vec<[u32; 2]> {
+    let sides: HashMap<u32, [bool; 4]> = whole
+        .vertices
+        .iter()
+        .map(|(slot, v)| (*slot, [v.x == 0, v.y == 0, v.x + 1 == samples[0], v.y + 1 == samples[1]]))
+        .filter(|(_, sides)| sides.contains(&true))
+        .collect();
+    let on_one_side = |[a, b]: &[u32; 2]| match (sides.get(a), sides.get(b)) {
+        (Some(a), Some(b)) => a.iter().zip(b).any(|(a, b)| *a && *b),
+        _ => false,
+    };
+    let drawn = whole.triangles.iter().map(|(_, corners)| *corners).filter(|[a, b, _]| a != b);
+    drawn.flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).filter(on_one_side).collect()
 }
 
 fn new_renderer(shape: TerrainShape, gpu: &Gpu, options: SceneOptions) -> Result<Renderer, RenderError> {

@@ -38,6 +38,11 @@ impl<'a> Studio<'a> {
         self.scene.update(view)
     }
 
+    /// Makes the terrain a block: walls from its border down to `bottom_m`, heights before exaggeration.
+    pub(crate) fn raise_walls(&mut self, bottom_m: f64) {
+        self.scene.raise_walls(bottom_m as f32);
+    }
+
     /// A picture of the mesh as it is: three bytes a pixel, row by row from the top.
     ///
     /// # Errors

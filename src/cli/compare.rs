@@ -19,8 +19,8 @@ use terrasoar_layout::terrain::Terrain;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  terrasoar compare alps.iqt --flight low.flight --engines soar,smart -o report
-  terrasoar compare alps.iqt --flight low.flight --engines naive,soar,smart --no-sweeps -o report --json
+  terrasoar compare alps.iqt --flight low.flight -o report
+  terrasoar compare alps.iqt --flight low.flight --engines naive,soar,smart,kinetic --no-sweeps -o report --json
 
 Two sweeps redo the plots of the SMART paper: speed-up by tolerance (0.5 to 8 px) and by incoherence (0.6, 1.4, 5.3 %). They fly up to 120
 frames a point; --no-sweeps leaves them out.")]
@@ -31,7 +31,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "F")]
     flight: PathBuf,
     /// Engines, the first being the base of the ratios
-    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "soar,smart", value_parser = parse::engine())]
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "soar,smart,kinetic", value_parser = parse::engine())]
     engines: Vec<EngineKind>,
     #[command(flatten)]
     quality: QualityArgs,

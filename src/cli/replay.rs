@@ -2,7 +2,7 @@
 
 use super::output::{check_stream, columns, grouped, print, print_json};
 use super::progress::Progress;
-use super::{parse, terrain};
+use super::{WrongUsage, parse, terrain};
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::{Flight, FlightFrame};
@@ -33,6 +33,9 @@ pub(super) struct Args {
     engine: EngineKind,
     #[command(flatten)]
     quality: QualityArgs,
+    /// Make at most N vertex tests a frame (kinetic only); what is late stays coarse, and the figures say how much
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    budget_tests: Option<u64>,
     /// Also write every frame's figures to this file
     #[arg(long, value_name = "CSV")]
     stats: Option<PathBuf>,
@@ -65,6 +68,7 @@ impl QualityArgs {
             tolerance_px: self.tolerance_px,
             vertical_exaggeration: self.exaggeration,
             culling: self.culling,
+            budget_tests: None,
         }
     }
 }
@@ -91,7 +95,14 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let flight = Flight::read(&args.flight)?;
     let progress = Progress::new("frames");
     let name = args.engine.name();
-    let frames = fly(&terrain, &flight.frames, args.quality.quality(), args.engine, name, &progress)?;
+    let quality = Quality { budget_tests: args.budget_tests, ..args.quality.quality() };
+    if quality.budget_tests.is_some() && args.engine != EngineKind::Kinetic {
+        return Err(WrongUsage(format!(
+            "--budget-tests is for the engine kinetic; {name} does all or nothing"
+        ))
+        .into());
+    }
+    let frames = fly(&terrain, &flight.frames, quality, args.engine, name, &progress)?;
     drop(progress);
     if let Some(path) = &args.stats {
         write_frames_csv(path, &frames)?;
@@ -113,6 +124,8 @@ fn text(s: &ReplaySummary) -> String {
         row("live ranges over", grouped(s.expired_total)),
         row("triangle slots written", grouped(s.slots_written_total)),
         row("patch bytes", grouped(s.patch_bytes_total)),
+        row("late, sum over frames", grouped(s.late_total)),
+        row("largest late error", format!("{:.2} px", s.late_error_px_max)),
         row("pages touched", grouped(s.pages_touched_total)),
         row("record bytes read", grouped(s.record_bytes_touched_total)),
         row("update, median", format!("{:.3} ms", t.p50)),

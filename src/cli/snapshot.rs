@@ -14,6 +14,7 @@ use terrasoar::flight::Flight;
 use terrasoar::flyover::ReplayError;
 use terrasoar::view::View;
 use terrasoar_layout::terrain::Terrain;
+use terrasoar_render::Haze;
 
 /// Draw a picture of a terrain as PNG.
 ///
@@ -111,7 +112,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     drop(progress);
     let Some(view) = views.last() else { return Err(WrongUsage("a flight without frames".into()).into()) };
-    let look = picture.look();
+    let mut look = picture.look();
+    if args.is_overview() {
+        // A block on a table: no air between it and the eye.
+        look.haze = Haze::Off;
+        studio.raise_walls(block_bottom_m(&terrain, picture.exaggeration));
+    }
     let rgb = studio.picture(view, &look)?;
     write_png(&args.output, &rgb, picture.size)?;
     let [width, height] = [picture.size.width_px, picture.size.height_px];
@@ -145,7 +151,18 @@ pub(super) fn run(args: &Args) -> Result<()> {
     ))
 }
 
+/// Where the block that the terrain is shown as ends: a fortieth of its width below the lowest ground, as drawn.
+fn block_bottom_m(terrain: &Terrain, exaggeration: f64) -> f64 {
+    let [east_m, north_m] = terrain.grid().extent_m();
+    terrain.header().height_range_m[0] - 0.025 * east_m.min(north_m) / exaggeration
+}
+
 impl Args {
+    /// Whether nothing says where the eye is.
+    fn is_overview(&self) -> bool {
+        self.flight.is_none() && self.at.is_none()
+    }
+
     /// The views to fly through; the last is the picture's.
     fn views(&self, terrain: &Terrain) -> Result<Vec<View>> {
         let (size, exaggeration) = (self.picture.size, self.picture.exaggeration);

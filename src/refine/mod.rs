@@ -53,7 +53,8 @@ pub struct Work {
     pub patch_bytes: u64,
     /// Vertices that are to be tested or split and were not, for want of budget; 0 without a budget.
     pub late: u64,
-    /// Largest error on the screen that late vertices leave, in pixels; 0 if none exceeds the tolerance.
+    /// Largest error on the screen that late vertices may leave, in pixels, the ground being a sample spacing away at the least; 0 if none exceeds the
+    /// tolerance.
     pub late_error_px: f64,
 }
 

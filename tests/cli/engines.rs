@@ -3,7 +3,7 @@
 use crate::support::{Bench, fields, text};
 use serde_json::Value;
 
-const REPLAY_FIELDS: [&str; 11] = [
+const REPLAY_FIELDS: [&str; 19] = [
     "engine",
     "frames",
     "triangles_mean",
@@ -15,6 +15,14 @@ const REPLAY_FIELDS: [&str; 11] = [
     "mesh_hash",
     "pages_touched_total",
     "record_bytes_touched_total",
+    "expired_total",
+    "slots_written_total",
+    "patch_bytes_total",
+    "late_total",
+    "late_error_px_max",
+    "scan_us_p50",
+    "test_us_p50",
+    "apply_us_p50",
 ];
 
 fn sorted(mut names: Vec<&str>) -> Vec<&str> {
@@ -84,8 +92,8 @@ fn engines_replay_the_same_mesh() {
         assert_eq!((value["engine"].as_str(), value["frames"].as_u64()), (Some(engine), Some(40)));
         value
     };
-    let [naive, soar, smart] = ["naive", "soar", "smart"].map(replay);
-    for other in [&soar, &smart, &replay("smart")] {
+    let [naive, soar, smart, kinetic] = ["naive", "soar", "smart", "kinetic"].map(replay);
+    for other in [&soar, &smart, &kinetic, &replay("smart"), &replay("kinetic")] {
         for field in ["mesh_hash", "triangles_mean", "incoherence_percent", "splits_total", "merges_total"] {
             assert_eq!(other[field], naive[field], "{field}");
         }
@@ -93,6 +101,7 @@ fn engines_replay_the_same_mesh() {
     assert_eq!(naive["mesh_hash"].as_str().unwrap().len(), 16);
     let tests = |v: &Value| v["vertex_tests_total"].as_u64().unwrap();
     assert!(tests(&smart) < tests(&soar));
+    assert!(tests(&kinetic) < tests(&smart));
     let human = bench.good(&[
         "replay",
         "land.iqt",
@@ -120,6 +129,35 @@ fn tolerance_and_viewport_change_the_mesh() {
 }
 
 #[test]
+fn a_budget_leaves_detail_out_and_says_so() {
+    let bench = Bench::with_flight();
+    let args = ["replay", "land.iqt", "--flight", "land.flight", "--json"];
+    let [all, bounded] =
+        [&[][..], &["--budget-tests", "50"]].map(|flags: &[&str]| bench.json(&[&args[..], flags].concat()));
+    assert_eq!((all["engine"].as_str(), all["late_total"].as_u64()), (Some("kinetic"), Some(0)));
+    assert!(bounded["late_total"].as_u64() > Some(0));
+    assert!(bounded["late_error_px_max"].as_f64() > Some(1.0));
+    assert!(bounded["triangles_mean"].as_f64() < all["triangles_mean"].as_f64());
+    let message = bench.bad(2, &[&args[..], &["--budget-tests", "50", "--engine", "soar"]].concat());
+    assert!(message.contains("kinetic"), "{message}");
+}
+
+#[test]
+fn culling_by_clusters_and_exaggeration_keep_the_engines_together() {
+    let bench = Bench::with_flight();
+    let args = ["compare", "land.iqt", "--flight", "land.flight", "--no-sweeps", "--json"];
+    let triangles = |flags: &[&str], out: &str| {
+        let value = bench.json(&[&args[..], flags, &["-o", out]].concat());
+        assert_eq!(value["same_mesh"], true);
+        value["engines"][2]["triangles_mean"].as_f64()
+    };
+    let plain = triangles(&[], "a");
+    assert!(triangles(&["--culling", "clusters"], "b") > plain);
+    assert!(triangles(&["--exaggeration", "3"], "c") > plain);
+    assert!(bench.bad(2, &[&args[..], &["--exaggeration", "0", "-o", "d"]].concat()).contains("0.01 to 100"));
+}
+
+#[test]
 fn compare_writes_a_report_and_one_object() {
     let bench = Bench::with_flight();
     let args = [
@@ -128,7 +166,7 @@ fn compare_writes_a_report_and_one_object() {
         "--flight",
         "land.flight",
         "--engines",
-        "soar,smart",
+        "soar,smart,kinetic",
         "-o",
         "report",
         "--no-sweeps",
@@ -137,7 +175,7 @@ fn compare_writes_a_report_and_one_object() {
     assert_eq!(sorted(fields(&value)), ["engines", "same_mesh"]);
     assert_eq!(value["same_mesh"], true);
     let engines = value["engines"].as_array().unwrap();
-    assert_eq!(engines.len(), 2);
+    assert_eq!(engines.len(), 3);
     for engine in engines {
         let names = fields(engine);
         let more = ["vertex_tests_ratio", "vertex_tests_ratio_worst_frame", "speedup_median"];
@@ -147,7 +185,7 @@ fn compare_writes_a_report_and_one_object() {
     }
     assert_eq!(engines[0]["vertex_tests_ratio"], 1.0);
     assert!(engines[1]["vertex_tests_ratio"].as_f64().unwrap() < 0.5);
-    for file in ["report.html", "summary.json", "frames-soar.csv", "frames-smart.csv"] {
+    for file in ["report.html", "summary.json", "frames-soar.csv", "frames-smart.csv", "frames-kinetic.csv"] {
         assert!(bench.path("report").join(file).is_file(), "{file}");
     }
     let output = bench.run(&args);
@@ -188,7 +226,7 @@ fn meshes_are_the_frames_triangles() {
         let at = ply.windows(end.len()).position(|w| w == end).unwrap() + end.len();
         (text(&ply[..at]), ply.len() - at)
     };
-    for engine in ["naive", "soar", "smart"] {
+    for engine in ["naive", "soar", "smart", "kinetic"] {
         let (head, body) = header(&mesh(engine, "a.ply", &[]));
         assert!(head.contains(&format!("element vertex {vertices}\n")), "{head}");
         assert!(head.contains(&format!("element face {faces}\n")), "{head}");

@@ -5,21 +5,25 @@ use std::time::{Duration, Instant};
 /// Bounds of a frame's work; none by default.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Budget {
-    /// Vertex tests of one frame. The last split may go beyond it by the tests of its children, at most 4.
+    /// Vertex tests of one frame. The last split may go beyond it by the tests of its children, at most 3.
     pub tests: Option<u64>,
-    /// Time from the first test of one frame to its last split. Exceeded by the tests of 256 vertices at most and by the merges, which always go
+    /// Time from the first test of one frame to its last split. Exceeded by no more than 256 tests or 32 splits, and by the merges, which always go
     /// through. Results then depend on the machine's speed, as nothing else here does.
     pub time: Option<Duration>,
 }
 
-/// Splits and tests between two looks at the clock.
+/// Splits between two looks at the clock.
 const STRIDE: u32 = 32;
+/// Tests between two looks at the clock.
+const BATCH: usize = 256;
 
 /// What is left of a frame's budget.
 #[derive(Debug)]
 pub(super) struct Allowance {
     tests: u64,
     until: Option<Instant>,
+    /// Tests kept for the children of splits that wait.
+    kept: usize,
     stride: u32,
     over: bool,
 }
@@ -27,27 +31,34 @@ pub(super) struct Allowance {
 impl Allowance {
     pub(super) fn new(budget: Budget) -> Self {
         let until = budget.time.map(|time| Instant::now() + time);
-        Self { tests: budget.tests.unwrap_or(u64::MAX), until, stride: 0, over: false }
+        let tests = budget.tests.unwrap_or(u64::MAX);
+        let kept = budget.tests.map_or(0, |tests| usize::try_from(tests.div_ceil(2)).unwrap_or(usize::MAX));
+        Self { tests, until, kept, stride: STRIDE - 1, over: false }
     }
 
-    /// How many of `wanted` tests may be made; takes them off.
-    pub(super) fn tests(&mut self, wanted: usize) -> usize {
-        let allowed =
-            if self.is_over() { 0 } else { wanted.min(usize::try_from(self.tests).unwrap_or(usize::MAX)) };
+    /// How many of `wanted` tests may be made before asking again; takes them off. While splits wait, half is kept for them, lest tests alone use up every
+    /// frame.
+    pub(super) fn tests(&mut self, wanted: usize, splits_wait: bool) -> usize {
+        if self.is_over() {
+            return 0;
+        }
+        let left = usize::try_from(self.tests).unwrap_or(usize::MAX);
+        let most = if splits_wait { left.saturating_sub(self.kept) } else { left };
+        let allowed = wanted.min(most).min(if self.until.is_some() { BATCH } else { usize::MAX });
         self.tests -= allowed as u64;
         allowed
     }
 
-    /// Whether one more vertex may be split; takes off the tests of its children.
+    /// Whether one more vertex may be split.
     #[inline]
     pub(super) fn split(&mut self) -> bool {
-        if self.tests == 0 || self.until.is_some() && self.is_over_by_now() {
-            return false;
-        }
-        if self.tests != u64::MAX {
-            self.tests = self.tests.saturating_sub(2);
-        }
-        true
+        self.tests > 0 && !(self.until.is_some() && self.is_over_by_now())
+    }
+
+    /// Takes off tests that will be made.
+    #[inline]
+    pub(super) fn charge(&mut self, tests: usize) {
+        self.tests = self.tests.saturating_sub(tests as u64);
     }
 
     fn is_over_by_now(&mut self) -> bool {

@@ -1,7 +1,7 @@
 //! How arrays grow and lists shrink, so that what is held follows the mesh and not the largest frame ever.
 
 /// Lists below this many bytes are left as they are.
-const SMALL_BYTES: usize = 256 << 10;
+const SMALL_BYTES: usize = 32 << 10;
 /// A list is cut down when a frame uses less than one part in so many of it.
 const UNUSED: usize = 32;
 
@@ -15,6 +15,6 @@ pub(super) fn grow<T>(array: &mut Vec<T>, more: usize) {
 /// Gives back most of a list's memory if a frame that used `used` of it has no need of it: after the first frame, or a jump.
 pub(super) fn settle<T>(list: &mut Vec<T>, used: usize) {
     if list.capacity() * size_of::<T>() > SMALL_BYTES && used < list.capacity() / UNUSED {
-        list.shrink_to(list.capacity() / 8);
+        list.shrink_to((4 * used).max(SMALL_BYTES / size_of::<T>()));
     }
 }

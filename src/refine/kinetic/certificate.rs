@@ -18,8 +18,9 @@
 //! * planes: m is linear, with slope k: L = m(0) rho / max(rho, -k).
 //!
 //! A course may also turn about an axis through the eye. The clock then counts rho G t for an angle t, G being the band; a plane's distance h changes by at
-//! most B t + d t^2 / 2, B = (axis x normal) . offset and d the distance from the axis, and by another s t for way and turn together, s being at most S = L / rho.
-//! With the root T of m(0) = (B + S) t + d t^2 / 2 the condition is L <= rho G T, since the bound is concave in (s, t).
+//! most B t + d t^2 / 2, B = (axis x normal) . offset and d the distance from the axis. With T the angle at which that uses up m(0), L = min(m(0), rho G T), since
+//! the bound is concave. A course that has both turns by w s in a way s: the clock counts c s, c = rho (1 + G w), a plane's distance changes by at most
+//! (k + B w) s + (d w^2 + 2 w) s^2 / 2, and with S the way at which that or the sphere of radius R ends it, L = min(m(0), c S).
 //!
 //! Where a course has no direction, L = m(0). Everything is rounded towards a shorter life. Cost: two square roots a vertex, and one a plane while turning.
 
@@ -60,6 +61,9 @@ pub(super) struct Judge {
     turns: bool,
     direction: [f64; 3],
     axis: [f64; 3],
+    turn_per_m: f64,
+    /// What each plane's distance grows by a metre of way, the eye's turn left out.
+    slopes: [f64; PLANES],
     /// Axis x normal of each plane.
     sweeps: [[f64; 3]; PLANES],
     /// Share of a margin to each plane that counts: from inside, from outside.
@@ -84,7 +88,7 @@ struct Life {
 impl Judge {
     /// The judge of a frame, after the clocks have moved to it. Without `culls` the view's planes are not asked.
     pub(super) fn new(metric: Metric, clocks: &Clocks, culls: bool) -> Self {
-        let (course, Course { direction, axis }) = clocks.course();
+        let (course, Course { direction, axis, turn_per_m }) = clocks.course();
         let normals = metric.normals().map(DVec3::from_array);
         let slopes = normals.map(|n| n.dot(direction));
         let moves = direction != DVec3::ZERO;
@@ -96,6 +100,9 @@ impl Judge {
             turns: axis != DVec3::ZERO,
             direction: direction.to_array(),
             axis: axis.to_array(),
+            turn_per_m,
+            // The eye's way takes it nearer to what lies ahead.
+            slopes: slopes.map(|k| -k),
             sweeps: normals.map(|n| axis.cross(n).to_array()),
             // A plane moves with the eye: m = r - h grows by the slope inside, m = h - r falls by it outside.
             from_inside: slopes.map(|k| share(-k)),
@@ -119,7 +126,7 @@ impl Judge {
         let margin_m = life.margin_m - sighting.guard_m();
         let band = band_of(life.scale_m * self.bands_per_m);
         let band_m = f64::from(1u32 << band) / self.bands_per_m;
-        let margin_m = if self.turns && life.kind == Kind::Planes {
+        let margin_m = if self.turns && !self.moves && life.kind == Kind::Planes {
             margin_m.min(self.turning_margin_m(sighting, &life, band_m))
         } else {
             margin_m
@@ -137,6 +144,9 @@ impl Judge {
         let distance_m = sighting.distance_m();
         let reach_m = sighting.reach_m();
         let selected = sighting.is_selected();
+        if self.turn_per_m > 0.0 && selected && self.culls {
+            return self.turning_life(sighting, distance_m, reach_m);
+        }
         let margin_m = self.error_margin_m(sighting, selected, distance_m, reach_m);
         let scale_m = if selected { reach_m } else { distance_m };
         if !self.culls {
@@ -153,8 +163,6 @@ impl Judge {
         }
         let culled = outside_m > 0.0;
         let planes_m = if culled { outside_m } else { margin_m.min(inside_m) };
-        // While turning, a long way ahead would weigh on every turn.
-        let planes_m = if self.turns & self.moves { planes_m.min(RATE * distance_m) } else { planes_m };
         // While the eye moves on by what the margin allows, turning acts on a longer arm.
         let arm_m = if self.moves { planes_m / RATE } else { 0.0 };
         let arm_m = if culled { distance_m } else { reach_m } + arm_m;
@@ -166,34 +174,77 @@ impl Judge {
         }
     }
 
-    /// What a margin that rests on the planes may be if the view turns about the course's axis.
+    /// What a margin that rests on the planes may be if the view turns on the spot.
     #[inline(never)]
     fn turning_margin_m(&self, sighting: &Sighting, life: &Life, band_m: f64) -> f64 {
-        let dot = |[a, b, c]: [f64; 3], [x, y, z]: [f64; 3]| a * x + b * y + c * z;
-        let offset_m = sighting.offset_m();
-        let along_m = dot(self.axis, offset_m);
-        // From the axis, rounded up.
-        let arm_m = (sighting.distance2() - along_m * along_m).max(0.0).sqrt()
-            + sighting.distance_m() * SQUARE_ERROR.sqrt();
-        let way_m = if self.moves { life.margin_m / RATE } else { 0.0 };
-        let angle = |margin_m: f64, nearing_m: f64| {
-            let b = nearing_m + way_m;
-            let root = (b * b + 2.0 * arm_m * margin_m).sqrt();
-            if b > 0.0 { 2.0 * margin_m / (b + root) } else { (root - b) / arm_m }
-        };
+        let arm_m = self.arm_m(sighting);
         let (mut inside, mut outside_m) = (f64::INFINITY, 0.0f64);
         for i in 0..PLANES {
             let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
-            let sweep_m = dot(self.sweeps[i], offset_m);
+            let sweep_m = dot(self.sweeps[i], sighting.offset_m());
             if life.active {
-                inside = inside.min(angle((-beyond).max(0.0), sweep_m));
+                inside = inside.min(used_up_at((-beyond).max(0.0), sweep_m, arm_m));
             } else if beyond > 0.0 {
                 // Each plane may vouch by itself.
-                let margin_m = life.margin_m.min(beyond * self.from_outside[i]);
-                outside_m = outside_m.max(margin_m.min(RATE * band_m * angle(beyond, -sweep_m)));
+                let turn = used_up_at(beyond, -sweep_m, arm_m);
+                outside_m = outside_m.max(beyond.min(RATE * band_m * turn));
             }
         }
         if life.active { RATE * band_m * inside } else { outside_m }
+    }
+
+    /// The life of a selected vertex on a course that goes along and turns.
+    #[inline(never)]
+    fn turning_life(&self, sighting: &Sighting, distance_m: f64, reach_m: f64) -> Life {
+        let arm_m = self.arm_m(sighting);
+        let bend = self.turn_per_m * (arm_m * self.turn_per_m + 2.0);
+        let mut margins_m = [0.0; PLANES];
+        let mut ways_m = [0.0; PLANES];
+        for i in 0..PLANES {
+            let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
+            let grows = self.slopes[i] + self.turn_per_m * dot(self.sweeps[i], sighting.offset_m());
+            margins_m[i] = beyond;
+            ways_m[i] = used_up_at(beyond.abs(), if beyond > 0.0 { -grows } else { grows }, bend);
+        }
+        let culled = margins_m.iter().any(|beyond| *beyond > 0.0);
+        let nearest = if culled { distance_m } else { reach_m };
+        // A way of many times the distance would weigh on every turn.
+        let longest_m = 4.0 * nearest;
+        let (way_m, margin_m) = if culled {
+            let outside = (0..PLANES).filter(|i| margins_m[*i] > 0.0);
+            (outside.map(|i| ways_m[i]).fold(0.0, f64::max).min(longest_m), f64::INFINITY)
+        } else {
+            let inside_m = margins_m.iter().fold(reach_m - distance_m, |least, beyond| least.min(-beyond));
+            (ways_m.iter().copied().fold(self.chord_m(sighting, reach_m).min(longest_m), f64::min), inside_m)
+        };
+        let scale_m = nearest + way_m;
+        let band_m = f64::from(1u32 << band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
+        let counted_per_m = RATE * (1.0 + band_m * self.turn_per_m);
+        let margin_m = if culled {
+            // Each plane may vouch by itself.
+            let vouched = |i: usize| margins_m[i].min(counted_per_m * ways_m[i].min(longest_m));
+            (0..PLANES).filter(|i| margins_m[*i] > 0.0).map(vouched).fold(0.0, f64::max)
+        } else {
+            margin_m.min(counted_per_m * way_m)
+        };
+        Life { active: !culled, kind: Kind::Planes, margin_m, scale_m }
+    }
+
+    /// Distance from the course's axis, rounded up.
+    #[inline(always)]
+    fn arm_m(&self, sighting: &Sighting) -> f64 {
+        let along_m = dot(self.axis, sighting.offset_m());
+        let square = sighting.distance2() - along_m * along_m;
+        square.max(0.0).sqrt() + sighting.distance_m() * SQUARE_ERROR.sqrt()
+    }
+
+    /// Way along the course to where it leaves the sphere of radius `reach_m` around the vertex, rounded down.
+    #[inline(always)]
+    fn chord_m(&self, sighting: &Sighting, reach_m: f64) -> f64 {
+        let b = dot(self.direction, sighting.offset_m());
+        let (reach2, distance2) = (reach_m * reach_m, sighting.distance2());
+        let half_chord2 = reach2 - distance2 + b * b - (reach2 + distance2) * SQUARE_ERROR;
+        b + half_chord2.max(0.0).sqrt()
     }
 
     /// The margin of the error test. Written without branches, for which answer is right is anybody's guess.
@@ -204,9 +255,8 @@ impl Judge {
         if !self.moves {
             return now_m;
         }
-        let ([x, y, z], [u, v, w]) = (sighting.offset_m(), self.direction);
         // Way along the course to the foot of the vertex, and squares of the distances.
-        let b = x * u + y * v + z * w;
+        let b = dot(self.direction, sighting.offset_m());
         let (reach2, distance2) = (reach_m * reach_m, sighting.distance2());
         let off2 = (distance2 - b * b - distance2 * SQUARE_ERROR).max(0.0);
         let half_chord2 = reach2 - distance2 + b * b - (reach2 + distance2) * SQUARE_ERROR;
@@ -222,6 +272,18 @@ impl Judge {
         let falls_slowly = !selected & (b <= RATE * distance_m);
         if falls_slowly { now_m } else { ahead_m.min(now_m) }
     }
+}
+
+#[inline(always)]
+fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
+    a * x + b * y + c * z
+}
+
+/// The least t at which `slope` t + `bend` t^2 / 2 reaches `margin`, which is 0 or more, as `bend` is.
+#[inline(always)]
+fn used_up_at(margin: f64, slope: f64, bend: f64) -> f64 {
+    let root = (slope * slope + 2.0 * bend * margin).sqrt();
+    if slope > 0.0 { 2.0 * margin / (slope + root) } else { (root - slope) / bend }
 }
 
 #[cfg(test)]
@@ -267,20 +329,28 @@ mod tests {
         #[test]
         fn a_live_word_is_a_true_word(
             course in direction(), speed in 0.01f64..80.0,
-            away in direction(), distance in 1.0f64..20_000.0,
-            closeness in 0.2f64..2.0, radius in 0.0f64..300.0,
+            away in direction(), distance in (0.0f64..10.0).prop_map(f64::exp), edge in prop::option::weighted(0.7, (-1.3f64..1.3, -1.3f64..1.3)),
+            closeness in prop_oneof![0.2f64..2.0, 2.0f64..20.0], radius in 0.0f64..300.0,
             steps in prop::collection::vec((direction(), 0.0f64..0.5, -0.01f64..0.01, 0.98f64..1.02, 0.99f64..1.01), 1..80),
             turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in -0.01f64..0.02,
         ) {
             let mut clocks = Clocks::new(10.0, 3000.0);
             let mut now = view(DVec3::new(100.0, 200.0, 1000.0), 0.3, -0.2, 0.8, 1.0);
             if start_course {
-                clocks.take_course(2, Course { direction: if speed > 1.0 { course } else { DVec3::ZERO }, axis });
+                let direction = if speed > 1.0 { course } else { DVec3::ZERO };
+                let turn_per_m = if speed > 1.0 && axis != DVec3::ZERO { spin.abs() / speed + 1e-9 } else { 0.0 };
+                clocks.take_course(2, Course { direction, axis, turn_per_m });
             }
             let mut metric = Metric::new(&now);
             clocks.move_to(pose(&metric, &now));
+            // Where vertices enter and leave the view, or anywhere.
+            let away = edge.map_or(away, |(x, y)| {
+                let [right, up, forward] = now.axes();
+                (forward + 0.42 * (4.0 / 3.0 * x * right + y * up)).normalize()
+            });
             let at = now.eye_m + away * distance;
             // An error that puts the vertex near the boundary of selection.
+            let radius = radius.min(0.5 * distance);
             let error_m = ((distance * closeness - radius) / metric.nu()).max(0.0);
             let vertex = Vertex { height_m: at.z.clamp(-3000.0, 3000.0), error_m, radius_m: radius, class: VertexClass::Plain };
             let sight = |metric: &Metric| metric.sight([at.x, at.y], &vertex);
@@ -307,7 +377,7 @@ mod tests {
     fn on_course_words_last_until_the_change() {
         let mut clocks = Clocks::new(10.0, 0.0);
         let start = view(DVec3::ZERO, 0.0, 0.0, 0.8, 1.0);
-        clocks.take_course(1, Course { direction: DVec3::Y, axis: DVec3::ZERO });
+        clocks.take_course(1, Course { direction: DVec3::Y, ..Default::default() });
         let metric = Metric::new(&start);
         clocks.move_to(pose(&metric, &start));
         // Not selected, 30 degrees off the course; SMART would look again after 400 m, then 330 m more, ...

@@ -31,9 +31,11 @@ pub(super) const HORIZON: u32 = (1 << (EXPIRY_BITS - 1)) - 1;
 /// Fixed-point units a metre.
 const UNITS_PER_M: f64 = (1u64 << 20) as f64;
 /// A course is left when more than this share of the recent way was counted.
-const LEAVE_RATE: f64 = 0.3;
+const LEAVE_RATE: f64 = 0.25;
 /// A course is taken only if the recent way leads this straight.
 const STRAIGHT: f64 = 0.9;
+/// How far ahead of a bend its course points.
+const LEAD_RAD: f64 = 0.12;
 /// Share of the newest frame in what "recent" means.
 const RECENT: f64 = 0.2;
 /// (e^x - 1) / x stays below this for x up to 1/2, which margins of at most half a band see to.
@@ -71,6 +73,8 @@ pub(super) struct Course {
     pub direction: DVec3,
     /// Unit vector it turns about, right-handed, or zero.
     pub axis: DVec3,
+    /// Radians it turns about the axis a metre of way, if it has both.
+    pub turn_per_m: f64,
 }
 
 /// How something has been going of late.
@@ -172,7 +176,9 @@ impl Clocks {
         let beyond = (u64::from(HORIZON) + 1) << self.shift;
         for course in 0..COURSES {
             let used_m = self.courses[course].used_m(step) + raised_m;
-            let used_rad = if turned { self.courses[course].used_rad(&last, &pose) } else { 0.0 };
+            let expects_turn = self.courses[course].turn_per_m > 0.0;
+            let used_rad =
+                if turned || expects_turn { self.courses[course].used_rad(&last, &pose) } else { 0.0 };
             for (kind, angle) in [(Kind::Error, zoomed), (Kind::Planes, zoomed + used_rad)] {
                 if used_m + angle == 0.0 {
                     continue;
@@ -190,10 +196,14 @@ impl Clocks {
         let current = self.courses[self.current];
         self.way.follow(step, current.used_m(step));
         self.turn.follow(last.turn_to(&pose), current.used_rad(&last, &pose));
-        if self.way.is_off() || self.turn.is_off() {
-            let next = Course { direction: self.way.direction(), axis: self.turn.direction() };
-            // Once is enough where no better one is to be had.
-            if (next.direction, next.axis) == (DVec3::ZERO, DVec3::ZERO) {
+        let next = Course::of(&self.way, &self.turn);
+        // Whoever keeps no direction is on no course that could be better.
+        let changes =
+            |off: bool, current: DVec3, next: DVec3| off && (current != DVec3::ZERO || next != DVec3::ZERO);
+        if changes(self.way.is_off(), current.direction, next.direction)
+            || changes(self.turn.is_off(), current.axis, next.axis)
+        {
+            if next.direction == DVec3::ZERO && next.axis == DVec3::ZERO {
                 self.current = 0;
             } else {
                 moved.next_course = Some((self.newest % (COURSES - 1) + 1, next));
@@ -254,6 +264,17 @@ impl Clocks {
 }
 
 impl Course {
+    /// The course that goes on as it has been going.
+    fn of(way: &Trend, turn: &Trend) -> Self {
+        let (direction, axis) = (way.direction(), turn.direction());
+        if direction == DVec3::ZERO || axis == DVec3::ZERO {
+            return Self { direction, axis, turn_per_m: 0.0 };
+        }
+        // Who turns flies a bend: straight ahead of where the trend, which lags behind, will have led in a while.
+        let lead = DQuat::from_axis_angle(axis, turn.length / RECENT + LEAD_RAD);
+        Self { direction: (lead * direction).normalize(), axis, turn_per_m: turn.length / way.length }
+    }
+
     /// Metres that a step uses up.
     fn used_m(&self, step: DVec3) -> f64 {
         let along = step.dot(self.direction).max(0.0);
@@ -262,7 +283,11 @@ impl Course {
 
     /// Radians that a turn uses up: a bound on how far the planes' normals are from where the counted angle would take them.
     fn used_rad(&self, last: &Pose, pose: &Pose) -> f64 {
-        let about = last.turn_to(pose).dot(self.axis).clamp(0.0, 1.0).asin();
+        let about = if self.turn_per_m > 0.0 {
+            self.turn_per_m * (pose.eye_m - last.eye_m).dot(self.direction).max(0.0)
+        } else {
+            last.turn_to(pose).dot(self.axis).clamp(0.0, 1.0).asin()
+        };
         let expected = DQuat::from_axis_angle(if about > 0.0 { self.axis } else { DVec3::Z }, about);
         let off = |i: usize| (pose.normals[i] - expected * last.normals[i]).length();
         RATE * about + (0..4).map(off).fold(0.0, f64::max)

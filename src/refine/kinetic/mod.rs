@@ -15,43 +15,42 @@
 //!
 //! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
 
+mod bounds;
 mod budget;
 mod capacity;
 mod certificate;
 mod clocks;
+mod collect;
+mod compact;
 mod labels;
 mod nodes;
 mod pages;
 mod patch;
 mod queue;
-mod rebuild;
 mod tree;
 mod vertices;
+mod whole;
 
+pub use bounds::Bounds;
 pub use budget::Budget;
-pub use pages::Bounds;
 pub use patch::{NO_LEVEL, Patch, PatchVertex};
 
-use super::strip::StripBuilder;
 use super::{Culling, Engine, Phase, Probe, Work};
 use crate::mesh::{Triangle, is_drawn};
 use crate::metric::{ALL_PLANES, Metric};
-use crate::refine::soar::StripVertex;
 use crate::view::View;
 use budget::Allowance;
 use capacity::settle;
-use certificate::{ACTIVE, Judge, clock_of, expiry_of, with_certificate};
-use clocks::{BANDS, Clocks, HORIZON, Kind, Pose, clock_id};
+use certificate::{ACTIVE, Judge, clock_of, expiry_of};
+use clocks::{Clocks, Pose};
 use glam::DVec3;
 use labels::level_of;
 use nodes::{CENTRE, Nodes, SPLIT, STATUS, body};
 use pages::{Dealing, Pages};
 use queue::{Entry, Queue};
 use rayon::prelude::*;
-use rebuild::Rebuild;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{ROOTS, corners, slot_of};
-use terrasoar_layout::prefetch::prefetch;
 use terrasoar_layout::record::{RecordCodec, Vertex};
 use terrasoar_layout::terrain::Records;
 use vertices::Vertices;
@@ -74,20 +73,23 @@ pub struct Kinetic<'a, C: RecordCodec> {
     triangles: usize,
     /// The page whose bounds are due to be made anew.
     stale: usize,
+    /// The page that was looked at last for being sparse.
+    sparse: usize,
     clocks: Clocks,
     queue: Queue,
-    rebuild: Rebuild,
     budget: Budget,
     /// Nodes whose certificate is over and that are in no queue.
     due: Vec<u32>,
-    /// Those that the budget or their parents left for the next frame.
+    /// Those that the budget left for the next frame.
     late: Vec<u32>,
     /// Children made by splits, untested yet.
     fresh: Vec<u32>,
     /// Nodes to be split or merged, in order.
     list: Vec<u32>,
+    /// Leaves that are to be split, by level. What a budget leaves here waits for the next frame.
     to_split: [Vec<u32>; LEVELS],
     to_merge: [Vec<u32>; LEVELS],
+    /// Records and words of the nodes being tested.
     verdicts: Vec<(C::Raw, u32)>,
     /// Entries that are over, of words that may have changed since.
     over: Vec<Entry>,
@@ -110,9 +112,9 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             vertices: Vertices::default(),
             triangles: 0,
             stale: 0,
+            sparse: 0,
             clocks: Clocks::new(dx.min(dy), low.abs().max(high.abs())),
             queue: Queue::new(),
-            rebuild: Rebuild::default(),
             budget: Budget::default(),
             due: Vec::new(),
             late: Vec::new(),
@@ -139,34 +141,8 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         &self.patch
     }
 
-    /// The whole mesh as a patch to an empty one, for a GPU that has lost its copy. Reads the records of all vertices in the mesh.
-    pub fn whole_patch(&self) -> Patch {
-        let mut patch = Patch { draws: self.patch.draws.clone(), ..Default::default() };
-        let mut in_use = vec![false; self.vertices.slots().len()];
-        self.for_each_slot(|slot, corners| {
-            corners.iter().for_each(|v| in_use[*v as usize] = true);
-            patch.triangles.push((slot, self.shown(Some(corners))));
-        });
-        let grid = self.records.grid();
-        let slot_at: std::collections::HashMap<GridPoint, u32> = (0..in_use.len() as u32)
-            .filter(|v| in_use[*v as usize])
-            .map(|v| (self.vertices.point(v), v))
-            .collect();
-        for (point, slot) in &slot_at {
-            let own = grid.is_corner(*point) || self.nodes.get(CENTRE).point == *point;
-            let ends = if own {
-                [*slot; 2]
-            } else {
-                grid.edge_ends(*point).map(|p| slot_at.get(&p).copied().unwrap_or(*slot))
-            };
-            patch.vertices.push((*slot, self.patch_vertex(*point, &self.records.vertex_at(*point), ends)));
-        }
-        patch.vertices.sort_unstable_by_key(|(slot, _)| *slot);
-        patch
-    }
-
     /// Bounds and triangle slots of the clusters of the mesh. Bounds are kept with [`Culling::Clusters`] only; without it they are empty.
-    pub fn clusters(&self) -> impl Iterator<Item = (&Bounds, std::ops::Range<u32>)> {
+    pub fn clusters(&self) -> impl Iterator<Item = (Bounds, std::ops::Range<u32>)> {
         self.nodes.pages.clusters()
     }
 
@@ -195,27 +171,6 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             + self.patch.draws.capacity() * size_of::<std::ops::Range<u32>>()
     }
 
-    /// The mesh as one triangle strip, SOAR's, from scratch. For those who want a strip; updates do not need it.
-    pub fn strip(&self, strip: &mut Vec<StripVertex>) {
-        strip.clear();
-        if self.nodes.is_empty() {
-            return;
-        }
-        let grid = self.records.grid();
-        let c = corners(grid.k());
-        let vertex = |i: usize| *self.vertices.get(i as u32);
-        let mut walk = StripWalk { engine: self, strip: StripBuilder::start(strip, c[0], vertex(0)) };
-        let centre = (self.nodes.get(CENTRE).point, vertex(4));
-        for (root, (side, [b, d])) in ROOTS.into_iter().enumerate() {
-            let node = self.nodes.get(CENTRE).body[root_label(side)];
-            walk.visit(grid.levels() - 1, Some(node), centre, c[b], c[d]);
-            if root < 3 {
-                walk.strip.append(c[root + 1], 0, vertex(root + 1));
-            }
-        }
-        strip.push(*self.vertices.get(0));
-    }
-
     fn patch_vertex(&self, point: GridPoint, vertex: &Vertex, ends: [u32; 2]) -> PatchVertex {
         let folded = self.records.grid().fold(point);
         PatchVertex {
@@ -236,17 +191,6 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         self.records.decode(node.raw, level_of(node.point))
     }
 
-    /// Calls `visit` with every triangle of the mesh and its slot.
-    fn for_each_slot(&self, mut visit: impl FnMut(u32, [u32; 3])) {
-        for node in (0..self.nodes.pages.len()).flat_map(|page| self.nodes.pages.places_of(page)) {
-            for (side, corners) in self.nodes.triangles(node).into_iter().enumerate() {
-                if let Some(corners) = corners {
-                    visit(2 * node + side as u32, corners);
-                }
-            }
-        }
-    }
-
     /// What a slot sends to the GPU: nothing where voids touch or padding takes the area.
     #[inline(always)]
     fn shown(&self, corners: Option<[u32; 3]>) -> [u32; 3] {
@@ -255,79 +199,26 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         corners.filter(drawn).unwrap_or([0; 3])
     }
 
-    /// Takes from the queue what is over, and brings clocks and courses in order.
-    fn collect<P: Probe>(&mut self, pose: Pose, probe: &mut P) {
-        let moved = self.clocks.move_to(pose);
-        self.due.clear();
-        // Late nodes may have gone since, or be another's by now, which then is in the queue.
-        let is_late = |node: &u32| self.nodes.get(*node).word & !STATUS == 0;
-        self.due.extend(self.late.drain(..).filter(is_late));
-        let mut clocks = moved.clocks;
-        while clocks != 0 {
-            let clock = clocks.trailing_zeros() as usize;
-            clocks &= clocks - 1;
-            let over = &mut self.over;
-            self.queue.advance(clock, self.clocks.now(clock), |entry| {
-                prefetch(&self.nodes.all, entry.node as usize);
-                over.push(entry);
-            });
-            if let Some(by) = self.clocks.set_back(clock) {
-                self.move_words(clock, clock, |expiry| u64::from(expiry).saturating_sub(by) as u32);
+    /// Tests what is due, as far as the budget allows.
+    fn test_due<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+        let mut batch = std::mem::take(&mut self.list);
+        while !self.due.is_empty() {
+            let splits_wait = self.to_split.iter().any(|nodes| !nodes.is_empty());
+            let allowed = allowance.tests(self.due.len(), splits_wait);
+            if allowed == 0 {
+                break;
             }
+            // From the end, where those lie that have been late before.
+            batch.extend(self.due.drain(self.due.len() - allowed..));
+            self.test(&batch, false, judge, probe);
+            batch.clear();
         }
-        self.keep_true_entries();
-        if let Some((number, course)) = moved.next_course {
-            for kind in [Kind::Error, Kind::Planes] {
-                for band in 0..BANDS {
-                    let (from, to) = (clock_id(number, kind, band), clock_id(0, kind, band));
-                    let (then, now) = (self.clocks.now(from) as u32, self.clocks.now(to) as u32);
-                    // A tick less, for the two clocks' ticks begin at different points.
-                    self.move_words(from, to, |expiry| now + expiry.saturating_sub(then + 1).min(HORIZON));
-                }
-            }
-            self.clocks.take_course(number, course);
-        }
-        self.work.expired = self.due.len() as u64;
-        probe.phase(Phase::Test);
-    }
-
-    /// Makes due those nodes whose word still is the one that was entered.
-    fn keep_true_entries(&mut self) {
-        for entry in self.over.drain(..) {
-            let word = &mut self.nodes.get_mut(entry.node).word;
-            if *word & !SPLIT == entry.word {
-                *word &= STATUS;
-                self.due.push(entry.node);
-            }
-        }
-    }
-
-    /// Gives all words on clock `from` an expiry on clock `to`.
-    fn move_words(&mut self, from: usize, to: usize, expiry: impl Fn(u32) -> u32) {
-        let mut waiting = std::mem::take(&mut self.waiting);
-        let nodes = &mut self.nodes.all;
-        self.queue.drain(from, |entry| {
-            let word = &mut nodes[entry.node as usize].word;
-            if *word & !SPLIT == entry.word {
-                let moved = with_certificate(entry.word, to, expiry(expiry_of(entry.word)));
-                *word = moved | (*word & SPLIT);
-                waiting.push(Entry { node: entry.node, word: moved });
-            }
-        });
-        self.queue.restart(from, self.clocks.now(from) as u32);
-        for entry in waiting.drain(..) {
-            self.queue.enter(to, entry);
-        }
-        self.waiting = waiting;
+        self.late.append(&mut self.due);
+        self.list = batch;
     }
 
     /// Tests nodes and sorts out those that are to be split or merged. Fresh ones have their records read first.
-    fn test<P: Probe>(&mut self, fresh: bool, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
-        let mut nodes = std::mem::take(if fresh { &mut self.fresh } else { &mut self.due });
-        if !fresh {
-            let allowed = allowance.tests(nodes.len());
-            self.late.extend(nodes.drain(allowed..));
-        }
+    fn test<P: Probe>(&mut self, nodes: &[u32], fresh: bool, judge: &Judge, probe: &mut P) {
         let k = self.records.grid().k();
         let mut verdicts = std::mem::take(&mut self.verdicts);
         let verdict = |node: &u32| {
@@ -363,8 +254,14 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             }
         }
         self.verdicts = verdicts;
-        nodes.clear();
-        *(if fresh { &mut self.fresh } else { &mut self.due }) = nodes;
+    }
+
+    /// Tests the children that splits have made.
+    fn test_fresh<P: Probe>(&mut self, judge: &Judge, probe: &mut P) {
+        let mut fresh = std::mem::take(&mut self.fresh);
+        self.test(&fresh, true, judge, probe);
+        fresh.clear();
+        self.fresh = fresh;
     }
 
     /// Splits and merges what is to be, until no child made on the way is left untested.
@@ -383,8 +280,11 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             list.extend(self.to_split.iter_mut().rev().flat_map(|nodes| nodes.drain(..)));
             self.in_order(&list, |engine, node| {
                 let wanted = engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == ACTIVE;
-                if wanted && !(allowance.split() && engine.split(node)) {
-                    // Its other parent may be among the untested.
+                let before = engine.fresh.len();
+                let split = wanted && allowance.split() && engine.split(node);
+                allowance.charge(engine.fresh.len() - before);
+                if wanted && !split {
+                    // Its other parent may be among the untested; or it waits for the next frame.
                     let level = level_of(engine.nodes.get(node).point);
                     engine.to_split[level as usize].push(node);
                 }
@@ -393,10 +293,9 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
                 break;
             }
             probe.phase(Phase::Test);
-            self.test(true, judge, allowance, probe);
+            self.test_fresh(judge, probe);
             probe.phase(Phase::Apply);
         }
-        self.postpone();
         list.clear();
         self.list = list;
     }
@@ -414,26 +313,20 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         }
     }
 
-    /// Leaves the splits that could not be made to the next frame.
-    fn postpone(&mut self) {
-        for nodes in &mut self.to_split {
-            for node in nodes.drain(..) {
-                self.nodes.get_mut(node).word &= STATUS;
-                self.late.push(node);
-            }
-        }
-    }
-
     /// Counts what is late and how far the largest error of it exceeds the tolerance.
     fn assess_late(&mut self, metric: &Metric, view: &View) {
-        self.work.late = self.late.len() as u64;
-        for node in &self.late {
+        let [dx, dy] = self.records.grid().spacing_m();
+        let nearest_m = dx.min(dy);
+        for node in
+            self.late.iter().chain(self.to_split.iter().flatten()).filter(|node| self.nodes.is_live(**node))
+        {
+            self.work.late += 1;
             let vertex = self.vertex_of(*node);
             let at_m = self.records.grid().position_m(self.nodes.get(*node).point);
             let sighting = metric.sight(at_m, &vertex);
             let culled = self.culling == Culling::Vertices && metric.cull(&sighting, ALL_PLANES).is_none();
             if !self.nodes.is_split(*node) && sighting.is_selected() && !culled {
-                let error_px = sighting.error_px(view.tolerance_px);
+                let error_px = sighting.error_px(view.tolerance_px, nearest_m);
                 self.work.late_error_px = self.work.late_error_px.max(error_px);
             }
         }
@@ -456,29 +349,37 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
             self.patch.draws.push(0..2 * self.nodes.pages.places() as u32);
             return;
         }
-        self.stale = (self.stale + 1) % self.nodes.pages.len();
-        self.tighten(self.stale);
-        let [dx, dy] = self.records.grid().spacing_m();
-        let draws = &mut self.patch.draws;
-        for (bounds, range) in self.nodes.pages.clusters() {
-            if !metric.culls_box(bounds.least, bounds.largest, [dx, dy]) {
-                draws.push(range);
-            }
+        if self.work.merges > 0 {
+            self.stale = (self.stale + 1) % self.nodes.pages.len();
+            self.tighten(self.stale);
         }
+        let grid = self.records.grid();
+        let [low, high] = self.records.height_range_m();
+        let largest = f64::from(grid.side_steps()).max(low.abs()).max(high.abs());
+        let draws = &mut self.patch.draws;
+        self.nodes.pages.cull(&metric.box_planes(grid.spacing_m(), largest), |range| draws.push(range));
     }
 
     /// Gives back what only a large frame before this one has needed.
     fn settle(&mut self) {
         // A frame that made most of the mesh says nothing about the next ones.
         let made_anew = self.work.tests as usize > self.nodes.pages.taken() / 2;
-        let used = if made_anew { 0 } else { (self.work.tests + self.work.slots_written) as usize };
+        let used = if made_anew {
+            self.nodes.pages.taken() / 128
+        } else {
+            (self.work.tests + self.work.slots_written) as usize
+        };
         let lists = [&mut self.due, &mut self.late, &mut self.fresh, &mut self.list];
         lists
             .into_iter()
             .chain(&mut self.to_split)
             .chain(&mut self.to_merge)
             .for_each(|list| settle(list, used));
-        [&mut self.over, &mut self.waiting].into_iter().for_each(|list| settle(list, used));
+        settle(&mut self.over, used);
+        if made_anew {
+            // Filled whenever a course ends, however little else there is to do.
+            settle(&mut self.waiting, 0);
+        }
         settle(&mut self.verdicts, used);
         settle(&mut self.patch.vertices, used);
         settle(&mut self.patch.triangles, used);
@@ -535,15 +436,17 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
         self.collect(pose, probe);
         let judge = Judge::new(metric, &self.clocks, self.culling == Culling::Vertices);
         let mut allowance = Allowance::new(self.budget);
-        if !self.fresh.is_empty() {
-            self.test(true, &judge, &mut allowance, probe);
-        }
-        self.test(false, &judge, &mut allowance, probe);
+        self.test_fresh(&judge, probe);
+        self.test_due(&judge, &mut allowance, probe);
         probe.phase(Phase::Apply);
         self.apply(&judge, &mut allowance, probe);
-        self.step_rebuild();
-        if !self.late.is_empty() {
+        if !self.late.is_empty() || self.to_split.iter().any(|nodes| !nodes.is_empty()) {
             self.assess_late(&metric, view);
+        }
+        self.compact();
+        if self.queue.len() > 2 * self.nodes.pages.taken() {
+            let nodes = &self.nodes.all;
+            self.queue.sweep_some(|e| nodes.get(e.node as usize).is_some_and(|n| n.word & !SPLIT == e.word));
         }
         self.list_written();
         self.list_draws(&metric);
@@ -560,39 +463,5 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
 
     fn work(&self) -> Work {
         self.work
-    }
-}
-
-/// The walk that makes a strip.
-struct StripWalk<'w, 'a, C: RecordCodec> {
-    engine: &'w Kinetic<'a, C>,
-    strip: StripBuilder<'w, StripVertex>,
-}
-
-impl<C: RecordCodec> StripWalk<'_, '_, C> {
-    /// Visits the triangle (apex; b, d), whose split vertex is `node` unless it is one of the smallest.
-    fn visit(
-        &mut self,
-        height: u32,
-        node: Option<u32>,
-        apex: (GridPoint, StripVertex),
-        b: GridPoint,
-        d: GridPoint,
-    ) {
-        if let Some(node) = node.filter(|node| self.engine.nodes.is_split(*node)) {
-            let at = b.midpoint(d);
-            let height_m = self.engine.vertex_of(node).height_m as f32;
-            let here = (at, StripVertex { x: at.x(), y: at.y(), height_m });
-            // At the finest level edges have no middle, and triangles no vertex to split at.
-            let child = |end: GridPoint| {
-                if height > 1 { self.engine.child_at(node, end.midpoint(apex.0)) } else { None }
-            };
-            let (left, right) = (child(b), child(d));
-            self.visit(height - 1, left, here, b, apex.0);
-            self.strip.append(apex.0, height & 1, apex.1);
-            self.visit(height - 1, right, here, apex.0, d);
-        } else {
-            self.strip.append(apex.0, height & 1, apex.1);
-        }
     }
 }

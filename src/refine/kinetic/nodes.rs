@@ -61,12 +61,11 @@ pub(super) struct Nodes<R> {
     pub all: Vec<Node<R>>,
     /// Which places are taken, and which slots have changed.
     pub pages: Pages,
-    blank: Option<R>,
 }
 
 impl<R: Copy> Nodes<R> {
     pub(super) fn new(pages: Pages) -> Self {
-        Self { all: Vec::new(), pages, blank: None }
+        Self { all: Vec::new(), pages }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -86,6 +85,12 @@ impl<R: Copy> Nodes<R> {
     #[inline(always)]
     pub(super) fn get_mut(&mut self, node: u32) -> &mut Node<R> {
         &mut self.all[node as usize]
+    }
+
+    /// The word at a place that may have been given up since, if it is the one that was entered for it.
+    #[inline(always)]
+    pub(super) fn word_if(&mut self, node: u32, entered: u32) -> Option<&mut u32> {
+        self.all.get_mut(node as usize).map(|node| &mut node.word).filter(|word| **word & !SPLIT == entered)
     }
 
     /// Whether the place holds a vertex.
@@ -115,21 +120,23 @@ impl<R: Copy> Nodes<R> {
     }
 
     fn place(&mut self, beside: u32, record: Node<R>) -> u32 {
-        let blank = *self.blank.get_or_insert(record.raw);
         let node = self.pages.take(beside);
         if self.all.len() < self.pages.places() {
-            let free = Node {
-                word: NO_VERTEX,
-                raw: blank,
-                point: GridPoint::default(),
-                parents: [NONE; 2],
-                body: [NONE; 6],
-            };
+            let (parents, body) = ([NONE; 2], [NONE; 6]);
+            let free = Node { word: NO_VERTEX, parents, body, ..record };
             grow(&mut self.all, PAGE);
             self.all.resize(self.pages.places(), free);
         }
         *self.get_mut(node) = record;
         node
+    }
+
+    /// Cuts the array off after the last page.
+    pub(super) fn shorten(&mut self) {
+        self.all.truncate(self.pages.places());
+        if self.all.capacity() > 2 * self.all.len() {
+            self.all.shrink_to(self.all.len() + self.all.len() / 8);
+        }
     }
 
     /// Frees a node or an annex.

@@ -6,35 +6,14 @@
 //!
 //! Invariant: a page's bounds contain all triangles that its slots show. Cost: a few bit operations a node.
 
+use super::bounds::{Bounds, BoundsColumns};
+use crate::metric::{BoxPlane, PLANES};
 use std::ops::Range;
 
 /// Nodes of a page.
 pub(super) const PAGE: usize = 128;
 /// No page.
 const NONE: u32 = u32::MAX;
-
-/// A box around a cluster, in grid steps (padding folded) and metres of height.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds {
-    /// Least column, row and height.
-    pub least: [f32; 3],
-    /// Largest column, row and height.
-    pub largest: [f32; 3],
-}
-
-impl Bounds {
-    /// The box around nothing.
-    pub(super) const EMPTY: Self = Self { least: [f32::INFINITY; 3], largest: [f32::NEG_INFINITY; 3] };
-
-    /// Widens the box to contain a point.
-    #[inline(always)]
-    pub(super) fn include(&mut self, p: [f32; 3]) {
-        for (i, p) in p.into_iter().enumerate() {
-            self.least[i] = self.least[i].min(p);
-            self.largest[i] = self.largest[i].max(p);
-        }
-    }
-}
 
 #[derive(Debug, Clone, Copy)]
 struct Page {
@@ -61,9 +40,11 @@ pub(super) struct Pages {
     dealing: Dealing,
     pages: Vec<Page>,
     /// Bounds of each page.
-    bounds: Vec<Bounds>,
-    /// Packed: pages with room, newest last; near: empty pages. May hold others as well.
-    open: Vec<u32>,
+    bounds: BoundsColumns,
+    /// Packed: no page before this one has room.
+    first_open: usize,
+    /// Near: empty pages. May hold others as well.
+    empty: Vec<u32>,
     /// Pages with slots that have changed.
     written: Vec<u32>,
     taken: usize,
@@ -74,8 +55,9 @@ impl Pages {
         Self {
             dealing,
             pages: Vec::new(),
-            bounds: Vec::new(),
-            open: Vec::new(),
+            bounds: BoundsColumns::default(),
+            first_open: 0,
+            empty: Vec::new(),
             written: Vec::new(),
             taken: 0,
         }
@@ -84,8 +66,8 @@ impl Pages {
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
         self.pages.capacity() * size_of::<Page>()
-            + self.bounds.capacity() * size_of::<Bounds>()
-            + (self.open.capacity() + self.written.capacity()) * size_of::<u32>()
+            + self.bounds.bytes()
+            + (self.empty.capacity() + self.written.capacity()) * size_of::<u32>()
     }
 
     /// Places in all pages.
@@ -104,34 +86,27 @@ impl Pages {
             Dealing::Packed => self.page_with_room(),
             Dealing::Near => self.page_near(beside as usize / PAGE),
         };
+        self.take_in(page)
+    }
+
+    /// Takes a place in the page of the place `beside`, if it has room and is not page `other`.
+    pub(super) fn take_in_page_of(&mut self, beside: u32, other: usize) -> Option<u32> {
+        let page = beside as usize / PAGE;
+        (page != other && self.pages.get(page)?.taken != u128::MAX).then(|| self.take_in(page))
+    }
+
+    fn take_in(&mut self, page: usize) -> u32 {
         let place = (!self.pages[page].taken).trailing_zeros();
         self.pages[page].taken |= 1 << place;
         self.taken += 1;
         (page * PAGE) as u32 + place
     }
 
-    /// Takes the place `place`. If somebody is there, takes another place for him and returns it.
-    pub(super) fn clear(&mut self, place: u32) -> Option<u32> {
-        let (page, bit) = (place as usize / PAGE, 1 << (place as usize % PAGE));
-        if self.pages[page].taken & bit == 0 {
-            self.pages[page].taken |= bit;
-            self.taken += 1;
-            return None;
-        }
-        // Moving him gives the place back, so it is taken twice over until then: once for him, once for who comes.
-        Some(self.take(place))
-    }
-
+    /// The first page with room.
     fn page_with_room(&mut self) -> usize {
-        while let Some(page) = self.open.last() {
-            if self.pages[*page as usize].taken != u128::MAX {
-                return *page as usize;
-            }
-            self.open.pop();
-        }
-        let page = self.new_page();
-        self.open.push(page as u32);
-        page
+        let full = self.pages[self.first_open..].iter().take_while(|page| page.taken == u128::MAX).count();
+        self.first_open += full;
+        if self.first_open == self.pages.len() { self.new_page() } else { self.first_open }
     }
 
     fn page_near(&mut self, page: usize) -> usize {
@@ -153,8 +128,8 @@ impl Pages {
     }
 
     fn empty_page(&mut self) -> usize {
-        while let Some(page) = self.open.pop() {
-            if self.pages[page as usize].taken == 0 {
+        while let Some(page) = self.empty.pop() {
+            if self.pages.get(page as usize).is_some_and(|page| page.taken == 0) {
                 return page as usize;
             }
         }
@@ -163,7 +138,7 @@ impl Pages {
 
     fn new_page(&mut self) -> usize {
         self.pages.push(Page { taken: 0, written: [0; 2], spill: (NONE, 0), use_count: 0 });
-        self.bounds.push(Bounds::EMPTY);
+        self.bounds.push_empty();
         self.pages.len() - 1
     }
 
@@ -171,17 +146,28 @@ impl Pages {
     pub(super) fn give_back(&mut self, place: u32) {
         let index = place as usize / PAGE;
         let page = &mut self.pages[index];
-        let was_full = page.taken == u128::MAX;
         page.taken &= !(1 << (place as usize % PAGE));
         self.taken -= 1;
         if page.taken == 0 {
             page.use_count = page.use_count.wrapping_add(1);
-            self.bounds[index] = Bounds::EMPTY;
+            self.bounds.set(index, Bounds::EMPTY);
         }
-        if (self.dealing == Dealing::Packed && was_full) || (self.dealing == Dealing::Near && page.taken == 0)
-        {
-            self.open.push(index as u32);
+        if self.dealing == Dealing::Packed {
+            self.first_open = self.first_open.min(index);
+        } else if page.taken == 0 {
+            self.empty.push(index as u32);
         }
+    }
+
+    /// Gives up empty pages at the end whose slots have been told; whether there were any.
+    pub(super) fn give_up_empty_end(&mut self) -> bool {
+        let before = self.pages.len();
+        while self.pages.last().is_some_and(|page| page.taken == 0 && page.written == [0; 2]) {
+            self.pages.pop();
+            self.bounds.pop();
+        }
+        self.first_open = self.first_open.min(self.pages.len());
+        self.pages.len() < before
     }
 
     /// Notes that the slot of a place's side shows something else now.
@@ -226,13 +212,15 @@ impl Pages {
     /// Widens the bounds of a place's page.
     #[inline(always)]
     pub(super) fn cover(&mut self, place: u32, points: &[[f32; 3]]) {
-        let bounds = &mut self.bounds[place as usize / PAGE];
+        let page = place as usize / PAGE;
+        let mut bounds = self.bounds.get(page);
         points.iter().for_each(|p| bounds.include(*p));
+        self.bounds.set(page, bounds);
     }
 
     /// Sets the bounds of a page.
     pub(super) fn set_bounds(&mut self, page: usize, bounds: Bounds) {
-        self.bounds[page] = bounds;
+        self.bounds.set(page, bounds);
     }
 
     /// Number of pages.
@@ -253,13 +241,25 @@ impl Pages {
     }
 
     /// Bounds and triangle slots of every page that is in use.
-    pub(super) fn clusters(&self) -> impl Iterator<Item = (&Bounds, Range<u32>)> {
-        self.pages.iter().zip(&self.bounds).enumerate().filter(|(_, (page, _))| page.taken != 0).map(
-            |(index, (page, bounds))| {
-                let first = (index * PAGE) as u32;
-                let (from, to) = (page.taken.trailing_zeros(), PAGE as u32 - page.taken.leading_zeros());
-                (bounds, 2 * (first + from)..2 * (first + to))
-            },
-        )
+    pub(super) fn clusters(&self) -> impl Iterator<Item = (Bounds, Range<u32>)> {
+        let used = self.pages.iter().enumerate().filter(|(_, page)| page.taken != 0);
+        used.map(|(index, page)| (self.bounds.get(index), slots_of(index, page)))
     }
+
+    /// Calls `draw` with the triangle slots of every page that is in use and may be seen.
+    pub(super) fn cull(&mut self, planes: &[BoxPlane; PLANES], mut draw: impl FnMut(Range<u32>)) {
+        let is_seen = self.bounds.cull(planes);
+        for (index, page) in self.pages.iter().enumerate() {
+            if page.taken != 0 && is_seen(index) {
+                draw(slots_of(index, page));
+            }
+        }
+    }
+}
+
+/// The triangle slots from a page's first place taken to its last.
+fn slots_of(index: usize, page: &Page) -> Range<u32> {
+    let first = (index * PAGE) as u32;
+    let (from, to) = (page.taken.trailing_zeros(), PAGE as u32 - page.taken.leading_zeros());
+    2 * (first + from)..2 * (first + to)
 }

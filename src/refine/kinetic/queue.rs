@@ -60,12 +60,22 @@ pub(super) struct Queue {
     free: u32,
     /// Entries on their way to another level.
     moving: Vec<Entry>,
+    entries: usize,
+    /// The slot that was looked at last for entries that are of no use any more.
+    swept: usize,
 }
 
 impl Queue {
     pub(super) fn new() -> Self {
         let wheel = Wheel { now: 0, occupied: [0; LEVELS], heads: [[NONE; SLOTS]; LEVELS] };
-        Self { wheels: vec![wheel; CLOCKS].into(), chunks: Vec::new(), free: NONE, moving: Vec::new() }
+        Self {
+            wheels: vec![wheel; CLOCKS].into(),
+            chunks: Vec::new(),
+            free: NONE,
+            moving: Vec::new(),
+            entries: 0,
+            swept: 0,
+        }
     }
 
     /// Bytes held.
@@ -78,6 +88,7 @@ impl Queue {
     /// Enters a node under its word's expiry on clock `clock`.
     #[inline]
     pub(super) fn enter(&mut self, clock: usize, entry: Entry) {
+        self.entries += 1;
         let wheel = &mut self.wheels[clock];
         let expiry = entry.expiry().max(wheel.now);
         let differing = expiry ^ wheel.now;
@@ -155,6 +166,29 @@ impl Queue {
         }
     }
 
+    /// Entries, those of words that have changed since included.
+    pub(super) fn len(&self) -> usize {
+        self.entries
+    }
+
+    /// Looks through a few slots and drops entries that `keep` does not want.
+    pub(super) fn sweep_some(&mut self, keep: impl Fn(Entry) -> bool) {
+        const SLOTS_A_FRAME: usize = 64;
+        let mut kept = std::mem::take(&mut self.moving);
+        for _ in 0..SLOTS_A_FRAME {
+            self.swept = (self.swept + 1) % (CLOCKS * LEVELS * SLOTS);
+            let (clock, level, slot) =
+                (self.swept / (LEVELS * SLOTS), self.swept / SLOTS % LEVELS, self.swept % SLOTS);
+            if self.wheels[clock].occupied[level] >> slot & 1 == 1 {
+                self.take_slot(clock, level, slot, &mut |entry| kept.extend(keep(entry).then_some(entry)));
+                for entry in kept.drain(..) {
+                    self.enter(clock, entry);
+                }
+            }
+        }
+        self.moving = kept;
+    }
+
     /// Sets the tick of an empty wheel.
     pub(super) fn restart(&mut self, clock: usize, now: u32) {
         debug_assert_eq!(self.wheels[clock].occupied, [0; LEVELS]);
@@ -181,6 +215,7 @@ impl Queue {
         while at != NONE {
             let chunk = &mut self.chunks[at as usize];
             chunk.entries[..chunk.used as usize].iter().for_each(|entry| each(*entry));
+            self.entries -= chunk.used as usize;
             let next = std::mem::replace(&mut chunk.next, self.free);
             self.free = at;
             at = next;

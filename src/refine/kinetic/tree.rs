@@ -5,9 +5,9 @@
 //! [`Kinetic::fetch`] shortens by asking for a node's relatives some splits ahead.
 
 use super::Kinetic;
+use super::bounds::Bounds;
 use super::labels::{child_point, level_of};
 use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
-use super::pages::Bounds;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::slot_of;
 use terrasoar_layout::prefetch::prefetch;
@@ -58,7 +58,7 @@ impl<C: RecordCodec> Kinetic<'_, C> {
 
     /// Widens the bounds of a node's page to contain vertices.
     #[inline(always)]
-    fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
+    pub(super) fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
         if self.nodes.pages.has_bounds() {
             let places = vertices.map(|v| self.place_of(v));
             self.nodes.pages.cover(node, &places);
