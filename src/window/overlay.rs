@@ -64,6 +64,10 @@ impl Overlay {
 
     /// Hears an event; says whether it asks for a new picture.
     pub(crate) fn hear(&mut self, window: &Window, event: &WindowEvent) -> bool {
+        // Being drawn is no reason to be drawn again.
+        if matches!(event, WindowEvent::RedrawRequested) {
+            return false;
+        }
         if let WindowEvent::KeyboardInput { event: key, .. } = event
             && key.state == ElementState::Pressed
             && !self.is_typing()

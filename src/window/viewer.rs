@@ -36,8 +36,8 @@ use winit::window::Window;
 
 /// Longest span that a frame moves on by, so that a hitch is no leap.
 const LONGEST_SPAN: Duration = Duration::from_millis(100);
-/// How often a build's progress is looked at.
-const JOB_LOOKS: Duration = Duration::from_millis(100);
+/// How often a build's progress is looked at, and whether a window that could not be drawn on can be by now.
+const LOOKS: Duration = Duration::from_millis(100);
 
 /// When the next frame is due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +76,8 @@ pub(super) struct Viewer {
     frame_at: Option<Instant>,
     frames: u64,
     tiles_missing: bool,
+    /// Whether the last frame found nothing to be drawn on.
+    unshown: bool,
     hidden: bool,
     touched: bool,
     ending: bool,
@@ -125,6 +127,7 @@ impl Viewer {
             frame_at: None,
             frames: 0,
             tiles_missing: true,
+            unshown: false,
             hidden: false,
             touched: true,
             ending: false,
@@ -336,7 +339,7 @@ impl Viewer {
         let news = self.notes.iter().filter_map(|note| note.until).min();
         let waits = [
             Some(again),
-            self.job.as_ref().map(|_| JOB_LOOKS),
+            (self.job.is_some() || self.unshown).then_some(LOOKS),
             news.map(|until| until.saturating_duration_since(now)),
         ];
         Next::In(waits.into_iter().flatten().min().unwrap_or(again))

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Mutex;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::time::{Duration, Instant};
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_render::Gpu;
@@ -120,11 +120,9 @@ impl Window<'_> {
                 }
                 Err(why) => {
                     let how = if why == RecvTimeoutError::Timeout { "nothing more came" } else { "it ended" };
-                    return Err(format!(
-                        "waited for {beginning:?} and {how}; heard {:?}; {}",
-                        self.heard,
-                        self.last_words()
-                    ));
+                    let words = self.last_words();
+                    let heard = &self.heard;
+                    return Err(format!("waited for {beginning:?} and {how}; heard {heard:?}; {words}"));
                 }
             }
         }

@@ -47,9 +47,9 @@ impl Camera {
     pub(crate) fn overview(ground: &dyn Ground, exaggeration: f64) -> Self {
         let [east_m, north_m] = ground.extent_m();
         let [low, high] = ground.height_range_m();
-        let away_m = 0.95 * east_m.max(north_m);
+        let away_m = 1.15 * east_m.max(north_m);
         let middle = DVec3::new(0.5 * east_m, 0.5 * north_m, 0.5 * (low + high) * exaggeration);
-        let pitch_deg = -32.0_f64;
+        let pitch_deg = -38.0_f64;
         let (sin, cos) = pitch_deg.to_radians().sin_cos();
         let eye_m = middle - away_m * DVec3::new(0.0, cos, sin);
         Self { eye_m, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0, vertical_fov_deg: 45.0 }

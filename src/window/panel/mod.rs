@@ -90,7 +90,7 @@ pub(crate) fn show(
         let frame = Frame::new().fill(super::overlay::PANEL).inner_margin(Margin::same(10));
         egui::Panel::left("panel").exact_size(286.0).resizable(false).frame(frame).show(ui, |ui| {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                ui.spacing_mut().slider_width = 140.0;
+                ui.spacing_mut().slider_width = 132.0;
                 title(ui, facts);
                 section(ui, "Look", true, |ui| look::show(ui, settings));
                 section(ui, "Mesh", true, |ui| look::mesh(ui, facts, settings, &mut wishes));

@@ -39,7 +39,9 @@ impl Viewer {
         };
         let update = before.elapsed();
         self.screen.gpu.watch.check()?;
-        let Some(picture) = self.screen.acquire()? else {
+        let picture = self.screen.acquire()?;
+        self.unshown = picture.is_none();
+        let Some(picture) = picture else {
             return Ok(());
         };
         let target = picture.texture.create_view(&wgpu::TextureViewDescriptor::default());
