@@ -27,7 +27,8 @@ pub(crate) struct Hand {
     /// The pointer in pixels from the top left, while it is in the window.
     pub pointer: Option<[f64; 2]>,
     dragging: Option<MouseButton>,
-    dragged_px: [f64; 2],
+    look_px: [f64; 2],
+    orbit_px: [f64; 2],
     clicked: Option<(Instant, [f64; 2])>,
 }
 
@@ -50,8 +51,13 @@ impl Hand {
 
     /// The pointer moves.
     pub(crate) fn move_to(&mut self, to: [f64; 2]) {
-        if let (Some(from), Some(_)) = (self.pointer, self.dragging) {
-            self.dragged_px = [0, 1].map(|i| self.dragged_px[i] + to[i] - from[i]);
+        let dragged_px = match self.dragging {
+            Some(MouseButton::Left) => Some(&mut self.look_px),
+            Some(MouseButton::Right) => Some(&mut self.orbit_px),
+            _ => None,
+        };
+        if let (Some(from), Some(dragged_px)) = (self.pointer, dragged_px) {
+            *dragged_px = [0, 1].map(|i| dragged_px[i] + to[i] - from[i]);
         }
         self.pointer = Some(to);
     }
@@ -81,6 +87,11 @@ impl Hand {
         self.dragging.is_some()
     }
 
+    /// Whether something is held that flies.
+    pub(crate) fn is_flying(&self) -> bool {
+        self.held.iter().any(|code| keys::thrust(*code).is_some())
+    }
+
     /// What is held, and what was dragged since the last time.
     pub(crate) fn controls(&mut self) -> Controls {
         let mut controls = Controls { fast: self.shift, ..Controls::default() };
@@ -89,12 +100,12 @@ impl Hand {
                 *sum = (*sum + part).clamp(-1.0, 1.0);
             }
         }
-        let [x, y] = std::mem::take(&mut self.dragged_px);
-        match self.dragging {
-            Some(MouseButton::Left) => controls.look_deg = [x * LOOK_DEG_PX, -y * LOOK_DEG_PX],
-            Some(MouseButton::Right) => controls.orbit_deg = [x * ORBIT_DEG_PX, -y * ORBIT_DEG_PX],
-            _ => {}
-        }
+        let degrees = |px: &mut [f64; 2], scale: f64| {
+            let [x, y] = std::mem::take(px);
+            [x * scale, -y * scale]
+        };
+        controls.look_deg = degrees(&mut self.look_px, LOOK_DEG_PX);
+        controls.orbit_deg = degrees(&mut self.orbit_px, ORBIT_DEG_PX);
         controls
     }
 }
@@ -111,10 +122,10 @@ mod tests {
         assert_eq!(hand.controls(), Controls::default(), "no button, no drag");
         hand.press(MouseButton::Left, Instant::now());
         hand.move_to([60.0, 30.0]);
+        hand.lift(MouseButton::Left);
         let look = hand.controls().look_deg;
         assert!(look[0] > 0.0 && look[1] < 0.0, "to the right and down: {look:?}");
         assert_eq!(hand.controls(), Controls::default());
-        hand.lift(MouseButton::Left);
         hand.press(MouseButton::Right, Instant::now());
         hand.move_to([70.0, 30.0]);
         assert!(hand.controls().orbit_deg[0] > 0.0);

@@ -48,14 +48,14 @@ impl Screen {
             wgpu::InstanceDescriptor::new_with_display_handle_from_env(Box::new(display.clone()));
         descriptor.backends = backends;
         let instance = wgpu::Instance::new(descriptor);
-        let surface = instance.create_surface(Arc::clone(window)).context("the window cannot be drawn on")?;
+        let no_adapter = |e: &dyn std::fmt::Display| RenderError::NoAdapter { detail: e.to_string() };
+        let surface = instance.create_surface(Arc::clone(window)).map_err(|e| no_adapter(&e))?;
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             compatible_surface: Some(&surface),
             ..Default::default()
         };
-        let adapter = pollster::block_on(instance.request_adapter(&options))
-            .map_err(|e| RenderError::NoAdapter { detail: e.to_string() })?;
+        let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(|e| no_adapter(&e))?;
         let size = window.inner_size();
         let mut config = surface
             .get_default_config(&adapter, size.width.max(1), size.height.max(1))

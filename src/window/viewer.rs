@@ -233,8 +233,8 @@ impl Viewer {
     pub(super) fn button(&mut self, button: MouseButton, down: bool) {
         self.touched = true;
         if !down {
+            // What was dragged is still to be turned by, about its own pivot.
             self.hand.lift(button);
-            self.rig.pivot = None;
             return;
         }
         if self.overlay.has_pointer() {
@@ -325,6 +325,7 @@ impl Viewer {
         let counting = self.plan.exit_after_frames.is_some() || self.plan.lose_device_after_frames.is_some();
         let moving = self.rig.is_moving()
             || self.hand.is_dragging()
+            || self.hand.is_flying()
             || self.recorder.is_some()
             || self.player.as_ref().is_some_and(Player::is_playing);
         self.tell_motion(moving);

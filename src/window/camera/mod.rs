@@ -137,6 +137,8 @@ pub(crate) struct Rig {
     pub pivot: Option<DVec3>,
     glide: Option<Glide>,
     velocity: Velocity,
+    /// Whether a height that is kept is still to be reached.
+    rising: bool,
 }
 
 impl Rig {
@@ -151,6 +153,7 @@ impl Rig {
             pivot: None,
             glide: None,
             velocity: Velocity::default(),
+            rising: false,
         }
     }
 
@@ -203,7 +206,8 @@ impl Rig {
 
     /// Whether it moves by itself or still rolls out.
     pub(crate) fn is_moving(&self) -> bool {
-        self.glide.is_some() || self.circling.is_some() || !self.velocity.is_rest(self.speed_m_s)
+        let still = self.velocity.is_rest(self.speed_m_s) && !self.rising;
+        self.glide.is_some() || self.circling.is_some() || !still
     }
 
     /// Moves on by `span_s` seconds.
@@ -252,12 +256,17 @@ impl Rig {
         let climb = if self.follow_m.is_some() { 0.0 } else { to_sky };
         let wanted = (right * to_right + forward * to_front + DVec3::Z * climb).clamp_length_max(1.0);
         self.camera.eye_m += self.velocity.advance(span_s, wanted * speed_m_s);
+        if wanted == DVec3::ZERO && self.velocity.is_rest(self.speed_m_s) {
+            self.velocity = Velocity::default();
+        }
+        self.rising = false;
         if let Some(height_m) = &mut self.follow_m {
             *height_m = (*height_m * (1.5 * to_sky * span_s).exp()).clamp(CLEARANCE_M, 1e7);
             if let Some(below_m) = ground_below_m(ground, self.camera.eye_m, exaggeration) {
                 let kept = (-span_s / FOLLOW_S).exp();
                 let target_m = below_m + *height_m;
                 self.camera.eye_m.z = target_m + (self.camera.eye_m.z - target_m) * kept;
+                self.rising = (self.camera.eye_m.z - target_m).abs() > 1e-3 * *height_m;
             }
         }
     }

@@ -38,6 +38,8 @@ impl Viewer {
             None => Some(self.stage.with(|live| live.scene.update(&view))),
         };
         let update = before.elapsed();
+        // A device that went while nothing was drawn says so when it is asked.
+        let _ = self.screen.gpu.device.poll(wgpu::PollType::Poll);
         self.screen.gpu.watch.check()?;
         let picture = self.screen.acquire()?;
         self.unshown = picture.is_none();
