@@ -41,6 +41,9 @@ pub(super) struct Args {
     /// End after so many frames
     #[arg(long, hide = true, value_name = "N")]
     exit_after_frames: Option<u64>,
+    /// Open this file as if it had been dropped on the window
+    #[arg(long, hide = true, value_name = "FILE")]
+    drop: Vec<PathBuf>,
     /// Throw the graphics device away after so many frames
     #[arg(long, hide = true, value_name = "N")]
     lose_device_after_frames: Option<u64>,
@@ -63,6 +66,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         exaggeration: args.exaggeration,
         size_px: args.size.map(|size| [size.width_px, size.height_px]),
         narrate: args.narrate,
+        drop: args.drop.clone(),
         exit_after_frames: args.exit_after_frames,
         lose_device_after_frames: args.lose_device_after_frames,
     })

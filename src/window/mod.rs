@@ -47,6 +47,8 @@ pub(crate) struct Plan {
     pub size_px: Option<[u32; 2]>,
     /// Whether to tell on standard output what happens, for programs that drive the window.
     pub narrate: bool,
+    /// Files to open as if they had been dropped.
+    pub drop: Vec<PathBuf>,
     /// Frames after which to end.
     pub exit_after_frames: Option<u64>,
     /// Frames after which the device is thrown away, to try how that goes.

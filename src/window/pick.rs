@@ -132,9 +132,9 @@ pub(super) mod tests {
     #[test]
     fn a_ray_meets_the_ground_where_the_ground_is() {
         for exaggeration in [0.5, 1.0, 3.0] {
-            let eye = DVec3::new(4000.0, -3000.0, 2500.0);
+            let eye = DVec3::new(4000.0, -3000.0, 4500.0);
             for (east, north) in [(0.1, 0.9), (-0.3, 1.0), (0.0, 0.6)] {
-                let along = DVec3::new(east, north, -0.3).normalize();
+                let along = DVec3::new(east, north, -0.35).normalize();
                 let hit = cast(&Hills, SPACING_M, exaggeration, eye, along).unwrap();
                 assert!((hit.at_m.z - hit.height_m * exaggeration).abs() < 1e-3, "{hit:?}");
                 assert!((hit.at_m - eye - along * hit.distance_m).length() < 1e-6);

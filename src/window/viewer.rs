@@ -138,6 +138,7 @@ impl Viewer {
         if let Some(flight) = flight {
             viewer.take_flight(flight);
         }
+        std::mem::take(&mut viewer.plan.drop).into_iter().for_each(|path| viewer.open(path));
         Ok(viewer)
     }
 

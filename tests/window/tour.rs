@@ -88,3 +88,26 @@ pub fn settings_are_remembered(display: &Display) -> Outcome {
     let has = |line: &str| heard.iter().any(|l| l == line);
     ensure(has("style hillshade") && has("size 760x540"), || format!("{heard:?}"))
 }
+
+/// Elevation data is built and shown, a flight is taken, and what is neither is told.
+pub fn dropped_files(display: &Display) -> Outcome {
+    let folder = display.folder.path();
+    let input = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/puget_sound_1025.png");
+    std::fs::copy(input, folder.join("dropped.png")).map_err(|e| e.to_string())?;
+    std::fs::write(folder.join("bad.flight"), "no flight").map_err(|e| e.to_string())?;
+    std::fs::write(folder.join("bad.iqt"), "no terrain").map_err(|e| e.to_string())?;
+    let dropped = ["--drop", "bad.flight", "--drop", "bad.iqt", "--drop", "dropped.png"];
+    let mut window = display.open(&dropped)?;
+    for file in ["bad.flight", "bad.iqt"] {
+        let words = window.hear("trouble ")?;
+        ensure(words.contains(file), || words.clone())?;
+    }
+    let built = window.hear("built ")?;
+    ensure(built.ends_with("dropped.iqt") && folder.join("dropped.iqt").exists(), || built.clone())?;
+    window.hear("opened ")?;
+    window.rest()?;
+    window.focus()?;
+    window.key("ctrl+q")?;
+    let (code, words, _) = window.end()?;
+    ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))
+}
