@@ -80,7 +80,7 @@ impl Uniforms {
         // Thin enough that a map seen from above is clear, thick enough that valleys are hazier than summits; never
         // thicker than the Earth's.
         let scale_height_m = (0.12 * haze_m).min(8000.0);
-        let eye_in_air = ((view.eye_m.z - g * terrain.height_range_m[0]) / scale_height_m).clamp(-2.0, 60.0);
+        let eye_in_air = ((view.eye_m.z - g * terrain.height_range_m[0]) / scale_height_m).clamp(-2.0, 1e6);
 
         let [low_m, high_m] = look.tint_range_m.unwrap_or(terrain.height_range_m.map(|h| h as f32));
         let contour = look.contours.unwrap_or_default();

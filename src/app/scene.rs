@@ -35,18 +35,13 @@ pub(crate) struct SceneOptions {
 }
 
 /// How many of the normal tiles that a view lacks it is given before it is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum TileService {
     /// All: the picture depends on the view alone.
+    #[default]
     All,
     /// So many a frame, the coarsest first; what is missing shows coarser shading for some frames.
     AFrame(usize),
-}
-
-impl Default for TileService {
-    fn default() -> Self {
-        Self::All
-    }
 }
 
 /// Why there is no scene or picture.
@@ -161,12 +156,29 @@ impl<'a> Scene<'a> {
         look: &Look,
         refined_for: Option<&View>,
     ) -> Result<Drawn, SceneError> {
+        let mut tiles = Drawn::default();
+        if look.tile_normals {
+            self.serve_tiles(view, &mut tiles)?;
+        }
+        let drawn = self.draw_served(encoder, target, view, look, refined_for)?;
+        Ok(Drawn { upload: drawn.upload, draw: drawn.draw, ..tiles })
+    }
+
+    /// [`Scene::draw`] without asking for tiles.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn draw_served(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: Target<'_>,
+        view: &View,
+        look: &Look,
+        refined_for: Option<&View>,
+    ) -> Result<Drawn, SceneError> {
         let view = frame_view(view);
         let refined_for = refined_for.map(frame_view);
         let mut drawn = Drawn { upload: self.send(encoder)?, ..Drawn::default() };
-        if look.tile_normals {
-            self.give_tiles(&view, &mut drawn)?;
-        }
         let frame = Frame { view: &view, refined_for: refined_for.as_ref(), look };
         drawn.draw = self.renderer.render(encoder, target, frame)?;
         Ok(drawn)
@@ -189,7 +201,12 @@ impl<'a> Scene<'a> {
         Ok(sent)
     }
 
-    fn give_tiles(&mut self, view: &FrameView, drawn: &mut Drawn) -> Result<(), SceneError> {
+    /// Gives the renderer tiles that the view lacks, as many as the options say, and counts them in `drawn`.
+    ///
+    /// # Errors
+    /// What the renderer says.
+    pub(crate) fn serve_tiles(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
+        let view = &frame_view(view);
         let most = match self.options.tiles {
             TileService::All => usize::MAX,
             TileService::AFrame(most) => most,

@@ -5,6 +5,7 @@ use crate::app::feed::PictureEngine;
 use crate::app::scene::SceneOptions;
 use crate::app::studio::Studio;
 use anyhow::{Result, bail};
+use clap::ArgAction;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use image::ExtendedColorType;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -38,7 +39,7 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "PX", default_value = "1", value_parser = parse::tolerance_px)]
     pub tolerance_px: f64,
     /// Whether vertices move into place as the eye comes nearer, or appear there
-    #[arg(long, value_name = "ON|OFF", default_value = "on", value_parser = switch())]
+    #[arg(long, value_name = "ON|OFF", default_value = "on", action = ArgAction::Set, value_parser = switch())]
     pub morph: bool,
     /// Where the light comes from: degrees clockwise from north, and above the horizon
     #[arg(long, value_name = "AZ,EL", value_parser = sun, allow_hyphen_values = true)]

@@ -29,8 +29,10 @@ fn sky(direction: vec3<f32>) -> vec3<f32> {
 fn air_m(direction: vec3<f32>, distance_m: f32) -> f32 {
     let start = frame.air.x;
     let rise = direction.z * distance_m * frame.air.y;
-    let mean = select((1.0 - exp(-rise)) / rise, 1.0 - 0.5 * rise, abs(rise) < 1e-3);
-    return distance_m * exp(-start) * mean;
+    // Densities at both ends, not their ratio: from a great height that is larger than any number. No ground lies far below the lowest.
+    let here = exp(-start);
+    let there = exp(-max(start + rise, -2.0));
+    return distance_m * select((here - there) / rise, here * (1.0 - 0.5 * rise), abs(rise) < 1e-3);
 }
 
 // What is left of `colour` after so many metres, and the air's own light added. Blue is scattered soonest.
