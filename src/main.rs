@@ -3,6 +3,8 @@
 #[cfg(feature = "view")]
 mod app;
 mod cli;
+#[cfg(feature = "view")]
+mod window;
 
 fn main() -> std::process::ExitCode {
     cli::run()

@@ -4,8 +4,9 @@
 
 use super::full_mesh::FullMesh;
 use terrasoar::refine::kinetic::{Kinetic, Patch, PatchVertex};
-use terrasoar::refine::{Culling, Engine, Unobserved, Work};
+use terrasoar::refine::{Culling, Engine, Probe, Work};
 use terrasoar::view::View;
+use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::record::RecordCodec;
 use terrasoar_layout::terrain::{Records, Terrain};
@@ -29,6 +30,10 @@ pub(crate) struct Refined {
     pub work: Work,
     /// Triangles in the mesh.
     pub triangles: u64,
+    /// Bytes of records read, every read counted; 0 for SOAR.
+    pub record_bytes_read: u64,
+    /// Distinct 4 KiB pages of them; 0 for SOAR.
+    pub pages_read: u64,
 }
 
 /// An engine over a terrain.
@@ -50,7 +55,7 @@ pub(crate) trait Feed {
 pub(crate) fn feed(terrain: &Terrain, engine: PictureEngine, culling: Culling) -> Option<Box<dyn Feed + '_>> {
     Some(with_records!(terrain.records()?, records => match engine {
         PictureEngine::Kinetic => {
-            Box::new(KineticFeed { engine: Kinetic::new(records.clone(), culling), records }) as Box<dyn Feed + '_>
+            Box::new(KineticFeed { engine: Kinetic::new(records.clone(), culling), reads: Reads::over(&records), records }) as Box<dyn Feed + '_>
         }
         PictureEngine::Soar => Box::new(FullMesh::new(records, culling)),
     }))
@@ -65,12 +70,48 @@ pub(crate) fn mesh_vertex(vertex: &PatchVertex) -> MeshVertex {
 struct KineticFeed<'a, C: RecordCodec> {
     engine: Kinetic<'a, C>,
     records: Records<'a, C>,
+    reads: Reads,
+}
+
+/// The pages of the records that an update reads, each read a page.
+#[derive(Debug, Default)]
+struct Reads {
+    slots_a_page: u64,
+    pages: Vec<u64>,
+}
+
+impl Probe for Reads {
+    fn read(&mut self, slot: u64) {
+        self.pages.push(slot / self.slots_a_page);
+    }
+}
+
+impl Reads {
+    fn over<C: RecordCodec>(_: &Records<'_, C>) -> Self {
+        Self { slots_a_page: (PAGE_BYTES / C::BYTES) as u64, pages: Vec::new() }
+    }
+
+    /// How many reads there were, and of how many pages; forgets them.
+    fn take(&mut self) -> [u64; 2] {
+        let reads = self.pages.len() as u64;
+        self.pages.sort_unstable();
+        self.pages.dedup();
+        let pages = self.pages.len() as u64;
+        self.pages.clear();
+        [reads, pages]
+    }
 }
 
 impl<C: RecordCodec> Feed for KineticFeed<'_, C> {
     fn update(&mut self, view: &View) -> Refined {
-        self.engine.update(view, &mut Unobserved);
-        Refined { work: self.engine.work(), triangles: self.engine.triangle_count() as u64 }
+        self.engine.update(view, &mut self.reads);
+        let [reads, pages_read] = self.reads.take();
+        Refined {
+            work: self.engine.work(),
+            triangles: self.engine.triangle_count() as u64,
+            record_bytes_read: reads * C::BYTES as u64,
+            pages_read,
+        }
     }
 
     fn patch(&self) -> &Patch {

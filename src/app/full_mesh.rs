@@ -68,7 +68,11 @@ impl<C: RecordCodec> Feed for FullMesh<'_, C> {
         patch.draws.clear();
         patch.draws.push(0..patch.triangles.len() as u32);
         self.patch = patch;
-        Refined { work: Work { tests, ..Work::default() }, triangles: triangles.len() as u64 }
+        Refined {
+            work: Work { tests, ..Work::default() },
+            triangles: triangles.len() as u64,
+            ..Refined::default()
+        }
     }
 
     fn patch(&self) -> &Patch {

@@ -30,9 +30,11 @@ mod sweep;
 mod synth;
 mod terrain;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
 
 #[cfg(not(feature = "view"))]
-use pictureless::{movie, snapshot};
+use pictureless::{movie, snapshot, view};
 
 use clap::{Parser, Subcommand};
 use std::fmt;
@@ -73,6 +75,7 @@ enum Verb {
     Replay(replay::Args),
     Compare(compare::Args),
     Mesh(mesh::Args),
+    View(view::Args),
     Snapshot(snapshot::Args),
     Movie(movie::Args),
 }
@@ -101,6 +104,7 @@ pub(crate) fn run() -> ExitCode {
         Verb::Replay(args) => replay::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Mesh(args) => mesh::run(&args),
+        Verb::View(args) => view::run(&args),
         Verb::Snapshot(args) => snapshot::run(&args),
         Verb::Movie(args) => movie::run(&args),
     };

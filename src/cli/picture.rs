@@ -95,11 +95,11 @@ impl PictureArgs {
     }
 }
 
-fn style() -> impl TypedValueParser<Value = String> {
+pub(super) fn style() -> impl TypedValueParser<Value = String> {
     PossibleValuesParser::new(LOOKS.iter().map(|(name, about)| PossibleValue::new(*name).help(*about)))
 }
 
-fn ramp() -> impl TypedValueParser<Value = &'static Ramp> {
+pub(super) fn ramp() -> impl TypedValueParser<Value = &'static Ramp> {
     PossibleValuesParser::new(RAMPS.iter().map(|ramp| ramp.name))
         .map(|name| Ramp::named(&name).unwrap_or(&RAMPS[0]))
 }

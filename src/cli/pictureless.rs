@@ -32,6 +32,22 @@ pub(super) mod movie {
     }
 }
 
+/// `terrasoar view`.
+pub(super) mod view {
+    /// Fly over a terrain in a window (this program was built without pictures).
+    #[derive(Debug, clap::Args)]
+    #[command(disable_help_flag = true)]
+    pub(crate) struct Args {
+        /// Ignored
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+        ignored: Vec<std::ffi::OsString>,
+    }
+
+    pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+        super::refuse("view", &args.ignored)
+    }
+}
+
 fn refuse(verb: &str, _: &[std::ffi::OsString]) -> anyhow::Result<()> {
     anyhow::bail!(
         "this program was built without pictures, which {verb} draws; build it with the feature view (cargo build --release does)"

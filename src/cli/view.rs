@@ -1,0 +1,73 @@
+//! `terrasoar view`: a window to fly over a terrain in.
+
+use super::{parse, picture};
+use crate::window::{self, Plan};
+use anyhow::Result;
+use std::path::PathBuf;
+use terrasoar::view::Viewport;
+use terrasoar_render::ramps::Ramp;
+
+/// Fly over a terrain in a window.
+///
+/// Elevation data, terrain files and flights may be dropped on the window. Pictures and flights that are kept go to the folder the program
+/// was started in. What is set in the panel is remembered for the next time. It needs a display and a graphics adapter; a software driver
+/// such as Mesa's does.
+#[derive(Debug, clap::Args)]
+#[command(after_help = after_help())]
+pub(super) struct Args {
+    /// Terrain file (.iqt)
+    file: PathBuf,
+    /// Flight to play
+    #[arg(long, value_name = "F")]
+    flight: Option<PathBuf>,
+    /// Style to begin with, instead of the last one
+    #[arg(long, value_name = "STYLE", value_parser = picture::style())]
+    style: Option<String>,
+    /// Colours to begin with, instead of the style's
+    #[arg(long, value_name = "RAMP", value_parser = picture::ramp())]
+    ramp: Option<&'static Ramp>,
+    /// Largest error on the screen in pixels, instead of the last one
+    #[arg(long, value_name = "PX", value_parser = parse::tolerance_px)]
+    tolerance_px: Option<f64>,
+    /// Multiply heights by this factor, instead of the last one
+    #[arg(long, value_name = "FACTOR", value_parser = parse::exaggeration)]
+    exaggeration: Option<f64>,
+    /// Size of the window in pixels, instead of the last one
+    #[arg(long, value_name = "WxH", value_parser = parse::viewport)]
+    size: Option<Viewport>,
+    /// Tell on standard output what happens, a line each
+    #[arg(long, hide = true)]
+    narrate: bool,
+    /// End after so many frames
+    #[arg(long, hide = true, value_name = "N")]
+    exit_after_frames: Option<u64>,
+    /// Open this file as if it had been dropped on the window
+    #[arg(long, hide = true, value_name = "FILE")]
+    drop: Vec<PathBuf>,
+    /// Throw the graphics device away after so many frames
+    #[arg(long, hide = true, value_name = "N")]
+    lose_device_after_frames: Option<u64>,
+}
+
+fn after_help() -> String {
+    format!(
+        "Examples:\n  terrasoar view alps.iqt\n  terrasoar view alps.iqt --flight low.flight --style contours --exaggeration 2\n\nKeys:\n{}",
+        window::list_of_keys()
+    )
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    window::run(Plan {
+        file: args.file.clone(),
+        flight: args.flight.clone(),
+        style: args.style.clone(),
+        ramp: args.ramp.map(|ramp| ramp.name.to_owned()),
+        tolerance_px: args.tolerance_px,
+        exaggeration: args.exaggeration,
+        size_px: args.size.map(|size| [size.width_px, size.height_px]),
+        narrate: args.narrate,
+        drop: args.drop.clone(),
+        exit_after_frames: args.exit_after_frames,
+        lose_device_after_frames: args.lose_device_after_frames,
+    })
+}

@@ -1,0 +1,70 @@
+//! `terrasoar view`: a window that a terrain is flown over in.
+//!
+//! [`camera`], [`pick`], [`flights`], [`settings`], [`keys`], [`hand`] and [`job`] know no window and are tested by themselves; [`screen`] and
+//! [`overlay`] know no terrain; [`viewer`] puts a frame together, [`events`] brings it the window's events. A frame is drawn when something
+//! moves or was touched; else nothing is. **Whatever fails while the window is open is said in it.**
+
+mod camera;
+mod events;
+mod flights;
+mod ground;
+mod hand;
+mod history;
+mod job;
+mod keep;
+mod keys;
+mod overlay;
+mod panel;
+mod pick;
+mod screen;
+mod settings;
+mod stage;
+mod viewer;
+
+use anyhow::{Context, Result};
+use std::path::PathBuf;
+use terrasoar::flight::Flight;
+use terrasoar_layout::terrain::Terrain;
+
+pub(crate) use keys::list as list_of_keys;
+
+/// What was asked for on the command line.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Plan {
+    /// Terrain file.
+    pub file: PathBuf,
+    /// Flight to play.
+    pub flight: Option<PathBuf>,
+    /// Style, ramp, tolerance, exaggeration and size instead of what is remembered.
+    pub style: Option<String>,
+    /// Name of a ramp.
+    pub ramp: Option<String>,
+    /// Pixels.
+    pub tolerance_px: Option<f64>,
+    /// Factor on heights.
+    pub exaggeration: Option<f64>,
+    /// Size of the window in pixels.
+    pub size_px: Option<[u32; 2]>,
+    /// Whether to tell on standard output what happens, for programs that drive the window.
+    pub narrate: bool,
+    /// Files to open as if they had been dropped.
+    pub drop: Vec<PathBuf>,
+    /// Frames after which to end.
+    pub exit_after_frames: Option<u64>,
+    /// Frames after which the device is thrown away, to try how that goes.
+    pub lose_device_after_frames: Option<u64>,
+}
+
+/// Shows the window until it is closed.
+///
+/// # Errors
+/// A terrain or flight that cannot be opened, before there is a window; no display; no adapter.
+pub(crate) fn run(plan: Plan) -> Result<()> {
+    let terrain = Terrain::open(&plan.file)?;
+    let flight = plan.flight.as_deref().map(Flight::read).transpose()?;
+    let event_loop = winit::event_loop::EventLoop::with_user_event().build().context(
+        "no window can be opened: there is no display. Run it on a desktop, or with DISPLAY or WAYLAND_DISPLAY set \
+         (ssh -X does); all other verbs need none",
+    )?;
+    events::run(event_loop, plan, terrain, flight)
+}

@@ -1,0 +1,461 @@
+//! A frame of the window, and what keys and panels ask for.
+//!
+//! The order of a frame: move the eye, lay the panels out, grant their wishes, refine, draw, show. What goes wrong becomes a note in the window;
+//! a lost device is replaced and told, twice in a row it ends the program.
+
+mod act;
+mod draw;
+
+use super::camera::{Camera, Rig, ground_below_m};
+use super::events::Wake;
+use super::flights::{Player, Recorder};
+use super::hand::Hand;
+use super::history::{Figures, History};
+use super::job::{self, Job};
+use super::keys;
+use super::overlay::Overlay;
+use super::panel::{self, Facts, Memory, Note};
+use super::pick::{self, Hit};
+use super::screen::Screen;
+use super::settings::Settings;
+use super::stage::Stage;
+use super::{Plan, keep};
+use anyhow::Result;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use terrasoar::flight::Flight;
+use terrasoar::flight::generate::Ground;
+use terrasoar::view::{View, Viewport};
+use terrasoar_layout::terrain::Terrain;
+use winit::event::{MouseButton, WindowEvent};
+use winit::event_loop::{EventLoopProxy, OwnedDisplayHandle};
+use winit::keyboard::KeyCode;
+use winit::window::Window;
+
+/// Longest span that a frame moves on by, so that a hitch is no leap.
+const LONGEST_SPAN: Duration = Duration::from_millis(100);
+/// How often a build's progress is looked at, and whether a window that could not be drawn on can be by now.
+const LOOKS: Duration = Duration::from_millis(100);
+
+/// When the next frame is due.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Next {
+    /// Something moves.
+    AtOnce,
+    /// Nothing moves; not before that, events apart.
+    In(Duration),
+    /// Never: the window is to be closed.
+    End,
+}
+
+/// Everything behind the window.
+pub(super) struct Viewer {
+    window: Arc<Window>,
+    display: OwnedDisplayHandle,
+    proxy: EventLoopProxy<Wake>,
+    plan: Plan,
+    screen: Screen,
+    overlay: Overlay,
+    stage: Stage,
+    terrain_name: String,
+    settings: Settings,
+    memory: Memory,
+    rig: Rig,
+    /// What the hands do.
+    pub hand: Hand,
+    /// The view that the mesh was refined for, while it is frozen.
+    frozen: Option<View>,
+    recorder: Option<Recorder>,
+    player: Option<Player>,
+    job: Option<Job>,
+    notes: Vec<Note>,
+    history: History,
+    under: Option<Hit>,
+    frame_at: Option<Instant>,
+    frames: u64,
+    tiles_missing: bool,
+    /// Whether the last frame found nothing to be drawn on.
+    unshown: bool,
+    hidden: bool,
+    touched: bool,
+    ending: bool,
+    /// Why it ends, if not because it was asked to.
+    pub failure: Option<anyhow::Error>,
+    said: Vec<(&'static str, String)>,
+}
+
+impl Viewer {
+    /// A window with a terrain, and a flight perhaps.
+    ///
+    /// # Errors
+    /// No adapter, no device, or a terrain that cannot be shown.
+    pub(super) fn new(
+        window: Arc<Window>,
+        display: OwnedDisplayHandle,
+        proxy: EventLoopProxy<Wake>,
+        plan: Plan,
+        settings: Settings,
+        terrain: Terrain,
+        flight: Option<Flight>,
+    ) -> Result<Self> {
+        let screen = Screen::new(Arc::clone(&window), display.clone())?;
+        let overlay = Overlay::new(&window, &display, &screen);
+        let stage = Stage::new(terrain, &screen.gpu, settings.culling())?;
+        let rig = stage.on_ground(|ground| Rig::over(ground, settings.exaggeration));
+        let mut viewer = Self {
+            terrain_name: String::new(),
+            window,
+            display,
+            proxy,
+            plan,
+            screen,
+            overlay,
+            stage,
+            settings,
+            memory: Memory::default(),
+            rig,
+            hand: Hand::default(),
+            frozen: None,
+            recorder: None,
+            player: None,
+            job: None,
+            notes: Vec::new(),
+            history: History::default(),
+            under: None,
+            frame_at: None,
+            frames: 0,
+            tiles_missing: true,
+            unshown: false,
+            hidden: false,
+            touched: true,
+            ending: false,
+            failure: None,
+            said: Vec::new(),
+        };
+        viewer.name_terrain();
+        if let Some(flight) = flight {
+            viewer.take_flight(flight);
+        }
+        std::mem::take(&mut viewer.plan.drop).into_iter().for_each(|path| viewer.open(path));
+        Ok(viewer)
+    }
+
+    /// The window.
+    pub(super) fn window(&self) -> &Window {
+        &self.window
+    }
+
+    /// Whether something was touched since the last frame.
+    pub(super) fn is_touched(&self) -> bool {
+        self.touched && !self.hidden
+    }
+
+    /// What is to be remembered, the window's size now included.
+    pub(super) fn settings_to_keep(&mut self) -> &Settings {
+        if self.window.fullscreen().is_none() {
+            let size = self.window.inner_size().to_logical::<f64>(self.window.scale_factor());
+            self.settings.window = [size.width.round() as u32, size.height.round() as u32];
+        }
+        &self.settings
+    }
+
+    /// Says in the window what went wrong.
+    pub(super) fn trouble(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        self.tell(&format!("trouble {text}"));
+        if self.notes.last().is_none_or(|note| note.text != text) {
+            self.notes.push(Note::trouble(text));
+        }
+        self.touched = true;
+    }
+
+    fn news(&mut self, text: impl Into<String>) {
+        self.notes.push(Note::news(text));
+        self.touched = true;
+    }
+
+    /// Tells who drives the window what happened. If nobody listens there is nobody to tell.
+    fn tell(&self, line: &str) {
+        if self.plan.narrate {
+            let mut out = std::io::stdout().lock();
+            let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+        }
+    }
+
+    /// Tells a state when it is another than before.
+    fn tell_state(&mut self, name: &'static str, value: String) {
+        if !self.plan.narrate {
+            return;
+        }
+        match self.said.iter_mut().find(|(said, _)| *said == name) {
+            Some((_, before)) if *before == value => return,
+            Some((_, before)) => before.clone_from(&value),
+            None => self.said.push((name, value.clone())),
+        }
+        self.tell(&format!("{name} {value}"));
+    }
+
+    /// The overlay hears an event first.
+    pub(super) fn overlay_hears(&mut self, event: &WindowEvent) -> bool {
+        self.overlay.hear(&self.window, event)
+    }
+
+    /// The window has another size.
+    pub(super) fn resize(&mut self, width: u32, height: u32) {
+        self.hidden = width == 0 || height == 0;
+        self.screen.resize(width, height);
+        self.touched = true;
+    }
+
+    /// The window is out of sight, or seen again.
+    pub(super) fn hide(&mut self, hidden: bool) {
+        self.hidden = hidden;
+        self.touched |= !hidden;
+    }
+
+    /// A key goes down or up.
+    pub(super) fn key(&mut self, code: KeyCode, down: bool, repeat: bool) {
+        if down && self.overlay.is_typing() {
+            return;
+        }
+        self.touched = true;
+        self.hand.key(code, down);
+        if down
+            && !repeat
+            && let Some(action) = keys::action(code, self.hand.ctrl)
+        {
+            self.act(action);
+        }
+    }
+
+    /// A mouse button goes down or up.
+    pub(super) fn button(&mut self, button: MouseButton, down: bool) {
+        self.touched = true;
+        if !down {
+            // What was dragged is still to be turned by, about its own pivot.
+            self.hand.lift(button);
+            return;
+        }
+        if self.overlay.has_pointer() {
+            return;
+        }
+        let double = self.hand.press(button, Instant::now());
+        let hit = self.pick(self.hand.pointer);
+        if button == MouseButton::Right {
+            self.rig.pivot = Some(hit.map_or_else(|| self.ahead_m(), |hit| hit.at_m));
+        } else if double && let Some(hit) = hit {
+            self.pause();
+            self.rig.go_to(hit.at_m, (0.35 * hit.distance_m).max(30.0));
+        }
+    }
+
+    /// The wheel turns by lines.
+    pub(super) fn wheel(&mut self, lines: f64) {
+        if !self.overlay.has_pointer() {
+            self.rig.change_speed(1.25f64.powf(lines.clamp(-20.0, 20.0)));
+            self.touched = true;
+        }
+    }
+
+    fn viewport(&self) -> Viewport {
+        let [width_px, height_px] = self.screen.size_px();
+        Viewport { width_px, height_px }
+    }
+
+    fn view(&self) -> View {
+        let Settings { tolerance_px, exaggeration, .. } = self.settings;
+        self.rig.camera.view(self.viewport(), tolerance_px, exaggeration)
+    }
+
+    /// The ground at a place of the window.
+    fn pick(&self, pointer: Option<[f64; 2]>) -> Option<Hit> {
+        let [x, y] = pointer?;
+        let viewport = self.viewport();
+        let at = [x / f64::from(viewport.width_px), y / f64::from(viewport.height_px)];
+        let camera = self.rig.camera;
+        self.stage.on_ground(|ground| {
+            let spacing_m = ground.spacing_m();
+            pick::cast(ground, spacing_m, self.settings.exaggeration, camera.eye_m, camera.ray(at, viewport))
+        })
+    }
+
+    /// What lies in the middle of the picture, or would.
+    fn ahead_m(&self) -> glam::DVec3 {
+        let [width, height] = self.screen.size_px().map(f64::from);
+        match self.pick(Some([0.5 * width, 0.5 * height])) {
+            Some(hit) => hit.at_m,
+            None => {
+                let [east_m, north_m] = self.stage.on_ground(|ground| ground.extent_m());
+                self.rig.camera.eye_m + self.rig.camera.axes()[2] * 0.25 * east_m.max(north_m)
+            }
+        }
+    }
+
+    fn pause(&mut self) {
+        if let Some(player) = &mut self.player {
+            player.pause();
+        }
+    }
+
+    /// A frame, and when the next is due.
+    pub(super) fn frame(&mut self) -> Next {
+        if self.hidden {
+            self.frame_at = None;
+            return if self.ending { Next::End } else { Next::In(Duration::MAX) };
+        }
+        self.touched = false;
+        let now = Instant::now();
+        let passed = self.frame_at.map(|before| now - before);
+        let span_s = passed.unwrap_or_default().min(LONGEST_SPAN).as_secs_f64();
+        self.look_after_job();
+        self.notes.retain(|note| note.until.is_none_or(|until| until > now));
+        self.fly(span_s);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.push(span_s, &self.rig.camera);
+        }
+        let pointer = self.hand.pointer.filter(|_| !self.overlay.has_pointer());
+        self.under = self.pick(pointer);
+        let mut layer = self.lay_out();
+        let again = layer.again;
+        self.show(&mut layer, passed, now);
+        if self.plan.exit_after_frames.is_some_and(|frames| self.frames >= frames) {
+            self.ending = true;
+        }
+        let counting = self.plan.exit_after_frames.is_some() || self.plan.lose_device_after_frames.is_some();
+        let moving = self.rig.is_moving()
+            || self.hand.is_dragging()
+            || self.hand.is_flying()
+            || self.recorder.is_some()
+            || self.player.as_ref().is_some_and(Player::is_playing);
+        self.tell_motion(moving);
+        if self.ending {
+            return Next::End;
+        }
+        if moving || self.tiles_missing || self.touched || counting || again.is_zero() {
+            self.frame_at = Some(now);
+            return Next::AtOnce;
+        }
+        self.frame_at = None;
+        let news = self.notes.iter().filter_map(|note| note.until).min();
+        let waits = [
+            Some(again),
+            (self.job.is_some() || self.unshown).then_some(LOOKS),
+            news.map(|until| until.saturating_duration_since(now)),
+        ];
+        Next::In(waits.into_iter().flatten().min().unwrap_or(again))
+    }
+
+    fn tell_motion(&mut self, moving: bool) {
+        let [width, height] = self.screen.size_px();
+        let flying = self.rig.is_moving() || self.hand.is_dragging();
+        self.tell_state("moving", flying.to_string());
+        self.tell_state("size", format!("{width}x{height}"));
+        self.tell_state("panel", self.settings.panel.to_string());
+        self.tell_state("help", self.memory.help.to_string());
+        self.tell_state("frozen", self.frozen.is_some().to_string());
+        self.tell_state("style", self.settings.style.clone());
+        self.tell_state("playing", self.player.as_ref().is_some_and(Player::is_playing).to_string());
+        self.tell_state("recording", self.recorder.is_some().to_string());
+        self.tell_state("full-screen", self.window.fullscreen().is_some().to_string());
+        if !moving && !self.tiles_missing {
+            let Camera { eye_m, yaw_deg, pitch_deg, .. } = self.rig.camera;
+            let place = format!("{:.2} {:.2} {:.2} {yaw_deg:.3} {pitch_deg:.3}", eye_m.x, eye_m.y, eye_m.z);
+            self.tell_state("at-rest", place);
+        } else {
+            self.said.retain(|(name, _)| *name != "at-rest");
+        }
+    }
+
+    /// Moves the eye: by the flight that is played, or by hand.
+    fn fly(&mut self, span_s: f64) {
+        let controls = self.hand.controls();
+        if let Some(player) = &mut self.player
+            && player.is_playing()
+        {
+            if controls.thrust == [0.0; 3] && !self.hand.is_dragging() {
+                player.advance(span_s);
+                self.rig.place(player.camera());
+                return;
+            }
+            player.pause();
+        }
+        let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
+        self.stage.on_ground(|ground| rig.advance(span_s, &controls, ground, exaggeration));
+    }
+
+    /// Lays the panels out and grants their wishes.
+    fn lay_out(&mut self) -> super::overlay::Layer {
+        let before = self.settings.clone();
+        let (mut settings, mut wishes) = (self.settings.clone(), Vec::new());
+        let adapter = self.screen.gpu.capabilities.adapter.clone();
+        let extent_m = self.stage.on_ground(|ground| ground.extent_m());
+        let job = self.job.as_ref().map(|job| {
+            let (stage, part) = job.progress();
+            (job.input.file_name().unwrap_or_default().to_string_lossy().into_owned(), stage, part)
+        });
+        let facts = Facts {
+            terrain: &self.terrain_name,
+            extent_m,
+            adapter: &adapter,
+            under: self.under,
+            eye_m: self.rig.camera.eye_m.to_array(),
+            speed_m_s: self.rig.speed_m_s,
+            follow_m: self.rig.follow_m,
+            circling: self.rig.circling.is_some(),
+            frozen: self.frozen.is_some(),
+            recorder: self.recorder.as_ref(),
+            player: self.player.as_ref(),
+            history: &self.history,
+            job,
+            notes: &self.notes,
+        };
+        let memory = &mut self.memory;
+        let layer = self.overlay.lay_out(&self.window, |ui| {
+            wishes.extend(panel::show(ui, &facts, &mut settings, memory));
+        });
+        self.settings = settings;
+        wishes.into_iter().for_each(|wish| self.grant(wish));
+        self.touched |= self.settings != before;
+        self.follow_settings(&before);
+        layer
+    }
+
+    /// What other settings mean beyond the picture.
+    fn follow_settings(&mut self, before: &Settings) {
+        let now = self.settings.exaggeration;
+        if now != before.exaggeration {
+            let rig = &mut self.rig;
+            self.stage.on_ground(|ground| rig.exaggerate(ground, before.exaggeration, now));
+        }
+        if self.settings.culling != before.culling {
+            if let Err(error) = self.stage.set_culling(self.settings.culling(), &self.screen.gpu) {
+                self.settings.culling.clone_from(&before.culling);
+                self.trouble(format!("{error:#}"));
+            }
+            self.frozen = None;
+        }
+    }
+
+    fn look_after_job(&mut self) {
+        let Some(ended) = self.job.as_mut().and_then(Job::take) else { return };
+        self.job = None;
+        match ended {
+            Ok(built) => {
+                self.tell(&format!("built {}", built.path.display()));
+                self.open_terrain(&built.path);
+                if let Some(note) = built.note {
+                    self.trouble(note);
+                }
+            }
+            Err(words) => self.trouble(words),
+        }
+    }
+
+    fn name_terrain(&mut self) {
+        let path = self.stage.path();
+        self.terrain_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        self.window.set_title(&format!("{} - Terrasoar", self.terrain_name));
+    }
+}

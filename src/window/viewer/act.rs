@@ -1,0 +1,209 @@
+//! What keys, panels and dropped files ask for, carried out.
+
+use super::*;
+use crate::window::keys::Action;
+use crate::window::panel::Wish;
+use winit::window::Fullscreen;
+
+impl Viewer {
+    /// Does what a key stands for.
+    pub(super) fn act(&mut self, action: Action) {
+        self.touched = true;
+        match action {
+            Action::Help => self.memory.help = !self.memory.help,
+            Action::Panel => self.settings.panel = !self.settings.panel,
+            Action::Figures => self.settings.figures = !self.settings.figures,
+            Action::FullScreen => {
+                let is_full = self.window.fullscreen().is_some();
+                self.window.set_fullscreen((!is_full).then_some(Fullscreen::Borderless(None)));
+            }
+            Action::Follow => {
+                let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
+                self.stage.on_ground(|ground| rig.toggle_follow(ground, exaggeration));
+            }
+            Action::Circle => {
+                self.pause();
+                self.rig.circling = match self.rig.circling {
+                    Some(_) => None,
+                    None => Some(self.ahead_m()),
+                };
+            }
+            Action::Overview => {
+                self.pause();
+                let exaggeration = self.settings.exaggeration;
+                self.rig.follow_m = None;
+                self.rig.glide_to(self.stage.on_ground(|ground| Camera::overview(ground, exaggeration)));
+            }
+            Action::GoTo => {
+                self.settings.panel = true;
+                self.memory.focus_place = true;
+            }
+            Action::Freeze => {
+                self.frozen = match self.frozen {
+                    Some(_) => None,
+                    None => Some(self.view()),
+                };
+            }
+            Action::NextStyle => self.settings.next_style(),
+            Action::Contours => self.settings.contours = !self.settings.contours,
+            Action::Wireframe => self.settings.wireframe = !self.settings.wireframe,
+            Action::Screenshot => self.keep_picture(),
+            Action::Record => self.record(),
+            Action::Play => match &mut self.player {
+                Some(player) => player.toggle(),
+                None => {
+                    self.news("There is no flight yet: R records one; a .flight file may be dropped here.")
+                }
+            },
+            Action::StepBack => self.step(-1),
+            Action::StepForward => self.step(1),
+            Action::Cancel => {
+                self.memory.help = false;
+                self.pause();
+                self.rig.circling = None;
+                self.rig.place(self.rig.camera);
+            }
+            Action::Quit => self.ending = true,
+        }
+    }
+
+    /// Does what a panel asks for.
+    pub(super) fn grant(&mut self, wish: Wish) {
+        self.touched = true;
+        match wish {
+            Wish::Act(action) => self.act(action),
+            Wish::GoTo(text) => self.go_to(&text),
+            Wish::Seek(frame) => {
+                if let Some(player) = &mut self.player {
+                    player.pause();
+                    player.seek(frame);
+                    self.rig.place(player.camera());
+                }
+            }
+            Wish::CloseFlight => self.player = None,
+            Wish::Dismiss(note) => {
+                if note < self.notes.len() {
+                    self.notes.remove(note);
+                }
+            }
+        }
+    }
+
+    /// Opens what was dropped on the window: a terrain, a flight, or elevation data, which is built first.
+    pub(in crate::window) fn open(&mut self, path: PathBuf) {
+        self.touched = true;
+        if job::is_terrain(&path) {
+            self.open_terrain(&path);
+        } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("flight")) {
+            match Flight::read(&path) {
+                Ok(flight) => self.take_flight(flight),
+                Err(error) => self.trouble(error.to_string()),
+            }
+        } else if self.job.is_some() {
+            self.trouble(format!(
+                "{}: another terrain is being built; drop it again after that",
+                path.display()
+            ));
+        } else {
+            let proxy = self.proxy.clone();
+            // A window that has gone needs no waking.
+            match Job::start(path, move || {
+                let _ = proxy.send_event(Wake);
+            }) {
+                Ok(job) => self.job = Some(job),
+                Err(words) => self.trouble(words),
+            }
+        }
+    }
+
+    pub(super) fn open_terrain(&mut self, path: &Path) {
+        match Stage::open(path, &self.screen.gpu, self.settings.culling()) {
+            Ok(stage) => {
+                self.end_recording();
+                self.stage = stage;
+                let exaggeration = self.settings.exaggeration;
+                self.rig = self.stage.on_ground(|ground| Rig::over(ground, exaggeration));
+                (self.player, self.frozen) = (None, None);
+                self.name_terrain();
+                self.tell(&format!("opened {}", path.display()));
+            }
+            Err(error) => self.trouble(format!("{error:#}")),
+        }
+    }
+
+    pub(super) fn take_flight(&mut self, flight: Flight) {
+        self.player = Player::new(flight);
+        if let Some(player) = &self.player {
+            self.rig.place(player.camera());
+        }
+    }
+
+    fn step(&mut self, by: isize) {
+        if let Some(player) = &mut self.player {
+            player.step(by);
+            self.rig.place(player.camera());
+        }
+    }
+
+    fn go_to(&mut self, text: &str) {
+        let numbers: Vec<Option<f64>> = text
+            .split([',', ' ', ';'])
+            .filter(|word| !word.is_empty())
+            .map(|word| word.parse().ok().filter(|n: &f64| n.is_finite()))
+            .collect();
+        let [Some(east), Some(north)] = numbers[..] else {
+            return self.trouble(format!(
+                "{text:?} is no place: give metres east and north of the south-west corner, such as 1500, 820.5"
+            ));
+        };
+        let [wide, high] = self.stage.on_ground(|ground| ground.extent_m());
+        if !((0.0..=wide).contains(&east) && (0.0..=high).contains(&north)) {
+            return self.trouble(format!(
+                "{east}, {north} lies outside the terrain, which extends from 0, 0 to {wide:.0}, {high:.0} metres"
+            ));
+        }
+        let exaggeration = self.settings.exaggeration;
+        let at = glam::DVec3::new(east, north, 0.0);
+        let below_m = self.stage.on_ground(|ground| ground_below_m(ground, at, exaggeration));
+        self.pause();
+        self.rig.go_to(at.with_z(below_m.unwrap_or_default()), 0.04 * wide.max(high));
+    }
+
+    fn record(&mut self) {
+        if self.recorder.is_some() {
+            self.end_recording();
+        } else {
+            self.pause();
+            self.recorder = Some(Recorder::new(&self.stage.path(), self.settings.exaggeration));
+        }
+    }
+
+    pub(in crate::window) fn end_recording(&mut self) {
+        let Some(recorder) = self.recorder.take() else { return };
+        let path = keep::free_name(Path::new(""), &self.stage.path(), "flight");
+        match recorder.finish(&path) {
+            Ok(flight) => {
+                self.news(format!("flight: {}", shown(&path)));
+                self.tell(&format!("flight {}", shown(&path)));
+                self.player = Player::new(flight);
+            }
+            Err(error) => self.trouble(error.to_string()),
+        }
+    }
+
+    fn keep_picture(&mut self) {
+        let path = keep::free_name(Path::new(""), &self.stage.path(), "png");
+        match self.take_picture(&path) {
+            Ok(()) => {
+                self.news(format!("picture: {}", shown(&path)));
+                self.tell(&format!("picture {}", shown(&path)));
+            }
+            Err(error) => self.trouble(format!("{error:#}")),
+        }
+    }
+}
+
+/// A path that tells where the file is.
+fn shown(path: &Path) -> String {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()).display().to_string()
+}
