@@ -55,3 +55,9 @@ fetch_dependencies() {
     fi
     export CARGO_NET_OFFLINE=true
 }
+
+# graphics_driver WHY: whether there is one, installing one in software if need be.
+graphics_driver() {
+    [ "$(uname)" = Darwin ] && return
+    compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || apt_install "$1" mesa-vulkan-drivers libvulkan1
+}

@@ -173,7 +173,8 @@ impl Player {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::window::camera::{Controls, Rig};
+    use crate::window::camera::Controls;
+    use crate::window::camera::tests::high;
     use crate::window::pick::tests::Hills;
     use terrasoar::view::Viewport;
 
@@ -181,7 +182,7 @@ mod tests {
     fn a_recorded_flight_shows_the_views_that_were_seen() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.flight");
-        let mut rig = Rig::over(&Hills, 1.5);
+        let mut rig = high();
         let mut recorder = Recorder::new(Path::new("/x/hills.iqt"), 1.5);
         let mut seen = Vec::new();
         let viewport = Viewport { width_px: 640, height_px: 400 };

@@ -72,6 +72,11 @@ impl Stage {
         self.opened.borrow_owner().path().to_path_buf()
     }
 
+    /// The opened terrain.
+    pub(crate) fn terrain(&self) -> &Terrain {
+        self.opened.borrow_owner()
+    }
+
     /// Does something with ground and scene.
     pub(crate) fn with<R>(&mut self, act: impl for<'a> FnOnce(&mut Live<'a>) -> R) -> R {
         self.opened.with_dependent_mut(|_, live| act(live))

@@ -20,6 +20,7 @@ use super::screen::Screen;
 use super::settings::Settings;
 use super::stage::Stage;
 use super::{Plan, keep};
+use crate::app::overview::{FOV_DEG, overview};
 use anyhow::Result;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -34,8 +35,9 @@ use winit::event_loop::{EventLoopProxy, OwnedDisplayHandle};
 use winit::keyboard::KeyCode;
 use winit::window::Window;
 
-/// Longest span that a frame moves on by, so that a hitch is no leap.
-const LONGEST_SPAN: Duration = Duration::from_millis(100);
+/// Longest span that a frame moves on by, so that a hitch is no leap, and that a flight does, whose way
+/// is known.
+const LONGEST_SPAN: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(1)];
 /// How often a build's progress is looked at, and whether a window that could not be drawn on can be by now.
 const LOOKS: Duration = Duration::from_millis(100);
 
@@ -103,7 +105,7 @@ impl Viewer {
         let screen = Screen::new(Arc::clone(&window), display.clone())?;
         let overlay = Overlay::new(&window, &display, &screen);
         let stage = Stage::new(terrain, &screen.gpu, settings.culling())?;
-        let rig = stage.on_ground(|ground| Rig::over(ground, settings.exaggeration));
+        let rig = start(&stage, &screen, &window, &settings);
         let mut viewer = Self {
             terrain_name: String::new(),
             window,
@@ -293,6 +295,11 @@ impl Viewer {
         }
     }
 
+    /// The whole terrain, beside the panel.
+    fn overview(&self) -> Camera {
+        overview_beside_panel(&self.stage, &self.screen, &self.window, &self.settings)
+    }
+
     fn pause(&mut self) {
         if let Some(player) = &mut self.player {
             player.pause();
@@ -308,12 +315,12 @@ impl Viewer {
         self.touched = false;
         let now = Instant::now();
         let passed = self.frame_at.map(|before| now - before);
-        let span_s = passed.unwrap_or_default().min(LONGEST_SPAN).as_secs_f64();
+        let spans_s = LONGEST_SPAN.map(|longest| passed.unwrap_or_default().min(longest).as_secs_f64());
         self.look_after_job();
         self.notes.retain(|note| note.until.is_none_or(|until| until > now));
-        self.fly(span_s);
+        self.fly(spans_s);
         if let Some(recorder) = &mut self.recorder {
-            recorder.push(span_s, &self.rig.camera);
+            recorder.push(spans_s[0], &self.rig.camera);
         }
         let pointer = self.hand.pointer.filter(|_| !self.overlay.has_pointer());
         self.under = self.pick(pointer);
@@ -369,19 +376,20 @@ impl Viewer {
     }
 
     /// Moves the eye: by the flight that is played, or by hand.
-    fn fly(&mut self, span_s: f64) {
+    fn fly(&mut self, [span_s, played_s]: [f64; 2]) {
         let controls = self.hand.controls();
         if let Some(player) = &mut self.player
             && player.is_playing()
         {
             if controls.thrust == [0.0; 3] && !self.hand.is_dragging() {
-                player.advance(span_s);
+                player.advance(played_s);
                 self.rig.place(player.camera());
                 return;
             }
             player.pause();
         }
         let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
+        let span_s = if rig.is_gliding() { played_s } else { span_s };
         self.stage.on_ground(|ground| rig.advance(span_s, &controls, ground, exaggeration));
     }
 
@@ -458,4 +466,26 @@ impl Viewer {
         self.terrain_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         self.window.set_title(&format!("{} - Terrasoar", self.terrain_name));
     }
+}
+
+/// A rig that sees the whole terrain.
+fn start(stage: &Stage, screen: &Screen, window: &Window, settings: &Settings) -> Rig {
+    let camera = overview_beside_panel(stage, screen, window, settings);
+    stage.on_ground(|ground| Rig::new(camera, ground))
+}
+
+/// The overview in what the panel leaves of the window.
+fn overview_beside_panel(stage: &Stage, screen: &Screen, window: &Window, settings: &Settings) -> Camera {
+    let [width_px, height_px] = screen.size_px();
+    let panel_px = if settings.panel { panel::WIDTH * window.scale_factor() } else { 0.0 };
+    let panel_px = panel_px.min(0.5 * f64::from(width_px));
+    // Perspective makes the near side wider when the eye steps aside.
+    let beside = Viewport { width_px: (0.94 * (f64::from(width_px) - panel_px)) as u32, height_px };
+    let mut view = overview(stage.terrain(), settings.exaggeration, FOV_DEG, beside);
+    // The eye steps aside by half the panel, as wide as that is in the middle of the terrain.
+    let [east_m, north_m] = stage.on_ground(|ground| ground.extent_m());
+    let away_m = view.eye_m.distance(glam::DVec3::new(0.5 * east_m, 0.5 * north_m, 0.0));
+    let m_a_px = 2.0 * away_m * (0.5 * view.vertical_fov_rad).tan() / f64::from(height_px);
+    view.eye_m -= view.axes()[0] * (0.5 * panel_px * m_a_px);
+    Camera::from(&view)
 }

@@ -45,6 +45,12 @@ fn check(gpu: &Gpu, options: SceneOptions, exaggeration: f64, tolerance_px: f64)
 }
 
 fn along_a_flight(gpu: &Gpu) -> Outcome {
+    // That sky is seen where there is some.
+    let level = view([80.0, 70.0, 6.0], [0.0, 0.0, 0.0], 40.0, SIZE_PX);
+    let mut rig = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    rig.shoot(&level, &Look::default());
+    let sky = rig.depth_m().iter().filter(|d| d.is_infinite()).count();
+    ensure(sky > 40_000, || format!("only {sky} pixels of sky in a level view"))?;
     check(gpu, SceneOptions::default(), 1.0, 1.0)?;
     // Large triangles move farthest.
     check(gpu, SceneOptions::default(), 1.0, 12.0)?;

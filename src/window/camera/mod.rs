@@ -43,18 +43,6 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// From the south, so that the whole terrain is seen.
-    pub(crate) fn overview(ground: &dyn Ground, exaggeration: f64) -> Self {
-        let [east_m, north_m] = ground.extent_m();
-        let [low, high] = ground.height_range_m();
-        let away_m = 1.15 * east_m.max(north_m);
-        let middle = DVec3::new(0.5 * east_m, 0.5 * north_m, 0.5 * (low + high) * exaggeration);
-        let pitch_deg = -38.0_f64;
-        let (sin, cos) = pitch_deg.to_radians().sin_cos();
-        let eye_m = middle - away_m * DVec3::new(0.0, cos, sin);
-        Self { eye_m, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0, vertical_fov_deg: 45.0 }
-    }
-
     /// The camera as a frame of a flight.
     pub(crate) fn frame(&self, time_s: f64) -> FlightFrame {
         FlightFrame {
@@ -88,6 +76,18 @@ impl Camera {
     fn turn(&mut self, by_deg: [f64; 2]) {
         self.yaw_deg = (self.yaw_deg + by_deg[0]).rem_euclid(360.0);
         self.pitch_deg = (self.pitch_deg + by_deg[1]).clamp(-STEEPEST_DEG, STEEPEST_DEG);
+    }
+}
+
+impl From<&View> for Camera {
+    fn from(view: &View) -> Self {
+        Self {
+            eye_m: view.eye_m,
+            yaw_deg: view.yaw_rad.to_degrees(),
+            pitch_deg: view.pitch_rad.to_degrees(),
+            roll_deg: view.roll_rad.to_degrees(),
+            vertical_fov_deg: view.vertical_fov_rad.to_degrees(),
+        }
     }
 }
 
@@ -142,11 +142,11 @@ pub(crate) struct Rig {
 }
 
 impl Rig {
-    /// Looks over the whole terrain, and crosses it in half a minute.
-    pub(crate) fn over(ground: &dyn Ground, exaggeration: f64) -> Self {
+    /// Starts at a camera, at a speed that crosses the ground in half a minute.
+    pub(crate) fn new(camera: Camera, ground: &dyn Ground) -> Self {
         let [east_m, north_m] = ground.extent_m();
         Self {
-            camera: Camera::overview(ground, exaggeration),
+            camera,
             speed_m_s: east_m.max(north_m) / 30.0,
             follow_m: None,
             circling: None,
@@ -202,6 +202,11 @@ impl Rig {
         };
         self.camera.eye_m.z += below(now) - below(before);
         self.keep_clear(ground, now);
+    }
+
+    /// Whether it is on a way that is known beforehand.
+    pub(crate) fn is_gliding(&self) -> bool {
+        self.glide.is_some()
     }
 
     /// Whether it moves by itself or still rolls out.
@@ -284,4 +289,4 @@ pub(crate) fn ground_below_m(ground: &dyn Ground, at_m: DVec3, exaggeration: f64
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

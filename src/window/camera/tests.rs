@@ -9,11 +9,11 @@ fn fly(rig: &mut Rig, steps: u32, span_s: f64, controls: Controls) {
     }
 }
 
-fn high() -> Rig {
-    let mut rig = Rig::over(&Hills, 2.0);
-    rig.camera.eye_m = DVec3::new(5000.0, 1000.0, 9000.0);
-    rig.camera.pitch_deg = 0.0;
-    rig
+/// Level, north, high above the ground.
+pub(crate) fn high() -> Rig {
+    let eye_m = DVec3::new(5000.0, 1000.0, 9000.0);
+    let camera = Camera { eye_m, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0, vertical_fov_deg: 45.0 };
+    Rig::new(camera, &Hills)
 }
 
 #[test]
@@ -114,16 +114,6 @@ fn it_goes_where_it_is_sent_and_looks_there() {
     rig.go_to(DVec3::ZERO, 10.0);
     rig.advance(0.1, &Controls { look_deg: [1.0, 0.0], ..Default::default() }, &Hills, 1.0);
     assert!(!rig.is_moving(), "a hand on the controls ends it");
-}
-
-#[test]
-fn the_overview_sees_all_corners() {
-    let camera = Camera::overview(&Hills, 1.0);
-    let view = camera.view(Viewport::default(), 1.0, 1.0);
-    let [east, north] = Hills.extent_m();
-    for corner in [DVec3::ZERO, DVec3::X * east, DVec3::Y * north, DVec3::new(east, north, 0.0)] {
-        assert!(view.side_normals().iter().all(|n| n.dot(corner - camera.eye_m) < 0.0), "{corner}");
-    }
 }
 
 #[test]

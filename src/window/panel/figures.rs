@@ -6,7 +6,9 @@ use egui::{
 };
 
 const WIDTH: f32 = 236.0;
-const HEIGHT: f32 = 30.0;
+const HEIGHT: f32 = 36.0;
+/// Room for words above the line.
+const WORDS: f32 = 15.0;
 
 /// All graphs in the lower right corner of `room`.
 pub(super) fn show(context: &Context, history: &History, room: Rect) {
@@ -30,7 +32,7 @@ fn graph(ui: &mut Ui, history: &History, (name, unit, value): &Series) {
     let point = |(i, figures): (usize, &_)| {
         let x = rect.left() + rect.width() * (first + i) as f32 / (FRAMES - 1) as f32;
         let part = if most > 0.0 { (value(figures) / most) as f32 } else { 0.0 };
-        Pos2::new(x, rect.bottom() - 2.0 - part * (rect.height() - 6.0))
+        Pos2::new(x, rect.bottom() - 2.0 - part * (rect.height() - WORDS - 4.0))
     };
     let points: Vec<Pos2> = history.iter().enumerate().map(point).collect();
     painter.add(Shape::line(points, Stroke::new(1.2, Color32::from_rgb(0x6f, 0xb4, 0xe8))));

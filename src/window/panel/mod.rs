@@ -19,6 +19,9 @@ use egui::{CollapsingHeader, Frame, Margin, ScrollArea, Ui};
 
 pub(crate) use notes::Note;
 
+/// Width of the panel in points.
+pub(crate) const WIDTH: f64 = 286.0;
+
 /// What a panel asks for.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Wish {
@@ -88,7 +91,7 @@ pub(crate) fn show(
     status::show(ui, facts, &mut wishes);
     if settings.panel {
         let frame = Frame::new().fill(super::overlay::PANEL).inner_margin(Margin::same(10));
-        egui::Panel::left("panel").exact_size(286.0).resizable(false).frame(frame).show(ui, |ui| {
+        egui::Panel::left("panel").exact_size(WIDTH as f32).resizable(false).frame(frame).show(ui, |ui| {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 ui.spacing_mut().slider_width = 132.0;
                 title(ui, facts);
@@ -100,7 +103,7 @@ pub(crate) fn show(
         });
     }
     let room = ui.available_rect_before_wrap();
-    if settings.figures && room.width() > 420.0 && room.height() > 330.0 {
+    if settings.figures && room.width() > 420.0 && room.height() > 400.0 {
         figures::show(ui.ctx(), facts.history, room);
     }
     notes::show(ui.ctx(), facts, room, &mut wishes);

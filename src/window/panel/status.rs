@@ -18,7 +18,7 @@ pub(super) fn show(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
                     ui.label(RichText::new("mesh frozen").color(Color32::from_rgb(0x8f, 0xc7, 0xf2)));
                 }
                 if facts.recorder.is_some() {
-                    ui.label(RichText::new("● recording").color(Color32::from_rgb(0xf0, 0x6a, 0x5a)));
+                    ui.label(RichText::new("recording").color(Color32::from_rgb(0xf0, 0x6a, 0x5a)));
                 }
             });
         });

@@ -30,9 +30,8 @@ impl Viewer {
             }
             Action::Overview => {
                 self.pause();
-                let exaggeration = self.settings.exaggeration;
                 self.rig.follow_m = None;
-                self.rig.glide_to(self.stage.on_ground(|ground| Camera::overview(ground, exaggeration)));
+                self.rig.glide_to(self.overview());
             }
             Action::GoTo => {
                 self.settings.panel = true;
@@ -121,8 +120,7 @@ impl Viewer {
             Ok(stage) => {
                 self.end_recording();
                 self.stage = stage;
-                let exaggeration = self.settings.exaggeration;
-                self.rig = self.stage.on_ground(|ground| Rig::over(ground, exaggeration));
+                self.rig = start(&self.stage, &self.screen, &self.window, &self.settings);
                 (self.player, self.frozen) = (None, None);
                 self.name_terrain();
                 self.tell(&format!("opened {}", path.display()));
