@@ -10,7 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use terrasoar::refine::Culling;
 use terrasoar_render::ramps::Ramp;
-use terrasoar_render::{Contours, Haze, LOOKS, Look, Wireframe};
+use terrasoar_render::{Contours, Haze, LOOKS, Look};
 
 /// Everything that is remembered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -100,7 +100,7 @@ impl Settings {
         look.contours = self
             .contours
             .then(|| Contours { interval_m: self.contour_interval_m, ..style.contours.unwrap_or_default() });
-        look.wireframe = self.wireframe.then(|| style.wireframe.unwrap_or_else(Wireframe::default));
+        look.wireframe = self.wireframe.then(|| style.wireframe.unwrap_or_default());
         look.morph = self.morph;
         look.haze = if self.haze { Haze::Auto } else { Haze::Off };
         look.multisample = self.smooth_edges;
