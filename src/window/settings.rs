@@ -10,7 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use terrasoar::refine::Culling;
 use terrasoar_render::ramps::Ramp;
-use terrasoar_render::{Contours, Haze, LOOKS, Look, Wireframe};
+use terrasoar_render::{Contours, Haze, LOOKS, Look};
 
 /// Everything that is remembered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
