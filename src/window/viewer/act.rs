@@ -19,7 +19,11 @@ impl Viewer {
             }
             Action::Follow => {
                 let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
+                let before = rig.follow_m;
                 self.stage.on_ground(|ground| rig.toggle_follow(ground, exaggeration));
+                if before.is_none() && self.rig.follow_m.is_none() {
+                    self.news("There is no ground below to keep a height above.");
+                }
             }
             Action::Circle => {
                 self.pause();
