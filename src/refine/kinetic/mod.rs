@@ -1,9 +1,9 @@
 //! Kinetic: refinement whose cost follows the change, not the mesh.
 //!
 //! The mesh of the frame before is kept. Every vertex in it has a live-range word, a certificate of how long its status holds
-//! ([`certificate`]), and lies in a queue by the tick at which that ends ([`queue`], [`clocks`]). A frame takes the words that are over, tests their
-//! vertices again and splits or merges those whose status has changed ([`tree`]); nothing else is looked at. Triangles and vertices
-//! keep their slots ([`triangles`], [`vertices`]), so what changed is a short [`Patch`].
+//! (`certificate`), and lies in a queue by the tick at which that ends (`queue`, `clocks`). A frame takes the words that are over, tests their
+//! vertices again and splits or merges those whose status has changed (`tree`); nothing else is looked at. Triangles and vertices
+//! keep their slots (`pages`, `vertices`), so what changed is a short [`Patch`].
 //!
 //! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART" (live ranges, the bin-tree array); P. Lindstrom, V. Pascucci, "Visualization of Large Terrains Made
 //! Easy", IEEE Visualization 2001 (the mesh, which is SOAR's in every frame); J. Basch, L. Guibas, J. Hershberger, "Data Structures for Mobile Data",
