@@ -7,10 +7,14 @@
 //!
 //! Prints Markdown tables. Keep runs under benches/runs/.
 
+#[path = "support/ground.rs"]
+mod ground;
+
+use ground::OverTerrain;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
-use terrasoar::flight::generate::{FlightKind, FlightPlan, Ground};
+use terrasoar::flight::generate::{FlightKind, FlightPlan};
 use terrasoar::flight::{FlightFrame, incoherence};
 use terrasoar::flyover::{EngineKind, Quality, mean_incoherence_percent, replay};
 use terrasoar::stats::Comparison;
@@ -48,22 +52,6 @@ impl Arguments {
             }
         }
         Ok(parsed)
-    }
-}
-
-struct OverTerrain<'a>(&'a Terrain);
-
-impl Ground for OverTerrain<'_> {
-    fn extent_m(&self) -> [f64; 2] {
-        self.0.grid().extent_m()
-    }
-
-    fn height_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
-        self.0.height_m(east_m, north_m).ok().flatten()
-    }
-
-    fn height_range_m(&self) -> [f64; 2] {
-        self.0.header().height_range_m
     }
 }
 

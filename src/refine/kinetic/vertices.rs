@@ -1,6 +1,6 @@
 //! The vertex array: the vertices that triangles are made of, in slots that they keep for as long as they are in the mesh.
 //!
-//! It lies beside the bin-tree array but has an order of its own, so that rebuilding that array moves nothing on the GPU. The first
+//! It lies beside the bin-tree array but has an order of its own, so that nodes moved in that array move no vertex on the GPU. The first
 //! five slots are the square's corners and its centre. Cost: 12 bytes a vertex, half a vertex a triangle.
 
 use super::capacity::grow;
