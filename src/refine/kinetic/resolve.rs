@@ -1,0 +1,137 @@
+//! The middle of a frame: vertices that are due are tested, and those whose status has changed are split or merged.
+//!
+//! Invariant: without a budget nothing is left due, and what is split is what the words want. Tests give the same answers in whatever order and on
+//! however many threads they are made; splits and merges go one by one, in an order that the list of what was over decides. Cost: what is over, and the
+//! children of what is split.
+
+use super::Kinetic;
+use super::budget::Allowance;
+use super::certificate::{ACTIVE, Judge, clock_of, expiry_of};
+use super::labels::level_of;
+use super::nodes::{SPLIT, STATUS};
+use super::queue::Entry;
+use crate::refine::{Phase, Probe};
+use rayon::prelude::*;
+use terrasoar_layout::order::slot_of;
+use terrasoar_layout::record::RecordCodec;
+
+/// From so many tests on they are shared among threads.
+const PARALLEL: usize = 4096;
+/// How many splits or merges ahead memory is asked for what: see [`Kinetic::fetch`].
+const FETCH_AHEAD: [(u32, usize); 3] = [(2, 6), (1, 4), (0, 2)];
+
+impl<C: RecordCodec> Kinetic<'_, C> {
+    /// Tests what is due, as far as the budget allows.
+    pub(super) fn test_due<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+        let mut batch = std::mem::take(&mut self.list);
+        while !self.due.is_empty() {
+            let splits_wait = self.to_split.iter().any(|nodes| !nodes.is_empty());
+            let allowed = allowance.tests(self.due.len(), splits_wait);
+            if allowed == 0 {
+                break;
+            }
+            // From the end, where those lie that have been late before.
+            batch.extend(self.due.drain(self.due.len() - allowed..));
+            self.test(&batch, false, judge, probe);
+            batch.clear();
+        }
+        self.late.append(&mut self.due);
+        self.list = batch;
+    }
+
+    /// Tests nodes and sorts out those that are to be split or merged. Fresh ones have their records read first.
+    fn test<P: Probe>(&mut self, nodes: &[u32], fresh: bool, judge: &Judge, probe: &mut P) {
+        let k = self.records.grid().k();
+        let mut verdicts = std::mem::take(&mut self.verdicts);
+        let verdict = |node: &u32| {
+            let node = self.nodes.get(*node);
+            let point = node.point;
+            let raw = if fresh { self.records.raw(slot_of(k, point)) } else { node.raw };
+            let vertex = self.records.decode(raw, level_of(point));
+            (raw, judge.word(&judge.metric().sight(self.records.grid().position_m(point), &vertex)))
+        };
+        if nodes.len() >= PARALLEL && rayon::current_num_threads() > 1 {
+            nodes.par_iter().with_min_len(PARALLEL / 8).map(verdict).collect_into_vec(&mut verdicts);
+        } else {
+            verdicts.clear();
+            verdicts.extend(nodes.iter().map(verdict));
+        }
+        self.work.tests += nodes.len() as u64;
+        for (node, (raw, word)) in nodes.iter().zip(&verdicts) {
+            let record = self.nodes.get_mut(*node);
+            let (old, point) = (record.word, record.point);
+            if fresh {
+                probe.read(slot_of(k, point));
+                record.raw = *raw;
+            } else if expiry_of(old) != 0 {
+                // Twice in the list: it had been late, then gone, then come back.
+                continue;
+            }
+            record.word = *word | (old & SPLIT);
+            self.queue.enter(clock_of(*word), Entry { node: *node, word: *word });
+            match (*word & ACTIVE != 0, old & SPLIT != 0) {
+                (true, false) => self.to_split[level_of(point) as usize].push(*node),
+                (false, true) => self.to_merge[level_of(point) as usize].push(*node),
+                _ => {}
+            }
+        }
+        self.verdicts = verdicts;
+    }
+
+    /// Tests the children that splits have made.
+    pub(super) fn test_fresh<P: Probe>(&mut self, judge: &Judge, probe: &mut P) {
+        let mut fresh = std::mem::take(&mut self.fresh);
+        self.test(&fresh, true, judge, probe);
+        fresh.clear();
+        self.fresh = fresh;
+    }
+
+    /// Splits and merges what is to be, until no child made on the way is left untested.
+    pub(super) fn apply<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+        let mut list = std::mem::take(&mut self.list);
+        // From fine to coarse, so that children have merged before their parents.
+        list.extend(self.to_merge.iter_mut().flat_map(|nodes| nodes.drain(..)));
+        self.in_order(&list, |engine, node| {
+            if engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == SPLIT {
+                engine.merge(node);
+            }
+        });
+        loop {
+            list.clear();
+            // From coarse to fine, so that parents have split before their children.
+            list.extend(self.to_split.iter_mut().rev().flat_map(|nodes| nodes.drain(..)));
+            self.in_order(&list, |engine, node| {
+                let wanted = engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == ACTIVE;
+                let before = engine.fresh.len();
+                let split = wanted && allowance.split() && engine.split(node);
+                allowance.charge(engine.fresh.len() - before);
+                if wanted && !split {
+                    // Its other parent may be among the untested; or it waits for the next frame.
+                    let level = level_of(engine.nodes.get(node).point);
+                    engine.to_split[level as usize].push(node);
+                }
+            });
+            if self.fresh.is_empty() {
+                break;
+            }
+            probe.phase(Phase::Test);
+            self.test_fresh(judge, probe);
+            probe.phase(Phase::Apply);
+        }
+        list.clear();
+        self.list = list;
+    }
+
+    /// Does something to each node, and asks memory for what comes after it meanwhile.
+    #[inline(always)]
+    fn in_order(&mut self, nodes: &[u32], mut each: impl FnMut(&mut Self, u32)) {
+        for (i, node) in nodes.iter().enumerate() {
+            for (ahead, distance) in FETCH_AHEAD {
+                if let Some(later) = nodes.get(i + distance) {
+                    self.fetch(*later, ahead);
+                }
+            }
+            each(self, *node);
+        }
+    }
+}
