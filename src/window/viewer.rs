@@ -5,6 +5,7 @@
 
 mod act;
 mod draw;
+mod hear;
 
 use super::camera::{Camera, Rig, ground_below_m};
 use super::events::Wake;
@@ -12,7 +13,6 @@ use super::flights::{Player, Recorder};
 use super::hand::Hand;
 use super::history::{Figures, History};
 use super::job::{self, Job};
-use super::keys;
 use super::overlay::Overlay;
 use super::panel::{self, Facts, Memory, Note};
 use super::pick::{self, Hit};
@@ -30,9 +30,7 @@ use terrasoar::flight::Flight;
 use terrasoar::flight::generate::Ground;
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::terrain::Terrain;
-use winit::event::{MouseButton, WindowEvent};
 use winit::event_loop::{EventLoopProxy, OwnedDisplayHandle};
-use winit::keyboard::KeyCode;
 use winit::window::Window;
 
 /// Longest span that a frame moves on by, so that a hitch is no leap, and that a flight does, whose way
@@ -197,68 +195,6 @@ impl Viewer {
             None => self.said.push((name, value.clone())),
         }
         self.tell(&format!("{name} {value}"));
-    }
-
-    /// The overlay hears an event first.
-    pub(super) fn overlay_hears(&mut self, event: &WindowEvent) -> bool {
-        self.overlay.hear(&self.window, event)
-    }
-
-    /// The window has another size.
-    pub(super) fn resize(&mut self, width: u32, height: u32) {
-        self.hidden = width == 0 || height == 0;
-        self.screen.resize(width, height);
-        self.touched = true;
-    }
-
-    /// The window is out of sight, or seen again.
-    pub(super) fn hide(&mut self, hidden: bool) {
-        self.hidden = hidden;
-        self.touched |= !hidden;
-    }
-
-    /// A key goes down or up.
-    pub(super) fn key(&mut self, code: KeyCode, down: bool, repeat: bool) {
-        if down && self.overlay.is_typing() {
-            return;
-        }
-        self.touched = true;
-        self.hand.key(code, down);
-        if down
-            && !repeat
-            && let Some(action) = keys::action(code, self.hand.ctrl)
-        {
-            self.act(action);
-        }
-    }
-
-    /// A mouse button goes down or up.
-    pub(super) fn button(&mut self, button: MouseButton, down: bool) {
-        self.touched = true;
-        if !down {
-            // What was dragged is still to be turned by, about its own pivot.
-            self.hand.lift(button);
-            return;
-        }
-        if self.overlay.has_pointer() {
-            return;
-        }
-        let double = self.hand.press(button, Instant::now());
-        let hit = self.pick(self.hand.pointer);
-        if button == MouseButton::Right {
-            self.rig.pivot = Some(hit.map_or_else(|| self.ahead_m(), |hit| hit.at_m));
-        } else if double && let Some(hit) = hit {
-            self.pause();
-            self.rig.go_to(hit.at_m, (0.35 * hit.distance_m).max(30.0));
-        }
-    }
-
-    /// The wheel turns by lines.
-    pub(super) fn wheel(&mut self, lines: f64) {
-        if !self.overlay.has_pointer() {
-            self.rig.change_speed(1.25f64.powf(lines.clamp(-20.0, 20.0)));
-            self.touched = true;
-        }
     }
 
     fn viewport(&self) -> Viewport {
