@@ -11,6 +11,7 @@ pub mod metric;
 pub mod refine;
 pub mod report;
 pub mod stats;
+pub mod stream;
 pub mod view;
 
 /// The program in EMBEDDING.md, run as a test.

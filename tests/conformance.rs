@@ -60,7 +60,7 @@ fn fly_culling(terrain: &Terrain, views: &[View], culling: Culling, check_sample
 /// What the patches made, all of them, and the strip on demand, against the full mesh.
 fn check_mirror<C: RecordCodec>(
     records: &Records<'_, C>,
-    kinetic: &Kinetic<'_, C>,
+    kinetic: &Kinetic<Records<'_, C>>,
     soar: &Soar<'_, C>,
     mirror: &Mirror,
     expected: &[Triangle],

@@ -162,7 +162,7 @@ fn a_warm_frame_allocates_nothing() {
     with_records!(terrain.records().unwrap(), records => {
         for culling in Culling::ALL {
             let mut kinetic = Kinetic::new(records.clone(), culling);
-            let round = |kinetic: &mut Kinetic<'_, _>| {
+            let round = |kinetic: &mut Kinetic<_>| {
                 for i in 0..400 {
                     let angle = f64::from(i) / 400.0 * std::f64::consts::TAU;
                     let at = [0.5 + 0.3 * angle.cos(), 0.5 + 0.3 * angle.sin()];

@@ -11,9 +11,11 @@ use crate::error::LayoutError;
 use crate::grid::{Grid, GridPoint};
 use crate::header::{Header, INERT_PAGE, LEAF_ENTRIES};
 use crate::order::slot_of;
+use crate::pool::PagePool;
 use crate::prefetch::prefetch;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
 use crate::source::{MapSource, PreadSource, Source};
+use crate::store::{RecordShape, RecordStore};
 use std::path::Path;
 
 /// An opened and checked terrain file.
@@ -43,6 +45,14 @@ impl Terrain {
         let file = PreadSource::open(path)?;
         let (header, entries) = read_structure(&file)?;
         Self::assemble(Box::new(MapSource::map(file)?), header, entries)
+    }
+
+    /// Opens the file at `path` without mapping it: for [`Terrain::pool`], whose pages are read. Files that others may truncate raise no signal then.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn open_unmapped(path: &Path) -> Result<Self, LayoutError> {
+        Self::from_source(Box::new(PreadSource::open(path)?))
     }
 
     /// Opens any source.
@@ -105,14 +115,22 @@ impl Terrain {
         };
         let number = if entry.is_present() { entry.page } else { INERT_PAGE };
         self.source.read_at(u64::from(number) * PAGE_BYTES as u64, &mut page[..])?;
-        if entry.is_present() && checksum(&page[..]) != entry.checksum {
-            return Err(LayoutError::damaged(
-                self.path(),
-                format!("record page {logical_page} (file page {number})"),
-                "the checksum does not match; restore a copy of the file or build it again",
-            ));
+        if entry.is_present() {
+            self.check_page(logical_page, *entry, &page)?;
         }
         Ok(page)
+    }
+
+    /// Checks what was read for a page that is present.
+    pub(crate) fn check_page(&self, logical_page: u64, entry: Entry, page: &Page) -> Result<(), LayoutError> {
+        if checksum(page) == entry.checksum {
+            return Ok(());
+        }
+        Err(LayoutError::damaged(
+            self.path(),
+            format!("record page {logical_page} (file page {})", entry.page),
+            "the checksum does not match; restore a copy of the file or build it again",
+        ))
     }
 
     /// One vertex, read from a checked page.
@@ -175,12 +193,37 @@ impl Terrain {
     /// The records as refinement reads them. `None` if the source cannot lend its bytes as one slice.
     pub fn records(&self) -> Option<AnyRecords<'_>> {
         let bytes = self.source.bytes()?;
-        let (grid, scale) = (self.grid(), &self.header.scale);
-        Some(match self.header.record_kind {
-            RecordKind::Compact => AnyRecords::Compact(Records::new(self, bytes, Compact::new(grid, scale))),
-            RecordKind::Exact8 => AnyRecords::Exact8(Records::new(self, bytes, Exact8::new(grid, scale))),
-            RecordKind::Exact16 => AnyRecords::Exact16(Records::new(self, bytes, Exact16::new(grid, scale))),
+        Some(match self.codec() {
+            ByKind::Compact(codec) => ByKind::Compact(Records::new(self, bytes, codec)),
+            ByKind::Exact8(codec) => ByKind::Exact8(Records::new(self, bytes, codec)),
+            ByKind::Exact16(codec) => ByKind::Exact16(Records::new(self, bytes, codec)),
         })
+    }
+
+    /// A pool of at most `cache_bytes` for the pages of this terrain, whatever its source.
+    ///
+    /// # Errors
+    /// As [`PagePool::new`].
+    pub fn pool(&self, cache_bytes: u64) -> Result<AnyPool, LayoutError> {
+        Ok(match self.codec() {
+            ByKind::Compact(codec) => ByKind::Compact(PagePool::new(self, self.shape(codec), cache_bytes)?),
+            ByKind::Exact8(codec) => ByKind::Exact8(PagePool::new(self, self.shape(codec), cache_bytes)?),
+            ByKind::Exact16(codec) => ByKind::Exact16(PagePool::new(self, self.shape(codec), cache_bytes)?),
+        })
+    }
+
+    fn codec(&self) -> ByKind<Compact, Exact8, Exact16> {
+        let (grid, scale) = (self.grid(), &self.header.scale);
+        match self.header.record_kind {
+            RecordKind::Compact => ByKind::Compact(Compact::new(grid, scale)),
+            RecordKind::Exact8 => ByKind::Exact8(Exact8::new(grid, scale)),
+            RecordKind::Exact16 => ByKind::Exact16(Exact16::new(grid, scale)),
+        }
+    }
+
+    fn shape<C>(&self, codec: C) -> RecordShape<C> {
+        let Header { grid, height_range_m, has_voids, .. } = self.header;
+        RecordShape { codec, grid, height_range_m, has_voids }
     }
 }
 
@@ -190,26 +233,31 @@ fn snap(v: f64) -> f64 {
     if (v - near).abs() < 1e-9 * near.abs().max(1.0) { near } else { v }
 }
 
-/// The records of a terrain, of whichever kind.
+/// One thing for whichever kind of records a terrain has.
 #[derive(Debug, Clone)]
-#[expect(clippy::large_enum_variant, reason = "one a terrain, taken apart before the first vertex is read")]
-pub enum AnyRecords<'a> {
+pub enum ByKind<A, B, C> {
     /// 4-byte records.
-    Compact(Records<'a, Compact>),
+    Compact(A),
     /// 8-byte records.
-    Exact8(Records<'a, Exact8>),
+    Exact8(B),
     /// 16-byte records.
-    Exact16(Records<'a, Exact16>),
+    Exact16(C),
 }
 
-/// Runs `$body` with `$records` bound to the records of whichever kind.
+/// The records of a terrain, of whichever kind.
+pub type AnyRecords<'a> = ByKind<Records<'a, Compact>, Records<'a, Exact8>, Records<'a, Exact16>>;
+
+/// A pool of pages, of whichever kind.
+pub type AnyPool = ByKind<PagePool<Compact>, PagePool<Exact8>, PagePool<Exact16>>;
+
+/// Runs `$body` with `$records` bound to the records, or the pool, of whichever kind.
 #[macro_export]
 macro_rules! with_records {
     ($any:expr, $records:ident => $body:expr) => {
         match $any {
-            $crate::terrain::AnyRecords::Compact($records) => $body,
-            $crate::terrain::AnyRecords::Exact8($records) => $body,
-            $crate::terrain::AnyRecords::Exact16($records) => $body,
+            $crate::terrain::ByKind::Compact($records) => $body,
+            $crate::terrain::ByKind::Exact8($records) => $body,
+            $crate::terrain::ByKind::Exact16($records) => $body,
         }
     };
 }
@@ -219,10 +267,7 @@ macro_rules! with_records {
 pub struct Records<'a, C: RecordCodec> {
     bytes: &'a [u8],
     pages: &'a [u32],
-    codec: C,
-    grid: Grid,
-    height_range_m: [f64; 2],
-    has_voids: bool,
+    shape: RecordShape<C>,
 }
 
 impl<'a, C: RecordCodec> Records<'a, C> {
@@ -230,26 +275,23 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
 
     fn new(terrain: &'a Terrain, bytes: &'a [u8], codec: C) -> Self {
-        let header = terrain.header();
-        let height_range_m = header.height_range_m;
-        let (grid, has_voids) = (header.grid, header.has_voids);
-        Self { bytes, pages: &terrain.pages, codec, grid, height_range_m, has_voids }
+        Self { bytes, pages: &terrain.pages, shape: terrain.shape(codec) }
     }
 
     /// Grid shape and spacing.
     #[inline(always)]
     pub fn grid(&self) -> &Grid {
-        &self.grid
+        &self.shape.grid
     }
 
     /// Lowest and highest height in metres.
     pub fn height_range_m(&self) -> [f64; 2] {
-        self.height_range_m
+        self.shape.height_range_m
     }
 
     /// Whether any sample is void.
     pub fn has_voids(&self) -> bool {
-        self.has_voids
+        self.shape.has_voids
     }
 
     /// Bytes a record.
@@ -287,7 +329,7 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     /// The vertex of a record at `level` (0 for corners).
     #[inline(always)]
     pub fn decode(&self, raw: C::Raw, level: u32) -> Vertex {
-        self.codec.decode(raw, level)
+        self.shape.codec.decode(raw, level)
     }
 
     /// The vertex at `slot`, whose level is `level` (0 for corners).
@@ -301,8 +343,29 @@ impl<'a, C: RecordCodec> Records<'a, C> {
 
     /// The vertex at a grid point.
     pub fn vertex_at(&self, p: GridPoint) -> Vertex {
-        let level = if self.grid.is_corner(p) { 0 } else { self.grid.level(p) };
-        self.vertex(slot_of(self.grid.k(), p), level)
+        let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };
+        self.vertex(slot_of(self.grid().k(), p), level)
+    }
+}
+
+impl<C: RecordCodec> RecordStore for Records<'_, C> {
+    type Codec = C;
+
+    const IS_COMPLETE: bool = true;
+
+    #[inline(always)]
+    fn shape(&self) -> &RecordShape<C> {
+        &self.shape
+    }
+
+    #[inline(always)]
+    fn get(&self, slot: u64) -> Option<C::Raw> {
+        Some(self.raw(slot))
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, slot: u64) {
+        Records::prefetch(self, slot);
     }
 }
 

@@ -68,7 +68,7 @@ pub(crate) fn mesh_vertex(vertex: &PatchVertex) -> MeshVertex {
 }
 
 struct KineticFeed<'a, C: RecordCodec> {
-    engine: Kinetic<'a, C>,
+    engine: Kinetic<Records<'a, C>>,
     records: Records<'a, C>,
     reads: Reads,
 }

@@ -51,8 +51,10 @@ pub struct Work {
     pub slots_written: u64,
     /// Bytes of vertices and triangles that a GPU receives.
     pub patch_bytes: u64,
-    /// Vertices that are to be tested or split and were not, for want of budget; 0 without a budget.
+    /// Vertices that are to be tested or split and were not, for want of budget or of pages; 0 without a budget over records that are all at hand.
     pub late: u64,
+    /// Those of them whose own record is away.
+    pub unread: u64,
     /// Largest error on the screen that late vertices may leave, in pixels, the ground being a sample spacing away at the least; 0 if none exceeds the
     /// tolerance.
     pub late_error_px: f64,

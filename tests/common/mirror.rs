@@ -72,7 +72,11 @@ pub fn drawn<C: RecordCodec>(records: &Records<'_, C>, triangles: &[Triangle]) -
 }
 
 /// Clusters lie around their triangles, and each triangle of the mesh is in one of them.
-pub fn check_clusters<C: RecordCodec>(engine: &Kinetic<'_, C>, whole: &Patch, expected: &[TriangleKey]) {
+pub fn check_clusters<C: RecordCodec>(
+    engine: &Kinetic<Records<'_, C>>,
+    whole: &Patch,
+    expected: &[TriangleKey],
+) {
     let mut found = 0;
     for (bounds, range) in engine.clusters() {
         for (slot, corners) in &whole.triangles {

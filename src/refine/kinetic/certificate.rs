@@ -114,6 +114,12 @@ impl Judge {
         }
     }
 
+    /// The frame's tick of a clock.
+    #[inline(always)]
+    pub(super) fn now(&self, clock: usize) -> u32 {
+        self.now[clock]
+    }
+
     /// The frame's metric.
     pub(super) fn metric(&self) -> &Metric {
         &self.metric

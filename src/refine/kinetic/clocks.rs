@@ -119,6 +119,8 @@ impl Trend {
 pub(super) struct Clocks {
     /// Used since a clock was last set back, in units.
     totals: [u64; CLOCKS],
+    /// Units that the newest move has used.
+    steps: [u64; CLOCKS],
     /// Units a tick: 2^shift.
     shift: u32,
     least_band_m: f64,
@@ -149,6 +151,7 @@ impl Clocks {
         Self {
             // Expiry 0 is kept for words that are not in the queue.
             totals: [1 << shift; CLOCKS],
+            steps: [0; CLOCKS],
             shift,
             least_band_m: 4.0 * spacing_m,
             tallest_m,
@@ -163,6 +166,7 @@ impl Clocks {
 
     /// Counts the way from the last pose to `pose`.
     pub(super) fn move_to(&mut self, pose: Pose) -> Moved {
+        self.steps = [0; CLOCKS];
         let Some(last) = self.last.replace(pose) else { return Moved::default() };
         let step = pose.eye_m - last.eye_m;
         let raised_m = self.tallest_m * (pose.exaggeration - last.exaggeration).abs();
@@ -189,6 +193,7 @@ impl Clocks {
                     // One unit more covers the rounding of the sum itself; beyond the horizon nothing is alive.
                     let units = ((metres * UNITS_PER_M).ceil() as u64).min(beyond) + 1;
                     self.totals[clock] += units;
+                    self.steps[clock] = units;
                     moved.clocks |= 1 << clock;
                 }
             }
@@ -230,6 +235,11 @@ impl Clocks {
     /// Current tick of a clock; may exceed the horizon until [`Clocks::set_back`] is called.
     pub(super) fn now(&self, clock: usize) -> u64 {
         self.totals[clock] >> self.shift
+    }
+
+    /// Ticks, and parts of them, that the newest move took on a clock.
+    pub(super) fn newest_step(&self, clock: usize) -> f32 {
+        self.steps[clock] as f32 / (1u64 << self.shift) as f32
     }
 
     /// Ticks of all clocks, once none exceeds the horizon.

@@ -1,6 +1,6 @@
 //! The start of a frame: clocks move, what is over leaves the queue, and words change clocks where a course ends or a clock starts again.
 //!
-//! Invariant: afterwards every live word is in the queue exactly once, or due. Cost: what is over; moving a course's words when the eye takes
+//! Invariant: afterwards every live word is in one of the queues exactly once, or due. Cost: what is over; moving a course's words when the eye takes
 //! another.
 
 use super::Kinetic;
@@ -10,22 +10,29 @@ use super::nodes::{SPLIT, STATUS};
 use super::queue::Entry;
 use crate::refine::{Phase, Probe};
 use terrasoar_layout::prefetch::prefetch;
-use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::store::RecordStore;
 
-impl<C: RecordCodec> Kinetic<'_, C> {
+impl<S: RecordStore> Kinetic<S> {
     /// Takes from the queue what is over, and brings clocks and courses in order.
     pub(super) fn collect<P: Probe>(&mut self, pose: Pose, probe: &mut P) {
         let moved = self.clocks.move_to(pose);
+        if let Some(ahead) = &mut self.ahead {
+            ahead.keep_pace(&self.clocks);
+        }
         let mut clocks = moved.clocks;
         while clocks != 0 {
             let clock = clocks.trailing_zeros() as usize;
             clocks &= clocks - 1;
+            self.bring_near(clock);
             let over = &mut self.over;
             self.queue.advance(clock, self.clocks.now(clock), |entry| {
                 prefetch(&self.nodes.all, entry.node as usize);
                 over.push(entry);
             });
             if let Some(by) = self.clocks.set_back(clock) {
+                if let Some(ahead) = &mut self.ahead {
+                    ahead.until[clock] = ahead.until[clock].saturating_sub(by);
+                }
                 self.move_words(clock, clock, |expiry| u64::from(expiry).saturating_sub(by) as u32);
             }
         }
@@ -48,6 +55,35 @@ impl<C: RecordCodec> Kinetic<'_, C> {
         probe.phase(Phase::Test);
     }
 
+    /// Moves to the queue what is over before long, and notes that it is to be looked from.
+    fn bring_near(&mut self, clock: usize) {
+        let Some(ahead) = &mut self.ahead else { return };
+        let until = ahead.reach(clock, self.clocks.now(clock));
+        let mut near = std::mem::take(&mut self.waiting);
+        ahead.far.advance(clock, until, |entry| near.push(entry));
+        for entry in near.drain(..) {
+            if self.nodes.word_if(entry.node, entry.word).is_some() {
+                ahead.near(entry);
+                self.queue.enter(clock, entry);
+            }
+        }
+        self.waiting = near;
+    }
+
+    /// Enters a word under its expiry.
+    #[inline(always)]
+    pub(super) fn enter(&mut self, clock: usize, entry: Entry) {
+        if !S::IS_COMPLETE
+            && let Some(ahead) = &mut self.ahead
+        {
+            if u64::from(expiry_of(entry.word)) > ahead.until[clock] {
+                return ahead.far.enter(clock, entry);
+            }
+            ahead.near(entry);
+        }
+        self.queue.enter(clock, entry);
+    }
+
     /// Makes due those nodes whose word still is the one that was entered.
     fn keep_true_entries(&mut self) {
         for entry in self.over.drain(..) {
@@ -62,16 +98,21 @@ impl<C: RecordCodec> Kinetic<'_, C> {
     fn move_words(&mut self, from: usize, to: usize, expiry: impl Fn(u32) -> u32) {
         let mut waiting = std::mem::take(&mut self.waiting);
         let nodes = &mut self.nodes;
-        self.queue.drain(from, |entry| {
+        let mut move_word = |entry: Entry| {
             if let Some(word) = nodes.word_if(entry.node, entry.word) {
                 let moved = with_certificate(entry.word, to, expiry(expiry_of(entry.word)));
                 *word = moved | (*word & SPLIT);
                 waiting.push(Entry { node: entry.node, word: moved });
             }
-        });
+        };
+        self.queue.drain(from, &mut move_word);
         self.queue.restart(from, self.clocks.now(from) as u32);
+        if let Some(ahead) = &mut self.ahead {
+            ahead.far.drain(from, &mut move_word);
+            ahead.far.restart(from, ahead.until[from].min(u64::from(u32::MAX)) as u32);
+        }
         for entry in waiting.drain(..) {
-            self.queue.enter(to, entry);
+            self.enter(to, entry);
         }
         self.waiting = waiting;
     }

@@ -8,17 +8,17 @@
 use super::Kinetic;
 use super::certificate::{ACTIVE, clock_of, expiry_of};
 use super::labels::level_of;
-use super::nodes::{CENTRE, NONE, SPLIT, STATUS, body};
+use super::nodes::{CENTRE, NONE, SPLIT, STATUS, UNREAD, body};
 use super::pages::{Dealing, PAGE};
 use super::queue::Entry;
-use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::store::RecordStore;
 
 /// Nodes moved in one frame at most.
 const MOVES_PER_FRAME: usize = 32;
 /// A near page with no more nodes is emptied.
 const SPARSE: usize = PAGE / 4;
 
-impl<C: RecordCodec> Kinetic<'_, C> {
+impl<S: RecordStore> Kinetic<S> {
     /// Moves a few nodes, if that is of use.
     pub(super) fn compact(&mut self) {
         match self.nodes.pages.dealing() {
@@ -91,8 +91,10 @@ impl<C: RecordCodec> Kinetic<'_, C> {
             }
         }
         let word = record.word & !SPLIT;
-        if expiry_of(word) != 0 {
-            self.queue.enter(clock_of(word), Entry { node: to, word });
+        if word == UNREAD {
+            self.unread.push(to);
+        } else if expiry_of(word) != 0 {
+            self.enter(clock_of(word), Entry { node: to, word });
         } else {
             self.late.push(to);
         }

@@ -15,6 +15,7 @@
 //!
 //! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
 
+mod ahead;
 mod bounds;
 mod budget;
 mod capacity;
@@ -28,31 +29,34 @@ mod pages;
 mod patch;
 mod queue;
 mod resolve;
+mod shown;
 mod tree;
 mod vertices;
 mod whole;
 
+pub use ahead::Want;
 pub use bounds::Bounds;
 pub use budget::Budget;
 pub use patch::{NO_LEVEL, Patch, PatchVertex};
 
 use super::{Culling, Engine, Phase, Probe, Work};
-use crate::mesh::{Triangle, is_drawn};
+use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
+use ahead::Ahead;
 use budget::Allowance;
 use capacity::settle;
 use certificate::Judge;
 use clocks::{Clocks, Pose};
 use glam::DVec3;
 use labels::level_of;
-use nodes::{CENTRE, Nodes, SPLIT, STATUS, body};
+use nodes::{CENTRE, NONE, Nodes, SPLIT, STATUS, body};
 use pages::{Dealing, Pages};
 use queue::{Entry, Queue};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{ROOTS, corners, slot_of};
+use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, corners};
 use terrasoar_layout::record::{RecordCodec, Vertex};
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::store::{RawOf, RecordStore};
 use vertices::Vertices;
 
 /// Levels of the largest terrain.
@@ -60,11 +64,13 @@ const LEVELS: usize = 32;
 
 /// Refinement by certificates.
 #[derive(Debug)]
-pub struct Kinetic<'a, C: RecordCodec> {
-    records: Records<'a, C>,
+pub struct Kinetic<S: RecordStore> {
+    records: S,
     culling: Culling,
-    nodes: Nodes<C::Raw>,
+    nodes: Nodes<RawOf<S>>,
     vertices: Vertices,
+    /// The square's corners, which no node splits.
+    corners: [Vertex; 4],
     /// Triangles in the mesh.
     triangles: usize,
     /// The page whose bounds are due to be made anew.
@@ -73,6 +79,11 @@ pub struct Kinetic<'a, C: RecordCodec> {
     sparse: usize,
     clocks: Clocks,
     queue: Queue,
+    /// Looks ahead, if pages are to be wanted before they are needed.
+    ahead: Option<Box<Ahead>>,
+    /// Nodes whose record is away.
+    unread: Vec<u32>,
+    wants: Vec<Want>,
     budget: Budget,
     /// Nodes whose certificate is over and that are in no queue.
     due: Vec<u32>,
@@ -86,7 +97,7 @@ pub struct Kinetic<'a, C: RecordCodec> {
     to_split: [Vec<u32>; LEVELS],
     to_merge: [Vec<u32>; LEVELS],
     /// Records and words of the nodes being tested.
-    verdicts: Vec<(C::Raw, u32)>,
+    verdicts: Vec<(RawOf<S>, u32)>,
     /// Entries that are over, of words that may have changed since.
     over: Vec<Entry>,
     /// Entries on their way from one clock to another.
@@ -95,22 +106,27 @@ pub struct Kinetic<'a, C: RecordCodec> {
     work: Work,
 }
 
-impl<'a, C: RecordCodec> Kinetic<'a, C> {
+impl<S: RecordStore> Kinetic<S> {
     /// An engine over `records` that culls as `culling` says.
-    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
-        let grid = *records.grid();
-        let [dx, dy] = grid.spacing_m();
-        let [low, high] = records.height_range_m();
+    pub fn new(records: S, culling: Culling) -> Self {
+        let shape = records.shape();
+        let [dx, dy] = shape.grid.spacing_m();
+        let [low, high] = shape.height_range_m;
+        let nowhere = shape.codec.decode(S::Codec::INERT, 0);
         let dealing = if culling == Culling::Clusters { Dealing::Near } else { Dealing::Packed };
         Self {
             culling,
             nodes: Nodes::new(Pages::new(dealing)),
             vertices: Vertices::default(),
+            corners: [nowhere; 4],
             triangles: 0,
             stale: 0,
             sparse: 0,
             clocks: Clocks::new(dx.min(dy), low.abs().max(high.abs())),
             queue: Queue::new(),
+            ahead: None,
+            unread: Vec::new(),
+            wants: Vec::new(),
             budget: Budget::default(),
             due: Vec::new(),
             late: Vec::new(),
@@ -130,6 +146,30 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
     /// Bounds what a frame may do from now on. What it leaves undone stays coarse, conforming, and is told by [`Work::late`].
     pub fn set_budget(&mut self, budget: Budget) {
         self.budget = budget;
+    }
+
+    /// Looks `frames` ahead for pages from now on, for stores that are not complete: see [`Kinetic::wants`]. To be called before the first frame, and again
+    /// whenever the lead changes. Without it only what the mesh lacks already is wanted.
+    pub fn look_ahead(&mut self, frames: f32) {
+        match &mut self.ahead {
+            Some(ahead) => ahead.set_lead(frames),
+            None => self.ahead = Some(Box::new(Ahead::new(frames))),
+        }
+    }
+
+    /// Pages that the mesh lacks or will need, in no order and some more than once. What is away is wanted again every few frames.
+    pub fn wants(&self) -> &[Want] {
+        &self.wants
+    }
+
+    /// Where its records come from.
+    pub fn store(&self) -> &S {
+        &self.records
+    }
+
+    /// The store, to be given pages between two frames. What it holds may change in no other way.
+    pub fn store_mut(&mut self) -> &mut S {
+        &mut self.records
     }
 
     /// What the last update changed in the mesh.
@@ -154,14 +194,16 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
 
     /// Bytes held by all arrays, spare capacity included.
     pub fn bytes(&self) -> usize {
-        let lists = [&self.due, &self.late, &self.fresh, &self.list];
+        let lists = [&self.due, &self.late, &self.fresh, &self.list, &self.unread];
         let by_level = self.to_split.iter().chain(&self.to_merge);
         self.nodes.bytes()
             + self.vertices.bytes()
             + self.queue.bytes()
             + lists.into_iter().chain(by_level).map(|l| l.capacity() * size_of::<u32>()).sum::<usize>()
-            + self.verdicts.capacity() * size_of::<(C::Raw, u32)>()
+            + self.verdicts.capacity() * size_of::<(RawOf<S>, u32)>()
             + (self.over.capacity() + self.waiting.capacity()) * size_of::<Entry>()
+            + self.ahead.as_ref().map_or(0, |ahead| ahead.bytes())
+            + self.wants.capacity() * size_of::<Want>()
             + self.patch.vertices.capacity() * size_of::<(u32, PatchVertex)>()
             + self.patch.triangles.capacity() * size_of::<(u32, [u32; 3])>()
             + self.patch.draws.capacity() * size_of::<std::ops::Range<u32>>()
@@ -187,59 +229,38 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         self.records.decode(node.raw, level_of(node.point))
     }
 
-    /// What a slot sends to the GPU: nothing where voids touch or padding takes the area.
-    #[inline(always)]
-    fn shown(&self, corners: Option<[u32; 3]>) -> [u32; 3] {
-        let partial = self.records.grid().has_padding() || self.records.has_voids();
-        let drawn = |t: &[u32; 3]| !partial || is_drawn(&self.records, t.map(|v| self.vertices.point(v)));
-        corners.filter(drawn).unwrap_or([0; 3])
-    }
-
     /// Counts what is late and how far the largest error of it exceeds the tolerance.
     fn assess_late(&mut self, metric: &Metric, view: &View) {
         let [dx, dy] = self.records.grid().spacing_m();
         let nearest_m = dx.min(dy);
+        // What a vertex leaves on the screen while it is not split, if that shows.
+        let error_px = |node: u32| {
+            let vertex = self.vertex_of(node);
+            let sighting = metric.sight(self.records.grid().position_m(self.nodes.get(node).point), &vertex);
+            let culled = self.culling == Culling::Vertices && metric.cull(&sighting, ALL_PLANES).is_none();
+            let shows = sighting.is_selected() && !culled;
+            if shows { sighting.error_px(view.tolerance_px, nearest_m) } else { 0.0 }
+        };
+        let (mut late, mut late_error_px) = (0, 0.0f64);
         for node in
             self.late.iter().chain(self.to_split.iter().flatten()).filter(|node| self.nodes.is_live(**node))
         {
-            self.work.late += 1;
-            let vertex = self.vertex_of(*node);
-            let at_m = self.records.grid().position_m(self.nodes.get(*node).point);
-            let sighting = metric.sight(at_m, &vertex);
-            let culled = self.culling == Culling::Vertices && metric.cull(&sighting, ALL_PLANES).is_none();
-            if !self.nodes.is_split(*node) && sighting.is_selected() && !culled {
-                let error_px = sighting.error_px(view.tolerance_px, nearest_m);
-                self.work.late_error_px = self.work.late_error_px.max(error_px);
+            late += 1;
+            if !self.nodes.is_split(*node) {
+                late_error_px = late_error_px.max(error_px(*node));
             }
         }
-    }
-
-    /// Lists the slots that show something else than in the frame before.
-    fn list_written(&mut self) {
-        let mut written = std::mem::take(&mut self.patch.triangles);
-        let mut pages = std::mem::replace(&mut self.nodes.pages, Pages::new(Dealing::Packed));
-        pages.take_written(|node, side| {
-            written.push((2 * node + side as u32, self.shown(self.nodes.triangles(node)[side])));
-        });
-        self.nodes.pages = pages;
-        self.patch.triangles = written;
-    }
-
-    /// Lists what there is to draw: all slots, or those of the clusters that the view's planes do not cull.
-    fn list_draws(&mut self, metric: &Metric) {
-        if self.culling == Culling::Vertices {
-            self.patch.draws.push(0..2 * self.nodes.pages.places() as u32);
-            return;
+        let mut unread = 0;
+        for node in self.unread.iter().filter(|node| self.nodes.is_unread(**node)) {
+            unread += 1;
+            // Its own error is not known, but no larger than its parents'.
+            let parents = self.nodes.get(*node).parents.into_iter().filter(|parent| *parent != NONE);
+            let bound_px = parents.map(error_px).fold(f64::INFINITY, f64::min);
+            late_error_px = late_error_px.max(if bound_px.is_finite() { bound_px } else { 0.0 });
         }
-        if self.work.merges > 0 {
-            self.stale = (self.stale + 1) % self.nodes.pages.len();
-            self.tighten(self.stale);
-        }
-        let grid = self.records.grid();
-        let [low, high] = self.records.height_range_m();
-        let largest = f64::from(grid.side_steps()).max(low.abs()).max(high.abs());
-        let draws = &mut self.patch.draws;
-        self.nodes.pages.cull(&metric.box_planes(grid.spacing_m(), largest), |range| draws.push(range));
+        self.work.late = late + unread;
+        self.work.unread = unread;
+        self.work.late_error_px = late_error_px;
     }
 
     /// Gives back what only a large frame before this one has needed.
@@ -267,24 +288,29 @@ impl<'a, C: RecordCodec> Kinetic<'a, C> {
         settle(&mut self.patch.triangles, used);
     }
 
+    /// A record of the first page.
+    fn first_record(&self, slot: u64) -> RawOf<S> {
+        self.records.get(slot).unwrap_or(S::Codec::INERT)
+    }
+
     /// Makes the mesh of four triangles that every other grows from.
     fn plant<P: Probe>(&mut self, probe: &mut P) {
         let grid = *self.records.grid();
         let square = corners(grid.k());
+        // The first page is always at hand.
         for (slot, at) in square.into_iter().enumerate() {
             probe.read(slot as u64);
-            let vertex = self.records.vertex_at(at);
-            self.vertices.place(at, vertex.height_m);
+            let vertex = self.records.decode(self.first_record(slot as u64), 0);
+            self.corners[slot] = vertex;
+            self.vertices.place(at, &vertex);
             self.patch.vertices.push((slot as u32, self.patch_vertex(at, &vertex, [slot as u32; 2])));
         }
         let centre_at = square[0].midpoint(square[2]);
-        let centre_slot = slot_of(grid.k(), centre_at);
-        probe.read(centre_slot);
-        let raw = self.records.raw(centre_slot);
-        let centre = self.nodes.create(CENTRE, centre_at, raw);
+        probe.read(CENTRE_SLOT);
+        let centre = self.nodes.create(CENTRE, centre_at, self.first_record(CENTRE_SLOT));
         self.nodes.get_mut(centre).word = STATUS;
         let vertex = self.vertex_of(centre);
-        let slot = self.vertices.place(centre_at, vertex.height_m);
+        let slot = self.vertices.place(centre_at, &vertex);
         self.patch.vertices.push((slot, self.patch_vertex(centre_at, &vertex, [slot; 2])));
         self.nodes.get_mut(centre).body[body::HERE] = slot;
         for (side, [b, d]) in ROOTS {
@@ -299,7 +325,7 @@ fn root_label(side_slot: u64) -> usize {
     [2, 3, 0, 1][side_slot as usize - 5]
 }
 
-impl<C: RecordCodec> Engine for Kinetic<'_, C> {
+impl<S: RecordStore> Engine for Kinetic<S> {
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
         let metric = Metric::new(view);
         let pose = Pose {
@@ -315,6 +341,7 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
         if self.nodes.is_empty() {
             self.plant(probe);
         }
+        self.take_arrivals();
         self.collect(pose, probe);
         let judge = Judge::new(metric, &self.clocks, self.culling == Culling::Vertices);
         let mut allowance = Allowance::new(self.budget);
@@ -322,13 +349,22 @@ impl<C: RecordCodec> Engine for Kinetic<'_, C> {
         self.test_due(&judge, &mut allowance, probe);
         probe.phase(Phase::Apply);
         self.apply(&judge, &mut allowance, probe);
-        if !self.late.is_empty() || self.to_split.iter().any(|nodes| !nodes.is_empty()) {
+        if !S::IS_COMPLETE {
+            self.look(&judge);
+        }
+        if !self.late.is_empty()
+            || !self.unread.is_empty()
+            || self.to_split.iter().any(|nodes| !nodes.is_empty())
+        {
             self.assess_late(&metric, view);
         }
         self.compact();
-        if self.queue.len() > 2 * self.nodes.pages.taken() {
-            let nodes = &self.nodes.all;
-            self.queue.sweep_some(|e| nodes.get(e.node as usize).is_some_and(|n| n.word & !SPLIT == e.word));
+        let nodes = &self.nodes.all;
+        let is_true = |e: Entry| nodes.get(e.node as usize).is_some_and(|n| n.word & !SPLIT == e.word);
+        for queue in std::iter::once(&mut self.queue).chain(self.ahead.as_mut().map(|ahead| &mut ahead.far)) {
+            if queue.len() > 2 * self.nodes.pages.taken() {
+                queue.sweep_some(is_true);
+            }
         }
         self.list_written();
         self.list_draws(&metric);

@@ -12,6 +12,7 @@
 
 use super::capacity::grow;
 use super::certificate::ACTIVE;
+use super::clocks::EXPIRY_BITS;
 use super::labels::{first_child, is_on_border, level_of, orientation};
 use super::pages::{PAGE, Pages};
 use terrasoar_layout::grid::GridPoint;
@@ -22,6 +23,8 @@ pub(super) const SPLIT: u32 = 1 << 30;
 pub(super) const STATUS: u32 = ACTIVE | SPLIT;
 /// The word of a free node, and of an annex: no live word has this certificate.
 const NO_VERTEX: u32 = SPLIT - 1;
+/// The word of a node whose record has not come yet: nor has any this one.
+pub(super) const UNREAD: u32 = NO_VERTEX - (1 << EXPIRY_BITS);
 /// No node, no vertex.
 pub(super) const NONE: u32 = u32::MAX;
 /// The square's centre, which is always split.
@@ -97,6 +100,12 @@ impl<R: Copy> Nodes<R> {
     #[inline(always)]
     pub(super) fn is_live(&self, node: u32) -> bool {
         self.get(node).word & !STATUS != NO_VERTEX
+    }
+
+    /// Whether the node waits for its record.
+    #[inline(always)]
+    pub(super) fn is_unread(&self, node: u32) -> bool {
+        self.get(node).word == UNREAD
     }
 
     #[inline(always)]

@@ -8,19 +8,19 @@ use super::Kinetic;
 use super::budget::Allowance;
 use super::certificate::{ACTIVE, Judge, clock_of, expiry_of};
 use super::labels::level_of;
-use super::nodes::{SPLIT, STATUS};
+use super::nodes::{SPLIT, STATUS, UNREAD};
 use super::queue::Entry;
 use crate::refine::{Phase, Probe};
 use rayon::prelude::*;
 use terrasoar_layout::order::slot_of;
-use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::store::RecordStore;
 
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
 /// How many splits or merges ahead memory is asked for what: see [`Kinetic::fetch`].
 const FETCH_AHEAD: [(u32, usize); 3] = [(2, 6), (1, 4), (0, 2)];
 
-impl<C: RecordCodec> Kinetic<'_, C> {
+impl<S: RecordStore> Kinetic<S> {
     /// Tests what is due, as far as the budget allows.
     pub(super) fn test_due<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
         let mut batch = std::mem::take(&mut self.list);
@@ -39,14 +39,16 @@ impl<C: RecordCodec> Kinetic<'_, C> {
         self.list = batch;
     }
 
-    /// Tests nodes and sorts out those that are to be split or merged. Fresh ones have their records read first.
+    /// Tests nodes and sorts out those that are to be split or merged. Fresh ones have their records read first; where a record is away
+    /// the node waits for it.
     fn test<P: Probe>(&mut self, nodes: &[u32], fresh: bool, judge: &Judge, probe: &mut P) {
         let k = self.records.grid().k();
         let mut verdicts = std::mem::take(&mut self.verdicts);
         let verdict = |node: &u32| {
             let node = self.nodes.get(*node);
             let point = node.point;
-            let raw = if fresh { self.records.raw(slot_of(k, point)) } else { node.raw };
+            let raw = if fresh { self.records.get(slot_of(k, point)) } else { Some(node.raw) };
+            let Some(raw) = raw else { return (node.raw, UNREAD) };
             let vertex = self.records.decode(raw, level_of(point));
             (raw, judge.word(&judge.metric().sight(self.records.grid().position_m(point), &vertex)))
         };
@@ -60,6 +62,11 @@ impl<C: RecordCodec> Kinetic<'_, C> {
         for (node, (raw, word)) in nodes.iter().zip(&verdicts) {
             let record = self.nodes.get_mut(*node);
             let (old, point) = (record.word, record.point);
+            if !S::IS_COMPLETE && *word == UNREAD {
+                record.word = UNREAD;
+                self.unread.push(*node);
+                continue;
+            }
             if fresh {
                 probe.read(slot_of(k, point));
                 record.raw = *raw;
@@ -68,7 +75,7 @@ impl<C: RecordCodec> Kinetic<'_, C> {
                 continue;
             }
             record.word = *word | (old & SPLIT);
-            self.queue.enter(clock_of(*word), Entry { node: *node, word: *word });
+            self.enter(clock_of(*word), Entry { node: *node, word: *word });
             match (*word & ACTIVE != 0, old & SPLIT != 0) {
                 (true, false) => self.to_split[level_of(point) as usize].push(*node),
                 (false, true) => self.to_merge[level_of(point) as usize].push(*node),

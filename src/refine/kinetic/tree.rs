@@ -11,9 +11,9 @@ use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::slot_of;
 use terrasoar_layout::prefetch::prefetch;
-use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::store::RecordStore;
 
-impl<C: RecordCodec> Kinetic<'_, C> {
+impl<S: RecordStore> Kinetic<S> {
     /// The child of a split node that lies at `at`; `None` at the finest level, where there are none.
     pub(super) fn child_at(&self, node: u32, at: GridPoint) -> Option<u32> {
         let node = self.nodes.get(node);
@@ -104,7 +104,7 @@ impl<C: RecordCodec> Kinetic<'_, C> {
         let level = level_of(leaf.point);
         let sides = self.nodes.sides(node, level);
         let vertex = self.records.decode(leaf.raw, level);
-        let here = self.vertices.place(leaf.point, vertex.height_m);
+        let here = self.vertices.place(leaf.point, &vertex);
         {
             let split = self.nodes.get_mut(node);
             split.word |= SPLIT;

@@ -1,28 +1,35 @@
 //! The vertex array: the vertices that triangles are made of, in slots that they keep for as long as they are in the mesh.
 //!
 //! It lies beside the bin-tree array but has an order of its own, so that nodes moved in that array move no vertex on the GPU. The first
-//! five slots are the square's corners and its centre. Cost: 12 bytes a vertex, half a vertex a triangle.
+//! five slots are the square's corners and its centre. Cost: 13 bytes a vertex, half a vertex a triangle.
 
 use super::capacity::grow;
 use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::record::Vertex;
 
 #[derive(Debug, Default)]
 pub(super) struct Vertices {
     all: Vec<StripVertex>,
+    /// Whether a vertex's sample is void.
+    void: Vec<bool>,
     free: Vec<u32>,
 }
 
 impl Vertices {
     /// Places a vertex; returns its slot.
-    pub(super) fn place(&mut self, at: GridPoint, height_m: f64) -> u32 {
-        let vertex = StripVertex { x: at.x(), y: at.y(), height_m: height_m as f32 };
+    pub(super) fn place(&mut self, at: GridPoint, vertex: &Vertex) -> u32 {
+        let placed = StripVertex { x: at.x(), y: at.y(), height_m: vertex.height_m as f32 };
+        let is_void = vertex.class.is_void();
         if let Some(slot) = self.free.pop() {
-            self.all[slot as usize] = vertex;
+            self.all[slot as usize] = placed;
+            self.void[slot as usize] = is_void;
             return slot;
         }
         grow(&mut self.all, 1);
-        self.all.push(vertex);
+        self.all.push(placed);
+        grow(&mut self.void, 1);
+        self.void.push(is_void);
         self.all.len() as u32 - 1
     }
 
@@ -43,13 +50,15 @@ impl Vertices {
         &self.all[slot as usize]
     }
 
-    /// Slots, free ones included.
-    pub(super) fn slots(&self) -> &[StripVertex] {
-        &self.all
+    #[inline(always)]
+    pub(super) fn is_void(&self, slot: u32) -> bool {
+        self.void[slot as usize]
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        self.all.capacity() * size_of::<StripVertex>() + self.free.capacity() * size_of::<u32>()
+        self.all.capacity() * size_of::<StripVertex>()
+            + self.void.capacity()
+            + self.free.capacity() * size_of::<u32>()
     }
 }

@@ -1,37 +1,46 @@
 //! The whole mesh at once, for those who cannot follow patches: as one patch, as triangles, as SOAR's strip. Cost: proportional to the mesh; updates need
 //! none of it.
 
-use super::nodes::CENTRE;
+use super::nodes::{CENTRE, body};
 use super::{Kinetic, Patch, root_label};
 use crate::refine::soar::StripVertex;
 use crate::refine::strip::StripBuilder;
 use std::collections::HashMap;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{ROOTS, corners};
-use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::record::Vertex;
+use terrasoar_layout::store::RecordStore;
 
-impl<C: RecordCodec> Kinetic<'_, C> {
-    /// The whole mesh as a patch to an empty one, for a GPU that has lost its copy. Reads the records of all vertices in the mesh.
+impl<S: RecordStore> Kinetic<S> {
+    /// The whole mesh as a patch to an empty one, for a GPU that has lost its copy.
     pub fn whole_patch(&self) -> Patch {
         let mut patch = Patch { draws: self.patch.draws.clone(), ..Default::default() };
-        let mut in_use = vec![false; self.vertices.slots().len()];
+        if self.nodes.is_empty() {
+            return patch;
+        }
         self.for_each_slot(|slot, corners| {
-            corners.iter().for_each(|v| in_use[*v as usize] = true);
-            patch.triangles.push((slot, self.shown(Some(corners))));
+            patch.triangles.push((slot, self.shown(slot / 2, Some(corners))));
         });
         let grid = self.records.grid();
-        let slot_at: HashMap<GridPoint, u32> = (0..in_use.len() as u32)
-            .filter(|v| in_use[*v as usize])
-            .map(|v| (self.vertices.point(v), v))
-            .collect();
-        for (point, slot) in &slot_at {
-            let own = grid.is_corner(*point) || self.nodes.get(CENTRE).point == *point;
+        let square = corners(grid.k());
+        let mut vertices: Vec<(u32, GridPoint, Vertex)> =
+            self.corners.iter().enumerate().map(|(i, vertex)| (i as u32, square[i], *vertex)).collect();
+        self.nodes().filter(|node| self.nodes.is_live(*node) && self.nodes.is_split(*node)).for_each(
+            |node| {
+                let record = self.nodes.get(node);
+                vertices.push((record.body[body::HERE], record.point, self.vertex_of(node)));
+            },
+        );
+        let slot_at: HashMap<GridPoint, u32> =
+            vertices.iter().map(|(slot, point, _)| (*point, *slot)).collect();
+        for (slot, point, vertex) in vertices {
+            let own = grid.is_corner(point) || self.nodes.get(CENTRE).point == point;
             let ends = if own {
-                [*slot; 2]
+                [slot; 2]
             } else {
-                grid.edge_ends(*point).map(|p| slot_at.get(&p).copied().unwrap_or(*slot))
+                grid.edge_ends(point).map(|p| slot_at.get(&p).copied().unwrap_or(slot))
             };
-            patch.vertices.push((*slot, self.patch_vertex(*point, &self.records.vertex_at(*point), ends)));
+            patch.vertices.push((slot, self.patch_vertex(point, &vertex, ends)));
         }
         patch.vertices.sort_unstable_by_key(|(slot, _)| *slot);
         patch
@@ -58,9 +67,14 @@ impl<C: RecordCodec> Kinetic<'_, C> {
         strip.push(*self.vertices.get(0));
     }
 
+    /// All nodes and annexes.
+    fn nodes(&self) -> impl Iterator<Item = u32> {
+        (0..self.nodes.pages.len()).flat_map(|page| self.nodes.pages.places_of(page))
+    }
+
     /// Calls `visit` with every triangle of the mesh and its slot.
     pub(super) fn for_each_slot(&self, mut visit: impl FnMut(u32, [u32; 3])) {
-        for node in (0..self.nodes.pages.len()).flat_map(|page| self.nodes.pages.places_of(page)) {
+        for node in self.nodes() {
             for (side, corners) in self.nodes.triangles(node).into_iter().enumerate() {
                 if let Some(corners) = corners {
                     visit(2 * node + side as u32, corners);
@@ -71,12 +85,12 @@ impl<C: RecordCodec> Kinetic<'_, C> {
 }
 
 /// The walk that makes a strip.
-struct StripWalk<'w, 'a, C: RecordCodec> {
-    engine: &'w Kinetic<'a, C>,
+struct StripWalk<'w, S: RecordStore> {
+    engine: &'w Kinetic<S>,
     strip: StripBuilder<'w, StripVertex>,
 }
 
-impl<C: RecordCodec> StripWalk<'_, '_, C> {
+impl<S: RecordStore> StripWalk<'_, S> {
     /// Visits the triangle (apex; b, d), whose split vertex is `node` unless it is one of the smallest.
     fn visit(
         &mut self,

@@ -1,0 +1,64 @@
+//! What a frame tells: slots that show something else than before, and what there is to draw.
+//!
+//! Whether a triangle is drawn follows from what its node holds, so no file is read for it. A triangle whose split vertex has not come yet is drawn; whether void
+//! touches it is known when it comes. Cost: the slots that changed.
+
+use super::Kinetic;
+use super::pages::{Dealing, Pages};
+use crate::mesh::has_area;
+use crate::metric::Metric;
+use crate::refine::Culling;
+use terrasoar_layout::store::RecordStore;
+
+impl<S: RecordStore> Kinetic<S> {
+    /// What a slot of `node` sends to the GPU: nothing where voids touch or padding takes the area.
+    #[inline(always)]
+    pub(super) fn shown(&self, node: u32, corners: Option<[u32; 3]>) -> [u32; 3] {
+        corners.filter(|corners| self.is_drawn(node, corners)).unwrap_or([0; 3])
+    }
+
+    /// As [`crate::mesh::is_drawn`].
+    #[inline(always)]
+    fn is_drawn(&self, node: u32, corners: &[u32; 3]) -> bool {
+        let shape = self.records.shape();
+        if shape.grid.has_padding() && !has_area(&shape.grid, corners.map(|v| self.vertices.point(v))) {
+            return false;
+        }
+        if !shape.has_voids {
+            return true;
+        }
+        if self.nodes.is_live(node) && !self.nodes.is_split(node) {
+            self.nodes.is_unread(node) || self.vertex_of(node).class.is_plain()
+        } else {
+            corners.iter().all(|v| !self.vertices.is_void(*v))
+        }
+    }
+
+    /// Lists the slots that show something else than in the frame before.
+    pub(super) fn list_written(&mut self) {
+        let mut written = std::mem::take(&mut self.patch.triangles);
+        let mut pages = std::mem::replace(&mut self.nodes.pages, Pages::new(Dealing::Packed));
+        pages.take_written(|node, side| {
+            written.push((2 * node + side as u32, self.shown(node, self.nodes.triangles(node)[side])));
+        });
+        self.nodes.pages = pages;
+        self.patch.triangles = written;
+    }
+
+    /// Lists what there is to draw: all slots, or those of the clusters that the view's planes do not cull.
+    pub(super) fn list_draws(&mut self, metric: &Metric) {
+        if self.culling == Culling::Vertices {
+            self.patch.draws.push(0..2 * self.nodes.pages.places() as u32);
+            return;
+        }
+        if self.work.merges > 0 {
+            self.stale = (self.stale + 1) % self.nodes.pages.len();
+            self.tighten(self.stale);
+        }
+        let grid = self.records.grid();
+        let [low, high] = self.records.shape().height_range_m;
+        let largest = f64::from(grid.side_steps()).max(low.abs()).max(high.abs());
+        let draws = &mut self.patch.draws;
+        self.nodes.pages.cull(&metric.box_planes(grid.spacing_m(), largest), |range| draws.push(range));
+    }
+}

@@ -1,0 +1,253 @@
+//! Flying over a terrain of which only some pages are in memory, without waiting for any.
+//!
+//! A frame goes: pages that have come are put into the pool; the engine refines with what is there; the pages that it lacks or will need are asked for, each with the frame by which
+//! it is needed. What is late stays coarse, conforming, and its error is told; it refines by itself once its page has come. What cannot be read is
+//! told once and tried again later.
+//!
+//! Invariant: nothing here waits for storage but [`Streamed::fill`]. Once all has come the mesh is the one that an engine over the whole file makes. Cost beside the
+//! engine's: a copy of 4 KiB a page that comes, a look into a table a page that is wanted.
+
+mod fetch;
+mod frustum;
+mod lead;
+mod model;
+mod requests;
+
+pub use fetch::{Fetch, Threads};
+pub use model::ModelDisk;
+
+use crate::refine::kinetic::Kinetic;
+use crate::refine::{Culling, Engine, Probe, Work};
+use crate::view::View;
+use frustum::Extension;
+use lead::Lead;
+use requests::Requests;
+use std::collections::VecDeque;
+use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::loader::Outcome;
+use terrasoar_layout::pool::PagePool;
+use terrasoar_layout::record::RecordCodec;
+
+/// Pages put into the pool in one frame at most: two megabytes are copied in a fraction of a millisecond.
+const INSTALLS_A_FRAME: usize = 512;
+/// Errors kept for whoever asks.
+const ERRORS_KEPT: usize = 64;
+
+/// How pages are asked for before they are needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Prefetch {
+    /// Not at all: a page is asked for when the mesh lacks it.
+    None,
+    /// What an extension of the view frustum needs, after Qiu et al., section 4. For comparison.
+    Frustum,
+    /// By deadline: what the live ranges say will be needed, the earliest first.
+    #[default]
+    Deadline,
+}
+
+impl Prefetch {
+    /// All ways.
+    pub const ALL: [Self; 3] = [Self::None, Self::Frustum, Self::Deadline];
+
+    /// The word the command line uses.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Frustum => "frustum",
+            Self::Deadline => "deadline",
+        }
+    }
+}
+
+/// What a frame had to do with storage.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StreamFrame {
+    /// The engine's account.
+    pub work: Work,
+    /// Distinct pages whose records entered the mesh's array.
+    pub pages_read: u64,
+    /// Pages that the mesh lacked for the first time in this frame: those that came too late, or were not foreseen.
+    pub late_pages: u64,
+    /// Pages asked for.
+    pub pages_asked: u64,
+    /// Pages that came.
+    pub pages_come: u64,
+    /// Pages that could not be read.
+    pub failures: u64,
+    /// Pages asked for that have not come yet.
+    pub outstanding: u64,
+    /// Frames that pages are asked for ahead of need.
+    pub lead_frames: f32,
+}
+
+/// The kinetic engine over a pool, and what fills it.
+#[derive(Debug)]
+pub struct Streamed<C: RecordCodec, F> {
+    engine: Kinetic<PagePool<C>>,
+    fetch: F,
+    prefetch: Prefetch,
+    extension: Extension,
+    lead: Lead,
+    requests: Requests,
+    now: u64,
+    errors: VecDeque<LayoutError>,
+    pages_read: Vec<u64>,
+}
+
+/// Remembers pages read, and hands on.
+struct PagesRead<'p, C, P> {
+    pages: &'p mut Vec<u64>,
+    probe: &'p mut P,
+    codec: std::marker::PhantomData<C>,
+}
+
+impl<C: RecordCodec, P: Probe> Probe for PagesRead<'_, C, P> {
+    fn read(&mut self, slot: u64) {
+        use terrasoar_layout::store::RecordStore;
+        let page = PagePool::<C>::page_of(slot);
+        if self.pages.last() != Some(&page) {
+            self.pages.push(page);
+        }
+        self.probe.read(slot);
+    }
+
+    fn phase(&mut self, phase: crate::refine::Phase) {
+        self.probe.phase(phase);
+    }
+}
+
+impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
+    /// An engine over `pool`, whose pages come through `fetch`.
+    pub fn new(pool: PagePool<C>, fetch: F, culling: Culling, prefetch: Prefetch) -> Self {
+        let mut engine = Kinetic::new(pool, culling);
+        let lead = Lead::default();
+        if prefetch == Prefetch::Deadline {
+            engine.look_ahead(lead.frames());
+        }
+        Self {
+            engine,
+            fetch,
+            prefetch,
+            extension: Extension::default(),
+            lead,
+            requests: Requests::default(),
+            now: 0,
+            errors: VecDeque::new(),
+            pages_read: Vec::new(),
+        }
+    }
+
+    /// The engine: its mesh and patch.
+    pub fn engine(&self) -> &Kinetic<PagePool<C>> {
+        &self.engine
+    }
+
+    /// The engine, to be given a budget.
+    pub fn engine_mut(&mut self) -> &mut Kinetic<PagePool<C>> {
+        &mut self.engine
+    }
+
+    /// What fetches the pages.
+    pub fn fetch(&self) -> &F {
+        &self.fetch
+    }
+
+    /// The oldest error that nobody has heard of yet. Each page that cannot be read is told once, however often it is tried.
+    pub fn take_error(&mut self) -> Option<LayoutError> {
+        self.errors.pop_front()
+    }
+
+    /// Brings the mesh to `view` with the pages at hand. Waits for nothing.
+    pub fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> StreamFrame {
+        self.now += 1;
+        let mut frame = StreamFrame::default();
+        self.take_pages(&mut frame);
+        if self.prefetch == Prefetch::Deadline {
+            self.engine.look_ahead(self.lead.frames());
+        }
+        self.pages_read.clear();
+        let mut listener =
+            PagesRead::<C, P> { pages: &mut self.pages_read, probe, codec: std::marker::PhantomData };
+        self.engine.update(view, &mut listener);
+        self.pages_read.sort_unstable();
+        self.pages_read.dedup();
+        self.ask(view, &mut frame);
+        frame.work = self.engine.work();
+        frame.pages_read = self.pages_read.len() as u64;
+        frame.outstanding = self.requests.outstanding() as u64;
+        frame.lead_frames = self.lead.frames();
+        frame
+    }
+
+    /// Updates until the mesh of `view` lacks no page that can be read, waiting for those that come. For the first frame of a flight, and for pictures that must repeat.
+    /// Returns the frames that took.
+    pub fn fill<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
+        let start = self.now;
+        loop {
+            let frame = self.update(view, probe);
+            if frame.work.late == 0 {
+                return self.now - start;
+            }
+            if frame.outstanding > 0 {
+                self.fetch.wait();
+            } else if frame.work.unread > 0 && !self.fetch.has_arrivals() {
+                // What is left cannot be read; waiting until it is tried again would keep us here for ever.
+                return self.now - start;
+            }
+        }
+    }
+
+    /// Puts into the pool what has come.
+    fn take_pages(&mut self, frame: &mut StreamFrame) {
+        for _ in 0..INSTALLS_A_FRAME {
+            let Some(arrival) = self.fetch.take(self.now) else { break };
+            match arrival.outcome {
+                Outcome::Read(page) => {
+                    if let Some(frames) = self.requests.came(arrival.page, self.now) {
+                        self.lead.came_after(frames);
+                    }
+                    frame.pages_come += 1;
+                    // Only pages that exist are asked for.
+                    if let Err(error) = self.engine.store_mut().install(arrival.page, &page) {
+                        self.keep(error);
+                    }
+                }
+                Outcome::Failed(error) => {
+                    frame.failures += 1;
+                    if self.requests.failed(arrival.page, self.now) {
+                        self.keep(error);
+                    }
+                }
+                Outcome::Dropped => self.requests.dropped(arrival.page),
+            }
+        }
+    }
+
+    fn keep(&mut self, error: LayoutError) {
+        if self.errors.len() < ERRORS_KEPT {
+            self.errors.push_back(error);
+        }
+    }
+
+    /// Asks for what the engine wants, and for what the frustum's extension needs.
+    fn ask(&mut self, view: &View, frame: &mut StreamFrame) {
+        let mut asked = std::mem::take(&mut self.requests.asked);
+        asked.clear();
+        let pool = self.engine.store();
+        for want in self.engine.wants() {
+            // A page may have been given up, or put in, since.
+            if pool.is_resident(want.page) {
+                continue;
+            }
+            asked.extend(self.requests.ask(want.page, self.now, want.in_frames));
+            frame.late_pages += u64::from(want.is_lacking && self.requests.is_newly_late(want.page));
+        }
+        if self.prefetch == Prefetch::Frustum {
+            let pages = self.extension.pages_away(view, pool);
+            asked.extend(pages.iter().filter_map(|page| self.requests.ask(*page, self.now, 1.0)));
+        }
+        frame.pages_asked = asked.len() as u64;
+        self.fetch.ask(self.now, &asked);
+        self.requests.asked = asked;
+    }
+}

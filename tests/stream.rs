@@ -1,0 +1,188 @@
+//! Flying over a terrain of which only some pages are in memory: the mesh conforms whatever is late, becomes the whole engine's once all has come, and live ranges
+//! foresee what a steady flight needs. Every test runs on a model disk, so that two runs are the same.
+
+mod common;
+
+use common::checks::{check_conforming, keys, triangles, views};
+use common::mirror::{Mirror, drawn};
+use common::{frame, rugged, rugged_terrain, terrain_of};
+use std::sync::Arc;
+use terrasoar::flight::FlightFrame;
+use terrasoar::refine::soar::Soar;
+use terrasoar::refine::{Culling, Engine, Unobserved};
+use terrasoar::stream::{ModelDisk, Prefetch, StreamFrame, Streamed};
+use terrasoar::view::View;
+use terrasoar_layout::build::BuildOptions;
+use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::dem::{MemoryDem, SampleType};
+use terrasoar_layout::terrain::Terrain;
+
+/// A terrain of some 1,700 pages.
+fn large_terrain() -> Arc<Terrain> {
+    let dem = MemoryDem::from_fn([1025; 2], SampleType::I16, |x, y| rugged(9, x, y));
+    Arc::new(terrain_of(&dem, &BuildOptions { spacing_m: Some([10.0, 10.0]), ..Default::default() }))
+}
+
+/// Straight ahead, and a turn at the end.
+fn path(terrain: &Terrain, frames: u32, turning: bool) -> Vec<FlightFrame> {
+    (0..frames)
+        .map(|i| {
+            let turn = if turning { f64::from(i.saturating_sub(frames / 2)) } else { 0.0 };
+            frame(
+                terrain,
+                [0.4, 0.1 + 0.6 * f64::from(i) / f64::from(frames)],
+                1400.0,
+                15.0 + 2.0 * turn,
+                -20.0,
+            )
+        })
+        .collect()
+}
+
+/// How a flight is streamed.
+#[derive(Debug, Clone, Copy)]
+struct How {
+    culling: Culling,
+    prefetch: Prefetch,
+    cache_pages: u64,
+    reads_a_frame: usize,
+    latency_frames: u64,
+    /// Frames from one check of the mesh to the next.
+    check_every: usize,
+}
+
+/// Flies `flown`, checks every frame, and at the end that what was late has come.
+fn fly(terrain: &Arc<Terrain>, flown: &[View], how: How) -> Vec<StreamFrame> {
+    let mut frames = Vec::new();
+    let disk = ModelDisk::new(Arc::clone(terrain), how.reads_a_frame, how.latency_frames);
+    let pool = terrain.pool(how.cache_pages * PAGE_BYTES as u64).unwrap();
+    macro_rules! flight {
+        ($pool:expr, $records:expr) => {{
+            let records = $records;
+            let mut streamed = Streamed::new($pool, disk, how.culling, how.prefetch);
+            let mut mirror = Mirror::default();
+            let mut follow = |streamed: &Streamed<_, _>, i: usize| {
+                mirror.apply(streamed.engine().patch());
+                let mesh = triangles(streamed.engine());
+                if !i.is_multiple_of(how.check_every) {
+                    return mesh;
+                }
+                check_conforming(&records, &mesh);
+                // What waits for its record is drawn until void is known of.
+                if how.culling == Culling::Vertices
+                    && (!records.has_voids() || streamed.engine().work().unread == 0)
+                {
+                    assert!(mirror.triangles() == drawn(&records, &mesh), "frame {i}");
+                }
+                mesh
+            };
+            for (i, view) in flown.iter().enumerate() {
+                let frame = streamed.update(view, &mut Unobserved);
+                assert_eq!(frame.failures, 0);
+                assert!(frame.work.late_error_px == 0.0 || frame.work.late > 0);
+                follow(&streamed, i);
+                frames.push(frame);
+            }
+            let last = flown.last().unwrap();
+            let mut soar = Soar::new(records.clone(), how.culling);
+            soar.update(last, &mut Unobserved);
+            for i in 0.. {
+                assert!(i < 5000, "{} stay late", streamed.engine().work().late);
+                let frame = streamed.update(last, &mut Unobserved);
+                let mesh = follow(&streamed, flown.len() + i);
+                if frame.work.late == 0 {
+                    assert!(keys(&mesh) == keys(&triangles(&soar)), "what was late has not caught up");
+                    break;
+                }
+            }
+        }};
+    }
+    match (pool, terrain.records().unwrap()) {
+        (
+            terrasoar_layout::terrain::ByKind::Compact(pool),
+            terrasoar_layout::terrain::ByKind::Compact(records),
+        ) => flight!(pool, records),
+        (
+            terrasoar_layout::terrain::ByKind::Exact8(pool),
+            terrasoar_layout::terrain::ByKind::Exact8(records),
+        ) => flight!(pool, records),
+        (
+            terrasoar_layout::terrain::ByKind::Exact16(pool),
+            terrasoar_layout::terrain::ByKind::Exact16(records),
+        ) => flight!(pool, records),
+        _ => unreachable!("pool and records are of one kind"),
+    }
+    frames
+}
+
+#[test]
+fn the_mesh_conforms_whatever_is_late_and_catches_up() {
+    for (samples, holes) in [([257, 257], false), ([240, 180], true)] {
+        let terrain = Arc::new(rugged_terrain(samples, 6, holes));
+        let flown = views(path(&terrain, 40, true), 1.0);
+        for culling in Culling::ALL {
+            for prefetch in Prefetch::ALL {
+                let how = How {
+                    culling,
+                    prefetch,
+                    cache_pages: 4000,
+                    reads_a_frame: 1,
+                    latency_frames: 3,
+                    check_every: 1,
+                };
+                let frames = fly(&terrain, &flown, how);
+                assert!(frames[0].work.unread > 0 && frames[0].late_pages > 0, "{how:?}");
+                assert!(frames.iter().any(|f| f.work.late_error_px > 1.0), "{how:?}: what is late shows");
+            }
+        }
+    }
+}
+
+#[test]
+fn two_flights_over_a_model_disk_are_the_same() {
+    let terrain = Arc::new(rugged_terrain([257, 257], 6, false));
+    let flown = views(path(&terrain, 30, true), 1.0);
+    for prefetch in Prefetch::ALL {
+        let how = How {
+            culling: Culling::Vertices,
+            prefetch,
+            cache_pages: 30,
+            reads_a_frame: 2,
+            latency_frames: 2,
+            check_every: 1,
+        };
+        assert_eq!(fly(&terrain, &flown, how), fly(&terrain, &flown, how));
+    }
+}
+
+#[test]
+fn deadlines_foresee_what_a_steady_flight_needs() {
+    let terrain = large_terrain();
+    let flown = views(path(&terrain, 400, false), 2.0);
+    let shares = Prefetch::ALL.map(|prefetch| {
+        let how = How {
+            culling: Culling::Vertices,
+            prefetch,
+            cache_pages: 600,
+            reads_a_frame: 20,
+            latency_frames: 2,
+            check_every: 40,
+        };
+        let frames = fly(&terrain, &flown, how);
+        // The first second is for starting from nothing.
+        let later = &frames[60..];
+        let sum = |f: fn(&StreamFrame) -> u64| later.iter().map(f).sum::<u64>();
+        let (late, come) = (sum(|f| f.late_pages), sum(|f| f.pages_come));
+        println!(
+            "{}: {late} late pages of {come} that came, {} read, {} asked",
+            prefetch.name(),
+            sum(|f| f.pages_read),
+            sum(|f| f.pages_asked)
+        );
+        (late, come)
+    });
+    let [(none, _), (_, _), (deadline, come)] = shares;
+    assert!(none > 100, "a flight that needs nothing shows nothing: {shares:?}");
+    assert!(deadline * 100 <= none, "{shares:?}");
+    assert!(come < 4 * none, "what is foreseen is far more than what is needed: {shares:?}");
+}
