@@ -7,15 +7,17 @@ use common::checks::{check_conforming, keys, triangles, views};
 use common::mirror::{Mirror, drawn};
 use common::{frame, rugged, rugged_terrain, terrain_of};
 use std::sync::Arc;
+use std::time::Duration;
 use terrasoar::flight::FlightFrame;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
-use terrasoar::stream::{ModelDisk, Prefetch, StreamFrame, Streamed};
+use terrasoar::stream::{ModelDisk, Prefetch, StreamFrame, Streamed, sound};
 use terrasoar::view::View;
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::with_records;
 
 /// A terrain of some 1,700 pages.
 fn large_terrain() -> Arc<Terrain> {
@@ -185,4 +187,40 @@ fn deadlines_foresee_what_a_steady_flight_needs() {
     assert!(none > 100, "a flight that needs nothing shows nothing: {shares:?}");
     assert!(deadline * 100 <= none, "{shares:?}");
     assert!(come < 4 * none, "what is foreseen is far more than what is needed: {shares:?}");
+}
+
+#[test]
+fn soundings_are_the_terrains_own_where_it_is_at_hand() {
+    let terrain = Arc::new(rugged_terrain([240, 180], 6, true));
+    let view = views(path(&terrain, 2, false), 1.0)[0];
+    let [wide_m, high_m] = terrain.grid().extent_m();
+    let spots: Vec<[f64; 2]> = (0..400)
+        .map(|i| [0.618 * f64::from(i) % 1.0 * wide_m, 0.414 * f64::from(i) % 1.0 * high_m])
+        .chain([[0.0, 0.0], [wide_m, high_m], [wide_m, 0.0], [-1.0, 5.0], [5.0, high_m + 1.0]])
+        .collect();
+    with_records!(terrain.pool(1 << 30).unwrap(), pool => {
+        let mut streamed = Streamed::new(pool, ModelDisk::new(Arc::clone(&terrain), 8, 1), Culling::Vertices, Prefetch::None);
+        let [mut coarse, mut largest_m] = [0.0f64; 2];
+        for [east_m, north_m] in spots.iter().copied() {
+            let sounding = sound(streamed.engine().store(), east_m, north_m);
+            if let (false, Some(height_m), Some(own_m)) = (sounding.is_exact, sounding.height_m, terrain.height_m(east_m, north_m).unwrap()) {
+                coarse += 1.0;
+                largest_m = largest_m.max((height_m - own_m).abs());
+            }
+            streamed.want_height(east_m, north_m);
+        }
+        let [low, high] = terrain.header().height_range_m;
+        assert!(coarse > 100.0 && largest_m > 0.0 && largest_m < high - low, "{coarse} {largest_m}");
+        streamed.fill(&view, Duration::from_secs(60), &mut Unobserved);
+        for _ in 0..200 {
+            streamed.update(&view, &mut Unobserved);
+        }
+        for [east_m, north_m] in spots {
+            let sounding = sound(streamed.engine().store(), east_m, north_m);
+            let own_m = terrain.height_m(east_m, north_m).unwrap();
+            assert!(sounding.is_exact);
+            let off_m = sounding.height_m.zip(own_m).map(|(a, b)| (a - b).abs());
+            assert!(sounding.height_m.is_some() == own_m.is_some() && off_m.is_none_or(|off| off < 1e-6), "{sounding:?} {own_m:?} at {east_m} {north_m}");
+        }
+    });
 }

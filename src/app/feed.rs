@@ -5,10 +5,12 @@
 use super::full_mesh::FullMesh;
 use terrasoar::refine::kinetic::{Kinetic, Patch, PatchVertex};
 use terrasoar::refine::{Culling, Engine, Probe, Work};
+use terrasoar::stream::sound;
 use terrasoar::view::View;
-use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::record::{RecordCodec, Vertex};
+use terrasoar_layout::store::RecordStore;
 use terrasoar_layout::terrain::{Records, Terrain};
 use terrasoar_layout::with_records;
 use terrasoar_render::{HEIGHTS_PER_TILE, MeshVertex, TILE_BORDER, TILE_CELLS, TileId};
@@ -34,6 +36,10 @@ pub(crate) struct Refined {
     pub record_bytes_read: u64,
     /// Distinct 4 KiB pages of them; 0 for SOAR.
     pub pages_read: u64,
+    /// Pages that came from storage; 0 where the file is mapped.
+    pub pages_come: u64,
+    /// Pages that the mesh lacked; 0 where the file is mapped.
+    pub late_pages: u64,
 }
 
 /// An engine over a terrain.
@@ -47,8 +53,32 @@ pub(crate) trait Feed {
     /// The mesh of the last update as a patch to an empty one.
     fn whole(&self) -> Patch;
 
-    /// Heights of a tile as the renderer wants them, void not a number; replaces what `heights_m` held.
-    fn heights_m(&self, tile: TileId, heights_m: &mut Vec<f32>);
+    /// Heights of a tile as the renderer wants them, void not a number; replaces what `heights_m` held. `false` if they are not at hand yet: then they
+    /// have been asked for.
+    fn heights_m(&mut self, tile: TileId, heights_m: &mut Vec<f32>) -> bool;
+
+    /// Height of the ground in metres at a place in metres east and north, where one is known.
+    fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64>;
+
+    /// Asks for what the exact height at a place needs.
+    fn want_ground(&mut self, east_m: f64, north_m: f64) {
+        let _ = (east_m, north_m);
+    }
+
+    /// Whether what the last view needs is still on its way.
+    fn is_waiting(&self) -> bool {
+        false
+    }
+
+    /// Whether the mesh lacks pages, those that cannot be read included.
+    fn lacks_pages(&self) -> bool {
+        false
+    }
+
+    /// What could not be read and nobody has heard of yet.
+    fn take_error(&mut self) -> Option<LayoutError> {
+        None
+    }
 }
 
 /// The feed of an engine over a terrain; none if the terrain's source lends no bytes.
@@ -75,7 +105,7 @@ struct KineticFeed<'a, C: RecordCodec> {
 
 /// The pages of the records that an update reads, each read a page.
 #[derive(Debug, Default)]
-struct Reads {
+pub(crate) struct Reads {
     slots_a_page: u64,
     pages: Vec<u64>,
 }
@@ -87,12 +117,12 @@ impl Probe for Reads {
 }
 
 impl Reads {
-    fn over<C: RecordCodec>(_: &Records<'_, C>) -> Self {
-        Self { slots_a_page: (PAGE_BYTES / C::BYTES) as u64, pages: Vec::new() }
+    pub(crate) fn over<S: RecordStore>(_: &S) -> Self {
+        Self { slots_a_page: S::records_per_page(), pages: Vec::new() }
     }
 
     /// How many reads there were, and of how many pages; forgets them.
-    fn take(&mut self) -> [u64; 2] {
+    pub(crate) fn take(&mut self) -> [u64; 2] {
         let reads = self.pages.len() as u64;
         self.pages.sort_unstable();
         self.pages.dedup();
@@ -111,6 +141,7 @@ impl<C: RecordCodec> Feed for KineticFeed<'_, C> {
             triangles: self.engine.triangle_count() as u64,
             record_bytes_read: reads * C::BYTES as u64,
             pages_read,
+            ..Refined::default()
         }
     }
 
@@ -122,12 +153,28 @@ impl<C: RecordCodec> Feed for KineticFeed<'_, C> {
         self.engine.whole_patch()
     }
 
-    fn heights_m(&self, tile: TileId, heights_m: &mut Vec<f32>) {
+    fn heights_m(&mut self, tile: TileId, heights_m: &mut Vec<f32>) -> bool {
         tile_heights_m(&self.records, tile, heights_m);
+        true
+    }
+
+    fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
+        sound(&self.records, east_m, north_m).height_m
     }
 }
 
-/// Heights of the grid points of a tile and its border, south-west first; those beyond the data are the nearest sample's.
+/// Grid points of a tile and its border, south-west first; those beyond the data are the nearest sample.
+pub(crate) fn tile_points(samples: [u32; 2], tile: TileId) -> impl Iterator<Item = GridPoint> {
+    let points = move |axis: usize| {
+        let (first, last) = (i64::from(tile.first_sample()[axis]), i64::from(samples[axis]) - 1);
+        let at =
+            move |i: u32| first + (i64::from(i) - i64::from(TILE_BORDER)) * i64::from(tile.cell_samples());
+        (0..TILE_CELLS + 1 + 2 * TILE_BORDER).map(move |i| at(i).clamp(0, last) as u32)
+    };
+    points(1).flat_map(move |y| points(0).map(move |x| GridPoint::new(x, y)))
+}
+
+/// Heights of the points of a tile.
 pub(crate) fn tile_heights_m<C: RecordCodec>(
     records: &Records<'_, C>,
     tile: TileId,
@@ -135,17 +182,11 @@ pub(crate) fn tile_heights_m<C: RecordCodec>(
 ) {
     heights_m.clear();
     heights_m.reserve(HEIGHTS_PER_TILE);
-    let samples = records.grid().samples();
-    let points = |axis: usize| {
-        let (first, last) = (i64::from(tile.first_sample()[axis]), i64::from(samples[axis]) - 1);
-        let at =
-            move |i: u32| first + (i64::from(i) - i64::from(TILE_BORDER)) * i64::from(tile.cell_samples());
-        (0..TILE_CELLS + 1 + 2 * TILE_BORDER).map(move |i| at(i).clamp(0, last) as u32)
-    };
-    for y in points(1) {
-        heights_m.extend(points(0).map(|x| {
-            let vertex = records.vertex_at(GridPoint::new(x, y));
-            if vertex.class.is_void() { f32::NAN } else { vertex.height_m as f32 }
-        }));
-    }
+    heights_m
+        .extend(tile_points(records.grid().samples(), tile).map(|point| shown_m(&records.vertex_at(point))));
+}
+
+/// Height of a sample as tiles have it.
+pub(crate) fn shown_m(vertex: &Vertex) -> f32 {
+    if vertex.class.is_void() { f32::NAN } else { vertex.height_m as f32 }
 }

@@ -7,6 +7,7 @@ use terrasoar::mesh::{Triangle, is_drawn, with_apex_first};
 use terrasoar::refine::kinetic::{NO_LEVEL, Patch, PatchVertex};
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved, Work};
+use terrasoar::stream::sound;
 use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::record::RecordCodec;
@@ -83,7 +84,12 @@ impl<C: RecordCodec> Feed for FullMesh<'_, C> {
         self.patch.clone()
     }
 
-    fn heights_m(&self, tile: TileId, heights_m: &mut Vec<f32>) {
+    fn heights_m(&mut self, tile: TileId, heights_m: &mut Vec<f32>) -> bool {
         tile_heights_m(&self.records, tile, heights_m);
+        true
+    }
+
+    fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
+        sound(&self.records, east_m, north_m).height_m
     }
 }

@@ -8,4 +8,6 @@ pub(crate) mod full_mesh;
 pub(crate) mod overview;
 #[allow(dead_code, reason = "windows and tests use more of a scene than pictures do")]
 pub(crate) mod scene;
+#[allow(dead_code, reason = "pictures without a window are of mapped files")]
+pub(crate) mod streamed;
 pub(crate) mod studio;

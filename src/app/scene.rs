@@ -10,16 +10,22 @@
 //! Cost on the processor: the engine's update, a copy of its patch, some 2 ms a tile.
 
 use super::feed::{Feed, PictureEngine, Refined, feed, mesh_vertex};
+use super::streamed::streamed_feed;
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::Arc;
 use terrasoar::refine::Culling;
 use terrasoar::refine::kinetic::Patch;
 use terrasoar::view::View;
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{
     DrawStats, Frame, FrameView, Gpu, Look, MeshPatch, MeshVertex, RenderError, Renderer, RendererOptions,
     Target, TerrainShape, TileId, TileStats, UploadStats, wgpu,
 };
+
+/// Tiles that are asked for, for each that is given in a frame.
+const TILES_ASKED: usize = 8;
 
 /// How a scene is made.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -51,6 +57,9 @@ pub(crate) enum SceneError {
     /// The terrain's source does not lend its bytes.
     #[error("{0}: pictures need a mapped or in-memory terrain")]
     NotInAddressSpace(String),
+    /// The terrain cannot be read.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// The renderer or its device failed. [`RenderError::DeviceLost`] is over with [`Scene::recover`].
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -121,6 +130,30 @@ impl<'a> Scene<'a> {
     pub(crate) fn new(terrain: &'a Terrain, gpu: &Gpu, options: SceneOptions) -> Result<Self, SceneError> {
         let feed = feed(terrain, options.engine, options.culling)
             .ok_or_else(|| SceneError::NotInAddressSpace(terrain.path().display().to_string()))?;
+        Self::over(feed, terrain, gpu, options)
+    }
+
+    /// A scene over a terrain that need not be mapped: its pages are read into `cache_bytes` of memory by threads, and no frame waits for one. The engine
+    /// is [`PictureEngine::Kinetic`] whatever the options say.
+    ///
+    /// # Errors
+    /// [`SceneError::Layout`], and what [`Renderer::new`] says.
+    pub(crate) fn streamed(
+        terrain: &Arc<Terrain>,
+        cache_bytes: u64,
+        gpu: &Gpu,
+        options: SceneOptions,
+    ) -> Result<Self, SceneError> {
+        let feed = streamed_feed(terrain, cache_bytes, options.culling)?;
+        Self::over(feed, terrain, gpu, options)
+    }
+
+    fn over(
+        feed: Box<dyn Feed + 'a>,
+        terrain: &Terrain,
+        gpu: &Gpu,
+        options: SceneOptions,
+    ) -> Result<Self, SceneError> {
         let renderer = new_renderer(shape(terrain), gpu, options)?;
         Ok(Self {
             feed,
@@ -131,6 +164,16 @@ impl<'a> Scene<'a> {
             heights_m: Vec::new(),
             wanted: Vec::new(),
         })
+    }
+
+    /// What the mesh and its light are made from: heights of the ground, and what could not be read.
+    pub(crate) fn feed(&self) -> &(dyn Feed + 'a) {
+        &*self.feed
+    }
+
+    /// As [`Scene::feed`], to ask for more.
+    pub(crate) fn feed_mut(&mut self) -> &mut (dyn Feed + 'a) {
+        &mut *self.feed
     }
 
     /// Brings the mesh to a view. Touches no device.
@@ -213,13 +256,18 @@ impl<'a> Scene<'a> {
         };
         loop {
             self.wanted.clear();
-            self.wanted.extend_from_slice(self.renderer.want_tiles(view, most));
+            // Pages of more tiles are asked for than are given in a frame.
+            self.wanted.extend_from_slice(self.renderer.want_tiles(view, most.saturating_mul(TILES_ASKED)));
             let mut given = 0;
             for tile in &self.wanted {
-                self.feed.heights_m(*tile, &mut self.heights_m);
-                let bytes = self.renderer.give_tile(*tile, &self.heights_m)?;
-                given += u64::from(bytes > 0);
-                drawn.tiles[1] += bytes;
+                if given as usize == most {
+                    break;
+                }
+                if self.feed.heights_m(*tile, &mut self.heights_m) {
+                    let bytes = self.renderer.give_tile(*tile, &self.heights_m)?;
+                    given += u64::from(bytes > 0);
+                    drawn.tiles[1] += bytes;
+                }
             }
             drawn.tiles[0] += given;
             // Where no room is left for a wanted tile a coarser one stands in for good.

@@ -32,6 +32,9 @@ pub(super) struct Args {
     /// Multiply heights by this factor, instead of the last one
     #[arg(long, value_name = "FACTOR", value_parser = parse::exaggeration)]
     exaggeration: Option<f64>,
+    /// Memory for the terrain file's pages in MiB; what does not fit is read again when it is needed
+    #[arg(long, value_name = "MIB", default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    cache: u64,
     /// Size of the window in pixels, instead of the last one
     #[arg(long, value_name = "WxH", value_parser = parse::viewport)]
     size: Option<Viewport>,
@@ -69,5 +72,6 @@ pub(super) fn run(args: &Args) -> Result<()> {
         drop: args.drop.clone(),
         exit_after_frames: args.exit_after_frames,
         lose_device_after_frames: args.lose_device_after_frames,
+        cache_bytes: args.cache << 20,
     })
 }

@@ -12,9 +12,11 @@ mod frustum;
 mod lead;
 mod model;
 mod requests;
+mod surface;
 
 pub use fetch::{Fetch, Threads};
 pub use model::ModelDisk;
+pub use surface::{Sounding, sound};
 
 use crate::refine::kinetic::Kinetic;
 use crate::refine::{Culling, Engine, Probe, Work};
@@ -23,6 +25,7 @@ use frustum::Extension;
 use lead::Lead;
 use requests::Requests;
 use std::collections::VecDeque;
+use std::time::{Duration, Instant};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::loader::Outcome;
 use terrasoar_layout::pool::PagePool;
@@ -92,6 +95,8 @@ pub struct Streamed<C: RecordCodec, F> {
     now: u64,
     errors: VecDeque<LayoutError>,
     pages_read: Vec<u64>,
+    /// Pages wanted by others than the engine.
+    wanted: Vec<(u64, f32)>,
 }
 
 /// Remembers pages read, and hands on.
@@ -134,6 +139,7 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             now: 0,
             errors: VecDeque::new(),
             pages_read: Vec::new(),
+            wanted: Vec::new(),
         }
     }
 
@@ -150,6 +156,22 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
     /// What fetches the pages.
     pub fn fetch(&self) -> &F {
         &self.fetch
+    }
+
+    /// Asks for a page besides those that the engine wants: for what else is made of a terrain's records.
+    pub fn want(&mut self, page: u64, in_frames: f32) {
+        self.wanted.push((page, in_frames));
+    }
+
+    /// Asks for what the exact height at a place, in metres east and north, needs.
+    pub fn want_height(&mut self, east_m: f64, north_m: f64) {
+        let wanted = &mut self.wanted;
+        surface::pages_away(self.engine.store(), east_m, north_m, |page| wanted.push((page, 0.0)));
+    }
+
+    /// Whether a page could not be read when it was last tried.
+    pub fn is_in_trouble(&self, page: u64) -> bool {
+        self.requests.is_in_trouble(page)
     }
 
     /// The oldest error that nobody has heard of yet. Each page that cannot be read is told once, however often it is tried.
@@ -179,13 +201,13 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
         frame
     }
 
-    /// Updates until the mesh of `view` lacks no page that can be read, waiting for those that come. For the first frame of a flight, and for pictures that must repeat.
-    /// Returns the frames that took.
-    pub fn fill<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
-        let start = self.now;
+    /// Updates until the mesh of `view` lacks no page that can be read, waiting for those that come, `longest` at most. For the first frame of a flight: patches
+    /// of the updates on the way are lost, the whole mesh is to be asked for. Returns the number of updates.
+    pub fn fill<P: Probe>(&mut self, view: &View, longest: Duration, probe: &mut P) -> u64 {
+        let (start, begun) = (self.now, Instant::now());
         loop {
             let frame = self.update(view, probe);
-            if frame.work.late == 0 {
+            if frame.work.late == 0 || begun.elapsed() >= longest {
                 return self.now - start;
             }
             if frame.outstanding > 0 {
@@ -241,6 +263,11 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             }
             asked.extend(self.requests.ask(want.page, self.now, want.in_frames));
             frame.late_pages += u64::from(want.is_lacking && self.requests.is_newly_late(want.page));
+        }
+        for (page, in_frames) in self.wanted.drain(..) {
+            if !pool.is_resident(page) {
+                asked.extend(self.requests.ask(page, self.now, in_frames));
+            }
         }
         if self.prefetch == Prefetch::Frustum {
             let pages = self.extension.pages_away(view, pool);

@@ -82,6 +82,11 @@ impl Requests {
         trouble.failures == 1
     }
 
+    /// Whether a page failed when it was last tried.
+    pub(super) fn is_in_trouble(&self, page: u64) -> bool {
+        self.trouble.contains_key(&page)
+    }
+
     /// A page was not read, for nobody seemed to need it.
     pub(super) fn dropped(&mut self, page: u64) {
         self.pending.remove(&page);

@@ -26,6 +26,10 @@ pub(crate) struct Figures {
     pub pages: u64,
     /// Bytes of records read.
     pub record_bytes: u64,
+    /// Pages that came from storage.
+    pub pages_come: u64,
+    /// Vertices that wait for a page.
+    pub late: u64,
 }
 
 /// A figure by name, unit and value.
@@ -41,6 +45,8 @@ pub(crate) const SERIES: &[Series] = &[
     ("patch", "B", |f| f.patch_bytes as f64),
     ("record pages", "", |f| f.pages as f64),
     ("record bytes", "B", |f| f.record_bytes as f64),
+    ("pages from storage", "", |f| f.pages_come as f64),
+    ("vertices late", "", |f| f.late as f64),
 ];
 
 /// The latest frames.

@@ -53,6 +53,8 @@ pub(crate) struct Plan {
     pub exit_after_frames: Option<u64>,
     /// Frames after which the device is thrown away, to try how that goes.
     pub lose_device_after_frames: Option<u64>,
+    /// Memory for pages of the terrain, in bytes.
+    pub cache_bytes: u64,
 }
 
 /// Shows the window until it is closed.
@@ -60,7 +62,7 @@ pub(crate) struct Plan {
 /// # Errors
 /// A terrain or flight that cannot be opened, before there is a window; no display; no adapter.
 pub(crate) fn run(plan: Plan) -> Result<()> {
-    let terrain = Terrain::open(&plan.file)?;
+    let terrain = Terrain::open_unmapped(&plan.file)?;
     let flight = plan.flight.as_deref().map(Flight::read).transpose()?;
     let event_loop = winit::event_loop::EventLoop::with_user_event().build().context(
         "no window can be opened: there is no display. Run it on a desktop, or with DISPLAY or WAYLAND_DISPLAY set \

@@ -75,7 +75,8 @@ pub(super) struct Viewer {
     under: Option<Hit>,
     frame_at: Option<Instant>,
     frames: u64,
-    tiles_missing: bool,
+    /// Whether the picture will be better when what it lacks has come.
+    unsettled: bool,
     /// Whether the last frame found nothing to be drawn on.
     unshown: bool,
     hidden: bool,
@@ -102,7 +103,7 @@ impl Viewer {
     ) -> Result<Self> {
         let screen = Screen::new(Arc::clone(&window), display.clone())?;
         let overlay = Overlay::new(&window, &display, &screen);
-        let stage = Stage::new(terrain, &screen.gpu, settings.culling())?;
+        let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
         let rig = start(&stage, &screen, &window, &settings);
         let mut viewer = Self {
             terrain_name: String::new(),
@@ -126,7 +127,7 @@ impl Viewer {
             under: None,
             frame_at: None,
             frames: 0,
-            tiles_missing: true,
+            unsettled: true,
             unshown: false,
             hidden: false,
             touched: true,
@@ -213,10 +214,14 @@ impl Viewer {
         let viewport = self.viewport();
         let at = [x / f64::from(viewport.width_px), y / f64::from(viewport.height_px)];
         let camera = self.rig.camera;
-        self.stage.on_ground(|ground| {
-            let spacing_m = ground.spacing_m();
-            pick::cast(ground, spacing_m, self.settings.exaggeration, camera.eye_m, camera.ray(at, viewport))
-        })
+        let ground = self.stage.ground();
+        pick::cast(
+            &ground,
+            ground.spacing_m(),
+            self.settings.exaggeration,
+            camera.eye_m,
+            camera.ray(at, viewport),
+        )
     }
 
     /// What lies in the middle of the picture, or would.
@@ -225,7 +230,7 @@ impl Viewer {
         match self.pick(Some([0.5 * width, 0.5 * height])) {
             Some(hit) => hit.at_m,
             None => {
-                let [east_m, north_m] = self.stage.on_ground(|ground| ground.extent_m());
+                let [east_m, north_m] = self.stage.ground().extent_m();
                 self.rig.camera.eye_m + self.rig.camera.axes()[2] * 0.25 * east_m.max(north_m)
             }
         }
@@ -260,6 +265,9 @@ impl Viewer {
         }
         let pointer = self.hand.pointer.filter(|_| !self.overlay.has_pointer());
         self.under = self.pick(pointer);
+        if let Some(hit) = &self.under {
+            self.stage.scene.feed_mut().want_ground(hit.at_m.x, hit.at_m.y);
+        }
         let mut layer = self.lay_out();
         let again = layer.again;
         self.show(&mut layer, passed, now);
@@ -276,7 +284,7 @@ impl Viewer {
         if self.ending {
             return Next::End;
         }
-        if moving || self.tiles_missing || self.touched || counting || again.is_zero() {
+        if moving || self.unsettled || self.touched || counting || again.is_zero() {
             self.frame_at = Some(now);
             return Next::AtOnce;
         }
@@ -284,7 +292,8 @@ impl Viewer {
         let news = self.notes.iter().filter_map(|note| note.until).min();
         let waits = [
             Some(again),
-            (self.job.is_some() || self.unshown).then_some(LOOKS),
+            // What cannot be read now is tried again.
+            (self.job.is_some() || self.unshown || self.stage.scene.feed().lacks_pages()).then_some(LOOKS),
             news.map(|until| until.saturating_duration_since(now)),
         ];
         Next::In(waits.into_iter().flatten().min().unwrap_or(again))
@@ -302,7 +311,7 @@ impl Viewer {
         self.tell_state("playing", self.player.as_ref().is_some_and(Player::is_playing).to_string());
         self.tell_state("recording", self.recorder.is_some().to_string());
         self.tell_state("full-screen", self.window.fullscreen().is_some().to_string());
-        if !moving && !self.tiles_missing {
+        if !moving && !self.unsettled {
             let Camera { eye_m, yaw_deg, pitch_deg, .. } = self.rig.camera;
             let place = format!("{:.2} {:.2} {:.2} {yaw_deg:.3} {pitch_deg:.3}", eye_m.x, eye_m.y, eye_m.z);
             self.tell_state("at-rest", place);
@@ -326,7 +335,7 @@ impl Viewer {
         }
         let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
         let span_s = if rig.is_gliding() { played_s } else { span_s };
-        self.stage.on_ground(|ground| rig.advance(span_s, &controls, ground, exaggeration));
+        rig.advance(span_s, &controls, &self.stage.ground(), exaggeration);
     }
 
     /// Lays the panels out and grants their wishes.
@@ -334,7 +343,7 @@ impl Viewer {
         let before = self.settings.clone();
         let (mut settings, mut wishes) = (self.settings.clone(), Vec::new());
         let adapter = self.screen.gpu.capabilities.adapter.clone();
-        let extent_m = self.stage.on_ground(|ground| ground.extent_m());
+        let extent_m = self.stage.ground().extent_m();
         let job = self.job.as_ref().map(|job| {
             let (stage, part) = job.progress();
             (job.input.file_name().unwrap_or_default().to_string_lossy().into_owned(), stage, part)
@@ -371,7 +380,7 @@ impl Viewer {
         let now = self.settings.exaggeration;
         if now != before.exaggeration {
             let rig = &mut self.rig;
-            self.stage.on_ground(|ground| rig.exaggerate(ground, before.exaggeration, now));
+            rig.exaggerate(&self.stage.ground(), before.exaggeration, now);
         }
         if self.settings.culling != before.culling {
             if let Err(error) = self.stage.set_culling(self.settings.culling(), &self.screen.gpu) {
@@ -407,7 +416,7 @@ impl Viewer {
 /// A rig that sees the whole terrain.
 fn start(stage: &Stage, screen: &Screen, window: &Window, settings: &Settings) -> Rig {
     let camera = overview_beside_panel(stage, screen, window, settings);
-    stage.on_ground(|ground| Rig::new(camera, ground))
+    Rig::new(camera, &stage.ground())
 }
 
 /// The overview in what the panel leaves of the window.
@@ -419,7 +428,7 @@ fn overview_beside_panel(stage: &Stage, screen: &Screen, window: &Window, settin
     let beside = Viewport { width_px: (0.94 * (f64::from(width_px) - panel_px)) as u32, height_px };
     let mut view = overview(stage.terrain(), settings.exaggeration, FOV_DEG, beside);
     // The eye steps aside by half the panel, as wide as that is in the middle of the terrain.
-    let [east_m, north_m] = stage.on_ground(|ground| ground.extent_m());
+    let [east_m, north_m] = stage.ground().extent_m();
     let away_m = view.eye_m.distance(glam::DVec3::new(0.5 * east_m, 0.5 * north_m, 0.0));
     let m_a_px = 2.0 * away_m * (0.5 * view.vertical_fov_rad).tan() / f64::from(height_px);
     view.eye_m -= view.axes()[0] * (0.5 * panel_px * m_a_px);

@@ -20,7 +20,7 @@ impl Viewer {
             Action::Follow => {
                 let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
                 let before = rig.follow_m;
-                self.stage.on_ground(|ground| rig.toggle_follow(ground, exaggeration));
+                rig.toggle_follow(&self.stage.ground(), exaggeration);
                 if before.is_none() && self.rig.follow_m.is_none() {
                     self.news("There is no ground below to keep a height above.");
                 }
@@ -120,7 +120,8 @@ impl Viewer {
     }
 
     pub(super) fn open_terrain(&mut self, path: &Path) {
-        match Stage::open(path, &self.screen.gpu, self.settings.culling()) {
+        let (culling, cache_bytes) = (self.settings.culling(), self.plan.cache_bytes);
+        match Stage::open(path, &self.screen.gpu, culling, cache_bytes) {
             Ok(stage) => {
                 self.end_recording();
                 self.stage = stage;
@@ -158,7 +159,7 @@ impl Viewer {
                 "{text:?} is no place: give metres east and north of the south-west corner, such as 1500, 820.5"
             ));
         };
-        let [wide, high] = self.stage.on_ground(|ground| ground.extent_m());
+        let [wide, high] = self.stage.ground().extent_m();
         if !((0.0..=wide).contains(&east) && (0.0..=high).contains(&north)) {
             return self.trouble(format!(
                 "{east}, {north} lies outside the terrain, which extends from 0, 0 to {wide:.0}, {high:.0} metres"
@@ -166,7 +167,7 @@ impl Viewer {
         }
         let exaggeration = self.settings.exaggeration;
         let at = glam::DVec3::new(east, north, 0.0);
-        let below_m = self.stage.on_ground(|ground| ground_below_m(ground, at, exaggeration));
+        let below_m = ground_below_m(&self.stage.ground(), at, exaggeration);
         self.pause();
         self.rig.go_to(at.with_z(below_m.unwrap_or_default()), 0.04 * wide.max(high));
     }

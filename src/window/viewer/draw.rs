@@ -35,7 +35,7 @@ impl Viewer {
         let view = self.view();
         let refined = match self.frozen {
             Some(_) => None,
-            None => Some(self.stage.with(|live| live.scene.update(&view))),
+            None => Some(self.stage.scene.update(&view)),
         };
         let update = before.elapsed();
         // A device that went while nothing was drawn says so when it is asked.
@@ -56,7 +56,11 @@ impl Viewer {
         self.window.pre_present_notify();
         self.screen.gpu.queue.present(picture);
         self.screen.gpu.watch.check()?;
-        self.tiles_missing = drawn.tiles_missing > 0 && drawn.tiles[0] > 0;
+        let waiting = self.stage.scene.feed().is_waiting();
+        self.unsettled = waiting || (drawn.tiles_missing > 0 && drawn.tiles[0] > 0);
+        while let Some(error) = self.stage.scene.feed_mut().take_error() {
+            self.trouble(format!("{error}; the ground stays coarse there"));
+        }
         self.count(refined, drawn, update, passed.unwrap_or_else(|| begun.elapsed()));
         Ok(())
     }
@@ -64,7 +68,7 @@ impl Viewer {
     fn draw(&mut self, encoder: &mut wgpu::CommandEncoder, target: Target<'_>, view: &View) -> Result<Drawn> {
         let look = self.settings.look();
         let frozen = self.frozen;
-        Ok(self.stage.with(|live| live.scene.draw(encoder, target, view, &look, frozen.as_ref()))?)
+        Ok(self.stage.scene.draw(encoder, target, view, &look, frozen.as_ref())?)
     }
 
     fn count(&mut self, refined: Option<Refined>, drawn: Drawn, update: Duration, frame: Duration) {
@@ -78,6 +82,8 @@ impl Viewer {
             patch_bytes: drawn.upload.bytes,
             pages: refined.pages_read,
             record_bytes: refined.record_bytes_read,
+            pages_come: refined.pages_come,
+            late: refined.work.late,
         });
     }
 
@@ -96,8 +102,7 @@ impl Viewer {
     fn recover(&mut self, loss: &anyhow::Error) {
         let recovered = self.screen.renew().and_then(|()| {
             self.overlay = Overlay::new(&self.window, &self.display, &self.screen);
-            let gpu = &self.screen.gpu;
-            Ok(self.stage.with(|live| live.scene.recover(gpu))?)
+            Ok(self.stage.scene.recover(&self.screen.gpu)?)
         });
         match recovered {
             Ok(()) => {
