@@ -91,7 +91,7 @@ impl Settings {
         self.suited_tolerance_px = SOFTWARE_TOLERANCE_PX;
         self.tolerance_px.is_none().then(|| {
             format!(
-                "The processor draws, for there is no graphics hardware ({}): the tolerance is {SOFTWARE_TOLERANCE_PX} px instead of 1 until you set it.",
+                "Drawn in software ({}), so the tolerance is {SOFTWARE_TOLERANCE_PX} px instead of 1 until you set it.",
                 adapter.adapter
             )
         })

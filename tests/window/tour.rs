@@ -97,7 +97,7 @@ pub fn tolerance_suits_the_adapter(display: &Display) -> Outcome {
         let (code, words, heard) = display.open(&all)?.end()?;
         ensure(code == Some(0), || format!("{code:?}: {words}"))?;
         let has = |beginning: &str| heard.iter().any(|line| line.starts_with(beginning));
-        Ok([has("tolerance 4 px"), has("tolerance 1 px"), has("news The processor draws")])
+        Ok([has("tolerance 4 px"), has("tolerance 1 px"), has("news Drawn in software")])
     };
     // The tour may not have come before.
     let _ = std::fs::remove_file(&settings);
