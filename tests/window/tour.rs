@@ -117,7 +117,7 @@ pub fn tolerance_suits_the_adapter(display: &Display) -> Outcome {
 pub fn window_within_the_screen(display: &Display) -> Outcome {
     let settings = display.settings();
     std::fs::create_dir_all(settings.parent().unwrap()).map_err(|e| e.to_string())?;
-    for (scale, size) in [("1", "size 1177x736"), ("2", "size 1177x736")] {
+    for (scale, size) in [("1", "size 1177x736"), ("2", "size 1176x736")] {
         std::fs::write(&settings, "window = [2000, 1500]").map_err(|e| e.to_string())?;
         let mut window = display.open_scaled(&["--exit-after-frames", "2"], scale)?;
         window.hear(size)?;
