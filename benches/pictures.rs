@@ -1,8 +1,9 @@
 //! What pictures cost: the way from an engine's changes to pixels.
 //!
 //! Questions: how many bytes go to the device a frame, against the engine's patch; how much processor time the renderer takes a frame beside
-//! the draw itself (sending the patch, tiles, recording); how long whole frames take; and how much a picture changes at most from one frame to the next of
-//! a slow flight, with vertices that move into place and with vertices that pop. Data: a terrain file and a flight over it. Command:
+//! the draw itself (sending the patch, tiles, recording); how long whole frames take; and how much the change of detail is seen in a slow flight, with
+//! vertices that move into place and with vertices that pop. For that each step is taken apart: what the eye's motion changes over a frozen mesh, and what
+//! the mesh of the new frame changes in the same view. Data: a terrain file and a flight over it. Command:
 //!
 //!     cargo bench --bench pictures -- TERRAIN.iqt FLIGHT [--frames 200] [--size 1280x720]
 //!
@@ -25,6 +26,10 @@ type Failure = Box<dyn std::error::Error>;
 const TILES_A_FRAME: usize = 4;
 /// Share of a frame's way that a slow flight makes.
 const SLOW: f64 = 0.1;
+/// Steps of the slow flight.
+const STEPS: usize = 200;
+/// Side of a block of pixels whose mean is compared.
+const BLOCK: usize = 4;
 
 struct Plan {
     terrain: PathBuf,
@@ -99,7 +104,7 @@ fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -
         "patch of the engine, KB",
         "sent for it, KB",
         "sent in all, KB",
-        "triangles drawn, thousands",
+        "triangles of the mesh, thousands",
         "engine's update, ms",
         "renderer without tiles, CPU, ms",
         "tiles, CPU, ms",
@@ -129,7 +134,7 @@ fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -
             kb(refined.work.patch_bytes),
             kb(drawn.upload.bytes),
             kb(drawn.upload.bytes + drawn.draw.bytes + tiles.tiles[1]),
-            drawn.draw.triangles as f64 / 1e3,
+            refined.triangles as f64 / 1e3,
             ms(start, updated),
             ms(served, recorded),
             ms(updated, served),
@@ -145,10 +150,42 @@ fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -
     Ok(())
 }
 
-/// The largest change of a channel between one picture and the next, of a flight a tenth as fast as recorded.
+/// Means of a picture's blocks of 4 x 4 pixels, red, green and blue: an edge that steps from one pixel to the next is no large change in them, a triangle of
+/// another shade is.
+fn blocks(rgba: &[u8], width: usize) -> Vec<f32> {
+    let (columns, lines) = (width / BLOCK, rgba.len() / (4 * width) / BLOCK);
+    let mut means = vec![0.0; 3 * columns * lines];
+    for (i, pixel) in rgba.as_chunks::<4>().0.iter().enumerate() {
+        let (x, y) = (i % width / BLOCK, i / width / BLOCK);
+        if x < columns && y < lines {
+            let mean = &mut means[3 * (y * columns + x)..][..3];
+            mean.iter_mut().zip(pixel).for_each(|(m, c)| *m += f32::from(*c) / (BLOCK * BLOCK) as f32);
+        }
+    }
+    means
+}
+
+/// How two pictures differ: the largest change of a block, and how many blocks change by more than 2 of 255.
+#[derive(Debug, Clone, Copy, Default)]
+struct Change {
+    most: f32,
+    seen: u64,
+}
+
+impl Change {
+    fn add(&mut self, before: &[f32], after: &[f32]) {
+        for (a, b) in before.chunks_exact(3).zip(after.chunks_exact(3)) {
+            let change = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            self.most = self.most.max(change);
+            self.seen += u64::from(change > 2.0);
+        }
+    }
+}
+
+/// A flight a tenth as fast as recorded, each step taken apart: first the eye moves over the frozen mesh, then the mesh follows while the eye rests.
 fn pops(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -> Result<(), Failure> {
     let small = Viewport { width_px: size.width_px / 2, height_px: size.height_px / 2 };
-    let views: Vec<View> = (0..flight.len().min(40))
+    let views: Vec<View> = (0..=STEPS)
         .filter_map(|i| {
             let at = i as f64 * SLOW;
             let (a, b) = (flight.get(at as usize)?, flight.get(at as usize + 1)?);
@@ -162,29 +199,43 @@ fn pops(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) ->
         })
         .collect();
     println!(
-        "\n| slow flight at 4 px, of 255 | largest change of a pixel | pixels that change by more than 16, a frame |\n|---|---|---|"
+        "\n| slow flight at 4 px, blocks of {BLOCK} x {BLOCK} pixels, of 255 | largest change | blocks that change by more than 2, a frame |\n|---|---|---|"
     );
+    let mut changes = 0.0;
     for morph in [true, false] {
         // The haze hides little: what is measured is the ground.
         let look = Look { morph, tile_normals: false, ..Look::named("hillshade").unwrap_or_default() };
         let mut scene = Scene::new(terrain, gpu, SceneOptions::default())?;
         let offscreen = Offscreen::new(&gpu.device, [small.width_px, small.height_px])?;
-        let (mut before, mut most, mut large) = (Vec::new(), 0, 0_u64);
-        for view in &views {
-            scene.update(view);
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            scene.draw(&mut encoder, offscreen.target(), view, &look, None)?;
-            gpu.queue.submit([encoder.finish()]);
-            let picture = offscreen.read_rgba(&gpu.device, &gpu.queue)?;
-            for (a, b) in picture.as_chunks::<4>().0.iter().zip(before.as_chunks::<4>().0) {
-                let change = a.iter().zip(b).map(|(a, b): (&u8, &u8)| a.abs_diff(*b)).max().unwrap_or(0);
-                most = most.max(change);
-                large += u64::from(change > 16);
-            }
-            before = picture;
+        let picture =
+            |scene: &mut Scene<'_>, view: &View, refined_for: Option<&View>| -> Result<Vec<f32>, Failure> {
+                let mut encoder = gpu.device.create_command_encoder(&Default::default());
+                scene.draw(&mut encoder, offscreen.target(), view, &look, refined_for)?;
+                gpu.queue.submit([encoder.finish()]);
+                let rgba = offscreen.read_rgba(&gpu.device, &gpu.queue)?;
+                Ok(blocks(&rgba, small.width_px as usize))
+            };
+        let ([mut motion, mut detail], mut work) = ([Change::default(); 2], 0);
+        let Some(first) = views.first() else { return Ok(()) };
+        scene.update(first);
+        let mut before = picture(&mut scene, first, None)?;
+        for [from, to] in views.array_windows() {
+            let frozen = picture(&mut scene, to, Some(from))?;
+            let did = scene.update(to).work;
+            work += did.splits + did.merges;
+            let refined = picture(&mut scene, to, None)?;
+            motion.add(&before, &frozen);
+            detail.add(&frozen, &refined);
+            before = refined;
         }
         let word = if morph { "moving" } else { "popping" };
-        println!("| {word} | {most} | {:.1} |", large as f64 / (views.len().max(2) - 1) as f64);
+        let steps = (views.len().max(2) - 1) as f64;
+        let rows = [("the eye's motion alone", motion), ("change of detail alone", detail)];
+        for (what, Change { most, seen }) in rows {
+            println!("| vertices {word}: {what} | {most:.1} | {:.2} |", seen as f64 / steps);
+        }
+        changes = work as f64 / steps;
     }
+    println!("\nVertices split and merged a frame: {changes:.1}.");
     Ok(())
 }

@@ -60,11 +60,14 @@ impl Session {
             settings.set_style(style);
         }
         settings.ramp = plan.ramp.clone().or(settings.ramp);
-        settings.tolerance_px = plan.tolerance_px.unwrap_or(settings.tolerance_px);
+        settings.tolerance_px = plan.tolerance_px.or(settings.tolerance_px);
         settings.exaggeration = plan.exaggeration.unwrap_or(settings.exaggeration);
         let size: Size = match plan.size_px {
             Some([width, height]) => PhysicalSize::new(width, height).into(),
-            None => LogicalSize::new(settings.window[0], settings.window[1]).into(),
+            None => {
+                let [width, height] = settings.window_on(screen_points(event_loop));
+                LogicalSize::new(width, height).into()
+            }
         };
         let attributes = Window::default_attributes()
             .with_title("Terrasoar")
@@ -92,6 +95,13 @@ impl Session {
         }
         event_loop.exit();
     }
+}
+
+/// Size of the screen in points, where it can be known.
+fn screen_points(event_loop: &ActiveEventLoop) -> Option<[f64; 2]> {
+    let monitor = event_loop.primary_monitor().or_else(|| event_loop.available_monitors().next())?;
+    let size = monitor.size().to_logical::<f64>(monitor.scale_factor());
+    (size.width > 0.0 && size.height > 0.0).then_some([size.width, size.height])
 }
 
 impl ApplicationHandler<Wake> for Session {

@@ -14,7 +14,7 @@ pub(crate) struct Figures {
     pub frame_ms: f64,
     /// Milliseconds of the mesh update.
     pub update_ms: f64,
-    /// Triangles drawn.
+    /// Triangles of the mesh.
     pub triangles: u64,
     /// Vertex tests.
     pub tests: u64,

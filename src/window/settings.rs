@@ -10,14 +10,17 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use terrasoar::refine::Culling;
 use terrasoar_render::ramps::Ramp;
-use terrasoar_render::{Contours, Haze, LOOKS, Look};
+use terrasoar_render::{Capabilities, Contours, Haze, LOOKS, Look};
 
 /// Everything that is remembered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Settings {
-    /// Largest error on the screen in pixels, 0.1 to 50.
-    pub tolerance_px: f64,
+    /// Largest error on the screen in pixels, 0.1 to 50; without it what suits the adapter.
+    pub tolerance_px: Option<f64>,
+    /// Tolerance where none is set.
+    #[serde(skip)]
+    pub suited_tolerance_px: f64,
     /// Factor on heights, 0.1 to 20.
     pub exaggeration: f64,
     /// Direction of the sun, clockwise from north.
@@ -53,7 +56,8 @@ pub(crate) struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            tolerance_px: 1.0,
+            tolerance_px: None,
+            suited_tolerance_px: 1.0,
             exaggeration: 1.0,
             sun_azimuth_deg: 312.0,
             sun_elevation_deg: 38.0,
@@ -74,6 +78,31 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Largest error on the screen in pixels.
+    pub(crate) fn tolerance_px(&self) -> f64 {
+        self.tolerance_px.unwrap_or(self.suited_tolerance_px)
+    }
+
+    /// Suits what is not set to an adapter; says what that means where it is worth saying.
+    pub(crate) fn suit(&mut self, adapter: &Capabilities) -> Option<String> {
+        if !adapter.software {
+            return None;
+        }
+        self.suited_tolerance_px = SOFTWARE_TOLERANCE_PX;
+        self.tolerance_px.is_none().then(|| {
+            format!(
+                "Drawn in software ({}), so the tolerance is {SOFTWARE_TOLERANCE_PX} px instead of 1 until you set it.",
+                adapter.adapter
+            )
+        })
+    }
+
+    /// Size of the window in points, no larger than the screen with room for bars around it.
+    pub(crate) fn window_on(&self, screen: Option<[f64; 2]>) -> [f64; 2] {
+        let most = screen.unwrap_or([f64::INFINITY; 2]);
+        [0, 1].map(|i| f64::from(self.window[i]).min((SHARE_OF_SCREEN * most[i]).floor()))
+    }
+
     /// Takes a style with everything that belongs to it.
     pub(crate) fn set_style(&mut self, name: &str) {
         let Some(look) = Look::named(name) else { return };
@@ -153,7 +182,8 @@ impl Settings {
         };
         let keep_f32 =
             |value: f32, range: [f64; 2], own: f32| keep(f64::from(value), range, f64::from(own)) as f32;
-        self.tolerance_px = keep(self.tolerance_px, TOLERANCE_PX, own.tolerance_px);
+        let [least, most] = TOLERANCE_PX;
+        self.tolerance_px = self.tolerance_px.filter(|px| px.is_finite()).map(|px| px.clamp(least, most));
         self.exaggeration = keep(self.exaggeration, EXAGGERATION, own.exaggeration);
         self.sun_azimuth_deg = keep_f32(self.sun_azimuth_deg, [0.0, 360.0], own.sun_azimuth_deg);
         self.sun_elevation_deg = keep_f32(self.sun_elevation_deg, [0.0, 90.0], own.sun_elevation_deg);
@@ -171,6 +201,10 @@ impl Settings {
 
 /// Least and largest tolerance of the panel.
 pub(crate) const TOLERANCE_PX: [f64; 2] = [0.1, 50.0];
+/// Tolerance on a driver in software: a frame takes two thirds of what it takes at 1 px there, and hardly less at 8, where pixels cost more than triangles.
+const SOFTWARE_TOLERANCE_PX: f64 = 4.0;
+/// Most of the screen's width and height that a window begins with.
+const SHARE_OF_SCREEN: f64 = 0.92;
 /// Least and largest exaggeration of the panel.
 pub(crate) const EXAGGERATION: [f64; 2] = [0.1, 20.0];
 /// Least and largest distance of contour lines.
@@ -225,9 +259,45 @@ mod tests {
         .unwrap();
         let (settings, word) = Settings::load(&path);
         assert_eq!(word, None);
-        assert_eq!(settings.tolerance_px, 50.0);
+        assert_eq!(settings.tolerance_px, Some(50.0));
         assert_eq!((settings.exaggeration, settings.style.as_str()), (1.0, "relief"));
         assert_eq!((settings.ramp, settings.window), (None, [320, 240]));
+    }
+
+    #[test]
+    fn a_tolerance_that_is_set_suits_every_adapter() {
+        let adapter = |software| Capabilities {
+            adapter: "pipe".into(),
+            backend: "Vulkan".into(),
+            software,
+            texture_compression_bc: false,
+            timestamps: false,
+            multi_draw: false,
+            depth_copies: true,
+            max_binding_bytes: 1 << 27,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("view.toml");
+        let mut settings = Settings::default();
+        assert_eq!((settings.suit(&adapter(false)), settings.tolerance_px()), (None, 1.0));
+        assert!(settings.suit(&adapter(true)).unwrap().contains("pipe"));
+        assert_eq!(settings.tolerance_px(), 4.0);
+        settings.save(&path).unwrap();
+        assert_eq!(
+            Settings::load(&path).0.tolerance_px(),
+            1.0,
+            "what suits one adapter is not kept for others"
+        );
+        settings.tolerance_px = Some(1.0);
+        assert_eq!((settings.suit(&adapter(true)), settings.tolerance_px()), (None, 1.0));
+    }
+
+    #[test]
+    fn a_window_begins_within_the_screen() {
+        let settings = Settings { window: [1280, 800], ..Default::default() };
+        assert_eq!(settings.window_on(None), [1280.0, 800.0]);
+        assert_eq!(settings.window_on(Some([1280.0, 720.0])), [1177.0, 662.0]);
+        assert_eq!(settings.window_on(Some([3840.0, 2160.0])), [1280.0, 800.0]);
     }
 
     #[test]

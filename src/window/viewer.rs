@@ -6,29 +6,28 @@
 mod act;
 mod draw;
 mod hear;
+mod lay_out;
+mod sight;
+mod tell;
 
-use super::camera::{Camera, Rig, ground_below_m};
+use super::Plan;
+use super::camera::Rig;
 use super::events::Wake;
 use super::flights::{Player, Recorder};
 use super::hand::Hand;
-use super::history::{Figures, History};
-use super::job::{self, Job};
+use super::history::History;
+use super::job::Job;
 use super::overlay::Overlay;
-use super::panel::{self, Facts, Memory, Note};
-use super::pick::{self, Hit};
+use super::panel::{Memory, Note};
+use super::pick::Hit;
 use super::screen::Screen;
 use super::settings::Settings;
 use super::stage::Stage;
-use super::{Plan, keep};
-use crate::app::overview::{FOV_DEG, overview};
 use anyhow::Result;
-use std::io::Write;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::flight::Flight;
-use terrasoar::flight::generate::Ground;
-use terrasoar::view::{View, Viewport};
+use terrasoar::view::View;
 use terrasoar_layout::terrain::Terrain;
 use winit::event_loop::{EventLoopProxy, OwnedDisplayHandle};
 use winit::window::Window;
@@ -97,14 +96,15 @@ impl Viewer {
         display: OwnedDisplayHandle,
         proxy: EventLoopProxy<Wake>,
         plan: Plan,
-        settings: Settings,
+        mut settings: Settings,
         terrain: Terrain,
         flight: Option<Flight>,
     ) -> Result<Self> {
         let screen = Screen::new(Arc::clone(&window), display.clone())?;
+        let suited = settings.suit(&screen.gpu.capabilities);
         let overlay = Overlay::new(&window, &display, &screen);
         let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
-        let rig = start(&stage, &screen, &window, &settings);
+        let rig = sight::start(&stage, &screen, &window, &settings);
         let mut viewer = Self {
             terrain_name: String::new(),
             window,
@@ -136,6 +136,9 @@ impl Viewer {
             said: Vec::new(),
         };
         viewer.name_terrain();
+        if let Some(words) = suited {
+            viewer.news(words);
+        }
         if let Some(flight) = flight {
             viewer.take_flight(flight);
         }
@@ -160,85 +163,6 @@ impl Viewer {
             self.settings.window = [size.width.round() as u32, size.height.round() as u32];
         }
         &self.settings
-    }
-
-    /// Says in the window what went wrong.
-    pub(super) fn trouble(&mut self, text: impl Into<String>) {
-        let text = text.into();
-        self.tell(&format!("trouble {text}"));
-        if self.notes.last().is_none_or(|note| note.text != text) {
-            self.notes.push(Note::trouble(text));
-        }
-        self.touched = true;
-    }
-
-    fn news(&mut self, text: impl Into<String>) {
-        self.notes.push(Note::news(text));
-        self.touched = true;
-    }
-
-    /// Tells who drives the window what happened. If nobody listens there is nobody to tell.
-    fn tell(&self, line: &str) {
-        if self.plan.narrate {
-            let mut out = std::io::stdout().lock();
-            let _ = writeln!(out, "{line}").and_then(|()| out.flush());
-        }
-    }
-
-    /// Tells a state when it is another than before.
-    fn tell_state(&mut self, name: &'static str, value: String) {
-        if !self.plan.narrate {
-            return;
-        }
-        match self.said.iter_mut().find(|(said, _)| *said == name) {
-            Some((_, before)) if *before == value => return,
-            Some((_, before)) => before.clone_from(&value),
-            None => self.said.push((name, value.clone())),
-        }
-        self.tell(&format!("{name} {value}"));
-    }
-
-    fn viewport(&self) -> Viewport {
-        let [width_px, height_px] = self.screen.size_px();
-        Viewport { width_px, height_px }
-    }
-
-    fn view(&self) -> View {
-        let Settings { tolerance_px, exaggeration, .. } = self.settings;
-        self.rig.camera.view(self.viewport(), tolerance_px, exaggeration)
-    }
-
-    /// The ground at a place of the window.
-    fn pick(&self, pointer: Option<[f64; 2]>) -> Option<Hit> {
-        let [x, y] = pointer?;
-        let viewport = self.viewport();
-        let at = [x / f64::from(viewport.width_px), y / f64::from(viewport.height_px)];
-        let camera = self.rig.camera;
-        let ground = self.stage.ground();
-        pick::cast(
-            &ground,
-            ground.spacing_m(),
-            self.settings.exaggeration,
-            camera.eye_m,
-            camera.ray(at, viewport),
-        )
-    }
-
-    /// What lies in the middle of the picture, or would.
-    fn ahead_m(&self) -> glam::DVec3 {
-        let [width, height] = self.screen.size_px().map(f64::from);
-        match self.pick(Some([0.5 * width, 0.5 * height])) {
-            Some(hit) => hit.at_m,
-            None => {
-                let [east_m, north_m] = self.stage.ground().extent_m();
-                self.rig.camera.eye_m + self.rig.camera.axes()[2] * 0.25 * east_m.max(north_m)
-            }
-        }
-    }
-
-    /// The whole terrain, beside the panel.
-    fn overview(&self) -> Camera {
-        overview_beside_panel(&self.stage, &self.screen, &self.window, &self.settings)
     }
 
     fn pause(&mut self) {
@@ -299,27 +223,6 @@ impl Viewer {
         Next::In(waits.into_iter().flatten().min().unwrap_or(again))
     }
 
-    fn tell_motion(&mut self, moving: bool) {
-        let [width, height] = self.screen.size_px();
-        let flying = self.rig.is_moving() || self.hand.is_dragging();
-        self.tell_state("moving", flying.to_string());
-        self.tell_state("size", format!("{width}x{height}"));
-        self.tell_state("panel", self.settings.panel.to_string());
-        self.tell_state("help", self.memory.help.to_string());
-        self.tell_state("frozen", self.frozen.is_some().to_string());
-        self.tell_state("style", self.settings.style.clone());
-        self.tell_state("playing", self.player.as_ref().is_some_and(Player::is_playing).to_string());
-        self.tell_state("recording", self.recorder.is_some().to_string());
-        self.tell_state("full-screen", self.window.fullscreen().is_some().to_string());
-        if !moving && !self.unsettled {
-            let Camera { eye_m, yaw_deg, pitch_deg, .. } = self.rig.camera;
-            let place = format!("{:.2} {:.2} {:.2} {yaw_deg:.3} {pitch_deg:.3}", eye_m.x, eye_m.y, eye_m.z);
-            self.tell_state("at-rest", place);
-        } else {
-            self.said.retain(|(name, _)| *name != "at-rest");
-        }
-    }
-
     /// Moves the eye: by the flight that is played, or by hand.
     fn fly(&mut self, [span_s, played_s]: [f64; 2]) {
         let controls = self.hand.controls();
@@ -336,59 +239,6 @@ impl Viewer {
         let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
         let span_s = if rig.is_gliding() { played_s } else { span_s };
         rig.advance(span_s, &controls, &self.stage.ground(), exaggeration);
-    }
-
-    /// Lays the panels out and grants their wishes.
-    fn lay_out(&mut self) -> super::overlay::Layer {
-        let before = self.settings.clone();
-        let (mut settings, mut wishes) = (self.settings.clone(), Vec::new());
-        let adapter = self.screen.gpu.capabilities.adapter.clone();
-        let extent_m = self.stage.ground().extent_m();
-        let job = self.job.as_ref().map(|job| {
-            let (stage, part) = job.progress();
-            (job.input.file_name().unwrap_or_default().to_string_lossy().into_owned(), stage, part)
-        });
-        let facts = Facts {
-            terrain: &self.terrain_name,
-            extent_m,
-            adapter: &adapter,
-            under: self.under,
-            eye_m: self.rig.camera.eye_m.to_array(),
-            speed_m_s: self.rig.speed_m_s,
-            follow_m: self.rig.follow_m,
-            circling: self.rig.circling.is_some(),
-            frozen: self.frozen.is_some(),
-            recorder: self.recorder.as_ref(),
-            player: self.player.as_ref(),
-            history: &self.history,
-            job,
-            notes: &self.notes,
-        };
-        let memory = &mut self.memory;
-        let layer = self.overlay.lay_out(&self.window, |ui| {
-            wishes.extend(panel::show(ui, &facts, &mut settings, memory));
-        });
-        self.settings = settings;
-        wishes.into_iter().for_each(|wish| self.grant(wish));
-        self.touched |= self.settings != before;
-        self.follow_settings(&before);
-        layer
-    }
-
-    /// What other settings mean beyond the picture.
-    fn follow_settings(&mut self, before: &Settings) {
-        let now = self.settings.exaggeration;
-        if now != before.exaggeration {
-            let rig = &mut self.rig;
-            rig.exaggerate(&self.stage.ground(), before.exaggeration, now);
-        }
-        if self.settings.culling != before.culling {
-            if let Err(error) = self.stage.set_culling(self.settings.culling(), &self.screen.gpu) {
-                self.settings.culling.clone_from(&before.culling);
-                self.trouble(format!("{error:#}"));
-            }
-            self.frozen = None;
-        }
     }
 
     fn look_after_job(&mut self) {
@@ -411,26 +261,4 @@ impl Viewer {
         self.terrain_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         self.window.set_title(&format!("{} - Terrasoar", self.terrain_name));
     }
-}
-
-/// A rig that sees the whole terrain.
-fn start(stage: &Stage, screen: &Screen, window: &Window, settings: &Settings) -> Rig {
-    let camera = overview_beside_panel(stage, screen, window, settings);
-    Rig::new(camera, &stage.ground())
-}
-
-/// The overview in what the panel leaves of the window.
-fn overview_beside_panel(stage: &Stage, screen: &Screen, window: &Window, settings: &Settings) -> Camera {
-    let [width_px, height_px] = screen.size_px();
-    let panel_px = if settings.panel { panel::WIDTH * window.scale_factor() } else { 0.0 };
-    let panel_px = panel_px.min(0.5 * f64::from(width_px));
-    // Perspective makes the near side wider when the eye steps aside.
-    let beside = Viewport { width_px: (0.94 * (f64::from(width_px) - panel_px)) as u32, height_px };
-    let mut view = overview(stage.terrain(), settings.exaggeration, FOV_DEG, beside);
-    // The eye steps aside by half the panel, as wide as that is in the middle of the terrain.
-    let [east_m, north_m] = stage.ground().extent_m();
-    let away_m = view.eye_m.distance(glam::DVec3::new(0.5 * east_m, 0.5 * north_m, 0.0));
-    let m_a_px = 2.0 * away_m * (0.5 * view.vertical_fov_rad).tan() / f64::from(height_px);
-    view.eye_m -= view.axes()[0] * (0.5 * panel_px * m_a_px);
-    Camera::from(&view)
 }

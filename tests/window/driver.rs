@@ -16,6 +16,8 @@ const PATIENCE: Duration = Duration::from_secs(30);
 pub struct Display {
     server: Mutex<Child>,
     name: String,
+    /// Whether the processor draws.
+    pub software: bool,
     pub folder: tempfile::TempDir,
 }
 
@@ -42,7 +44,7 @@ impl Display {
         let name = format!(":{}", number.trim());
         let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
         make_terrain(&folder.path().join("puget.iqt"))?;
-        Ok(Self { server: Mutex::new(server), name, folder })
+        Ok(Self { server: Mutex::new(server), name, software: gpu.capabilities.software, folder })
     }
 
     pub fn stop(&self) {
@@ -71,9 +73,15 @@ impl Display {
 
     /// Opens a window and waits for its first pictures.
     pub fn open(&self, arguments: &[&str]) -> Result<Window<'_>, String> {
+        self.open_scaled(arguments, "1")
+    }
+
+    /// Opens a window on a screen with so many pixels a point.
+    pub fn open_scaled(&self, arguments: &[&str], scale: &str) -> Result<Window<'_>, String> {
         let all = [&["view", "puget.iqt", "--narrate"], arguments].concat();
         let mut child = self
             .program(&all)
+            .env("WINIT_X11_SCALE_FACTOR", scale)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()

@@ -19,6 +19,8 @@ type Test = fn(&Display) -> Outcome;
 const TESTS: &[(&str, Test)] = &[
     ("tour", tour::tour),
     ("settings_are_remembered", tour::settings_are_remembered),
+    ("tolerance_suits_the_adapter", tour::tolerance_suits_the_adapter),
+    ("window_within_the_screen", tour::window_within_the_screen),
     ("dropped_files", tour::dropped_files),
     ("broken_settings", troubles::broken_settings),
     ("lost_device", troubles::lost_device),

@@ -89,6 +89,43 @@ pub fn settings_are_remembered(display: &Display) -> Outcome {
     ensure(has("style hillshade") && has("size 760x540"), || format!("{heard:?}"))
 }
 
+/// A driver in software begins coarser and says so; what was set once stays, and is nothing to be said.
+pub fn tolerance_suits_the_adapter(display: &Display) -> Outcome {
+    let settings = display.settings();
+    let heard = |arguments: &[&str]| -> Result<[bool; 3], String> {
+        let all = [&["--exit-after-frames", "3"], arguments].concat();
+        let (code, words, heard) = display.open(&all)?.end()?;
+        ensure(code == Some(0), || format!("{code:?}: {words}"))?;
+        let has = |beginning: &str| heard.iter().any(|line| line.starts_with(beginning));
+        Ok([has("tolerance 4 px"), has("tolerance 1 px"), has("news Drawn in software")])
+    };
+    // The tour may not have come before.
+    let _ = std::fs::remove_file(&settings);
+    let software = display.software;
+    for time in ["first", "second"] {
+        let seen = heard(&[])?;
+        ensure(seen == [software, !software, software], || format!("{time} time: {seen:?}"))?;
+    }
+    for (arguments, what) in [(&["--tolerance-px", "1"][..], "asked for"), (&[], "remembered")] {
+        let seen = heard(arguments)?;
+        ensure(seen == [false, true, false], || format!("{what}: {seen:?}"))?;
+    }
+    std::fs::remove_file(&settings).map_err(|e| e.to_string())
+}
+
+/// A window that was larger than this screen is not begun beyond it.
+pub fn window_within_the_screen(display: &Display) -> Outcome {
+    let settings = display.settings();
+    std::fs::create_dir_all(settings.parent().unwrap()).map_err(|e| e.to_string())?;
+    for (scale, size) in [("1", "size 1177x736"), ("2", "size 1176x736")] {
+        std::fs::write(&settings, "window = [2000, 1500]").map_err(|e| e.to_string())?;
+        let mut window = display.open_scaled(&["--exit-after-frames", "2"], scale)?;
+        window.hear(size)?;
+        window.end()?;
+    }
+    std::fs::remove_file(&settings).map_err(|e| e.to_string())
+}
+
 /// Elevation data is built and shown, a flight is taken, and what is neither is told.
 pub fn dropped_files(display: &Display) -> Outcome {
     let folder = display.folder.path();

@@ -55,8 +55,15 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
 /// Tolerance, exaggeration, culling, freezing.
 pub(super) fn mesh(ui: &mut Ui, facts: &Facts<'_>, settings: &mut Settings, wishes: &mut Vec<Wish>) {
     let [least, most] = TOLERANCE_PX;
-    let tolerance = Slider::new(&mut settings.tolerance_px, least..=most).logarithmic(true);
-    ui.add(tolerance.suffix(" px").text("tolerance")).on_hover_text("Largest error on the screen");
+    let mut tolerance_px = settings.tolerance_px();
+    let tolerance = Slider::new(&mut tolerance_px, least..=most).logarithmic(true);
+    if ui
+        .add(tolerance.suffix(" px").text("tolerance"))
+        .on_hover_text("Largest error on the screen")
+        .changed()
+    {
+        settings.tolerance_px = Some(tolerance_px);
+    }
     let [least, most] = EXAGGERATION;
     let exaggeration = Slider::new(&mut settings.exaggeration, least..=most).logarithmic(true);
     ui.add(exaggeration.prefix("x ").text("heights"));

@@ -1,8 +1,17 @@
 //! What keys, panels and dropped files ask for, carried out.
 
-use super::*;
+use super::{Viewer, sight};
+use crate::window::camera::ground_below_m;
+use crate::window::events::Wake;
+use crate::window::flights::{Player, Recorder};
+use crate::window::job::{self, Job};
+use crate::window::keep;
 use crate::window::keys::Action;
 use crate::window::panel::Wish;
+use crate::window::stage::Stage;
+use std::path::{Path, PathBuf};
+use terrasoar::flight::Flight;
+use terrasoar::flight::generate::Ground;
 use winit::window::Fullscreen;
 
 impl Viewer {
@@ -125,7 +134,7 @@ impl Viewer {
             Ok(stage) => {
                 self.end_recording();
                 self.stage = stage;
-                self.rig = start(&self.stage, &self.screen, &self.window, &self.settings);
+                self.rig = sight::start(&self.stage, &self.screen, &self.window, &self.settings);
                 (self.player, self.frozen) = (None, None);
                 self.name_terrain();
                 self.tell(&format!("opened {}", path.display()));

@@ -1,9 +1,15 @@
 //! The picture: refined, drawn, covered by the overlay, shown; and what that took.
 
-use super::*;
+use super::Viewer;
 use crate::app::feed::Refined;
 use crate::app::scene::Drawn;
-use crate::window::overlay::Layer;
+use crate::window::history::Figures;
+use crate::window::keep;
+use crate::window::overlay::{Layer, Overlay};
+use anyhow::Result;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use terrasoar::view::View;
 use terrasoar_render::{Offscreen, RenderError, Target, wgpu};
 
 impl Viewer {
@@ -72,11 +78,14 @@ impl Viewer {
     }
 
     fn count(&mut self, refined: Option<Refined>, drawn: Drawn, update: Duration, frame: Duration) {
+        // A frozen mesh is the last one that was refined.
+        let frozen = self.history.last().map_or(0, |figures| figures.triangles);
+        let triangles = refined.map_or(frozen, |refined| refined.triangles);
         let refined = refined.unwrap_or_default();
         self.history.push(Figures {
             frame_ms: 1e3 * frame.as_secs_f64(),
             update_ms: 1e3 * update.as_secs_f64(),
-            triangles: drawn.draw.triangles,
+            triangles,
             tests: refined.work.tests,
             changes: refined.work.splits + refined.work.merges,
             patch_bytes: drawn.upload.bytes,
