@@ -8,3 +8,5 @@ pub mod feed;
 pub mod full_mesh;
 #[path = "../../src/app/scene.rs"]
 pub mod scene;
+#[path = "../../src/app/streamed.rs"]
+pub mod streamed;

@@ -11,6 +11,7 @@ use terrasoar_render::{Gpu, LOOKS, Look};
 pub const TESTS: &[Test] = &[
     ("engines::kinetic_looks_as_soar", kinetic_looks_as_soar),
     ("engines::clusters_look_as_vertices", clusters_look_as_soar),
+    ("engines::streamed_looks_as_mapped", streamed_looks_as_mapped),
     ("engines::unseen_updates_are_made_up_for", unseen_updates),
     ("engines::a_new_device_shows_the_same", new_device),
 ];
@@ -57,6 +58,19 @@ fn kinetic_looks_as_soar(gpu: &Gpu) -> Outcome {
 
 fn clusters_look_as_soar(gpu: &Gpu) -> Outcome {
     against_soar(gpu, Culling::Clusters)
+}
+
+fn streamed_looks_as_mapped(gpu: &Gpu) -> Outcome {
+    let mut mapped = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    // Less than the file has, so that pages are given up on the way.
+    let mut streamed = Rig::streamed(gpu, SceneOptions::default(), SIZE_PX, 3 << 20);
+    let look = Look::default();
+    for i in [0, 1, 2, 3, 20, 0, 25, 9] {
+        let view = frame(i);
+        let [a, b] = [mapped.shoot(&view, &look), streamed.shoot_settled(&view, &look)];
+        same(&a, &b, || format!("frame {i}"))?;
+    }
+    Ok(())
 }
 
 fn unseen_updates(gpu: &Gpu) -> Outcome {

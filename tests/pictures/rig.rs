@@ -3,7 +3,8 @@
 use super::app::scene::{Scene, SceneOptions};
 use glam::DVec3;
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::import;
@@ -12,6 +13,15 @@ use terrasoar_render::{Gpu, Look, Offscreen, read_depth_m};
 
 /// Puget Sound: 1,025 x 1,025 samples 160 m apart.
 pub fn puget_sound() -> &'static Terrain {
+    &built().1
+}
+
+/// The same, not mapped.
+pub fn puget_sound_unmapped() -> Arc<Terrain> {
+    Arc::new(Terrain::open_unmapped(built().1.path()).unwrap())
+}
+
+fn built() -> &'static (tempfile::TempDir, Terrain) {
     static TERRAIN: OnceLock<(tempfile::TempDir, Terrain)> = OnceLock::new();
     let made = || {
         let folder = tempfile::tempdir().unwrap();
@@ -22,7 +32,7 @@ pub fn puget_sound() -> &'static Terrain {
         let terrain = Terrain::open(&file).unwrap();
         (folder, terrain)
     };
-    &TERRAIN.get_or_init(made).1
+    TERRAIN.get_or_init(made)
 }
 
 /// A scene on a device, with a picture to draw to.
@@ -36,6 +46,28 @@ impl<'a> Rig<'a> {
     pub fn new(gpu: &'a Gpu, options: SceneOptions, size_px: [u32; 2]) -> Self {
         let scene = Scene::new(puget_sound(), gpu, options).unwrap();
         Self { gpu, scene, offscreen: Offscreen::new(&gpu.device, size_px).unwrap() }
+    }
+
+    /// Over pages that are read into `cache_bytes`.
+    pub fn streamed(gpu: &'a Gpu, options: SceneOptions, size_px: [u32; 2], cache_bytes: u64) -> Self {
+        let scene = Scene::streamed(&puget_sound_unmapped(), cache_bytes, gpu, options).unwrap();
+        Self { gpu, scene, offscreen: Offscreen::new(&gpu.device, size_px).unwrap() }
+    }
+
+    /// Refines for a view and draws it until all that it needs has come.
+    pub fn shoot_settled(&mut self, view: &View, look: &Look) -> Vec<u8> {
+        let begun = Instant::now();
+        loop {
+            let refined = self.scene.update(view);
+            let picture = self.draw(view, look);
+            if refined.work.late == 0
+                && self.scene.tile_stats().missing == 0
+                && !self.scene.feed().is_waiting()
+            {
+                return picture;
+            }
+            assert!(begun.elapsed() < Duration::from_secs(60), "what is missing does not come");
+        }
     }
 
     /// Refines for a view and draws it; four bytes a pixel.

@@ -14,7 +14,7 @@ pub use map::MapSource;
 pub use memory::MemorySource;
 pub use pread::PreadSource;
 #[cfg(any(test, feature = "testing"))]
-pub use testing::{CountingSource, FailingSource};
+pub use testing::{CountingSource, FailingSource, Fault, HostileSource, Hostility};
 
 use crate::error::LayoutError;
 use std::path::Path;
