@@ -5,6 +5,8 @@
 //! itself is wrong.** A reader that closes our output early ends the program quietly.
 
 mod build;
+#[cfg(unix)]
+mod bus;
 mod compare;
 mod flight;
 mod ground;
@@ -94,6 +96,8 @@ impl std::error::Error for WrongUsage {}
 
 /// The whole program.
 pub(crate) fn run() -> ExitCode {
+    #[cfg(unix)]
+    bus::watch();
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
         Verb::Info(args) => info::run(&args),

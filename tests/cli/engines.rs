@@ -260,3 +260,43 @@ fn wrong_flights_are_refused_with_their_line() {
             .contains("no/x.csv")
     );
 }
+
+/// A mapped file that is cut short under a replay ends it with words, not with a signal.
+#[cfg(unix)]
+#[test]
+fn a_file_cut_short_under_a_replay() {
+    use std::time::Duration;
+    let bench = Bench::new();
+    bench.good(&["synth", "--size", "513", "--seed", "5", "-o", "land.tif"]);
+    bench.good(&["build", "land.tif", "-o", "land.iqt"]);
+    bench.good(&[
+        "flight",
+        "straight",
+        "land.iqt",
+        "-o",
+        "long.flight",
+        "--frames",
+        "20000",
+        "--speed",
+        "0.2",
+    ]);
+    let mut replay = bench.command(&[
+        "replay",
+        "land.iqt",
+        "--flight",
+        "long.flight",
+        "--engine",
+        "soar",
+        "--tolerance-px",
+        "0.2",
+    ]);
+    let mut running =
+        replay.stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::null()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(running.try_wait().unwrap().is_none(), "over before anything could be done to it");
+    std::fs::OpenOptions::new().write(true).open(bench.path("land.iqt")).unwrap().set_len(4096).unwrap();
+    let ended = running.wait_with_output().unwrap();
+    let words = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(ended.status.code(), Some(1), "{words}");
+    assert!(words.contains("cut short") && words.contains("build it again"), "{words}");
+}
