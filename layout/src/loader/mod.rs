@@ -13,9 +13,9 @@ pub use queue::PageRequest;
 
 use crate::bytes::{PAGE_BYTES, Page};
 use crate::error::LayoutError;
+use crate::source::ReadJob;
 use crate::terrain::Terrain;
 use queue::Waiting;
-use std::ops::RangeInclusive;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -56,9 +56,9 @@ pub struct LoaderStats {
     pub pages: u64,
     /// Reads or pages that failed.
     pub failures: u64,
-    /// Time spent in reads, over all threads.
+    /// Time spent in reads, or batches of them, over all threads.
     pub time: Duration,
-    /// Longest read.
+    /// Longest read or batch.
     pub longest: Duration,
 }
 
@@ -154,39 +154,54 @@ impl Drop for Loader {
     }
 }
 
+/// Pages that are read together, in the order of the file, and what they are read into.
+#[derive(Debug)]
+struct Run {
+    pages: Vec<u64>,
+    buffer: Vec<u8>,
+}
+
 /// One thread's life.
 fn serve(shared: &Shared, arrivals: &Sender<Arrival>) {
-    let mut buffer = vec![0; RUN_PAGES as usize * PAGE_BYTES];
-    let mut wanted = Vec::with_capacity(RUN_PAGES as usize);
+    let terrain = &*shared.terrain;
+    let depth = terrain.source().depth().max(1);
+    let new_run = || Run {
+        pages: Vec::with_capacity(RUN_PAGES as usize),
+        buffer: vec![0; RUN_PAGES as usize * PAGE_BYTES],
+    };
+    let mut runs: Vec<Run> = (0..depth).map(|_| new_run()).collect();
     let mut state = shared.lock();
     loop {
         if state.stopped {
             return;
         }
-        let Some(first) = state.waiting.pop() else {
+        let mut begun = 0;
+        while begun < depth
+            && let Some(first) = state.waiting.pop()
+        {
+            if first.due + STALE_FRAMES < state.now {
+                if arrivals.send(Arrival { page: first.page, outcome: Outcome::Dropped }).is_err() {
+                    return;
+                }
+                continue;
+            }
+            gather(terrain, first.page, &mut state.waiting, &mut runs[begun].pages);
+            begun += 1;
+        }
+        if begun == 0 {
             state = shared.work.wait(state).unwrap_or_else(PoisonError::into_inner);
             continue;
-        };
-        if first.due + STALE_FRAMES < state.now {
-            if arrivals.send(Arrival { page: first.page, outcome: Outcome::Dropped }).is_err() {
-                return;
-            }
-            continue;
         }
-        gather(&shared.terrain, first.page, &mut state.waiting, &mut wanted);
         drop(state);
         let start = Instant::now();
-        let (bytes, failures, gone) = read_run(&shared.terrain, &wanted, &mut buffer, arrivals);
+        let Some(done) = read_runs(terrain, &mut runs[..begun], arrivals) else { return };
         let took = start.elapsed();
-        if gone {
-            return;
-        }
         state = shared.lock();
         let stats = &mut state.stats;
-        stats.reads += 1;
-        stats.bytes += bytes;
-        stats.pages += wanted.len() as u64 - failures;
-        stats.failures += failures;
+        stats.reads += done.reads;
+        stats.bytes += done.bytes;
+        stats.pages += done.pages;
+        stats.failures += done.failures;
         stats.time += took;
         stats.longest = stats.longest.max(took);
     }
@@ -195,9 +210,7 @@ fn serve(shared: &Shared, arrivals: &Sender<Arrival>) {
 /// Puts `page` and what waits besides in its run of the file into `wanted`, in the order of the file.
 fn gather(terrain: &Terrain, page: u64, waiting: &mut Waiting, wanted: &mut Vec<u64>) {
     wanted.clear();
-    let run_of = |page: u64| {
-        terrain.entries().get(page as usize).filter(|e| e.is_present()).map(|e| u64::from(e.page) / RUN_PAGES)
-    };
+    let run_of = |page: u64| file_page(terrain, page).map(|p| p / RUN_PAGES);
     let run = run_of(page);
     // Files that were edited or have holes keep neighbours elsewhere; then there is less to gather.
     for near in page.saturating_sub(RUN_PAGES - 1)..page + RUN_PAGES {
@@ -205,49 +218,46 @@ fn gather(terrain: &Terrain, page: u64, waiting: &mut Waiting, wanted: &mut Vec<
             wanted.push(near);
         }
     }
-    wanted.sort_unstable_by_key(|page| terrain.entries().get(*page as usize).map(|e| e.page));
+    wanted.sort_unstable_by_key(|page| file_page(terrain, *page));
 }
 
-/// Reads pages of one run and hands them over. Tells bytes read, pages failed, and whether nobody listens any more.
-fn read_run(
-    terrain: &Terrain,
-    wanted: &[u64],
-    buffer: &mut [u8],
-    arrivals: &Sender<Arrival>,
-) -> (u64, u64, bool) {
-    let span = file_span(terrain, wanted);
-    let bytes = (span.end() - span.start() + 1) * PAGE_BYTES as u64;
-    let read = match buffer.get_mut(..bytes as usize) {
-        Some(buffer) if wanted.len() > 1 => {
-            terrain.source().read_at(span.start() * PAGE_BYTES as u64, buffer).is_ok()
-        }
-        _ => false,
-    };
-    let mut failures = 0;
-    for page in wanted {
-        let outcome =
-            if read { cut_out(terrain, *page, *span.start(), buffer) } else { terrain.checked_page(*page) };
-        // A long read that fails says nothing of each of its pages: each is tried by itself, so that an error names the page it is about.
-        let outcome = match outcome {
-            Ok(page) => Outcome::Read(page),
-            Err(error) => {
-                failures += 1;
-                Outcome::Failed(error)
+/// Where a logical page lies in the file, if it is there.
+fn file_page(terrain: &Terrain, logical_page: u64) -> Option<u64> {
+    terrain.entries().get(logical_page as usize).filter(|e| e.is_present()).map(|e| u64::from(e.page))
+}
+
+/// Reads runs and hands their pages over. `None` if nobody listens any more.
+fn read_runs(terrain: &Terrain, runs: &mut [Run], arrivals: &Sender<Arrival>) -> Option<LoaderStats> {
+    let mut done = LoaderStats { reads: runs.len() as u64, ..LoaderStats::default() };
+    let mut jobs: Vec<ReadJob<'_>> = Vec::with_capacity(runs.len());
+    for Run { pages, buffer } in runs.iter_mut() {
+        let page = |at: Option<&u64>| at.and_then(|page| file_page(terrain, *page)).unwrap_or(0);
+        let (first, last) = (page(pages.first()), page(pages.last()));
+        // All lie in one aligned run, which the buffer holds.
+        let bytes = ((last - first + 1) as usize * PAGE_BYTES).min(buffer.len());
+        jobs.push(ReadJob::new(first * PAGE_BYTES as u64, &mut buffer[..bytes]));
+    }
+    terrain.source().read_many(&mut jobs);
+    let outcomes: Vec<bool> = jobs.iter().map(|job| job.outcome.is_ok()).collect();
+    done.bytes = jobs.iter().map(|job| job.buffer.len() as u64).sum();
+    for (Run { pages, buffer }, is_read) in runs.iter().zip(outcomes) {
+        let first = pages.first().and_then(|page| file_page(terrain, *page));
+        for page in pages {
+            // A read that fails says nothing of each of its pages: each is tried by itself, so that an error names the page it is about.
+            let read = first.filter(|_| is_read).map(|first| cut_out(terrain, *page, first, buffer));
+            let outcome = match read.unwrap_or_else(|| terrain.checked_page(*page)) {
+                Ok(page) => Outcome::Read(page),
+                Err(error) => Outcome::Failed(error),
+            };
+            if matches!(outcome, Outcome::Read(_)) {
+                done.pages += 1;
+            } else {
+                done.failures += 1;
             }
-        };
-        if arrivals.send(Arrival { page: *page, outcome }).is_err() {
-            return (bytes, failures, true);
+            arrivals.send(Arrival { page: *page, outcome }).ok()?;
         }
     }
-    (bytes, failures, false)
-}
-
-/// First and last file page of `wanted`, which is in the order of the file.
-fn file_span(terrain: &Terrain, wanted: &[u64]) -> RangeInclusive<u64> {
-    let page = |at: Option<&u64>| {
-        at.and_then(|p| terrain.entries().get(*p as usize)).map_or(0, |e| u64::from(e.page))
-    };
-    page(wanted.first())..=page(wanted.last())
+    Some(done)
 }
 
 /// One page out of a run whose first file page is `first`.

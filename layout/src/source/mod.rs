@@ -1,4 +1,4 @@
-//! Where the bytes of a terrain file come from: one trait under everything, so that a map, plain reads, memory, counting and
+//! Where the bytes of a terrain file come from: one trait under everything, so that a map, plain reads, many reads at once, memory, counting and
 //! failing sources interchange.
 //!
 //! A source's length is fixed when it is opened. A source may lend its bytes as one slice (a map, memory); the refinement's hot path
@@ -9,6 +9,8 @@ mod memory;
 mod pread;
 #[cfg(any(test, feature = "testing"))]
 mod testing;
+#[cfg(target_os = "linux")]
+mod uring;
 
 pub use map::MapSource;
 pub use memory::MemorySource;
@@ -16,8 +18,29 @@ pub use pread::PreadSource;
 #[cfg(any(test, feature = "testing"))]
 pub use testing::{CountingSource, FailingSource, Fault, HostileSource, Hostility};
 
+#[cfg(target_os = "linux")]
+pub use uring::UringSource;
+
 use crate::error::LayoutError;
 use std::path::Path;
+
+/// One of several reads that are made together.
+#[derive(Debug)]
+pub struct ReadJob<'b> {
+    /// Where it begins.
+    pub offset: u64,
+    /// What it fills.
+    pub buffer: &'b mut [u8],
+    /// What became of it.
+    pub outcome: Result<(), LayoutError>,
+}
+
+impl<'b> ReadJob<'b> {
+    /// A read of `buffer` at `offset` that is yet to be made.
+    pub fn new(offset: u64, buffer: &'b mut [u8]) -> Self {
+        Self { offset, buffer, outcome: Ok(()) }
+    }
+}
 
 /// Random access to the bytes of one terrain file.
 pub trait Source: Send + Sync {
@@ -32,6 +55,18 @@ pub trait Source: Send + Sync {
     /// # Errors
     /// [`LayoutError::Io`], or [`LayoutError::Damaged`] if the file has become shorter.
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError>;
+
+    /// Makes several reads; each is told its own outcome. One after the other, unless the source can have many under way.
+    fn read_many(&self, jobs: &mut [ReadJob<'_>]) {
+        for job in jobs {
+            job.outcome = self.read_at(job.offset, job.buffer);
+        }
+    }
+
+    /// Reads that are worth making together; 1 for sources that make one at a time.
+    fn depth(&self) -> usize {
+        1
+    }
 
     /// All bytes, if the source has them in its address space.
     fn bytes(&self) -> Option<&[u8]> {
