@@ -17,14 +17,15 @@ use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
 use crate::source::{MapSource, PreadSource, Source};
 use crate::store::{RecordShape, RecordStore};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// An opened and checked terrain file.
 pub struct Terrain {
     source: Box<dyn Source>,
     header: Header,
     entries: Vec<Entry>,
-    /// Page number of each logical page, absent ones replaced by the inert page.
-    pages: Vec<u32>,
+    /// Page number of each logical page, absent ones replaced by the inert page. Made when records are first asked for.
+    pages: OnceLock<Vec<u32>>,
 }
 
 impl std::fmt::Debug for Terrain {
@@ -44,7 +45,7 @@ impl Terrain {
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
         let file = PreadSource::open(path)?;
         let (header, entries) = read_structure(&file)?;
-        Self::assemble(Box::new(MapSource::map(file)?), header, entries)
+        Ok(Self { source: Box::new(MapSource::map(file)?), header, entries, pages: OnceLock::new() })
     }
 
     /// Opens the file at `path` without mapping it: for [`Terrain::pool`], whose pages are read. Files that others may truncate raise no signal then.
@@ -61,12 +62,12 @@ impl Terrain {
     /// As [`Terrain::open`].
     pub fn from_source(source: Box<dyn Source>) -> Result<Self, LayoutError> {
         let (header, entries) = read_structure(&*source)?;
-        Self::assemble(source, header, entries)
+        Ok(Self { source, header, entries, pages: OnceLock::new() })
     }
 
-    fn assemble(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Result<Self, LayoutError> {
-        let pages = entries.iter().map(|e| if e.is_present() { e.page } else { INERT_PAGE }).collect();
-        Ok(Self { source, header, entries, pages })
+    fn pages(&self) -> &[u32] {
+        let page = |entry: &Entry| if entry.is_present() { entry.page } else { INERT_PAGE };
+        self.pages.get_or_init(|| self.entries.iter().map(page).collect())
     }
 
     /// The file's name for messages.
@@ -275,7 +276,7 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
 
     fn new(terrain: &'a Terrain, bytes: &'a [u8], codec: C) -> Self {
-        Self { bytes, pages: &terrain.pages, shape: terrain.shape(codec) }
+        Self { bytes, pages: terrain.pages(), shape: terrain.shape(codec) }
     }
 
     /// Grid shape and spacing.
