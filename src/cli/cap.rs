@@ -1,8 +1,9 @@
-//! A cap on the program's memory, page cache included, by a Linux control group.
+//! A cap on the memory of what is measured, page cache included, by a Linux control group.
 //!
-//! The program makes a group, caps it, and runs itself again in it: the copy joins as the first thing it does, so that all it reads is charged to the group. The group
-//! goes when the copy has ended; groups that a killed program left behind go at the next cap. Version 1 has `memory.limit_in_bytes`, version 2 `memory.max`. Where
-//! neither can be had, the program goes on without a cap and says why.
+//! The program makes a group, caps it, and runs itself again; the copy is in the group while it measures and out of it while it counts, so that the cap is on what flying and
+//! reading take: memory stays charged where it was first touched. The first program outlives the copy, tells if the kernel ended it, and removes the group; groups
+//! that a killed program left behind go at the next cap. Version 1 has `memory.limit_in_bytes`, version 2 `memory.max`. Where neither can be had, the program
+//! goes on without a cap and says why.
 
 use super::WrongUsage;
 use anyhow::{Context, Result, bail};
@@ -23,6 +24,14 @@ pub(super) struct Standing {
     pub(super) cap: Option<Cap>,
     /// Why it has none though one was asked for.
     pub(super) note: Option<String>,
+    groups: Option<Groups>,
+}
+
+/// Where the copy is while it measures and while it does not.
+#[derive(Debug)]
+struct Groups {
+    capped: PathBuf,
+    home: PathBuf,
 }
 
 /// What came of asking for a cap.
@@ -33,6 +42,26 @@ pub(super) enum Asked {
     Ran,
 }
 
+impl Standing {
+    fn uncapped(why: String) -> Self {
+        Self { note: Some(why), ..Self::default() }
+    }
+
+    /// Does `work` under the cap, if there is one.
+    pub(super) fn within<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        let Some(Groups { capped, home }) = &self.groups else { return work() };
+        enter(capped).with_context(|| format!("{}: cannot enter the control group", capped.display()))?;
+        let done = work();
+        enter(home).with_context(|| format!("{}: cannot leave for this control group", home.display()))?;
+        done
+    }
+}
+
+/// Moves this process, all threads, into a group.
+fn enter(group: &Path) -> std::io::Result<()> {
+    std::fs::write(group.join("cgroup.procs"), "0")
+}
+
 /// Brings the program under a cap of `mib`. `group` is what [`GROUP_FLAG`] says in the copy.
 pub(super) fn ask(mib: u64, group: Option<&Path>) -> Result<Asked> {
     if let Some(path) = group {
@@ -40,30 +69,31 @@ pub(super) fn ask(mib: u64, group: Option<&Path>) -> Result<Asked> {
     }
     match Group::create(mib) {
         Ok(group) => run_in(&group, mib).map(|()| Asked::Ran),
-        Err(why) => {
-            let note = format!("{why}");
-            Ok(Asked::GoOn(Standing { cap: None, note: Some(note) }))
-        }
+        Err(why) => Ok(Asked::GoOn(Standing::uncapped(why.to_string()))),
     }
 }
 
-/// Joins the group that the first program made.
-fn join(path: &Path, mib: u64) -> Result<Standing> {
-    let ours = path.file_name().and_then(|n| n.to_str()).is_some_and(|name| name.starts_with(PREFIX));
-    if !ours || !path.is_dir() {
+/// Finds out whether the group that the first program made can be entered and left.
+fn join(capped: &Path, mib: u64) -> Result<Standing> {
+    let ours = capped.file_name().and_then(|n| n.to_str()).is_some_and(|name| name.starts_with(PREFIX));
+    if !ours || !capped.is_dir() {
         return Err(WrongUsage(format!(
             "{GROUP_FLAG} is for the program's own use; ask for a cap with --cap"
         ))
         .into());
     }
-    let control_group_version = if path.join("memory.limit_in_bytes").exists() { 1 } else { 2 };
-    Ok(match std::fs::write(path.join("cgroup.procs"), "0") {
-        Ok(()) => Standing { cap: Some(Cap { mib, control_group_version }), note: None },
-        Err(e) => Standing {
-            cap: None,
-            note: Some(format!("the control group {} cannot be joined: {e}", path.display())),
-        },
-    })
+    let control_group_version = if capped.join("memory.limit_in_bytes").exists() { 1 } else { 2 };
+    let own = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let home = parents(&own).into_iter().find(|(_, version)| *version == control_group_version);
+    let Some((home, _)) = home else {
+        return Ok(Standing::uncapped("this process does not find its own control group".into()));
+    };
+    let standing = Standing {
+        cap: Some(Cap { mib, control_group_version }),
+        note: None,
+        groups: Some(Groups { capped: capped.into(), home }),
+    };
+    Ok(standing.within(|| Ok(())).map(|()| standing).unwrap_or_else(|e| Standing::uncapped(format!("{e:#}"))))
 }
 
 /// Runs the program again with the same words and the group's name.
@@ -84,7 +114,7 @@ fn run_in(group: &Group, mib: u64) -> Result<()> {
             std::process::exit(code)
         }
         None => bail!(
-            "{status} under the cap of {mib} MiB, which is less than the program itself needs if the kernel ended it; allow more with --cap"
+            "{status} under the cap of {mib} MiB, which is less than the engines themselves need if the kernel ended it; allow more with --cap"
         ),
     }
 }
@@ -215,10 +245,28 @@ mod tests {
     fn only_our_groups_are_joined() {
         let folder = tempfile::tempdir().unwrap();
         assert!(join(folder.path(), 64).unwrap_err().is::<WrongUsage>());
-        let group = folder.path().join("terrasoar-iobench-1");
-        std::fs::create_dir(&group).unwrap();
-        let standing = join(&group, 64).unwrap();
-        assert_eq!(standing.cap, Some(Cap { mib: 64, control_group_version: 2 }));
-        assert_eq!(std::fs::read_to_string(group.join("cgroup.procs")).unwrap(), "0");
+        assert!(join(&folder.path().join("terrasoar-iobench-1"), 64).unwrap_err().is::<WrongUsage>());
+    }
+
+    #[test]
+    fn work_is_done_inside_and_the_rest_outside() {
+        let folder = tempfile::tempdir().unwrap();
+        let [capped, home] = ["capped", "home"].map(|name| folder.path().join(name));
+        std::fs::create_dir(&capped).unwrap();
+        std::fs::create_dir(&home).unwrap();
+        let inside = |group: &Path| std::fs::read_to_string(group.join("cgroup.procs")).ok();
+        let standing = Standing {
+            groups: Some(Groups { capped: capped.clone(), home: home.clone() }),
+            ..Default::default()
+        };
+        let failed = standing.within(|| {
+            assert_eq!((inside(&capped).as_deref(), inside(&home)), (Some("0"), None));
+            bail!("no luck") as Result<()>
+        });
+        assert_eq!(failed.unwrap_err().to_string(), "no luck");
+        assert_eq!(inside(&home).as_deref(), Some("0"), "it has left, whatever came of the work");
+        std::fs::remove_dir_all(&capped).unwrap();
+        assert!(standing.within(|| -> Result<()> { panic!("uncapped") }).is_err());
+        assert_eq!(Standing::default().within(|| Ok(7)).unwrap(), 7);
     }
 }

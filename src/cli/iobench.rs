@@ -56,7 +56,7 @@ pub(super) struct Args {
     /// Metres that the view is moved back when preloading; a sixteenth of the terrain's side if not given
     #[arg(long, value_name = "M", value_parser = parse::not_negative)]
     block: Option<f64>,
-    /// Run with memory capped, page cache included (Linux control groups)
+    /// Measure with memory capped, page cache included (Linux control groups)
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(16..=1 << 24))]
     cap: Option<u64>,
     /// The capped copy's group
@@ -162,11 +162,20 @@ pub(super) fn run(args: &Args) -> Result<()> {
             ..frame.view(quality.viewport, quality.tolerance_px)
         })
         .collect();
+    // Times come first: what counting holds would be in the peak of memory.
+    let timed = measured(args, &views, &standing, &progress)?;
     let (runs, block_m) = counted(args, &views, &progress)?;
-    let mut runs: Vec<(Run, Option<Timed>)> = runs.into_iter().map(|run| (run, None)).collect();
-    measure(args, &views, &mut runs, &progress)?;
+    let timed_of = |run: &Run| {
+        let found = timed.iter().find(|(reader, _)| *reader == run.reader && is_plain(run));
+        found.map(|(_, timed)| timed.clone())
+    };
+    let with_times = |run: Run| {
+        let timed = timed_of(&run);
+        (run, timed)
+    };
+    let runs: Vec<(Run, Option<Timed>)> = runs.into_iter().map(with_times).collect();
     let scratch = match &args.scratch {
-        Some(folder) => replayed(folder, &runs, &progress)?,
+        Some(folder) => replayed(folder, &runs, &standing, &progress)?,
         None => Vec::new(),
     };
     drop(progress);
@@ -236,26 +245,38 @@ fn counted(args: &Args, views: &[View], progress: &Progress) -> Result<(Vec<Run>
     Ok((runs, block_m))
 }
 
+/// Whether a run is one of the file as it is, without preloading.
+fn is_plain(run: &Run) -> bool {
+    run.layout == LayoutKind::Ours && run.preload == PreloadKind::None
+}
+
 /// Times each engine over the file as it is; the file must not be mapped meanwhile.
-fn measure(
+fn measured(
     args: &Args,
     views: &[View],
-    runs: &mut [(Run, Option<Timed>)],
+    standing: &Standing,
     progress: &Progress,
-) -> Result<()> {
-    let culling = args.quality.quality().culling;
-    let plain = |run: &Run| run.layout == LayoutKind::Ours && run.preload == PreloadKind::None;
-    for (run, timed) in runs.iter_mut().filter(|(run, _)| plain(run) && run.reader != Reader::Mesh) {
-        progress.begin(format!("{}, timing", run.reader.name()), 2 * views.len() as u64);
-        *timed = Some(time(&args.file, views, culling, run.reader, &mut |done| progress.set(done))?);
+) -> Result<Vec<(Reader, Timed)>> {
+    if !args.layouts.contains(&LayoutKind::Ours) || !args.prefetch.contains(&PreloadKind::None) {
+        return Ok(Vec::new());
     }
-    Ok(())
+    let culling = args.quality.quality().culling;
+    let engines = args.readers().filter(|reader| *reader != Reader::Mesh);
+    engines
+        .map(|reader| {
+            progress.begin(format!("{}, timing", reader.name()), 2 * views.len() as u64);
+            let timed = standing
+                .within(|| Ok(time(&args.file, views, culling, reader, &mut |done| progress.set(done))?))?;
+            Ok((reader, timed))
+        })
+        .collect()
 }
 
 /// Replays what was traced against a scratch file a layout: number of the run, by map, by plain reads.
 fn replayed(
     folder: &Path,
     runs: &[(Run, Option<Timed>)],
+    standing: &Standing,
     progress: &Progress,
 ) -> Result<Vec<(usize, ScratchCost, ScratchCost)>> {
     let mut costs = Vec::new();
@@ -272,8 +293,10 @@ fn replayed(
             let replay = |access, how: &str| {
                 let stage = format!("{} {}, {how}", run.reader.name(), layout.name());
                 progress.begin(stage, trace.len() as u64);
-                let costs = file.replay(trace, access, &mut |done| progress.set(done));
-                costs.map(|costs| ScratchCost::of(&costs))
+                standing.within(|| {
+                    let costs = file.replay(trace, access, &mut |done| progress.set(done))?;
+                    Ok(ScratchCost::of(&costs))
+                })
             };
             costs.push((i, replay(Access::Map, "map")?, replay(Access::Pread, "pread")?));
         }

@@ -56,6 +56,24 @@ pub fn forget_file(_: &Path) -> std::io::Result<bool> {
     Ok(false)
 }
 
+/// Tells the system that what is read next of the file will be anywhere: no read-ahead.
+///
+/// # Errors
+/// The system refuses.
+#[cfg(target_os = "linux")]
+pub fn expect_random_reads(file: &std::fs::File) -> std::io::Result<()> {
+    Ok(rustix::fs::fadvise(file, 0, None, rustix::fs::Advice::Random)?)
+}
+
+/// As on Linux: here it cannot be told.
+///
+/// # Errors
+/// None.
+#[cfg(not(target_os = "linux"))]
+pub fn expect_random_reads(_: &std::fs::File) -> std::io::Result<()> {
+    Ok(())
+}
+
 /// Bytes that an ordinary user may still write to the file system of `folder`; `None` where that is not known.
 ///
 /// # Errors

@@ -1,15 +1,16 @@
 //! Other layouts on a real disk: the page trace of a flight, replayed against a file of the layout's size.
 //!
 //! The file is full of bytes that do not compress and none of it is sparse, or the disk would not be asked. It has no use but being read, lies in a folder that the
-//! user names, and is removed when dropped. Each replay starts cold.
+//! user names, and has no name, so that even a killed program leaves nothing. Each replay starts cold.
 
 use super::kernel;
 use super::timed::{UpdateCost, observed};
 use super::{IoBenchError, PAGE_BYTES};
+use std::fs::File;
 use std::hint::black_box;
 use std::io::Write;
-use std::path::Path;
-use terrasoar_layout::source::{MapSource, PreadSource, Source};
+use std::path::{Path, PathBuf};
+use terrasoar_layout::source::{MapSource, Source};
 
 /// Room to leave on the disk.
 const SPARE_BYTES: u64 = 256 << 20;
@@ -22,14 +23,16 @@ const CHUNK_BYTES: usize = 4 << 20;
 pub enum Access {
     /// Touched in a map without read-ahead.
     Map,
-    /// Read into a buffer.
+    /// Read into a buffer, without read-ahead too.
     Pread,
 }
 
 /// A file of a layout's size.
 #[derive(Debug)]
 pub struct ScratchFile {
-    file: tempfile::NamedTempFile,
+    /// By which it is opened; it has no name of its own.
+    path: PathBuf,
+    file: File,
 }
 
 impl ScratchFile {
@@ -44,10 +47,7 @@ impl ScratchFile {
         if free.is_none_or(|free| free < bytes + SPARE_BYTES) {
             return Err(IoBenchError::NoRoom { folder: folder.into(), bytes, free });
         }
-        let mut file = tempfile::Builder::new()
-            .prefix(".terrasoar-iobench-")
-            .tempfile_in(folder)
-            .map_err(io("cannot create a scratch file"))?;
+        let mut file = tempfile::tempfile_in(folder).map_err(io("cannot create a scratch file"))?;
         let mut state = 0x9e37_79b9_7f4a_7c15;
         let mut chunk = vec![0u8; CHUNK_BYTES];
         let mut written = 0;
@@ -61,8 +61,8 @@ impl ScratchFile {
             done(written);
         }
         // Only clean pages can be forgotten.
-        file.as_file().sync_all().map_err(io("cannot write a scratch file"))?;
-        Ok(Self { file })
+        file.sync_all().map_err(io("cannot write a scratch file"))?;
+        Ok(Self { path: path_of(&file), file })
     }
 
     /// Reads each frame's pages in turn, from a file that the system was asked to forget. `done` hears the number of frames finished.
@@ -75,56 +75,86 @@ impl ScratchFile {
         access: Access,
         done: &mut dyn FnMut(u64),
     ) -> Result<Vec<UpdateCost>, IoBenchError> {
-        let path = self.file.path();
-        kernel::forget_file(path).map_err(|source| IoBenchError::Io {
-            doing: "cannot drop the scratch file from memory",
-            path: path.into(),
-            source,
-        })?;
-        let mut costs = Vec::with_capacity(trace.len());
-        let mut finish = |cost| {
-            costs.push(cost);
-            done(costs.len() as u64);
-        };
+        kernel::forget_file(&self.path).map_err(self.io("cannot drop the scratch file from memory"))?;
         match access {
-            Access::Map => {
-                let source = MapSource::open(path)?;
-                let bytes = source.bytes().unwrap_or_default();
-                let inside =
-                    |page: &u64| usize::try_from(page * PAGE_BYTES).ok().and_then(|at| bytes.get(at));
-                for pages in trace {
-                    let mut outside = None;
-                    finish(observed(|| {
-                        let mut sum = 0u64;
-                        for page in pages {
-                            match inside(page) {
-                                Some(byte) => sum += u64::from(*byte),
-                                None => outside = Some(*page),
-                            }
+            Access::Map => self.replay_by_map(trace, done),
+            Access::Pread => self.replay_by_reads(trace, done),
+        }
+    }
+
+    fn io(&self, doing: &'static str) -> impl Fn(std::io::Error) -> IoBenchError {
+        move |source| IoBenchError::Io { doing, path: self.path.clone(), source }
+    }
+
+    fn replay_by_map(
+        &self,
+        trace: &[Vec<u64>],
+        done: &mut dyn FnMut(u64),
+    ) -> Result<Vec<UpdateCost>, IoBenchError> {
+        let source = MapSource::open(&self.path)?;
+        let bytes = source.bytes().unwrap_or_default();
+        let byte_of = |page: &u64| usize::try_from(page * PAGE_BYTES).ok().and_then(|at| bytes.get(at));
+        let mut costs = Vec::with_capacity(trace.len());
+        for pages in trace {
+            let mut outside = None;
+            costs.push(observed(|| {
+                for page in pages {
+                    match byte_of(page) {
+                        Some(byte) => {
+                            black_box(*byte);
                         }
-                        black_box(sum);
-                    }));
-                    if let Some(page) = outside {
-                        return Err(IoBenchError::OutsideScratch { page });
+                        None => outside = Some(*page),
                     }
                 }
+            }));
+            if let Some(page) = outside {
+                return Err(IoBenchError::OutsideScratch { page });
             }
-            Access::Pread => {
-                let source = PreadSource::open(path)?;
-                let mut buffer = vec![0; PAGE_BYTES as usize];
-                for pages in trace {
-                    let mut result = Ok(());
-                    finish(observed(|| {
-                        result =
-                            pages.iter().try_for_each(|page| source.read_at(page * PAGE_BYTES, &mut buffer));
-                        black_box(&buffer);
-                    }));
-                    result?;
-                }
-            }
+            done(costs.len() as u64);
         }
         Ok(costs)
     }
+
+    fn replay_by_reads(
+        &self,
+        trace: &[Vec<u64>],
+        done: &mut dyn FnMut(u64),
+    ) -> Result<Vec<UpdateCost>, IoBenchError> {
+        kernel::expect_random_reads(&self.file).map_err(self.io("cannot do without read-ahead"))?;
+        let mut buffer = vec![0; PAGE_BYTES as usize];
+        let mut costs = Vec::with_capacity(trace.len());
+        for pages in trace {
+            let mut result = Ok(());
+            costs.push(observed(|| {
+                result =
+                    pages.iter().try_for_each(|page| read_at(&self.file, &mut buffer, page * PAGE_BYTES));
+                black_box(&buffer);
+            }));
+            result.map_err(self.io("cannot read the scratch file"))?;
+            done(costs.len() as u64);
+        }
+        Ok(costs)
+    }
+}
+
+/// The way to an open file that has no name. Systems without it have no answer from [`kernel::free_bytes`] either, and no scratch file.
+fn path_of(file: &File) -> PathBuf {
+    #[cfg(target_os = "linux")]
+    return PathBuf::from(format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(file)));
+    #[cfg(not(target_os = "linux"))]
+    PathBuf::new()
+}
+
+#[cfg(unix)]
+fn read_at(file: &File, buffer: &mut [u8], offset: u64) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, buffer, offset)
+}
+
+#[cfg(not(unix))]
+fn read_at(mut file: &File, buffer: &mut [u8], offset: u64) -> std::io::Result<()> {
+    use std::io::{Read, Seek};
+    file.seek(std::io::SeekFrom::Start(offset))?;
+    file.read_exact(buffer)
 }
 
 /// One number of xorshift64.
@@ -146,7 +176,8 @@ mod tests {
         let mut written = 0;
         let scratch = ScratchFile::create(folder.path(), 5_000_001, &mut |b| written = b).unwrap();
         assert_eq!(written, 5_001_216);
-        assert!(scratch.file.as_file().metadata().unwrap().len() == written);
+        assert_eq!(scratch.file.metadata().unwrap().len(), written);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "it has no name");
         let trace = [vec![0, 7, 1220], vec![], vec![3]];
         for access in [Access::Map, Access::Pread] {
             let costs = scratch.replay(&trace, access, &mut |_| {}).unwrap();
@@ -154,8 +185,6 @@ mod tests {
             assert!(costs.iter().all(|c| c.ms >= 0.0 && c.faults.is_some()));
             assert!(scratch.replay(&[vec![1221]], access, &mut |_| {}).is_err());
         }
-        drop(scratch);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
     #[test]
