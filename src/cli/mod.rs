@@ -7,11 +7,13 @@
 mod build;
 #[cfg(unix)]
 mod bus;
+mod cap;
 mod compare;
 mod flight;
 mod ground;
 mod height;
 mod info;
+mod iobench;
 mod mesh;
 mod mesh_file;
 #[cfg(feature = "view")]
@@ -76,6 +78,7 @@ enum Verb {
     Flight(flight::Args),
     Replay(replay::Args),
     Compare(compare::Args),
+    Iobench(iobench::Args),
     Mesh(mesh::Args),
     View(view::Args),
     Snapshot(snapshot::Args),
@@ -107,6 +110,7 @@ pub(crate) fn run() -> ExitCode {
         Verb::Flight(args) => flight::run(&args),
         Verb::Replay(args) => replay::run(&args),
         Verb::Compare(args) => compare::run(&args),
+        Verb::Iobench(args) => iobench::run(&args),
         Verb::Mesh(args) => mesh::run(&args),
         Verb::View(args) => view::run(&args),
         Verb::Snapshot(args) => snapshot::run(&args),

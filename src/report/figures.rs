@@ -8,7 +8,7 @@ use super::{ComparisonReport, SweepPoint};
 use crate::stats::{FrameStats, median};
 
 /// Medians further apart than this factor share a logarithmic axis.
-const WIDE: f64 = 12.0;
+pub(super) const WIDE: f64 = 12.0;
 
 /// The charts of a report, in the order shown.
 pub(super) fn all(report: &ComparisonReport<'_>) -> Vec<Chart> {
@@ -72,7 +72,7 @@ fn subtitle(report: &ComparisonReport<'_>, with_tolerance: bool) -> String {
     }
 }
 
-fn frame_axis() -> AxisPlan {
+pub(super) fn frame_axis() -> AxisPlan {
     AxisPlan {
         name: "Frame of the flight".into(),
         scale: Scale::Linear,
@@ -81,7 +81,7 @@ fn frame_axis() -> AxisPlan {
     }
 }
 
-fn y_axis(name: String, shows: &[f64]) -> AxisPlan {
+pub(super) fn y_axis(name: String, shows: &[f64]) -> AxisPlan {
     AxisPlan { name, scale: Scale::Linear, ticks: Ticks::Round, shows: shows.to_vec() }
 }
 

@@ -28,32 +28,13 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
         title.viewport.width_px,
         title.viewport.height_px
     );
-    push(&mut out, format_args!("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"));
-    push(&mut out, format_args!("<meta name=\"viewport\" content=\"width=device-width\">\n"));
-    push(&mut out, format_args!("<title>{heading}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"));
-    push(&mut out, format_args!("<h1>{heading}</h1>\n<p class=\"of\">{of}</p>\n"));
+    begin(&mut out, &heading, &of);
     verdict(&mut out, report);
     engines(&mut out, report);
     picture(&mut out, report.picture);
     sweep(&mut out, "By tolerance", "Tolerance, px", report.tolerance_sweep);
     sweep(&mut out, "By incoherence", "Incoherence, %", report.incoherence_sweep);
-    push(&mut out, format_args!("<h2>Plots</h2>\n"));
-    if plots.is_empty() {
-        push(
-            &mut out,
-            format_args!(
-                "<p>This program was built without the feature <code>plots</code>; the figures are in the files below.</p>\n"
-            ),
-        );
-    }
-    for plot in plots {
-        let (caption, svg, png) = (escaped(&plot.caption), &plot.svg, &plot.png);
-        push(&mut out, format_args!("<figure>\n{}\n<figcaption>{caption} ", plot.drawing.trim_end()));
-        push(
-            &mut out,
-            format_args!("<a href=\"{svg}\">SVG</a>, <a href=\"{png}\">PNG</a></figcaption>\n</figure>\n"),
-        );
-    }
+    figures(&mut out, plots);
     push(&mut out, format_args!("<h2>Files</h2>\n<ul>\n"));
     for ((engine, _), file) in report.runs.iter().zip(frame_files) {
         let engine = escaped(engine);
@@ -65,6 +46,35 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
     );
     push(&mut out, format_args!("</ul>\n</body>\n</html>\n"));
     out
+}
+
+/// The page's start, up to what it is of; both texts escaped.
+pub(super) fn begin(out: &mut String, heading: &str, of: &str) {
+    push(out, format_args!("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"));
+    push(out, format_args!("<meta name=\"viewport\" content=\"width=device-width\">\n"));
+    push(out, format_args!("<title>{heading}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"));
+    push(out, format_args!("<h1>{heading}</h1>\n<p class=\"of\">{of}</p>\n"));
+}
+
+/// The plots, or why there are none.
+pub(super) fn figures(out: &mut String, plots: &[PlotFile]) {
+    push(out, format_args!("<h2>Plots</h2>\n"));
+    if plots.is_empty() {
+        push(
+            out,
+            format_args!(
+                "<p>This program was built without the feature <code>plots</code>; the figures are in the files below.</p>\n"
+            ),
+        );
+    }
+    for plot in plots {
+        let (caption, svg, png) = (escaped(&plot.caption), &plot.svg, &plot.png);
+        push(out, format_args!("<figure>\n{}\n<figcaption>{caption} ", plot.drawing.trim_end()));
+        push(
+            out,
+            format_args!("<a href=\"{svg}\">SVG</a>, <a href=\"{png}\">PNG</a></figcaption>\n</figure>\n"),
+        );
+    }
 }
 
 fn verdict(out: &mut String, report: &ComparisonReport<'_>) {
@@ -170,13 +180,13 @@ fn sweep(out: &mut String, heading: &str, x_name: &str, points: &[SweepPoint]) {
     push(out, format_args!("</tbody>\n</table></div>\n"));
 }
 
-fn push(out: &mut String, text: std::fmt::Arguments<'_>) {
+pub(super) fn push(out: &mut String, text: std::fmt::Arguments<'_>) {
     // Formatting into a string cannot fail.
     let _ = out.write_fmt(text);
 }
 
 /// `text` for use between tags and in quoted attributes.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

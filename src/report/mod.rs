@@ -1,4 +1,4 @@
-//! What a comparison leaves in a directory: figures for programs, plots and one page for people.
+//! What a comparison leaves in a directory: figures for programs, plots and one page for people. `io.rs` has the same of what flights read.
 //!
 //! | file | what |
 //! |---|---|
@@ -16,11 +16,16 @@ mod csv;
 #[cfg(feature = "plots")]
 mod figures;
 mod html;
+mod io;
+#[cfg(feature = "plots")]
+mod io_figures;
+mod io_page;
 mod number;
 #[cfg(feature = "plots")]
 mod plot;
 
 pub use csv::write_frames_csv;
+pub use io::{IoReport, write_io_frames_csv};
 
 use crate::stats::{Comparison, FrameStats};
 use crate::view::Viewport;
@@ -189,27 +194,37 @@ impl ComparisonReport<'_> {
 
     #[cfg(feature = "plots")]
     fn write_plots(&self, dir: &Path, written: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
-        let mut plots = Vec::new();
-        for chart in figures::all(self) {
-            let (svg, png) = (format!("{}.svg", chart.stem), format!("{}.png", chart.stem));
-            let (svg_path, png_path) = (dir.join(&svg), dir.join(&png));
-            let drawn = |path: &Path| {
-                let path = path.to_path_buf();
-                move |reason| ReportError::Draw { path, reason }
-            };
-            let drawing = plot::svg(&chart).map_err(drawn(&svg_path))?;
-            write_text(&svg_path, &drawing)?;
-            plot::write_png(&chart, &png_path).map_err(drawn(&png_path))?;
-            written.extend([svg_path, png_path]);
-            plots.push(PlotFile { caption: chart.caption, svg, png, drawing });
-        }
-        Ok(plots)
+        write_charts(figures::all(self), dir, written)
     }
 
     #[cfg(not(feature = "plots"))]
     fn write_plots(&self, _: &Path, _: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
         Ok(Vec::new())
     }
+}
+
+/// Draws `charts` into the directory `dir`, each as SVG and as PNG.
+#[cfg(feature = "plots")]
+fn write_charts(
+    charts: Vec<chart::Chart>,
+    dir: &Path,
+    written: &mut Vec<PathBuf>,
+) -> Result<Vec<PlotFile>, ReportError> {
+    let mut plots = Vec::new();
+    for chart in charts {
+        let (svg, png) = (format!("{}.svg", chart.stem), format!("{}.png", chart.stem));
+        let (svg_path, png_path) = (dir.join(&svg), dir.join(&png));
+        let drawn = |path: &Path| {
+            let path = path.to_path_buf();
+            move |reason| ReportError::Draw { path, reason }
+        };
+        let drawing = plot::svg(&chart).map_err(drawn(&svg_path))?;
+        write_text(&svg_path, &drawing)?;
+        plot::write_png(&chart, &png_path).map_err(drawn(&png_path))?;
+        written.extend([svg_path, png_path]);
+        plots.push(PlotFile { caption: chart.caption, svg, png, drawing });
+    }
+    Ok(plots)
 }
 
 fn write_text(path: &Path, text: &str) -> Result<(), ReportError> {

@@ -2,6 +2,7 @@
 
 mod build;
 mod engines;
+mod iobench;
 mod pictures;
 mod support;
 mod usage;

@@ -1,0 +1,403 @@
+//! `terrasoar iobench`: how much of a file a flight touches, and what reading it costs.
+
+use super::cap::{self, Asked, Standing};
+use super::output::{check_stream, columns, grouped, print, print_json};
+use super::progress::Progress;
+use super::replay::QualityArgs;
+use super::{WrongUsage, parse, terrain};
+use anyhow::{Result, bail};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use std::path::{Path, PathBuf};
+use terrasoar::flight::Flight;
+use terrasoar::flyover::EngineKind;
+use terrasoar::iobench::scratch::{Access, ScratchFile};
+use terrasoar::iobench::{
+    CountOptions, IoBench, IoRun, LayoutKind, PreloadKind, Reader, Run, ScratchCost, Timed, count, kernel,
+    time,
+};
+use terrasoar::report::{IoReport, write_io_frames_csv};
+use terrasoar::view::View;
+use terrasoar_layout::bytes::PAGE_BYTES;
+
+/// Measure how much of a file a flight touches, by engine and layout.
+///
+/// Counts, which repeat: the records that each frame reads, the pages they lie on, and those of them that a page cache of the stated size does not hold when they are
+/// needed. Measured, cold and warm: update times, page faults and bytes read over the file itself. The row mesh is all that a frame's mesh needs, whoever has it in memory already.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar iobench alps.iqt --flight low.flight
+  terrasoar iobench alps.iqt --flight low.flight --engines soar,kinetic --layouts row,ours --prefetch none,frustum -o report
+  terrasoar iobench alps.iqt --flight low.flight --cap 128 --scratch /var/tmp --json
+
+Layouts: row (row by row, 20-byte records), tiled (Z-order, 20 bytes), soar (SOAR's interleaved quadtrees, 20 bytes), ours (the file as it is).
+Prefetch frustum extends the view as Qiu et al. do: back by --block, ahead by a frame's way; a disk of stated speed serves it between frames.")]
+pub(super) struct Args {
+    /// Terrain file (.iqt)
+    file: PathBuf,
+    /// Flight file
+    #[arg(long, value_name = "F")]
+    flight: PathBuf,
+    /// Engines
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "soar,smart,kinetic", value_parser = engine())]
+    engines: Vec<EngineKind>,
+    /// Layouts
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "row,tiled,soar,ours", value_parser = layout())]
+    layouts: Vec<LayoutKind>,
+    /// What is loaded before it is needed
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "none", value_parser = preload())]
+    prefetch: Vec<PreloadKind>,
+    /// Size of the page cache that is counted with
+    #[arg(long, value_name = "MIB", default_value = "128", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
+    cache: u64,
+    /// Pages that the disk serves between two frames when preloading: 16.7 ms at 130 us a read
+    #[arg(long, value_name = "N", default_value = "128", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
+    disk_pages: u64,
+    /// Metres that the view is moved back when preloading; a sixteenth of the terrain's side if not given
+    #[arg(long, value_name = "M", value_parser = parse::not_negative)]
+    block: Option<f64>,
+    /// Measure with memory capped, page cache included (Linux control groups)
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(16..=1 << 24))]
+    cap: Option<u64>,
+    /// The capped copy's group
+    #[arg(long, value_name = "DIR", hide = true, requires = "cap")]
+    cap_group: Option<PathBuf>,
+    /// Also replay each layout's pages against a file of its size in this folder, which needs the room
+    #[arg(long, value_name = "DIR")]
+    scratch: Option<PathBuf>,
+    #[command(flatten)]
+    quality: QualityArgs,
+    /// Also write every frame's figures to this file
+    #[arg(long, value_name = "CSV")]
+    frames: Option<PathBuf>,
+    /// Folder for a report with tables and plots, made if missing
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// An engine by name; `naive` reads everything and has nothing to be measured.
+fn engine() -> impl TypedValueParser<Value = EngineKind> {
+    let names = EngineKind::ALL.into_iter().filter(|e| *e != EngineKind::Naive).map(EngineKind::name);
+    PossibleValuesParser::new(names).try_map(|word| word.parse::<EngineKind>())
+}
+
+fn layout() -> impl TypedValueParser<Value = LayoutKind> {
+    PossibleValuesParser::new(LayoutKind::ALL.map(LayoutKind::name)).map(|word| {
+        LayoutKind::ALL.into_iter().find(|layout| layout.name() == word).unwrap_or(LayoutKind::Ours)
+    })
+}
+
+fn preload() -> impl TypedValueParser<Value = PreloadKind> {
+    let value = |kind: PreloadKind| PossibleValue::new(kind.name()).hide(kind == PreloadKind::Deadline);
+    PossibleValuesParser::new(PreloadKind::ALL.map(value)).map(|word| {
+        PreloadKind::ALL.into_iter().find(|kind| kind.name() == word).unwrap_or(PreloadKind::None)
+    })
+}
+
+impl Args {
+    fn check(&self) -> Result<()> {
+        fn twice<'a>(flag: &str, names: impl Iterator<Item = &'a str>) -> Result<(), WrongUsage> {
+            let mut seen: Vec<&str> = Vec::new();
+            for name in names {
+                if seen.contains(&name) {
+                    return Err(WrongUsage(format!("{flag} names {name} twice; name each once")));
+                }
+                seen.push(name);
+            }
+            Ok(())
+        }
+        twice("--engines", self.engines.iter().map(|e| e.name()))?;
+        twice("--layouts", self.layouts.iter().map(|l| l.name()))?;
+        twice("--prefetch", self.prefetch.iter().map(|p| p.name()))?;
+        if self.prefetch.contains(&PreloadKind::Deadline) {
+            let name = self.engines.first().map_or("this engine", |e| e.name());
+            return Err(WrongUsage(format!(
+                "--prefetch deadline is not available for {name}; preload by frustum or not at all"
+            ))
+            .into());
+        }
+        if let Some(folder) = &self.scratch
+            && !folder.is_dir()
+        {
+            bail!("{}: --scratch needs a folder that is there", folder.display());
+        }
+        if let Some(folder) = &self.output
+            && folder.exists()
+            && !folder.is_dir()
+        {
+            bail!("{}: the report needs a folder and this is a file; name another", folder.display());
+        }
+        if let Some(csv) = &self.frames {
+            check_stream(csv, &[&self.file, &self.flight])?;
+        }
+        Ok(())
+    }
+
+    /// The engines and the mesh.
+    fn readers(&self) -> impl Iterator<Item = Reader> {
+        self.engines.iter().map(|e| Reader::Engine(*e)).chain([Reader::Mesh])
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    args.check()?;
+    let standing = match args.cap {
+        None => Standing::default(),
+        Some(mib) => match cap::ask(mib, args.cap_group.as_deref())? {
+            Asked::GoOn(standing) => standing,
+            Asked::Ran => return Ok(()),
+        },
+    };
+    let progress = Progress::new("frames");
+    let flight = Flight::read(&args.flight)?;
+    let quality = args.quality.quality();
+    let views: Vec<View> = flight
+        .frames
+        .iter()
+        .map(|frame| View {
+            vertical_exaggeration: quality.vertical_exaggeration,
+            ..frame.view(quality.viewport, quality.tolerance_px)
+        })
+        .collect();
+    // Times come first: what counting holds would be in the peak of memory.
+    let timed = measured(args, &views, &standing, &progress)?;
+    let (runs, block_m) = counted(args, &views, &progress)?;
+    let timed_of = |run: &Run| {
+        let found = timed.iter().find(|(reader, _)| *reader == run.reader && is_plain(run));
+        found.map(|(_, timed)| timed.clone())
+    };
+    let with_times = |run: Run| {
+        let timed = timed_of(&run);
+        (run, timed)
+    };
+    let runs: Vec<(Run, Option<Timed>)> = runs.into_iter().map(with_times).collect();
+    let scratch = match &args.scratch {
+        Some(folder) => replayed(folder, &runs, &standing, &progress)?,
+        None => Vec::new(),
+    };
+    drop(progress);
+    let mut sums: Vec<IoRun> = runs
+        .iter()
+        .map(|(run, timed)| match timed {
+            Some(timed) => IoRun::of(run).with_times(timed),
+            None => IoRun::of(run),
+        })
+        .collect();
+    for (i, map, pread) in scratch {
+        sums[i].scratch_map = Some(map);
+        sums[i].scratch_pread = Some(pread);
+    }
+    let bench = IoBench {
+        terrain: name(&args.file),
+        flight: name(&args.flight),
+        tolerance_px: quality.tolerance_px,
+        viewport_px: [quality.viewport.width_px, quality.viewport.height_px],
+        page_bytes: PAGE_BYTES as u64,
+        cache_mib: args.cache,
+        disk_pages_per_frame: args.disk_pages,
+        block_m,
+        cap: standing.cap,
+        cap_note: standing.note,
+        kernel_known: kernel::thread_faults().is_some() && kernel::read_bytes().is_some(),
+        runs: sums,
+    };
+    if let Some(path) = &args.frames {
+        write_io_frames_csv(path, &runs)?;
+    }
+    let written = match &args.output {
+        Some(folder) => IoReport { bench: &bench, runs: &runs }.write(folder)?,
+        None => Vec::new(),
+    };
+    if args.json {
+        return print_json(&bench);
+    }
+    let page = written.last().map_or(String::new(), |page| format!("report: {}\n", page.display()));
+    print(&(text(&bench) + &page))
+}
+
+fn name(path: &Path) -> String {
+    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// The counting run of all readers, and the block length it used.
+fn counted(args: &Args, views: &[View], progress: &Progress) -> Result<(Vec<Run>, f64)> {
+    let terrain = terrain::open(&args.file)?;
+    let grid = terrain.grid();
+    let [dx, dy] = grid.spacing_m();
+    let block_m = args.block.unwrap_or(f64::from(grid.side_steps()) / 16.0 * dx.max(dy));
+    let options = CountOptions {
+        layouts: args.layouts.clone(),
+        preloads: args.prefetch.clone(),
+        cache_pages: usize::try_from(args.cache * (1 << 20) / PAGE_BYTES as u64).unwrap_or(usize::MAX),
+        disk_pages: usize::try_from(args.disk_pages).unwrap_or(usize::MAX),
+        block_m,
+        trace: args.scratch.is_some(),
+    };
+    let culling = args.quality.quality().culling;
+    let mut runs = Vec::new();
+    for reader in args.readers() {
+        progress.begin(format!("{}, counting", reader.name()), views.len() as u64);
+        runs.extend(count(&terrain, views, culling, reader, &options, &mut |done| progress.set(done))?);
+    }
+    Ok((runs, block_m))
+}
+
+/// Whether a run is one of the file as it is, without preloading.
+fn is_plain(run: &Run) -> bool {
+    run.layout == LayoutKind::Ours && run.preload == PreloadKind::None
+}
+
+/// Times each engine over the file as it is; the file must not be mapped meanwhile.
+fn measured(
+    args: &Args,
+    views: &[View],
+    standing: &Standing,
+    progress: &Progress,
+) -> Result<Vec<(Reader, Timed)>> {
+    if !args.layouts.contains(&LayoutKind::Ours) || !args.prefetch.contains(&PreloadKind::None) {
+        return Ok(Vec::new());
+    }
+    let culling = args.quality.quality().culling;
+    let engines = args.readers().filter(|reader| *reader != Reader::Mesh);
+    engines
+        .map(|reader| {
+            progress.begin(format!("{}, timing", reader.name()), 2 * views.len() as u64);
+            let timed = standing
+                .within(|| Ok(time(&args.file, views, culling, reader, &mut |done| progress.set(done))?))?;
+            Ok((reader, timed))
+        })
+        .collect()
+}
+
+/// Replays what was traced against a scratch file a layout: number of the run, by map, by plain reads.
+fn replayed(
+    folder: &Path,
+    runs: &[(Run, Option<Timed>)],
+    standing: &Standing,
+    progress: &Progress,
+) -> Result<Vec<(usize, ScratchCost, ScratchCost)>> {
+    let mut costs = Vec::new();
+    for layout in LayoutKind::ALL {
+        let traced = runs.iter().enumerate().filter_map(|(i, (run, _))| {
+            let trace = run.trace.as_ref().filter(|_| run.layout == layout && run.reader != Reader::Mesh)?;
+            Some((i, run, trace))
+        });
+        let traced: Vec<_> = traced.collect();
+        let Some((_, run, _)) = traced.first() else { continue };
+        progress.begin(format!("{}, writing", layout.name()), 0);
+        let file = ScratchFile::create(folder, run.file_bytes, &mut |_| {})?;
+        for (i, run, trace) in traced {
+            let replay = |access, how: &str| {
+                let stage = format!("{} {}, {how}", run.reader.name(), layout.name());
+                progress.begin(stage, trace.len() as u64);
+                standing.within(|| {
+                    let costs = file.replay(trace, access, &mut |done| progress.set(done))?;
+                    Ok(ScratchCost::of(&costs))
+                })
+            };
+            costs.push((i, replay(Access::Map, "map")?, replay(Access::Pread, "pread")?));
+        }
+    }
+    Ok(costs)
+}
+
+fn text(bench: &IoBench) -> String {
+    let known = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    let mut rows = vec![
+        [
+            "engine",
+            "layout",
+            "prefetch",
+            "pages",
+            "lines",
+            "record KB",
+            "needed MB",
+            "realtime MB",
+            "late pages",
+            "update ms",
+            "cold ms",
+            "io ms p99",
+            "major faults",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
+    for r in &bench.runs {
+        rows.push(vec![
+            r.engine.clone(),
+            r.layout.clone(),
+            r.prefetch.clone(),
+            format!("{:.1}", r.distinct_pages_per_frame_mean),
+            format!("{:.0}", r.distinct_lines_per_frame_mean),
+            format!("{:.1}", r.record_bytes_per_frame_mean / 1e3),
+            format!("{:.3}", r.needed_mb),
+            format!("{:.4}", r.realtime_mb),
+            grouped(r.late_pages),
+            known(r.update_ms),
+            known(r.update_ms_cold),
+            known(r.io_ms_p99),
+            r.frame_thread_major_faults.map_or("-".to_owned(), grouped),
+        ]);
+    }
+    let frames = bench.runs.first().map_or(0, |r| r.frames);
+    let mut out = format!(
+        "{}, {}, {} frames; a frame's means, the first left out; cache {} MiB\n",
+        bench.terrain,
+        bench.flight,
+        grouped(frames),
+        bench.cache_mib
+    );
+    out += &columns(&rows);
+    if bench.runs.iter().any(|r| r.scratch_map.is_some()) {
+        out += &scratch_text(bench);
+    }
+    if let Some(cap) = bench.cap {
+        out += &format!(
+            "memory capped at {} MiB, page cache included (control group version {})\n",
+            cap.mib, cap.control_group_version
+        );
+    }
+    if let Some(note) = &bench.cap_note {
+        out += &format!("memory not capped: {note}\n");
+    }
+    if !bench.kernel_known {
+        out += "page faults and bytes read are not known on this system\n";
+    }
+    out
+}
+
+fn scratch_text(bench: &IoBench) -> String {
+    let heads = [
+        "engine",
+        "layout",
+        "read by",
+        "ms",
+        "ms p99",
+        "first frame ms",
+        "major faults",
+        "disk MB",
+        "file MB",
+    ];
+    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+    for r in &bench.runs {
+        for (how, cost) in [("map", r.scratch_map), ("pread", r.scratch_pread)] {
+            rows.extend(cost.map(|c| {
+                vec![
+                    r.engine.clone(),
+                    r.layout.clone(),
+                    how.to_owned(),
+                    format!("{:.3}", c.frame_ms),
+                    format!("{:.3}", c.frame_ms_p99),
+                    format!("{:.1}", c.first_frame_ms),
+                    c.major_faults.map_or("-".to_owned(), grouped),
+                    c.disk_read_mb_total.map_or("-".to_owned(), |v| format!("{v:.1}")),
+                    format!("{:.0}", r.file_mb),
+                ]
+            }));
+        }
+    }
+    format!("pages replayed against a scratch file, cold at the start\n{}", columns(&rows))
+}

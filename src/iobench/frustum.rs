@@ -1,0 +1,166 @@
+//! Preloading by an extended view frustum.
+//!
+//! Based on: H. Qiu, L.-T. Chen, G.-P. Qiu, H. Yang, "An Effective Visualization Method for Large-scale Terrain Dataset", section 4. The frustum is moved back
+//! along the line of sight by a block's length L, which lets in what a turn would bring, and its far side is moved on by S = V cos(a) / f, the way of one frame along
+//! the line of sight, never back (eq. 8). What lies in the extension and not in the view is loaded before it is needed.
+//!
+//! Their frustum ends at a far side and their levels of detail belong to blocks. Here detail depends on distance alone and nothing is cut off far away, so moving
+//! the far side on by S means moving on by S the eye that the error test measures from. With L = S = 0 the walk reads what SOAR reads. Cost: a SOAR
+//! refinement of the extended view.
+
+use crate::metric::{ALL_PLANES, Metric};
+use crate::refine::Culling;
+use crate::view::View;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
+use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::terrain::Records;
+
+/// A view and what of its surroundings is to be at hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExtendedView {
+    /// Where errors are measured from: the view, moved on by S.
+    pub detail: View,
+    /// What is culled: the view, moved back by L.
+    pub extent: View,
+}
+
+impl ExtendedView {
+    /// The view as it is.
+    pub fn plain(view: &View) -> Self {
+        Self { detail: *view, extent: *view }
+    }
+
+    /// The extension of `now` after a frame that showed `before`, blocks being `block_m` metres long.
+    pub fn after(before: &View, now: &View, block_m: f64) -> Self {
+        let [_, _, forward] = now.axes();
+        let ahead_m = (now.eye_m - before.eye_m).dot(forward).max(0.0);
+        Self {
+            detail: View { eye_m: now.eye_m + forward * ahead_m, ..*now },
+            extent: View { eye_m: now.eye_m - forward * block_m, ..*now },
+        }
+    }
+
+    /// Slots of the records that a refinement of this view reads, sorted: coarse levels first.
+    pub fn slots<C: RecordCodec>(&self, records: &Records<'_, C>, culling: Culling) -> Vec<u64> {
+        let c = corners(records.grid().k());
+        let mut walk = Walk {
+            records,
+            detail: Metric::new(&self.detail),
+            extent: Metric::new(&self.extent),
+            slots: (0..=CENTRE_SLOT).collect(),
+        };
+        let planes = if culling == Culling::Vertices { ALL_PLANES } else { 0 };
+        let centre = (CENTRE_SLOT, c[0].midpoint(c[2]));
+        for (split, [b, d]) in ROOTS {
+            walk.visit(records.grid().levels() - 1, centre, split, [c[b], c[d]], planes);
+        }
+        let mut slots = walk.slots;
+        slots.sort_unstable();
+        slots.dedup();
+        slots
+    }
+}
+
+struct Walk<'w, 'a, C: RecordCodec> {
+    records: &'w Records<'a, C>,
+    detail: Metric,
+    extent: Metric,
+    slots: Vec<u64>,
+}
+
+impl<C: RecordCodec> Walk<'_, '_, C> {
+    /// Visits the triangle (apex; b, d) whose split vertex has slot `split` and level `height - 1`.
+    fn visit(&mut self, height: u32, apex: (u64, GridPoint), split: u64, [b, d]: [GridPoint; 2], planes: u8) {
+        let v = b.midpoint(d);
+        let vertex = self.records.vertex(split, height - 1);
+        self.slots.push(split);
+        let at_m = self.records.grid().position_m(v);
+        if height == 1 || !self.detail.sight(at_m, &vertex).is_selected() {
+            return;
+        }
+        let Some(planes) = self.extent.cull(&self.extent.sight(at_m, &vertex), planes) else { return };
+        let [left, right] = child_slots(apex.0, split);
+        self.visit(height - 1, (split, v), left, [b, apex.1], planes);
+        self.visit(height - 1, (split, v), right, [apex.1, d], planes);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{square_terrain, view_at};
+    use super::*;
+    use crate::refine::soar::Soar;
+    use crate::refine::{Engine, Probe};
+    use glam::DVec3;
+    use terrasoar_layout::with_records;
+
+    struct Read(Vec<u64>);
+
+    impl Probe for Read {
+        fn read(&mut self, slot: u64) {
+            self.0.push(slot);
+        }
+    }
+
+    #[test]
+    fn without_an_extension_it_reads_what_soar_reads() {
+        let terrain = square_terrain(7);
+        with_records!(terrain.records().unwrap(), records => {
+            for culling in Culling::ALL {
+                for (at, yaw_rad) in [([0.5, 0.5], 0.3), ([0.1, 0.9], 2.5), ([-0.2, 0.4], 1.5)] {
+                    let view = view_at(&terrain, at, yaw_rad);
+                    let mut read = Read(Vec::new());
+                    Soar::new(records.clone(), culling).update(&view, &mut read);
+                    read.0.sort_unstable();
+                    read.0.dedup();
+                    assert!(ExtendedView::plain(&view).slots(&records, culling) == read.0);
+                    let still = ExtendedView::after(&view, &view, 0.0);
+                    assert_eq!(still, ExtendedView::plain(&view));
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn the_extension_holds_the_view_and_what_a_step_ahead_or_a_turn_needs() {
+        let terrain = square_terrain(7);
+        let grid = *terrain.grid();
+        let block_m = grid.extent_m()[0] / 4.0;
+        let before = view_at(&terrain, [0.4, 0.4], 0.6);
+        let step = before.axes()[2] * 15.0;
+        let now = View { eye_m: before.eye_m + step, ..before };
+        let next = View { eye_m: now.eye_m + step, ..now };
+        let turned = View { yaw_rad: now.yaw_rad + 0.1, ..now };
+        with_records!(terrain.records().unwrap(), records => {
+            let slots = |view: &ExtendedView| view.slots(&records, Culling::Vertices);
+            let extended = slots(&ExtendedView::after(&before, &now, block_m));
+            let missing = |view: &View| {
+                let needed = slots(&ExtendedView::plain(view));
+                (needed.iter().filter(|s| extended.binary_search(s).is_err()).count(), needed.len())
+            };
+            assert_eq!(missing(&next).0, 0, "a straight step is foreseen");
+            let (missing, needed) = missing(&turned);
+            let plain = slots(&ExtendedView::plain(&now));
+            let new = slots(&ExtendedView::plain(&turned)).iter().filter(|s| plain.binary_search(s).is_err()).count();
+            assert!(missing * 3 < new, "{missing} of {new} new records of {needed} are missing after a turn");
+        });
+    }
+
+    #[test]
+    fn only_motion_along_the_line_of_sight_counts() {
+        let terrain = square_terrain(4);
+        let before = view_at(&terrain, [0.5, 0.5], 0.0);
+        let [right, up, forward] = before.axes();
+        let moved = |by: DVec3| {
+            let now = View { eye_m: before.eye_m + by, ..before };
+            (ExtendedView::after(&before, &now, 0.0).detail.eye_m - now.eye_m).dot(forward)
+        };
+        assert!((moved(forward * 7.0) - 7.0).abs() < 1e-9);
+        assert!((moved(forward * 3.0 + right * 4.0) - 3.0).abs() < 1e-9);
+        assert_eq!(moved(forward * -7.0), 0.0);
+        assert!(moved(right * 5.0 + up).abs() < 1e-9);
+        let extent = ExtendedView::after(&before, &before, 40.0).extent;
+        assert!((extent.eye_m - (before.eye_m - forward * 40.0)).length() < 1e-9);
+    }
+}

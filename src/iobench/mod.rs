@@ -1,0 +1,226 @@
+//! How much of a file a flight touches: which pages its reads need, under which layout, and what reading them costs.
+//!
+//! | part | what |
+//! |---|---|
+//! | [`layouts`] | where a record lies under four layouts |
+//! | [`count()`] | a flight's reads, counted: pages, lines, what a cache of a stated size misses, with and without preloading |
+//! | [`frustum`] | preloading by an extended frustum (Qiu et al.) |
+//! | [`time()`], [`kernel`] | a flight over the mapped file, cold and warm, and what the kernel says about it |
+//! | [`scratch`] | other layouts on a real disk |
+//! | [`IoBench`], [`IoRun`] | sums of all that, in the field names of reports |
+//!
+//! Counts repeat to the last page; times, faults and bytes are the machine's. A MB is 10^6 bytes, a page 4 KiB.
+
+mod cache;
+mod count;
+pub mod frustum;
+pub mod kernel;
+pub mod layouts;
+pub mod scratch;
+mod summary;
+mod timed;
+
+pub use cache::PageCache;
+pub use count::{CountOptions, count};
+pub use layouts::LayoutKind;
+pub use summary::{Cap, IoBench, IoRun, ScratchCost};
+pub use timed::{Timed, UpdateCost, time};
+
+use crate::flyover::EngineKind;
+use serde::Serialize;
+use std::path::PathBuf;
+use terrasoar_layout::LayoutError;
+
+/// Bytes a page.
+const PAGE_BYTES: u64 = terrasoar_layout::bytes::PAGE_BYTES as u64;
+
+/// Who reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reader {
+    /// An engine, its own reads: one that remembers vertices reads them once.
+    Engine(EngineKind),
+    /// The mesh itself: every record that a refinement of the frame from nothing looks at, whoever has it in memory already. SOAR reads just these.
+    Mesh,
+}
+
+impl Reader {
+    /// The word that reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Engine(engine) => engine.name(),
+            Self::Mesh => "mesh",
+        }
+    }
+
+    /// The engine whose reads they are.
+    const fn engine(self) -> EngineKind {
+        match self {
+            Self::Engine(engine) => engine,
+            Self::Mesh => EngineKind::Soar,
+        }
+    }
+}
+
+/// What is loaded before it is needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PreloadKind {
+    /// Nothing.
+    None,
+    /// What lies in the extended view frustum.
+    Frustum,
+    /// What will be needed first, by the live ranges of the engine.
+    Deadline,
+}
+
+impl PreloadKind {
+    /// All ways.
+    pub const ALL: [Self; 3] = [Self::None, Self::Frustum, Self::Deadline];
+
+    /// The word the command line uses.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Frustum => "frustum",
+            Self::Deadline => "deadline",
+        }
+    }
+}
+
+/// Why nothing can be measured.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum IoBenchError {
+    /// The terrain's source does not lend its bytes.
+    #[error("{0}: refinement needs a mapped or in-memory terrain")]
+    NotInAddressSpace(String),
+    /// The reader does not know when it will need what.
+    #[error("preloading by deadline is not available for {}; preload by frustum or not at all", reader.name())]
+    NoDeadlines {
+        /// The reader.
+        reader: Reader,
+    },
+    /// The disk is too full for a scratch file.
+    #[error("{}: a scratch file of {:.1} GB {}; name a folder on another disk with --scratch, or fewer layouts", folder.display(), *bytes as f64 / 1e9, room(*free))]
+    NoRoom {
+        /// The folder.
+        folder: PathBuf,
+        /// Bytes it takes.
+        bytes: u64,
+        /// Bytes that are free; `None` where not known.
+        free: Option<u64>,
+    },
+    /// A trace leads out of the scratch file.
+    #[error("page {page} lies outside the scratch file; this is a fault of terrasoar, please report it")]
+    OutsideScratch {
+        /// The page.
+        page: u64,
+    },
+    /// The terrain file.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// Something else on a disk.
+    #[error("{}: {doing}: {source}", path.display())]
+    Io {
+        /// What failed.
+        doing: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+}
+
+fn room(free: Option<u64>) -> String {
+    match free {
+        Some(free) => format!("does not fit with room to spare, {:.1} GB are free", free as f64 / 1e9),
+        None => "cannot be made, for this system does not say how much room there is".into(),
+    }
+}
+
+/// What one frame's reads touched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct FrameIo {
+    /// Frame number, from 0.
+    pub frame: u64,
+    /// Records read, every read counted.
+    pub reads: u64,
+    /// Bytes of these records.
+    pub record_bytes: u64,
+    /// Distinct 4 KiB pages they lie on: what the frame needs.
+    pub pages: u64,
+    /// Distinct cache lines of 64 bytes.
+    pub lines: u64,
+    /// Distinct units of 64 KiB.
+    pub units: u64,
+    /// Pages needed that were not in the cache.
+    pub realtime_pages: u64,
+    /// Pages loaded ahead since the frame before.
+    pub preloaded_pages: u64,
+}
+
+/// The counts of one flight: a reader, a layout, a way of preloading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Who read.
+    pub reader: Reader,
+    /// The layout.
+    pub layout: LayoutKind,
+    /// What was loaded ahead.
+    pub preload: PreloadKind,
+    /// Bytes a record.
+    pub record_bytes: u64,
+    /// Bytes of a file in this layout.
+    pub file_bytes: u64,
+    /// The frames.
+    pub frames: Vec<FrameIo>,
+    /// Pages of each frame in the order they were first read, if asked for; with [`PreloadKind::None`] only.
+    pub trace: Option<Vec<Vec<u64>>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::view::{View, Viewport};
+    use glam::DVec3;
+    use terrasoar_layout::build::{BuildOptions, Silent, build};
+    use terrasoar_layout::dem::{MemoryDem, SampleType};
+    use terrasoar_layout::source::MemorySource;
+    use terrasoar_layout::terrain::Terrain;
+
+    fn terrain(samples: [u32; 2]) -> Terrain {
+        let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| {
+            let hash = (x.wrapping_mul(0x9e37_79b9) ^ y.wrapping_mul(0x85eb_ca6b)).wrapping_mul(0xc2b2_ae35);
+            300.0 + 90.0 * (f64::from(x) / 17.0).sin() * (f64::from(y) / 11.0).cos() + f64::from(hash >> 28)
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.iqt");
+        let options = BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() };
+        build(&dem, &path, &options, &Silent).unwrap();
+        let bytes = std::fs::read(path).unwrap();
+        Terrain::from_source(Box::new(MemorySource::new("memory", bytes))).unwrap()
+    }
+
+    /// 2^k + 1 samples a side.
+    pub(super) fn square_terrain(k: u32) -> Terrain {
+        terrain([(1 << k) + 1; 2])
+    }
+
+    /// A third of the square is padding.
+    pub(super) fn padded_terrain() -> Terrain {
+        terrain([129, 70])
+    }
+
+    /// A view from a point given in fractions of the terrain's extent.
+    pub(super) fn view_at(terrain: &Terrain, at: [f64; 2], yaw_rad: f64) -> View {
+        let [w, h] = terrain.grid().extent_m();
+        View {
+            eye_m: DVec3::new(at[0] * w, at[1] * h, 520.0),
+            yaw_rad,
+            pitch_rad: -0.3,
+            roll_rad: 0.0,
+            vertical_fov_rad: 0.8,
+            viewport: Viewport { width_px: 320, height_px: 240 },
+            tolerance_px: 1.0,
+            vertical_exaggeration: 1.0,
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! What a measurement of reading leaves in a directory.
+//!
+//! | file | what |
+//! |---|---|
+//! | `frames.csv` | every count of every frame, a line a frame, engine, layout and way of preloading |
+//! | `summary.json` | the sums |
+//! | `plot-io-*.svg`, `plot-io-*.png` | the plots, with the feature `plots` |
+//! | `report.html` | tables and plots in one file that needs no other |
+
+use super::{PlotFile, ReportError, io_page, write_text};
+use crate::iobench::{FrameIo, IoBench, Run, Timed, UpdateCost};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+const HEADER: &str = "engine,layout,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes";
+
+/// All that goes into a report.
+#[derive(Debug, Clone, Copy)]
+pub struct IoReport<'a> {
+    /// The sums.
+    pub bench: &'a IoBench,
+    /// The counts of each of [`IoBench::runs`], in the same order, and what its frames cost where that was measured.
+    pub runs: &'a [(Run, Option<Timed>)],
+}
+
+impl IoReport<'_> {
+    /// Writes the report into the directory `dir`, made if missing, and gives the files written in order; the last
+    /// is the page to open.
+    ///
+    /// # Errors
+    /// [`ReportError`], which names the file; files before it are then complete.
+    pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
+        std::fs::create_dir_all(dir).map_err(|source| ReportError::Directory { path: dir.into(), source })?;
+        let mut written = vec![dir.join("frames.csv"), dir.join("summary.json")];
+        write_io_frames_csv(&written[0], self.runs)?;
+        let json = serde_json::to_string_pretty(self.bench)
+            .map_err(|source| ReportError::Json { path: written[1].clone(), source })?;
+        write_text(&written[1], &(json + "\n"))?;
+        let plots = self.write_plots(dir, &mut written)?;
+        let path = dir.join("report.html");
+        write_text(&path, &io_page::page(self.bench, &plots))?;
+        written.push(path);
+        Ok(written)
+    }
+
+    #[cfg(feature = "plots")]
+    fn write_plots(&self, dir: &Path, written: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
+        super::write_charts(super::io_figures::all(self), dir, written)
+    }
+
+    #[cfg(not(feature = "plots"))]
+    fn write_plots(&self, _: &Path, _: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
+        Ok(Vec::new())
+    }
+}
+
+/// Writes every frame of `runs` to the file at `path`, replacing it. What was not measured or is not known is empty.
+///
+/// # Errors
+/// [`ReportError::Write`].
+pub fn write_io_frames_csv(path: &Path, runs: &[(Run, Option<Timed>)]) -> Result<(), ReportError> {
+    let write = || {
+        let mut file = BufWriter::new(File::create(path)?);
+        writeln!(file, "{HEADER}")?;
+        runs.iter().try_for_each(|(run, timed)| write_run(&mut file, run, timed.as_ref()))?;
+        file.flush()
+    };
+    write().map_err(|source| ReportError::Write { path: path.into(), source })
+}
+
+fn write_run(to: &mut impl Write, run: &Run, timed: Option<&Timed>) -> std::io::Result<()> {
+    let words = [run.reader.name(), run.layout.name(), run.preload.name()].join(",");
+    for (i, f) in run.frames.iter().enumerate() {
+        // Named one by one, so that a new field cannot be forgotten.
+        let FrameIo { frame, reads, record_bytes, pages, lines, units, realtime_pages, preloaded_pages } = f;
+        write!(
+            to,
+            "{words},{frame},{reads},{record_bytes},{pages},{lines},{units},{realtime_pages},{preloaded_pages},"
+        )?;
+        let warm = timed.and_then(|t| t.warm.get(i));
+        let cold = timed.filter(|t| t.was_forgotten).and_then(|t| t.cold.get(i));
+        let faults = cold.and_then(|c| c.faults);
+        writeln!(
+            to,
+            "{},{},{},{},{}",
+            cell(warm.map(|c: &UpdateCost| c.ms)),
+            cell(cold.map(|c| c.ms)),
+            cell(faults.map(|f| f.major)),
+            cell(faults.map(|f| f.minor)),
+            cell(cold.and_then(|c| c.read_bytes)),
+        )?;
+    }
+    Ok(())
+}
+
+fn cell(value: Option<impl ToString>) -> String {
+    value.map_or(String::new(), |v| v.to_string())
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::flyover::EngineKind;
+    use crate::iobench::kernel::Faults;
+    use crate::iobench::{Cap, IoRun, LayoutKind, PreloadKind, Reader};
+
+    /// Figures of two engines and the mesh under two layouts.
+    pub(in super::super) fn made_up() -> (IoBench, Vec<(Run, Option<Timed>)>) {
+        let engines = [Reader::Engine(EngineKind::Soar), Reader::Engine(EngineKind::Kinetic), Reader::Mesh];
+        let mut runs = Vec::new();
+        for (n, reader) in engines.into_iter().enumerate() {
+            for layout in [LayoutKind::Row, LayoutKind::Ours] {
+                for preload in [PreloadKind::None, PreloadKind::Frustum] {
+                    let scale = if layout == LayoutKind::Row { 40 } else { 2 } * (n as u64 + 1);
+                    let frames = (0..5).map(|frame| FrameIo {
+                        frame,
+                        reads: 1000,
+                        record_bytes: 4000,
+                        pages: 10 * scale + frame,
+                        lines: 100 * scale,
+                        units: scale,
+                        realtime_pages: if frame == 0 { 10 * scale } else { frame },
+                        preloaded_pages: 1,
+                    });
+                    let run = Run {
+                        reader,
+                        layout,
+                        preload,
+                        record_bytes: 4,
+                        file_bytes: 1 << 30,
+                        frames: frames.collect(),
+                        trace: None,
+                    };
+                    let cost = UpdateCost {
+                        ms: 1.5,
+                        faults: Some(Faults { minor: 3, major: 2 }),
+                        read_bytes: Some(8192),
+                    };
+                    let measured = layout == LayoutKind::Ours && preload == PreloadKind::None && n < 2;
+                    let timed = measured.then(|| Timed {
+                        was_forgotten: true,
+                        cold: vec![cost; 5],
+                        warm: vec![UpdateCost { ms: 0.25, ..cost }; 5],
+                        peak_memory_bytes: None,
+                    });
+                    runs.push((run, timed));
+                }
+            }
+        }
+        let sums = |(run, timed): &(Run, Option<Timed>)| match timed {
+            Some(timed) => IoRun::of(run).with_times(timed),
+            None => IoRun::of(run),
+        };
+        let bench = IoBench {
+            terrain: "a & b <c>".into(),
+            flight: "f".into(),
+            tolerance_px: 1.0,
+            viewport_px: [800, 600],
+            page_bytes: 4096,
+            cache_mib: 128,
+            disk_pages_per_frame: 128,
+            block_m: 1000.0,
+            cap: Some(Cap { mib: 64, control_group_version: 1 }),
+            cap_note: None,
+            kernel_known: true,
+            runs: runs.iter().map(sums).collect(),
+        };
+        (bench, runs)
+    }
+
+    #[test]
+    fn the_directory_holds_what_the_page_names() {
+        let (bench, runs) = made_up();
+        let folder = tempfile::tempdir().unwrap();
+        let written = IoReport { bench: &bench, runs: &runs }.write(&folder.path().join("r")).unwrap();
+        assert_eq!(written.len(), if cfg!(feature = "plots") { 9 } else { 3 });
+        let page = std::fs::read_to_string(written.last().unwrap()).unwrap();
+        for file in &written[..written.len() - 1] {
+            let name = file.file_name().unwrap().to_str().unwrap();
+            assert!(file.is_file() && page.contains(&format!("href=\"{name}\"")), "{name}");
+        }
+        let json = std::fs::read_to_string(&written[1]).unwrap();
+        let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(value["runs"][2]["layout"], "ours");
+        assert_eq!(value["cap"]["mib"], 64);
+    }
+
+    #[test]
+    fn every_frame_has_a_line_and_every_name_a_cell() {
+        let (_, runs) = made_up();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f.csv");
+        write_io_frames_csv(&path, &runs).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 1 + 5 * runs.len());
+        assert!(lines.iter().all(|l| l.split(',').count() == HEADER.split(',').count()));
+        assert_eq!(lines[1], "soar,row,none,0,1000,4000,400,4000,40,400,1,,,,,");
+        assert_eq!(lines[11], "soar,ours,none,0,1000,4000,20,200,2,20,1,0.25,1.5,2,3,8192");
+        let named = serde_json::to_string(&FrameIo::default()).unwrap();
+        let fields: Vec<&str> = named.split('"').skip(1).step_by(2).collect();
+        assert!(HEADER.contains(&fields.join(",")));
+        let error = write_io_frames_csv(Path::new("/no/such/a.csv"), &runs).unwrap_err().to_string();
+        assert!(error.contains("/no/such/a.csv"), "{error}");
+    }
+}

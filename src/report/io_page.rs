@@ -1,0 +1,178 @@
+//! The page of a measurement of reading: two tables, what is needed and what it cost, and the plots.
+
+use super::PlotFile;
+use super::html::{begin, escaped, figures, push};
+use super::number::{exact, grouped, rounded};
+use crate::iobench::{IoBench, IoRun};
+
+/// The whole page.
+pub(super) fn page(bench: &IoBench, plots: &[PlotFile]) -> String {
+    let mut out = String::new();
+    let [wide, high] = bench.viewport_px;
+    let of = format!(
+        "Tolerance {} px, picture {wide} × {high} px, cache {} MiB, disk {} pages between frames",
+        exact(bench.tolerance_px),
+        bench.cache_mib,
+        bench.disk_pages_per_frame
+    );
+    begin(&mut out, &escaped(&format!("Reading: {}, {}", bench.terrain, bench.flight)), &of);
+    let cap = match (bench.cap, &bench.cap_note) {
+        (Some(cap), _) => format!(
+            "Measured with memory capped at {} MiB, page cache included (control group version {}).",
+            cap.mib, cap.control_group_version
+        ),
+        (None, Some(note)) => format!("Measured without a cap on memory: {}.", escaped(note)),
+        (None, None) => "Measured without a cap on memory.".into(),
+    };
+    push(
+        &mut out,
+        format_args!("<p>{cap} Figures leave the first frame out; a MB is 10<sup>6</sup> bytes.</p>\n"),
+    );
+    needed(&mut out, &bench.runs);
+    measured(&mut out, bench);
+    figures(&mut out, plots);
+    push(
+        &mut out,
+        format_args!(
+            "<h2>Files</h2>\n<ul>\n<li><a href=\"frames.csv\">frames.csv</a>: every frame</li>\n\
+<li><a href=\"summary.json\">summary.json</a>: sums</li>\n</ul>\n</body>\n</html>\n"
+        ),
+    );
+    out
+}
+
+fn table(out: &mut String, heads: &[&str], rows: impl Iterator<Item = Vec<String>>) {
+    push(out, format_args!("<div class=\"wide\"><table>\n<thead><tr>"));
+    heads.iter().for_each(|head| push(out, format_args!("<th>{head}</th>")));
+    push(out, format_args!("</tr></thead>\n<tbody>\n"));
+    for row in rows {
+        push(out, format_args!("<tr>"));
+        row.iter().for_each(|cell| push(out, format_args!("<td>{}</td>", escaped(cell))));
+        push(out, format_args!("</tr>\n"));
+    }
+    push(out, format_args!("</tbody>\n</table></div>\n"));
+}
+
+fn needed(out: &mut String, runs: &[IoRun]) {
+    push(
+        out,
+        format_args!(
+            "<h2>Needed</h2>\n<p>Counted, a frame. <b>mesh</b> is all that a frame's mesh needs, whoever has it in memory already.</p>\n"
+        ),
+    );
+    let heads = [
+        "Engine",
+        "Layout",
+        "Preloading",
+        "File, MB",
+        "Records",
+        "Record bytes",
+        "64 B lines",
+        "4 KiB pages",
+        "64 KiB units",
+        "Needed, MB",
+        "In real time, MB",
+        "Worst, MB",
+        "Preloaded, MB",
+        "Late pages, sum",
+    ];
+    let row = |r: &IoRun| {
+        vec![
+            r.engine.clone(),
+            r.layout.clone(),
+            r.prefetch.clone(),
+            grouped(r.file_mb, 0),
+            grouped(r.reads_per_frame_mean, 0),
+            grouped(r.record_bytes_per_frame_mean, 0),
+            grouped(r.distinct_lines_per_frame_mean, 0),
+            grouped(r.distinct_pages_per_frame_mean, 1),
+            grouped(r.distinct_units_per_frame_mean, 1),
+            rounded(r.needed_mb),
+            rounded(r.realtime_mb),
+            rounded(r.realtime_mb_max),
+            rounded(r.preloaded_mb),
+            grouped(r.late_pages as f64, 0),
+        ]
+    };
+    table(out, &heads, runs.iter().map(row));
+}
+
+fn measured(out: &mut String, bench: &IoBench) {
+    push(out, format_args!("<h2>Measured</h2>\n"));
+    if !bench.kernel_known {
+        push(
+            out,
+            format_args!("<p>This system does not tell of page faults and reads: they are not known.</p>\n"),
+        );
+    }
+    let known = |value: Option<f64>, decimals| value.map_or("–".to_owned(), |v| grouped(v, decimals));
+    let mut rows = Vec::new();
+    for r in &bench.runs {
+        if r.update_ms.is_some() {
+            let count = |v: Option<u64>| known(v.map(|v| v as f64), 0);
+            rows.push(vec![
+                r.engine.clone(),
+                r.layout.clone(),
+                "engine over the map".into(),
+                known(r.update_ms, 3),
+                known(r.update_ms_cold, 3),
+                known(r.io_ms_p99, 3),
+                known(r.first_frame_io_ms, 1),
+                count(r.frame_thread_major_faults),
+                known(r.disk_read_mb_total, 1),
+                known(r.peak_rss_mb, 1),
+            ]);
+        }
+        for (how, cost) in [("pages by map", r.scratch_map), ("pages by read", r.scratch_pread)] {
+            rows.extend(cost.map(|c| {
+                vec![
+                    r.engine.clone(),
+                    r.layout.clone(),
+                    how.into(),
+                    "–".into(),
+                    grouped(c.frame_ms, 3),
+                    grouped(c.frame_ms_p99, 3),
+                    grouped(c.first_frame_ms, 1),
+                    known(c.major_faults.map(|v| v as f64), 0),
+                    known(c.disk_read_mb_total, 1),
+                    "–".into(),
+                ]
+            }));
+        }
+    }
+    let heads = [
+        "Engine",
+        "Layout",
+        "What",
+        "Warm, ms a frame",
+        "Cold, ms a frame",
+        "Waiting p99, ms",
+        "First frame waits, ms",
+        "Major faults, sum",
+        "Read, MB",
+        "Peak memory, MB",
+    ];
+    table(out, &heads, rows.into_iter());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::io::tests::made_up;
+    use super::*;
+
+    #[test]
+    fn the_page_is_whole_and_names_stay_in_their_place() {
+        let (mut bench, _) = made_up();
+        bench.cap = None;
+        bench.cap_note = Some("no <rights>".into());
+        bench.kernel_known = false;
+        let page = page(&bench, &[]);
+        assert!(page.contains("a &amp; b &lt;c&gt;") && page.contains("no &lt;rights&gt;"));
+        assert!(page.contains("not known") && !page.contains("<c>"));
+        for tag in ["table", "tr", "td", "th", "div", "p", "h2", "ul", "li"] {
+            let opened =
+                page.matches(&format!("<{tag}>")).count() + page.matches(&format!("<{tag} ")).count();
+            assert_eq!(opened, page.matches(&format!("</{tag}>")).count(), "{tag}");
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! The verb iobench: counts that repeat and agree with replay, fields, refusals, the cap.
+
+use crate::support::{Bench, fields, text};
+use serde_json::Value;
+
+const RUN_FIELDS: [&str; 31] = [
+    "engine",
+    "layout",
+    "prefetch",
+    "frames",
+    "record_bytes",
+    "file_mb",
+    "reads_per_frame_mean",
+    "record_bytes_per_frame_mean",
+    "distinct_pages_per_frame_mean",
+    "distinct_lines_per_frame_mean",
+    "distinct_units_per_frame_mean",
+    "needed_mb",
+    "realtime_mb",
+    "preloaded_mb",
+    "realtime_mb_max",
+    "first_frame_mb",
+    "late_pages",
+    "late_frames",
+    "pages_touched_total",
+    "record_bytes_touched_total",
+    "update_ms",
+    "update_ms_cold",
+    "io_ms_p99",
+    "first_frame_io_ms",
+    "frame_thread_major_faults",
+    "frame_thread_minor_faults",
+    "first_frame_major_faults",
+    "disk_read_mb_total",
+    "peak_rss_mb",
+    "scratch_map",
+    "scratch_pread",
+];
+
+const PLAIN: [&str; 5] = ["iobench", "land.iqt", "--flight", "land.flight", "--json"];
+
+fn with<'a>(flags: &[&'a str]) -> Vec<&'a str> {
+    [&PLAIN[..], flags].concat()
+}
+
+fn runs(value: &Value) -> &Vec<Value> {
+    value["runs"].as_array().unwrap()
+}
+
+fn find<'v>(value: &'v Value, engine: &str, layout: &str, prefetch: &str) -> &'v Value {
+    let is = |r: &&Value| r["engine"] == engine && r["layout"] == layout && r["prefetch"] == prefetch;
+    runs(value).iter().find(is).unwrap()
+}
+
+#[test]
+fn every_engine_and_layout_has_a_run_with_every_field() {
+    let bench = Bench::with_flight();
+    let value = bench.json(&PLAIN);
+    assert_eq!(runs(&value).len(), 4 * 4, "three engines and the mesh, four layouts");
+    for run in runs(&value) {
+        let names = fields(run);
+        assert!(RUN_FIELDS.iter().all(|field| names.contains(field)), "{names:?}");
+        assert!(names.iter().all(|name| RUN_FIELDS.contains(name)), "{names:?}");
+        let measured = run["layout"] == "ours" && run["engine"] != "mesh";
+        assert_eq!(run["update_ms"].is_number(), measured);
+        assert!(run["scratch_map"].is_null());
+        assert!(run["needed_mb"].as_f64() >= run["realtime_mb"].as_f64());
+    }
+    for field in
+        ["terrain", "flight", "tolerance_px", "viewport_px", "cache_mib", "page_bytes", "kernel_known"]
+    {
+        assert!(!value[field].is_null(), "{field}");
+    }
+    assert!(value["cap"].is_null() && value["cap_note"].is_null());
+    if cfg!(target_os = "linux") {
+        let run = find(&value, "soar", "ours", "none");
+        for field in ["frame_thread_major_faults", "disk_read_mb_total", "io_ms_p99"] {
+            assert!(run[field].is_number(), "{field}");
+        }
+    }
+}
+
+/// All figures but the measured ones.
+fn counts(value: &Value) -> Vec<Value> {
+    let mut runs = runs(value).clone();
+    for run in &mut runs {
+        let run = run.as_object_mut().unwrap();
+        run.retain(|name, _| {
+            !["_ms", "ms_", "faults", "disk_read", "rss"].iter().any(|part| name.contains(part))
+        });
+    }
+    runs
+}
+
+#[test]
+fn counts_repeat_and_are_replays() {
+    let bench = Bench::with_flight();
+    let flags = with(&["--prefetch", "none,frustum", "--cache", "1"]);
+    let value = bench.json(&flags);
+    assert_eq!(counts(&value), counts(&bench.json(&flags)));
+    for engine in ["soar", "smart", "kinetic"] {
+        let replay =
+            bench.json(&["replay", "land.iqt", "--flight", "land.flight", "--engine", engine, "--json"]);
+        for prefetch in ["none", "frustum"] {
+            let run = find(&value, engine, "ours", prefetch);
+            for sum in ["pages_touched_total", "record_bytes_touched_total"] {
+                assert_eq!(run[sum], replay[sum], "{engine} {sum}");
+            }
+        }
+    }
+    let [soar, mesh] = ["soar", "mesh"].map(|engine| find(&value, engine, "row", "none"));
+    assert_eq!(soar["pages_touched_total"], mesh["pages_touched_total"]);
+}
+
+#[test]
+fn frames_report_and_table_are_written() {
+    let bench = Bench::with_flight();
+    let args =
+        ["iobench", "land.iqt", "--flight", "land.flight", "--engines", "kinetic", "--layouts", "row,ours"];
+    let table = bench.good(&[&args[..], &["--frames", "f.csv", "-o", "report"]].concat());
+    assert!(table.contains("kinetic") && table.contains("mesh") && table.contains("report.html"), "{table}");
+    let csv = std::fs::read_to_string(bench.path("f.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 4 * 40);
+    assert!(csv.starts_with("engine,layout,prefetch,frame,reads,"));
+    for file in ["report.html", "summary.json", "frames.csv"] {
+        assert!(bench.path("report").join(file).is_file(), "{file}");
+    }
+    let summary = std::fs::read_to_string(bench.path("report/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(runs(&summary).len(), 4);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn scratch_files_are_read_and_gone() {
+    let bench = Bench::with_flight();
+    let before = bench.names();
+    let value = bench.json(&with(&["--engines", "soar", "--layouts", "row,ours", "--scratch", "."]));
+    assert_eq!(bench.names(), before);
+    for layout in ["row", "ours"] {
+        let run = find(&value, "soar", layout, "none");
+        for how in ["scratch_map", "scratch_pread"] {
+            assert!(run[how]["frame_ms"].as_f64() >= Some(0.0), "{run}");
+            assert!(run[how]["major_faults"].is_number() && run[how]["disk_read_mb_total"].is_number());
+        }
+    }
+    assert!(find(&value, "mesh", "row", "none")["scratch_map"].is_null());
+}
+
+#[test]
+fn a_cap_holds_or_is_said_not_to() {
+    let bench = Bench::with_flight();
+    let value = bench.json(&with(&["--engines", "kinetic", "--layouts", "ours", "--cap", "256"]));
+    assert_eq!(runs(&value).len(), 2);
+    let capped = value["cap"].is_object();
+    assert_eq!(value["cap_note"].is_string(), !capped, "one of both: {value}");
+    if capped {
+        assert_eq!(value["cap"]["mib"], 256);
+        assert!([1, 2].map(Value::from).contains(&value["cap"]["control_group_version"]));
+    }
+    let output =
+        bench.run(&["iobench", "land.iqt", "--flight", "land.flight", "--layouts", "ours", "--cap", "256"]);
+    let table = text(&output.stdout);
+    assert!(
+        table.contains(if capped { "memory capped at 256 MiB" } else { "memory not capped: " }),
+        "{table}"
+    );
+    // What fails in the copy fails as it does without.
+    assert!(
+        bench
+            .bad(1, &["iobench", "none.iqt", "--flight", "land.flight", "--cap", "256"])
+            .contains("none.iqt")
+    );
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let bench = Bench::with_flight();
+    let wrong: [&[&str]; 14] = [
+        &["--engines", "roam"],
+        &["--engines", "naive"],
+        &["--engines", "soar,soar"],
+        &["--layouts", "column"],
+        &["--layouts", "row,row"],
+        &["--prefetch", "all"],
+        &["--prefetch", "none,none"],
+        &["--cache", "0"],
+        &["--cap", "0"],
+        &["--cap-group", "."],
+        &["--cap", "64", "--cap-group", "."],
+        &["--disk-pages", "0"],
+        &["--block", "-1"],
+        &["--tolerance-px", "0"],
+    ];
+    for flags in wrong {
+        bench.bad(2, &with(flags));
+    }
+    for engine in ["soar", "smart", "kinetic"] {
+        let message = bench.bad(2, &with(&["--prefetch", "deadline", "--engines", engine]));
+        assert!(message.contains("not available") && message.contains(engine), "{message}");
+    }
+    assert!(!bench.good(&["iobench", "--help"]).contains("deadline"));
+    let cases: [(&[&str], &str); 4] = [
+        (&["--scratch", "none"], "none"),
+        (&["-o", "land.tif"], "folder"),
+        (&["--frames", "land.flight"], "input"),
+        (&["--frames", "no/f.csv"], "no/f.csv"),
+    ];
+    for (flags, word) in cases {
+        let message = bench.bad(1, &with(flags));
+        assert!(message.contains(word), "{message}");
+    }
+    assert!(bench.bad(1, &["iobench", "none.iqt", "--flight", "land.flight"]).contains("none.iqt"));
+    assert!(bench.bad(1, &["iobench", "land.iqt", "--flight", "none.flight"]).contains("none.flight"));
+    assert!(bench.bad(1, &["iobench", "land.tif", "--flight", "land.flight"]).contains("land.tif"));
+}
