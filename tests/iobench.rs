@@ -6,7 +6,7 @@ use common::terrain_of;
 use std::sync::LazyLock;
 use terrasoar::flight::FlightFrame;
 use terrasoar::flyover::{EngineKind, Quality, replay};
-use terrasoar::iobench::{CountOptions, IoRun, LayoutKind, PreloadKind, Reader, Run, count};
+use terrasoar::iobench::{CountOptions, IoRun, LayoutKind, Prefetch, Reader, Run, count};
 use terrasoar::refine::Culling;
 use terrasoar::view::View;
 use terrasoar_layout::build::BuildOptions;
@@ -49,7 +49,7 @@ fn views(frames: &[FlightFrame], quality: Quality) -> Vec<View> {
 fn options() -> CountOptions {
     CountOptions {
         layouts: LayoutKind::ALL.to_vec(),
-        preloads: vec![PreloadKind::None, PreloadKind::Frustum],
+        preloads: vec![Prefetch::None, Prefetch::Frustum],
         cache_pages: 1 << 15,
         disk_pages: 128,
         block_m: 1000.0,
@@ -67,7 +67,7 @@ fn fly(terrain: &Terrain, frames: &[FlightFrame], reader: Reader, options: &Coun
     runs
 }
 
-fn find(runs: &[Run], layout: LayoutKind, preload: PreloadKind) -> IoRun {
+fn find(runs: &[Run], layout: LayoutKind, preload: Prefetch) -> IoRun {
     IoRun::of(runs.iter().find(|r| r.layout == layout && r.preload == preload).unwrap())
 }
 
@@ -100,12 +100,12 @@ fn what_is_counted_is_consistent() {
     for reader in ENGINES.map(Reader::Engine).into_iter().chain([Reader::Mesh]) {
         let options = CountOptions { trace: true, cache_pages: 40, disk_pages: 5, ..options() };
         for run in fly(&terrain, &frames, reader, &options) {
-            assert_eq!(run.trace.is_some(), run.preload == PreloadKind::None);
+            assert_eq!(run.trace.is_some(), run.preload == Prefetch::None);
             for (i, f) in run.frames.iter().enumerate() {
                 assert_eq!((f.frame, f.record_bytes), (i as u64, f.reads * run.record_bytes));
                 assert!(f.units <= f.pages && f.pages <= f.lines && f.lines <= 2 * f.reads);
                 assert!(f.realtime_pages <= f.pages);
-                assert!(f.preloaded_pages <= if run.preload == PreloadKind::None || i == 0 { 0 } else { 5 });
+                assert!(f.preloaded_pages <= if run.preload == Prefetch::None || i == 0 { 0 } else { 5 });
                 if let Some(trace) = &run.trace {
                     let mut pages = trace[i].clone();
                     pages.sort_unstable();
@@ -136,12 +136,12 @@ fn layouts_and_engines_keep_their_distance() {
     let frames = flight(&LARGE, 40, 40.0);
     let soar = fly(&LARGE, &frames, Reader::Engine(EngineKind::Soar), &options());
     let kinetic = fly(&LARGE, &frames, Reader::Engine(EngineKind::Kinetic), &options());
-    let pages = |layout| find(&soar, layout, PreloadKind::None).distinct_pages_per_frame_mean;
+    let pages = |layout| find(&soar, layout, Prefetch::None).distinct_pages_per_frame_mean;
     let [row, tiled, interleaved, ours] = LayoutKind::ALL.map(pages);
     assert!(2.0 * ours <= interleaved, "{ours} {interleaved}");
     // Tiles of full detail are worse than rows where far ground needs few samples of many.
     assert!(10.0 * ours <= row && row < tiled, "{ours} {tiled} {row}");
-    let [all, few] = [&soar, &kinetic].map(|runs| find(runs, LayoutKind::Ours, PreloadKind::None));
+    let [all, few] = [&soar, &kinetic].map(|runs| find(runs, LayoutKind::Ours, Prefetch::None));
     assert!(few.record_bytes_per_frame_mean <= 0.03 * all.record_bytes_per_frame_mean);
     assert!(3.0 * few.distinct_pages_per_frame_mean <= 2.0 * all.distinct_pages_per_frame_mean);
 }
@@ -155,7 +155,7 @@ fn preloading_by_frustum_leaves_less_to_real_time() {
         let runs = fly(&LARGE, &frames, reader, &options);
         for layout in layouts.clone() {
             let [none, frustum] =
-                [PreloadKind::None, PreloadKind::Frustum].map(|preload| find(&runs, layout, preload));
+                [Prefetch::None, Prefetch::Frustum].map(|preload| find(&runs, layout, preload));
             assert_eq!(none.needed_mb, frustum.needed_mb);
             assert!(none.late_pages > 0 && frustum.preloaded_mb > 0.0 && none.preloaded_mb == 0.0);
             assert!(5 * frustum.late_pages <= none.late_pages, "{reader:?} {layout:?}");
@@ -169,9 +169,9 @@ fn a_larger_cache_never_misses_more() {
     let frames = flight(&terrain, 30, 40.0);
     let there_and_back: Vec<FlightFrame> = frames.iter().chain(frames.iter().rev()).copied().collect();
     let late = |cache_pages| {
-        let options = CountOptions { cache_pages, preloads: vec![PreloadKind::None], ..options() };
+        let options = CountOptions { cache_pages, preloads: vec![Prefetch::None], ..options() };
         let runs = fly(&terrain, &there_and_back, Reader::Mesh, &options);
-        find(&runs, LayoutKind::Soar, PreloadKind::None).late_pages
+        find(&runs, LayoutKind::Soar, Prefetch::None).late_pages
     };
     let lates = [1, 20, 100, 400, 1 << 20].map(late);
     assert!(lates.windows(2).all(|w| w[1] <= w[0]), "{lates:?}");
@@ -181,7 +181,7 @@ fn a_larger_cache_never_misses_more() {
 #[test]
 fn deadlines_are_refused() {
     let terrain = ground(5);
-    let options = CountOptions { preloads: vec![PreloadKind::Deadline], ..options() };
+    let options = CountOptions { preloads: vec![Prefetch::Deadline], ..options() };
     for engine in ENGINES {
         let error = count(&terrain, &[], Culling::Vertices, Reader::Engine(engine), &options, &mut |_| {})
             .unwrap_err();

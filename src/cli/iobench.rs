@@ -6,14 +6,14 @@ use super::progress::Progress;
 use super::replay::QualityArgs;
 use super::{WrongUsage, parse, terrain};
 use anyhow::{Result, bail};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
 use terrasoar::iobench::scratch::{Access, ScratchFile};
 use terrasoar::iobench::{
-    CountOptions, IoBench, IoRun, LayoutKind, PreloadKind, Reader, Run, ScratchCost, Timed, count, kernel,
-    time,
+    CountOptions, IoBench, IoRun, LayoutKind, PoolOptions, Pooled, Prefetch, ReadBy, Reader, Run,
+    ScratchCost, StreamCost, Timed, count, fly_pooled, kernel, time,
 };
 use terrasoar::report::{IoReport, write_io_frames_csv};
 use terrasoar::view::View;
@@ -23,6 +23,7 @@ use terrasoar_layout::bytes::PAGE_BYTES;
 ///
 /// Counts, which repeat: the records that each frame reads, the pages they lie on, and those of them that a page cache of the stated size does not hold when they are
 /// needed. Measured, cold and warm: update times, page faults and bytes read over the file itself. The row mesh is all that a frame's mesh needs, whoever has it in memory already.
+/// Rows whose source is pool fly kinetic at a steady pace over pages that threads read into --cache of memory: no frame waits, and what came too late is told.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -31,7 +32,8 @@ Examples:
   terrasoar iobench alps.iqt --flight low.flight --cap 128 --scratch /var/tmp --json
 
 Layouts: row (row by row, 20-byte records), tiled (Z-order, 20 bytes), soar (SOAR's interleaved quadtrees, 20 bytes), ours (the file as it is).
-Prefetch frustum extends the view as Qiu et al. do: back by --block, ahead by a frame's way; a disk of stated speed serves it between frames.")]
+Prefetch: none (pages are read when they are lacked), frustum (the view extended as Qiu et al. do: back by --block, ahead by a frame's way; what is counted
+has a disk of stated speed between frames), deadline (by the frame in which live ranges say that a page will be needed; kinetic over a pool only).")]
 pub(super) struct Args {
     /// Terrain file (.iqt)
     file: PathBuf,
@@ -45,14 +47,20 @@ pub(super) struct Args {
     #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "row,tiled,soar,ours", value_parser = layout())]
     layouts: Vec<LayoutKind>,
     /// What is loaded before it is needed
-    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "none", value_parser = preload())]
-    prefetch: Vec<PreloadKind>,
-    /// Size of the page cache that is counted with
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "none,deadline", value_parser = preload())]
+    prefetch: Vec<Prefetch>,
+    /// Size of the page cache that is counted with, and of the pool that is flown over
     #[arg(long, value_name = "MIB", default_value = "128", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
     cache: u64,
     /// Pages that the disk serves between two frames when preloading: 16.7 ms at 130 us a read
     #[arg(long, value_name = "N", default_value = "128", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
     disk_pages: u64,
+    /// Pace of flights over the pool, in frames a second; 0 for as fast as frames are made
+    #[arg(long, value_name = "N", default_value = "60", value_parser = parse::not_negative)]
+    fps: f64,
+    /// What reads pages into the pool: threads, or one with an io_uring
+    #[arg(long, value_name = "HOW", default_value = ReadBy::default().name(), value_parser = read_by())]
+    reads: ReadBy,
     /// Metres that the view is moved back when preloading; a sixteenth of the terrain's side if not given
     #[arg(long, value_name = "M", value_parser = parse::not_negative)]
     block: Option<f64>,
@@ -90,11 +98,14 @@ fn layout() -> impl TypedValueParser<Value = LayoutKind> {
     })
 }
 
-fn preload() -> impl TypedValueParser<Value = PreloadKind> {
-    let value = |kind: PreloadKind| PossibleValue::new(kind.name()).hide(kind == PreloadKind::Deadline);
-    PossibleValuesParser::new(PreloadKind::ALL.map(value)).map(|word| {
-        PreloadKind::ALL.into_iter().find(|kind| kind.name() == word).unwrap_or(PreloadKind::None)
-    })
+fn preload() -> impl TypedValueParser<Value = Prefetch> {
+    PossibleValuesParser::new(Prefetch::ALL.map(Prefetch::name))
+        .map(|word| Prefetch::ALL.into_iter().find(|kind| kind.name() == word).unwrap_or(Prefetch::None))
+}
+
+fn read_by() -> impl TypedValueParser<Value = ReadBy> {
+    PossibleValuesParser::new(ReadBy::ALL.map(ReadBy::name))
+        .map(|word| ReadBy::ALL.into_iter().find(|how| how.name() == word).unwrap_or_default())
 }
 
 impl Args {
@@ -112,12 +123,9 @@ impl Args {
         twice("--engines", self.engines.iter().map(|e| e.name()))?;
         twice("--layouts", self.layouts.iter().map(|l| l.name()))?;
         twice("--prefetch", self.prefetch.iter().map(|p| p.name()))?;
-        if self.prefetch.contains(&PreloadKind::Deadline) {
-            let name = self.engines.first().map_or("this engine", |e| e.name());
-            return Err(WrongUsage(format!(
-                "--prefetch deadline is not available for {name}; preload by frustum or not at all"
-            ))
-            .into());
+        if self.prefetch == [Prefetch::Deadline] && !self.flies_pooled() {
+            let what = "--prefetch deadline is for the engine kinetic over the layout ours; add them, or preload by frustum or not at all";
+            return Err(WrongUsage(what.into()).into());
         }
         if let Some(folder) = &self.scratch
             && !folder.is_dir()
@@ -134,6 +142,11 @@ impl Args {
             check_stream(csv, &[&self.file, &self.flight])?;
         }
         Ok(())
+    }
+
+    /// Whether there are flights over a pool: of kinetic, over the file as it is.
+    fn flies_pooled(&self) -> bool {
+        self.engines.contains(&EngineKind::Kinetic) && self.layouts.contains(&LayoutKind::Ours)
     }
 
     /// The engines and the mesh.
@@ -173,12 +186,19 @@ pub(super) fn run(args: &Args) -> Result<()> {
         let timed = timed_of(&run);
         (run, timed)
     };
-    let runs: Vec<(Run, Option<Timed>)> = runs.into_iter().map(with_times).collect();
+    let mut runs: Vec<(Run, Option<Timed>)> = runs.into_iter().map(with_times).collect();
     let scratch = match &args.scratch {
         Some(folder) => replayed(folder, &runs, &standing, &progress)?,
         None => Vec::new(),
     };
+    let pooled = streamed(args, &views, &runs, &standing, &progress)?;
     drop(progress);
+    let counted = runs.len();
+    let mut streams = Vec::new();
+    for (run, pooled) in pooled {
+        streams.push(StreamCost::of(&pooled));
+        runs.push((run, Some(pooled.timed)));
+    }
     let mut sums: Vec<IoRun> = runs
         .iter()
         .map(|(run, timed)| match timed {
@@ -186,6 +206,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
             None => IoRun::of(run),
         })
         .collect();
+    sums[counted..].iter_mut().zip(streams).for_each(|(sum, stream)| sum.stream = Some(stream));
     for (i, map, pread) in scratch {
         sums[i].scratch_map = Some(map);
         sums[i].scratch_pread = Some(pread);
@@ -198,6 +219,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
         page_bytes: PAGE_BYTES as u64,
         cache_mib: args.cache,
         disk_pages_per_frame: args.disk_pages,
+        frames_per_second: args.fps,
+        reads: args.reads.name().into(),
         block_m,
         cap: standing.cap,
         cap_note: standing.note,
@@ -230,7 +253,8 @@ fn counted(args: &Args, views: &[View], progress: &Progress) -> Result<(Vec<Run>
     let block_m = args.block.unwrap_or(f64::from(grid.side_steps()) / 16.0 * dx.max(dy));
     let options = CountOptions {
         layouts: args.layouts.clone(),
-        preloads: args.prefetch.clone(),
+        // What is counted has no deadlines; the mesh is what flights over the pool are measured by.
+        preloads: counted_preloads(args),
         cache_pages: usize::try_from(args.cache * (1 << 20) / PAGE_BYTES as u64).unwrap_or(usize::MAX),
         disk_pages: usize::try_from(args.disk_pages).unwrap_or(usize::MAX),
         block_m,
@@ -245,9 +269,47 @@ fn counted(args: &Args, views: &[View], progress: &Progress) -> Result<(Vec<Run>
     Ok((runs, block_m))
 }
 
+fn counted_preloads(args: &Args) -> Vec<Prefetch> {
+    let without: Vec<Prefetch> = args.prefetch.iter().copied().filter(|p| *p != Prefetch::Deadline).collect();
+    if without.is_empty() { vec![Prefetch::None] } else { without }
+}
+
+/// Flights over a pool, a way of preloading each.
+fn streamed(
+    args: &Args,
+    views: &[View],
+    counted: &[(Run, Option<Timed>)],
+    standing: &Standing,
+    progress: &Progress,
+) -> Result<Vec<(Run, Pooled)>> {
+    if !args.flies_pooled() {
+        return Ok(Vec::new());
+    }
+    let mesh = counted
+        .iter()
+        .map(|(run, _)| run)
+        .find(|run| run.reader == Reader::Mesh && run.layout == LayoutKind::Ours);
+    let mesh_pages: Vec<u64> = mesh.map_or(Vec::new(), |run| run.frames.iter().map(|f| f.pages).collect());
+    let terrain = terrain::open(&args.file)?;
+    let flight = |prefetch: &Prefetch| {
+        let options = PoolOptions {
+            cache_bytes: args.cache << 20,
+            prefetch: *prefetch,
+            culling: args.quality.quality().culling,
+            read_by: args.reads,
+            frames_per_second: args.fps,
+        };
+        progress.begin(format!("pool, {}", prefetch.name()), 2 * views.len() as u64);
+        let pooled = standing
+            .within(|| Ok(fly_pooled(&args.file, views, options, &mut |done| progress.set(done))?))?;
+        Ok((pooled.run(&terrain, *prefetch, &mesh_pages), pooled))
+    };
+    args.prefetch.iter().map(flight).collect()
+}
+
 /// Whether a run is one of the file as it is, without preloading.
 fn is_plain(run: &Run) -> bool {
-    run.layout == LayoutKind::Ours && run.preload == PreloadKind::None
+    run.layout == LayoutKind::Ours && run.preload == Prefetch::None
 }
 
 /// Times each engine over the file as it is; the file must not be mapped meanwhile.
@@ -257,7 +319,7 @@ fn measured(
     standing: &Standing,
     progress: &Progress,
 ) -> Result<Vec<(Reader, Timed)>> {
-    if !args.layouts.contains(&LayoutKind::Ours) || !args.prefetch.contains(&PreloadKind::None) {
+    if !args.layouts.contains(&LayoutKind::Ours) || !args.prefetch.contains(&Prefetch::None) {
         return Ok(Vec::new());
     }
     let culling = args.quality.quality().culling;
@@ -310,6 +372,7 @@ fn text(bench: &IoBench) -> String {
         [
             "engine",
             "layout",
+            "source",
             "prefetch",
             "pages",
             "lines",
@@ -318,7 +381,9 @@ fn text(bench: &IoBench) -> String {
             "realtime MB",
             "late pages",
             "update ms",
+            "p99",
             "cold ms",
+            "cold p99",
             "io ms p99",
             "major faults",
         ]
@@ -329,6 +394,7 @@ fn text(bench: &IoBench) -> String {
         rows.push(vec![
             r.engine.clone(),
             r.layout.clone(),
+            r.source.clone(),
             r.prefetch.clone(),
             format!("{:.1}", r.distinct_pages_per_frame_mean),
             format!("{:.0}", r.distinct_lines_per_frame_mean),
@@ -337,7 +403,9 @@ fn text(bench: &IoBench) -> String {
             format!("{:.4}", r.realtime_mb),
             grouped(r.late_pages),
             known(r.update_ms),
+            known(r.update_ms_p99),
             known(r.update_ms_cold),
+            known(r.update_ms_p99_cold),
             known(r.io_ms_p99),
             r.frame_thread_major_faults.map_or("-".to_owned(), grouped),
         ]);
@@ -354,6 +422,7 @@ fn text(bench: &IoBench) -> String {
     if bench.runs.iter().any(|r| r.scratch_map.is_some()) {
         out += &scratch_text(bench);
     }
+    out += &stream_text(bench);
     if let Some(cap) = bench.cap {
         out += &format!(
             "memory capped at {} MiB, page cache included (control group version {})\n",
@@ -367,6 +436,52 @@ fn text(bench: &IoBench) -> String {
         out += "page faults and bytes read are not known on this system\n";
     }
     out
+}
+
+/// What flights over a pool did, if there are any.
+fn stream_text(bench: &IoBench) -> String {
+    let heads = [
+        "prefetch",
+        "late pages",
+        "late error px",
+        "asked",
+        "come",
+        "lead",
+        "reads",
+        "ms a read",
+        "longest",
+        "peak MB",
+    ];
+    let row = |r: &IoRun| {
+        let s = r.stream.as_ref()?;
+        Some(vec![
+            r.prefetch.clone(),
+            grouped(r.late_pages),
+            format!("{:.2}", s.late_error_px_max),
+            grouped(s.pages_asked),
+            grouped(s.pages_come),
+            format!("{:.0}", s.lead_frames_max),
+            grouped(s.reads),
+            format!("{:.3}", s.read_ms_mean),
+            format!("{:.1}", s.read_ms_max),
+            r.peak_rss_mb.map_or("-".to_owned(), |mb| format!("{mb:.0}")),
+        ])
+    };
+    let rows: Vec<Vec<String>> = bench.runs.iter().filter_map(row).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let pace = if bench.frames_per_second > 0.0 {
+        format!("{} frames a second", bench.frames_per_second)
+    } else {
+        "as fast as frames are made".to_owned()
+    };
+    let head = heads.map(str::to_owned).to_vec();
+    format!(
+        "over the pool, {pace}, read by {}; cold, sums and largest of all frames but the first\n{}",
+        bench.reads,
+        columns(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
+    )
 }
 
 fn scratch_text(bench: &IoBench) -> String {

@@ -5,15 +5,15 @@
 //! input gives equal counts.
 
 use super::cache::PageCache;
-use super::frustum::ExtendedView;
 use super::layouts::{LINE_BYTES, Layout, LayoutKind, UNIT_BYTES};
-use super::{FrameIo, IoBenchError, PreloadKind, Reader, Run};
+use super::{FrameIo, IoBenchError, Prefetch, Reader, Run};
 use crate::flyover::EngineKind;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::naive::Naive;
 use crate::refine::smart::Smart;
 use crate::refine::soar::Soar;
 use crate::refine::{Culling, Engine, Probe};
+use crate::stream::ExtendedView;
 use crate::view::View;
 use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::record::RecordCodec;
@@ -29,7 +29,7 @@ pub struct CountOptions {
     /// Layouts to count under.
     pub layouts: Vec<LayoutKind>,
     /// Ways of preloading.
-    pub preloads: Vec<PreloadKind>,
+    pub preloads: Vec<Prefetch>,
     /// Pages that the cache holds.
     pub cache_pages: usize,
     /// Pages that the disk delivers between two frames.
@@ -52,7 +52,7 @@ pub fn count(
     options: &CountOptions,
     done: &mut dyn FnMut(u64),
 ) -> Result<Vec<Run>, IoBenchError> {
-    if options.preloads.contains(&PreloadKind::Deadline) {
+    if options.preloads.contains(&Prefetch::Deadline) {
         return Err(IoBenchError::NoDeadlines { reader });
     }
     let records = terrain
@@ -95,7 +95,7 @@ struct Sink<'s, 't, C: RecordCodec> {
 impl<C: RecordCodec> Sink<'_, '_, C> {
     fn fly(&mut self, mut engine: impl Engine) {
         let mut reads = Reads::default();
-        let extends = self.options.preloads.contains(&PreloadKind::Frustum);
+        let extends = self.options.preloads.contains(&Prefetch::Frustum);
         let mut before: Option<&View> = None;
         for (i, view) in self.views.iter().enumerate() {
             reads.0.clear();
@@ -131,7 +131,7 @@ struct LayoutCount<'t> {
 
 /// One way of preloading under one layout.
 struct Mode {
-    kind: PreloadKind,
+    kind: Prefetch,
     cache: PageCache,
     frames: Vec<FrameIo>,
     /// Pages loaded since the last frame.
@@ -140,7 +140,7 @@ struct Mode {
 
 impl<'t> LayoutCount<'t> {
     fn new(layout: Layout<'t>, options: &CountOptions) -> Self {
-        let mode = |kind: &PreloadKind| Mode {
+        let mode = |kind: &Prefetch| Mode {
             kind: *kind,
             cache: PageCache::new(options.cache_pages),
             frames: Vec::new(),
@@ -205,7 +205,7 @@ impl<'t> LayoutCount<'t> {
         let mut view = lines(plain);
         view.sort_unstable();
         let wanted = in_order_of_first_touch(lines(extension).into_iter());
-        for mode in self.modes.iter_mut().filter(|mode| mode.kind == PreloadKind::Frustum) {
+        for mode in self.modes.iter_mut().filter(|mode| mode.kind == Prefetch::Frustum) {
             let missing =
                 wanted.iter().filter(|p| view.binary_search(p).is_err() && !mode.cache.contains(**p));
             let loads: Vec<u64> = missing.take(disk_pages).copied().collect();
@@ -225,7 +225,7 @@ impl<'t> LayoutCount<'t> {
             record_bytes: layout.record_bytes(),
             file_bytes: layout.file_bytes(),
             frames: mode.frames,
-            trace: if mode.kind == PreloadKind::None { trace.clone() } else { None },
+            trace: if mode.kind == Prefetch::None { trace.clone() } else { None },
         })
     }
 }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`layouts`] | where a record lies under four layouts |
 //! | [`count()`] | a flight's reads, counted: pages, lines, what a cache of a stated size misses, with and without preloading |
-//! | [`frustum`] | preloading by an extended frustum (Qiu et al.) |
+//! | [`fly_pooled`] | a flight over pages read by threads into a pool |
 //! | [`time()`], [`kernel`] | a flight over the mapped file, cold and warm, and what the kernel says about it |
 //! | [`scratch`] | other layouts on a real disk |
 //! | [`IoBench`], [`IoRun`] | sums of all that, in the field names of reports |
@@ -13,9 +13,9 @@
 
 mod cache;
 mod count;
-pub mod frustum;
 pub mod kernel;
 pub mod layouts;
+mod pooled;
 pub mod scratch;
 mod summary;
 mod timed;
@@ -23,8 +23,11 @@ mod timed;
 pub use cache::PageCache;
 pub use count::{CountOptions, count};
 pub use layouts::LayoutKind;
-pub use summary::{Cap, IoBench, IoRun, ScratchCost};
+pub use pooled::{PoolOptions, Pooled, ReadBy, fly_pooled};
+pub use summary::{Cap, IoBench, IoRun, ScratchCost, StreamCost};
 pub use timed::{Timed, UpdateCost, time};
+
+pub use crate::stream::Prefetch;
 
 use crate::flyover::EngineKind;
 use serde::Serialize;
@@ -39,6 +42,8 @@ const PAGE_BYTES: u64 = terrasoar_layout::bytes::PAGE_BYTES as u64;
 pub enum Reader {
     /// An engine, its own reads: one that remembers vertices reads them once.
     Engine(EngineKind),
+    /// Kinetic over pages that are read into a pool by the time they are needed.
+    Pool,
     /// The mesh itself: every record that a refinement of the frame from nothing looks at, whoever has it in memory already. SOAR reads just these.
     Mesh,
 }
@@ -48,6 +53,7 @@ impl Reader {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Engine(engine) => engine.name(),
+            Self::Pool => EngineKind::Kinetic.name(),
             Self::Mesh => "mesh",
         }
     }
@@ -56,32 +62,16 @@ impl Reader {
     const fn engine(self) -> EngineKind {
         match self {
             Self::Engine(engine) => engine,
+            Self::Pool => EngineKind::Kinetic,
             Self::Mesh => EngineKind::Soar,
         }
     }
-}
 
-/// What is loaded before it is needed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum PreloadKind {
-    /// Nothing.
-    None,
-    /// What lies in the extended view frustum.
-    Frustum,
-    /// What will be needed first, by the live ranges of the engine.
-    Deadline,
-}
-
-impl PreloadKind {
-    /// All ways.
-    pub const ALL: [Self; 3] = [Self::None, Self::Frustum, Self::Deadline];
-
-    /// The word the command line uses.
-    pub const fn name(self) -> &'static str {
+    /// Where its records come from, in the word that reports use.
+    pub const fn source(self) -> &'static str {
         match self {
-            Self::None => "none",
-            Self::Frustum => "frustum",
-            Self::Deadline => "deadline",
+            Self::Pool => "pool",
+            Self::Engine(_) | Self::Mesh => "map",
         }
     }
 }
@@ -94,7 +84,7 @@ pub enum IoBenchError {
     #[error("{0}: refinement needs a mapped or in-memory terrain")]
     NotInAddressSpace(String),
     /// The reader does not know when it will need what.
-    #[error("preloading by deadline is not available for {}; preload by frustum or not at all", reader.name())]
+    #[error("preloading by deadline needs the engine kinetic over a pool; preload {} by frustum or not at all", reader.name())]
     NoDeadlines {
         /// The reader.
         reader: Reader,
@@ -166,19 +156,19 @@ pub struct Run {
     /// The layout.
     pub layout: LayoutKind,
     /// What was loaded ahead.
-    pub preload: PreloadKind,
+    pub preload: Prefetch,
     /// Bytes a record.
     pub record_bytes: u64,
     /// Bytes of a file in this layout.
     pub file_bytes: u64,
     /// The frames.
     pub frames: Vec<FrameIo>,
-    /// Pages of each frame in the order they were first read, if asked for; with [`PreloadKind::None`] only.
+    /// Pages of each frame in the order they were first read, if asked for; with [`Prefetch::None`] only.
     pub trace: Option<Vec<Vec<u64>>>,
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use crate::view::{View, Viewport};
     use glam::DVec3;
     use terrasoar_layout::build::{BuildOptions, Silent, build};
@@ -200,7 +190,7 @@ mod tests {
     }
 
     /// 2^k + 1 samples a side.
-    pub(super) fn square_terrain(k: u32) -> Terrain {
+    pub(crate) fn square_terrain(k: u32) -> Terrain {
         terrain([(1 << k) + 1; 2])
     }
 
@@ -210,7 +200,7 @@ mod tests {
     }
 
     /// A view from a point given in fractions of the terrain's extent.
-    pub(super) fn view_at(terrain: &Terrain, at: [f64; 2], yaw_rad: f64) -> View {
+    pub(crate) fn view_at(terrain: &Terrain, at: [f64; 2], yaw_rad: f64) -> View {
         let [w, h] = terrain.grid().extent_m();
         View {
             eye_m: DVec3::new(at[0] * w, at[1] * h, 520.0),

@@ -4,9 +4,11 @@
 //! frames say so in their names. What was not measured or is not known is `None`.
 
 use super::kernel::Faults;
-use super::{FrameIo, PAGE_BYTES, Run, Timed, UpdateCost};
+use super::{FrameIo, PAGE_BYTES, Pooled, Run, Timed, UpdateCost};
 use crate::stats::TimeSpread;
+use crate::stream::StreamFrame;
 use serde::Serialize;
+use terrasoar_layout::loader::LoaderStats;
 
 /// All figures of a flight, and with what means they were taken.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -25,6 +27,10 @@ pub struct IoBench {
     pub cache_mib: u64,
     /// Pages that the counting run's disk delivers between two frames.
     pub disk_pages_per_frame: u64,
+    /// Pace of flights over the pool; 0 for as fast as frames are made.
+    pub frames_per_second: f64,
+    /// What reads pages into the pool.
+    pub reads: String,
     /// How far the frustum is moved back for preloading, in metres.
     pub block_m: f64,
     /// The cap on the program's memory, if it has one.
@@ -53,6 +59,8 @@ pub struct IoRun {
     pub engine: String,
     /// Layout's name.
     pub layout: String,
+    /// Where records come from: `map`, the whole file, or `pool`, pages that are read into memory by the time they are needed.
+    pub source: String,
     /// Way of preloading.
     pub prefetch: String,
     /// Frames flown.
@@ -93,6 +101,10 @@ pub struct IoRun {
     pub update_ms: Option<f64>,
     /// The same with the file cold at the start.
     pub update_ms_cold: Option<f64>,
+    /// 99th percentile of an update in memory, milliseconds.
+    pub update_ms_p99: Option<f64>,
+    /// The same with the file cold at the start.
+    pub update_ms_p99_cold: Option<f64>,
     /// 99th percentile of what a frame waited for storage: its cold time beyond its warm one, milliseconds.
     pub io_ms_p99: Option<f64>,
     /// What the first frame waited for storage, milliseconds.
@@ -107,10 +119,53 @@ pub struct IoRun {
     pub disk_read_mb_total: Option<f64>,
     /// Most memory the program held during the cold pass, touched pages of the map included, MB.
     pub peak_rss_mb: Option<f64>,
+    /// What streaming did, of runs over a pool.
+    pub stream: Option<StreamCost>,
     /// The pages of this run read from a scratch file through a map.
     pub scratch_map: Option<ScratchCost>,
     /// The same by plain reads.
     pub scratch_pread: Option<ScratchCost>,
+}
+
+/// What streaming a flight did, cold.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StreamCost {
+    /// Largest error on the screen that anything late may have left, in pixels; 0 if none exceeded the tolerance.
+    pub late_error_px_max: f64,
+    /// Pages that came, sum.
+    pub pages_come: u64,
+    /// Pages asked for, sum.
+    pub pages_asked: u64,
+    /// Pages that could not be read, sum.
+    pub failures: u64,
+    /// Largest lead, in frames.
+    pub lead_frames_max: f64,
+    /// Reads, the first frame's included.
+    pub reads: u64,
+    /// Mean time of a read, or of a batch of them, milliseconds.
+    pub read_ms_mean: f64,
+    /// Longest, milliseconds.
+    pub read_ms_max: f64,
+}
+
+impl StreamCost {
+    /// The sums of a flight.
+    pub fn of(pooled: &Pooled) -> Self {
+        let frames = later(&pooled.frames);
+        let sum = |figure: fn(&StreamFrame) -> u64| frames.iter().map(figure).sum::<u64>();
+        let most = |figure: fn(&StreamFrame) -> f64| frames.iter().map(figure).fold(0.0, f64::max);
+        let LoaderStats { reads, time, longest, .. } = pooled.loader;
+        Self {
+            late_error_px_max: most(|f| f.work.late_error_px),
+            pages_come: sum(|f| f.pages_come),
+            pages_asked: sum(|f| f.pages_asked),
+            failures: sum(|f| f.failures),
+            lead_frames_max: most(|f| f64::from(f.lead_frames)),
+            reads,
+            read_ms_mean: time.as_secs_f64() * 1e3 / reads.max(1) as f64,
+            read_ms_max: longest.as_secs_f64() * 1e3,
+        }
+    }
 }
 
 /// What reading the pages of a flight from a scratch file cost, cold at the start.
@@ -141,6 +196,7 @@ impl IoRun {
         Self {
             engine: run.reader.name().into(),
             layout: run.layout.name().into(),
+            source: run.reader.source().into(),
             prefetch: run.preload.name().into(),
             frames: frames.len() as u64,
             record_bytes: run.record_bytes,
@@ -161,6 +217,9 @@ impl IoRun {
             record_bytes_touched_total: frames.iter().map(|f| f.record_bytes).sum(),
             update_ms: None,
             update_ms_cold: None,
+            update_ms_p99: None,
+            update_ms_p99_cold: None,
+            stream: None,
             io_ms_p99: None,
             first_frame_io_ms: None,
             frame_thread_major_faults: None,
@@ -180,10 +239,12 @@ impl IoRun {
             timed.cold.iter().zip(&timed.warm).map(|(c, w)| (c.ms - w.ms).max(0.0)).collect();
         let spread = |values: &[f64]| TimeSpread::of(later(values).iter().copied());
         let ms = |costs: &[UpdateCost]| costs.iter().map(|c| c.ms).collect::<Vec<f64>>();
-        self.update_ms = Some(spread(&ms(&timed.warm)).p50);
+        let warm = spread(&ms(&timed.warm));
+        (self.update_ms, self.update_ms_p99) = (Some(warm.p50), Some(warm.p99));
         // Without forgetting, nothing was cold.
         if timed.was_forgotten {
-            self.update_ms_cold = Some(spread(&ms(&timed.cold)).p50);
+            let cold = spread(&ms(&timed.cold));
+            (self.update_ms_cold, self.update_ms_p99_cold) = (Some(cold.p50), Some(cold.p99));
             self.io_ms_p99 = Some(spread(&waits).p99);
             self.first_frame_io_ms = waits.first().copied();
             self.frame_thread_major_faults = faults(later(&timed.cold), |f| f.major);
@@ -229,7 +290,7 @@ fn read_mb(costs: &[UpdateCost]) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{LayoutKind, PreloadKind, Reader};
+    use super::super::{LayoutKind, Prefetch, Reader};
     use super::*;
 
     fn run(realtime: &[u64]) -> Run {
@@ -246,7 +307,7 @@ mod tests {
         Run {
             reader: Reader::Mesh,
             layout: LayoutKind::Ours,
-            preload: PreloadKind::None,
+            preload: Prefetch::None,
             record_bytes: 4,
             file_bytes: 1_000_000,
             frames: realtime.iter().enumerate().map(frame).collect(),

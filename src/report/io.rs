@@ -13,7 +13,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-const HEADER: &str = "engine,layout,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes";
+const HEADER: &str = "engine,layout,source,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes";
 
 /// All that goes into a report.
 #[derive(Debug, Clone, Copy)]
@@ -70,7 +70,7 @@ pub fn write_io_frames_csv(path: &Path, runs: &[(Run, Option<Timed>)]) -> Result
 }
 
 fn write_run(to: &mut impl Write, run: &Run, timed: Option<&Timed>) -> std::io::Result<()> {
-    let words = [run.reader.name(), run.layout.name(), run.preload.name()].join(",");
+    let words = [run.reader.name(), run.layout.name(), run.reader.source(), run.preload.name()].join(",");
     for (i, f) in run.frames.iter().enumerate() {
         // Named one by one, so that a new field cannot be forgotten.
         let FrameIo { frame, reads, record_bytes, pages, lines, units, realtime_pages, preloaded_pages } = f;
@@ -103,7 +103,7 @@ pub(super) mod tests {
     use super::*;
     use crate::flyover::EngineKind;
     use crate::iobench::kernel::Faults;
-    use crate::iobench::{Cap, IoRun, LayoutKind, PreloadKind, Reader};
+    use crate::iobench::{Cap, IoRun, LayoutKind, Prefetch, Reader};
 
     /// Figures of two engines and the mesh under two layouts.
     pub(in super::super) fn made_up() -> (IoBench, Vec<(Run, Option<Timed>)>) {
@@ -111,7 +111,7 @@ pub(super) mod tests {
         let mut runs = Vec::new();
         for (n, reader) in engines.into_iter().enumerate() {
             for layout in [LayoutKind::Row, LayoutKind::Ours] {
-                for preload in [PreloadKind::None, PreloadKind::Frustum] {
+                for preload in [Prefetch::None, Prefetch::Frustum] {
                     let scale = if layout == LayoutKind::Row { 40 } else { 2 } * (n as u64 + 1);
                     let frames = (0..5).map(|frame| FrameIo {
                         frame,
@@ -137,7 +137,7 @@ pub(super) mod tests {
                         faults: Some(Faults { minor: 3, major: 2 }),
                         read_bytes: Some(8192),
                     };
-                    let measured = layout == LayoutKind::Ours && preload == PreloadKind::None && n < 2;
+                    let measured = layout == LayoutKind::Ours && preload == Prefetch::None && n < 2;
                     let timed = measured.then(|| Timed {
                         was_forgotten: true,
                         cold: vec![cost; 5],
@@ -160,6 +160,8 @@ pub(super) mod tests {
             page_bytes: 4096,
             cache_mib: 128,
             disk_pages_per_frame: 128,
+            frames_per_second: 60.0,
+            reads: "threads".into(),
             block_m: 1000.0,
             cap: Some(Cap { mib: 64, control_group_version: 1 }),
             cap_note: None,
@@ -196,8 +198,8 @@ pub(super) mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 1 + 5 * runs.len());
         assert!(lines.iter().all(|l| l.split(',').count() == HEADER.split(',').count()));
-        assert_eq!(lines[1], "soar,row,none,0,1000,4000,400,4000,40,400,1,,,,,");
-        assert_eq!(lines[11], "soar,ours,none,0,1000,4000,20,200,2,20,1,0.25,1.5,2,3,8192");
+        assert_eq!(lines[1], "soar,row,map,none,0,1000,4000,400,4000,40,400,1,,,,,");
+        assert_eq!(lines[11], "soar,ours,map,none,0,1000,4000,20,200,2,20,1,0.25,1.5,2,3,8192");
         let named = serde_json::to_string(&FrameIo::default()).unwrap();
         let fields: Vec<&str> = named.split('"').skip(1).step_by(2).collect();
         assert!(HEADER.contains(&fields.join(",")));

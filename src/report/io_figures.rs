@@ -4,14 +4,15 @@ use super::chart::{Chart, Scale, Series};
 use super::figures::{WIDE, frame_axis, y_axis};
 use super::io::IoReport;
 use super::number::exact;
-use crate::iobench::{FrameIo, LayoutKind, PreloadKind, Run};
+use crate::iobench::{FrameIo, LayoutKind, Prefetch, Reader, Run};
 use crate::stats::median;
 
 /// The charts of a report, in the order shown.
 pub(super) fn all(report: &IoReport<'_>) -> Vec<Chart> {
     let runs: Vec<&Run> = report.runs.iter().map(|(run, _)| run).collect();
     let Some(first) = runs.first() else { return Vec::new() };
-    let plain = |run: &&Run| run.preload == PreloadKind::None;
+    // Flights over a pool count what is late, not what is read.
+    let plain = |run: &&Run| run.preload == Prefetch::None && run.reader != Reader::Pool;
     let layouts: Vec<&Run> =
         runs.iter().copied().filter(plain).filter(|run| run.reader == first.reader).collect();
     // Engines are compared in the terrain file, or in the last layout named.
@@ -41,14 +42,17 @@ pub(super) fn all(report: &IoReport<'_>) -> Vec<Chart> {
             |f| f.pages,
         ));
     }
-    if engines.iter().any(|run| run.preload != PreloadKind::None) {
+    if engines.iter().any(|run| run.preload != Prefetch::None) {
         charts.push(chart(
             report,
             "plot-io-realtime",
             format!("Pages read in real time in layout {}", layout.name()),
             "4 KiB pages a frame that were not in the cache",
             "What preloading leaves: pages that a frame needed and that were not there. The first frame is left out.",
-            engines.iter().map(|run| (format!("{}, {}", run.reader.name(), run.preload.name()), *run)),
+            engines.iter().map(|run| {
+                let [reader, source, preload] = [run.reader.name(), run.reader.source(), run.preload.name()];
+                (format!("{reader}, {source}, {preload}"), *run)
+            }),
             |f| f.realtime_pages,
         ));
     }

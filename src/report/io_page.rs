@@ -30,6 +30,7 @@ pub(super) fn page(bench: &IoBench, plots: &[PlotFile]) -> String {
     );
     needed(&mut out, &bench.runs);
     measured(&mut out, bench);
+    streamed(&mut out, bench);
     figures(&mut out, plots);
     push(
         &mut out,
@@ -63,6 +64,7 @@ fn needed(out: &mut String, runs: &[IoRun]) {
     let heads = [
         "Engine",
         "Layout",
+        "From",
         "Preloading",
         "File, MB",
         "Records",
@@ -80,6 +82,7 @@ fn needed(out: &mut String, runs: &[IoRun]) {
         vec![
             r.engine.clone(),
             r.layout.clone(),
+            r.source.clone(),
             r.prefetch.clone(),
             grouped(r.file_mb, 0),
             grouped(r.reads_per_frame_mean, 0),
@@ -113,9 +116,15 @@ fn measured(out: &mut String, bench: &IoBench) {
             rows.push(vec![
                 r.engine.clone(),
                 r.layout.clone(),
-                "engine over the map".into(),
+                if r.source == "pool" {
+                    format!("engine over a pool, {}", r.prefetch)
+                } else {
+                    "engine over the map".into()
+                },
                 known(r.update_ms, 3),
+                known(r.update_ms_p99, 3),
                 known(r.update_ms_cold, 3),
+                known(r.update_ms_p99_cold, 3),
                 known(r.io_ms_p99, 3),
                 known(r.first_frame_io_ms, 1),
                 count(r.frame_thread_major_faults),
@@ -130,8 +139,10 @@ fn measured(out: &mut String, bench: &IoBench) {
                     r.layout.clone(),
                     how.into(),
                     "–".into(),
+                    "–".into(),
                     grouped(c.frame_ms, 3),
                     grouped(c.frame_ms_p99, 3),
+                    "–".into(),
                     grouped(c.first_frame_ms, 1),
                     known(c.major_faults.map(|v| v as f64), 0),
                     known(c.disk_read_mb_total, 1),
@@ -145,12 +156,61 @@ fn measured(out: &mut String, bench: &IoBench) {
         "Layout",
         "What",
         "Warm, ms a frame",
+        "Warm p99, ms",
         "Cold, ms a frame",
+        "Cold p99, ms",
         "Waiting p99, ms",
         "First frame waits, ms",
         "Major faults, sum",
         "Read, MB",
         "Peak memory, MB",
+    ];
+    table(out, &heads, rows.into_iter());
+}
+
+/// What flights over a pool did, if there are any.
+fn streamed(out: &mut String, bench: &IoBench) {
+    let row = |r: &IoRun| {
+        let s = r.stream.as_ref()?;
+        Some(vec![
+            r.prefetch.clone(),
+            grouped(r.late_pages as f64, 0),
+            grouped(s.late_error_px_max, 2),
+            grouped(s.pages_asked as f64, 0),
+            grouped(s.pages_come as f64, 0),
+            grouped(s.lead_frames_max, 0),
+            grouped(s.reads as f64, 0),
+            grouped(s.read_ms_mean, 3),
+            grouped(s.read_ms_max, 1),
+        ])
+    };
+    let rows: Vec<Vec<String>> = bench.runs.iter().filter_map(row).collect();
+    if rows.is_empty() {
+        return;
+    }
+    let pace = if bench.frames_per_second > 0.0 {
+        format!("{} frames a second", exact(bench.frames_per_second))
+    } else {
+        "as fast as frames are made".into()
+    };
+    push(
+        out,
+        format_args!(
+            "<h2>Streamed</h2>\n<p>Kinetic over pages that are read into {} MiB, {pace}, by {}; cold. No frame waits: what is late is drawn coarse.</p>\n",
+            bench.cache_mib,
+            escaped(&bench.reads)
+        ),
+    );
+    let heads = [
+        "Preloading",
+        "Late pages, sum",
+        "Largest late error, px",
+        "Asked for, sum",
+        "Come, sum",
+        "Largest lead, frames",
+        "Reads",
+        "A read, ms",
+        "Longest, ms",
     ];
     table(out, &heads, rows.into_iter());
 }

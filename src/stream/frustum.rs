@@ -1,76 +1,182 @@
-//! Preloading by an extension of the view frustum, for comparison with deadlines.
+//! Preloading by an extended view frustum.
 //!
-//! Based on: Qiu et al., section 4: what the eye may need next lies in a larger triangle similar to the frustum's, whose apex lies behind the eye by L, room for
-//! turning, and which reaches farther by S = V cos(a) / f, the way of one frame along the line of sight. Here L is the length of 64 samples, their block,
-//! and the ground within the extension is refined for the eye where it will be in the next frame.
+//! Based on: H. Qiu, L.-T. Chen, G.-P. Qiu, H. Yang, "An Effective Visualization Method for Large-scale Terrain Dataset", section 4. The frustum is moved back
+//! along the line of sight by a block's length L, which lets in what a turn would bring, and its far side is moved on by S = V cos(a) / f, the way of one frame along
+//! the line of sight, never back (eq. 8). What lies in the extension and not in the view is loaded before it is needed. For comparison with deadlines.
 //!
-//! Cost: a walk over the refined ground every frame, twice as much as the view's own.
+//! Their frustum ends at a far side and their levels of detail belong to blocks. Here detail depends on distance alone and nothing is cut off far away, so moving
+//! the far side on by S means moving on by S the eye that the error test measures from. With L = S = 0 the walk reads what SOAR reads. Cost: a SOAR
+//! refinement of the extended view.
 
 use crate::metric::{ALL_PLANES, Metric};
+use crate::refine::Culling;
 use crate::view::View;
-use glam::DVec3;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
 use terrasoar_layout::store::RecordStore;
 
-/// Samples a side of the paper's blocks.
-const BLOCK_SAMPLES: f64 = 64.0;
+/// A view and what of its surroundings is to be at hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExtendedView {
+    /// Where errors are measured from: the view, moved on by S.
+    pub detail: View,
+    /// What is culled: the view, moved back by L.
+    pub extent: View,
+}
 
-/// The extension of a moving frustum.
-#[derive(Debug, Default)]
-pub(super) struct Extension {
-    last_eye_m: Option<DVec3>,
-    pages: Vec<u64>,
+impl ExtendedView {
+    /// The view as it is.
+    pub fn plain(view: &View) -> Self {
+        Self { detail: *view, extent: *view }
+    }
+
+    /// The extension of `now` after a frame that showed `before`, blocks being `block_m` metres long.
+    pub fn after(before: &View, now: &View, block_m: f64) -> Self {
+        let [_, _, forward] = now.axes();
+        let ahead_m = (now.eye_m - before.eye_m).dot(forward).max(0.0);
+        Self {
+            detail: View { eye_m: now.eye_m + forward * ahead_m, ..*now },
+            extent: View { eye_m: now.eye_m - forward * block_m, ..*now },
+        }
+    }
+
+    /// Slots of the records that a refinement of this view reads, sorted: coarse levels first.
+    pub fn slots<S: RecordStore>(&self, store: &S, culling: Culling) -> Vec<u64> {
+        let mut slots: Vec<u64> = (0..=CENTRE_SLOT).collect();
+        self.walk(store, culling, &mut |slot, _| slots.push(slot));
+        slots.sort_unstable();
+        slots.dedup();
+        slots
+    }
+
+    /// Pages that a refinement of this view lacks, as far as it can be told from what is at hand; sorted, into `pages`.
+    pub fn pages_away<S: RecordStore>(&self, store: &S, culling: Culling, pages: &mut Vec<u64>) {
+        pages.clear();
+        self.walk(store, culling, &mut |slot, is_at_hand| {
+            let page = S::page_of(slot);
+            if !is_at_hand && pages.last() != Some(&page) {
+                pages.push(page);
+            }
+        });
+        pages.sort_unstable();
+        pages.dedup();
+    }
+
+    /// Calls `read` with the slot of every record that a refinement reads below the centre's, and whether it is at hand.
+    fn walk<S: RecordStore>(&self, store: &S, culling: Culling, read: &mut dyn FnMut(u64, bool)) {
+        let grid = *store.grid();
+        let c = corners(grid.k());
+        let mut walk =
+            Walk { store, detail: Metric::new(&self.detail), extent: Metric::new(&self.extent), read };
+        let planes = if culling == Culling::Vertices { ALL_PLANES } else { 0 };
+        let centre = (CENTRE_SLOT, c[0].midpoint(c[2]));
+        for (split, [b, d]) in ROOTS {
+            walk.visit(grid.levels() - 1, centre, split, [c[b], c[d]], planes);
+        }
+    }
 }
 
 struct Walk<'w, S> {
     store: &'w S,
-    /// The eye in the next frame, which decides how fine.
-    near: Metric,
-    /// The extension, which decides where.
-    wide: Metric,
-    pages: &'w mut Vec<u64>,
-}
-
-impl Extension {
-    /// Distinct pages that the extension of `view` needs and that are away.
-    pub(super) fn pages_away<S: RecordStore>(&mut self, view: &View, store: &S) -> &[u64] {
-        let step_m = self.last_eye_m.replace(view.eye_m).map_or(DVec3::ZERO, |last| view.eye_m - last);
-        let [_, _, forward] = view.axes();
-        let [dx, dy] = store.grid().spacing_m();
-        let behind_m = BLOCK_SAMPLES * dx.max(dy) + step_m.dot(forward).abs();
-        let near = Metric::new(&View { eye_m: view.eye_m + step_m, ..*view });
-        let wide = Metric::new(&View { eye_m: view.eye_m - forward * behind_m, ..*view });
-        self.pages.clear();
-        let grid = *store.grid();
-        let c = corners(grid.k());
-        let centre = c[0].midpoint(c[2]);
-        let mut walk = Walk { store, near, wide, pages: &mut self.pages };
-        for (split, [b, d]) in ROOTS {
-            walk.visit(grid.levels() - 1, (CENTRE_SLOT, centre), split, [c[b], c[d]], ALL_PLANES);
-        }
-        self.pages.sort_unstable();
-        self.pages.dedup();
-        &self.pages
-    }
+    detail: Metric,
+    extent: Metric,
+    read: &'w mut dyn FnMut(u64, bool),
 }
 
 impl<S: RecordStore> Walk<'_, S> {
+    /// Visits the triangle (apex; b, d) whose split vertex has slot `split` and level `height - 1`.
     fn visit(&mut self, height: u32, apex: (u64, GridPoint), split: u64, [b, d]: [GridPoint; 2], planes: u8) {
-        let Some(raw) = self.store.get(split) else {
-            return self.pages.push(S::page_of(split));
-        };
         let v = b.midpoint(d);
+        let raw = self.store.get(split);
+        (self.read)(split, raw.is_some());
+        let Some(raw) = raw else { return };
         let vertex = self.store.decode(raw, height - 1);
         let at_m = self.store.grid().position_m(v);
-        if !self.near.sight(at_m, &vertex).is_selected() {
+        if height == 1 || !self.detail.sight(at_m, &vertex).is_selected() {
             return;
         }
-        let planes =
-            if planes == 0 { Some(0) } else { self.wide.cull(&self.wide.sight(at_m, &vertex), planes) };
-        let Some(planes) = planes.filter(|_| height > 1) else { return };
+        let Some(planes) = self.extent.cull(&self.extent.sight(at_m, &vertex), planes) else { return };
         let [left, right] = child_slots(apex.0, split);
         self.visit(height - 1, (split, v), left, [b, apex.1], planes);
         self.visit(height - 1, (split, v), right, [apex.1, d], planes);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::iobench::tests::{square_terrain, view_at};
+    use crate::refine::soar::Soar;
+    use crate::refine::{Engine, Probe};
+    use glam::DVec3;
+    use terrasoar_layout::with_records;
+
+    struct Read(Vec<u64>);
+
+    impl Probe for Read {
+        fn read(&mut self, slot: u64) {
+            self.0.push(slot);
+        }
+    }
+
+    #[test]
+    fn without_an_extension_it_reads_what_soar_reads() {
+        let terrain = square_terrain(7);
+        with_records!(terrain.records().unwrap(), records => {
+            for culling in Culling::ALL {
+                for (at, yaw_rad) in [([0.5, 0.5], 0.3), ([0.1, 0.9], 2.5), ([-0.2, 0.4], 1.5)] {
+                    let view = view_at(&terrain, at, yaw_rad);
+                    let mut read = Read(Vec::new());
+                    Soar::new(records.clone(), culling).update(&view, &mut read);
+                    read.0.sort_unstable();
+                    read.0.dedup();
+                    assert!(ExtendedView::plain(&view).slots(&records, culling) == read.0);
+                    let still = ExtendedView::after(&view, &view, 0.0);
+                    assert_eq!(still, ExtendedView::plain(&view));
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn the_extension_holds_the_view_and_what_a_step_ahead_or_a_turn_needs() {
+        let terrain = square_terrain(7);
+        let grid = *terrain.grid();
+        let block_m = grid.extent_m()[0] / 4.0;
+        let before = view_at(&terrain, [0.4, 0.4], 0.6);
+        let step = before.axes()[2] * 15.0;
+        let now = View { eye_m: before.eye_m + step, ..before };
+        let next = View { eye_m: now.eye_m + step, ..now };
+        let turned = View { yaw_rad: now.yaw_rad + 0.1, ..now };
+        with_records!(terrain.records().unwrap(), records => {
+            let slots = |view: &ExtendedView| view.slots(&records, Culling::Vertices);
+            let extended = slots(&ExtendedView::after(&before, &now, block_m));
+            let missing = |view: &View| {
+                let needed = slots(&ExtendedView::plain(view));
+                (needed.iter().filter(|s| extended.binary_search(s).is_err()).count(), needed.len())
+            };
+            assert_eq!(missing(&next).0, 0, "a straight step is foreseen");
+            let (missing, needed) = missing(&turned);
+            let plain = slots(&ExtendedView::plain(&now));
+            let new = slots(&ExtendedView::plain(&turned)).iter().filter(|s| plain.binary_search(s).is_err()).count();
+            assert!(missing * 3 < new, "{missing} of {new} new records of {needed} are missing after a turn");
+        });
+    }
+
+    #[test]
+    fn only_motion_along_the_line_of_sight_counts() {
+        let terrain = square_terrain(4);
+        let before = view_at(&terrain, [0.5, 0.5], 0.0);
+        let [right, up, forward] = before.axes();
+        let moved = |by: DVec3| {
+            let now = View { eye_m: before.eye_m + by, ..before };
+            (ExtendedView::after(&before, &now, 0.0).detail.eye_m - now.eye_m).dot(forward)
+        };
+        assert!((moved(forward * 7.0) - 7.0).abs() < 1e-9);
+        assert!((moved(forward * 3.0 + right * 4.0) - 3.0).abs() < 1e-9);
+        assert_eq!(moved(forward * -7.0), 0.0);
+        assert!(moved(right * 5.0 + up).abs() < 1e-9);
+        let extent = ExtendedView::after(&before, &before, 40.0).extent;
+        assert!((extent.eye_m - (before.eye_m - forward * 40.0)).length() < 1e-9);
     }
 }

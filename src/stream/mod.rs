@@ -15,13 +15,13 @@ mod requests;
 mod surface;
 
 pub use fetch::{Fetch, Threads};
+pub use frustum::ExtendedView;
 pub use model::ModelDisk;
 pub use surface::{Sounding, sound};
 
 use crate::refine::kinetic::Kinetic;
 use crate::refine::{Culling, Engine, Probe, Work};
 use crate::view::View;
-use frustum::Extension;
 use lead::Lead;
 use requests::Requests;
 use std::collections::VecDeque;
@@ -30,9 +30,12 @@ use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::loader::Outcome;
 use terrasoar_layout::pool::PagePool;
 use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::store::RecordStore;
 
 /// Pages put into the pool in one frame at most: two megabytes are copied in a fraction of a millisecond.
 const INSTALLS_A_FRAME: usize = 512;
+/// Blocks a side of the terrain that the frustum's extension reckons with.
+const BLOCKS_A_SIDE: f64 = 16.0;
 /// Errors kept for whoever asks.
 const ERRORS_KEPT: usize = 64;
 
@@ -67,7 +70,9 @@ impl Prefetch {
 pub struct StreamFrame {
     /// The engine's account.
     pub work: Work,
-    /// Distinct pages whose records entered the mesh's array.
+    /// Records that entered the mesh's array.
+    pub records_read: u64,
+    /// Distinct pages of them.
     pub pages_read: u64,
     /// Pages that the mesh lacked for the first time in this frame: those that came too late, or were not foreseen.
     pub late_pages: u64,
@@ -89,7 +94,12 @@ pub struct Streamed<C: RecordCodec, F> {
     engine: Kinetic<PagePool<C>>,
     fetch: F,
     prefetch: Prefetch,
-    extension: Extension,
+    culling: Culling,
+    /// How far the frustum is moved back for preloading.
+    block_m: f64,
+    last_view: Option<View>,
+    /// Pages that the frustum's extension lacks.
+    extension: Vec<u64>,
     lead: Lead,
     requests: Requests,
     now: u64,
@@ -102,13 +112,14 @@ pub struct Streamed<C: RecordCodec, F> {
 /// Remembers pages read, and hands on.
 struct PagesRead<'p, C, P> {
     pages: &'p mut Vec<u64>,
+    reads: u64,
     probe: &'p mut P,
     codec: std::marker::PhantomData<C>,
 }
 
 impl<C: RecordCodec, P: Probe> Probe for PagesRead<'_, C, P> {
     fn read(&mut self, slot: u64) {
-        use terrasoar_layout::store::RecordStore;
+        self.reads += 1;
         let page = PagePool::<C>::page_of(slot);
         if self.pages.last() != Some(&page) {
             self.pages.push(page);
@@ -124,6 +135,9 @@ impl<C: RecordCodec, P: Probe> Probe for PagesRead<'_, C, P> {
 impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
     /// An engine over `pool`, whose pages come through `fetch`.
     pub fn new(pool: PagePool<C>, fetch: F, culling: Culling, prefetch: Prefetch) -> Self {
+        let grid = pool.grid();
+        let [dx, dy] = grid.spacing_m();
+        let block_m = f64::from(grid.side_steps()) / BLOCKS_A_SIDE * dx.max(dy);
         let mut engine = Kinetic::new(pool, culling);
         let lead = Lead::default();
         if prefetch == Prefetch::Deadline {
@@ -133,7 +147,10 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             engine,
             fetch,
             prefetch,
-            extension: Extension::default(),
+            culling,
+            block_m,
+            last_view: None,
+            extension: Vec::new(),
             lead,
             requests: Requests::default(),
             now: 0,
@@ -188,9 +205,14 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             self.engine.look_ahead(self.lead.frames());
         }
         self.pages_read.clear();
-        let mut listener =
-            PagesRead::<C, P> { pages: &mut self.pages_read, probe, codec: std::marker::PhantomData };
+        let mut listener = PagesRead::<C, P> {
+            pages: &mut self.pages_read,
+            reads: 0,
+            probe,
+            codec: std::marker::PhantomData,
+        };
         self.engine.update(view, &mut listener);
+        frame.records_read = listener.reads;
         self.pages_read.sort_unstable();
         self.pages_read.dedup();
         self.ask(view, &mut frame);
@@ -270,8 +292,10 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             }
         }
         if self.prefetch == Prefetch::Frustum {
-            let pages = self.extension.pages_away(view, pool);
-            asked.extend(pages.iter().filter_map(|page| self.requests.ask(*page, self.now, 1.0)));
+            let before = self.last_view.replace(*view).unwrap_or(*view);
+            let extended = ExtendedView::after(&before, view, self.block_m);
+            extended.pages_away(pool, self.culling, &mut self.extension);
+            asked.extend(self.extension.iter().filter_map(|page| self.requests.ask(*page, self.now, 1.0)));
         }
         frame.pages_asked = asked.len() as u64;
         self.fetch.ask(self.now, &asked);

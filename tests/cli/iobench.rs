@@ -3,9 +3,10 @@
 use crate::support::{Bench, fields, text};
 use serde_json::Value;
 
-const RUN_FIELDS: [&str; 31] = [
+const RUN_FIELDS: [&str; 35] = [
     "engine",
     "layout",
+    "source",
     "prefetch",
     "frames",
     "record_bytes",
@@ -26,6 +27,8 @@ const RUN_FIELDS: [&str; 31] = [
     "record_bytes_touched_total",
     "update_ms",
     "update_ms_cold",
+    "update_ms_p99",
+    "update_ms_p99_cold",
     "io_ms_p99",
     "first_frame_io_ms",
     "frame_thread_major_faults",
@@ -33,6 +36,7 @@ const RUN_FIELDS: [&str; 31] = [
     "first_frame_major_faults",
     "disk_read_mb_total",
     "peak_rss_mb",
+    "stream",
     "scratch_map",
     "scratch_pread",
 ];
@@ -48,7 +52,9 @@ fn runs(value: &Value) -> &Vec<Value> {
 }
 
 fn find<'v>(value: &'v Value, engine: &str, layout: &str, prefetch: &str) -> &'v Value {
-    let is = |r: &&Value| r["engine"] == engine && r["layout"] == layout && r["prefetch"] == prefetch;
+    let is = |r: &&Value| {
+        r["engine"] == engine && r["layout"] == layout && r["prefetch"] == prefetch && r["source"] == "map"
+    };
     runs(value).iter().find(is).unwrap()
 }
 
@@ -56,7 +62,11 @@ fn find<'v>(value: &'v Value, engine: &str, layout: &str, prefetch: &str) -> &'v
 fn every_engine_and_layout_has_a_run_with_every_field() {
     let bench = Bench::with_flight();
     let value = bench.json(&PLAIN);
-    assert_eq!(runs(&value).len(), 4 * 4, "three engines and the mesh, four layouts");
+    assert_eq!(
+        runs(&value).len(),
+        4 * 4 + 2,
+        "three engines and the mesh, four layouts; two flights over a pool"
+    );
     for run in runs(&value) {
         let names = fields(run);
         assert!(RUN_FIELDS.iter().all(|field| names.contains(field)), "{names:?}");
@@ -65,6 +75,7 @@ fn every_engine_and_layout_has_a_run_with_every_field() {
         assert_eq!(run["update_ms"].is_number(), measured);
         assert!(run["scratch_map"].is_null());
         assert!(run["needed_mb"].as_f64() >= run["realtime_mb"].as_f64());
+        assert_eq!(run["stream"].is_object(), run["source"] == "pool");
     }
     for field in
         ["terrain", "flight", "tolerance_px", "viewport_px", "cache_mib", "page_bytes", "kernel_known"]
@@ -195,11 +206,10 @@ fn what_makes_no_sense_is_refused() {
     for flags in wrong {
         bench.bad(2, &with(flags));
     }
-    for engine in ["soar", "smart", "kinetic"] {
-        let message = bench.bad(2, &with(&["--prefetch", "deadline", "--engines", engine]));
-        assert!(message.contains("not available") && message.contains(engine), "{message}");
+    for flags in [["--engines", "soar,smart"], ["--layouts", "row"]] {
+        let message = bench.bad(2, &with(&[&["--prefetch", "deadline"], &flags[..]].concat()));
+        assert!(message.contains("kinetic") && message.contains("ours"), "{message}");
     }
-    assert!(!bench.good(&["iobench", "--help"]).contains("deadline"));
     let cases: [(&[&str], &str); 4] = [
         (&["--scratch", "none"], "none"),
         (&["-o", "land.tif"], "folder"),
@@ -213,4 +223,38 @@ fn what_makes_no_sense_is_refused() {
     assert!(bench.bad(1, &["iobench", "none.iqt", "--flight", "land.flight"]).contains("none.iqt"));
     assert!(bench.bad(1, &["iobench", "land.iqt", "--flight", "none.flight"]).contains("none.flight"));
     assert!(bench.bad(1, &["iobench", "land.tif", "--flight", "land.flight"]).contains("land.tif"));
+}
+
+#[test]
+fn flights_over_a_pool_load_what_the_mesh_needs() {
+    let bench = Bench::with_flight();
+    for reads in ["threads", "ring"] {
+        let flags = [
+            "--engines",
+            "kinetic",
+            "--layouts",
+            "ours",
+            "--prefetch",
+            "none,frustum,deadline",
+            "--fps",
+            "500",
+            "--reads",
+            reads,
+        ];
+        let output = bench.run(&with(&flags));
+        if reads == "ring" && text(&output.stderr).contains("io_uring") {
+            println!("not tried: {}", text(&output.stderr));
+            continue;
+        }
+        let value: Value = serde_json::from_str(&text(&output.stdout)).unwrap();
+        let pooled: Vec<&Value> = runs(&value).iter().filter(|r| r["source"] == "pool").collect();
+        let names: Vec<&str> = pooled.iter().filter_map(|r| r["prefetch"].as_str()).collect();
+        assert_eq!(names, ["none", "frustum", "deadline"]);
+        for run in pooled {
+            assert!(run["stream"]["reads"].as_u64().unwrap() > 0, "{run}");
+            assert_eq!(run["stream"]["failures"], 0);
+            assert!(run["update_ms"].is_number());
+        }
+        assert_eq!(value["reads"], reads);
+    }
 }
