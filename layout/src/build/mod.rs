@@ -198,18 +198,15 @@ impl MemoryPlan {
             wide * (7 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
                 + wide * 128 * record_bytes
                 + threads * (tile + 1) * (tile + 1) * 8
+                // A code, a void and an own error for every corner of a tile.
+                + (wide / tile + 2) * (high / tile + 2) * 13
         };
         let largest = n.min(options.largest_tile.clamp(2, LARGEST_TILE));
         let smallest = largest.min(16);
         let spool = wide * high * if single { 4 } else { 8 };
         let available = budget.saturating_sub(fixed);
-        let largest_within = |bytes: u64| {
-            (0..=8)
-                .rev()
-                .map(|m| 1 << m)
-                .filter(|s| (smallest..=largest).contains(s))
-                .find(|s| work(*s) <= bytes)
-        };
+        let tiles = || (0..=8).rev().map(|m| 1 << m).filter(|s| (smallest..=largest).contains(s));
+        let largest_within = |bytes: u64| tiles().find(|s| work(*s) <= bytes);
         if let Some(tile) = largest_within(available.saturating_sub(spool)).filter(|t| *t >= largest.min(128))
         {
             return Ok(Self { tile, spool_bytes: spool });
@@ -218,7 +215,7 @@ impl MemoryPlan {
             Some(tile) => Ok(Self { tile, spool_bytes: 0 }),
             None => Err(LayoutError::Usage(format!(
                 "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; give at least --memory {}",
-                (fixed + work(smallest)).div_ceil(MIB)
+                (fixed + tiles().map(work).min().unwrap_or(0)).div_ceil(MIB)
             ))),
         }
     }

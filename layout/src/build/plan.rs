@@ -123,7 +123,7 @@ fn block_rows(k: u32, shape: &LevelShape, base: u64, offset: u64, order: u32, ro
 }
 
 /// Bounds in x and y of a block of 4^order slots, ghosts included.
-fn block_bounds(k: u32, shape: &LevelShape, offset: u64, order: u32) -> [[i64; 2]; 2] {
+pub(super) fn block_bounds(k: u32, shape: &LevelShape, offset: u64, order: u32) -> [[i64; 2]; 2] {
     use crate::order::{black_block_at, white_block_at};
     let d = k - 1 - shape.level() / 2;
     let t = shape.level() / 2;

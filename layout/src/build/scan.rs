@@ -28,7 +28,7 @@ pub(super) fn scan_tile_row(grid: &Grid, band: &Band, own: &OwnErrors, tile_y: u
     debug_assert!(y0 < high);
     let tiles = (wide - 1).div_ceil(side).max(1);
     (0..tiles).into_par_iter().for_each_init(Vec::new, |buffer, tile_x| {
-        let tile = Tile::load(grid, band, tile_x * side, y0, side, buffer);
+        let Some(tile) = Tile::load(grid, band, tile_x * side, y0, side, buffer) else { return };
         tile.scan_inside(own, step_m);
         tile.scan_around(own, step_m);
     });
@@ -47,8 +47,25 @@ struct Tile<'a> {
 }
 
 impl<'a> Tile<'a> {
-    fn load(grid: &'a Grid, band: &'a Band, x0: u32, y0: u32, side: u32, buffer: &'a mut Vec<f64>) -> Self {
+    /// The tile with its south-west corner at (`x0`, `y0`); `None` if it is wholly void and has nothing to say.
+    fn load(
+        grid: &'a Grid,
+        band: &'a Band,
+        x0: u32,
+        y0: u32,
+        side: u32,
+        buffer: &'a mut Vec<f64>,
+    ) -> Option<Self> {
         let samples = [0, 1].map(|i| (grid.samples()[i] - [x0, y0][i]).min(side + 1));
+        let is_void = |y| {
+            let voids = band.row_voids(y);
+            // Without an early end the comparison takes many samples at once.
+            !voids.is_empty()
+                && voids[x0 as usize..(x0 + samples[0]) as usize].iter().fold(true, |all, v| all & v)
+        };
+        if (y0..y0 + samples[1]).all(is_void) {
+            return None;
+        }
         buffer.clear();
         buffer.resize((side as usize + 1) * (side as usize + 1), f64::NAN);
         let rows = buffer.chunks_exact_mut(side as usize + 1).zip(y0..y0 + samples[1]);
@@ -62,7 +79,7 @@ impl<'a> Tile<'a> {
                 }
             }
         }
-        Self { grid, band, x0, y0, side, samples, codes: buffer }
+        Some(Self { grid, band, x0, y0, side, samples, codes: buffer })
     }
 
     /// Code at tile coordinates.

@@ -2,13 +2,15 @@
 //! allows, else in a nameless temporary file.
 //!
 //! While samples arrive their statistics are taken: range, voids, and which height steps they are whole multiples of. A void is
-//! NaN. Samples that single precision holds exactly take 4 bytes, others 8.
+//! NaN. Samples that single precision holds exactly take 4 bytes, others 8. A void's bytes are zero, so rows of voids are never written: the
+//! file has a hole there, and no room is taken.
 
 use crate::atomic_file::{read_at, write_at};
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
 use crate::error::LayoutError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError, RwLock};
 
 /// Height steps tried on floating-point samples, in raw units, coarsest first.
@@ -65,6 +67,10 @@ fn is_multiple(value: f64, step: f64, sample_type: SampleType) -> bool {
     if sample_type == SampleType::F32 { exact as f32 == value as f32 } else { exact == value }
 }
 
+/// What the bits of stored samples are combined with, so that a void's are zero.
+const VOID_F32: u32 = f32::NAN.to_bits();
+const VOID_F64: u64 = f64::NAN.to_bits();
+
 enum Storage {
     Memory(RwLock<Vec<u8>>),
     File(File),
@@ -80,6 +86,8 @@ pub(super) struct Spool<'a> {
     nodata: Option<f64>,
     storage: Storage,
     stats: Mutex<SampleStats>,
+    /// Which rows, from the south, have a sample that is not void.
+    has_heights: Vec<AtomicBool>,
     advance: &'a (dyn Fn(u64) + Sync),
 }
 
@@ -99,6 +107,7 @@ impl<'a> Spool<'a> {
         } else {
             let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
             let file = tempfile::tempfile_in(folder)
+                .and_then(|file| file.set_len(bytes).map(|()| file))
                 .map_err(|e| LayoutError::io(target, "cannot create a temporary file beside it", e))?;
             Storage::File(file)
         };
@@ -111,6 +120,7 @@ impl<'a> Spool<'a> {
             nodata,
             storage,
             stats: Mutex::new(SampleStats::new()),
+            has_heights: (0..info.samples_high).map(|_| AtomicBool::new(false)).collect(),
             advance,
         })
     }
@@ -128,8 +138,17 @@ impl<'a> Spool<'a> {
         LayoutError::io(&self.target, "cannot write the temporary file beside it", e)
     }
 
+    /// Whether all of row `y`, counted from the south, is void.
+    pub(super) fn is_void_row(&self, y: u32) -> bool {
+        !self.has_heights[y as usize].load(Ordering::Relaxed)
+    }
+
     /// Row `y`, counted from the south, of raw samples.
     pub(super) fn read_row(&self, y: u32, row: &mut [f64]) -> Result<(), LayoutError> {
+        if self.is_void_row(y) {
+            row.fill(f64::NAN);
+            return Ok(());
+        }
         let offset = u64::from(y) * u64::from(self.wide) * self.sample_bytes();
         let length = row.len() * self.sample_bytes() as usize;
         match &self.storage {
@@ -152,11 +171,11 @@ impl<'a> Spool<'a> {
     fn decode(&self, bytes: &[u8], row: &mut [f64]) {
         if self.double {
             for (value, raw) in row.iter_mut().zip(bytes.as_chunks().0) {
-                *value = f64::from_le_bytes(*raw);
+                *value = f64::from_bits(u64::from_le_bytes(*raw) ^ VOID_F64);
             }
         } else {
             for (value, raw) in row.iter_mut().zip(bytes.as_chunks().0) {
-                *value = f64::from(f32::from_le_bytes(*raw));
+                *value = f64::from(f32::from_bits(u32::from_le_bytes(*raw) ^ VOID_F32));
             }
         }
     }
@@ -164,9 +183,11 @@ impl<'a> Spool<'a> {
     fn encode(&self, row: &[f64], bytes: &mut Vec<u8>) {
         bytes.clear();
         if self.double {
-            bytes.extend(row.iter().flat_map(|v| v.to_le_bytes()));
+            let bits = |v: f64| if v.is_nan() { 0 } else { v.to_bits() ^ VOID_F64 };
+            bytes.extend(row.iter().flat_map(|v| bits(*v).to_le_bytes()));
         } else {
-            bytes.extend(row.iter().flat_map(|v| (*v as f32).to_le_bytes()));
+            let bits = |v: f64| if v.is_nan() { 0 } else { (v as f32).to_bits() ^ VOID_F32 };
+            bytes.extend(row.iter().flat_map(|v| bits(*v).to_le_bytes()));
         }
     }
 }
@@ -181,6 +202,11 @@ impl SampleSink for Spool<'_> {
                 "a window {window:?} does not lie in the elevation model"
             )));
         }
+        if samples.iter().all(|v| v.is_nan()) {
+            self.stats.lock().unwrap_or_else(PoisonError::into_inner).voids += samples.len() as u64;
+            (self.advance)(samples.len() as u64);
+            return Ok(());
+        }
         let cleaned;
         let is_void = |v: f64| !v.is_finite() || self.nodata == Some(v);
         let samples = if samples.iter().any(|v| is_void(*v) && !v.is_nan()) {
@@ -192,8 +218,12 @@ impl SampleSink for Spool<'_> {
         let stats = SampleStats::of(samples, self.sample_type);
         let mut bytes = Vec::new();
         for (i, row) in samples.chunks_exact(window.width.max(1) as usize).enumerate() {
+            if row.iter().all(|v| v.is_nan()) {
+                continue;
+            }
             self.encode(row, &mut bytes);
             let y = self.high - 1 - (window.row + i as u32);
+            self.has_heights[y as usize].store(true, Ordering::Relaxed);
             let offset = (u64::from(y) * u64::from(self.wide) + u64::from(window.col)) * self.sample_bytes();
             match &self.storage {
                 Storage::Memory(all) => {

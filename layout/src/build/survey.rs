@@ -122,17 +122,25 @@ pub(super) fn steepest_steps_m(
             let mut last_row = vec![f64::NAN; wide as usize];
             let mut row = last_row.clone();
             let mut steepest = [0.0f64; 2];
+            let mut follows_row = false;
             // The row below the block belongs to it, so that no pair of rows is left out.
             for y in first.saturating_sub(1)..(first + ROWS).min(high) {
+                if spool.is_void_row(y) {
+                    follows_row = false;
+                    continue;
+                }
                 spool.read_row(y, &mut row)?;
                 row.iter_mut().for_each(|v| *v = code.code(*v));
                 for pair in row.windows(2) {
                     steepest[0] = steepest[0].max((pair[0] - pair[1]).abs());
                 }
-                for (a, b) in row.iter().zip(&last_row) {
-                    steepest[1] = steepest[1].max((a - b).abs());
+                if follows_row {
+                    for (a, b) in row.iter().zip(&last_row) {
+                        steepest[1] = steepest[1].max((a - b).abs());
+                    }
                 }
                 std::mem::swap(&mut row, &mut last_row);
+                follows_row = true;
             }
             advance(u64::from(ROWS.min(high - first)) * u64::from(wide));
             Ok(steepest)

@@ -1,15 +1,16 @@
 //! Records into pages, pages into the file: gathers the parts of each planned page once their last row is known, then closes the gaps that
 //! all-void pages left and writes directory and header.
 //!
-//! Pages are gathered in parallel and land at places fixed by the plan, so threads and order do not show in the bytes.
+//! Pages are gathered in parallel and land at places fixed by the plan, so threads and order do not show in the bytes. Of an ocean no page is
+//! ever made: a part whose surroundings are inert costs a look at them.
 
 use super::levels::{LevelShape, Levels};
-use super::plan::{LevelPlan, PagePart, Plan};
+use super::plan::{LevelPlan, PagePart, Plan, block_bounds};
 use crate::atomic_file::{AtomicFile, read_at, write_at};
 use crate::bytes::{PAGE_BYTES, Page, checksum};
 use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::error::LayoutError;
-use crate::grid::Grid;
+use crate::grid::{Grid, GridPoint};
 use crate::header::{Header, INERT_PAGE};
 use crate::order::{BLOCK_SLOTS, BlockPoints, level_slots};
 use crate::record::{RecordCodec, RecordKind};
@@ -110,7 +111,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         let ready = waiting.partition_point(|p| i64::from(p.y[1]) <= done_y);
         // Batches bound the memory of pages on their way to the file.
         for batch in waiting[..ready].chunks(PAGES_AT_ONCE) {
-            let gathered: Vec<Vec<u8>> =
+            let gathered: Vec<Option<Vec<u8>>> =
                 batch.par_iter().with_min_len(16).map(|part| self.gather(part, &shape, records)).collect();
             let mut complete = Vec::new();
             for (part, bytes) in batch.iter().zip(gathered) {
@@ -120,7 +121,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
                     &self.inert,
                     C::BYTES,
                     part.first,
-                    &bytes,
+                    bytes.as_deref(),
                 ));
             }
             send_pages(self.outgoing.as_ref(), &mut self.entries, &self.inert, complete)?;
@@ -130,11 +131,14 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         Ok(later.unwrap_or(i64::MAX))
     }
 
-    /// The bytes of a part's records.
-    fn gather(&self, part: &PagePart, shape: &LevelShape, records: &Levels<C::Raw>) -> Vec<u8> {
-        let mut bytes = vec![0; part.count as usize * C::BYTES];
+    /// The bytes of a part's records; `None` if all are inert.
+    fn gather(&self, part: &PagePart, shape: &LevelShape, records: &Levels<C::Raw>) -> Option<Vec<u8>> {
         let offset = part.first - level_slots(self.grid.k(), shape.level()).start;
         let within = (offset % BLOCK_SLOTS) as usize;
+        if self.is_inert_around(offset - within as u64, shape, records) {
+            return None;
+        }
+        let mut bytes = vec![0; part.count as usize * C::BYTES];
         let block = BlockPoints::new(self.grid.k(), shape.level(), offset - within as u64);
         for (i, place) in bytes.chunks_exact_mut(C::BYTES).enumerate() {
             let raw = block
@@ -147,7 +151,20 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
                 .unwrap_or(C::INERT);
             C::write(raw, place);
         }
-        bytes
+        Some(bytes)
+    }
+
+    /// Whether the smallest upright rectangle around a block of slots holds only inert records. Rows of a block that are no longer kept
+    /// belong to other parts of it, and are passed over.
+    fn is_inert_around(&self, block: u64, shape: &LevelShape, records: &Levels<C::Raw>) -> bool {
+        let [x, y] = block_bounds(self.grid.k(), shape, block, BLOCK_SLOTS.ilog2() / 2);
+        let clip = |v: i64, i: usize| v.clamp(0, i64::from(shape.limit()[i])) as u32;
+        let index = |i: usize| shape.index(GridPoint::new(clip(x[i], 0), clip(y[i], 1)));
+        let ((south, west), (north, east)) = (index(0), index(1));
+        (south..=north).filter_map(|row| records.row(shape.level(), row)).all(|row| {
+            let columns = west.min(row.len())..(east + 1).min(row.len());
+            row[columns].iter().all(|raw| *raw == C::INERT)
+        })
     }
 
     /// Sets the records of the corners, slots 0 to 3.
@@ -156,7 +173,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         for (raw, place) in corners.into_iter().zip(bytes.chunks_exact_mut(C::BYTES)) {
             C::write(raw, place);
         }
-        let complete = put(&mut self.open, &mut self.lacking, &self.inert, C::BYTES, 0, &bytes);
+        let complete = put(&mut self.open, &mut self.lacking, &self.inert, C::BYTES, 0, Some(&bytes));
         send_pages(self.outgoing.as_ref(), &mut self.entries, &self.inert, complete.into_iter().collect())
     }
 
@@ -215,20 +232,23 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     }
 }
 
-/// Puts the bytes of records of `record` bytes from slot `first` into their page; returns the page if that completes it.
+/// Puts the bytes of records of `record` bytes from slot `first` into their page, unless they are all inert; returns the page if that completes
+/// it and anything was ever put there.
 fn put(
     open: &mut HashMap<u64, Box<Page>>,
     lacking: &mut [u8],
     inert: &Page,
     record: usize,
     first: u64,
-    bytes: &[u8],
+    bytes: Option<&[u8]>,
 ) -> Option<(u64, Box<Page>)> {
     let per_page = (PAGE_BYTES / record) as u64;
     let number = first / per_page;
-    let at = (first % per_page) as usize * record;
-    let page = open.entry(number).or_insert_with(|| Box::new(*inert));
-    page[at..at + bytes.len()].copy_from_slice(bytes);
+    if let Some(bytes) = bytes {
+        let at = (first % per_page) as usize * record;
+        let page = open.entry(number).or_insert_with(|| Box::new(*inert));
+        page[at..at + bytes.len()].copy_from_slice(bytes);
+    }
     lacking[number as usize] -= 1;
     if lacking[number as usize] > 0 {
         return None;
