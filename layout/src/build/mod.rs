@@ -8,6 +8,8 @@
 //! Invariant: neither threads nor the memory budget change a byte of the file.
 
 mod band;
+mod extremes;
+mod gather;
 mod levels;
 mod padding;
 mod plan;
@@ -36,7 +38,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicU32;
 use std::sync::mpsc::SyncSender;
 use survey::HeightCode;
-use writer::{PageWriter, PlacedPage, page_queue, write_pages};
+use writer::{PageWriter, PlacedPages, page_queue, write_pages};
 
 /// Mebibyte.
 const MIB: u64 = 1 << 20;
@@ -249,7 +251,7 @@ impl Work<'_> {
         &self,
         codec: C,
         header: &Header,
-        outgoing: SyncSender<PlacedPage>,
+        outgoing: SyncSender<PlacedPages>,
     ) -> Result<PageWriter<'_, C>, LayoutError> {
         let grid = header.grid;
         let [wide, high] = grid.samples();

@@ -4,6 +4,7 @@
 //! asks: tile size, memory budget and threads cannot change a bit of the result. On whole height codes all of
 //! it is exact.
 
+use super::extremes::larger;
 use crate::grid::GridPoint;
 
 /// `z = (zv + gy * (y - yv)) + gx * (x - xv)` in height codes.
@@ -39,21 +40,22 @@ impl Plane {
     pub(super) fn farthest_in_row(&self, x: u32, y: u32, row: &[f64]) -> f64 {
         let base = self.zv + self.gy * (f64::from(y) - self.yv);
         let first = f64::from(x) - self.xv;
+        let distance = |value: f64, i: f64| (value - (base + self.gx * (first + i))).abs();
+        // Eight lanes, so that the compiler can vectorise; most triangles are small, and most rows shorter than that.
         let (chunks, rest) = row.as_chunks::<8>();
-        // Comparisons with NaN are false, which leaves voids out. Eight lanes, so that the compiler can vectorise.
-        let mut lanes = [0.0f64; 8];
-        let mut done = 0.0;
-        for chunk in chunks {
-            for (lane, (value, best)) in chunk.iter().zip(&mut lanes).enumerate() {
-                let distance = (value - (base + self.gx * (first + (done + lane as f64)))).abs();
-                *best = if distance > *best { distance } else { *best };
+        let (mut farthest, mut done) = (0.0, 0.0);
+        if !chunks.is_empty() {
+            let mut lanes = [0.0f64; 8];
+            for chunk in chunks {
+                for (lane, (value, best)) in chunk.iter().zip(&mut lanes).enumerate() {
+                    *best = larger(*best, distance(*value, done + lane as f64));
+                }
+                done += 8.0;
             }
-            done += 8.0;
+            farthest = lanes.into_iter().fold(0.0, larger);
         }
-        let mut farthest = lanes.into_iter().fold(0.0, f64::max);
         for (i, value) in rest.iter().enumerate() {
-            let distance = (value - (base + self.gx * (first + (done + i as f64)))).abs();
-            farthest = if distance > farthest { distance } else { farthest };
+            farthest = larger(farthest, distance(*value, done + i as f64));
         }
         farthest
     }

@@ -4,6 +4,7 @@
 //! the file says and survives the rounding of the engine's arithmetic (FORMAT.md, section 3).
 
 use super::band::Band;
+use super::extremes::{larger, smaller};
 use super::levels::{LevelShape, Levels};
 use super::padding::{deviation, has_area};
 use super::scan::{FIRST_SCANNED, OwnErrors};
@@ -162,7 +163,7 @@ impl<C: RecordCodec> Saturator<C> {
     #[inline(always)]
     fn encode(&self, level: u32, code: f64, class: VertexClass, own_m: f64, below: &Below) -> Option<C::Raw> {
         // No triangle is farther from a sample than the range of heights, which lies a millionth below the top.
-        let error_m = below.error_m.max(own_m.min(self.scale.error_top_m * (1.0 - 1e-7)));
+        let error_m = larger(below.error_m, smaller(self.scale.error_top_m * (1.0 - 1e-7), own_m));
         self.codec.encode(level, code, class, error_m, below.radius_m)
     }
 }
@@ -197,8 +198,8 @@ impl Below {
         }
         self.any_alive = true;
         let dz = height_m - (child.height_m - base_m);
-        self.radius_m = self.radius_m.max(((ground2 + dz * dz).sqrt() + child.radius_m) * MARGIN);
-        self.error_m = self.error_m.max(child.error_m);
+        self.radius_m = larger(self.radius_m, ((ground2 + dz * dz).sqrt() + child.radius_m) * MARGIN);
+        self.error_m = larger(self.error_m, child.error_m);
     }
 }
 

@@ -6,6 +6,7 @@
 //! about two nanoseconds of one core each. Triangles that padding deforms are left to [`super::padding`].
 
 use super::band::Band;
+use super::extremes::larger;
 use super::levels::{LevelShape, Levels};
 use super::plane::Plane;
 use crate::grid::{Grid, GridPoint};
@@ -132,14 +133,14 @@ impl<'a> Tile<'a> {
                         let plane = Plane::of(c);
                         for row in y - s + 1..y + s {
                             let reach = s - 1 - row.abs_diff(y);
-                            farthest = farthest.max(self.row(&plane, x - reach, x, row));
+                            farthest = larger(farthest, self.row(&plane, x - reach, x, row));
                         }
                     }
                     if let Some(c) = self.corners([[x + s, y], ends[0], ends[1]]) {
                         let plane = Plane::of(c);
                         for row in y - s + 1..y + s {
                             let reach = s - 1 - row.abs_diff(y);
-                            farthest = farthest.max(self.row(&plane, x, x + reach, row));
+                            farthest = larger(farthest, self.row(&plane, x, x + reach, row));
                         }
                     }
                 } else {
@@ -148,14 +149,14 @@ impl<'a> Tile<'a> {
                         let plane = Plane::of(c);
                         for row in y - s + 1..=y {
                             let reach = s - 1 - (y - row);
-                            farthest = farthest.max(self.row(&plane, x - reach, x + reach, row));
+                            farthest = larger(farthest, self.row(&plane, x - reach, x + reach, row));
                         }
                     }
                     if let Some(c) = self.corners([[x, y + s], ends[0], ends[1]]) {
                         let plane = Plane::of(c);
                         for row in y..y + s {
                             let reach = s - 1 - (row - y);
-                            farthest = farthest.max(self.row(&plane, x - reach, x + reach, row));
+                            farthest = larger(farthest, self.row(&plane, x - reach, x + reach, row));
                         }
                     }
                 }
@@ -184,7 +185,7 @@ impl<'a> Tile<'a> {
                         let diagonal = if rising { x - s + along } else { x + s - along };
                         let (from, to) =
                             if apex_east { (diagonal, x + s - 1) } else { (x - s + 1, diagonal) };
-                        farthest = farthest.max(self.row(&plane, from, to, row));
+                        farthest = larger(farthest, self.row(&plane, from, to, row));
                     }
                 }
                 self.raise(own, x, y, farthest, step_m);
@@ -219,7 +220,7 @@ impl<'a> Tile<'a> {
                         3 => (0, south.min(north)),
                         _ => continue,
                     };
-                    farthest = farthest.max(self.row(&plane, from, to, row));
+                    farthest = larger(farthest, self.row(&plane, from, to, row));
                 }
                 own.raise(split, farthest, step_m);
             });

@@ -5,6 +5,7 @@
 //! NaN. Samples that single precision holds exactly take 4 bytes, others 8. A void's bytes are zero, so rows of voids are never written: the
 //! file has a hole there, and no room is taken.
 
+use super::extremes::range;
 use crate::atomic_file::{read_at, write_at};
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
 use crate::error::LayoutError;
@@ -42,12 +43,9 @@ impl SampleStats {
 
     fn of(samples: &[f64], sample_type: SampleType) -> Self {
         let mut stats = Self::new();
-        for &value in samples {
-            if value.is_nan() {
-                stats.voids += 1;
-                continue;
-            }
-            stats.range = [stats.range[0].min(value), stats.range[1].max(value)];
+        stats.voids = samples.iter().map(|v| u64::from(v.is_nan())).sum();
+        if stats.voids < samples.len() as u64 {
+            stats.range = range(samples);
         }
         if !sample_type.fits_f32() {
             stats.fits_f32 = samples.iter().all(|v| v.is_nan() || f64::from(*v as f32) == *v);
@@ -181,13 +179,17 @@ impl<'a> Spool<'a> {
     }
 
     fn encode(&self, row: &[f64], bytes: &mut Vec<u8>) {
-        bytes.clear();
+        bytes.resize(row.len() * self.sample_bytes() as usize, 0);
         if self.double {
-            let bits = |v: f64| if v.is_nan() { 0 } else { v.to_bits() ^ VOID_F64 };
-            bytes.extend(row.iter().flat_map(|v| bits(*v).to_le_bytes()));
+            for (value, raw) in row.iter().zip(bytes.as_chunks_mut().0) {
+                let bits = if value.is_nan() { 0 } else { value.to_bits() ^ VOID_F64 };
+                *raw = bits.to_le_bytes();
+            }
         } else {
-            let bits = |v: f64| if v.is_nan() { 0 } else { (v as f32).to_bits() ^ VOID_F32 };
-            bytes.extend(row.iter().flat_map(|v| bits(*v).to_le_bytes()));
+            for (value, raw) in row.iter().zip(bytes.as_chunks_mut().0) {
+                let bits = if value.is_nan() { 0 } else { (*value as f32).to_bits() ^ VOID_F32 };
+                *raw = bits.to_le_bytes();
+            }
         }
     }
 }
@@ -208,9 +210,11 @@ impl SampleSink for Spool<'_> {
             return Ok(());
         }
         let cleaned;
-        let is_void = |v: f64| !v.is_finite() || self.nodata == Some(v);
-        let samples = if samples.iter().any(|v| is_void(*v) && !v.is_nan()) {
-            cleaned = samples.iter().map(|v| if is_void(*v) { f64::NAN } else { *v }).collect::<Vec<_>>();
+        let nodata = self.nodata.unwrap_or(f64::NAN);
+        let means_void = |v: f64| v.is_infinite() | (v == nodata);
+        // Without an early end the comparison takes many samples at once.
+        let samples = if samples.iter().fold(false, |any, v| any | means_void(*v)) {
+            cleaned = samples.iter().map(|v| if means_void(*v) { f64::NAN } else { *v }).collect::<Vec<_>>();
             &cleaned
         } else {
             samples

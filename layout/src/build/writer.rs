@@ -2,17 +2,17 @@
 //! all-void pages left and writes directory and header.
 //!
 //! Pages are gathered in parallel and land at places fixed by the plan, so threads and order do not show in the bytes. Of an ocean no page is
-//! ever made: a part whose surroundings are inert costs a look at them.
+//! ever made.
 
+use super::gather::gather;
 use super::levels::{LevelShape, Levels};
-use super::plan::{LevelPlan, PagePart, Plan, block_bounds};
+use super::plan::{LevelPlan, Plan};
 use crate::atomic_file::{AtomicFile, read_at, write_at};
 use crate::bytes::{PAGE_BYTES, Page, checksum};
 use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::error::LayoutError;
-use crate::grid::{Grid, GridPoint};
+use crate::grid::Grid;
 use crate::header::{Header, INERT_PAGE};
-use crate::order::{BLOCK_SLOTS, BlockPoints, level_slots};
 use crate::record::{RecordCodec, RecordKind};
 use crate::terrain::inert_page;
 use rayon::prelude::*;
@@ -38,24 +38,21 @@ pub(super) struct PageWriter<'a, C: RecordCodec> {
     open: HashMap<u64, Box<Page>>,
     inert: Box<Page>,
     /// Complete pages on their way to the thread that writes them.
-    outgoing: Option<SyncSender<PlacedPage>>,
+    outgoing: Option<SyncSender<PlacedPages>>,
     codec: std::marker::PhantomData<C>,
 }
 
-/// A page and its place in the file.
-pub(super) type PlacedPage = (u32, Box<Page>);
+/// Pages and their places in the file.
+pub(super) type PlacedPages = Vec<(u32, Box<Page>)>;
 
-/// Pages that may wait to be written.
-const QUEUE: usize = 512;
-
-/// The two ends of the way from gathering pages to writing them.
-pub(super) fn page_queue() -> (SyncSender<PlacedPage>, Receiver<PlacedPage>) {
-    sync_channel(QUEUE)
+/// The two ends of the way from gathering pages to writing them. One batch may wait while another is written.
+pub(super) fn page_queue() -> (SyncSender<PlacedPages>, Receiver<PlacedPages>) {
+    sync_channel(1)
 }
 
 /// Writes pages as they arrive, until there will be no more: the work of a thread of its own, so that nobody waits for the disk.
-pub(super) fn write_pages(file: &AtomicFile, pages: Receiver<PlacedPage>) -> Result<(), LayoutError> {
-    for (place, page) in pages {
+pub(super) fn write_pages(file: &AtomicFile, batches: Receiver<PlacedPages>) -> Result<(), LayoutError> {
+    for (place, page) in batches.into_iter().flatten() {
         write_at(file.file(), &page[..], u64::from(place) * PAGE)
             .map_err(|e| LayoutError::io(file.target(), "cannot write the terrain file", e))?;
     }
@@ -68,7 +65,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         grid: Grid,
         plan: Plan,
         kind: RecordKind,
-        outgoing: SyncSender<PlacedPage>,
+        outgoing: SyncSender<PlacedPages>,
     ) -> Self {
         let mut page = INERT_PAGE;
         let entries = plan
@@ -111,8 +108,11 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         let ready = waiting.partition_point(|p| i64::from(p.y[1]) <= done_y);
         // Batches bound the memory of pages on their way to the file.
         for batch in waiting[..ready].chunks(PAGES_AT_ONCE) {
-            let gathered: Vec<Option<Vec<u8>>> =
-                batch.par_iter().with_min_len(16).map(|part| self.gather(part, &shape, records)).collect();
+            let gathered: Vec<Option<Vec<u8>>> = batch
+                .par_iter()
+                .with_min_len(16)
+                .map(|part| gather::<C>(&self.grid, part, &shape, records))
+                .collect();
             let mut complete = Vec::new();
             for (part, bytes) in batch.iter().zip(gathered) {
                 complete.extend(put(
@@ -129,42 +129,6 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         self.next[level as usize] += ready;
         let later = waiting.get(ready).map(|p| i64::from(p.y[1]) - i64::from(plan.span));
         Ok(later.unwrap_or(i64::MAX))
-    }
-
-    /// The bytes of a part's records; `None` if all are inert.
-    fn gather(&self, part: &PagePart, shape: &LevelShape, records: &Levels<C::Raw>) -> Option<Vec<u8>> {
-        let offset = part.first - level_slots(self.grid.k(), shape.level()).start;
-        let within = (offset % BLOCK_SLOTS) as usize;
-        if self.is_inert_around(offset - within as u64, shape, records) {
-            return None;
-        }
-        let mut bytes = vec![0; part.count as usize * C::BYTES];
-        let block = BlockPoints::new(self.grid.k(), shape.level(), offset - within as u64);
-        for (i, place) in bytes.chunks_exact_mut(C::BYTES).enumerate() {
-            let raw = block
-                .point(within + i)
-                .filter(|p| !shape.is_beyond(*p))
-                .and_then(|p| {
-                    let (row, column) = shape.index(p);
-                    records.row(shape.level(), row)?.get(column).copied()
-                })
-                .unwrap_or(C::INERT);
-            C::write(raw, place);
-        }
-        Some(bytes)
-    }
-
-    /// Whether the smallest upright rectangle around a block of slots holds only inert records. Rows of a block that are no longer kept
-    /// belong to other parts of it, and are passed over.
-    fn is_inert_around(&self, block: u64, shape: &LevelShape, records: &Levels<C::Raw>) -> bool {
-        let [x, y] = block_bounds(self.grid.k(), shape, block, BLOCK_SLOTS.ilog2() / 2);
-        let clip = |v: i64, i: usize| v.clamp(0, i64::from(shape.limit()[i])) as u32;
-        let index = |i: usize| shape.index(GridPoint::new(clip(x[i], 0), clip(y[i], 1)));
-        let ((south, west), (north, east)) = (index(0), index(1));
-        (south..=north).filter_map(|row| records.row(shape.level(), row)).all(|row| {
-            let columns = west.min(row.len())..(east + 1).min(row.len());
-            row[columns].iter().all(|raw| *raw == C::INERT)
-        })
     }
 
     /// Sets the records of the corners, slots 0 to 3.
@@ -258,22 +222,24 @@ fn put(
 
 /// Sends complete pages to be written and notes their checksums; pages that are inert after all are left out.
 fn send_pages(
-    outgoing: Option<&SyncSender<PlacedPage>>,
+    outgoing: Option<&SyncSender<PlacedPages>>,
     entries: &mut [Entry],
     inert: &Page,
     pages: Vec<(u64, Box<Page>)>,
 ) -> Result<(), LayoutError> {
     let sums: Vec<Option<u32>> =
         pages.par_iter().map(|(_, page)| (**page != *inert).then(|| checksum(&page[..]))).collect();
+    let mut placed = Vec::with_capacity(pages.len());
     for ((number, page), sum) in pages.into_iter().zip(sums) {
         if let Some(sum) = sum {
             let entry = &mut entries[number as usize];
             (entry.checksum, entry.generation) = (sum, 1);
-            // The writer hangs up only after an error, which it reports itself.
-            if outgoing.is_none_or(|queue| queue.send((entry.page, page)).is_err()) {
-                return Err(LayoutError::Usage("the terrain file could not be written".into()));
-            }
+            placed.push((entry.page, page));
         }
+    }
+    // The writer hangs up only after an error, which it reports itself.
+    if !placed.is_empty() && outgoing.is_none_or(|queue| queue.send(placed).is_err()) {
+        return Err(LayoutError::Usage("the terrain file could not be written".into()));
     }
     Ok(())
 }
