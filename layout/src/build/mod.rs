@@ -23,6 +23,7 @@ mod writer;
 
 use crate::atomic_file::AtomicFile;
 use crate::dem::{DemSource, SampleType};
+use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::header::{ErrorKind, Header};
@@ -108,6 +109,20 @@ pub fn build(
     options: &BuildOptions,
     progress: &dyn BuildProgress,
 ) -> Result<Header, LayoutError> {
+    build_on(&SystemDisk, dem, out, options, progress)
+}
+
+/// As [`build()`], with all writing and reading back done by `disk`.
+///
+/// # Errors
+/// As [`build()`].
+pub fn build_on(
+    disk: &dyn Disk,
+    dem: &dyn DemSource,
+    out: &Path,
+    options: &BuildOptions,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
     let info = dem.info();
     if !(options.z_scale.is_finite() && options.z_scale > 0.0) {
         return Err(LayoutError::Usage(format!("--z-scale is a positive factor, not {}", options.z_scale)));
@@ -120,7 +135,7 @@ pub fn build(
     let advance = |n| progress.advance(n);
 
     progress.stage("reading", samples);
-    let spool = Spool::new(info, options.nodata, out, memory.spool_bytes, &advance)?;
+    let spool = Spool::new(disk, info, options.nodata, out, memory.spool_bytes, &advance)?;
     dem.stream(&spool)?;
     let stats = spool.stats();
     if stats.voids == samples {
@@ -156,7 +171,7 @@ pub fn build(
     };
 
     progress.stage("building", samples);
-    let work = Work { spool: &spool, code, scale, tile: memory.tile, file: &file, advance: &advance };
+    let work = Work { spool: &spool, code, scale, tile: memory.tile, file: &file, disk, advance: &advance };
     match code.kind {
         RecordKind::Compact => work.run(Compact::new(&grid, &scale), &mut header)?,
         RecordKind::Exact8 => work.run(Exact8::new(&grid, &scale), &mut header)?,
@@ -164,7 +179,7 @@ pub fn build(
     }
     progress.stage("syncing", 0);
     drop(spool);
-    file.publish()?;
+    file.publish_on(disk)?;
     Ok(header)
 }
 
@@ -230,6 +245,7 @@ struct Work<'a> {
     scale: RecordScale,
     tile: u32,
     file: &'a AtomicFile,
+    disk: &'a dyn Disk,
     advance: &'a (dyn Fn(u64) + Sync),
 }
 
@@ -237,7 +253,7 @@ impl Work<'_> {
     fn run<C: RecordCodec>(&self, codec: C, header: &mut Header) -> Result<(), LayoutError> {
         let (outgoing, incoming) = page_queue();
         let writer = std::thread::scope(|scope| {
-            let writing = scope.spawn(|| write_pages(self.file, incoming));
+            let writing = scope.spawn(|| write_pages(self.file, self.disk, incoming));
             let made = self.make_pages(codec, header, outgoing);
             let written = writing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             // What the disk said is the cause of whatever followed.
@@ -271,7 +287,7 @@ impl Work<'_> {
             band: Band::new(grid, self.tile, lowest),
             own: Levels::new(grid),
             records: Levels::new(grid),
-            writer: PageWriter::new(self.file, grid, plan, header.record_kind, outgoing),
+            writer: PageWriter::new(self.file, self.disk, grid, plan, header.record_kind, outgoing),
             scanned: 0,
         };
         state.band.preload_coarse(self.spool, &self.code)?;

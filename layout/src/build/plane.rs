@@ -36,7 +36,7 @@ impl Plane {
     }
 
     /// Largest distance in codes of the samples `row` from the plane; the first lies at (`x`, `y`). Void samples are NaN and do not count.
-    #[inline]
+    #[inline(always)]
     pub(super) fn farthest_in_row(&self, x: u32, y: u32, row: &[f64]) -> f64 {
         let base = self.zv + self.gy * (f64::from(y) - self.yv);
         let first = f64::from(x) - self.xv;

@@ -6,8 +6,8 @@
 //! file has a hole there, and no room is taken.
 
 use super::extremes::range;
-use crate::atomic_file::{read_at, write_at};
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
+use crate::disk::Disk;
 use crate::error::LayoutError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -76,6 +76,7 @@ enum Storage {
 
 /// The spooled samples of one DEM.
 pub(super) struct Spool<'a> {
+    disk: &'a dyn Disk,
     target: PathBuf,
     wide: u32,
     high: u32,
@@ -92,6 +93,7 @@ pub(super) struct Spool<'a> {
 impl<'a> Spool<'a> {
     /// An empty spool for the samples of `info`, in memory if that takes at most `memory_bytes`, else in the folder of `target`.
     pub(super) fn new(
+        disk: &'a dyn Disk,
         info: &DemInfo,
         nodata: Option<f64>,
         target: &Path,
@@ -105,11 +107,12 @@ impl<'a> Spool<'a> {
         } else {
             let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
             let file = tempfile::tempfile_in(folder)
-                .and_then(|file| file.set_len(bytes).map(|()| file))
-                .map_err(|e| LayoutError::io(target, "cannot create a temporary file beside it", e))?;
+                .and_then(|file| disk.set_len(&file, bytes).map(|()| file))
+                .map_err(|e| failed(target, "cannot create a temporary file beside it", e))?;
             Storage::File(file)
         };
         Ok(Self {
+            disk,
             target: target.to_owned(),
             wide: info.samples_wide,
             high: info.samples_high,
@@ -130,10 +133,6 @@ impl<'a> Spool<'a> {
 
     fn sample_bytes(&self) -> u64 {
         if self.double { 8 } else { 4 }
-    }
-
-    fn failed(&self, e: std::io::Error) -> LayoutError {
-        LayoutError::io(&self.target, "cannot write the temporary file beside it", e)
     }
 
     /// Whether all of row `y`, counted from the south, is void.
@@ -157,7 +156,7 @@ impl<'a> Spool<'a> {
             }
             Storage::File(file) => {
                 let mut bytes = vec![0; length];
-                read_at(file, &mut bytes, offset).map_err(|e| {
+                self.disk.read_at(file, &mut bytes, offset).map_err(|e| {
                     LayoutError::io(&self.target, "cannot read the temporary file beside it", e)
                 })?;
                 self.decode(&bytes, row);
@@ -192,6 +191,12 @@ impl<'a> Spool<'a> {
             }
         }
     }
+}
+
+fn failed(target: &Path, action: &'static str, e: std::io::Error) -> LayoutError {
+    let when_full = "no room for the temporary file beside it, which takes 4 or 8 bytes a sample; make some on its disk, name an output on \
+                     another, or give more --memory, which may hold the samples instead";
+    LayoutError::write(target, action, when_full, e)
 }
 
 impl SampleSink for Spool<'_> {
@@ -234,7 +239,10 @@ impl SampleSink for Spool<'_> {
                     let mut all = all.write().unwrap_or_else(PoisonError::into_inner);
                     all[offset as usize..offset as usize + bytes.len()].copy_from_slice(&bytes);
                 }
-                Storage::File(file) => write_at(file, &bytes, offset).map_err(|e| self.failed(e))?,
+                Storage::File(file) => self
+                    .disk
+                    .write_at(file, &bytes, offset)
+                    .map_err(|e| failed(&self.target, "cannot write the temporary file beside it", e))?,
             }
         }
         self.stats.lock().unwrap_or_else(PoisonError::into_inner).merge(&stats);

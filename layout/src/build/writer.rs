@@ -7,9 +7,10 @@
 use super::gather::gather;
 use super::levels::{LevelShape, Levels};
 use super::plan::{LevelPlan, Plan};
-use crate::atomic_file::{AtomicFile, read_at, write_at};
+use crate::atomic_file::AtomicFile;
 use crate::bytes::{PAGE_BYTES, Page, checksum};
 use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::header::{Header, INERT_PAGE};
@@ -26,6 +27,7 @@ const PAGES_AT_ONCE: usize = 1024;
 /// Writes the pages of one file.
 pub(super) struct PageWriter<'a, C: RecordCodec> {
     file: &'a AtomicFile,
+    disk: &'a dyn Disk,
     grid: Grid,
     levels: Vec<LevelPlan>,
     /// Next part of each level.
@@ -51,17 +53,26 @@ pub(super) fn page_queue() -> (SyncSender<PlacedPages>, Receiver<PlacedPages>) {
 }
 
 /// Writes pages as they arrive, until there will be no more: the work of a thread of its own, so that nobody waits for the disk.
-pub(super) fn write_pages(file: &AtomicFile, batches: Receiver<PlacedPages>) -> Result<(), LayoutError> {
+pub(super) fn write_pages(
+    file: &AtomicFile,
+    disk: &dyn Disk,
+    batches: Receiver<PlacedPages>,
+) -> Result<(), LayoutError> {
     for (place, page) in batches.into_iter().flatten() {
-        write_at(file.file(), &page[..], u64::from(place) * PAGE)
-            .map_err(|e| LayoutError::io(file.target(), "cannot write the terrain file", e))?;
+        disk.write_at(file.file(), &page[..], u64::from(place) * PAGE).map_err(|e| failed(file, e))?;
     }
     Ok(())
+}
+
+fn failed(file: &AtomicFile, e: std::io::Error) -> LayoutError {
+    let when_full = "cannot write the terrain file, for which there is no room; make some on its disk, or name an output on another";
+    LayoutError::write(file.target(), "cannot write the terrain file", when_full, e)
 }
 
 impl<'a, C: RecordCodec> PageWriter<'a, C> {
     pub(super) fn new(
         file: &'a AtomicFile,
+        disk: &'a dyn Disk,
         grid: Grid,
         plan: Plan,
         kind: RecordKind,
@@ -78,6 +89,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             .collect();
         Self {
             file,
+            disk,
             grid,
             next: vec![0; plan.levels.len()],
             levels: plan.levels,
@@ -88,10 +100,6 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             outgoing: Some(outgoing),
             codec: std::marker::PhantomData,
         }
-    }
-
-    fn failed(&self, e: std::io::Error) -> LayoutError {
-        LayoutError::io(self.file.target(), "cannot write the terrain file", e)
     }
 
     /// Gathers the parts of `level` that are complete now that all its rows up to `done_y` are, and writes the pages that are; returns the
@@ -155,7 +163,9 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             if entries.iter().any(|e| e.is_present()) {
                 let leaf = leaf_page(entries);
                 Entry { page, checksum: checksum(&leaf), generation: 1 }.write(&mut root, i);
-                write_at(self.file.file(), &leaf, u64::from(page) * PAGE).map_err(|e| self.failed(e))?;
+                self.disk
+                    .write_at(self.file.file(), &leaf, u64::from(page) * PAGE)
+                    .map_err(|e| failed(self.file, e))?;
                 page += 1;
             }
         }
@@ -165,13 +175,13 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         root.resize(root.len().next_multiple_of(PAGE_BYTES), 0);
         header.file_bytes = u64::from(page) * PAGE + root.len() as u64;
         header.generation = 1;
-        let file = self.file.file();
-        write_at(file, &root, u64::from(page) * PAGE)
-            .and_then(|()| write_at(file, &[0; PAGE_BYTES], PAGE))
-            .and_then(|()| write_at(file, &self.inert[..], u64::from(INERT_PAGE) * PAGE))
-            .and_then(|()| write_at(file, &header.to_page()[..], 0))
-            .and_then(|()| file.set_len(header.file_bytes))
-            .map_err(|e| self.failed(e))
+        let (file, disk) = (self.file.file(), self.disk);
+        disk.write_at(file, &root, u64::from(page) * PAGE)
+            .and_then(|()| disk.write_at(file, &[0; PAGE_BYTES], PAGE))
+            .and_then(|()| disk.write_at(file, &self.inert[..], u64::from(INERT_PAGE) * PAGE))
+            .and_then(|()| disk.write_at(file, &header.to_page()[..], 0))
+            .and_then(|()| disk.set_len(file, header.file_bytes))
+            .map_err(|e| failed(self.file, e))
     }
 
     /// Moves pages down over those planned that turned out inert; returns the first free page.
@@ -185,9 +195,10 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
                 continue;
             }
             if entry.page != free {
-                read_at(self.file.file(), &mut page[..], u64::from(entry.page) * PAGE)
-                    .and_then(|()| write_at(self.file.file(), &page[..], u64::from(free) * PAGE))
-                    .map_err(|e| self.failed(e))?;
+                let (file, disk) = (self.file.file(), self.disk);
+                disk.read_at(file, &mut page[..], u64::from(entry.page) * PAGE)
+                    .and_then(|()| disk.write_at(file, &page[..], u64::from(free) * PAGE))
+                    .map_err(|e| failed(self.file, e))?;
                 self.entries[i].page = free;
             }
             free += 1;
