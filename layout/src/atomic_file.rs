@@ -82,7 +82,7 @@ impl AtomicFile {
     pub(crate) fn publish_on(self, disk: &dyn Disk) -> Result<(), LayoutError> {
         let target = self.target;
         let failed = |e| {
-            let when_full = "cannot write the file; make room on its disk, or name an output on another";
+            let when_full = "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
             LayoutError::write(&target, "cannot write the file", when_full, e)
         };
         match self.inner {

@@ -10,6 +10,7 @@ mod flight;
 mod ground;
 mod height;
 mod info;
+mod limits;
 mod mesh;
 mod mesh_file;
 #[cfg(feature = "view")]
@@ -94,6 +95,7 @@ impl std::error::Error for WrongUsage {}
 
 /// The whole program.
 pub(crate) fn run() -> ExitCode {
+    limits::heed_file_size_limit();
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
         Verb::Info(args) => info::run(&args),

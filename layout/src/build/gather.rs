@@ -18,7 +18,7 @@ pub(super) fn gather<C: RecordCodec>(
     shape: &LevelShape,
     records: &Levels<C::Raw>,
 ) -> Option<Vec<u8>> {
-    let offset = part.first - level_slots(grid.k(), shape.level()).start;
+    let offset = part.first() - level_slots(grid.k(), shape.level()).start;
     let within = (offset % BLOCK_SLOTS) as usize;
     let start = offset - within as u64;
     let [x, y] = block_bounds(grid.k(), shape, start, BLOCK_SLOTS.ilog2() / 2);
@@ -37,7 +37,7 @@ pub(super) fn gather<C: RecordCodec>(
     if rows.iter().all(is_inert) {
         return None;
     }
-    let mut bytes = vec![0; part.count as usize * C::BYTES];
+    let mut bytes = vec![0; part.count() as usize * C::BYTES];
     let block = BlockPoints::new(grid.k(), shape.level(), start);
     for (i, place) in bytes.chunks_exact_mut(C::BYTES).enumerate() {
         let raw = block.point(within + i).filter(|p| !shape.is_beyond(*p)).and_then(|p| {

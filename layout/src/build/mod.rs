@@ -205,8 +205,8 @@ impl MemoryPlan {
             (_, true) => 8,
             (_, false) => 16,
         };
-        // Pages of the directory and their plan, some 48 bytes each.
-        let directory = crate::order::slot_count(grid.k()) * record_bytes / 4096 * 48;
+        // Pages of the directory and their plan, some 34 bytes each.
+        let directory = crate::order::slot_count(grid.k()) * record_bytes / 4096 * 34;
         let fixed = RESERVED_BYTES + directory;
         let threads = rayon::current_num_threads() as u64;
         let work = |tile: u32| {

@@ -128,7 +128,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
                     &mut self.lacking,
                     &self.inert,
                     C::BYTES,
-                    part.first,
+                    part.first(),
                     bytes.as_deref(),
                 ));
             }
