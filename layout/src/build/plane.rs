@@ -39,23 +39,26 @@ impl Plane {
     #[inline(always)]
     pub(super) fn farthest_in_row(&self, x: u32, y: u32, row: &[f64]) -> f64 {
         let base = self.zv + self.gy * (f64::from(y) - self.yv);
-        let first = f64::from(x) - self.xv;
-        let distance = |value: f64, i: f64| (value - (base + self.gx * (first + i))).abs();
+        // A whole number, as are its sums with the lanes: no rounding depends on how the row is cut.
+        let mut offset = f64::from(x) - self.xv;
+        let distance = |value: f64, offset: f64| (value - (base + self.gx * offset)).abs();
+        let (mut farthest, mut rest) = (0.0, row);
         // Eight lanes, so that the compiler can vectorise; most triangles are small, and most rows shorter than that.
-        let (chunks, rest) = row.as_chunks::<8>();
-        let (mut farthest, mut done) = (0.0, 0.0);
-        if !chunks.is_empty() {
+        if row.len() >= 8 {
+            let chunks;
+            (chunks, rest) = row.as_chunks::<8>();
             let mut lanes = [0.0f64; 8];
             for chunk in chunks {
                 for (lane, (value, best)) in chunk.iter().zip(&mut lanes).enumerate() {
-                    *best = larger(*best, distance(*value, done + lane as f64));
+                    *best = larger(*best, distance(*value, offset + lane as f64));
                 }
-                done += 8.0;
+                offset += 8.0;
             }
             farthest = lanes.into_iter().fold(0.0, larger);
         }
-        for (i, value) in rest.iter().enumerate() {
-            farthest = larger(farthest, distance(*value, done + i as f64));
+        for value in rest {
+            farthest = larger(farthest, distance(*value, offset));
+            offset += 1.0;
         }
         farthest
     }
