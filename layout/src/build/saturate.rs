@@ -54,8 +54,9 @@ impl<C: RecordCodec> Saturator<C> {
         for column in 0..columns {
             let v = shape.point(row, column);
             let folded = v.x() + step >= wide || y + step >= high;
+            let is_inside = !folded && v.x() >= step;
             // The rest of an ocean.
-            if let Some(void) = void_row.as_ref().filter(|_| !folded && v.x() >= step)
+            if let Some(void) = void_row.as_ref().filter(|_| is_inside)
                 && void.is_inert(v.x(), column)
             {
                 made.push(C::INERT);
@@ -66,7 +67,7 @@ impl<C: RecordCodec> Saturator<C> {
                 _ => f64::NAN,
             };
             // Nearly every vertex: all around it is there, nothing folds, nothing is void.
-            if let Some(open) = open_row.as_ref().filter(|_| !folded && v.x() >= step)
+            if let Some(open) = open_row.as_ref().filter(|_| is_inside)
                 && let Some(raw) = open.record(v.x(), column, own_m)
             {
                 made.push(raw);

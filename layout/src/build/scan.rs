@@ -7,7 +7,7 @@
 
 use super::band::Band;
 use super::extremes::larger;
-use super::levels::{LevelShape, Levels};
+use super::levels::{Levels, index_in};
 use super::plane::Plane;
 use crate::grid::{Grid, GridPoint};
 use crate::order::corners;
@@ -281,9 +281,9 @@ impl OwnErrors {
     fn raise(&self, v: GridPoint, codes: f64, step_m: f64) {
         // Rounding of the distance itself is below 2^-40 of it and of the heights it came from.
         let metres = f32_at_least(codes * step_m * (1.0 + 1e-9));
-        let shape = LevelShape::new(self.grid(), self.grid().level(v));
-        let (row, column) = shape.index(v);
-        if let Some(cell) = self.row(shape.level(), row).and_then(|r| r.get(column)) {
+        let level = self.grid().level(v);
+        let (row, column) = index_in(level, v);
+        if let Some(cell) = self.row(level, row).and_then(|r| r.get(column)) {
             cell.fetch_max(metres.to_bits(), Ordering::Relaxed);
         }
     }
