@@ -11,6 +11,7 @@ mod band;
 mod extremes;
 mod gather;
 mod levels;
+mod memory;
 mod padding;
 mod plan;
 mod plane;
@@ -22,7 +23,7 @@ mod survey;
 mod writer;
 
 use crate::atomic_file::AtomicFile;
-use crate::dem::{DemSource, SampleType};
+use crate::dem::DemSource;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::grid::Grid;
@@ -31,6 +32,7 @@ use crate::order::corners;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
 use band::{Band, RowReader};
 use levels::{LevelShape, Levels};
+use memory::{LARGEST_TILE, MemoryPlan};
 use rayon::prelude::*;
 use saturate::Saturator;
 use scan::{FIRST_SCANNED, OwnErrors, scan_tile_row};
@@ -40,13 +42,6 @@ use std::sync::atomic::AtomicU32;
 use std::sync::mpsc::SyncSender;
 use survey::HeightCode;
 use writer::{PageWriter, PlacedPages, page_queue, write_pages};
-
-/// Mebibyte.
-const MIB: u64 = 1 << 20;
-/// Memory kept aside for decoders, threads and the program itself.
-const RESERVED_BYTES: u64 = 24 * MIB;
-/// Largest tile: beyond this a tile no longer fits a core's cache.
-const LARGEST_TILE: u32 = 256;
 
 /// What to build.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,7 +125,7 @@ pub fn build_on(
     let (spacing_m, spacing_origin) = spacing::resolve(info, options.spacing_m)?;
     let grid = Grid::new([info.samples_wide, info.samples_high], spacing_m)?;
     let samples = u64::from(info.samples_wide) * u64::from(info.samples_high);
-    let memory = MemoryPlan::new(&grid, info.sample_type, options)?;
+    let memory = MemoryPlan::new(&grid, info.sample_type, options, rayon::current_num_threads() as u64)?;
     let file = AtomicFile::create(out)?;
     let advance = |n| progress.advance(n);
 
@@ -181,61 +176,6 @@ pub fn build_on(
     drop(spool);
     file.publish_on(disk)?;
     Ok(header)
-}
-
-/// How the budget is spent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct MemoryPlan {
-    /// Side of a tile in steps, a power of two.
-    tile: u32,
-    /// Bytes the spool may hold in memory.
-    spool_bytes: u64,
-}
-
-impl MemoryPlan {
-    fn new(grid: &Grid, sample_type: SampleType, options: &BuildOptions) -> Result<Self, LayoutError> {
-        let memory_mib = options.memory_mib;
-        let budget = memory_mib * MIB;
-        let [wide, high] = grid.samples().map(u64::from);
-        let n = grid.side_steps();
-        let single = sample_type.fits_f32();
-        // The widest record the samples may need; the range of 16-bit integers always fits the compact one.
-        let record_bytes = match (sample_type.is_integer(), single) {
-            (true, true) if options.record.is_none_or(|kind| kind == RecordKind::Compact) => 4,
-            (_, true) => 8,
-            (_, false) => 16,
-        };
-        // Pages of the directory and their plan, some 34 bytes each.
-        let directory = crate::order::slot_count(grid.k()) * record_bytes / 4096 * 34;
-        let fixed = RESERVED_BYTES + directory;
-        let threads = rayon::current_num_threads() as u64;
-        let work = |tile: u32| {
-            let tile = u64::from(tile);
-            // Codes and voids of some 3.5 tile rows, records and own errors beside them, rows of records that wait for their pages.
-            wide * (7 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
-                + wide * 128 * record_bytes
-                + threads * (tile + 1) * (tile + 1) * 8
-                // A code, a void and an own error for every corner of a tile.
-                + (wide / tile + 2) * (high / tile + 2) * 13
-        };
-        let largest = n.min(options.largest_tile.clamp(2, LARGEST_TILE));
-        let smallest = largest.min(16);
-        let spool = wide * high * if single { 4 } else { 8 };
-        let available = budget.saturating_sub(fixed);
-        let tiles = || (0..=8).rev().map(|m| 1 << m).filter(|s| (smallest..=largest).contains(s));
-        let largest_within = |bytes: u64| tiles().find(|s| work(*s) <= bytes);
-        if let Some(tile) = largest_within(available.saturating_sub(spool)).filter(|t| *t >= largest.min(128))
-        {
-            return Ok(Self { tile, spool_bytes: spool });
-        }
-        match largest_within(available) {
-            Some(tile) => Ok(Self { tile, spool_bytes: 0 }),
-            None => Err(LayoutError::Usage(format!(
-                "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; give at least --memory {}",
-                (fixed + tiles().map(work).min().unwrap_or(0)).div_ceil(MIB)
-            ))),
-        }
-    }
 }
 
 /// What the work on one file needs to know.
