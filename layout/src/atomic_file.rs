@@ -4,6 +4,8 @@
 //! systems without nameless files, to a temporary file beside the target that is removed when dropped.
 //! Publishing syncs the bytes, then renames over whatever had the name.
 
+pub(crate) use crate::disk::read_at;
+use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -73,16 +75,24 @@ impl AtomicFile {
     /// # Errors
     /// [`LayoutError::Io`]; nothing is left behind then.
     pub fn publish(self) -> Result<(), LayoutError> {
+        self.publish_on(&SystemDisk)
+    }
+
+    /// As [`AtomicFile::publish`], synced by `disk`.
+    pub(crate) fn publish_on(self, disk: &dyn Disk) -> Result<(), LayoutError> {
         let target = self.target;
-        let failed = |e| LayoutError::io(&target, "cannot write the file", e);
+        let failed = |e| {
+            let when_full = "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
+            LayoutError::write(&target, "cannot write the file", when_full, e)
+        };
         match self.inner {
             #[cfg(target_os = "linux")]
             Inner::Nameless(file) => {
-                file.sync_all().map_err(failed)?;
+                disk.sync(&file).map_err(failed)?;
                 name_file(&file, &target).map_err(failed)
             }
             Inner::Named(file) => {
-                file.as_file().sync_all().map_err(failed)?;
+                disk.sync(file.as_file()).map_err(failed)?;
                 file.persist(&target).map(drop).map_err(|e| failed(e.error))
             }
         }
@@ -111,37 +121,6 @@ fn name_file(file: &File, target: &Path) -> std::io::Result<()> {
     std::fs::rename(&name, target)
 }
 
-/// Writes all of `bytes` at `offset`.
-pub(crate) fn write_at(file: &File, bytes: &[u8], offset: u64) -> std::io::Result<()> {
-    #[cfg(unix)]
-    return std::os::unix::fs::FileExt::write_all_at(file, bytes, offset);
-    #[cfg(windows)]
-    {
-        let mut done = 0;
-        while done < bytes.len() {
-            done += std::os::windows::fs::FileExt::seek_write(file, &bytes[done..], offset + done as u64)?;
-        }
-        Ok(())
-    }
-}
-
-/// Fills `bytes` from `offset`.
-pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> std::io::Result<()> {
-    #[cfg(unix)]
-    return std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset);
-    #[cfg(windows)]
-    {
-        let mut done = 0;
-        while done < bytes.len() {
-            match std::os::windows::fs::FileExt::seek_read(file, &mut bytes[done..], offset + done as u64)? {
-                0 => return Err(std::io::ErrorKind::UnexpectedEof.into()),
-                count => done += count,
-            }
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,13 +131,13 @@ mod tests {
         let target = folder.path().join("a");
         let names = || std::fs::read_dir(folder.path()).unwrap().count();
         let file = AtomicFile::create(&target).unwrap();
-        write_at(file.file(), b"half", 0).unwrap();
+        SystemDisk.write_at(file.file(), b"half", 0).unwrap();
         assert!(!target.exists());
         drop(file);
         assert_eq!(names(), 0);
         for text in ["one", "two"] {
             let file = AtomicFile::create(&target).unwrap();
-            write_at(file.file(), text.as_bytes(), 0).unwrap();
+            SystemDisk.write_at(file.file(), text.as_bytes(), 0).unwrap();
             file.publish().unwrap();
             assert_eq!(std::fs::read_to_string(&target).unwrap(), text);
             assert_eq!(names(), 1);

@@ -2,6 +2,7 @@
 //! not our format, damaged, unsupported, I/O, wrong usage. Every message says what, where, and
 //! what to do.
 
+use crate::disk::is_full;
 use std::path::{Path, PathBuf};
 
 /// Anything that can go wrong between a DEM and a terrain file, or in reading one.
@@ -53,6 +54,12 @@ impl LayoutError {
     /// An I/O error on `path` while attempting `action` ("cannot read the file").
     pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
         Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// A failed write to `path`: `action` as for [`LayoutError::io`], or `when_full`, which says what to do, where there was no room.
+    pub fn write(path: &Path, action: &'static str, when_full: &'static str, source: std::io::Error) -> Self {
+        let action = if is_full(&source) { when_full } else { action };
+        Self::io(path, action, source)
     }
 
     /// A format mismatch.

@@ -7,6 +7,7 @@ pub mod build;
 pub mod bytes;
 pub mod dem;
 pub mod directory;
+pub mod disk;
 pub mod error;
 pub mod grid;
 pub mod header;

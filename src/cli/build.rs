@@ -14,8 +14,8 @@ use terrasoar_layout::record::RecordKind;
 /// Make a terrain file (.iqt) from elevation data.
 ///
 /// Reads 16-bit and 8-bit grey PNG, VTP BT, SRTM .hgt (one tile, or several that border each other) and GeoTIFF, of any size and any
-/// rectangle. The output appears when it is complete; a build that fails or is killed leaves nothing. The same input gives the same bytes
-/// whatever --threads and --memory.
+/// rectangle. The output appears when it is complete; a build that fails or is killed leaves nothing, and the next one starts from the
+/// beginning. The same input gives the same bytes whatever --threads and --memory.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -23,6 +23,9 @@ Examples:
   terrasoar build N46E007.hgt N46E008.hgt -o valais.iqt
   terrasoar build puget.png --spacing 160 --z-scale 0.1 -o puget.iqt
   terrasoar build huge.tif --memory 2048 -o huge.iqt
+
+Room on the output's disk: some 4 bytes a sample for the file (8 or 16 with exact records), and while building another 4 (8 where single
+precision does not hold the samples), unless --memory holds them. Voids take none.
 
 A DEM in degrees gets the spacing in metres that degrees have at its centre; `terrasoar info` says so. PNG says nothing about spacing:
 state it, or it is taken to be 1 m.")]

@@ -5,8 +5,6 @@
 //! itself is wrong.** A reader that closes our output early ends the program quietly.
 
 mod build;
-#[cfg(unix)]
-mod bus;
 mod cap;
 mod compare;
 mod flight;
@@ -28,6 +26,10 @@ mod picture;
 mod pictureless;
 mod progress;
 mod replay;
+#[cfg(unix)]
+mod signals;
+#[cfg(unix)]
+mod signals;
 #[cfg(feature = "view")]
 mod snapshot;
 mod sweep;
@@ -100,7 +102,7 @@ impl std::error::Error for WrongUsage {}
 /// The whole program.
 pub(crate) fn run() -> ExitCode {
     #[cfg(unix)]
-    bus::watch();
+    signals::heed();
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
         Verb::Info(args) => info::run(&args),

@@ -1,20 +1,21 @@
 //! The rows of height codes the build is working on: a window that slides north over the terrain, voids filled in.
 //!
 //! A void's height serves positions only. It is interpolated along its row between the nearest samples that have one; a row of
-//! nothing but voids repeats the row south of it. Both depend on the data alone, so every band size gives the same fill.
+//! nothing but voids repeats the row south of it, and shares its memory. Both depend on the data alone, so every band size gives the same fill.
 
 use super::spool::Spool;
 use super::survey::HeightCode;
 use crate::error::LayoutError;
 use crate::grid::{Grid, GridPoint};
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// One row of the window.
 #[derive(Debug)]
 pub(super) struct Row {
-    codes: Vec<f64>,
+    codes: Arc<[f64]>,
     /// Which samples are void; empty if none is.
-    voids: Vec<bool>,
+    voids: Arc<[bool]>,
 }
 
 /// Reads rows of codes from the south, voids filled in; apart from the window, so that rows ahead of it can be read meanwhile.
@@ -23,65 +24,75 @@ pub(super) struct RowReader<'s> {
     code: HeightCode,
     next: u32,
     /// Filled codes of the row last read, which a wholly void row repeats.
-    last: Vec<f64>,
+    last: Arc<[f64]>,
+    /// The voids of a wholly void row.
+    all_void: Arc<[bool]>,
 }
 
 impl<'s> RowReader<'s> {
     /// A reader at the southernmost row; rows of voids before any height have `fallback_code`.
     pub(super) fn new(spool: &'s Spool<'s>, code: HeightCode, wide: u32, fallback_code: f64) -> Self {
-        Self { spool, code, next: 0, last: vec![fallback_code; wide as usize] }
+        let wide = wide as usize;
+        Self {
+            spool,
+            code,
+            next: 0,
+            last: vec![fallback_code; wide].into(),
+            all_void: vec![true; wide].into(),
+        }
     }
 
     /// Reads on up to and including row `through`.
     pub(super) fn read(&mut self, through: u32) -> Result<Vec<Row>, LayoutError> {
         let mut rows = Vec::new();
+        let mut codes = vec![0.0; self.last.len()];
         while self.next <= through {
-            let mut codes = vec![0.0; self.last.len()];
-            self.spool.read_row(self.next, &mut codes)?;
-            codes.iter_mut().for_each(|v| *v = self.code.code(*v));
-            let voids = self.fill(&mut codes);
-            self.last.copy_from_slice(&codes);
-            rows.push(Row { codes, voids });
+            let voids = if self.spool.is_void_row(self.next) {
+                Arc::clone(&self.all_void)
+            } else {
+                self.spool.read_row(self.next, &mut codes)?;
+                codes.iter_mut().for_each(|v| *v = self.code.code(*v));
+                let voids = fill(&mut codes);
+                self.last = codes.as_slice().into();
+                voids.into()
+            };
+            rows.push(Row { codes: Arc::clone(&self.last), voids });
             self.next += 1;
         }
         Ok(rows)
     }
+}
 
-    /// Fills voids (NaN) along a row; says which were void.
-    fn fill(&self, codes: &mut [f64]) -> Vec<bool> {
-        if !codes.iter().any(|v| v.is_nan()) {
-            return Vec::new();
-        }
-        let voids: Vec<bool> = codes.iter().map(|v| v.is_nan()).collect();
-        if voids.iter().all(|v| *v) {
-            codes.copy_from_slice(&self.last);
-            return voids;
-        }
-        let mut at = 0;
-        while at < codes.len() {
-            if !voids[at] {
-                at += 1;
-                continue;
-            }
-            let end = (at..codes.len()).find(|i| !voids[*i]).unwrap_or(codes.len());
-            let west = at.checked_sub(1).map(|i| codes[i]);
-            let east = codes.get(end).copied();
-            let (a, b) = match (west, east) {
-                (Some(a), Some(b)) => (a, b),
-                (Some(a), None) => (a, a),
-                (None, Some(b)) => (b, b),
-                // A row that is wholly void was dealt with above.
-                (None, None) => break,
-            };
-            let gap = (end - at + 1) as f64;
-            for (i, code) in codes[at..end].iter_mut().enumerate() {
-                // Rounded, for compact records keep whole codes only.
-                *code = (a + (b - a) * ((i + 1) as f64 / gap)).round_ties_even();
-            }
-            at = end;
-        }
-        voids
+/// Fills voids (NaN) along a row that is not wholly void; says which were void.
+fn fill(codes: &mut [f64]) -> Vec<bool> {
+    if !codes.iter().any(|v| v.is_nan()) {
+        return Vec::new();
     }
+    let voids: Vec<bool> = codes.iter().map(|v| v.is_nan()).collect();
+    let mut at = 0;
+    while at < codes.len() {
+        if !voids[at] {
+            at += 1;
+            continue;
+        }
+        let end = (at..codes.len()).find(|i| !voids[*i]).unwrap_or(codes.len());
+        let west = at.checked_sub(1).map(|i| codes[i]);
+        let east = codes.get(end).copied();
+        let (a, b) = match (west, east) {
+            (Some(a), Some(b)) => (a, b),
+            (Some(a), None) => (a, a),
+            (None, Some(b)) => (b, b),
+            // A row that is wholly void was dealt with above.
+            (None, None) => break,
+        };
+        let gap = (end - at + 1) as f64;
+        for (i, code) in codes[at..end].iter_mut().enumerate() {
+            // Rounded, for compact records keep whole codes only.
+            *code = (a + (b - a) * ((i + 1) as f64 / gap)).round_ties_even();
+        }
+        at = end;
+    }
+    voids
 }
 
 /// Height codes of rows `first..first + rows.len()`, and of every `coarse_step`-th sample of all rows read so far.
@@ -175,6 +186,11 @@ impl Band {
     /// Row `y` of codes, if it is in the window.
     pub(super) fn find_row(&self, y: u32) -> Option<&[f64]> {
         Some(&self.rows.get(y.checked_sub(self.first)? as usize)?.codes)
+    }
+
+    /// Which samples of row `y` are void, if it is in the window; empty if none is.
+    pub(super) fn find_row_voids(&self, y: u32) -> Option<&[bool]> {
+        Some(&self.rows.get(y.checked_sub(self.first)? as usize)?.voids)
     }
 
     /// Which samples of row `y` are void; empty if none is.

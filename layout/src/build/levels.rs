@@ -51,8 +51,7 @@ impl LevelShape {
     /// Row and column of a vertex of this level.
     #[inline(always)]
     pub(super) fn index(&self, p: GridPoint) -> (usize, usize) {
-        let row = if self.white { p.y() >> (self.t + 1) } else { p.y() >> self.t };
-        (row as usize, (p.x() >> (self.t + 1)) as usize)
+        index_in(self.level, p)
     }
 
     /// y of a row.
@@ -84,6 +83,13 @@ impl LevelShape {
             None => 0,
         }
     }
+}
+
+/// Row and column of a vertex in its level.
+#[inline(always)]
+pub(super) fn index_in(level: u32, p: GridPoint) -> (usize, usize) {
+    let (t, is_white) = (level / 2, level & 1);
+    ((p.y() >> (t + is_white)) as usize, (p.x() >> (t + 1)) as usize)
 }
 
 #[derive(Debug)]

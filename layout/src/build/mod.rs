@@ -8,7 +8,10 @@
 //! Invariant: neither threads nor the memory budget change a byte of the file.
 
 mod band;
+mod extremes;
+mod gather;
 mod levels;
+mod memory;
 mod padding;
 mod plan;
 mod plane;
@@ -20,7 +23,8 @@ mod survey;
 mod writer;
 
 use crate::atomic_file::AtomicFile;
-use crate::dem::{DemSource, SampleType};
+use crate::dem::DemSource;
+use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::header::{ErrorKind, Header};
@@ -28,6 +32,7 @@ use crate::order::corners;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
 use band::{Band, RowReader};
 use levels::{LevelShape, Levels};
+use memory::{LARGEST_TILE, MemoryPlan};
 use rayon::prelude::*;
 use saturate::Saturator;
 use scan::{FIRST_SCANNED, OwnErrors, scan_tile_row};
@@ -36,14 +41,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicU32;
 use std::sync::mpsc::SyncSender;
 use survey::HeightCode;
-use writer::{PageWriter, PlacedPage, page_queue, write_pages};
-
-/// Mebibyte.
-const MIB: u64 = 1 << 20;
-/// Memory kept aside for decoders, threads and the program itself.
-const RESERVED_BYTES: u64 = 24 * MIB;
-/// Largest tile: beyond this a tile no longer fits a core's cache.
-const LARGEST_TILE: u32 = 256;
+use writer::{PageWriter, PlacedPages, page_queue, write_pages};
 
 /// What to build.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,6 +104,20 @@ pub fn build(
     options: &BuildOptions,
     progress: &dyn BuildProgress,
 ) -> Result<Header, LayoutError> {
+    build_on(&SystemDisk, dem, out, options, progress)
+}
+
+/// As [`build()`], with all writing and reading back done by `disk`.
+///
+/// # Errors
+/// As [`build()`].
+pub fn build_on(
+    disk: &dyn Disk,
+    dem: &dyn DemSource,
+    out: &Path,
+    options: &BuildOptions,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
     let info = dem.info();
     if !(options.z_scale.is_finite() && options.z_scale > 0.0) {
         return Err(LayoutError::Usage(format!("--z-scale is a positive factor, not {}", options.z_scale)));
@@ -113,12 +125,12 @@ pub fn build(
     let (spacing_m, spacing_origin) = spacing::resolve(info, options.spacing_m)?;
     let grid = Grid::new([info.samples_wide, info.samples_high], spacing_m)?;
     let samples = u64::from(info.samples_wide) * u64::from(info.samples_high);
-    let memory = MemoryPlan::new(&grid, info.sample_type, options)?;
+    let memory = MemoryPlan::new(&grid, info.sample_type, options, rayon::current_num_threads() as u64)?;
     let file = AtomicFile::create(out)?;
     let advance = |n| progress.advance(n);
 
     progress.stage("reading", samples);
-    let spool = Spool::new(info, options.nodata, out, memory.spool_bytes, &advance)?;
+    let spool = Spool::new(disk, info, options.nodata, out, memory.spool_bytes, &advance)?;
     dem.stream(&spool)?;
     let stats = spool.stats();
     if stats.voids == samples {
@@ -154,7 +166,7 @@ pub fn build(
     };
 
     progress.stage("building", samples);
-    let work = Work { spool: &spool, code, scale, tile: memory.tile, file: &file, advance: &advance };
+    let work = Work { spool: &spool, code, scale, tile: memory.tile, file: &file, disk, advance: &advance };
     match code.kind {
         RecordKind::Compact => work.run(Compact::new(&grid, &scale), &mut header)?,
         RecordKind::Exact8 => work.run(Exact8::new(&grid, &scale), &mut header)?,
@@ -162,66 +174,8 @@ pub fn build(
     }
     progress.stage("syncing", 0);
     drop(spool);
-    file.publish()?;
+    file.publish_on(disk)?;
     Ok(header)
-}
-
-/// How the budget is spent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct MemoryPlan {
-    /// Side of a tile in steps, a power of two.
-    tile: u32,
-    /// Bytes the spool may hold in memory.
-    spool_bytes: u64,
-}
-
-impl MemoryPlan {
-    fn new(grid: &Grid, sample_type: SampleType, options: &BuildOptions) -> Result<Self, LayoutError> {
-        let memory_mib = options.memory_mib;
-        let budget = memory_mib * MIB;
-        let [wide, high] = grid.samples().map(u64::from);
-        let n = grid.side_steps();
-        let single = sample_type.fits_f32();
-        // The widest record the samples may need; the range of 16-bit integers always fits the compact one.
-        let record_bytes = match (sample_type.is_integer(), single) {
-            (true, true) if options.record.is_none_or(|kind| kind == RecordKind::Compact) => 4,
-            (_, true) => 8,
-            (_, false) => 16,
-        };
-        // Pages of the directory and their plan, some 48 bytes each.
-        let directory = crate::order::slot_count(grid.k()) * record_bytes / 4096 * 48;
-        let fixed = RESERVED_BYTES + directory;
-        let threads = rayon::current_num_threads() as u64;
-        let work = |tile: u32| {
-            let tile = u64::from(tile);
-            // Codes and voids of some 3.5 tile rows, records and own errors beside them, rows of records that wait for their pages.
-            wide * (7 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
-                + wide * 128 * record_bytes
-                + threads * (tile + 1) * (tile + 1) * 8
-        };
-        let largest = n.min(options.largest_tile.clamp(2, LARGEST_TILE));
-        let smallest = largest.min(16);
-        let spool = wide * high * if single { 4 } else { 8 };
-        let available = budget.saturating_sub(fixed);
-        let largest_within = |bytes: u64| {
-            (0..=8)
-                .rev()
-                .map(|m| 1 << m)
-                .filter(|s| (smallest..=largest).contains(s))
-                .find(|s| work(*s) <= bytes)
-        };
-        if let Some(tile) = largest_within(available.saturating_sub(spool)).filter(|t| *t >= largest.min(128))
-        {
-            return Ok(Self { tile, spool_bytes: spool });
-        }
-        match largest_within(available) {
-            Some(tile) => Ok(Self { tile, spool_bytes: 0 }),
-            None => Err(LayoutError::Usage(format!(
-                "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; give at least --memory {}",
-                (fixed + work(smallest)).div_ceil(MIB)
-            ))),
-        }
-    }
 }
 
 /// What the work on one file needs to know.
@@ -231,6 +185,7 @@ struct Work<'a> {
     scale: RecordScale,
     tile: u32,
     file: &'a AtomicFile,
+    disk: &'a dyn Disk,
     advance: &'a (dyn Fn(u64) + Sync),
 }
 
@@ -238,7 +193,7 @@ impl Work<'_> {
     fn run<C: RecordCodec>(&self, codec: C, header: &mut Header) -> Result<(), LayoutError> {
         let (outgoing, incoming) = page_queue();
         let writer = std::thread::scope(|scope| {
-            let writing = scope.spawn(|| write_pages(self.file, incoming));
+            let writing = scope.spawn(|| write_pages(self.file, self.disk, incoming));
             let made = self.make_pages(codec, header, outgoing);
             let written = writing.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             // What the disk said is the cause of whatever followed.
@@ -252,7 +207,7 @@ impl Work<'_> {
         &self,
         codec: C,
         header: &Header,
-        outgoing: SyncSender<PlacedPage>,
+        outgoing: SyncSender<PlacedPages>,
     ) -> Result<PageWriter<'_, C>, LayoutError> {
         let grid = header.grid;
         let [wide, high] = grid.samples();
@@ -272,7 +227,7 @@ impl Work<'_> {
             band: Band::new(grid, self.tile, lowest),
             own: Levels::new(grid),
             records: Levels::new(grid),
-            writer: PageWriter::new(self.file, grid, plan, header.record_kind, outgoing),
+            writer: PageWriter::new(self.file, self.disk, grid, plan, header.record_kind, outgoing),
             scanned: 0,
         };
         state.band.preload_coarse(self.spool, &self.code)?;

@@ -11,15 +11,33 @@ use crate::grid::Grid;
 use crate::order::{BLOCK_SLOTS, level_slots, point_of, slot_count};
 use rayon::prelude::*;
 
-/// The slots of one page that lie in one block of one level: gathered together once the last of their rows is known.
+/// The slots of one page that lie in one block of one level: gathered together once the last of their rows is known. There are some two a
+/// page and all are there from the start, so they are small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct PagePart {
-    /// First slot.
-    pub(super) first: u64,
-    /// Number of slots.
-    pub(super) count: u32,
+    /// First slot, and number of slots in the low [`COUNT_BITS`].
+    slots: u64,
     /// Least and largest y of its vertices.
     pub(super) y: [u32; 2],
+}
+
+/// Bits that hold the number of slots of a block.
+const COUNT_BITS: u32 = BLOCK_SLOTS.ilog2() + 1;
+
+impl PagePart {
+    fn new(slots: std::ops::Range<u64>, y: [u32; 2]) -> Self {
+        Self { slots: slots.start << COUNT_BITS | (slots.end - slots.start), y }
+    }
+
+    /// First slot.
+    pub(super) fn first(&self) -> u64 {
+        self.slots >> COUNT_BITS
+    }
+
+    /// Number of slots, at most [`BLOCK_SLOTS`].
+    pub(super) fn count(&self) -> u64 {
+        self.slots & ((1 << COUNT_BITS) - 1)
+    }
 }
 
 /// What one level contributes, in order of the row at which it becomes complete.
@@ -60,13 +78,13 @@ impl Plan {
                         let first = start.max(page * records_per_page);
                         let last = end.min((page + 1) * records_per_page);
                         let y = rows_of(k, &shape, first..last)?;
-                        Some(PagePart { first, count: (last - first) as u32, y })
+                        Some(PagePart::new(first..last, y))
                     })
                 })
                 .collect();
-            level_parts.sort_unstable_by_key(|p| (p.y[1], p.first));
+            level_parts.sort_unstable_by_key(|p| (p.y[1], p.slots));
             for part in &level_parts {
-                parts[(part.first / records_per_page) as usize] += 1;
+                parts[(part.first() / records_per_page) as usize] += 1;
             }
             let span = level_parts.iter().map(|p| p.y[1] - p.y[0]).max().unwrap_or(0);
             levels.push(LevelPlan { parts: level_parts, span });
@@ -123,7 +141,7 @@ fn block_rows(k: u32, shape: &LevelShape, base: u64, offset: u64, order: u32, ro
 }
 
 /// Bounds in x and y of a block of 4^order slots, ghosts included.
-fn block_bounds(k: u32, shape: &LevelShape, offset: u64, order: u32) -> [[i64; 2]; 2] {
+pub(super) fn block_bounds(k: u32, shape: &LevelShape, offset: u64, order: u32) -> [[i64; 2]; 2] {
     use crate::order::{black_block_at, white_block_at};
     let d = k - 1 - shape.level() / 2;
     let t = shape.level() / 2;
@@ -160,9 +178,9 @@ mod tests {
             let mut seen = vec![0u8; plan.parts.len()];
             seen[0] = 1;
             for part in plan.levels.iter().flat_map(|l| &l.parts) {
-                seen[(part.first / per_page) as usize] += 1;
-                assert_eq!(part.first / per_page, (part.first + u64::from(part.count) - 1) / per_page);
-                let rows: Vec<u32> = (part.first..part.first + u64::from(part.count))
+                seen[(part.first() / per_page) as usize] += 1;
+                assert_eq!(part.first() / per_page, (part.first() + part.count() - 1) / per_page);
+                let rows: Vec<u32> = (part.first()..part.first() + part.count())
                     .filter_map(|s| point_of(k, s))
                     .filter(|p| !grid.is_beyond(*p, grid.level(*p)))
                     .map(GridPoint::y)

@@ -4,6 +4,7 @@
 //! asks: tile size, memory budget and threads cannot change a bit of the result. On whole height codes all of
 //! it is exact.
 
+use super::extremes::larger;
 use crate::grid::GridPoint;
 
 /// `z = (zv + gy * (y - yv)) + gx * (x - xv)` in height codes.
@@ -35,25 +36,29 @@ impl Plane {
     }
 
     /// Largest distance in codes of the samples `row` from the plane; the first lies at (`x`, `y`). Void samples are NaN and do not count.
-    #[inline]
+    #[inline(always)]
     pub(super) fn farthest_in_row(&self, x: u32, y: u32, row: &[f64]) -> f64 {
         let base = self.zv + self.gy * (f64::from(y) - self.yv);
-        let first = f64::from(x) - self.xv;
-        let (chunks, rest) = row.as_chunks::<8>();
-        // Comparisons with NaN are false, which leaves voids out. Eight lanes, so that the compiler can vectorise.
-        let mut lanes = [0.0f64; 8];
-        let mut done = 0.0;
-        for chunk in chunks {
-            for (lane, (value, best)) in chunk.iter().zip(&mut lanes).enumerate() {
-                let distance = (value - (base + self.gx * (first + (done + lane as f64)))).abs();
-                *best = if distance > *best { distance } else { *best };
+        // A whole number, as are its sums with the lanes: no rounding depends on how the row is cut.
+        let mut offset = f64::from(x) - self.xv;
+        let distance = |value: f64, offset: f64| (value - (base + self.gx * offset)).abs();
+        let (mut farthest, mut rest) = (0.0, row);
+        // Eight lanes, so that the compiler can vectorise; most triangles are small, and most rows shorter than that.
+        if row.len() >= 8 {
+            let chunks;
+            (chunks, rest) = row.as_chunks::<8>();
+            let mut lanes = [0.0f64; 8];
+            for chunk in chunks {
+                for (lane, (value, best)) in chunk.iter().zip(&mut lanes).enumerate() {
+                    *best = larger(*best, distance(*value, offset + lane as f64));
+                }
+                offset += 8.0;
             }
-            done += 8.0;
+            farthest = lanes.into_iter().fold(0.0, larger);
         }
-        let mut farthest = lanes.into_iter().fold(0.0, f64::max);
-        for (i, value) in rest.iter().enumerate() {
-            let distance = (value - (base + self.gx * (first + (done + i as f64)))).abs();
-            farthest = if distance > farthest { distance } else { farthest };
+        for value in rest {
+            farthest = larger(farthest, distance(*value, offset));
+            offset += 1.0;
         }
         farthest
     }

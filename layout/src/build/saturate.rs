@@ -4,6 +4,7 @@
 //! the file says and survives the rounding of the engine's arithmetic (FORMAT.md, section 3).
 
 use super::band::Band;
+use super::extremes::{larger, smaller};
 use super::levels::{LevelShape, Levels};
 use super::padding::{deviation, has_area};
 use super::scan::{FIRST_SCANNED, OwnErrors};
@@ -47,17 +48,26 @@ impl<C: RecordCodec> Saturator<C> {
         let around = Surroundings { shape, band, records };
         let columns = shape.columns(row);
         let mut made = Vec::with_capacity(columns);
-        let row_is_open = !voids_near && y >= step && y + step < high;
-        let open_row = row_is_open.then(|| OpenRow::new(self, &around, y)).flatten();
+        let is_inside = y >= step && y + step < high;
+        let open_row = (is_inside && !voids_near).then(|| OpenRow::new(self, &around, y)).flatten();
+        let void_row = (is_inside && voids_near).then(|| VoidRow::new(self, &around, y)).flatten();
         for column in 0..columns {
             let v = shape.point(row, column);
             let folded = v.x() + step >= wide || y + step >= high;
+            let is_inside = !folded && v.x() >= step;
+            // The rest of an ocean.
+            if let Some(void) = void_row.as_ref().filter(|_| is_inside)
+                && void.is_inert(v.x(), column)
+            {
+                made.push(C::INERT);
+                continue;
+            }
             let own_m = match scanned {
                 Some(cells) if !folded => f64::from(f32::from_bits(cells[column].load(Ordering::Relaxed))),
                 _ => f64::NAN,
             };
             // Nearly every vertex: all around it is there, nothing folds, nothing is void.
-            if let Some(open) = open_row.as_ref().filter(|_| !folded && v.x() >= step)
+            if let Some(open) = open_row.as_ref().filter(|_| is_inside)
                 && let Some(raw) = open.record(v.x(), column, own_m)
             {
                 made.push(raw);
@@ -154,7 +164,7 @@ impl<C: RecordCodec> Saturator<C> {
     #[inline(always)]
     fn encode(&self, level: u32, code: f64, class: VertexClass, own_m: f64, below: &Below) -> Option<C::Raw> {
         // No triangle is farther from a sample than the range of heights, which lies a millionth below the top.
-        let error_m = below.error_m.max(own_m.min(self.scale.error_top_m * (1.0 - 1e-7)));
+        let error_m = larger(below.error_m, smaller(self.scale.error_top_m * (1.0 - 1e-7), own_m));
         self.codec.encode(level, code, class, error_m, below.radius_m)
     }
 }
@@ -189,8 +199,80 @@ impl Below {
         }
         self.any_alive = true;
         let dz = height_m - (child.height_m - base_m);
-        self.radius_m = self.radius_m.max(((ground2 + dz * dz).sqrt() + child.radius_m) * MARGIN);
-        self.error_m = self.error_m.max(child.error_m);
+        self.radius_m = larger(self.radius_m, ((ground2 + dz * dz).sqrt() + child.radius_m) * MARGIN);
+        self.error_m = larger(self.error_m, child.error_m);
+    }
+}
+
+/// The rows of records that hold the children of a row's vertices.
+struct ChildRows<'r, C: RecordCodec> {
+    /// Distance of the vertices from their nearest ancestors in steps.
+    step: usize,
+    /// Whether the vertices are white.
+    is_white: bool,
+    /// Rows south of, level with and north of the vertices.
+    rows: [&'r [C::Raw]; 3],
+}
+
+impl<'r, C: RecordCodec> ChildRows<'r, C> {
+    /// The children of the vertices at `y`, a row away from the data's borders above level 0.
+    fn new(grid: &Grid, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
+        let Surroundings { shape, records, .. } = *around;
+        let (s, level) = (shape.step(), shape.level());
+        let child = |y: u32| {
+            let shape = LevelShape::new(grid, level - 1);
+            records.row(level - 1, shape.index(GridPoint::new(0, y)).0)
+        };
+        let rows = match (level, shape.is_white()) {
+            (0, _) => [&[][..]; 3],
+            (_, true) => [child(y - s)?, child(y)?, child(y + s)?],
+            (_, false) => [child(y - s / 2)?, &[], child(y + s / 2)?],
+        };
+        Some(Self { step: s as usize, is_white: shape.is_white(), rows })
+    }
+
+    /// The four children of the vertex at `x`: those beside it before those north and south, where that makes a difference.
+    #[inline(always)]
+    fn of(&self, x: usize, column: usize) -> Option<[C::Raw; 4]> {
+        let [south, beside, north] = self.rows;
+        if self.is_white {
+            return Some([
+                *beside.get(column)?,
+                *beside.get(column + 1)?,
+                *south.get(column)?,
+                *north.get(column)?,
+            ]);
+        }
+        let west = (x - self.step / 2) >> self.step.trailing_zeros();
+        let (south, north) = (south.get(west..west + 2)?, north.get(west..west + 2)?);
+        Some([south[0], south[1], north[0], north[1]])
+    }
+}
+
+/// A row away from the data's borders, with voids.
+struct VoidRow<'r, C: RecordCodec> {
+    voids: &'r [bool],
+    /// `None` at level 0.
+    children: Option<ChildRows<'r, C>>,
+}
+
+impl<'r, C: RecordCodec> VoidRow<'r, C> {
+    /// `None` if the row itself has no voids or is no longer in the band.
+    fn new(saturator: &Saturator<C>, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
+        let voids = around.band.find_row_voids(y).filter(|voids| !voids.is_empty())?;
+        let has_children = around.shape.level() > 0;
+        let children = if has_children { Some(ChildRows::new(&saturator.grid, around, y)?) } else { None };
+        Some(Self { voids, children })
+    }
+
+    /// Whether the vertex at `x` is known to be void with nothing but inert vertices below it.
+    #[inline(always)]
+    fn is_inert(&self, x: u32, column: usize) -> bool {
+        let x = x as usize;
+        self.voids[x]
+            && self.children.as_ref().is_none_or(|children| {
+                children.of(x, column).is_some_and(|raws| raws.iter().all(|raw| *raw == C::INERT))
+            })
     }
 }
 
@@ -208,8 +290,7 @@ struct OpenRow<'r, C: RecordCodec> {
     alternates: bool,
     /// Whether the row's cells are the southern ones of their parents.
     south_cell: bool,
-    /// Rows of children south of, level with and north of the vertices.
-    children: [&'r [C::Raw]; 3],
+    children: ChildRows<'r, C>,
     /// Square metres over the ground to the children beside, and to those north and south.
     ground2: [f64; 2],
 }
@@ -217,7 +298,7 @@ struct OpenRow<'r, C: RecordCodec> {
 impl<'r, C: RecordCodec> OpenRow<'r, C> {
     /// `None` if the rows are no longer in the band, as for levels larger than a tile.
     fn new(saturator: &'r Saturator<C>, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
-        let Surroundings { shape, band, records } = *around;
+        let Surroundings { shape, band, .. } = *around;
         let (s, level) = (shape.step(), shape.level());
         let codes = band.find_row(y)?;
         let (ends, end_offsets) = if shape.is_white() || y & s != 0 {
@@ -225,18 +306,12 @@ impl<'r, C: RecordCodec> OpenRow<'r, C> {
         } else {
             ([codes; 2], [-(s as isize), s as isize])
         };
-        let child = |y: u32| {
-            let shape = LevelShape::new(&saturator.grid, level - 1);
-            records.row(level - 1, shape.index(GridPoint::new(0, y)).0)
-        };
+        let children = ChildRows::new(&saturator.grid, around, y)?;
         let [dx, dy] = saturator.grid.spacing_m().map(|d| d * f64::from(s));
-        let (children, ground2) = match (level, shape.is_white()) {
-            (0, _) => ([&[][..]; 3], [0.0; 2]),
-            (_, true) => ([child(y - s)?, child(y)?, child(y + s)?], [dx * dx, dy * dy]),
-            (_, false) => {
-                let diagonal = (0.5 * dx) * (0.5 * dx) + (0.5 * dy) * (0.5 * dy);
-                ([child(y - s / 2)?, &[], child(y + s / 2)?], [diagonal; 2])
-            }
+        let ground2 = match (level, shape.is_white()) {
+            (0, _) => [0.0; 2],
+            (_, true) => [dx * dx, dy * dy],
+            (_, false) => [(0.5 * dx) * (0.5 * dx) + (0.5 * dy) * (0.5 * dy); 2],
         };
         Some(Self {
             saturator,
@@ -281,14 +356,7 @@ impl<'r, C: RecordCodec> OpenRow<'r, C> {
         let mut below = Below::default();
         if self.level > 0 {
             let height_m = code * scale.height_step_m;
-            let [south, beside, north] = self.children;
-            let children = if self.alternates {
-                [*beside.get(column)?, *beside.get(column + 1)?, *south.get(column)?, *north.get(column)?]
-            } else {
-                let west = (x - self.step / 2) >> self.step.trailing_zeros();
-                let (south, north) = (south.get(west..west + 2)?, north.get(west..west + 2)?);
-                [south[0], south[1], north[0], north[1]]
-            };
+            let children = self.children.of(x, column)?;
             for (i, raw) in children.into_iter().enumerate() {
                 let child = self.saturator.codec.decode(raw, self.level - 1);
                 below.add(&child, self.ground2[i / 2], height_m, scale.height_base_m);

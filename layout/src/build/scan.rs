@@ -6,7 +6,8 @@
 //! about two nanoseconds of one core each. Triangles that padding deforms are left to [`super::padding`].
 
 use super::band::Band;
-use super::levels::{LevelShape, Levels};
+use super::extremes::larger;
+use super::levels::{Levels, index_in};
 use super::plane::Plane;
 use crate::grid::{Grid, GridPoint};
 use crate::order::corners;
@@ -28,7 +29,7 @@ pub(super) fn scan_tile_row(grid: &Grid, band: &Band, own: &OwnErrors, tile_y: u
     debug_assert!(y0 < high);
     let tiles = (wide - 1).div_ceil(side).max(1);
     (0..tiles).into_par_iter().for_each_init(Vec::new, |buffer, tile_x| {
-        let tile = Tile::load(grid, band, tile_x * side, y0, side, buffer);
+        let Some(tile) = Tile::load(grid, band, tile_x * side, y0, side, buffer) else { return };
         tile.scan_inside(own, step_m);
         tile.scan_around(own, step_m);
     });
@@ -47,8 +48,25 @@ struct Tile<'a> {
 }
 
 impl<'a> Tile<'a> {
-    fn load(grid: &'a Grid, band: &'a Band, x0: u32, y0: u32, side: u32, buffer: &'a mut Vec<f64>) -> Self {
+    /// The tile with its south-west corner at (`x0`, `y0`); `None` if it is wholly void and has nothing to say.
+    fn load(
+        grid: &'a Grid,
+        band: &'a Band,
+        x0: u32,
+        y0: u32,
+        side: u32,
+        buffer: &'a mut Vec<f64>,
+    ) -> Option<Self> {
         let samples = [0, 1].map(|i| (grid.samples()[i] - [x0, y0][i]).min(side + 1));
+        let is_void = |y| {
+            let voids = band.row_voids(y);
+            // Without an early end the comparison takes many samples at once.
+            !voids.is_empty()
+                && voids[x0 as usize..(x0 + samples[0]) as usize].iter().fold(true, |all, v| all & v)
+        };
+        if (y0..y0 + samples[1]).all(is_void) {
+            return None;
+        }
         buffer.clear();
         buffer.resize((side as usize + 1) * (side as usize + 1), f64::NAN);
         let rows = buffer.chunks_exact_mut(side as usize + 1).zip(y0..y0 + samples[1]);
@@ -62,7 +80,7 @@ impl<'a> Tile<'a> {
                 }
             }
         }
-        Self { grid, band, x0, y0, side, samples, codes: buffer }
+        Some(Self { grid, band, x0, y0, side, samples, codes: buffer })
     }
 
     /// Code at tile coordinates.
@@ -115,14 +133,14 @@ impl<'a> Tile<'a> {
                         let plane = Plane::of(c);
                         for row in y - s + 1..y + s {
                             let reach = s - 1 - row.abs_diff(y);
-                            farthest = farthest.max(self.row(&plane, x - reach, x, row));
+                            farthest = larger(farthest, self.row(&plane, x - reach, x, row));
                         }
                     }
                     if let Some(c) = self.corners([[x + s, y], ends[0], ends[1]]) {
                         let plane = Plane::of(c);
                         for row in y - s + 1..y + s {
                             let reach = s - 1 - row.abs_diff(y);
-                            farthest = farthest.max(self.row(&plane, x, x + reach, row));
+                            farthest = larger(farthest, self.row(&plane, x, x + reach, row));
                         }
                     }
                 } else {
@@ -131,14 +149,14 @@ impl<'a> Tile<'a> {
                         let plane = Plane::of(c);
                         for row in y - s + 1..=y {
                             let reach = s - 1 - (y - row);
-                            farthest = farthest.max(self.row(&plane, x - reach, x + reach, row));
+                            farthest = larger(farthest, self.row(&plane, x - reach, x + reach, row));
                         }
                     }
                     if let Some(c) = self.corners([[x, y + s], ends[0], ends[1]]) {
                         let plane = Plane::of(c);
                         for row in y..y + s {
                             let reach = s - 1 - (row - y);
-                            farthest = farthest.max(self.row(&plane, x - reach, x + reach, row));
+                            farthest = larger(farthest, self.row(&plane, x - reach, x + reach, row));
                         }
                     }
                 }
@@ -167,7 +185,7 @@ impl<'a> Tile<'a> {
                         let diagonal = if rising { x - s + along } else { x + s - along };
                         let (from, to) =
                             if apex_east { (diagonal, x + s - 1) } else { (x - s + 1, diagonal) };
-                        farthest = farthest.max(self.row(&plane, from, to, row));
+                        farthest = larger(farthest, self.row(&plane, from, to, row));
                     }
                 }
                 self.raise(own, x, y, farthest, step_m);
@@ -202,7 +220,7 @@ impl<'a> Tile<'a> {
                         3 => (0, south.min(north)),
                         _ => continue,
                     };
-                    farthest = farthest.max(self.row(&plane, from, to, row));
+                    farthest = larger(farthest, self.row(&plane, from, to, row));
                 }
                 own.raise(split, farthest, step_m);
             });
@@ -263,9 +281,9 @@ impl OwnErrors {
     fn raise(&self, v: GridPoint, codes: f64, step_m: f64) {
         // Rounding of the distance itself is below 2^-40 of it and of the heights it came from.
         let metres = f32_at_least(codes * step_m * (1.0 + 1e-9));
-        let shape = LevelShape::new(self.grid(), self.grid().level(v));
-        let (row, column) = shape.index(v);
-        if let Some(cell) = self.row(shape.level(), row).and_then(|r| r.get(column)) {
+        let level = self.grid().level(v);
+        let (row, column) = index_in(level, v);
+        if let Some(cell) = self.row(level, row).and_then(|r| r.get(column)) {
             cell.fetch_max(metres.to_bits(), Ordering::Relaxed);
         }
     }

@@ -2,13 +2,16 @@
 //! allows, else in a nameless temporary file.
 //!
 //! While samples arrive their statistics are taken: range, voids, and which height steps they are whole multiples of. A void is
-//! NaN. Samples that single precision holds exactly take 4 bytes, others 8.
+//! NaN. Samples that single precision holds exactly take 4 bytes, others 8. A void's bytes are zero, so rows of voids are never written: the
+//! file has a hole there, and no room is taken.
 
-use crate::atomic_file::{read_at, write_at};
+use super::extremes::range;
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
+use crate::disk::Disk;
 use crate::error::LayoutError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError, RwLock};
 
 /// Height steps tried on floating-point samples, in raw units, coarsest first.
@@ -40,12 +43,9 @@ impl SampleStats {
 
     fn of(samples: &[f64], sample_type: SampleType) -> Self {
         let mut stats = Self::new();
-        for &value in samples {
-            if value.is_nan() {
-                stats.voids += 1;
-                continue;
-            }
-            stats.range = [stats.range[0].min(value), stats.range[1].max(value)];
+        stats.voids = samples.iter().map(|v| u64::from(v.is_nan())).sum();
+        if stats.voids < samples.len() as u64 {
+            stats.range = range(samples);
         }
         if !sample_type.fits_f32() {
             stats.fits_f32 = samples.iter().all(|v| v.is_nan() || f64::from(*v as f32) == *v);
@@ -65,6 +65,10 @@ fn is_multiple(value: f64, step: f64, sample_type: SampleType) -> bool {
     if sample_type == SampleType::F32 { exact as f32 == value as f32 } else { exact == value }
 }
 
+/// What the bits of stored samples are combined with, so that a void's are zero.
+const VOID_F32: u32 = f32::NAN.to_bits();
+const VOID_F64: u64 = f64::NAN.to_bits();
+
 enum Storage {
     Memory(RwLock<Vec<u8>>),
     File(File),
@@ -72,6 +76,7 @@ enum Storage {
 
 /// The spooled samples of one DEM.
 pub(super) struct Spool<'a> {
+    disk: &'a dyn Disk,
     target: PathBuf,
     wide: u32,
     high: u32,
@@ -80,12 +85,15 @@ pub(super) struct Spool<'a> {
     nodata: Option<f64>,
     storage: Storage,
     stats: Mutex<SampleStats>,
+    /// Which rows, from the south, have a sample that is not void.
+    has_heights: Vec<AtomicBool>,
     advance: &'a (dyn Fn(u64) + Sync),
 }
 
 impl<'a> Spool<'a> {
     /// An empty spool for the samples of `info`, in memory if that takes at most `memory_bytes`, else in the folder of `target`.
     pub(super) fn new(
+        disk: &'a dyn Disk,
         info: &DemInfo,
         nodata: Option<f64>,
         target: &Path,
@@ -99,10 +107,12 @@ impl<'a> Spool<'a> {
         } else {
             let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
             let file = tempfile::tempfile_in(folder)
-                .map_err(|e| LayoutError::io(target, "cannot create a temporary file beside it", e))?;
+                .and_then(|file| disk.set_len(&file, bytes).map(|()| file))
+                .map_err(|e| failed(target, "cannot create a temporary file beside it", e))?;
             Storage::File(file)
         };
         Ok(Self {
+            disk,
             target: target.to_owned(),
             wide: info.samples_wide,
             high: info.samples_high,
@@ -111,6 +121,7 @@ impl<'a> Spool<'a> {
             nodata,
             storage,
             stats: Mutex::new(SampleStats::new()),
+            has_heights: (0..info.samples_high).map(|_| AtomicBool::new(false)).collect(),
             advance,
         })
     }
@@ -124,12 +135,17 @@ impl<'a> Spool<'a> {
         if self.double { 8 } else { 4 }
     }
 
-    fn failed(&self, e: std::io::Error) -> LayoutError {
-        LayoutError::io(&self.target, "cannot write the temporary file beside it", e)
+    /// Whether all of row `y`, counted from the south, is void.
+    pub(super) fn is_void_row(&self, y: u32) -> bool {
+        !self.has_heights[y as usize].load(Ordering::Relaxed)
     }
 
     /// Row `y`, counted from the south, of raw samples.
     pub(super) fn read_row(&self, y: u32, row: &mut [f64]) -> Result<(), LayoutError> {
+        if self.is_void_row(y) {
+            row.fill(f64::NAN);
+            return Ok(());
+        }
         let offset = u64::from(y) * u64::from(self.wide) * self.sample_bytes();
         let length = row.len() * self.sample_bytes() as usize;
         match &self.storage {
@@ -140,7 +156,7 @@ impl<'a> Spool<'a> {
             }
             Storage::File(file) => {
                 let mut bytes = vec![0; length];
-                read_at(file, &mut bytes, offset).map_err(|e| {
+                self.disk.read_at(file, &mut bytes, offset).map_err(|e| {
                     LayoutError::io(&self.target, "cannot read the temporary file beside it", e)
                 })?;
                 self.decode(&bytes, row);
@@ -152,23 +168,35 @@ impl<'a> Spool<'a> {
     fn decode(&self, bytes: &[u8], row: &mut [f64]) {
         if self.double {
             for (value, raw) in row.iter_mut().zip(bytes.as_chunks().0) {
-                *value = f64::from_le_bytes(*raw);
+                *value = f64::from_bits(u64::from_le_bytes(*raw) ^ VOID_F64);
             }
         } else {
             for (value, raw) in row.iter_mut().zip(bytes.as_chunks().0) {
-                *value = f64::from(f32::from_le_bytes(*raw));
+                *value = f64::from(f32::from_bits(u32::from_le_bytes(*raw) ^ VOID_F32));
             }
         }
     }
 
     fn encode(&self, row: &[f64], bytes: &mut Vec<u8>) {
-        bytes.clear();
+        bytes.resize(row.len() * self.sample_bytes() as usize, 0);
         if self.double {
-            bytes.extend(row.iter().flat_map(|v| v.to_le_bytes()));
+            for (value, raw) in row.iter().zip(bytes.as_chunks_mut().0) {
+                let bits = if value.is_nan() { 0 } else { value.to_bits() ^ VOID_F64 };
+                *raw = bits.to_le_bytes();
+            }
         } else {
-            bytes.extend(row.iter().flat_map(|v| (*v as f32).to_le_bytes()));
+            for (value, raw) in row.iter().zip(bytes.as_chunks_mut().0) {
+                let bits = if value.is_nan() { 0 } else { (*value as f32).to_bits() ^ VOID_F32 };
+                *raw = bits.to_le_bytes();
+            }
         }
     }
+}
+
+fn failed(target: &Path, action: &'static str, e: std::io::Error) -> LayoutError {
+    let when_full = "no room for the temporary file beside it, which takes 4 or 8 bytes a sample; make some on its disk, name an output on \
+                     another, or give more --memory, which may hold the samples instead";
+    LayoutError::write(target, action, when_full, e)
 }
 
 impl SampleSink for Spool<'_> {
@@ -181,10 +209,17 @@ impl SampleSink for Spool<'_> {
                 "a window {window:?} does not lie in the elevation model"
             )));
         }
+        if samples.iter().all(|v| v.is_nan()) {
+            self.stats.lock().unwrap_or_else(PoisonError::into_inner).voids += samples.len() as u64;
+            (self.advance)(samples.len() as u64);
+            return Ok(());
+        }
         let cleaned;
-        let is_void = |v: f64| !v.is_finite() || self.nodata == Some(v);
-        let samples = if samples.iter().any(|v| is_void(*v) && !v.is_nan()) {
-            cleaned = samples.iter().map(|v| if is_void(*v) { f64::NAN } else { *v }).collect::<Vec<_>>();
+        let nodata = self.nodata.unwrap_or(f64::NAN);
+        let means_void = |v: f64| v.is_infinite() | (v == nodata);
+        // Without an early end the comparison takes many samples at once.
+        let samples = if samples.iter().fold(false, |any, v| any | means_void(*v)) {
+            cleaned = samples.iter().map(|v| if means_void(*v) { f64::NAN } else { *v }).collect::<Vec<_>>();
             &cleaned
         } else {
             samples
@@ -192,15 +227,22 @@ impl SampleSink for Spool<'_> {
         let stats = SampleStats::of(samples, self.sample_type);
         let mut bytes = Vec::new();
         for (i, row) in samples.chunks_exact(window.width.max(1) as usize).enumerate() {
+            if row.iter().all(|v| v.is_nan()) {
+                continue;
+            }
             self.encode(row, &mut bytes);
             let y = self.high - 1 - (window.row + i as u32);
+            self.has_heights[y as usize].store(true, Ordering::Relaxed);
             let offset = (u64::from(y) * u64::from(self.wide) + u64::from(window.col)) * self.sample_bytes();
             match &self.storage {
                 Storage::Memory(all) => {
                     let mut all = all.write().unwrap_or_else(PoisonError::into_inner);
                     all[offset as usize..offset as usize + bytes.len()].copy_from_slice(&bytes);
                 }
-                Storage::File(file) => write_at(file, &bytes, offset).map_err(|e| self.failed(e))?,
+                Storage::File(file) => self
+                    .disk
+                    .write_at(file, &bytes, offset)
+                    .map_err(|e| failed(&self.target, "cannot write the temporary file beside it", e))?,
             }
         }
         self.stats.lock().unwrap_or_else(PoisonError::into_inner).merge(&stats);

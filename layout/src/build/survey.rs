@@ -1,5 +1,6 @@
 //! From statistics to a record kind and its scale, and from a pass over the rows to the steepest slope, which bounds the radii.
 
+use super::extremes::{larger, largest_difference};
 use super::spool::{CANDIDATE_STEPS, SampleStats, Spool};
 use crate::dem::{DemInfo, SampleType};
 use crate::error::LayoutError;
@@ -122,17 +123,21 @@ pub(super) fn steepest_steps_m(
             let mut last_row = vec![f64::NAN; wide as usize];
             let mut row = last_row.clone();
             let mut steepest = [0.0f64; 2];
+            let mut follows_row = false;
             // The row below the block belongs to it, so that no pair of rows is left out.
             for y in first.saturating_sub(1)..(first + ROWS).min(high) {
+                if spool.is_void_row(y) {
+                    follows_row = false;
+                    continue;
+                }
                 spool.read_row(y, &mut row)?;
                 row.iter_mut().for_each(|v| *v = code.code(*v));
-                for pair in row.windows(2) {
-                    steepest[0] = steepest[0].max((pair[0] - pair[1]).abs());
-                }
-                for (a, b) in row.iter().zip(&last_row) {
-                    steepest[1] = steepest[1].max((a - b).abs());
+                steepest[0] = larger(steepest[0], largest_difference(&row, &row[1..]));
+                if follows_row {
+                    steepest[1] = larger(steepest[1], largest_difference(&row, &last_row));
                 }
                 std::mem::swap(&mut row, &mut last_row);
+                follows_row = true;
             }
             advance(u64::from(ROWS.min(high - first)) * u64::from(wide));
             Ok(steepest)

@@ -1,17 +1,19 @@
 //! Records into pages, pages into the file: gathers the parts of each planned page once their last row is known, then closes the gaps that
 //! all-void pages left and writes directory and header.
 //!
-//! Pages are gathered in parallel and land at places fixed by the plan, so threads and order do not show in the bytes.
+//! Pages are gathered in parallel and land at places fixed by the plan, so threads and order do not show in the bytes. Of an ocean no page is
+//! ever made.
 
+use super::gather::gather;
 use super::levels::{LevelShape, Levels};
-use super::plan::{LevelPlan, PagePart, Plan};
-use crate::atomic_file::{AtomicFile, read_at, write_at};
+use super::plan::{LevelPlan, Plan};
+use crate::atomic_file::AtomicFile;
 use crate::bytes::{PAGE_BYTES, Page, checksum};
 use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::header::{Header, INERT_PAGE};
-use crate::order::{BLOCK_SLOTS, BlockPoints, level_slots};
 use crate::record::{RecordCodec, RecordKind};
 use crate::terrain::inert_page;
 use rayon::prelude::*;
@@ -25,6 +27,7 @@ const PAGES_AT_ONCE: usize = 1024;
 /// Writes the pages of one file.
 pub(super) struct PageWriter<'a, C: RecordCodec> {
     file: &'a AtomicFile,
+    disk: &'a dyn Disk,
     grid: Grid,
     levels: Vec<LevelPlan>,
     /// Next part of each level.
@@ -37,37 +40,43 @@ pub(super) struct PageWriter<'a, C: RecordCodec> {
     open: HashMap<u64, Box<Page>>,
     inert: Box<Page>,
     /// Complete pages on their way to the thread that writes them.
-    outgoing: Option<SyncSender<PlacedPage>>,
+    outgoing: Option<SyncSender<PlacedPages>>,
     codec: std::marker::PhantomData<C>,
 }
 
-/// A page and its place in the file.
-pub(super) type PlacedPage = (u32, Box<Page>);
+/// Pages and their places in the file.
+pub(super) type PlacedPages = Vec<(u32, Box<Page>)>;
 
-/// Pages that may wait to be written.
-const QUEUE: usize = 512;
-
-/// The two ends of the way from gathering pages to writing them.
-pub(super) fn page_queue() -> (SyncSender<PlacedPage>, Receiver<PlacedPage>) {
-    sync_channel(QUEUE)
+/// The two ends of the way from gathering pages to writing them. One batch may wait while another is written.
+pub(super) fn page_queue() -> (SyncSender<PlacedPages>, Receiver<PlacedPages>) {
+    sync_channel(1)
 }
 
 /// Writes pages as they arrive, until there will be no more: the work of a thread of its own, so that nobody waits for the disk.
-pub(super) fn write_pages(file: &AtomicFile, pages: Receiver<PlacedPage>) -> Result<(), LayoutError> {
-    for (place, page) in pages {
-        write_at(file.file(), &page[..], u64::from(place) * PAGE)
-            .map_err(|e| LayoutError::io(file.target(), "cannot write the terrain file", e))?;
+pub(super) fn write_pages(
+    file: &AtomicFile,
+    disk: &dyn Disk,
+    batches: Receiver<PlacedPages>,
+) -> Result<(), LayoutError> {
+    for (place, page) in batches.into_iter().flatten() {
+        disk.write_at(file.file(), &page[..], u64::from(place) * PAGE).map_err(|e| failed(file, e))?;
     }
     Ok(())
+}
+
+fn failed(file: &AtomicFile, e: std::io::Error) -> LayoutError {
+    let when_full = "cannot write the terrain file, for which there is no room; make some on its disk, or name an output on another";
+    LayoutError::write(file.target(), "cannot write the terrain file", when_full, e)
 }
 
 impl<'a, C: RecordCodec> PageWriter<'a, C> {
     pub(super) fn new(
         file: &'a AtomicFile,
+        disk: &'a dyn Disk,
         grid: Grid,
         plan: Plan,
         kind: RecordKind,
-        outgoing: SyncSender<PlacedPage>,
+        outgoing: SyncSender<PlacedPages>,
     ) -> Self {
         let mut page = INERT_PAGE;
         let entries = plan
@@ -80,6 +89,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             .collect();
         Self {
             file,
+            disk,
             grid,
             next: vec![0; plan.levels.len()],
             levels: plan.levels,
@@ -90,10 +100,6 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             outgoing: Some(outgoing),
             codec: std::marker::PhantomData,
         }
-    }
-
-    fn failed(&self, e: std::io::Error) -> LayoutError {
-        LayoutError::io(self.file.target(), "cannot write the terrain file", e)
     }
 
     /// Gathers the parts of `level` that are complete now that all its rows up to `done_y` are, and writes the pages that are; returns the
@@ -110,8 +116,11 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         let ready = waiting.partition_point(|p| i64::from(p.y[1]) <= done_y);
         // Batches bound the memory of pages on their way to the file.
         for batch in waiting[..ready].chunks(PAGES_AT_ONCE) {
-            let gathered: Vec<Vec<u8>> =
-                batch.par_iter().with_min_len(16).map(|part| self.gather(part, &shape, records)).collect();
+            let gathered: Vec<Option<Vec<u8>>> = batch
+                .par_iter()
+                .with_min_len(16)
+                .map(|part| gather::<C>(&self.grid, part, &shape, records))
+                .collect();
             let mut complete = Vec::new();
             for (part, bytes) in batch.iter().zip(gathered) {
                 complete.extend(put(
@@ -119,8 +128,8 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
                     &mut self.lacking,
                     &self.inert,
                     C::BYTES,
-                    part.first,
-                    &bytes,
+                    part.first(),
+                    bytes.as_deref(),
                 ));
             }
             send_pages(self.outgoing.as_ref(), &mut self.entries, &self.inert, complete)?;
@@ -130,33 +139,13 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         Ok(later.unwrap_or(i64::MAX))
     }
 
-    /// The bytes of a part's records.
-    fn gather(&self, part: &PagePart, shape: &LevelShape, records: &Levels<C::Raw>) -> Vec<u8> {
-        let mut bytes = vec![0; part.count as usize * C::BYTES];
-        let offset = part.first - level_slots(self.grid.k(), shape.level()).start;
-        let within = (offset % BLOCK_SLOTS) as usize;
-        let block = BlockPoints::new(self.grid.k(), shape.level(), offset - within as u64);
-        for (i, place) in bytes.chunks_exact_mut(C::BYTES).enumerate() {
-            let raw = block
-                .point(within + i)
-                .filter(|p| !shape.is_beyond(*p))
-                .and_then(|p| {
-                    let (row, column) = shape.index(p);
-                    records.row(shape.level(), row)?.get(column).copied()
-                })
-                .unwrap_or(C::INERT);
-            C::write(raw, place);
-        }
-        bytes
-    }
-
     /// Sets the records of the corners, slots 0 to 3.
     pub(super) fn set_corners(&mut self, corners: [C::Raw; 4]) -> Result<(), LayoutError> {
         let mut bytes = vec![0; 4 * C::BYTES];
         for (raw, place) in corners.into_iter().zip(bytes.chunks_exact_mut(C::BYTES)) {
             C::write(raw, place);
         }
-        let complete = put(&mut self.open, &mut self.lacking, &self.inert, C::BYTES, 0, &bytes);
+        let complete = put(&mut self.open, &mut self.lacking, &self.inert, C::BYTES, 0, Some(&bytes));
         send_pages(self.outgoing.as_ref(), &mut self.entries, &self.inert, complete.into_iter().collect())
     }
 
@@ -174,7 +163,9 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             if entries.iter().any(|e| e.is_present()) {
                 let leaf = leaf_page(entries);
                 Entry { page, checksum: checksum(&leaf), generation: 1 }.write(&mut root, i);
-                write_at(self.file.file(), &leaf, u64::from(page) * PAGE).map_err(|e| self.failed(e))?;
+                self.disk
+                    .write_at(self.file.file(), &leaf, u64::from(page) * PAGE)
+                    .map_err(|e| failed(self.file, e))?;
                 page += 1;
             }
         }
@@ -184,13 +175,13 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         root.resize(root.len().next_multiple_of(PAGE_BYTES), 0);
         header.file_bytes = u64::from(page) * PAGE + root.len() as u64;
         header.generation = 1;
-        let file = self.file.file();
-        write_at(file, &root, u64::from(page) * PAGE)
-            .and_then(|()| write_at(file, &[0; PAGE_BYTES], PAGE))
-            .and_then(|()| write_at(file, &self.inert[..], u64::from(INERT_PAGE) * PAGE))
-            .and_then(|()| write_at(file, &header.to_page()[..], 0))
-            .and_then(|()| file.set_len(header.file_bytes))
-            .map_err(|e| self.failed(e))
+        let (file, disk) = (self.file.file(), self.disk);
+        disk.write_at(file, &root, u64::from(page) * PAGE)
+            .and_then(|()| disk.write_at(file, &[0; PAGE_BYTES], PAGE))
+            .and_then(|()| disk.write_at(file, &self.inert[..], u64::from(INERT_PAGE) * PAGE))
+            .and_then(|()| disk.write_at(file, &header.to_page()[..], 0))
+            .and_then(|()| disk.set_len(file, header.file_bytes))
+            .map_err(|e| failed(self.file, e))
     }
 
     /// Moves pages down over those planned that turned out inert; returns the first free page.
@@ -204,9 +195,10 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
                 continue;
             }
             if entry.page != free {
-                read_at(self.file.file(), &mut page[..], u64::from(entry.page) * PAGE)
-                    .and_then(|()| write_at(self.file.file(), &page[..], u64::from(free) * PAGE))
-                    .map_err(|e| self.failed(e))?;
+                let (file, disk) = (self.file.file(), self.disk);
+                disk.read_at(file, &mut page[..], u64::from(entry.page) * PAGE)
+                    .and_then(|()| disk.write_at(file, &page[..], u64::from(free) * PAGE))
+                    .map_err(|e| failed(self.file, e))?;
                 self.entries[i].page = free;
             }
             free += 1;
@@ -215,20 +207,23 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     }
 }
 
-/// Puts the bytes of records of `record` bytes from slot `first` into their page; returns the page if that completes it.
+/// Puts the bytes of records of `record` bytes from slot `first` into their page, unless they are all inert; returns the page if that completes
+/// it and anything was ever put there.
 fn put(
     open: &mut HashMap<u64, Box<Page>>,
     lacking: &mut [u8],
     inert: &Page,
     record: usize,
     first: u64,
-    bytes: &[u8],
+    bytes: Option<&[u8]>,
 ) -> Option<(u64, Box<Page>)> {
     let per_page = (PAGE_BYTES / record) as u64;
     let number = first / per_page;
-    let at = (first % per_page) as usize * record;
-    let page = open.entry(number).or_insert_with(|| Box::new(*inert));
-    page[at..at + bytes.len()].copy_from_slice(bytes);
+    if let Some(bytes) = bytes {
+        let at = (first % per_page) as usize * record;
+        let page = open.entry(number).or_insert_with(|| Box::new(*inert));
+        page[at..at + bytes.len()].copy_from_slice(bytes);
+    }
     lacking[number as usize] -= 1;
     if lacking[number as usize] > 0 {
         return None;
@@ -238,22 +233,24 @@ fn put(
 
 /// Sends complete pages to be written and notes their checksums; pages that are inert after all are left out.
 fn send_pages(
-    outgoing: Option<&SyncSender<PlacedPage>>,
+    outgoing: Option<&SyncSender<PlacedPages>>,
     entries: &mut [Entry],
     inert: &Page,
     pages: Vec<(u64, Box<Page>)>,
 ) -> Result<(), LayoutError> {
     let sums: Vec<Option<u32>> =
         pages.par_iter().map(|(_, page)| (**page != *inert).then(|| checksum(&page[..]))).collect();
+    let mut placed = Vec::with_capacity(pages.len());
     for ((number, page), sum) in pages.into_iter().zip(sums) {
         if let Some(sum) = sum {
             let entry = &mut entries[number as usize];
             (entry.checksum, entry.generation) = (sum, 1);
-            // The writer hangs up only after an error, which it reports itself.
-            if outgoing.is_none_or(|queue| queue.send((entry.page, page)).is_err()) {
-                return Err(LayoutError::Usage("the terrain file could not be written".into()));
-            }
+            placed.push((entry.page, page));
         }
+    }
+    // The writer hangs up only after an error, which it reports itself.
+    if !placed.is_empty() && outgoing.is_none_or(|queue| queue.send(placed).is_err()) {
+        return Err(LayoutError::Usage("the terrain file could not be written".into()));
     }
     Ok(())
 }

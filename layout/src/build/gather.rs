@@ -1,0 +1,51 @@
+//! The records of the slots of one part of a page, from the rows in which they were made.
+//!
+//! The rows are looked up once a part. A part in an ocean, all inert, costs a look at the rectangle around it and makes no page.
+
+use super::levels::{LevelShape, Levels};
+use super::plan::{PagePart, block_bounds};
+use crate::grid::{Grid, GridPoint};
+use crate::order::{BLOCK_SLOTS, BlockPoints, level_slots};
+use crate::record::RecordCodec;
+
+/// Rows that a block of slots can touch, and one more: 32 for white vertices, 63 for black ones, whose blocks stand on a corner.
+const ROWS: usize = 64;
+
+/// The bytes of a part's records; `None` if all are inert.
+pub(super) fn gather<C: RecordCodec>(
+    grid: &Grid,
+    part: &PagePart,
+    shape: &LevelShape,
+    records: &Levels<C::Raw>,
+) -> Option<Vec<u8>> {
+    let offset = part.first() - level_slots(grid.k(), shape.level()).start;
+    let within = (offset % BLOCK_SLOTS) as usize;
+    let start = offset - within as u64;
+    let [x, y] = block_bounds(grid.k(), shape, start, BLOCK_SLOTS.ilog2() / 2);
+    let clip = |v: i64, i: usize| v.clamp(0, i64::from(shape.limit()[i])) as u32;
+    let index = |i: usize| shape.index(GridPoint::new(clip(x[i], 0), clip(y[i], 1)));
+    let ((south, west), (north, east)) = (index(0), index(1));
+    // Rows of the block that are not kept belong to other parts of it.
+    let mut rows: [&[C::Raw]; ROWS] = [&[]; ROWS];
+    for (place, row) in rows.iter_mut().zip(south..=north) {
+        *place = records.row(shape.level(), row).unwrap_or_default();
+    }
+    let is_inert = |row: &&[C::Raw]| {
+        let columns = west.min(row.len())..(east + 1).min(row.len());
+        // Without an early end the comparison takes many records at once.
+        row[columns].iter().fold(true, |all, raw| all & (*raw == C::INERT))
+    };
+    if rows.iter().all(is_inert) {
+        return None;
+    }
+    let mut bytes = vec![0; part.count() as usize * C::BYTES];
+    let block = BlockPoints::new(grid.k(), shape.level(), start);
+    for (i, place) in bytes.chunks_exact_mut(C::BYTES).enumerate() {
+        let raw = block.point(within + i).filter(|p| !shape.is_beyond(*p)).and_then(|p| {
+            let (row, column) = shape.index(p);
+            rows.get(row.wrapping_sub(south))?.get(column).copied()
+        });
+        C::write(raw.unwrap_or(C::INERT), place);
+    }
+    Some(bytes)
+}

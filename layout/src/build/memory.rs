@@ -1,0 +1,104 @@
+//! How a build's memory budget is spent: the largest tile that fits, and whether the samples may stay in memory.
+//!
+//! An account of what grows with the terrain, somewhat on the safe side; `benches/runs` has what was measured.
+
+use super::BuildOptions;
+use crate::dem::SampleType;
+use crate::error::LayoutError;
+use crate::grid::Grid;
+use crate::record::RecordKind;
+
+/// Mebibyte.
+const MIB: u64 = 1 << 20;
+/// Memory kept aside for decoders, threads and the program itself.
+const RESERVED_BYTES: u64 = 24 * MIB;
+/// Largest tile: beyond this a tile no longer fits a core's cache.
+pub(super) const LARGEST_TILE: u32 = 256;
+
+/// How the budget is spent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct MemoryPlan {
+    /// Side of a tile in steps, a power of two.
+    pub(super) tile: u32,
+    /// Bytes the spool may hold in memory.
+    pub(super) spool_bytes: u64,
+}
+
+impl MemoryPlan {
+    pub(super) fn new(
+        grid: &Grid,
+        sample_type: SampleType,
+        options: &BuildOptions,
+        threads: u64,
+    ) -> Result<Self, LayoutError> {
+        let memory_mib = options.memory_mib;
+        let budget = memory_mib * MIB;
+        let [wide, high] = grid.samples().map(u64::from);
+        let n = grid.side_steps();
+        let single = sample_type.fits_f32();
+        // The widest record the samples may need; the range of 16-bit integers always fits the compact one.
+        let record_bytes = match (sample_type.is_integer(), single) {
+            (true, true) if options.record.is_none_or(|kind| kind == RecordKind::Compact) => 4,
+            (_, true) => 8,
+            (_, false) => 16,
+        };
+        // Pages of the directory and their plan, some 34 bytes each.
+        let directory = crate::order::slot_count(grid.k()) * record_bytes / 4096 * 34;
+        let fixed = RESERVED_BYTES + directory;
+        let work = |tile: u32| {
+            let tile = u64::from(tile);
+            // Codes and voids of some 3.5 tile rows, records and own errors beside them, rows of records that wait for their pages.
+            wide * (7 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
+                + wide * 128 * record_bytes
+                + threads * (tile + 1) * (tile + 1) * 8
+                // A code, a void and an own error for every corner of a tile.
+                + (wide / tile + 2) * (high / tile + 2) * 13
+        };
+        let largest = n.min(options.largest_tile.clamp(2, LARGEST_TILE));
+        let smallest = largest.min(16);
+        let spool = wide * high * if single { 4 } else { 8 };
+        let available = budget.saturating_sub(fixed);
+        let tiles = || (0..=8).rev().map(|m| 1 << m).filter(|s| (smallest..=largest).contains(s));
+        let largest_within = |bytes: u64| tiles().find(|s| work(*s) <= bytes);
+        if let Some(tile) = largest_within(available.saturating_sub(spool)).filter(|t| *t >= largest.min(128))
+        {
+            return Ok(Self { tile, spool_bytes: spool });
+        }
+        match largest_within(available) {
+            Some(tile) => Ok(Self { tile, spool_bytes: 0 }),
+            None => Err(LayoutError::Usage(format!(
+                "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; give at least --memory {}",
+                (fixed + tiles().map(work).min().unwrap_or(0)).div_ceil(MIB)
+            ))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(side: u32, sample_type: SampleType, memory_mib: u64) -> Result<MemoryPlan, LayoutError> {
+        let grid = Grid::new([side, side - 1], [1.0, 1.0]).unwrap();
+        MemoryPlan::new(&grid, sample_type, &BuildOptions { memory_mib, ..Default::default() }, 2)
+    }
+
+    #[test]
+    fn the_largest_terrain_of_16_bits_fits_the_default_budget() {
+        assert_eq!(plan(65_537, SampleType::I16, 512).unwrap(), MemoryPlan { tile: 32, spool_bytes: 0 });
+        assert_eq!(plan(16_385, SampleType::U16, 512).unwrap(), MemoryPlan { tile: 256, spool_bytes: 0 });
+        assert_eq!(plan(2049, SampleType::U16, 512).unwrap().spool_bytes, 2049 * 2048 * 4);
+    }
+
+    #[test]
+    fn the_budget_that_a_refusal_names_is_the_least_that_is_enough() {
+        for side in [4097, 16_385, 30_000, 65_537] {
+            for sample_type in [SampleType::I16, SampleType::F32, SampleType::F64] {
+                let refusal = plan(side, sample_type, 24).unwrap_err().to_string();
+                let named: u64 = refusal.rsplit(' ').next().unwrap().parse().unwrap();
+                assert!(plan(side, sample_type, named).is_ok(), "{refusal}");
+                assert!(plan(side, sample_type, named - 1).is_err(), "{refusal}");
+            }
+        }
+    }
+}
