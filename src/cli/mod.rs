@@ -28,8 +28,6 @@ mod progress;
 mod replay;
 #[cfg(unix)]
 mod signals;
-#[cfg(unix)]
-mod signals;
 #[cfg(feature = "view")]
 mod snapshot;
 mod sweep;
