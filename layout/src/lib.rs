@@ -10,6 +10,7 @@ pub mod directory;
 pub mod error;
 pub mod grid;
 pub mod header;
+pub mod imagery;
 pub mod import;
 pub mod loader;
 pub mod octave;

@@ -144,6 +144,7 @@ pub fn build(
         root_page: 0,
         root_checksum: 0,
         file_bytes: 0,
+        imagery: None,
         sample_to_crs: spacing::sample_to_crs(info),
         epsg: info.georeference.epsg,
         crs_unit: info.georeference.unit,
