@@ -55,6 +55,22 @@ pub enum SpacingOrigin {
     Assumed,
 }
 
+/// Where the imagery section lies (FORMAT.md, section 8).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageryPlace {
+    /// First byte, of a page.
+    pub offset: u64,
+    /// Length in bytes, of whole pages.
+    pub bytes: u64,
+}
+
+impl ImageryPlace {
+    /// First byte after it.
+    pub fn end(self) -> u64 {
+        self.offset.saturating_add(self.bytes)
+    }
+}
+
 /// What a terrain file says about itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
@@ -84,6 +100,8 @@ pub struct Header {
     pub root_checksum: u32,
     /// Length of the file.
     pub file_bytes: u64,
+    /// Where its imagery lies, if it has any.
+    pub imagery: Option<ImageryPlace>,
     /// Samples (east, north of the south-west sample) to reference-system coordinates, if known.
     pub sample_to_crs: Option<[f64; 6]>,
     /// EPSG code, if known.
@@ -122,7 +140,7 @@ impl Header {
         let p = &mut page[..];
         p[..8].copy_from_slice(&MAGIC);
         put_u16(p, 0x008, 1);
-        put_u16(p, 0x00a, 0);
+        put_u16(p, 0x00a, u16::from(self.imagery.is_some()));
         put_u32(p, 0x00c, PAGE_BYTES as u32);
         p[0x010] = self.grid.k() as u8;
         p[0x011] = match self.record_kind {
@@ -154,6 +172,8 @@ impl Header {
         put_u32(p, 0x07c, self.root_entries() as u32);
         put_u32(p, 0x080, self.root_checksum);
         put_u64(p, 0x088, self.file_bytes);
+        put_u64(p, 0x090, self.imagery.map_or(0, |place| place.offset));
+        put_u64(p, 0x098, self.imagery.map_or(0, |place| place.bytes));
         for (i, m) in self.sample_to_crs.unwrap_or_default().iter().enumerate() {
             put_f64(p, 0x0a0 + 8 * i, *m);
         }
@@ -291,6 +311,10 @@ impl Header {
         let text = |offset, field| {
             get_text(p, offset).ok_or_else(|| damaged(format!("the field {field} is not text")))
         };
+        let imagery = match [get_u64(p, 0x090), get_u64(p, 0x098)] {
+            [0, 0] => None,
+            [offset, bytes] => Some(ImageryPlace { offset, bytes }),
+        };
         let header = Self {
             grid,
             record_kind,
@@ -305,6 +329,7 @@ impl Header {
             root_page: get_u32(p, 0x078),
             root_checksum: get_u32(p, 0x080),
             file_bytes: get_u64(p, 0x088),
+            imagery,
             sample_to_crs: (map != [0.0; 6]).then_some(map),
             epsg: Some(get_u32(p, 0x0d0)).filter(|code| *code != 0),
             crs_unit,
@@ -321,6 +346,14 @@ impl Header {
         let root_end = u64::from(header.root_page) * PAGE_BYTES as u64 + 16 * header.root_entries();
         check(header.root_page > INERT_PAGE && root_end <= header.file_bytes, "root_page")?;
         check(header.file_bytes <= u64::from(u32::MAX) * PAGE_BYTES as u64, "file_bytes")?;
+        let fits = |place: ImageryPlace| {
+            let page = PAGE_BYTES as u64;
+            place.offset > u64::from(INERT_PAGE) * page
+                && [place.offset, place.bytes].iter().all(|v| v.is_multiple_of(page))
+                && (2 * page..=header.file_bytes).contains(&place.bytes)
+                && place.end() <= header.file_bytes
+        };
+        check(header.imagery.is_none_or(fits), "imagery")?;
         Ok(header)
     }
 }

@@ -11,6 +11,7 @@ pub mod disk;
 pub mod error;
 pub mod grid;
 pub mod header;
+pub mod imagery;
 pub mod import;
 pub mod loader;
 pub mod octave;

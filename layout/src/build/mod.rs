@@ -156,6 +156,7 @@ pub fn build_on(
         root_page: 0,
         root_checksum: 0,
         file_bytes: 0,
+        imagery: None,
         sample_to_crs: spacing::sample_to_crs(info),
         epsg: info.georeference.epsg,
         crs_unit: info.georeference.unit,

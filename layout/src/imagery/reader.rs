@@ -1,0 +1,174 @@
+//! The imagery of an opened terrain: a checked directory in memory, tiles read from the file one by one.
+//!
+//! Cost: opening reads 16 bytes a tile; a tile is one read, a checksum, and for tiles at the rim a copy. Reading needs no exclusive
+//! access, so any number of threads may read through one [`Imagery`].
+
+use super::section::{Section, TILE_ENTRY_BYTES, TileEntry, damaged};
+use super::shape::{ImageryShape, TILE_TEXELS, TileFormat, TileId};
+use crate::bytes::{PAGE_BYTES, checksum, to_usize};
+use crate::error::LayoutError;
+use crate::terrain::Terrain;
+
+/// The imagery section of a terrain file.
+#[derive(Debug, Clone)]
+pub struct Imagery {
+    section: Section,
+    entries: Vec<TileEntry>,
+}
+
+impl Imagery {
+    /// Reads header and directory of the imagery of `terrain`; `None` if it has none.
+    ///
+    /// # Errors
+    /// [`LayoutError::Damaged`] for anything out of place in them, [`LayoutError::Unsupported`] for a later version of the section; I/O.
+    pub fn open(terrain: &Terrain) -> Result<Option<Self>, LayoutError> {
+        let Some(place) = terrain.header().imagery else { return Ok(None) };
+        let (path, source) = (terrain.path(), terrain.source());
+        let mut page = Box::new([0; PAGE_BYTES]);
+        source.read_at(place.offset, &mut page[..])?;
+        let section = Section::parse(path, place, &page)?;
+        let mut directory = vec![0; to_usize(section.directory_bytes())?];
+        source.read_at(u64::from(section.directory_page) * PAGE_BYTES as u64, &mut directory)?;
+        if checksum(&directory) != section.directory_checksum {
+            return Err(damaged(path, "imagery directory".into(), "the checksum does not match"));
+        }
+        let entries: Vec<TileEntry> =
+            (0..directory.len() / TILE_ENTRY_BYTES).map(|i| TileEntry::read(&directory, i)).collect();
+        for (id, entry) in section.shape.ids().zip(&entries) {
+            if !section.is_entry(id, *entry, terrain.header().file_bytes) {
+                let place = format!("imagery directory entry of {}", name(id));
+                return Err(damaged(path, place, "the tile has another length or lies outside the file"));
+            }
+        }
+        let present = entries.iter().filter(|entry| entry.is_present());
+        let (tiles, bytes) = present.fold((0, 0), |(n, sum), entry| (n + 1, sum + u64::from(entry.bytes)));
+        if (tiles, bytes) != (section.stored_tiles, section.tile_bytes) {
+            let problem = "it holds another number of tiles or bytes than the imagery header says";
+            return Err(damaged(path, "imagery directory".into(), problem));
+        }
+        Ok(Some(Self { section, entries }))
+    }
+
+    /// What all tiles have in common, and where the image lies.
+    pub fn shape(&self) -> ImageryShape {
+        self.section.shape
+    }
+
+    /// Format of the image it was made from, in words.
+    pub fn source(&self) -> &str {
+        &self.section.source
+    }
+
+    /// Tiles east and north at a level; none past the coarsest.
+    pub fn tile_count(&self, level: u32) -> [u32; 2] {
+        self.section.shape.tile_count(level)
+    }
+
+    /// Tiles that are stored: those that are not transparent throughout.
+    pub fn stored_tiles(&self) -> u64 {
+        self.section.stored_tiles
+    }
+
+    /// Bytes of all stored tiles together.
+    pub fn tile_bytes(&self) -> u64 {
+        self.section.tile_bytes
+    }
+
+    /// Whether the tile exists and is not transparent throughout.
+    pub fn has_tile(&self, id: TileId) -> bool {
+        self.entry(id).is_some()
+    }
+
+    /// Mean colour of the texels a tile covers, weighted by alpha and taken in linear light, as sRGB, and their mean alpha. `None` where there is no tile.
+    pub fn average(&self, id: TileId) -> Option<[u8; 4]> {
+        self.entry(id).map(|entry| entry.average)
+    }
+
+    /// Fills `texels` with a whole tile, [`TileFormat::tile_bytes`] long, rows from the south: what a GPU takes. Past the rim of the image its
+    /// last texels are repeated. `Ok(false)` where there is no tile; `texels` is empty then.
+    ///
+    /// # Errors
+    /// [`LayoutError::Damaged`] naming the tile if it does not match its checksum; I/O.
+    pub fn read_tile(
+        &self,
+        terrain: &Terrain,
+        id: TileId,
+        texels: &mut Vec<u8>,
+    ) -> Result<bool, LayoutError> {
+        texels.clear();
+        let Some(entry) = self.entry(id) else { return Ok(false) };
+        let format = self.section.shape.format;
+        texels.reserve(format.tile_bytes());
+        texels.resize(entry.bytes as usize, 0);
+        terrain.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, texels)?;
+        if checksum(texels) != entry.checksum {
+            let place = format!("imagery {} (file page {})", name(id), entry.page);
+            return Err(damaged(terrain.path(), place, "the checksum does not match"));
+        }
+        widen(format, self.section.shape.stored_texels(id), texels);
+        Ok(true)
+    }
+
+    pub(crate) fn entry(&self, id: TileId) -> Option<TileEntry> {
+        let index = self.section.shape.index(id)?;
+        self.entries.get(index as usize).copied().filter(|entry| entry.is_present())
+    }
+}
+
+/// Name of a tile in messages.
+pub(crate) fn name(id: TileId) -> String {
+    format!("tile {}, {} of level {}", id.x, id.y, id.level)
+}
+
+/// Makes a tile stored with fewer texels whole: repeats the last column of blocks (of Rgba8: of texels) eastwards, then the last row northwards.
+fn widen(format: TileFormat, stored: [u32; 2], texels: &mut Vec<u8>) {
+    let (unit, unit_texels) = match format {
+        TileFormat::Bc1 | TileFormat::Bc7 => (format.block_bytes(), 4),
+        TileFormat::Rgba8 => (4, 1),
+    };
+    let [across, up] = stored.map(|side| (side / unit_texels) as usize);
+    let whole = (TILE_TEXELS / unit_texels) as usize;
+    let (row, whole_row) = (across * unit, whole * unit);
+    texels.resize(format.tile_bytes(), 0);
+    // From the last row to the first, so that no row is written over before it has moved.
+    for y in (0..up).rev() {
+        texels.copy_within(y * row..(y + 1) * row, y * whole_row);
+        let last = y * whole_row + row - unit;
+        for x in across..whole {
+            texels.copy_within(last..last + unit, y * whole_row + x * unit);
+        }
+    }
+    for y in up..whole {
+        texels.copy_within((up - 1) * whole_row..up * whole_row, y * whole_row);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn narrow_tiles_are_widened_with_their_rim() {
+        for (format, unit, unit_texels) in
+            [(TileFormat::Bc1, 8, 4), (TileFormat::Bc7, 16, 4), (TileFormat::Rgba8, 4, 1)]
+        {
+            for stored in [[12, 512], [512, 16], [12, 16], [512, 512]] {
+                let [across, up] = stored.map(|side: u32| (side / unit_texels) as usize);
+                let mark = |x: usize, y: usize| (x * 7 + y * 31) as u8;
+                let mut texels: Vec<u8> = (0..up)
+                    .flat_map(|y| (0..across).flat_map(move |x| std::iter::repeat_n(mark(x, y), unit)))
+                    .collect();
+                widen(format, stored, &mut texels);
+                let whole = (TILE_TEXELS / unit_texels) as usize;
+                assert_eq!(texels.len(), format.tile_bytes());
+                for y in 0..whole {
+                    for x in 0..whole {
+                        let wanted = mark(x.min(across - 1), y.min(up - 1));
+                        let at = (y * whole + x) * unit;
+                        assert!(texels[at..at + unit].iter().all(|b| *b == wanted), "{format:?} {x} {y}");
+                    }
+                }
+            }
+        }
+    }
+}
