@@ -93,8 +93,9 @@ pub use mesh::{MeshPatch, MeshVertex, UploadStats};
 pub use offscreen::{Offscreen, read_depth_m};
 pub use renderer::Renderer;
 pub use tiles::{
-    HEIGHTS_PER_TILE, Placement, Pyramid, Residency, TILE_BORDER, TILE_CELLS, TileId, TileStats, WantedTiles,
-    pack_gradients,
+    HEIGHTS_PER_TILE, IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, ImageTileId, ImageryFormat,
+    ImageryShape, ImageryStats, Placement, Pyramid, Residency, TILE_BORDER, TILE_CELLS, TileId, TileStats,
+    WantedTiles, pack_gradients,
 };
 pub use view::{FrameView, TerrainShape};
 /// The graphics interface of the version that this crate's types are of.

@@ -104,6 +104,8 @@ pub struct Look {
     pub tint_range_m: Option<[f32; 2]>,
     /// How much rock shows on steep ground, 0 to 1.
     pub rock: f32,
+    /// Share of the image, where one is set ([`crate::Renderer::set_imagery`]), in the ground's colour: 0 (off) to 1.
+    pub imagery: f32,
     /// Share of light and shade, 0 (bare colours) to 1.
     pub shading: f32,
     /// The sun.
@@ -131,6 +133,7 @@ impl Default for Look {
             ramp: &RAMPS[0],
             tint_range_m: None,
             rock: 0.7,
+            imagery: 0.0,
             shading: 1.0,
             sun: Sun::default(),
             sky: [linear_of(0x2f68b0), linear_of(0xcfdce8)],
@@ -147,6 +150,7 @@ impl Default for Look {
 /// Names of the prepared looks and a line about each; the first is the default.
 pub const LOOKS: &[(&str, &str)] = &[
     ("relief", "tint by height, sun, haze"),
+    ("photo", "the image where there is one, else a plainer relief"),
     ("hillshade", "light and shade alone"),
     ("contours", "tint by height with contour lines"),
     ("slope", "steepness from level to 60 degrees"),
@@ -163,6 +167,7 @@ impl Look {
         let thin = Wireframe { opacity: 0.4, ..Wireframe::default() };
         Some(match name {
             "relief" => relief,
+            "photo" => Self { imagery: 1.0, rock: 0.35, ..relief },
             "hillshade" => Self { surface: Surface::Plain, ..relief },
             "contours" => Self { contours: Some(Contours::default()), rock: 0.3, ..relief },
             "slope" => Self {

@@ -1,13 +1,14 @@
 //! Square tiles of a pyramid, held on the device as far as a budget allows.
 //!
-//! A pyramid covers the terrain with tiles of [`TILE_CELLS`] cells a side at level 0, each higher level twice as coarse, up to one
-//! tile over everything. What a tile contains is its *content* (`gradient.rs`: slopes; colours would be another),
-//! and how it gets in and out is *residency*, which knows nothing of content: [`WantedTiles`] says what a
+//! A pyramid covers the terrain, or an image on it, with square tiles, each level twice as coarse as the one below, up to one
+//! tile over everything. What a tile contains is its *content* (`gradient.rs`: slopes; `imagery.rs`: colours), and how
+//! it gets in and out is *residency*, which knows nothing of content: [`WantedTiles`] says what a
 //! view asks for, coarse first; [`Residency`] decides what stays; the pool puts bytes into layers of
 //! an array texture and keeps a page table, from which the shader takes for every pixel the finest resident tile not finer than it
-//! needs, else the next coarser. While the coarsest tile is resident there is no hole.
+//! needs, else the next coarser. While the coarsest level is resident there is no hole.
 
 mod gradient;
+mod imagery;
 mod pool;
 mod pyramid;
 mod residency;
@@ -15,8 +16,14 @@ mod wanted;
 
 pub(crate) use gradient::GRADIENT_FORMAT;
 pub use gradient::{HEIGHTS_PER_TILE, TILE_BORDER, pack_gradients};
+pub(crate) use imagery::Imagery;
+pub use imagery::{
+    IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, ImageTileId, ImageryFormat, ImageryShape,
+    ImageryStats,
+};
 pub use pool::TileStats;
 pub(crate) use pool::{TileLayout, TilePool};
 pub use pyramid::{Pyramid, TILE_CELLS, TileId};
 pub use residency::{Placement, Residency};
+pub(crate) use wanted::Raster;
 pub use wanted::WantedTiles;

@@ -1,6 +1,6 @@
 //! Which tiles there are: plain arithmetic on levels and positions.
 
-/// Cells a side of a tile, at its own level. A power of two.
+/// Cells a side of a tile of slopes, at its own level. A power of two.
 pub const TILE_CELLS: u32 = 128;
 
 /// A tile of the pyramid.
@@ -15,12 +15,12 @@ pub struct TileId {
 }
 
 impl TileId {
-    /// Samples along one side of a cell.
+    /// Samples (of an image: finest texels) along one side of a cell.
     pub fn cell_samples(self) -> u32 {
         1 << self.level
     }
 
-    /// Column and row of the tile's south-west sample.
+    /// Column and row of the south-west sample of a tile of slopes.
     pub fn first_sample(self) -> [u32; 2] {
         [self.x, self.y].map(|t| t.saturating_mul(TILE_CELLS << self.level))
     }
@@ -37,26 +37,45 @@ impl std::fmt::Display for TileId {
     }
 }
 
-/// All tiles over a terrain.
+/// All tiles over a terrain, or over an image on it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pyramid {
+    tile_cells: u32,
     /// Tiles east and north, by level.
     tiles: Vec<[u32; 2]>,
 }
 
 impl Pyramid {
-    /// The pyramid over so many samples east and north.
+    /// The pyramid of slopes over so many samples east and north, up to one tile over everything.
     pub fn over(samples: [u32; 2]) -> Self {
+        Self::of_cells(samples.map(|n| n.saturating_sub(1)), TILE_CELLS, u32::MAX)
+    }
+
+    /// A pyramid over so many cells east and north at level 0, in tiles of `tile_cells` a side: `most_levels` levels, or fewer
+    /// where one tile covers everything before.
+    pub fn of_cells(cells: [u32; 2], tile_cells: u32, most_levels: u32) -> Self {
+        let tile_cells = tile_cells.max(1);
         let mut tiles = Vec::new();
-        for level in 0..=(32 - TILE_CELLS.ilog2()) {
-            let cells = u64::from(TILE_CELLS) << level;
-            let across = samples.map(|n| u64::from(n.saturating_sub(1)).div_ceil(cells).max(1) as u32);
+        for level in 0..most_levels.clamp(1, 32) {
+            let side = u64::from(tile_cells) << level;
+            let across = cells.map(|n| u64::from(n).div_ceil(side).max(1) as u32);
             tiles.push(across);
             if across == [1, 1] {
                 break;
             }
         }
-        Self { tiles }
+        Self { tile_cells, tiles }
+    }
+
+    /// Cells a side of a tile, at its own level.
+    pub fn tile_cells(&self) -> u32 {
+        self.tile_cells
+    }
+
+    /// Cells of level 0 from the south-west corner to a tile's south-west and north-east corners; the latter may lie beyond the data.
+    pub fn corners(&self, tile: TileId) -> [[u64; 2]; 2] {
+        let side = u64::from(self.tile_cells) << tile.level;
+        [[tile.x, tile.y].map(|t| u64::from(t) * side), [tile.x, tile.y].map(|t| (u64::from(t) + 1) * side)]
     }
 
     /// Number of levels, at least 1.
@@ -64,9 +83,16 @@ impl Pyramid {
         self.tiles.len() as u32
     }
 
-    /// The one tile that covers everything.
+    /// The coarsest tile, the south-westernmost if there are several.
     pub fn root(&self) -> TileId {
         TileId { level: self.levels() - 1, x: 0, y: 0 }
+    }
+
+    /// All tiles of the coarsest level. Together they cover everything.
+    pub fn roots(&self) -> impl Iterator<Item = TileId> + use<> {
+        let level = self.levels() - 1;
+        let [east, north] = self.across(level);
+        (0..north).flat_map(move |y| (0..east).map(move |x| TileId { level, x, y }))
     }
 
     /// Tiles east and north of a level; none above the root's.
@@ -118,6 +144,9 @@ mod tests {
             [[3, 8], [2, 4], [1, 2], [1, 1]]
         );
         assert_eq!(Pyramid::over([2, 2]).levels(), 1);
+        let image = Pyramid::of_cells([16_384, 8_000], 504, 3);
+        assert_eq!((image.levels(), image.across(2), image.roots().count()), (3, [9, 4], 36));
+        assert_eq!(image.corners(TileId { level: 2, x: 8, y: 0 })[0], [16_128, 0]);
     }
 
     #[test]

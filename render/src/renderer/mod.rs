@@ -4,6 +4,8 @@
 //! given one patch with the whole mesh and the tiles it then asks for. Cost of a frame on the processor: the patch,
 //! one block of uniforms, a handful of commands and one draw a visible range (or one for all of them).
 
+mod imagery;
+
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -16,7 +18,7 @@ use crate::mesh::{MeshBuffers, MeshPatch, Morph, UploadStats};
 use crate::pipelines::{Modules, Pipelines, Variant, bind_group_layout};
 use crate::ramps::Ramp;
 use crate::tiles::{
-    GRADIENT_FORMAT, Pyramid, TILE_CELLS, TileId, TilePool, TileStats, WantedTiles, pack_gradients,
+    GRADIENT_FORMAT, Imagery, Pyramid, TILE_CELLS, TileId, TilePool, TileStats, WantedTiles, pack_gradients,
 };
 use crate::timing::GpuTimer;
 use crate::uniforms::{Inputs, Uniforms};
@@ -40,6 +42,7 @@ pub struct Renderer {
     walls: Option<Walls>,
     tiles: TilePool,
     wanted: WantedTiles,
+    imagery: Option<Imagery>,
     layout: wgpu::BindGroupLayout,
     modules: Modules,
     pipelines: HashMap<Variant, Pipelines>,
@@ -90,6 +93,7 @@ impl Renderer {
                 options.tile_budget_bytes,
             ),
             wanted: WantedTiles::default(),
+            imagery: None,
             modules: Modules::new(device, &layout),
             layout,
             pipelines: HashMap::new(),
@@ -327,6 +331,7 @@ impl Renderer {
         self.mesh.device_bytes()
             + self.morph.device_bytes()
             + self.tiles.device_bytes()
+            + self.imagery.as_ref().map_or(0, |i| i.pool.device_bytes())
             + self.uniforms.size()
     }
 

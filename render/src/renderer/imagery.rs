@@ -1,0 +1,81 @@
+//! The image on the terrain: what a caller sets, is asked for and gives.
+
+use super::Renderer;
+use crate::error::{RenderError, Result};
+use crate::tiles::{ImageTileId, Imagery, ImageryShape, ImageryStats};
+use crate::view::FrameView;
+
+impl Renderer {
+    /// Device memory for image tiles where nothing else is wanted, in bytes: 512 tiles of BC1, 256 of BC7, 64 of RGBA8. Devices hold at most as many
+    /// tiles as they have layers in a texture, 256 at least.
+    pub const IMAGERY_BYTES: u64 = 64 << 20;
+
+    /// Drapes an image over the terrain, or takes it off again. Its tiles are held within `pool_bytes` ([`Renderer::IMAGERY_BYTES`] will do for
+    /// most), none at first. It shows where a look says so ([`crate::Look::imagery`]).
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Usage`] for a shape that is none, a format the device does not take, and a pool that does not hold the coarsest
+    /// level. The image before is then gone too.
+    pub fn set_imagery(&mut self, shape: Option<ImageryShape>, pool_bytes: u64) -> Result<()> {
+        self.bind_group = None;
+        self.imagery = None;
+        self.imagery = shape.map(|s| Imagery::new(&self.device, &self.terrain, s, pool_bytes)).transpose()?;
+        Ok(())
+    }
+
+    /// The image on the terrain.
+    pub fn imagery(&self) -> Option<&ImageryShape> {
+        self.imagery.as_ref().map(|i| &i.shape)
+    }
+
+    /// Finds out which image tiles a view wants and returns those that are not on the device, most urgent first, at most `most`: those
+    /// whose texels are about a pixel on ground anywhere in the terrain's range of heights, and all coarser ones above them,
+    /// coarse before fine and near before far. To be called once a frame; what it returns is to be answered with
+    /// [`Renderer::give_imagery`] or [`Renderer::set_imagery_absent`], now or some frames later.
+    pub fn want_imagery(&mut self, view: &FrameView, most: usize) -> &[ImageTileId] {
+        let missing = self.imagery.as_mut().map_or(&[][..], |i| i.want(view));
+        &missing[..missing.len().min(most)]
+    }
+
+    /// Tiles that a view some time ahead will want beside those of [`Renderer::want_imagery`], which is to be called before. They take no
+    /// room that the current view needs, so a small pool may leave none for them.
+    pub fn want_imagery_ahead(&mut self, predicted: &FrameView, most: usize) -> &[ImageTileId] {
+        let missing = self.imagery.as_mut().map_or(&[][..], |i| i.want_ahead(predicted));
+        &missing[..missing.len().min(most)]
+    }
+
+    /// Gives an image tile: rows from south to north, 512 x 512 texels with their border, in the format of the shape; colours multiplied by alpha. Returns the
+    /// bytes sent; none where all room is taken by tiles that are wanted more.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::TileSize`], [`RenderError::NoSuchTile`]; [`RenderError::Usage`] without an image.
+    pub fn give_imagery(&mut self, tile: ImageTileId, bytes: &[u8]) -> Result<u64> {
+        let imagery = self.imagery.as_mut().ok_or(NO_IMAGE)?;
+        imagery.pool.upload(&self.queue, tile, bytes)
+    }
+
+    /// Says that a tile does not exist, because the image has nothing there: neither it nor any below it is asked for again.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::NoSuchTile`]; [`RenderError::Usage`] without an image.
+    pub fn set_imagery_absent(&mut self, tile: ImageTileId) -> Result<()> {
+        self.imagery.as_mut().ok_or(NO_IMAGE)?.set_absent(&self.queue, tile)
+    }
+
+    /// Forgets a tile whose texels changed, or one that exists by now; it will be wanted again.
+    pub fn forget_imagery(&mut self, tile: ImageTileId) {
+        if let Some(imagery) = &mut self.imagery {
+            imagery.forget(&self.queue, tile);
+        }
+    }
+
+    /// What the imagery did, and how near to its ideal the last view is. All zero without an image.
+    pub fn imagery_stats(&self) -> ImageryStats {
+        self.imagery.as_ref().map_or_else(ImageryStats::default, Imagery::stats)
+    }
+}
+
+const NO_IMAGE: RenderError = RenderError::Usage("no image is set; call set_imagery before giving its tiles");

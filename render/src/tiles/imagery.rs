@@ -1,0 +1,248 @@
+//! Content for colour: a photograph, draped.
+//!
+//! Unlike slopes, which lie on the grid's points, texels are areas and the image has a place and a texel size of its own. Tiles carry a
+//! border, so that a filter as wide as [`IMAGE_TILE_BORDER`] needs one tile alone and there is no seam. Colours
+//! are multiplied by alpha (in linear light, as blocks without a fourth colour are anyway): what is
+//! filtered then fades into the ground below without a fringe.
+
+use std::collections::HashSet;
+
+use super::{Pyramid, Raster, TileId, TileLayout, TilePool, WantedTiles};
+use crate::error::{RenderError, Result};
+use crate::gpu::Capabilities;
+use crate::view::{FrameView, TerrainShape};
+
+/// Stored texels a side of an image tile, border included.
+pub const IMAGE_TILE_TEXELS: u32 = 512;
+/// Stored texels on each side that belong to the neighbours, or repeat the image's edge.
+pub const IMAGE_TILE_BORDER: u32 = 4;
+/// Texels a side that a tile is there for.
+pub const IMAGE_TILE_INNER: u32 = IMAGE_TILE_TEXELS - 2 * IMAGE_TILE_BORDER;
+
+/// A tile of an image: level 0 the finest, x east and y north from the image's south-west corner, in tiles.
+pub type ImageTileId = TileId;
+
+/// How texels are stored; sRGB, with alpha.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ImageryFormat {
+    /// Blocks of 4 x 4 texels in 8 bytes; alpha 0 or 1.
+    Bc1,
+    /// Blocks of 4 x 4 texels in 16 bytes.
+    Bc7,
+    /// 4 bytes a texel.
+    Rgba8,
+}
+
+impl ImageryFormat {
+    /// Bytes of a tile: 131,072, 262,144 or 1,048,576.
+    pub fn tile_bytes(self) -> usize {
+        self.layout().layer_bytes() as usize
+    }
+
+    fn layout(self) -> TileLayout {
+        let format = match self {
+            Self::Bc1 => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
+            Self::Bc7 => wgpu::TextureFormat::Bc7RgbaUnormSrgb,
+            Self::Rgba8 => wgpu::TextureFormat::Rgba8UnormSrgb,
+        };
+        TileLayout { format, texels: IMAGE_TILE_TEXELS }
+    }
+
+    fn is_compressed(self) -> bool {
+        self != Self::Rgba8
+    }
+}
+
+impl Capabilities {
+    /// Formats that [`crate::Renderer::set_imagery`] takes on this device, the smallest first. Where blocks are not among them the caller
+    /// decodes them.
+    pub fn imagery_formats(&self) -> &'static [ImageryFormat] {
+        if self.texture_compression_bc {
+            &[ImageryFormat::Bc1, ImageryFormat::Bc7, ImageryFormat::Rgba8]
+        } else {
+            &[ImageryFormat::Rgba8]
+        }
+    }
+}
+
+/// An image on the terrain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageryShape {
+    /// How tiles are stored.
+    pub format: ImageryFormat,
+    /// Texels of level 0 east and north; 1 to 2^30.
+    pub texels: [u32; 2],
+    /// Levels there are, at least 1. Those past the first that is one tile are not asked for.
+    pub levels: u32,
+    /// South-west corner of the south-westernmost texel, metres east and north of the terrain's south-west sample.
+    pub origin_m: [f64; 2],
+    /// Metres a texel of level 0, east and north; above 0.
+    pub texel_m: [f64; 2],
+}
+
+impl ImageryShape {
+    fn check(&self) -> Result<()> {
+        let sound = self.texels.iter().all(|n| (1..=1 << 30).contains(n))
+            && self.levels > 0
+            && self.texel_m.iter().all(|m| m.is_finite() && *m > 0.0)
+            && self.origin_m.iter().all(|m| m.is_finite());
+        if sound {
+            Ok(())
+        } else {
+            Err(RenderError::Usage(
+                "an image needs 1 to 2^30 texels each way, a level, a finite place and texels of some size",
+            ))
+        }
+    }
+
+    /// All tiles it has.
+    pub fn pyramid(&self) -> Pyramid {
+        Pyramid::of_cells(self.texels, IMAGE_TILE_INNER, self.levels)
+    }
+}
+
+/// What the imagery did.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ImageryStats {
+    /// Tiles on the device.
+    pub resident: u32,
+    /// Tiles there is room for.
+    pub capacity: u32,
+    /// Device memory of the pool, bytes.
+    pub pool_bytes: u64,
+    /// Tiles known not to exist.
+    pub absent: u32,
+    /// Tiles the last view wants.
+    pub wanted: u32,
+    /// Tiles the last view wants, has room for and lacks.
+    pub missing: u32,
+    /// Tiles uploaded since the image was set.
+    pub uploads: u64,
+    /// Their bytes.
+    pub uploaded_bytes: u64,
+    /// Tiles that made room for others.
+    pub evicted: u64,
+    /// Tiles that came when they were no longer wanted and found no room.
+    pub dropped: u64,
+    /// Share of the last view's wanted tiles that are here, as of now: where one is, the ground shows its ideal level. 1 is the optimum.
+    pub ideal_share: f32,
+    /// By how many levels what is shown may be too coarse, at most. 0 is the optimum; where nothing is shown, as many as there are above.
+    pub most_levels_off: u32,
+}
+
+/// An image on the device.
+#[derive(Debug)]
+pub(crate) struct Imagery {
+    pub shape: ImageryShape,
+    pub pool: TilePool,
+    raster: Raster,
+    wanted: WantedTiles,
+    wanted_ahead: WantedTiles,
+    absent: HashSet<TileId>,
+}
+
+impl Imagery {
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        terrain: &TerrainShape,
+        shape: ImageryShape,
+        pool_bytes: u64,
+    ) -> Result<Self> {
+        shape.check()?;
+        if shape.format.is_compressed() && !device.features().contains(wgpu::Features::TEXTURE_COMPRESSION_BC)
+        {
+            return Err(RenderError::Usage(
+                "this device takes no BC textures; decode the image's tiles to RGBA8 (Capabilities::imagery_formats)",
+            ));
+        }
+        let pyramid = shape.pyramid();
+        let side = pyramid.across(0).into_iter().max().unwrap_or(1).next_power_of_two();
+        if side > device.limits().max_texture_dimension_2d {
+            return Err(RenderError::Usage(
+                "the image has more tiles in a row than the device's textures texels",
+            ));
+        }
+        let coarsest = pyramid.roots().count();
+        let pool = TilePool::new(device, pyramid, shape.format.layout(), pool_bytes);
+        if coarsest > pool.residency.capacity() as usize {
+            return Err(RenderError::Usage(
+                "the image's coarsest level alone does not fit the pool; give it more levels, or more memory",
+            ));
+        }
+        Ok(Self {
+            shape,
+            pool,
+            raster: Raster {
+                origin_m: shape.origin_m,
+                cell_m: shape.texel_m,
+                cells: shape.texels,
+                height_range_m: terrain.height_range_m,
+                flattest: 1.0,
+            },
+            wanted: WantedTiles::default(),
+            wanted_ahead: WantedTiles::default(),
+            absent: HashSet::new(),
+        })
+    }
+
+    pub(crate) fn want(&mut self, view: &FrameView) -> &[TileId] {
+        let absent = &self.absent;
+        let wanted =
+            self.wanted.find_on(&self.pool.pyramid, &self.raster, view, |tile| !absent.contains(&tile));
+        self.pool.residency.want(wanted);
+        self.pool.residency.missing()
+    }
+
+    pub(crate) fn want_ahead(&mut self, view: &FrameView) -> &[TileId] {
+        let absent = &self.absent;
+        let wanted =
+            self.wanted_ahead.find_on(&self.pool.pyramid, &self.raster, view, |tile| !absent.contains(&tile));
+        self.pool.residency.want_ahead(wanted);
+        self.pool.residency.missing_ahead()
+    }
+
+    pub(crate) fn set_absent(&mut self, queue: &wgpu::Queue, tile: TileId) -> Result<()> {
+        if !self.pool.pyramid.contains(tile) {
+            return Err(RenderError::NoSuchTile { tile: tile.to_string() });
+        }
+        self.absent.insert(tile);
+        self.pool.forget(queue, tile);
+        self.pool.residency.withdraw(tile);
+        Ok(())
+    }
+
+    pub(crate) fn forget(&mut self, queue: &wgpu::Queue, tile: TileId) {
+        self.absent.remove(&tile);
+        self.pool.forget(queue, tile);
+    }
+
+    pub(crate) fn stats(&self) -> ImageryStats {
+        let stats = self.pool.stats();
+        let here = |tile: TileId| self.pool.residency.layer(tile).is_some();
+        let levels = self.pool.pyramid.levels();
+        let [mut wanted, mut ideal, mut most_levels_off] = [0_u32; 3];
+        for tile in self.wanted.last().iter().filter(|t| !self.absent.contains(t)) {
+            wanted += 1;
+            let shown = std::iter::successors(Some(*tile), |t| Some(t.parent()))
+                .take_while(|t| t.level < levels)
+                .find(|t| here(*t));
+            let off = shown.map_or(levels, |t| t.level) - tile.level;
+            ideal += u32::from(off == 0);
+            most_levels_off = most_levels_off.max(off);
+        }
+        ImageryStats {
+            resident: stats.resident,
+            capacity: stats.capacity,
+            pool_bytes: self.pool.device_bytes(),
+            absent: self.absent.len() as u32,
+            wanted,
+            missing: stats.missing,
+            uploads: stats.uploads,
+            uploaded_bytes: stats.uploaded_bytes,
+            evicted: stats.evictions,
+            dropped: stats.dropped,
+            ideal_share: if wanted == 0 { 1.0 } else { ideal as f32 / wanted as f32 },
+            most_levels_off,
+        }
+    }
+}
