@@ -3,6 +3,7 @@
 //! The engine knows no pixels and the renderer no terrain file; nothing but this module knows both. It uses the libraries only and no part of
 //! the command line, so tests and benchmarks take it in as it is.
 
+pub(crate) mod drape;
 pub(crate) mod feed;
 pub(crate) mod full_mesh;
 pub(crate) mod overview;

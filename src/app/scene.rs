@@ -9,15 +9,18 @@
 //!
 //! Cost on the processor: the engine's update, a copy of its patch, some 2 ms a tile.
 
+use super::drape::{Drape, Served};
 use super::feed::{Feed, PictureEngine, Refined, feed, mesh_vertex};
 use super::streamed::streamed_feed;
 use std::collections::HashMap;
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use std::sync::Arc;
 use terrasoar::refine::Culling;
 use terrasoar::refine::kinetic::Patch;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
+use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{
     DrawStats, Frame, FrameView, Gpu, Look, MeshPatch, MeshVertex, RenderError, Renderer, RendererOptions,
@@ -27,8 +30,13 @@ use terrasoar_render::{
 /// Tiles that are asked for, for each that is given in a frame.
 const TILES_ASKED: usize = 8;
 
+/// Tiles of the image that a frame of a window is given at most: a megabyte of BC1.
+const IMAGE_TILES_A_FRAME: usize = 8;
+/// Frames ahead of the eye that tiles of the image are asked for.
+const FRAMES_AHEAD: f64 = 24.0;
+
 /// How a scene is made.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SceneOptions {
     /// What makes the mesh.
     pub engine: PictureEngine,
@@ -36,8 +44,29 @@ pub(crate) struct SceneOptions {
     pub culling: Culling,
     /// Normal tiles given a frame.
     pub tiles: TileService,
+    /// Device memory for the tiles of the image, in bytes.
+    pub imagery_bytes: u64,
     /// Whether frames are timed on the device, where it can ([`Scene::gpu_time_ms`]).
     pub timestamps: bool,
+}
+
+impl SceneOptions {
+    /// Whether frames must not wait.
+    fn is_for_a_window(self) -> bool {
+        self.tiles != TileService::All
+    }
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self {
+            engine: PictureEngine::default(),
+            culling: Culling::default(),
+            tiles: TileService::default(),
+            imagery_bytes: Renderer::IMAGERY_BYTES,
+            timestamps: false,
+        }
+    }
 }
 
 /// How many of the normal tiles that a view lacks it is given before it is drawn.
@@ -76,6 +105,10 @@ pub(crate) struct Drawn {
     pub tiles: [u64; 2],
     /// Tiles that the view still lacks.
     pub tiles_missing: u32,
+    /// Tiles of the image given.
+    pub image: Served,
+    /// Tiles of the image that the view still lacks.
+    pub image_missing: u32,
 }
 
 /// An opened terrain, its engine and its renderer.
@@ -88,6 +121,9 @@ pub(crate) struct Scene<'a> {
     walls: Option<(Vec<[u32; 2]>, f32)>,
     heights_m: Vec<f32>,
     wanted: Vec<TileId>,
+    drape: Option<Drape>,
+    /// The views of the last two updates, which say where the eye is going.
+    ways: [Option<View>; 2],
 }
 
 /// What the engine changed and the device has not heard of.
@@ -130,7 +166,16 @@ impl<'a> Scene<'a> {
     pub(crate) fn new(terrain: &'a Terrain, gpu: &Gpu, options: SceneOptions) -> Result<Self, SceneError> {
         let feed = feed(terrain, options.engine, options.culling)
             .ok_or_else(|| SceneError::NotInAddressSpace(terrain.path().display().to_string()))?;
-        Self::over(feed, terrain, gpu, options)
+        // Tiles are read, not mapped, whatever the records are.
+        let drape = match Imagery::open(terrain)? {
+            None => None,
+            Some(_) => Drape::of(
+                Arc::new(Terrain::open_unmapped(terrain.path())?),
+                &gpu.capabilities,
+                options.is_for_a_window(),
+            )?,
+        };
+        Self::over(feed, drape, terrain, gpu, options)
     }
 
     /// A scene over a terrain that need not be mapped: its pages are read into `cache_bytes` of memory by threads, and no frame waits for one. The engine
@@ -145,17 +190,21 @@ impl<'a> Scene<'a> {
         options: SceneOptions,
     ) -> Result<Self, SceneError> {
         let feed = streamed_feed(terrain, cache_bytes, options.culling)?;
-        Self::over(feed, terrain, gpu, options)
+        let drape = Drape::of(Arc::clone(terrain), &gpu.capabilities, options.is_for_a_window())?;
+        Self::over(feed, drape, terrain, gpu, options)
     }
 
     fn over(
         feed: Box<dyn Feed + 'a>,
+        drape: Option<Drape>,
         terrain: &Terrain,
         gpu: &Gpu,
         options: SceneOptions,
     ) -> Result<Self, SceneError> {
-        let renderer = new_renderer(shape(terrain), gpu, options)?;
+        let renderer = new_renderer(shape(terrain), drape.as_ref(), gpu, options)?;
         Ok(Self {
+            drape,
+            ways: [None; 2],
             feed,
             renderer,
             options,
@@ -179,6 +228,7 @@ impl<'a> Scene<'a> {
     /// Brings the mesh to a view. Touches no device.
     pub(crate) fn update(&mut self, view: &View) -> Refined {
         let refined = self.feed.update(view);
+        self.ways = [self.ways[1], Some(*view)];
         self.pending.changed = true;
         if self.pending.begun {
             self.pending.take(self.feed.patch());
@@ -202,6 +252,9 @@ impl<'a> Scene<'a> {
         let mut tiles = Drawn::default();
         if look.tile_normals {
             self.serve_tiles(view, &mut tiles)?;
+        }
+        if look.imagery > 0.0 {
+            self.serve_image(view, &mut tiles)?;
         }
         let drawn = self.draw_served(encoder, target, view, look, refined_for)?;
         Ok(Drawn { upload: drawn.upload, draw: drawn.draw, ..tiles })
@@ -279,6 +332,34 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
+    /// Gives the renderer tiles of the image that the view lacks, and counts them in `drawn`. A frame of a window is given what has come.
+    fn serve_image(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
+        let Some(drape) = &mut self.drape else { return Ok(()) };
+        let ahead = match self.ways {
+            [Some(before), Some(now)] => ahead(&before, &now),
+            _ => *view,
+        };
+        drawn.image =
+            drape.serve(&mut self.renderer, &frame_view(view), &frame_view(&ahead), IMAGE_TILES_A_FRAME)?;
+        drawn.image_missing = self.renderer.imagery_stats().missing;
+        Ok(())
+    }
+
+    /// Whether an image is draped over the terrain.
+    pub(crate) fn has_image(&self) -> bool {
+        self.drape.is_some()
+    }
+
+    /// Whether something that the last picture lacked is on its way.
+    pub(crate) fn is_waiting(&self) -> bool {
+        self.feed.is_waiting() || self.drape.as_ref().is_some_and(Drape::is_waiting)
+    }
+
+    /// What could not be read and nobody has heard of yet.
+    pub(crate) fn take_error(&mut self) -> Option<LayoutError> {
+        self.feed.take_error().or_else(|| self.drape.as_mut().and_then(Drape::take_error))
+    }
+
     /// Puts walls below the terrain's border, down to `bottom_m` (before exaggeration), so that it stands as a block. They go along the mesh of the
     /// last update: after another one raise them anew. Costs a walk over the mesh.
     pub(crate) fn raise_walls(&mut self, bottom_m: f32) {
@@ -292,7 +373,7 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// What [`Renderer::new`] says.
     pub(crate) fn recover(&mut self, gpu: &Gpu) -> Result<(), SceneError> {
-        self.renderer = new_renderer(*self.renderer.terrain(), gpu, self.options)?;
+        self.renderer = new_renderer(*self.renderer.terrain(), self.drape.as_ref(), gpu, self.options)?;
         self.pending = Pending { changed: true, ..Pending::default() };
         if let Some((edges, bottom_m)) = &self.walls {
             self.renderer.set_walls(edges, *bottom_m);
@@ -332,10 +413,28 @@ fn border(whole: &Patch, samples: [u32; 2]) -> Vec<[u32; 2]> {
     drawn.flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).filter(on_one_side).collect()
 }
 
-fn new_renderer(shape: TerrainShape, gpu: &Gpu, options: SceneOptions) -> Result<Renderer, RenderError> {
+/// Where a steady eye will be in some frames.
+fn ahead(before: &View, now: &View) -> View {
+    let turned = |before: f64, now: f64| now + FRAMES_AHEAD * (now - before).sin();
+    View {
+        eye_m: now.eye_m + FRAMES_AHEAD * (now.eye_m - before.eye_m),
+        yaw_rad: turned(before.yaw_rad, now.yaw_rad),
+        pitch_rad: turned(before.pitch_rad, now.pitch_rad).clamp(-FRAC_PI_2, FRAC_PI_2),
+        ..*now
+    }
+}
+
+fn new_renderer(
+    shape: TerrainShape,
+    drape: Option<&Drape>,
+    gpu: &Gpu,
+    options: SceneOptions,
+) -> Result<Renderer, RenderError> {
     let mut renderer_options = RendererOptions::from(&gpu.capabilities);
     renderer_options.timestamps &= options.timestamps;
-    Renderer::new(&gpu.device, &gpu.queue, shape, renderer_options)
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shape, renderer_options)?;
+    renderer.set_imagery(drape.map(Drape::shape), options.imagery_bytes)?;
+    Ok(renderer)
 }
 
 /// What the renderer needs to know of a terrain.

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "tests use a part of it")]
 
+#[path = "../../src/app/drape.rs"]
+pub mod drape;
 #[path = "../../src/app/feed.rs"]
 pub mod feed;
 #[path = "../../src/app/full_mesh.rs"]

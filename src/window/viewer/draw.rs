@@ -62,9 +62,9 @@ impl Viewer {
         self.window.pre_present_notify();
         self.screen.gpu.queue.present(picture);
         self.screen.gpu.watch.check()?;
-        let waiting = self.stage.scene.feed().is_waiting();
+        let waiting = self.stage.scene.is_waiting();
         self.unsettled = waiting || (drawn.tiles_missing > 0 && drawn.tiles[0] > 0);
-        while let Some(error) = self.stage.scene.feed_mut().take_error() {
+        while let Some(error) = self.stage.scene.take_error() {
             self.trouble(format!("{error}; the ground stays coarse there"));
         }
         self.count(refined, drawn, update, passed.unwrap_or_else(|| begun.elapsed()));
