@@ -41,14 +41,15 @@ pub(super) fn all(report: &IoReport<'_>) -> Vec<Chart> {
             |f| f.pages,
         ));
     }
-    if engines.iter().any(|run| run.preload != PreloadKind::None) {
+    let preloads: Vec<&Run> = engines.into_iter().filter(|run| run.reader == first.reader).collect();
+    if preloads.iter().any(|run| run.preload != PreloadKind::None) {
         charts.push(chart(
             report,
             "plot-io-realtime",
-            format!("Pages read in real time in layout {}", layout.name()),
+            format!("Pages that {} reads in real time in layout {}", first.reader.name(), layout.name()),
             "4 KiB pages a frame that were not in the cache",
             "What preloading leaves: pages that a frame needed and that were not there. The first frame is left out.",
-            engines.iter().map(|run| (format!("{}, {}", run.reader.name(), run.preload.name()), *run)),
+            preloads.into_iter().map(|run| (run.preload.name().to_owned(), run)),
             |f| f.realtime_pages,
         ));
     }
