@@ -354,6 +354,9 @@ fn text(bench: &IoBench) -> String {
     if bench.runs.iter().any(|r| r.scratch_map.is_some()) {
         out += &scratch_text(bench);
     }
+    if bench.runs.iter().any(|r| r.was_cold == Some(false)) {
+        out += "the file was not cold: it lies on no disk, or another program has it mapped; cold figures are of a file in memory\n";
+    }
     if let Some(cap) = bench.cap {
         out += &format!(
             "memory capped at {} MiB, page cache included (control group version {})\n",

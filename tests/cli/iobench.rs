@@ -3,7 +3,7 @@
 use crate::support::{Bench, fields, text};
 use serde_json::Value;
 
-const RUN_FIELDS: [&str; 31] = [
+const RUN_FIELDS: [&str; 32] = [
     "engine",
     "layout",
     "prefetch",
@@ -25,6 +25,7 @@ const RUN_FIELDS: [&str; 31] = [
     "pages_touched_total",
     "record_bytes_touched_total",
     "update_ms",
+    "was_cold",
     "update_ms_cold",
     "io_ms_p99",
     "first_frame_io_ms",
