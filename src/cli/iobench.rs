@@ -13,7 +13,7 @@ use terrasoar::flyover::EngineKind;
 use terrasoar::iobench::scratch::{Access, ScratchFile};
 use terrasoar::iobench::{
     CountOptions, IoBench, IoRun, LayoutKind, PoolOptions, Pooled, Prefetch, ReadBy, Reader, Run,
-    ScratchCost, StreamCost, Timed, count, fly_pooled, kernel, time,
+    ScratchCost, Timed, count, fly_pooled, kernel, time,
 };
 use terrasoar::report::{IoReport, write_io_frames_csv};
 use terrasoar::view::View;
@@ -193,12 +193,6 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     let pooled = streamed(args, &views, &runs, &standing, &progress)?;
     drop(progress);
-    let counted = runs.len();
-    let mut streams = Vec::new();
-    for (run, pooled) in pooled {
-        streams.push(StreamCost::of(&pooled));
-        runs.push((run, Some(pooled.timed)));
-    }
     let mut sums: Vec<IoRun> = runs
         .iter()
         .map(|(run, timed)| match timed {
@@ -206,10 +200,13 @@ pub(super) fn run(args: &Args) -> Result<()> {
             None => IoRun::of(run),
         })
         .collect();
-    sums[counted..].iter_mut().zip(streams).for_each(|(sum, stream)| sum.stream = Some(stream));
     for (i, map, pread) in scratch {
         sums[i].scratch_map = Some(map);
         sums[i].scratch_pread = Some(pread);
+    }
+    for (run, pooled) in pooled {
+        sums.push(IoRun::of(&run).with_times(&pooled.timed).with_stream(&pooled));
+        runs.push((run, Some(pooled.timed)));
     }
     let bench = IoBench {
         terrain: name(&args.file),
@@ -423,6 +420,9 @@ fn text(bench: &IoBench) -> String {
         out += &scratch_text(bench);
     }
     out += &stream_text(bench);
+    if bench.runs.iter().any(|r| r.was_cold == Some(false)) {
+        out += "the file was not cold: it lies on no disk, or another program has it mapped; cold figures are of a file in memory\n";
+    }
     if let Some(cap) = bench.cap {
         out += &format!(
             "memory capped at {} MiB, page cache included (control group version {})\n",

@@ -84,6 +84,8 @@ pub struct Pooled {
     pub frames: Vec<StreamFrame>,
     /// What reading took, cold, the first frame included.
     pub loader: LoaderStats,
+    /// Bytes that storage delivered meanwhile; `None` where not known.
+    pub storage_bytes: Option<u64>,
 }
 
 impl Pooled {
@@ -125,11 +127,17 @@ pub fn fly_pooled(
         path: path.into(),
         source,
     })?;
-    let knows_peak = kernel::reset_peak_memory();
+    let (knows_peak, before) = (kernel::reset_peak_memory(), kernel::read_bytes());
     let (cold, frames, loader) = pass(path, views, options, &mut |i| done(i))?;
+    let storage_bytes = kernel::read_bytes().zip(before).map(|(now, then)| now - then);
     let peak_memory_bytes = if knows_peak { kernel::peak_memory_bytes() } else { None };
     let (warm, ..) = pass(path, views, options, &mut |i| done(views.len() as u64 + i))?;
-    Ok(Pooled { timed: Timed { was_forgotten, cold, warm, peak_memory_bytes }, frames, loader })
+    Ok(Pooled {
+        timed: Timed { was_forgotten, cold, warm, peak_memory_bytes },
+        frames,
+        loader,
+        storage_bytes,
+    })
 }
 
 type Pass = (Vec<super::UpdateCost>, Vec<StreamFrame>, LoaderStats);

@@ -99,7 +99,10 @@ pub struct IoRun {
     pub record_bytes_touched_total: u64,
     /// Median time of an update over the mapped file in memory, milliseconds.
     pub update_ms: Option<f64>,
-    /// The same with the file cold at the start.
+    /// Whether the cold pass was cold: storage delivered at least nine tenths of what the first frame needs. Else the file lies on no disk, or someone else had it mapped
+    /// and it could not be dropped from memory.
+    pub was_cold: Option<bool>,
+    /// Median time of an update with the file cold at the start.
     pub update_ms_cold: Option<f64>,
     /// 99th percentile of an update in memory, milliseconds.
     pub update_ms_p99: Option<f64>,
@@ -216,6 +219,7 @@ impl IoRun {
             pages_touched_total: frames.iter().map(|f| f.pages).sum(),
             record_bytes_touched_total: frames.iter().map(|f| f.record_bytes).sum(),
             update_ms: None,
+            was_cold: None,
             update_ms_cold: None,
             update_ms_p99: None,
             update_ms_p99_cold: None,
@@ -251,8 +255,18 @@ impl IoRun {
             self.frame_thread_minor_faults = faults(later(&timed.cold), |f| f.minor);
             self.first_frame_major_faults = timed.cold.first().and_then(|c| c.faults).map(|f| f.major);
             self.disk_read_mb_total = read_mb(&timed.cold);
+            self.was_cold = self.disk_read_mb_total.map(|mb| mb >= 0.9 * self.first_frame_mb);
         }
         self.peak_rss_mb = timed.peak_memory_bytes.map(|bytes| bytes as f64 / 1e6);
+        self
+    }
+
+    /// With what streaming did: threads read between frames as well, so what storage delivered is told for all of the flight.
+    #[must_use]
+    pub fn with_stream(mut self, pooled: &Pooled) -> Self {
+        self.stream = Some(StreamCost::of(pooled));
+        self.disk_read_mb_total = pooled.storage_bytes.map(|bytes| bytes as f64 / 1e6);
+        self.was_cold = pooled.storage_bytes.map(|bytes| bytes as f64 >= 0.9 * pooled.loader.bytes as f64);
         self
     }
 }
@@ -344,7 +358,10 @@ mod tests {
         assert_eq!((sums.io_ms_p99, sums.first_frame_io_ms), (Some(2.0), Some(45.0)));
         assert_eq!((sums.frame_thread_major_faults, sums.first_frame_major_faults), (Some(2), Some(9)));
         assert_eq!(sums.disk_read_mb_total, Some(11.0 * 4096.0 / 1e6));
-        assert_eq!(sums.peak_rss_mb, None);
+        assert_eq!((sums.peak_rss_mb, sums.was_cold), (None, Some(true)));
+        let held = UpdateCost { read_bytes: Some(0), ..cost(1.0, Some(0)) };
+        let held = Timed { cold: vec![held; 3], ..known.clone() };
+        assert_eq!(IoRun::of(&run(&[1, 1, 1])).with_times(&held).was_cold, Some(false));
         let unknown = Timed { cold: vec![cost(3.0, None); 2], was_forgotten: true, ..known.clone() };
         assert_eq!(IoRun::of(&run(&[1])).with_times(&unknown).frame_thread_major_faults, None);
         let warm_only = Timed { was_forgotten: false, ..known };

@@ -42,17 +42,18 @@ pub(super) fn all(report: &IoReport<'_>) -> Vec<Chart> {
             |f| f.pages,
         ));
     }
-    if engines.iter().any(|run| run.preload != Prefetch::None) {
+    // Flights over a pool are what preloading is for; without any, the first reader's counts show it.
+    let pooled = engines.iter().any(|run| run.reader == Reader::Pool);
+    let reader = if pooled { Reader::Pool } else { first.reader };
+    let preloads: Vec<&Run> = engines.into_iter().filter(|run| run.reader == reader).collect();
+    if preloads.iter().any(|run| run.preload != Prefetch::None) {
         charts.push(chart(
             report,
             "plot-io-realtime",
-            format!("Pages read in real time in layout {}", layout.name()),
-            "4 KiB pages a frame that were not in the cache",
+            format!("Pages that {} lacks, in layout {}", reader.name(), layout.name()),
+            "4 KiB pages a frame that were not at hand",
             "What preloading leaves: pages that a frame needed and that were not there. The first frame is left out.",
-            engines.iter().map(|run| {
-                let [reader, source, preload] = [run.reader.name(), run.reader.source(), run.preload.name()];
-                (format!("{reader}, {source}, {preload}"), *run)
-            }),
+            preloads.into_iter().map(|run| (run.preload.name().to_owned(), run)),
             |f| f.realtime_pages,
         ));
     }

@@ -108,6 +108,14 @@ fn measured(out: &mut String, bench: &IoBench) {
             format_args!("<p>This system does not tell of page faults and reads: they are not known.</p>\n"),
         );
     }
+    if bench.runs.iter().any(|r| r.was_cold == Some(false)) {
+        push(
+            out,
+            format_args!(
+                "<p>The file was not cold: it lies on no disk, or another program has it mapped. Cold figures are of a file in memory.</p>\n"
+            ),
+        );
+    }
     let known = |value: Option<f64>, decimals| value.map_or("–".to_owned(), |v| grouped(v, decimals));
     let mut rows = Vec::new();
     for r in &bench.runs {

@@ -3,7 +3,7 @@
 use crate::support::{Bench, fields, text};
 use serde_json::Value;
 
-const RUN_FIELDS: [&str; 35] = [
+const RUN_FIELDS: [&str; 36] = [
     "engine",
     "layout",
     "source",
@@ -26,6 +26,7 @@ const RUN_FIELDS: [&str; 35] = [
     "pages_touched_total",
     "record_bytes_touched_total",
     "update_ms",
+    "was_cold",
     "update_ms_cold",
     "update_ms_p99",
     "update_ms_p99_cold",
