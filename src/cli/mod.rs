@@ -8,6 +8,7 @@ mod build;
 #[cfg(unix)]
 mod bus;
 mod compare;
+mod drape;
 mod flight;
 mod ground;
 mod height;
@@ -53,6 +54,7 @@ use std::process::ExitCode;
     after_help = "\
 Examples, in the order of the work:
   terrasoar build alps.tif -o alps.iqt
+  terrasoar drape alps.iqt --image alps-photo.tif
   terrasoar info alps.iqt
   terrasoar snapshot alps.iqt -o alps.png
   terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
@@ -69,6 +71,7 @@ struct Typed {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Build(build::Args),
+    Drape(drape::Args),
     Info(info::Args),
     Verify(verify::Args),
     Height(height::Args),
@@ -100,6 +103,7 @@ pub(crate) fn run() -> ExitCode {
     bus::watch();
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
+        Verb::Drape(args) => drape::run(&args),
         Verb::Info(args) => info::run(&args),
         Verb::Verify(args) => verify::run(&args),
         Verb::Height(args) => height::run(&args),
