@@ -201,6 +201,22 @@ impl Header {
         page
     }
 
+    /// The page of an older header with what an append changes: version, generation, length, imagery. Fields that this version does not know stay
+    /// as they are.
+    pub(crate) fn amended(&self, older: &Page) -> Box<Page> {
+        let mut page = Box::new(*older);
+        let ours = self.to_page();
+        if get_u16(&page[..], 0x00a) == 0 {
+            page[0x00a..0x00c].copy_from_slice(&ours[0x00a..0x00c]);
+        }
+        for range in [0x01c..0x020, 0x088..0x0a0] {
+            page[range.clone()].copy_from_slice(&ours[range]);
+        }
+        let sum = checksum(&page[..0xffc]);
+        put_u32(&mut page[..], 0xffc, sum);
+        page
+    }
+
     /// The current header of the two slots.
     ///
     /// # Errors

@@ -7,6 +7,7 @@
 mod build;
 mod cap;
 mod compare;
+mod drape;
 mod flight;
 mod ground;
 mod height;
@@ -55,6 +56,7 @@ use std::process::ExitCode;
     after_help = "\
 Examples, in the order of the work:
   terrasoar build alps.tif -o alps.iqt
+  terrasoar drape alps.iqt --image alps-photo.tif
   terrasoar info alps.iqt
   terrasoar snapshot alps.iqt -o alps.png
   terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
@@ -71,6 +73,7 @@ struct Typed {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Build(build::Args),
+    Drape(drape::Args),
     Info(info::Args),
     Verify(verify::Args),
     Height(height::Args),
@@ -103,6 +106,7 @@ pub(crate) fn run() -> ExitCode {
     signals::heed();
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
+        Verb::Drape(args) => drape::run(&args),
         Verb::Info(args) => info::run(&args),
         Verb::Verify(args) => verify::run(&args),
         Verb::Height(args) => height::run(&args),

@@ -75,6 +75,16 @@ pub(super) fn place_m(text: &str) -> Result<[f64; 2], String> {
     Ok([number(east)?, number(north)?])
 }
 
+/// `W,S,E,N`: the sides of a rectangle.
+pub(super) fn extent(text: &str) -> Result<[f64; 4], String> {
+    let sides: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
+    match <[f64; 4]>::try_from(sides) {
+        Ok([west, south, east, north]) if west < east && south < north => Ok([west, south, east, north]),
+        Ok(_) => Err("west must be less than east, and south less than north".into()),
+        Err(_) => Err("give west, south, east and north, such as 0,0,5000,4000".into()),
+    }
+}
+
 /// `WIDTHxHEIGHT` in pixels.
 pub(super) fn viewport(text: &str) -> Result<Viewport, String> {
     let side = |word: &str| match word.parse::<u32>() {
@@ -141,6 +151,10 @@ mod tests {
         }
         for wrong in ["", "5", "1,x", "1,nan"] {
             assert!(place_m(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(extent("-1,0,5e3,4").unwrap(), [-1.0, 0.0, 5000.0, 4.0]);
+        for wrong in ["", "1,2,3", "1,2,3,4,5", "2,0,1,1", "0,1,1,1", "0,0,nan,1"] {
+            assert!(extent(wrong).is_err(), "{wrong}");
         }
         for wrong in ["800", "0x600", "800x", "800x600x3", "99999999x1"] {
             assert!(viewport(wrong).is_err(), "{wrong}");

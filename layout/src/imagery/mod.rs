@@ -3,11 +3,25 @@
 //! [`Imagery`] reads it: shape, directory and single tiles as a GPU takes them. Tile data stay in the file until they are asked for; what
 //! is held is 16 bytes a tile. Rows of texels run from south to north everywhere in this module, tiles from the south-west.
 
+mod append;
 mod decode;
+mod drape;
+mod encode;
+mod image;
+mod linear;
+mod lock;
+mod mosaic;
+mod place;
+mod pyramid;
 mod reader;
 mod section;
 mod shape;
+mod source;
 
 pub use decode::decode_tile;
+pub use drape::{DrapeOptions, Draped, drape};
+pub use image::open as open_image;
+pub use place::{Extent, PlaceOrigin};
 pub use reader::Imagery;
 pub use shape::{BORDER_TEXELS, INNER_TEXELS, ImageryShape, TILE_TEXELS, TileFormat, TileId};
+pub use source::{ImageInfo, ImageSource, MemoryImage, RowReader};

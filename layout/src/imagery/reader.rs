@@ -109,7 +109,7 @@ impl Imagery {
         Ok(true)
     }
 
-    pub(crate) fn entry(&self, id: TileId) -> Option<TileEntry> {
+    fn entry(&self, id: TileId) -> Option<TileEntry> {
         let index = self.section.shape.index(id)?;
         self.entries.get(index as usize).copied().filter(|entry| entry.is_present())
     }

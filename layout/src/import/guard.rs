@@ -10,7 +10,7 @@ use std::path::Path;
 use crate::error::LayoutError;
 
 /// Runs `decode`; a panic in it becomes [`LayoutError::Damaged`] at `place` of `path`.
-pub(super) fn guard<T>(
+pub(crate) fn guard<T>(
     path: &Path,
     place: impl FnOnce() -> String,
     decode: impl FnOnce() -> Result<T, LayoutError>,

@@ -69,7 +69,7 @@ pub(super) fn identify(path: &Path) -> Result<Format, LayoutError> {
 }
 
 /// Classic TIFF is version 42, BigTIFF 43, in either byte order.
-fn is_tiff(head: &[u8]) -> bool {
+pub(crate) fn is_tiff(head: &[u8]) -> bool {
     [&b"II*\0"[..], b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| head.starts_with(magic))
 }
 

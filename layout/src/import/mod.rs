@@ -19,6 +19,9 @@ use crate::dem::DemSource;
 use crate::error::LayoutError;
 use identify::Format;
 
+pub(crate) use geotiff::TiffImage;
+pub(crate) use guard::guard;
+pub(crate) use identify::is_tiff;
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 
 /// Samples handed to a sink in one window, at most: 2 MiB of `f64`.

@@ -97,7 +97,7 @@ impl Chunks {
             ));
         }
         let sample_type = sample_type(file, directory)?;
-        let compression = compression(file, directory)?;
+        let compression = compression_of(file, directory)?;
         let predictor = file.number(directory, tags::PREDICTOR)?.unwrap_or(1);
         let predictor = match (predictor, sample_type) {
             _ if compression == Compression::None => Predictor::None,
@@ -269,7 +269,12 @@ impl Chunks {
     }
 }
 
-fn side(file: &mut TiffFile, directory: &Directory, tag: u16, what: &str) -> Result<u32, LayoutError> {
+pub(super) fn side(
+    file: &mut TiffFile,
+    directory: &Directory,
+    tag: u16,
+    what: &str,
+) -> Result<u32, LayoutError> {
     let value = file.number(directory, tag)?;
     // Sides of 2^31 and more would overflow the sum of a chunk's place and its size.
     let side = value.and_then(|value| u32::try_from(value).ok()).filter(|side| *side <= i32::MAX as u32);
@@ -311,7 +316,7 @@ fn sample_type(file: &mut TiffFile, directory: &Directory) -> Result<SampleType,
     })
 }
 
-fn compression(file: &mut TiffFile, directory: &Directory) -> Result<Compression, LayoutError> {
+pub(super) fn compression_of(file: &mut TiffFile, directory: &Directory) -> Result<Compression, LayoutError> {
     let code = file.number(directory, tags::COMPRESSION)?.unwrap_or(1);
     let name = match code {
         1 => return Ok(Compression::None),

@@ -12,6 +12,8 @@
 
 mod chunks;
 mod codec;
+mod colour;
+mod colour_table;
 mod convert;
 mod geokeys;
 mod metadata;
@@ -25,6 +27,7 @@ use std::path::{Path, PathBuf};
 use crate::dem::{DemInfo, DemSource, SampleSink, Window};
 use crate::error::LayoutError;
 use chunks::Chunks;
+pub(crate) use colour::TiffImage;
 use convert::Void;
 use tags::TiffFile;
 

@@ -1,4 +1,4 @@
-//! Undoes the predictors of TIFF on rows of one sample a pixel, in place.
+//! Undoes the predictors of TIFF on rows, in place; of reals on one sample a pixel.
 //!
 //! 2 stores the difference to the sample on the left, as an integer of the sample's width even for reals
 //! (TIFF 6.0, section 14). 3 stores the bytes of a row's reals by significance, most significant
@@ -28,6 +28,33 @@ pub(super) fn horizontal(bytes: &mut [u8], stride: usize, sample_bytes: u64, big
             (_, true) => {
                 sum::<8>(row, |a, b| u64::from_be_bytes(a).wrapping_add(u64::from_be_bytes(b)).to_be_bytes())
             }
+        }
+    }
+}
+
+/// Undoes predictor 2 on rows of `stride` bytes of `bands` samples a pixel, of 1 or 2 bytes each.
+pub(super) fn horizontal_bands(
+    bytes: &mut [u8],
+    stride: usize,
+    bands: usize,
+    sample_bytes: u64,
+    big_endian: bool,
+) {
+    for row in bytes.chunks_exact_mut(stride) {
+        if sample_bytes == 1 {
+            for at in bands..row.len() {
+                row[at] = row[at].wrapping_add(row[at - bands]);
+            }
+            continue;
+        }
+        let (samples, _) = row.as_chunks_mut::<2>();
+        for at in bands..samples.len() {
+            let (a, b) = (samples[at], samples[at - bands]);
+            samples[at] = if big_endian {
+                u16::from_be_bytes(a).wrapping_add(u16::from_be_bytes(b)).to_be_bytes()
+            } else {
+                u16::from_le_bytes(a).wrapping_add(u16::from_le_bytes(b)).to_le_bytes()
+            };
         }
     }
 }

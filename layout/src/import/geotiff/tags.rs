@@ -21,12 +21,16 @@ pub(super) const STRIP_OFFSETS: u16 = 273;
 pub(super) const SAMPLES_PER_PIXEL: u16 = 277;
 pub(super) const ROWS_PER_STRIP: u16 = 278;
 pub(super) const STRIP_BYTE_COUNTS: u16 = 279;
+pub(super) const PLANAR_CONFIGURATION: u16 = 284;
 pub(super) const PREDICTOR: u16 = 317;
+pub(super) const COLOR_MAP: u16 = 320;
 pub(super) const TILE_WIDTH: u16 = 322;
 pub(super) const TILE_LENGTH: u16 = 323;
 pub(super) const TILE_OFFSETS: u16 = 324;
 pub(super) const TILE_BYTE_COUNTS: u16 = 325;
+pub(super) const EXTRA_SAMPLES: u16 = 338;
 pub(super) const SAMPLE_FORMAT: u16 = 339;
+pub(super) const JPEG_TABLES: u16 = 347;
 pub(super) const MODEL_PIXEL_SCALE: u16 = 33550;
 pub(super) const MODEL_TIEPOINT: u16 = 33922;
 pub(super) const MODEL_TRANSFORMATION: u16 = 34264;
@@ -215,6 +219,15 @@ impl TiffFile {
                 );
             }
         }))
+    }
+
+    /// A tag's values as they are in the file.
+    pub(super) fn bytes_of(
+        &mut self,
+        directory: &Directory,
+        tag: u16,
+    ) -> Result<Option<Vec<u8>>, LayoutError> {
+        Ok(self.values(directory, tag)?.map(|(_, bytes)| bytes))
     }
 
     /// A tag's first value as an unsigned integer.

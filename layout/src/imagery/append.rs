@@ -1,0 +1,170 @@
+//! A section appended to a terrain file so that the file reads as before or as after, wherever the work is cut off.
+//!
+//! Tiles, directory and the section's first page go behind what the current header counts as the file; when they are on the disk, the header slot that is not
+//! current gets the next generation, and is synced. Nothing that a reader of the old generation can reach is written to. An append that fails gives
+//! the space back; one that is killed leaves bytes behind the file that no header counts, and the next append writes over them.
+
+use super::pyramid::MadeTile;
+use super::section::{Section, TileEntry};
+use super::shape::{ImageryShape, TileId};
+use crate::atomic_file::write_at;
+use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
+use crate::error::LayoutError;
+use crate::header::{Header, ImageryPlace};
+use std::fs::File;
+use std::io;
+use std::path::Path;
+
+const PAGE: u64 = PAGE_BYTES as u64;
+
+/// What an append does to a file; tests put failing ones in its place.
+pub(super) trait Target: Sync {
+    /// Writes all of `bytes` at `offset`.
+    fn write(&self, bytes: &[u8], offset: u64) -> io::Result<()>;
+
+    /// Returns when all that was written is on the disk.
+    fn sync(&self) -> io::Result<()>;
+}
+
+impl Target for File {
+    fn write(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
+        write_at(self, bytes, offset)
+    }
+
+    fn sync(&self) -> io::Result<()> {
+        self.sync_data()
+    }
+}
+
+/// The two header slots, and which counts.
+pub(super) struct Slots {
+    pub(super) current: Box<Page>,
+    /// 0 or 1.
+    pub(super) current_slot: u64,
+    pub(super) header: Header,
+}
+
+impl Slots {
+    pub(super) fn of(path: &Path, pages: [Box<Page>; 2]) -> Result<Self, LayoutError> {
+        let header = Header::current(path, &pages[0], &pages[1])?;
+        let [a, b] = pages;
+        let is_b = Header::parse(path, &b).is_ok_and(|b| b == header);
+        Ok(if is_b && !Header::parse(path, &a).is_ok_and(|a| a == header) {
+            Self { current: b, current_slot: 1, header }
+        } else {
+            Self { current: a, current_slot: 0, header }
+        })
+    }
+}
+
+/// An append under way.
+pub(super) struct Append<'t> {
+    path: &'t Path,
+    target: &'t dyn Target,
+    slots: Slots,
+    shape: ImageryShape,
+    begin: u64,
+    /// First byte not yet taken, of a page.
+    next: u64,
+    directory: Vec<u8>,
+    stored_tiles: u64,
+    tile_bytes: u64,
+}
+
+impl<'t> Append<'t> {
+    /// Begins behind the file's current end. Nothing is written yet.
+    pub(super) fn begin(
+        path: &'t Path,
+        target: &'t dyn Target,
+        slots: Slots,
+        shape: ImageryShape,
+    ) -> Result<Self, LayoutError> {
+        let directory_bytes = shape.tiles() * super::section::TILE_ENTRY_BYTES as u64;
+        let begin = slots.header.file_bytes.next_multiple_of(PAGE);
+        Ok(Self {
+            path,
+            target,
+            slots,
+            shape,
+            begin,
+            next: begin + PAGE + directory_bytes.next_multiple_of(PAGE),
+            directory: vec![0; to_usize(directory_bytes)?],
+            stored_tiles: 0,
+            tile_bytes: 0,
+        })
+    }
+
+    fn write(&self, bytes: &[u8], offset: u64) -> Result<(), LayoutError> {
+        self.target
+            .write(bytes, offset)
+            .map_err(|e| LayoutError::io(self.path, "cannot append to the file", e))
+    }
+
+    fn sync(&self) -> Result<(), LayoutError> {
+        self.target.sync().map_err(|e| LayoutError::io(self.path, "cannot bring the file to the disk", e))
+    }
+
+    /// Writes a tile behind the last one.
+    pub(super) fn put(&mut self, tile: &MadeTile) -> Result<(), LayoutError> {
+        let page = u32::try_from(self.next / PAGE).map_err(|_| {
+            LayoutError::Usage(format!(
+                "{}: with this imagery the file would be longer than 16 TiB",
+                self.path.display()
+            ))
+        })?;
+        self.write(&tile.bytes, self.next)?;
+        let rest = tile.bytes.len().next_multiple_of(PAGE_BYTES) - tile.bytes.len();
+        if rest > 0 {
+            self.write(&[0; PAGE_BYTES][..rest], self.next + tile.bytes.len() as u64)?;
+        }
+        self.enter(tile.id, TileEntry { page, ..tile.entry });
+        self.stored_tiles += 1;
+        self.tile_bytes += tile.bytes.len() as u64;
+        self.next += (tile.bytes.len() as u64).next_multiple_of(PAGE);
+        Ok(())
+    }
+
+    fn enter(&mut self, id: TileId, entry: TileEntry) {
+        if let Some(index) = self.shape.index(id) {
+            entry.write(&mut self.directory, index as usize);
+        }
+    }
+
+    /// Tiles written so far.
+    pub(super) fn stored_tiles(&self) -> u64 {
+        self.stored_tiles
+    }
+
+    /// Writes directory and first page, syncs, and makes the section the file's imagery. `may_commit` is asked right before the header.
+    pub(super) fn commit(
+        self,
+        source: &str,
+        may_commit: impl FnOnce() -> Result<(), LayoutError>,
+    ) -> Result<Header, LayoutError> {
+        let section = Section {
+            shape: self.shape,
+            stored_tiles: self.stored_tiles,
+            tile_bytes: self.tile_bytes,
+            directory_page: (self.begin / PAGE + 1) as u32,
+            directory_checksum: checksum(&self.directory),
+            source: source.to_owned(),
+        };
+        let mut start = section.to_page().to_vec();
+        start.extend_from_slice(&self.directory);
+        start.resize(start.len().next_multiple_of(PAGE_BYTES), 0);
+        self.write(&start, self.begin)?;
+        let place = ImageryPlace { offset: self.begin, bytes: self.next - self.begin };
+        self.sync()?;
+        may_commit()?;
+        let header = Header {
+            generation: self.slots.header.generation.saturating_add(1),
+            file_bytes: place.end(),
+            imagery: Some(place),
+            ..self.slots.header.clone()
+        };
+        let page = header.amended(&self.slots.current);
+        self.write(&page[..], (1 - self.slots.current_slot) * PAGE)?;
+        self.sync()?;
+        Ok(header)
+    }
+}

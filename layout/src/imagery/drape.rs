@@ -1,0 +1,275 @@
+//! Images in, an imagery section out: the whole way.
+//!
+//! One image, or several of one texel size on one grid of texels, become one picture ([`super::mosaic`]); its rows go through the pyramid
+//! ([`super::pyramid`]) while the next are read, and tiles are appended as they are made ([`super::append`]). Equal input gives
+//! equal bytes, whatever the number of threads. Cost: each image is read once, each tile written once, nothing is spooled.
+
+use super::append::{Append, Slots, Target};
+use super::encode::check_format;
+use super::lock::{WriteLock, is_named};
+use super::mosaic::Mosaic;
+use super::place::{Extent, PlaceOrigin};
+use super::pyramid::{Pyramid, STEP_ROWS, memory_bytes};
+use super::shape::{ImageryShape, TileFormat};
+use super::source::{ImageSource, RowReader};
+use crate::build::BuildProgress;
+use crate::bytes::{PAGE_BYTES, Page};
+use crate::error::LayoutError;
+use crate::header::Header;
+use crate::source::Source;
+use crate::terrain::Terrain;
+use std::fs::File;
+use std::path::Path;
+
+/// How to drape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DrapeOptions {
+    /// How texels are stored; default BC1.
+    pub format: TileFormat,
+    /// Where the image lies, instead of what it says. Of one image only.
+    pub extent: Option<Extent>,
+    /// Memory to use at most, in MiB; default 512.
+    pub memory_mib: u64,
+}
+
+impl Default for DrapeOptions {
+    fn default() -> Self {
+        Self { format: TileFormat::Bc1, extent: None, memory_mib: 512 }
+    }
+}
+
+/// What was draped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draped {
+    /// The file's header now.
+    pub header: Header,
+    /// The imagery's shape.
+    pub shape: ImageryShape,
+    /// Tiles stored.
+    pub stored_tiles: u64,
+    /// Where the place of the images came from.
+    pub place: PlaceOrigin,
+}
+
+/// Drapes `images` over the terrain file at `path`, those later in the list above those before. The file reads as before until the end, when the new imagery counts at
+/// once. Runs on the current rayon pool.
+///
+/// # Errors
+/// [`LayoutError::Usage`] for images that do not fit each other, the terrain or the memory, or while another program writes to the file; those of
+/// opening a terrain, of reading an image, of writing. The file reads as before then.
+pub fn drape(
+    path: &Path,
+    images: &[Box<dyn ImageSource>],
+    options: &DrapeOptions,
+    progress: &dyn BuildProgress,
+) -> Result<Draped, LayoutError> {
+    let _lock = WriteLock::take(path)?;
+    let terrain = Terrain::open_unmapped(path)?;
+    let file = File::options()
+        .read(true)
+        .write(true)
+        .open(path)
+        .map_err(|e| LayoutError::io(path, "cannot open the file for writing", e))?;
+    let length = terrain.source().byte_count();
+    let replaced = || {
+        if is_named(&file, path) {
+            return Ok(());
+        }
+        Err(LayoutError::Usage(format!(
+            "{}: the file was replaced by another while the image was draped; drape it again",
+            path.display()
+        )))
+    };
+    let images: Vec<&dyn ImageSource> = images.iter().map(|image| &**image).collect();
+    let done = drape_onto(terrain.source(), &file, &images, options, progress, replaced);
+    if done.is_err() {
+        // Gives back what was appended; nobody has read it. Failing costs space only.
+        let _ = file.set_len(length);
+    }
+    done
+}
+
+/// As [`drape`], reading the terrain from `source` and writing to `target`.
+pub(super) fn drape_onto(
+    source: &dyn Source,
+    target: &dyn Target,
+    images: &[&dyn ImageSource],
+    options: &DrapeOptions,
+    progress: &dyn BuildProgress,
+    may_commit: impl FnOnce() -> Result<(), LayoutError>,
+) -> Result<Draped, LayoutError> {
+    check_format(options.format)?;
+    let path = source.path();
+    let slots = read_slots(source)?;
+    let mosaic = Mosaic::new(images, &slots.header, options.extent)?;
+    let shape = mosaic.shape(options.format);
+    let needed = memory_bytes(&shape) + mosaic.memory_bytes();
+    if needed > options.memory_mib << 20 {
+        return Err(LayoutError::Usage(format!(
+            "{} x {} texels of {} take {} MiB of memory and {} are allowed: allow more with --memory, or give a tiled GeoTIFF: \
+             gdal_translate -co TILED=YES -co BIGTIFF=IF_SAFER INPUT output.tif",
+            shape.texels[0],
+            shape.texels[1],
+            mosaic.format(),
+            (needed >> 20) + 1,
+            options.memory_mib
+        )));
+    }
+    let mut append = Append::begin(path, target, slots, shape)?;
+    progress.stage("draping", u64::from(shape.texels[0]) * u64::from(shape.texels[1]));
+    let mut pyramid = Pyramid::new(shape);
+    let mut rows = mosaic.rows()?;
+    let row_bytes = shape.texels[0] as usize * 4;
+    let (mut arriving, mut arrived): (Vec<u8>, Vec<u8>) = (Vec::new(), Vec::new());
+    let mut left = shape.texels[1];
+    // One turn more than there are steps: each reads one and works on the one before.
+    loop {
+        let step = left.min(STEP_ROWS);
+        left -= step;
+        arriving.resize(step as usize * row_bytes, 0);
+        let read = || if step > 0 { rows.read(&mut arriving) } else { Ok(()) };
+        let work = || pyramid.push(&arrived, &mut |tile| append.put(&tile));
+        let (read, worked) = rayon::join(read, work);
+        read.and(worked)?;
+        progress.advance(arrived.len() as u64 / 4);
+        std::mem::swap(&mut arriving, &mut arrived);
+        if step == 0 {
+            break;
+        }
+    }
+    if append.stored_tiles() == 0 {
+        return Err(LayoutError::Usage(format!(
+            "{}: the image is transparent throughout",
+            images[0].path().display()
+        )));
+    }
+    let stored_tiles = append.stored_tiles();
+    progress.stage("writing to disk", 0);
+    let header = append.commit(&mosaic.format(), may_commit)?;
+    Ok(Draped { header, shape, stored_tiles, place: mosaic.place() })
+}
+
+fn read_slots(source: &dyn Source) -> Result<Slots, LayoutError> {
+    let page = |number: u64| -> Result<Box<Page>, LayoutError> {
+        let mut page = Box::new([0; PAGE_BYTES]);
+        source.read_at(number * PAGE_BYTES as u64, &mut page[..])?;
+        Ok(page)
+    };
+    Slots::of(source.path(), [page(0)?, page(1)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Imagery, MemoryImage};
+    use super::*;
+    use crate::build::{BuildOptions, Silent, build};
+    use crate::dem::{MemoryDem, SampleType};
+    use crate::source::MemorySource;
+    use std::io;
+    use std::sync::Mutex;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    /// A file in memory that stops for good at one of its writes and syncs, some of whose bytes still arrive.
+    struct Stopping {
+        bytes: Mutex<Vec<u8>>,
+        calls: AtomicU64,
+        stop_at: u64,
+        /// Share that arrives of the write that stops.
+        quarters: usize,
+    }
+
+    impl Target for Stopping {
+        fn write(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
+            let call = self.calls.fetch_add(1, Ordering::Relaxed);
+            let arrived = match call.cmp(&self.stop_at) {
+                std::cmp::Ordering::Less => bytes.len(),
+                std::cmp::Ordering::Equal => bytes.len() * self.quarters / 4,
+                std::cmp::Ordering::Greater => 0,
+            };
+            let mut file = self.bytes.lock().unwrap();
+            let end = offset as usize + arrived;
+            if file.len() < end {
+                file.resize(end, 0);
+            }
+            file[offset as usize..end].copy_from_slice(&bytes[..arrived]);
+            if call < self.stop_at { Ok(()) } else { Err(io::ErrorKind::StorageFull.into()) }
+        }
+
+        fn sync(&self) -> io::Result<()> {
+            let call = self.calls.fetch_add(1, Ordering::Relaxed);
+            if call < self.stop_at { Ok(()) } else { Err(io::ErrorKind::Other.into()) }
+        }
+    }
+
+    fn terrain_bytes() -> Vec<u8> {
+        let dem = MemoryDem::from_fn([40, 30], SampleType::I16, |x, y| f64::from(x * 3 + y));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.iqt");
+        build(&dem, &path, &BuildOptions { spacing_m: Some([10.0; 2]), ..Default::default() }, &Silent)
+            .unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    fn image(seed: u32) -> MemoryImage {
+        MemoryImage::from_fn([1200, 520], move |x, y| {
+            let hole = (700..1200).contains(&x) && y < 100;
+            [x as u8, y as u8, (x / 16 + y / 16 + seed) as u8, if hole { 0 } else { 255 }]
+        })
+    }
+
+    /// Everything a reader sees of a file: heights and tiles.
+    fn seen(bytes: Vec<u8>) -> (u32, Vec<u8>, Vec<Vec<u8>>) {
+        let terrain = Terrain::from_source(Box::new(MemorySource::new("a.iqt", bytes))).unwrap();
+        let records = (0..terrain.header().record_pages())
+            .flat_map(|page| terrain.checked_page(page).unwrap().to_vec())
+            .collect();
+        let mut tiles = Vec::new();
+        if let Some(imagery) = Imagery::open(&terrain).unwrap() {
+            for id in imagery.shape().ids() {
+                let mut tile = Vec::new();
+                imagery.read_tile(&terrain, id, &mut tile).unwrap();
+                tiles.push(tile);
+            }
+        }
+        (terrain.header().generation, records, tiles)
+    }
+
+    fn append(before: &[u8], image: &MemoryImage, stop_at: u64, quarters: usize) -> (Vec<u8>, bool, u64) {
+        let source = MemorySource::new("a.iqt", before.to_vec());
+        let bytes = Mutex::new(before.to_vec());
+        let target = Stopping { bytes, calls: AtomicU64::new(0), stop_at, quarters };
+        let options = DrapeOptions::default();
+        let done = drape_onto(&source, &target, &[image], &options, &Silent, || Ok(())).is_ok();
+        let calls = target.calls.load(Ordering::Relaxed);
+        (target.bytes.into_inner().unwrap(), done, calls)
+    }
+
+    /// Twice in a row, so that both header slots take their turn, and over the leavings of the append that was stopped.
+    #[test]
+    fn stopped_at_any_write_the_file_reads_as_before_or_after() {
+        let mut before = terrain_bytes();
+        for seed in [1, 2] {
+            let picture = image(seed);
+            let (after, done, writes) = append(&before, &picture, u64::MAX, 4);
+            assert!(done && writes > 8);
+            let [wanted_before, wanted_after] = [before.clone(), after.clone()].map(seen);
+            assert_ne!(wanted_before, wanted_after);
+            for stop_at in 0..writes {
+                for quarters in 0..=4 {
+                    let (stopped, done, _) = append(&before, &picture, stop_at, quarters);
+                    assert!(!done);
+                    let found = seen(stopped.clone());
+                    // Only the header's own write decides, and its sync may fail after it.
+                    let is_decided = stop_at + 1 == writes || stop_at + 2 == writes && quarters == 4;
+                    let wanted = if is_decided { &wanted_after } else { &wanted_before };
+                    assert!(found == *wanted, "stopped at {stop_at} of {writes}, {quarters} quarters");
+                    if quarters == 2 && !is_decided {
+                        let (again, done, _) = append(&stopped, &picture, u64::MAX, 4);
+                        assert!(done && seen(again) == wanted_after);
+                    }
+                }
+            }
+            before = after;
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Pictures as JPEG, baseline and progressive, decoded by jpeg-decoder.
+//!
+//! No Rust decoder gives a JPEG row by row, so its texels are held as a whole while it is read: 3 bytes a texel, twice that for the coefficients of a
+//! progressive one. That counts against the memory budget; larger pictures go through a tiled GeoTIFF.
+
+use super::super::source::{ImageInfo, ImageSource, RowReader};
+use super::png::spread;
+use super::world;
+use crate::error::LayoutError;
+use crate::import::guard;
+use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// A JPEG picture.
+#[derive(Debug)]
+pub(super) struct JpegImage {
+    path: PathBuf,
+    info: ImageInfo,
+    channels: usize,
+}
+
+impl JpegImage {
+    /// Reads the header.
+    pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
+        let mut decoder = decoder(path)?;
+        guard(path, || "header".into(), || decoder.read_info().map_err(|e| decoding_error(path, e)))?;
+        let Some(header) = decoder.info() else {
+            return Err(LayoutError::damaged(path, "header", "it says no size; fetch the file again"));
+        };
+        let channels = channels(path, header.pixel_format)?;
+        let texels = [u32::from(header.width), u32::from(header.height)];
+        if texels.contains(&0) {
+            return Err(LayoutError::damaged(path, "header", "it has no texels; fetch the file again"));
+        }
+        let progressive = header.coding_process == CodingProcess::DctProgressive;
+        // Coefficients of a progressive file are 16-bit and kept for all of it.
+        let held = if progressive { 3 * channels } else { channels };
+        let info = ImageInfo {
+            texels,
+            georeference: world::georeference(path, &["jgw", "jpgw", "jpegw", "wld"]),
+            format: format!(
+                "{}{} JPEG",
+                if progressive { "progressive " } else { "" },
+                if channels == 1 { "grey" } else { "RGB" }
+            ),
+            notes: Vec::new(),
+            memory_bytes: u64::from(texels[0]) * u64::from(texels[1]) * held as u64,
+        };
+        Ok(Self { path: path.to_owned(), info, channels })
+    }
+}
+
+impl ImageSource for JpegImage {
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn info(&self) -> &ImageInfo {
+        &self.info
+    }
+
+    fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
+        let mut decoder = decoder(&self.path)?;
+        let texels = guard(
+            &self.path,
+            || "image data".into(),
+            || decoder.decode().map_err(|e| decoding_error(&self.path, e)),
+        )?;
+        let [wide, high] = self.info.texels.map(|side| side as usize);
+        if texels.len() != wide * high * self.channels {
+            return Err(LayoutError::damaged(
+                &self.path,
+                "image data",
+                "it has another size than its header says",
+            ));
+        }
+        Ok(Box::new(Rows { texels, channels: self.channels, at: 0 }))
+    }
+}
+
+struct Rows {
+    texels: Vec<u8>,
+    channels: usize,
+    at: usize,
+}
+
+impl RowReader for Rows {
+    fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
+        let end = (self.at + rgba.len() / 4 * self.channels).min(self.texels.len());
+        spread(&self.texels[self.at..end], self.channels, rgba);
+        self.at = end;
+        Ok(())
+    }
+}
+
+fn decoder(path: &Path) -> Result<Decoder<BufReader<File>>, LayoutError> {
+    let file =
+        File::open(path).map_err(|source| LayoutError::io(path, "cannot open the JPEG file", source))?;
+    Ok(Decoder::new(BufReader::with_capacity(1 << 18, file)))
+}
+
+fn channels(path: &Path, format: PixelFormat) -> Result<usize, LayoutError> {
+    match format {
+        PixelFormat::L8 => Ok(1),
+        PixelFormat::RGB24 => Ok(3),
+        PixelFormat::CMYK32 => Err(LayoutError::unsupported(
+            path,
+            "the JPEG is in CMYK, the inks of a press, and textures are RGB; convert it with its colour profile, for example: \
+             magick INPUT -colorspace sRGB output.jpg",
+        )),
+        PixelFormat::L16 => Err(LayoutError::unsupported(
+            path,
+            "the JPEG is lossless of more than 8 bits, which is not read; convert it: gdal_translate -ot Byte -scale INPUT output.tif",
+        )),
+    }
+}
+
+fn decoding_error(path: &Path, error: Error) -> LayoutError {
+    match error {
+        Error::Io(source) if source.raw_os_error().is_some() => {
+            LayoutError::io(path, "cannot read the JPEG file", source)
+        }
+        Error::Unsupported(feature) => LayoutError::unsupported(
+            path,
+            format!(
+                "the JPEG uses {feature:?}, which is not read; convert it: gdal_translate -co TILED=YES INPUT output.tif"
+            ),
+        ),
+        error => LayoutError::damaged(path, "image data", format!("{error}; fetch the file again")),
+    }
+}

@@ -1,0 +1,183 @@
+//! Several images as one picture: the smallest rectangle of texels around them, those later in the list above those before.
+//!
+//! Images of a mosaic have one texel size and lie on one grid of texels; resampling is gdalwarp's business. Where no image is, the picture is
+//! transparent. Cost: a copy of the rows.
+
+use super::place::{Extent, Place, PlaceOrigin, place};
+use super::shape::{ImageryShape, MAX_TEXELS, TileFormat};
+use super::source::{ImageSource, RowReader};
+use crate::error::LayoutError;
+use crate::header::Header;
+
+/// How far off the common grid an image may lie, in texels.
+const GRID_TEXELS: f64 = 0.1;
+
+/// Images side by side.
+pub(super) struct Mosaic<'i> {
+    parts: Vec<Part<'i>>,
+    texels: [u32; 2],
+    place: Place,
+}
+
+struct Part<'i> {
+    image: &'i dyn ImageSource,
+    /// Texels east and south of the picture's north-west corner.
+    at: [u32; 2],
+}
+
+impl<'i> Mosaic<'i> {
+    pub(super) fn new(
+        images: &[&'i dyn ImageSource],
+        header: &Header,
+        extent: Option<Extent>,
+    ) -> Result<Self, LayoutError> {
+        let Some(first) = images.first() else {
+            return Err(LayoutError::Usage("no image was named; name one with --image".into()));
+        };
+        if images.len() > 1 && extent.is_some() {
+            return Err(LayoutError::Usage(
+                "an extent goes with one image; of several each must say itself where it lies (GeoTIFF)"
+                    .into(),
+            ));
+        }
+        let places: Vec<Place> =
+            images.iter().map(|image| place(*image, header, extent)).collect::<Result<_, _>>()?;
+        let texel_m = places[0].texel_m;
+        let mut from = [f64::INFINITY; 2];
+        let mut to = [f64::NEG_INFINITY; 2];
+        let mut corners = Vec::new();
+        for (image, place) in images.iter().zip(&places) {
+            let texels = image.info().texels;
+            let refused = |what: &str| {
+                Err(LayoutError::Usage(format!(
+                    "{} {what} {}; images of a mosaic lie on one grid of texels: bring them together with gdalbuildvrt and \
+                     gdal_translate, or with gdalwarp -tr",
+                    image.path().display(),
+                    first.path().display()
+                )))
+            };
+            if images.len() > 1 && place.origin == PlaceOrigin::Assumed {
+                return refused("does not say where it lies, unlike what a mosaic needs, as does");
+            }
+            let size_matters = |i: usize| {
+                (place.texel_m[i] - texel_m[i]).abs() * f64::from(texels[i]) > GRID_TEXELS * texel_m[i]
+            };
+            if size_matters(0) || size_matters(1) {
+                return refused("has texels of another size than");
+            }
+            let east = (place.north_west_m[0] - places[0].north_west_m[0]) / texel_m[0];
+            let south = (places[0].north_west_m[1] - place.north_west_m[1]) / texel_m[1];
+            let corner = [east.round(), south.round()];
+            if (east - corner[0]).abs().max((south - corner[1]).abs()) > GRID_TEXELS {
+                return refused("lies between the texels of");
+            }
+            for i in 0..2 {
+                from[i] = from[i].min(corner[i]);
+                to[i] = to[i].max(corner[i] + f64::from(texels[i]));
+            }
+            corners.push(corner);
+        }
+        let texels = [to[0] - from[0], to[1] - from[1]];
+        if texels.iter().any(|side| *side > f64::from(MAX_TEXELS)) {
+            return Err(LayoutError::Usage(format!(
+                "{}: {} x {} texels are more than {MAX_TEXELS} a side; drape a part, or coarser images",
+                first.path().display(),
+                texels[0],
+                texels[1]
+            )));
+        }
+        let parts = images
+            .iter()
+            .zip(corners)
+            .map(|(image, corner)| Part {
+                image: *image,
+                at: [(corner[0] - from[0]) as u32, (corner[1] - from[1]) as u32],
+            })
+            .collect();
+        let [east, north] = places[0].north_west_m;
+        let north_west_m = [east + from[0] * texel_m[0], north - from[1] * texel_m[1]];
+        let place = Place { north_west_m, ..places[0] };
+        Ok(Self { parts, texels: texels.map(|side| side as u32), place })
+    }
+
+    pub(super) fn shape(&self, format: TileFormat) -> ImageryShape {
+        let [west, north] = self.place.north_west_m;
+        let south = north - f64::from(self.texels[1]) * self.place.texel_m[1];
+        ImageryShape::new(format, self.texels, [west, south], self.place.texel_m)
+    }
+
+    pub(super) fn place(&self) -> PlaceOrigin {
+        self.place.origin
+    }
+
+    /// Format in words.
+    pub(super) fn format(&self) -> String {
+        match &self.parts[..] {
+            [part] => part.image.info().format.clone(),
+            parts => format!("{} images: {}", parts.len(), parts[0].image.info().format),
+        }
+    }
+
+    /// Memory that reading takes.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        self.parts.iter().map(|part| part.image.info().memory_bytes).sum()
+    }
+
+    /// The rows of the picture.
+    pub(super) fn rows(&self) -> Result<MosaicRows<'_>, LayoutError> {
+        Ok(MosaicRows {
+            mosaic: self,
+            y: 0,
+            readers: self.parts.iter().map(|_| None).collect(),
+            rows: Vec::new(),
+        })
+    }
+}
+
+/// Rows of a mosaic, from the north. An image is opened when its first row is due and closed after its last.
+pub(super) struct MosaicRows<'m> {
+    mosaic: &'m Mosaic<'m>,
+    y: u32,
+    readers: Vec<Option<Box<dyn RowReader + 'm>>>,
+    rows: Vec<u8>,
+}
+
+impl RowReader for MosaicRows<'_> {
+    fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
+        let wide = self.mosaic.texels[0] as usize;
+        let (from, to) = (self.y, self.y + (rgba.len() / (4 * wide)) as u32);
+        self.y = to;
+        if let [part] = &self.mosaic.parts[..] {
+            if self.readers[0].is_none() {
+                self.readers[0] = Some(part.image.rows()?);
+            }
+            return self.readers[0].as_mut().map_or(Ok(()), |reader| reader.read(rgba));
+        }
+        rgba.fill(0);
+        let (picture, _) = rgba.as_chunks_mut::<4>();
+        for (part, reader) in self.mosaic.parts.iter().zip(&mut self.readers) {
+            let [part_wide, part_high] = part.image.info().texels;
+            let (first, last) = (from.max(part.at[1]), to.min(part.at[1] + part_high));
+            if first >= last {
+                *reader = None;
+                continue;
+            }
+            let reader = match reader {
+                Some(reader) => reader,
+                None => reader.insert(part.image.rows()?),
+            };
+            self.rows.resize((last - first) as usize * part_wide as usize * 4, 0);
+            reader.read(&mut self.rows)?;
+            let (texels, _) = self.rows.as_chunks::<4>();
+            for (y, row) in (first..last).zip(texels.chunks_exact(part_wide as usize)) {
+                let at = (y - from) as usize * wide + part.at[0] as usize;
+                for (below, above) in picture[at..].iter_mut().zip(row) {
+                    if above[3] > 0 {
+                        *below = *above;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
