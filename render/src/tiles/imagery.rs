@@ -70,7 +70,7 @@ impl Capabilities {
 pub struct ImageryShape {
     /// How tiles are stored.
     pub format: ImageryFormat,
-    /// Texels of level 0 east and north; 1 to 2^30.
+    /// Texels of level 0 east and north; 1 to 2^29.
     pub texels: [u32; 2],
     /// Levels there are, at least 1. Those past the first that is one tile are not asked for.
     pub levels: u32,
@@ -82,7 +82,7 @@ pub struct ImageryShape {
 
 impl ImageryShape {
     fn check(&self) -> Result<()> {
-        let sound = self.texels.iter().all(|n| (1..=1 << 30).contains(n))
+        let sound = self.texels.iter().all(|n| (1..=1 << 29).contains(n))
             && self.levels > 0
             && self.texel_m.iter().all(|m| m.is_finite() && *m > 0.0)
             && self.origin_m.iter().all(|m| m.is_finite());
@@ -90,7 +90,7 @@ impl ImageryShape {
             Ok(())
         } else {
             Err(RenderError::Usage(
-                "an image needs 1 to 2^30 texels each way, a level, a finite place and texels of some size",
+                "an image needs 1 to 2^29 texels each way, a level, a finite place and texels of some size",
             ))
         }
     }
