@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    FrameView, Gpu, Haze, ImageTileId, ImageryFormat, ImageryShape, Look, RenderError, Sun, Surface,
+    FrameView, Gpu, Haze, ImageTileId, ImageryFormat, ImageryShape, Look, RenderError, Renderer,
+    RendererOptions, Sun, Surface, wgpu,
 };
 
 use crate::support::image::{Image, Texel, drape, encoded, give, in_565, linear_of};
@@ -17,6 +18,9 @@ pub fn tests() -> Vec<(&'static str, Test)> {
         ("imagery::a_checkerboard_lands_on_the_right_metre", checkerboard),
         ("imagery::levels_agree_with_a_filter_on_the_cpu", between_levels),
         ("imagery::ancestors_stand_in_for_missing_tiles", ancestors),
+        ("imagery::what_is_wanted_is_what_pixels_need", needed),
+        ("imagery::many_tiles_may_be_coarsest", few_levels),
+        ("imagery::same_picture_a_thousand_km_from_the_origin", far_away),
         ("imagery::to_and_fro_in_a_small_pool", to_and_fro),
         ("imagery::what_is_ahead_is_there_in_time", ahead),
         ("imagery::no_seam_between_tiles", seams),
@@ -220,6 +224,86 @@ fn ancestors(gpu: &Gpu) -> Outcome {
 
     scene.renderer.forget_imagery(withheld);
     ensure(scene.renderer.want_imagery(&view, 9) == [withheld], || "it is not wanted anew".into())
+}
+
+/// Every tile of the image on the device makes no other picture than those that the view asked for.
+fn needed(gpu: &Gpu) -> Outcome {
+    let square = Square::new(7, [0, 0], [20.0, 20.0], hills);
+    let mut scene = Scene::new(gpu, &square);
+    scene.show(&square.down_to(0));
+    let image = painted(Image::shape_over(&square.terrain, 0.5));
+    let pyramid = image.shape.pyramid();
+    let mut uneven =
+        FrameView::look_at(DVec3::new(300.0, 200.0, 1100.0), DVec3::new(1300.0, 1700.0, 500.0), SIZE_PX);
+    for exaggeration in [1.0, 1.7] {
+        uneven.vertical_exaggeration = exaggeration;
+        uneven.eye_m.z *= exaggeration;
+        scene.give_tiles(&uneven);
+        drape(&mut scene, &image, pyramid.len() as u64);
+        show_all(&mut scene, &image, &uneven);
+        let wanted = scene.renderer.imagery_stats().resident;
+        let asked_for = scene.draw(&uneven, &bare());
+        for level in 0..pyramid.levels() {
+            let [east, north] = pyramid.across(level);
+            for tile in (0..east * north).map(|i| ImageTileId { level, x: i % east, y: i / east }) {
+                scene.renderer.give_imagery(tile, &image.tile(tile)).map_err(|e| e.to_string())?;
+            }
+        }
+        let all = scene.renderer.imagery_stats().resident;
+        ensure(all as usize == pyramid.len() && wanted < all * 3 / 4, || {
+            format!("{wanted} of {all} are wanted")
+        })?;
+        ensure(scene.draw(&uneven, &bare()) == asked_for, || {
+            "pixels need tiles that the view does not want".into()
+        })?;
+    }
+    Ok(())
+}
+
+/// A pyramid that ends early keeps all of its coarsest tiles, however small the rest of the pool.
+fn few_levels(gpu: &Gpu) -> Outcome {
+    let square = level_ground();
+    let mut scene = Scene::new(gpu, &square);
+    scene.show(&square.down_to(0));
+    let image = painted(ImageryShape { levels: 2, ..Image::shape_over(&square.terrain, 0.5) });
+    drape(&mut scene, &image, 10);
+    for (east_m, north_m) in [(200.0, 200.0), (1000.0, 300.0), (600.0, 1100.0)] {
+        let view = down(east_m, north_m, 90.0);
+        show_all(&mut scene, &image, &view);
+        let stats = scene.renderer.imagery_stats();
+        ensure(stats.resident == 10 && stats.most_levels_off <= 1, || format!("{stats:?}"))?;
+        let (_, none) = count(&scene.draw(&view, &bare()));
+        ensure(none == 0, || format!("{none} pixels show no level"))?;
+    }
+    Ok(())
+}
+
+fn far_away(gpu: &Gpu) -> Outcome {
+    let corner = [65_536 - 64, 65_536 - 64];
+    let pictures = [[0, 0], corner].map(|corner| {
+        let square = Square::new(6, corner, [16.0, 16.0], hills);
+        let start = DVec3::new(f64::from(corner[0]) * 16.0, f64::from(corner[1]) * 16.0, 0.0);
+        let image = chart(ImageryShape {
+            format: ImageryFormat::Rgba8,
+            texels: [1024, 1024],
+            levels: 9,
+            origin_m: [start.x + 64.0, start.y + 32.0],
+            texel_m: [0.75, 0.5],
+        });
+        let mut scene = Scene::new(gpu, &square);
+        scene.show(&square.down_to(0));
+        drape(&mut scene, &image, 16);
+        [0.0, 1.0 / 256.0, 0.5].map(|further_m| {
+            let eye = start + DVec3::new(400.0 + further_m, 300.0, 900.0);
+            let view = FrameView::look_at(eye, eye + DVec3::new(0.125, 0.25, -0.5), SIZE_PX);
+            show_all(&mut scene, &image, &view);
+            scene.draw(&view, &bare())
+        })
+    });
+    for (near, far) in pictures[0].iter().zip(&pictures[1]) {
+        ensure(near == far, || format!("the pictures differ by {}", near.difference(far)))?;
+    }
+    ensure(pictures[0][0] != pictures[0][2], || "half a metre makes no difference".into())
 }
 
 /// In a pool that holds about what a view wants: no hole, no frame without end of uploads, none where nothing moves.
@@ -601,6 +685,19 @@ fn wrong_use(gpu: &Gpu) -> Outcome {
     let nowhere = ImageTileId { level: 0, x: 99, y: 0 };
     let outside = renderer.set_imagery_absent(nowhere);
     ensure(matches!(outside, Err(RenderError::NoSuchTile { .. })), || format!("{outside:?}"))?;
+    let plain = gpu
+        .adapter
+        .request_device(&wgpu::DeviceDescriptor { label: Some("no blocks"), ..Default::default() });
+    let (device, queue) = pollster::block_on(plain).map_err(|e| e.to_string())?;
+    let mut without_blocks = Renderer::new(&device, &queue, square.terrain, RendererOptions::default())
+        .map_err(|e| e.to_string())?;
+    let refused =
+        without_blocks.set_imagery(Some(ImageryShape { format: ImageryFormat::Bc1, ..shape }), 1 << 22);
+    ensure(refused.is_err_and(|e| e.to_string().contains("RGBA8")), || {
+        "blocks are taken for granted".into()
+    })?;
+    without_blocks.set_imagery(Some(shape), 1 << 22).map_err(|e| e.to_string())?;
+
     renderer.set_imagery(None, 0).map_err(|e| e.to_string())?;
     ensure(renderer.imagery().is_none() && renderer.imagery_stats() == Default::default(), || {
         "the image is still there".into()
