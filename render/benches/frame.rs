@@ -1,5 +1,5 @@
 //! What a frame costs the processor in this crate, apart from the drawing itself: recording a patch by its size, recording
-//! a frame by its visible ranges, finding wanted tiles. `cargo bench -p terrasoar-render`
+//! a frame by its visible ranges, finding wanted tiles of slopes and of an image. `cargo bench -p terrasoar-render`
 
 use std::hint::black_box;
 use std::ops::Range;
@@ -7,8 +7,8 @@ use std::ops::Range;
 use criterion::{BatchSize, BenchmarkId, Criterion};
 use glam::DVec3;
 use terrasoar_render::{
-    Frame, FrameView, Gpu, Look, MeshPatch, MeshVertex, Offscreen, Pyramid, Renderer, RendererOptions,
-    TerrainShape, WantedTiles,
+    Frame, FrameView, Gpu, ImageryShape, Look, MeshPatch, MeshVertex, Offscreen, Pyramid, Renderer,
+    RendererOptions, TerrainShape, WantedTiles,
 };
 
 const TERRAIN: TerrainShape =
@@ -36,6 +36,29 @@ fn main() {
 fn on_device(criterion: &mut Criterion, gpu: &Gpu) {
     let options = RendererOptions::from(&gpu.capabilities);
     let Ok(mut renderer) = Renderer::new(&gpu.device, &gpu.queue, TERRAIN, options) else { return };
+    let image = ImageryShape {
+        format: gpu.capabilities.imagery_formats()[0],
+        texels: [163_840, 163_840],
+        levels: 10,
+        origin_m: [0.0; 2],
+        texel_m: [1.0; 2],
+    };
+    if renderer.set_imagery(Some(image), Renderer::IMAGERY_BYTES).is_ok() {
+        let (view, mut ahead) = (view(), view());
+        ahead.eye_m += DVec3::new(500.0, 1000.0, 0.0);
+        let tile = vec![0; image.format.tile_bytes()];
+        for wanted in renderer.want_imagery(&view, usize::MAX).to_vec() {
+            let _ = renderer.give_imagery(wanted, &tile);
+        }
+        println!("{:?}", renderer.imagery_stats());
+        criterion.bench_function("wanted image tiles, 1920 x 1080", |b| {
+            b.iter(|| renderer.want_imagery(black_box(&view), 8).len());
+        });
+        criterion.bench_function("and those ahead", |b| {
+            b.iter(|| renderer.want_imagery_ahead(black_box(&ahead), 8).len());
+        });
+    }
+    let _ = renderer.set_imagery(None, 0);
     let encoder = || gpu.device.create_command_encoder(&Default::default());
     let vertex = MeshVertex {
         x: 1,

@@ -1,4 +1,4 @@
-//! Draws a terrain mesh that changes every frame, through wgpu: patches and normal tiles in, pixels out.
+//! Draws a terrain mesh that changes every frame, through wgpu: patches, normal tiles and image tiles in, pixels out.
 //!
 //! The crate opens no file, knows no engine and owns no window. The caller has the device, the queue and the target, and
 //! says what changed; the renderer records commands into the caller's encoder.
@@ -9,6 +9,7 @@
 //!    triangles that are seen. What is sent to the device is the patch, 36 bytes a vertex and 16 a triangle.
 //! 2. [`Renderer::want_tiles`] says which normal tiles the view lacks, most urgent first; [`Renderer::give_tile`] takes their heights.
 //!    How many a frame is the caller's choice. Until a tile comes a coarser one stands in; until any comes, triangles are shaded flat.
+//!    [`Renderer::want_imagery`] and [`Renderer::give_imagery`] do the same for an image on the ground, if [`Renderer::set_imagery`] says that there is one.
 //! 3. [`Renderer::render`] draws ground, walls and sky as a [`Look`] says. An overlay may follow in the same encoder.
 //!
 //! ```no_run
@@ -67,6 +68,7 @@
 //! * **Movement.** A vertex enters on the edge that it splits and reaches its own place when the eye has come half the way nearer. That
 //!   depends on vertex and eye alone: there are no cracks at any moment.
 //! * **Light** comes from tiles of slopes, chosen by distance alone, so that it is steady while triangles come and go.
+//! * **An image** is a second content of the same machinery. Its level follows the width of what a pixel covers, taps its length.
 //! * **Equal input gives equal bytes** on one driver.
 
 mod attachments;

@@ -19,6 +19,11 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
         view_dimension,
         multisampled: false,
     };
+    let page_table = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Uint,
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
     let (vertex, fragment) = (wgpu::ShaderStages::VERTEX, wgpu::ShaderStages::FRAGMENT);
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("frame"),
@@ -34,19 +39,13 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
             ),
             entry(1, vertex, storage),
             entry(2, vertex, storage),
-            entry(
-                3,
-                fragment,
-                wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Uint,
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-            ),
+            entry(3, fragment, page_table),
             entry(4, fragment, texture(wgpu::TextureViewDimension::D2Array, true)),
             entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
             entry(6, fragment, texture(wgpu::TextureViewDimension::D2, false)),
             entry(7, vertex, storage),
+            entry(8, fragment, page_table),
+            entry(9, fragment, texture(wgpu::TextureViewDimension::D2Array, true)),
         ],
     })
 }
@@ -59,23 +58,25 @@ pub(crate) struct Variant {
     pub surface: Surface,
     pub contours: bool,
     pub tiles: bool,
+    pub image: bool,
     pub morph: bool,
 }
 
 impl Variant {
-    pub(crate) fn of(look: &Look, format: wgpu::TextureFormat) -> Self {
+    pub(crate) fn of(look: &Look, has_image: bool, format: wgpu::TextureFormat) -> Self {
         Self {
             format,
             samples: if look.multisample { 4 } else { 1 },
             surface: look.surface,
             contours: look.contours.is_some(),
             tiles: look.tile_normals,
+            image: has_image && look.imagery > 0.0,
             morph: look.morph,
         }
     }
 
     /// Values for the shaders' overrides.
-    fn constants(&self) -> [(&'static str, f64); 5] {
+    fn constants(&self) -> [(&'static str, f64); 6] {
         let surface = match self.surface {
             Surface::Tint => 0,
             Surface::Plain => 1,
@@ -87,6 +88,7 @@ impl Variant {
             ("SURFACE", f64::from(surface)),
             ("CONTOURS", f64::from(u8::from(self.contours))),
             ("TILES", f64::from(u8::from(self.tiles))),
+            ("IMAGE", f64::from(u8::from(self.image))),
             ("MORPH", f64::from(u8::from(self.morph))),
             ("ENCODES", f64::from(u8::from(self.format.is_srgb()))),
         ]

@@ -27,6 +27,7 @@ impl Program {
                 include_str!("shaders/atmosphere.wgsl"),
                 include_str!("shaders/mesh.wgsl"),
                 include_str!("shaders/tiles.wgsl"),
+                include_str!("shaders/imagery.wgsl"),
                 include_str!("shaders/surface.wgsl"),
                 include_str!("shaders/terrain.wgsl"),
             ),

@@ -5,8 +5,8 @@ use glam::Vec3;
 
 use crate::look::{Haze, Look};
 use crate::ramps::linear_of;
-use crate::tiles::{Pyramid, TILE_CELLS};
-use crate::view::{FrameView, LocalView, TerrainShape, clip_from_eye, near_m};
+use crate::tiles::{IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, Imagery, Pyramid, TILE_CELLS};
+use crate::view::{FrameView, LocalView, TerrainShape, clip_from_eye, near_m, whole_and_rest};
 
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -34,6 +34,10 @@ pub(crate) struct Uniforms {
     wire_colour: [f32; 4],
     tiles: [u32; 4],
     terrain: [u32; 4],
+    image: [u32; 4],
+    image_eye: [i32; 4],
+    image_scale: [f32; 4],
+    image_share: [f32; 4],
 }
 
 /// What the uniforms are made of.
@@ -43,6 +47,7 @@ pub(crate) struct Inputs<'a> {
     pub view: &'a FrameView,
     pub refined_for: &'a FrameView,
     pub look: &'a Look,
+    pub imagery: Option<&'a Imagery>,
     pub wall_bottom_m: f32,
 }
 
@@ -85,6 +90,7 @@ impl Uniforms {
         let [low_m, high_m] = look.tint_range_m.unwrap_or(terrain.height_range_m.map(|h| h as f32));
         let contour = look.contours.unwrap_or_default();
         let wire = look.wireframe.unwrap_or_default();
+        let image = inputs.imagery.map_or_else(Image::default, |imagery| Image::new(imagery, view));
         Self {
             clip_from_eye: clip_from_eye(view, near_m).to_cols_array_2d(),
             ray_right: with((view.right * tan_x).as_vec3(), 0.0),
@@ -119,6 +125,32 @@ impl Uniforms {
             wire_colour: rgb(wire.colour, 0.0),
             tiles: [pyramid.levels(), TILE_CELLS.ilog2(), TILE_CELLS + 1, 0],
             terrain: [terrain.samples[0], terrain.samples[1], 0, 0],
+            image: [image.levels, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, IMAGE_TILE_BORDER],
+            image_eye: image.eye,
+            image_scale: image.scale,
+            image_share: [look.imagery.clamp(0.0, 1.0), 0.0, 0.0, 0.0],
+        }
+    }
+}
+
+/// An image in numbers that single precision holds: the eye as a whole texel and a remainder, as with the grid.
+#[derive(Default)]
+struct Image {
+    levels: u32,
+    eye: [i32; 4],
+    scale: [f32; 4],
+}
+
+impl Image {
+    fn new(imagery: &Imagery, view: &FrameView) -> Self {
+        let shape = &imagery.shape;
+        let eye = [0, 1].map(|i| whole_and_rest((view.eye_m[i] - shape.origin_m[i]) / shape.texel_m[i]));
+        let [wide, high] = shape.texels.map(|n| n as i32);
+        let [east, north] = shape.texel_m.map(|m| (1.0 / m) as f32);
+        Self {
+            levels: imagery.pool.pyramid.levels(),
+            eye: [eye[0].0, eye[1].0, wide, high],
+            scale: [east, north, eye[0].1 as f32, eye[1].1 as f32],
         }
     }
 }

@@ -138,18 +138,23 @@ pub(crate) struct LocalView {
 
 impl LocalView {
     pub(crate) fn new(view: &FrameView, terrain: &TerrainShape) -> Self {
-        // An eye far outside the terrain keeps a whole origin as far as the shader's difference stays in range.
-        const FARTHEST: f64 = (1 << 29) as f64;
-        let cell = [0, 1].map(|i| (view.eye_m[i] / terrain.spacing_m[i]).floor().clamp(-FARTHEST, FARTHEST));
+        let cell = [0, 1].map(|i| whole_and_rest(view.eye_m[i] / terrain.spacing_m[i]).0);
         let height_origin_m = (view.eye_m.z / view.vertical_exaggeration) as f32;
         Self {
-            origin: cell.map(|c| c as i32),
-            eye_in_cell_m: [0, 1].map(|i| (view.eye_m[i] - cell[i] * terrain.spacing_m[i]) as f32),
+            origin: cell,
+            eye_in_cell_m: [0, 1].map(|i| (view.eye_m[i] - f64::from(cell[i]) * terrain.spacing_m[i]) as f32),
             height_origin_m,
             eye_above_origin_m: (view.eye_m.z - view.vertical_exaggeration * f64::from(height_origin_m))
                 as f32,
         }
     }
+}
+
+/// A coordinate as a whole number and what is left. Far outside, the whole number ends where the shader's difference of two stays in range.
+pub(crate) fn whole_and_rest(at: f64) -> (i32, f64) {
+    const FARTHEST: f64 = (1 << 29) as f64;
+    let whole = at.floor().clamp(-FARTHEST, FARTHEST);
+    (whole as i32, at - whole)
 }
 
 /// Distance in metres of the near plane. With infinite reversed depth its choice costs no precision far away.

@@ -169,7 +169,7 @@ impl Renderer {
         if target.size_px.contains(&0) {
             return Err(RenderError::Usage("a target needs at least one pixel"));
         }
-        let variant = Variant::of(frame.look, target.format);
+        let variant = Variant::of(frame.look, self.imagery.is_some(), target.format);
         let samples = variant.samples;
         let key = Key { size_px: target.size_px, format: target.format, samples };
         self.attachments = Some(Attachments::keep_or_make(self.attachments.take(), &self.device, key));
@@ -183,6 +183,7 @@ impl Renderer {
             view: frame.view,
             refined_for,
             look: frame.look,
+            imagery: self.imagery.as_ref(),
             wall_bottom_m: self.walls.as_ref().map_or(0.0, |w| w.bottom_m),
         });
         let place = self.uniform_stride * self.next_place;
@@ -383,6 +384,8 @@ impl Renderer {
             size: wgpu::BufferSize::new(size_of::<Uniforms>() as u64),
         };
         self.morph.fit(&self.device, &self.mesh, uniform.clone());
+        // Without an image no program looks at one: whatever has its kind will do.
+        let image = self.imagery.as_ref().map_or(&self.tiles, |i| &i.pool);
         let resources = [
             wgpu::BindingResource::Buffer(uniform),
             self.mesh.vertices.as_entire_binding(),
@@ -392,6 +395,8 @@ impl Renderer {
             wgpu::BindingResource::Sampler(&self.sampler),
             wgpu::BindingResource::TextureView(ramp),
             self.morph.moved_heights().as_entire_binding(),
+            wgpu::BindingResource::TextureView(&image.page_table_view),
+            wgpu::BindingResource::TextureView(&image.view),
         ];
         let entries: Vec<_> = (0..)
             .zip(resources)

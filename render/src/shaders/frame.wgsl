@@ -39,6 +39,14 @@ struct Frame {
     tiles: vec4<u32>,
     // Samples east and north.
     terrain: vec4<u32>,
+    // Levels of the image, texels of a tile without and with its border, width of the border.
+    image: vec4<u32>,
+    // The texel that the eye is over; texels east and north.
+    image_eye: vec4<i32>,
+    // Texels a metre east and north; the eye's place in its texel.
+    image_scale: vec4<f32>,
+    // Share of the image in the ground's colour.
+    image_share: vec4<f32>,
 }
 
 const PI: f32 = 3.14159265;
@@ -47,6 +55,7 @@ const PI: f32 = 3.14159265;
 override SURFACE: u32 = 0u;
 override CONTOURS: bool = false;
 override TILES: bool = true;
+override IMAGE: bool = false;
 override MORPH: bool = true;
 // Whether the target encodes sRGB itself.
 override ENCODES: bool = true;

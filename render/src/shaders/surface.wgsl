@@ -53,13 +53,27 @@ fn bare_colour(g: Ground, normal: vec3<f32>) -> vec3<f32> {
     return mix(tint, mix(frame.rock.rgb, tint, 0.25), steep * frame.tint.w);
 }
 
-fn lit(colour: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+// Light of sun and sky on a surface.
+fn light(normal: vec3<f32>) -> vec3<f32> {
     let direct = max(dot(normal, frame.sun.xyz), 0.0) * frame.sun.w * clamp(frame.sun.z * 12.0 + 0.6, 0.0, 1.0);
     // The upper half of the sky lights more than the horizon, and the ground opposite sends a little back.
     let open = 0.5 + 0.5 * normal.z;
     let bounce = (1.0 - open) * 0.35 * vec3(1.0, 0.9, 0.75);
-    let light = direct * frame.sun_colour.rgb + frame.ambient.rgb * (open * open + bounce);
-    return colour * mix(vec3(1.0), light, frame.ambient.w);
+    return direct * frame.sun_colour.rgb + frame.ambient.rgb * (open * open + bounce);
+}
+
+fn lit(colour: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    return colour * mix(vec3(1.0), light(normal), frame.ambient.w);
+}
+
+// A photograph brings the light of its own hour. Lit like bare ground, a slope that it shows at a share r of level ground's light would be seen at
+// r * r when the sun stands as it did. So light counts relative to level ground's, which a photograph shows as it is, and
+// by its root: at r * sqrt(r) shadows are deepened by half of what they are, not doubled, and when the sun moves the form still follows it, at
+// half the contrast of bare ground. Level ground is the photograph itself by day, and dims as the sun goes down.
+fn lit_again(photo: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    let level = light(vec3(0.0, 0.0, 1.0));
+    let relief = sqrt(light(normal) / max(level, vec3(1e-4)));
+    return photo * mix(vec3(1.0), relief * min(level, vec3(1.0)), frame.ambient.w);
 }
 
 // Coverage of the nearest line among multiples of `interval`, fading where lines would run together.
@@ -75,12 +89,18 @@ fn ground(g: Ground, at: vec2<f32>) -> vec4<f32> {
     let drape = normalize(vec3(-slopes.xy * frame.height.z, 1.0));
     let normal = select(g.facet, drape, slopes.z > 0.5);
     var colour = bare_colour(g, normal);
+    var photo = image_at(g.from_eye_m, normal) * frame.image_share.x;
     if CONTOURS {
         let plain = line(g.height_m, g.height_step_m, frame.contour.x, frame.contour.z);
         let index = line(g.height_m, g.height_step_m, frame.contour.x * frame.contour.y, 2.0 * frame.contour.z);
-        colour = mix(colour, frame.contour_colour.rgb, max(0.7 * plain, index) * frame.contour.w);
+        let opacity = max(0.7 * plain, index) * frame.contour.w;
+        colour = mix(colour, frame.contour_colour.rgb, opacity);
+        photo = vec4(mix(photo.rgb, frame.contour_colour.rgb * photo.a, opacity), photo.a);
     }
     colour = lit(colour, normal);
+    if IMAGE {
+        colour = colour * (1.0 - photo.a) + lit_again(photo.rgb, normal);
+    }
     colour = mix(colour, frame.wire_colour.rgb, g.edge * frame.wire.y);
     let distance_m = length(g.from_eye_m);
     return to_target(through_air(colour, g.from_eye_m / max(distance_m, 1e-6), distance_m), at);

@@ -5,6 +5,7 @@
 
 mod cover;
 mod device;
+mod imagery;
 mod patches;
 mod places;
 mod shading;
@@ -41,12 +42,18 @@ fn main() -> ExitCode {
             None
         }
     };
-    let tests: Vec<(String, Test)> =
-        [cover::tests(), device::tests(), patches::tests(), places::tests(), shading::tests()]
-            .concat()
-            .into_iter()
-            .map(|(name, test): (&str, Test)| (name.to_owned(), test))
-            .collect();
+    let tests: Vec<(String, Test)> = [
+        cover::tests(),
+        device::tests(),
+        imagery::tests(),
+        patches::tests(),
+        places::tests(),
+        shading::tests(),
+    ]
+    .concat()
+    .into_iter()
+    .map(|(name, test): (&str, Test)| (name.to_owned(), test))
+    .collect();
     let depth_copies = gpu.is_some_and(|g| g.capabilities.depth_copies);
     let trial = |name: String, run: Box<dyn Fn(&Gpu) -> Outcome + Send>| {
         let unreadable = !depth_copies && READ_DEPTH.iter().any(|prefix| name.starts_with(prefix));

@@ -4,6 +4,7 @@ use glam::DVec3;
 use terrasoar_render::{Contours, FrameView, Gpu, LOOKS, Look, Sun, ramps::RAMPS};
 
 use crate::Outcome;
+use crate::support::image::{Image, drape, give};
 use crate::support::landscape::hills;
 use crate::support::picture::check_snapshot;
 use crate::support::refiner::Square;
@@ -14,7 +15,8 @@ const SIZE_PX: [u32; 2] = [160, 120];
 pub fn names() -> impl Iterator<Item = String> {
     let looks = LOOKS.iter().map(|(name, _)| format!("look-{name}"));
     let ramps = RAMPS.iter().map(|ramp| format!("ramp-{}", ramp.name));
-    let more = ["sunset", "mesh-normals", "walls", "roll", "smooth-edges", "chart"].map(str::to_owned);
+    let more =
+        ["sunset", "mesh-normals", "walls", "roll", "smooth-edges", "chart", "photo-map"].map(str::to_owned);
     looks.chain(ramps).chain(more)
 }
 
@@ -50,6 +52,14 @@ pub fn check(gpu: &Gpu, name: &str) -> Outcome {
             view.vertical_exaggeration = 1.6;
             view.eye_m.z = 2200.0;
         }
+        "photo-map" => {
+            look = Look { imagery: 0.6, contours: Some(Contours::default()), ..look };
+            view = FrameView::look_at(
+                DVec3::new(2560.0, 2559.0, 6800.0),
+                DVec3::new(2560.0, 2560.0, 0.0),
+                SIZE_PX,
+            );
+        }
         "smooth-edges" => look.multisample = true,
         "chart" => {
             look.contours = Some(Contours { interval_m: 50.0, ..Contours::default() });
@@ -70,6 +80,11 @@ pub fn check(gpu: &Gpu, name: &str) -> Outcome {
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.refine(&view));
     scene.give_tiles(&view);
+    if look.imagery > 0.0 {
+        let image = Image::fields(&square.terrain);
+        drape(&mut scene, &image, 64);
+        while give(&mut scene.renderer, &image, &view, usize::MAX, |_| false) > 0 {}
+    }
     if walls {
         scene.renderer.set_walls(&border(&square, &view), 0.0);
     }

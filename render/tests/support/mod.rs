@@ -1,5 +1,6 @@
 //! What the tests share.
 
+pub mod image;
 pub mod landscape;
 pub mod picture;
 pub mod refiner;
