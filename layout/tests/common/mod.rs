@@ -3,6 +3,8 @@
 
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
+pub mod drape;
+
 pub use terrasoar_layout::dem::MemoryDem;
 use terrasoar_layout::terrain::Terrain;
 
