@@ -23,6 +23,7 @@ pub mod source;
 pub mod store;
 pub mod synth;
 pub mod terrain;
+pub mod unused;
 pub mod verify;
 
 pub use error::LayoutError;

@@ -12,11 +12,14 @@
 //!
 //! Rows are made in bands, in parallel, while the band before is written: 35 to 70 MiB of memory with two threads.
 
+mod colour;
 mod detail;
 mod landscape;
 mod noise;
 mod output;
 mod tiff_header;
+
+pub use colour::{ColourOptions, write_colour};
 
 use std::path::Path;
 

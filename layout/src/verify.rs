@@ -8,6 +8,7 @@
 //!
 //! Invariant: a report without problems means that every promise refinement relies on holds for the bytes as they were read.
 
+mod imagery;
 mod nesting;
 mod structure;
 
@@ -46,6 +47,8 @@ pub struct VerifyReport {
     pub pages_checked: u64,
     /// Vertices whose records were decoded and compared with their children's.
     pub vertices_checked: u64,
+    /// Tiles of imagery read and held against their checksum.
+    pub tiles_checked: u64,
     /// The first [`LISTED_PROBLEMS`] problems, in file order within each pass; at most one a page and pass.
     pub problems: Vec<Problem>,
     /// All problems.
@@ -92,7 +95,7 @@ fn record_page(terrain: &Terrain, page: usize) -> String {
 
 /// Pages of work that [`verify`] reports to its `progress`, in sum.
 pub fn verify_pages(terrain: &Terrain) -> u64 {
-    2 * terrain.header().stored_pages
+    2 * terrain.header().stored_pages + imagery::pages(terrain)
 }
 
 /// Checks the whole file on the current rayon pool. `progress` hears how many more pages are done, [`verify_pages`] in sum.
@@ -116,10 +119,12 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
             nesting::check(terrain, &Exact16::new(grid, scale), &present, &damaged, progress)?
         }
     };
-    let Findings { listed, count } = findings.merge(wrong_sums).merge(records);
+    let (tiles, pictures) = imagery::check(terrain, progress)?;
+    let Findings { listed, count } = findings.merge(wrong_sums).merge(records).merge(pictures);
     Ok(VerifyReport {
         pages_checked: present.len() as u64,
         vertices_checked: vertices,
+        tiles_checked: tiles,
         problems: listed,
         problem_count: count,
     })

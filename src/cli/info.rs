@@ -5,11 +5,13 @@ use super::terrain;
 use anyhow::Result;
 use serde::Serialize;
 use std::path::PathBuf;
+use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::unused::unused_bytes;
 
 /// Show what a terrain file says about itself.
 ///
-/// Reads header and directory only, so it takes no time however large the file.
+/// Reads headers and directories only, so it takes no time however large the file.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -50,12 +52,55 @@ struct Info {
     generation: u32,
     file_bytes: u64,
     bytes_per_sample: f64,
+    /// Bytes that nothing leads to: what edits and other imagery replaced.
+    unused_bytes: u64,
+    imagery: Option<Pictures>,
+}
+
+/// What the imagery says about itself.
+#[derive(Debug, Serialize)]
+struct Pictures {
+    /// Format of the image.
+    source: String,
+    format: &'static str,
+    texels: [u32; 2],
+    texel_m: [f64; 2],
+    /// South-west corner, in metres from the terrain's south-west sample.
+    origin_m: [f64; 2],
+    levels: u32,
+    /// Tiles stored; transparent ones are left out.
+    tiles: u64,
+    logical_tiles: u64,
+    bytes: u64,
+    /// Bytes over those of the texels of level 0 as raw RGB.
+    raw_ratio: f64,
+}
+
+impl Pictures {
+    fn of(terrain: &Terrain) -> Result<Option<Self>> {
+        let Some(imagery) = Imagery::open(terrain)? else { return Ok(None) };
+        let shape = imagery.shape();
+        let bytes = terrain.header().imagery.map_or(0, |place| place.bytes);
+        let [wide, high] = shape.texels.map(f64::from);
+        Ok(Some(Self {
+            source: imagery.source().to_owned(),
+            format: shape.format.name(),
+            texels: shape.texels,
+            texel_m: shape.texel_m,
+            origin_m: shape.origin_m,
+            levels: shape.levels,
+            tiles: imagery.stored_tiles(),
+            logical_tiles: shape.tiles(),
+            bytes,
+            raw_ratio: bytes as f64 / (3.0 * wide * high),
+        }))
+    }
 }
 
 impl Info {
-    fn of(terrain: &Terrain) -> Self {
+    fn of(terrain: &Terrain) -> Result<Self> {
         let header = terrain.header();
-        Self {
+        Ok(Self {
             path: terrain.path().display().to_string(),
             source: header.source.clone(),
             samples: header.grid.samples(),
@@ -78,13 +123,15 @@ impl Info {
             generation: header.generation,
             file_bytes: header.file_bytes,
             bytes_per_sample: terrain.bytes_per_sample(),
-        }
+            unused_bytes: unused_bytes(terrain)?,
+            imagery: Pictures::of(terrain)?,
+        })
     }
 
     fn text(&self) -> String {
         let pair = |[a, b]: [f64; 2], digits| format!("{} x {}", decimal(a, digits), decimal(b, digits));
         let rounded = if self.heights_rounded { ", heights rounded to it" } else { "" };
-        table(&[
+        let mut rows = vec![
             ("file", self.path.clone()),
             ("made from", self.source.clone()),
             ("samples", format!("{} x {}", grouped(self.samples[0].into()), grouped(self.samples[1].into()))),
@@ -103,11 +150,38 @@ impl Info {
             ("pages", format!("{} of {} stored", grouped(self.pages), grouped(self.logical_pages))),
             ("file size", format!("{} bytes", grouped(self.file_bytes))),
             ("a sample", format!("{:.2} bytes", self.bytes_per_sample)),
-        ])
+        ];
+        if let Some(imagery) = &self.imagery {
+            let [wide, high] = imagery.texels.map(|side| grouped(side.into()));
+            let [east, north] = imagery.origin_m.map(|m| decimal(m, 2));
+            rows.extend([
+                ("imagery", format!("{wide} x {high} texels, made from {}", imagery.source)),
+                ("texel", format!("{} m", pair(imagery.texel_m, 4))),
+                ("imagery from", format!("{east} m east, {north} m north")),
+                (
+                    "tiles",
+                    format!(
+                        "{} of {} stored, {} levels, {}",
+                        grouped(imagery.tiles),
+                        grouped(imagery.logical_tiles),
+                        imagery.levels,
+                        imagery.format
+                    ),
+                ),
+                (
+                    "imagery size",
+                    format!("{} bytes, {:.4} of raw RGB", grouped(imagery.bytes), imagery.raw_ratio),
+                ),
+            ]);
+        }
+        if self.unused_bytes > 0 {
+            rows.push(("unused", format!("{} bytes that nothing leads to", grouped(self.unused_bytes))));
+        }
+        table(&rows)
     }
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let info = Info::of(&terrain::open(&args.file)?);
+    let info = Info::of(&terrain::open(&args.file)?)?;
     if args.json { print_json(&info) } else { print(&info.text()) }
 }

@@ -10,8 +10,8 @@ use terrasoar_layout::verify::{verify, verify_pages};
 
 /// Check every page of a terrain file.
 ///
-/// Header, directory, checksums, page numbers, and that errors and radii are nested the way refinement relies on. Names the pages that
-/// are wrong. Exit code 0: sound; 1: not.
+/// Header, directory, checksums, page numbers, that errors and radii are nested the way refinement relies on, and every tile of imagery. Names
+/// the pages that are wrong. Exit code 0: sound; 1: not.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Example:
@@ -29,8 +29,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let report = verify(&terrain, &|pages| progress.add(pages))?;
     drop(progress);
     if report.is_sound() {
+        let tiles = match report.tiles_checked {
+            0 => String::new(),
+            tiles => format!(", {} tiles of imagery match theirs", grouped(tiles)),
+        };
         return print(&format!(
-            "{}: sound: {} record pages match their checksums, {} vertices are nested",
+            "{}: sound: {} record pages match their checksums, {} vertices are nested{tiles}",
             args.file.display(),
             grouped(report.pages_checked),
             grouped(report.vertices_checked)

@@ -23,5 +23,6 @@ pub use drape::{DrapeOptions, Draped, drape};
 pub use image::open as open_image;
 pub use place::{Extent, PlaceOrigin};
 pub use reader::Imagery;
+pub(crate) use reader::tile_name;
 pub use shape::{BORDER_TEXELS, INNER_TEXELS, ImageryShape, TILE_TEXELS, TileFormat, TileId};
 pub use source::{ImageInfo, ImageSource, MemoryImage, RowReader};

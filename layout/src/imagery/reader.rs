@@ -36,7 +36,7 @@ impl Imagery {
             (0..directory.len() / TILE_ENTRY_BYTES).map(|i| TileEntry::read(&directory, i)).collect();
         for (id, entry) in section.shape.ids().zip(&entries) {
             if !section.is_entry(id, *entry, terrain.header().file_bytes) {
-                let place = format!("imagery directory entry of {}", name(id));
+                let place = format!("imagery directory entry of {}", tile_name(id));
                 return Err(damaged(path, place, "the tile has another length or lies outside the file"));
             }
         }
@@ -102,11 +102,21 @@ impl Imagery {
         texels.resize(entry.bytes as usize, 0);
         terrain.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, texels)?;
         if checksum(texels) != entry.checksum {
-            let place = format!("imagery {} (file page {})", name(id), entry.page);
+            let place = format!("imagery {} (file page {})", tile_name(id), entry.page);
             return Err(damaged(terrain.path(), place, "the checksum does not match"));
         }
         widen(format, self.section.shape.stored_texels(id), texels);
         Ok(true)
+    }
+
+    /// First page of a tile in the file.
+    pub(crate) fn first_page(&self, id: TileId) -> Option<u64> {
+        self.entry(id).map(|entry| entry.page.into())
+    }
+
+    /// Pages that a tile takes.
+    pub(crate) fn stored_pages(&self, id: TileId) -> u64 {
+        self.entry(id).map_or(0, |entry| u64::from(entry.bytes).div_ceil(PAGE_BYTES as u64))
     }
 
     fn entry(&self, id: TileId) -> Option<TileEntry> {
@@ -116,7 +126,7 @@ impl Imagery {
 }
 
 /// Name of a tile in messages.
-pub(crate) fn name(id: TileId) -> String {
+pub(crate) fn tile_name(id: TileId) -> String {
     format!("tile {}, {} of level {}", id.x, id.y, id.level)
 }
 

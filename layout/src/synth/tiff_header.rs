@@ -1,9 +1,11 @@
-//! Header and tag directory of an uncompressed GeoTIFF whose rows follow without a gap.
+//! Header and tag directory of an uncompressed GeoTIFF whose rows of heights, or tiles of colour, follow without a gap.
 //!
-//! Nothing depends on the samples, so the header can be written first and the rows streamed after it.
-//! Files beyond 4 GiB are BigTIFF. Layout: header, directory, values that do not fit into it, rows.
+//! Nothing depends on the samples, so the header can be written first and the rest streamed after it.
+//! Files beyond 4 GiB are BigTIFF. Layout: header, directory, values that do not fit into it, rows or tiles.
 
 use super::HEIGHT_SCALE;
+use crate::dem::HorizontalUnit;
+use crate::header::Header;
 
 const SHORT: u16 = 3;
 const LONG: u16 = 4;
@@ -32,7 +34,6 @@ pub(super) fn header(size: u32, spacing_m: f64) -> Vec<u8> {
     tags.numbers(258, SHORT, &[16]);
     tags.numbers(259, SHORT, &[1]);
     tags.numbers(262, SHORT, &[1]);
-    tags.numbers(273, place, &vec![0; sizes.len()]);
     tags.numbers(277, SHORT, &[1]);
     tags.numbers(278, LONG, &[rows_per_strip]);
     tags.numbers(279, place, &sizes);
@@ -63,12 +64,64 @@ pub(super) fn header(size: u32, spacing_m: f64) -> Vec<u8> {
         ),
     );
 
-    // The places of the strips follow from the header's length, which they do not change.
-    let start = tags.bytes().len() as u64;
-    let places: Vec<u64> = (0..strips).map(|strip| start + strip * rows_per_strip * row_bytes).collect();
-    tags.entries.retain(|entry| entry.tag != 273);
-    tags.numbers(273, place, &places);
-    tags.entries.sort_by_key(|entry| entry.tag);
+    tags.places(273, &sizes);
+    tags.bytes()
+}
+
+/// The bytes before the first tile of an RGB picture of `texels` (east, north) in tiles of `side` texels: it covers the terrain of `terrain`, `fine`
+/// texels a sample, in the terrain's reference system, or in metres from its south-west sample.
+pub(super) fn colour_header(texels: [u32; 2], side: u32, terrain: &Header, fine: u32) -> Vec<u8> {
+    let tiles = texels.map(|texels| u64::from(texels.div_ceil(side)));
+    let sizes = vec![u64::from(side).pow(2) * 3; (tiles[0] * tiles[1]) as usize];
+    let big = sizes.iter().sum::<u64>() > CLASSIC_BYTES;
+
+    let mut tags = Tags { big, entries: Vec::new() };
+    tags.numbers(256, LONG, &[u64::from(texels[0])]);
+    tags.numbers(257, LONG, &[u64::from(texels[1])]);
+    tags.numbers(258, SHORT, &[8, 8, 8]);
+    tags.numbers(259, SHORT, &[1]);
+    tags.numbers(262, SHORT, &[2]);
+    tags.numbers(277, SHORT, &[3]);
+    tags.numbers(284, SHORT, &[1]);
+    tags.numbers(322, LONG, &[u64::from(side)]);
+    tags.numbers(323, LONG, &[u64::from(side)]);
+    tags.numbers(325, if big { LONG8 } else { LONG }, &sizes);
+    tags.numbers(339, SHORT, &[1, 1, 1]);
+    let [dx, dy] = terrain.grid.spacing_m();
+    let samples = terrain.sample_to_crs.unwrap_or([0.0, dx, 0.0, 0.0, 0.0, dy]);
+    // A texel east is a share of a sample east; a row south one of a sample south, from the north-west sample.
+    let north = f64::from(terrain.grid.samples()[1] - 1);
+    let [x, xe, xn, y, ye, yn] = samples;
+    let share = 1.0 / f64::from(fine);
+    let [east, south] = [[xe * share, ye * share], [-xn * share, -yn * share]];
+    let corner = [x + xn * north, y + yn * north];
+    tags.reals(
+        34264,
+        &[
+            [east[0], south[0], 0.0, corner[0]],
+            [east[1], south[1], 0.0, corner[1]],
+            [0.0; 4],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+        .concat(),
+    );
+    let degrees = terrain.crs_unit == HorizontalUnit::Degree;
+    let code = u64::from(terrain.epsg.filter(|code| *code <= 65535).unwrap_or(32767));
+    let unit = match terrain.crs_unit {
+        HorizontalUnit::Degree => [2054, 0, 1, 9102],
+        HorizontalUnit::Foot => [3076, 0, 1, 9002],
+        HorizontalUnit::UsSurveyFoot => [3076, 0, 1, 9003],
+        HorizontalUnit::Unknown | HorizontalUnit::Metre => [3076, 0, 1, 9001],
+    };
+    let citation = "Terrasoar synthetic colour|";
+    let [model, system] = if degrees { [2, 2048] } else { [1, 3072] };
+    let mut keys = vec![[1024, 0, 1, model], [1025, 0, 1, 1], [1026, 34737, citation.len() as u64, 0]];
+    keys.extend([[system, 0, 1, code], unit]);
+    keys.sort_unstable();
+    keys.insert(0, [1, 1, 0, keys.len() as u64]);
+    tags.numbers(34735, SHORT, &keys.concat());
+    tags.text(34737, citation);
+    tags.places(324, &sizes);
     tags.bytes()
 }
 
@@ -103,6 +156,24 @@ impl Tags {
     fn text(&mut self, tag: u16, text: &str) {
         let values: Vec<u8> = text.bytes().chain([0]).collect();
         self.entries.push(Entry { tag, kind: ASCII, count: values.len() as u64, values });
+    }
+
+    /// The places of strips or tiles of `sizes`. They follow from the header's length, which they do not change.
+    fn places(&mut self, tag: u16, sizes: &[u64]) {
+        let kind = if self.big { LONG8 } else { LONG };
+        self.numbers(tag, kind, sizes);
+        let start = self.bytes().len() as u64;
+        let places: Vec<u64> = sizes
+            .iter()
+            .scan(start, |next, size| {
+                let place = *next;
+                *next += size;
+                Some(place)
+            })
+            .collect();
+        self.entries.retain(|entry| entry.tag != tag);
+        self.numbers(tag, kind, &places);
+        self.entries.sort_by_key(|entry| entry.tag);
     }
 
     /// Header, directory and the values outside it.

@@ -4,6 +4,8 @@
 use rayon::prelude::*;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
+pub mod drape;
+
 pub use terrasoar_layout::dem::MemoryDem;
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, SampleType, Window};
 use terrasoar_layout::terrain::Terrain;

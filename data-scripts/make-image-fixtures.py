@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""Makes the small pictures in layout/tests/fixtures, image-*: one for each way of storing one that is read, and those that are refused.
+
+Usage: data-scripts/make-image-fixtures.py        (from anywhere; needs gdal-bin 3.6 or later, no Python packages)
+
+All show the same 72 x 56 texels, whose colours `colour` gives; tests compute them again. Fixtures with alpha have a hole where
+x + y < 20. Georeference: 2 m a texel, north-west corner at 1000, 5000.
+"""
+import pathlib
+import subprocess
+import tempfile
+
+OUT = pathlib.Path(__file__).resolve().parent.parent / "layout" / "tests" / "fixtures"
+WIDTH, HEIGHT = 72, 56
+PLACE = ["-a_ullr", "1000", "5000", "1144", "4888"]
+
+
+def colour(x, y):
+    return 40 + 2 * x + y, 220 - x - y, 60 + x * y // 40
+
+
+def is_hole(x, y):
+    return x + y < 20
+
+
+def run(*command):
+    subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)
+
+
+def pnm(path, kind, texels):
+    path.write_bytes(f"{kind}\n{WIDTH} {HEIGHT}\n255\n".encode() + bytes(v for t in texels for v in t))
+
+
+def main():
+    places = [(x, y) for y in range(HEIGHT) for x in range(WIDTH)]
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        rgb, grey, hole, alpha = folder / "rgb.ppm", folder / "grey.pgm", folder / "hole.ppm", folder / "alpha.pgm"
+        pnm(rgb, "P6", (colour(x, y) for x, y in places))
+        pnm(grey, "P5", ((colour(x, y)[0],) for x, y in places))
+        pnm(hole, "P6", ((0, 0, 0) if is_hole(x, y) else colour(x, y) for x, y in places))
+        pnm(alpha, "P5", ((0 if is_hole(x, y) else 255,) for x, y in places))
+        rgba = folder / "rgba.vrt"
+        bands = "".join(
+            f'<VRTRasterBand dataType="Byte" band="{i + 1}"><ColorInterp>{name}</ColorInterp><SimpleSource>'
+            f"<SourceFilename>{file}</SourceFilename><SourceBand>{band}</SourceBand></SimpleSource></VRTRasterBand>"
+            for i, (name, file, band) in enumerate(
+                [("Red", rgb, 1), ("Green", rgb, 2), ("Blue", rgb, 3), ("Alpha", alpha, 1)]
+            )
+        )
+        rgba.write_text(f'<VRTDataset rasterXSize="{WIDTH}" rasterYSize="{HEIGHT}">{bands}</VRTDataset>')
+        grey16 = folder / "grey16.tif"
+        run("gdal_translate", "-ot", "UInt16", "-scale", "0", "255", "0", "65535", grey, grey16)
+        rgb16 = folder / "rgb16.tif"
+        run("gdal_translate", "-ot", "UInt16", "-scale", "0", "255", "0", "65535", rgb, rgb16)
+        tiles = ["-co", "TILED=YES", "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=16"]
+
+        def tiff(name, source, *options):
+            run("gdal_translate", "-q", "--config", "GDAL_PAM_ENABLED", "NO", *PLACE, *options, source, OUT / f"image-{name}.tif")
+
+        tiff("rgb-strips", rgb)
+        tiff("rgb-one-strip", rgb, "-co", "BLOCKYSIZE=56")
+        tiff("rgb-tiles-deflate-p2", rgb, *tiles, "-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=2")
+        tiff("rgb-tiles-big-endian-lzw", rgb, *tiles, "-co", "ENDIANNESS=BIG", "-co", "COMPRESS=LZW", "-co", "BIGTIFF=YES")
+        tiff("rgba-tiles-zstd", rgba, *tiles, "-co", "COMPRESS=ZSTD")
+        tiff("rgb-nodata", hole, "-a_nodata", "0", "-co", "COMPRESS=DEFLATE")
+        tiff("grey", grey, "-co", "COMPRESS=PACKBITS")
+        tiff("grey-16", grey16, *tiles, "-co", "COMPRESS=LZW", "-co", "PREDICTOR=2")
+        tiff("rgb-16-big-endian", rgb16, "-co", "ENDIANNESS=BIG", "-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=2")
+        tiff("jpeg-ycbcr", rgb, *tiles, "-co", "COMPRESS=JPEG", "-co", "PHOTOMETRIC=YCBCR", "-co", "JPEG_QUALITY=95")
+        tiff("jpeg-rgb", rgb, "-co", "COMPRESS=JPEG", "-co", "JPEG_QUALITY=95")
+        tiff("jpeg-grey", grey, *tiles, "-co", "COMPRESS=JPEG", "-co", "JPEG_QUALITY=95")
+        tiff("refused-planes", rgb, "-co", "INTERLEAVE=BAND")
+        tiff("refused-cmyk", rgba, "-co", "PHOTOMETRIC=CMYK", "-co", "COMPRESS=DEFLATE")
+        run("gdal_translate", "-q", "-of", "PNG", "-co", "WORLDFILE=YES", *PLACE, rgba, folder / "rgba.png")
+        (OUT / "image-rgba.png").write_bytes((folder / "rgba.png").read_bytes())
+        (OUT / "image-rgba.pgw").write_bytes((folder / "rgba.wld").read_bytes())
+        run("gdal_translate", "-q", "-of", "PNG", rgb16, OUT / "image-rgb-16.png")
+        for name, options in [("baseline", []), ("progressive", ["-co", "PROGRESSIVE=YES"])]:
+            run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", *options, rgb, OUT / f"image-{name}.jpg")
+        run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", grey, OUT / "image-grey.jpg")
+        run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=90", rgba, OUT / "image-refused-cmyk.jpg")
+        turned = folder / "turned.vrt"
+        turned.write_text(
+            f'<VRTDataset rasterXSize="{WIDTH}" rasterYSize="{HEIGHT}"><GeoTransform>1000, 2, 1, 5000, 1, -2</GeoTransform>'
+            + bands.rsplit("<VRTRasterBand", 1)[0]
+            + "</VRTDataset>"
+        )
+        run("gdal_translate", "-q", "-co", "COMPRESS=DEFLATE", turned, OUT / "image-refused-turned.tif")
+    for aux in OUT.glob("image-*.aux.xml"):
+        aux.unlink()
+
+
+if __name__ == "__main__":
+    main()

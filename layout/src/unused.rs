@@ -1,0 +1,26 @@
+//! How much of a file nothing leads to: pages that edits and imagery replaced (FORMAT.md, sections 7 and 8).
+
+use crate::bytes::{PAGE_BYTES, to_usize};
+use crate::directory::{ENTRY_BYTES, Entry};
+use crate::error::LayoutError;
+use crate::terrain::Terrain;
+
+/// Bytes of the file that neither header, directory nor imagery lead to, bytes behind its counted end included. Reads the directory's root.
+///
+/// # Errors
+/// I/O.
+pub fn unused_bytes(terrain: &Terrain) -> Result<u64, LayoutError> {
+    let page = PAGE_BYTES as u64;
+    let header = terrain.header();
+    let root_bytes = header.root_entries() * ENTRY_BYTES as u64;
+    let mut root = vec![0; to_usize(root_bytes)?];
+    terrain.source().read_at(u64::from(header.root_page) * page, &mut root)?;
+    let leaves = (0..header.root_entries() as usize).filter(|i| Entry::read(&root, *i).is_present()).count();
+    // The root ends where its entries do when it ends the file, as builds leave it.
+    let root_end = u64::from(header.root_page) * page + root_bytes;
+    let root_used =
+        if root_end == header.file_bytes { root_bytes } else { root_bytes.next_multiple_of(page) };
+    let imagery = header.imagery.map_or(0, |place| place.bytes);
+    let used = (3 + header.stored_pages + leaves as u64) * page + root_used + imagery;
+    Ok(terrain.source().byte_count().saturating_sub(used))
+}

@@ -1,0 +1,74 @@
+//! The imagery: header and directory as opening checks them, every tile against its checksum, and no page used twice.
+//!
+//! Cost: every tile is read once, in parallel; a tile a thread is held.
+
+use super::Findings;
+use crate::bytes::PAGE_BYTES;
+use crate::error::LayoutError;
+use crate::imagery::{Imagery, TileId};
+use crate::terrain::Terrain;
+use rayon::prelude::*;
+
+/// Pages of work that the imagery's part reports.
+pub(super) fn pages(terrain: &Terrain) -> u64 {
+    terrain.header().imagery.map_or(0, |place| place.bytes / PAGE_BYTES as u64)
+}
+
+/// Tiles checked, and what is wrong.
+pub(super) fn check(
+    terrain: &Terrain,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Result<(u64, Findings), LayoutError> {
+    let Some(place) = terrain.header().imagery else { return Ok((0, Findings::default())) };
+    let mut findings = Findings::default();
+    let section = place.offset / PAGE_BYTES as u64..place.end() / PAGE_BYTES as u64;
+    for (page, entry) in terrain.entries().iter().enumerate() {
+        if section.contains(&u64::from(entry.page)) {
+            findings.add(super::record_page(terrain, page), "its page lies in the imagery section");
+        }
+    }
+    let imagery = match Imagery::open(terrain) {
+        Ok(Some(imagery)) => imagery,
+        Ok(None) => return Ok((0, findings)),
+        Err(LayoutError::Damaged { place, problem, .. }) => {
+            findings.add(place, problem);
+            return Ok((0, findings));
+        }
+        Err(other) => return Err(other),
+    };
+    check_places(&imagery, &mut findings);
+    let ids: Vec<TileId> = imagery.shape().ids().filter(|id| imagery.has_tile(*id)).collect();
+    let task = |tile: &mut Vec<u8>, id: &TileId| match imagery.read_tile(terrain, *id, tile) {
+        Ok(_) => {
+            progress(imagery.stored_pages(*id));
+            Ok(None)
+        }
+        Err(LayoutError::Damaged { place, problem, .. }) => Ok(Some((place, problem))),
+        Err(other) => Err(other),
+    };
+    let found: Vec<Option<(String, String)>> =
+        ids.par_iter().map_init(Vec::new, task).collect::<Result<_, LayoutError>>()?;
+    for (place, problem) in found.into_iter().flatten() {
+        findings.add(place, problem);
+    }
+    Ok((ids.len() as u64, findings))
+}
+
+/// No two tiles share a page.
+fn check_places(imagery: &Imagery, findings: &mut Findings) {
+    let mut places: Vec<(u64, u64, TileId)> = imagery
+        .shape()
+        .ids()
+        .filter_map(|id| imagery.first_page(id).map(|page| (page, imagery.stored_pages(id), id)))
+        .collect();
+    places.sort_unstable();
+    for pair in places.windows(2) {
+        let [(page, pages, id), (next, ..)] = [pair[0], pair[1]];
+        if page + pages > next {
+            findings.add(
+                format!("imagery {}", crate::imagery::tile_name(id)),
+                format!("file page {next} is also that of another tile"),
+            );
+        }
+    }
+}
