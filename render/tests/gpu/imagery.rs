@@ -138,7 +138,8 @@ fn between_levels(gpu: &Gpu) -> Outcome {
         let [u, v] = [x, y].map(|c| ((c as f64 + 0.5) * size - 1280.0) / 9.0);
         let fade = (-0.5 * (size / 30.0).powi(2)).exp();
         let wave = 0.35 + 0.3 * fade * (u.hypot(v)).sin();
-        [encoded(wave).round() as u8, encoded(0.7 - wave).round() as u8, 60, 255]
+        // A step of blue from level to level, so that it matters how much of either shows.
+        [encoded(wave).round() as u8, encoded(0.7 - wave).round() as u8, 40 + 25 * level as u8, 255]
     });
     drape(&mut scene, &image, 64);
     for above_m in [90.0, 150.0, 240.0, 430.0] {
@@ -568,10 +569,10 @@ fn blocks(gpu: &Gpu) -> Outcome {
 
 /// Stripes along the line of sight stay, stripes across it become their mean, on ground that is seen at some ten degrees.
 fn anisotropy(gpu: &Gpu) -> Outcome {
-    let square = level_ground();
+    let square = Square::new(6, [0, 0], [80.0, 80.0], |_, _| 100.0);
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.down_to(0));
-    let eye = DVec3::new(640.0, 60.0, 170.0);
+    let eye = DVec3::new(2560.0, 60.0, 170.0);
     let view = FrameView::look_at(eye, eye + DVec3::new(0.0, 400.0, -70.0), SIZE_PX);
     // At 400 m a texel is a pixel wide, and a pixel six texels long.
     let texel_m = 400.0 / view.pixels_per_radian();
