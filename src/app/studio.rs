@@ -70,6 +70,11 @@ impl<'a> Studio<'a> {
         Ok(rgba?.as_chunks::<4>().0.iter().flat_map(|[r, g, b, _]| [*r, *g, *b]).collect())
     }
 
+    /// Whether an image is draped over the terrain.
+    pub(crate) fn has_image(&self) -> bool {
+        self.scene.has_image()
+    }
+
     /// The device's adapter.
     pub(crate) fn capabilities(&self) -> &Capabilities {
         &self.gpu.capabilities

@@ -76,8 +76,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let terrain = terrain::open(&args.file)?;
     let flight = Flight::read(&args.flight)?;
     let picture = &args.picture;
-    let look = picture.look();
     let mut studio = Studio::new(&terrain, picture.scene(), picture.size)?;
+    let has_image = studio.has_image();
+    let look = picture.look(has_image);
     let mut movie = MovieFile::create(&args.output, format, picture.size, args.fps)?;
     let progress = Progress::new("frames");
     progress.begin("drawing", flight.frames.len() as u64);
@@ -101,7 +102,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         return print_json(&Answer {
             output: args.output.clone(),
             size_px: [width, height],
-            style: picture.style.clone(),
+            style: picture.style(has_image).to_owned(),
             ramp: look.ramp.name,
             frames: u64::from(pictures),
             fps: args.fps,

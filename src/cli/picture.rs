@@ -20,15 +20,21 @@ use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
 use terrasoar_render::{Contours, LOOKS, Look, Sun};
 
+/// The style of a terrain with an image.
+const PHOTO: &str = "photo";
+
 /// Size, precision and looks.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct PictureArgs {
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse::viewport)]
     pub size: Viewport,
-    /// How the ground looks
-    #[arg(long, value_name = "STYLE", default_value = LOOKS[0].0, value_parser = style())]
-    pub style: String,
+    /// How the ground looks; without it photo where the terrain has an image, else relief
+    #[arg(long, value_name = "STYLE", value_parser = style())]
+    pub style: Option<String>,
+    /// How much of the terrain's image shows, from 0 to 1; the style has its own without it
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub image: Option<f32>,
     /// Colours of heights, slopes or errors; the style has its own without it
     #[arg(long, value_name = "RAMP", value_parser = ramp())]
     pub ramp: Option<&'static Ramp>,
@@ -56,9 +62,19 @@ pub(super) struct PictureArgs {
 }
 
 impl PictureArgs {
-    /// How it looks. Edges are smooth.
-    pub(super) fn look(&self) -> Look {
-        let mut look = Look::named(&self.style).unwrap_or_default();
+    /// Name of the style of a terrain, with an image or without.
+    pub(super) fn style(&self, has_image: bool) -> &str {
+        match &self.style {
+            Some(style) => style,
+            None if has_image => PHOTO,
+            None => LOOKS[0].0,
+        }
+    }
+
+    /// How a terrain looks, with an image or without. Edges are smooth.
+    pub(super) fn look(&self, has_image: bool) -> Look {
+        let mut look = Look::named(self.style(has_image)).unwrap_or_default();
+        look.imagery = self.image.unwrap_or(look.imagery);
         look.ramp = self.ramp.unwrap_or(look.ramp);
         look.morph = self.morph;
         look.multisample = true;
@@ -92,6 +108,13 @@ impl PictureArgs {
             PictureEngine::Kinetic => "kinetic",
             PictureEngine::Soar => "soar",
         }
+    }
+}
+
+fn share(text: &str) -> Result<f32, String> {
+    match text.trim().parse::<f32>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("give a number from 0 to 1".into()),
     }
 }
 

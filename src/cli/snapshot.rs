@@ -112,7 +112,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     drop(progress);
     let Some(view) = views.last() else { return Err(WrongUsage("a flight without frames".into()).into()) };
-    let mut look = picture.look();
+    let has_image = studio.has_image();
+    let mut look = picture.look(has_image);
     if args.is_overview() {
         // A block on a table: no air between it and the eye.
         look.haze = Haze::Off;
@@ -126,7 +127,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         return print_json(&Answer {
             output: args.output.clone(),
             size_px: [width, height],
-            style: picture.style.clone(),
+            style: picture.style(has_image).to_owned(),
             ramp: look.ramp.name,
             frame: args.frame,
             eye_m: view.eye_m.to_array(),

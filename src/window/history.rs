@@ -28,6 +28,8 @@ pub(crate) struct Figures {
     pub record_bytes: u64,
     /// Pages that came from storage.
     pub pages_come: u64,
+    /// Bytes of image tiles sent to the device.
+    pub image_bytes: u64,
     /// Vertices that wait for a page.
     pub late: u64,
 }
@@ -46,6 +48,7 @@ pub(crate) const SERIES: &[Series] = &[
     ("record pages", "", |f| f.pages as f64),
     ("record bytes", "B", |f| f.record_bytes as f64),
     ("pages from storage", "", |f| f.pages_come as f64),
+    ("image tiles", "B", |f| f.image_bytes as f64),
     ("vertices late", "", |f| f.late as f64),
 ];
 

@@ -10,7 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use terrasoar::refine::Culling;
 use terrasoar_render::ramps::Ramp;
-use terrasoar_render::{Capabilities, Contours, Haze, LOOKS, Look};
+use terrasoar_render::{Capabilities, Contours, Haze, LOOKS, Look, Surface};
 
 /// Everything that is remembered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -31,6 +31,8 @@ pub(crate) struct Settings {
     pub style: String,
     /// Name of a ramp; without it the style's own.
     pub ramp: Option<String>,
+    /// How much of the terrain's image shows, 0 to 1.
+    pub image: f32,
     /// Whether contour lines are drawn.
     pub contours: bool,
     /// Metres from contour line to contour line.
@@ -63,6 +65,7 @@ impl Default for Settings {
             sun_elevation_deg: 38.0,
             style: LOOKS[0].0.to_owned(),
             ramp: None,
+            image: 1.0,
             contours: false,
             contour_interval_m: 100.0,
             wireframe: false,
@@ -124,6 +127,9 @@ impl Settings {
         let style = Look::named(&self.style).unwrap_or_default();
         let mut look = style;
         look.ramp = self.ramp.as_deref().and_then(Ramp::named).unwrap_or(style.ramp);
+        if matches!(look.surface, Surface::Tint) {
+            look.imagery = self.image;
+        }
         look.sun.azimuth_rad = self.sun_azimuth_deg.to_radians();
         look.sun.elevation_rad = self.sun_elevation_deg.to_radians();
         look.contours = self

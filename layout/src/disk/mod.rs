@@ -72,6 +72,11 @@ impl Disk for SystemDisk {
     }
 }
 
+/// Writes all of `bytes` at `offset`.
+pub(crate) fn write_at(file: &File, bytes: &[u8], offset: u64) -> Result<()> {
+    SystemDisk.write_at(file, bytes, offset)
+}
+
 /// Fills `bytes` from `offset`.
 pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> Result<()> {
     #[cfg(unix)]

@@ -7,8 +7,8 @@
 use super::pyramid::MadeTile;
 use super::section::{Section, TileEntry};
 use super::shape::{ImageryShape, TileId};
-use crate::atomic_file::write_at;
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
+use crate::disk::write_at;
 use crate::error::LayoutError;
 use crate::header::{Header, ImageryPlace};
 use std::fs::File;

@@ -9,7 +9,7 @@ use terrasoar_render::LOOKS;
 use terrasoar_render::ramps::RAMPS;
 
 /// Style, colours, sun, lines.
-pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
+pub(super) fn show(ui: &mut Ui, facts: &Facts<'_>, settings: &mut Settings) {
     let before = settings.style.clone();
     ComboBox::from_label("style").width(150.0).selected_text(&before).show_ui(ui, |ui| {
         for (name, about) in LOOKS {
@@ -26,6 +26,10 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
                 .on_hover_text(ramp.about);
         }
     });
+    if facts.has_image {
+        ui.add(Slider::new(&mut settings.image, 0.0..=1.0).fixed_decimals(2).text("image"))
+            .on_hover_text("How much of the terrain's image shows");
+    }
     ui.add(
         Slider::new(&mut settings.sun_azimuth_deg, 0.0..=360.0)
             .suffix("°")

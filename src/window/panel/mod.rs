@@ -43,6 +43,8 @@ pub(crate) struct Facts<'a> {
     pub terrain: &'a str,
     /// Metres from the south-west to the north-east sample.
     pub extent_m: [f64; 2],
+    /// Whether an image is draped over it.
+    pub has_image: bool,
     /// The adapter's name.
     pub adapter: &'a str,
     /// The point under the cursor.
@@ -95,7 +97,7 @@ pub(crate) fn show(
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 ui.spacing_mut().slider_width = 132.0;
                 title(ui, facts);
-                section(ui, "Look", true, |ui| look::show(ui, settings));
+                section(ui, "Look", true, |ui| look::show(ui, facts, settings));
                 section(ui, "Mesh", true, |ui| look::mesh(ui, facts, settings, &mut wishes));
                 section(ui, "Place", true, |ui| place::show(ui, facts, memory, &mut wishes));
                 section(ui, "Flight", true, |ui| flights::show(ui, facts, &mut wishes));

@@ -92,6 +92,7 @@ impl Viewer {
             pages: refined.pages_read,
             record_bytes: refined.record_bytes_read,
             pages_come: refined.pages_come,
+            image_bytes: drawn.image.bytes,
             late: refined.work.late,
         });
     }

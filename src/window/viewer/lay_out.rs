@@ -20,6 +20,7 @@ impl Viewer {
         let facts = Facts {
             terrain: &self.terrain_name,
             extent_m,
+            has_image: self.stage.scene.has_image(),
             adapter: &adapter,
             under: self.under,
             eye_m: self.rig.camera.eye_m.to_array(),
