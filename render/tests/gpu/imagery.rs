@@ -25,6 +25,7 @@ pub fn tests() -> Vec<(&'static str, Test)> {
         ("imagery::what_is_ahead_is_there_in_time", ahead),
         ("imagery::no_seam_between_tiles", seams),
         ("imagery::no_image_shows_the_tint", transparent),
+        ("imagery::half_transparent_is_half_the_light", half_transparent),
         ("imagery::absent_tiles_are_asked_for_once", absent),
         ("imagery::blocks_look_as_their_texels", blocks),
         ("imagery::flat_views_are_sharp_across_and_calm_along", anisotropy),
@@ -490,6 +491,41 @@ fn transparent(gpu: &Gpu) -> Outcome {
     ensure(inside > 1000 && outside > 1000, || format!("{inside} pixels inside, {outside} outside"))
 }
 
+/// Of every format that has such texels, BC7 of squares of one colour.
+fn half_transparent(gpu: &Gpu) -> Outcome {
+    let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
+    let mut scene = Scene::new(gpu, &square);
+    scene.show(&square.down_to(0));
+    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    // Heights whose colours are too dark for the shoulder.
+    let look = Look { tint_range_m: Some([0.0, 9000.0]), rock: 0.0, ..bare() };
+    let tint = scene.draw(&view, &Look { imagery: 0.0, ..look });
+    let colour = [151, 75, 201, 129];
+    for format in gpu.capabilities.imagery_formats().iter().filter(|f| **f != ImageryFormat::Bc1) {
+        let shape = ImageryShape { format: *format, ..Image::shape_over(&square.terrain, 1.0) };
+        let image = Image::new(shape, move |_, _, _| colour);
+        drape(&mut scene, &image, 16);
+        show_all(&mut scene, &image, &view);
+        let shown = scene.draw(&view, &look);
+        let share = 129.0 / 255.0;
+        let photo = linear_of(colour);
+        let depth = scene.depth_m();
+        for (i, depth_m) in (0..).zip(&depth).filter(|(_, d)| **d > 0.0) {
+            let [x, y] = [i % SIZE_PX[0], i / SIZE_PX[0]];
+            let below = linear_of(pixel(&tint, x, y));
+            for (channel, code) in pixel(&shown, x, y).iter().take(3).enumerate() {
+                let expected = encoded(share * photo[channel] + (1.0 - share) * below[channel]);
+                ensure((expected - f64::from(*code)).abs() < 3.0, || {
+                    format!(
+                        "{format:?}, {depth_m} m: pixel {x}, {y} is {code} in channel {channel}, not {expected:.1}"
+                    )
+                })?;
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Tiles without image are never asked for again, nor is anything below them, and what is there is not touched.
 fn absent(gpu: &Gpu) -> Outcome {
     let square = level_ground();
@@ -563,6 +599,19 @@ fn blocks(gpu: &Gpu) -> Outcome {
     }
     let most = pictures[0].rgba.iter().zip(&pictures[1].rgba).map(|(a, b)| a.abs_diff(*b)).max();
     ensure(most <= Some(3), || format!("the pictures differ by up to {most:?}"))?;
+    // Squares of one colour, in blocks of the other kind.
+    let plain = |_: u32, x: i64, y: i64| {
+        let [i, j] = [x.div_euclid(4), y.div_euclid(4)];
+        [(i * 37 % 200) as u8 | 1, (j * 53 % 200) as u8 | 1, ((i + j) * 11 % 200) as u8 | 1, 255]
+    };
+    let [seven, raw] = [ImageryFormat::Bc7, ImageryFormat::Rgba8].map(|format| {
+        let image = Image::new(ImageryShape { format, ..shape }, plain);
+        drape(&mut scene, &image, 32);
+        show_all(&mut scene, &image, &view);
+        scene.draw(&view, &look)
+    });
+    let most = seven.rgba.iter().zip(&raw.rgba).map(|(a, b)| a.abs_diff(*b)).max();
+    ensure(most <= Some(3), || format!("the pictures of BC7 differ by up to {most:?}"))?;
     let plain = scene.draw(&view, &Look::default());
     ensure(plain.difference(&pictures[0]) > 0.05, || "there is no image to see".into())
 }
