@@ -16,7 +16,7 @@ impl Renderer {
     /// # Errors
     ///
     /// [`RenderError::Usage`] for a shape that is none, a format the device does not take, and a pool that does not hold the coarsest
-    /// level. The image before is then gone too.
+    /// level, or is smaller than the table of all tiles (where the image has more than a million texels a side). The image before is then gone too.
     pub fn set_imagery(&mut self, shape: Option<ImageryShape>, pool_bytes: u64) -> Result<()> {
         self.bind_group = None;
         self.imagery = None;

@@ -23,6 +23,9 @@ pub const IMAGE_TILE_BORDER: u32 = 4;
 /// Texels a side that a tile is there for.
 pub const IMAGE_TILE_INNER: u32 = IMAGE_TILE_TEXELS - 2 * IMAGE_TILE_BORDER;
 
+/// Memory that a page table may take beside a small pool: that of an image of a million texels a side needs a third.
+const MOST_PAGE_TABLE_BYTES: u64 = 64 << 20;
+
 /// A tile of an image: level 0 the finest, x east and y north from the image's south-west corner, in tiles.
 pub type ImageTileId = TileId;
 
@@ -165,10 +168,17 @@ impl Imagery {
             ));
         }
         let pyramid = shape.pyramid();
-        let side = pyramid.across(0).into_iter().max().unwrap_or(1).next_power_of_two();
-        if side > device.limits().max_texture_dimension_2d {
+        let [east, north] = pyramid.across(0).map(u32::next_power_of_two);
+        if east.max(north) > device.limits().max_texture_dimension_2d {
             return Err(RenderError::Usage(
                 "the image has more tiles in a row than the device's textures texels",
+            ));
+        }
+        // With all its levels the page table is a third larger.
+        let page_table_bytes = u64::from(east) * u64::from(north) * 16 / 3;
+        if page_table_bytes > pool_bytes.max(MOST_PAGE_TABLE_BYTES) {
+            return Err(RenderError::Usage(
+                "the image has so many tiles that the table of them is larger than the pool; give it more memory",
             ));
         }
         let coarsest = pyramid.roots().count();

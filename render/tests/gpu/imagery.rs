@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    FrameView, Gpu, Haze, ImageTileId, ImageryFormat, ImageryShape, Look, RenderError, Renderer,
-    RendererOptions, Sun, Surface, wgpu,
+    Contours, FrameView, Gpu, Haze, ImageTileId, ImageryFormat, ImageryShape, Look, RenderError, Renderer,
+    RendererOptions, Sun, Surface, Wireframe, wgpu,
 };
 
 use crate::support::image::{Image, Texel, drape, encoded, give, in_565, linear_of};
@@ -30,6 +30,7 @@ pub fn tests() -> Vec<(&'static str, Test)> {
         ("imagery::blocks_look_as_their_texels", blocks),
         ("imagery::flat_views_are_sharp_across_and_calm_along", anisotropy),
         ("imagery::light_does_not_double", light),
+        ("imagery::lines_and_edges_lie_over_it", lines),
         ("imagery::wrong_use_is_told", wrong_use),
     ]
 }
@@ -707,6 +708,31 @@ fn light(gpu: &Gpu) -> Outcome {
     Ok(())
 }
 
+/// Edges that nobody sees change nothing though triangles have vertices of their own; contours are as dark as on bare ground.
+fn lines(gpu: &Gpu) -> Outcome {
+    let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
+    let mut scene = Scene::new(gpu, &square);
+    scene.show(&square.down_to(0));
+    let image = Image::new(Image::shape_over(&square.terrain, 1.0), |_, _, _| [150, 140, 130, 255]);
+    drape(&mut scene, &image, 16);
+    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    show_all(&mut scene, &image, &view);
+    let look = bare();
+    let plain = scene.draw(&view, &look);
+    let unseen = Wireframe { opacity: 0.0, ..Wireframe::default() };
+    let edges = scene.draw(&view, &Look { wireframe: Some(unseen), ..look });
+    ensure(edges.difference(&plain) < 0.001, || format!("unseen edges: {}", edges.difference(&plain)))?;
+    let black = Contours { colour: [0.0; 3], opacity: 1.0, interval_m: 40.0, ..Contours::default() };
+    let contours = Some(black);
+    let on_image = scene.draw(&view, &Look { contours, ..look });
+    let on_tint = scene.draw(&view, &Look { contours, imagery: 0.0, ..look });
+    let dark = |p: &Picture| p.rgba.chunks_exact(4).filter(|p| p[..3].iter().all(|c| *c < 20)).count();
+    let [on_image, on_tint, none] = [&on_image, &on_tint, &plain].map(dark);
+    ensure(on_tint > 100 && on_image.abs_diff(on_tint) * 20 < on_tint && none == 0, || {
+        format!("{on_image} pixels of lines on the image, {on_tint} on bare ground, {none} without")
+    })
+}
+
 fn wrong_use(gpu: &Gpu) -> Outcome {
     let square = level_ground();
     let mut scene = Scene::new(gpu, &square);
@@ -723,6 +749,8 @@ fn wrong_use(gpu: &Gpu) -> Outcome {
         ImageryShape { levels: 0, ..shape },
         ImageryShape { texel_m: [1.0, -1.0], ..shape },
         ImageryShape { origin_m: [f64::NAN, 0.0], ..shape },
+        // More tiles than anyone could list.
+        ImageryShape { texels: [1 << 22; 2], ..shape },
         // A coarsest level of many tiles in a pool of one.
         ImageryShape { levels: 1, ..shape },
     ] {
