@@ -58,7 +58,8 @@
 //! # When a device is lost
 //!
 //! [`DeviceWatch::check`] returns [`RenderError::DeviceLost`] from then on. All that was on the device is gone, and none of it was
-//! the only copy: make a [`Gpu`] and a [`Renderer`] anew, apply one patch with the whole mesh, and give tiles as they are wanted.
+//! the only copy: make a [`Gpu`] and a [`Renderer`] anew, apply one patch with the whole mesh,
+//! set the image if there was one, and give tiles as they are wanted.
 //!
 //! # How things are
 //!

@@ -150,8 +150,8 @@ impl Default for Look {
 /// Names of the prepared looks and a line about each; the first is the default.
 pub const LOOKS: &[(&str, &str)] = &[
     ("relief", "tint by height, sun, haze"),
-    ("photo", "the image where there is one, else a plainer relief"),
     ("hillshade", "light and shade alone"),
+    ("photo", "the image where there is one, else a plainer relief"),
     ("contours", "tint by height with contour lines"),
     ("slope", "steepness from level to 60 degrees"),
     ("wireframe", "the relief with the edges of its triangles"),

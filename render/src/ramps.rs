@@ -128,7 +128,7 @@ pub fn linear_of(srgb: u32) -> [f32; 3] {
     })
 }
 
-fn encode(linear: f32) -> f32 {
+pub(crate) fn encode(linear: f32) -> f32 {
     let c = linear.clamp(0.0, 1.0);
     if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
 }

@@ -128,7 +128,7 @@ impl Uniforms {
             image: [image.levels, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, IMAGE_TILE_BORDER],
             image_eye: image.eye,
             image_scale: image.scale,
-            image_share: [look.imagery.clamp(0.0, 1.0), 0.0, 0.0, 0.0],
+            image_share: [look.imagery.clamp(0.0, 1.0), image.straight, 0.0, 0.0],
         }
     }
 }
@@ -139,6 +139,7 @@ struct Image {
     levels: u32,
     eye: [i32; 4],
     scale: [f32; 4],
+    straight: f32,
 }
 
 impl Image {
@@ -151,6 +152,7 @@ impl Image {
             levels: imagery.pool.pyramid.levels(),
             eye: [eye[0].0, eye[1].0, wide, high],
             scale: [east, north, eye[0].1 as f32, eye[1].1 as f32],
+            straight: f32::from(u8::from(shape.format.is_straight())),
         }
     }
 }

@@ -16,7 +16,7 @@ impl Renderer {
     /// # Errors
     ///
     /// [`RenderError::Usage`] for a shape that is none, a format the device does not take, and a pool that does not hold the coarsest
-    /// level. The image before is then gone too.
+    /// level, or is smaller than the table of all tiles (where the image has more than a million texels a side). The image before is then gone too.
     pub fn set_imagery(&mut self, shape: Option<ImageryShape>, pool_bytes: u64) -> Result<()> {
         self.bind_group = None;
         self.imagery = None;
@@ -45,15 +45,14 @@ impl Renderer {
         &missing[..missing.len().min(most)]
     }
 
-    /// Gives an image tile: rows from south to north, 512 x 512 texels with their border, in the format of the shape; colours multiplied by alpha. Returns the
+    /// Gives an image tile: rows from south to north, 512 x 512 texels with their border, in the format of the shape. Returns the
     /// bytes sent; none where all room is taken by tiles that are wanted more.
     ///
     /// # Errors
     ///
     /// [`RenderError::TileSize`], [`RenderError::NoSuchTile`]; [`RenderError::Usage`] without an image.
     pub fn give_imagery(&mut self, tile: ImageTileId, bytes: &[u8]) -> Result<u64> {
-        let imagery = self.imagery.as_mut().ok_or(NO_IMAGE)?;
-        imagery.pool.upload(&self.queue, tile, bytes)
+        self.imagery.as_mut().ok_or(NO_IMAGE)?.give(&self.queue, tile, bytes)
     }
 
     /// Says that a tile does not exist, because the image has nothing there: neither it nor any below it is asked for again.

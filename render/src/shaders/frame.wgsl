@@ -45,7 +45,7 @@ struct Frame {
     image_eye: vec4<i32>,
     // Texels a metre east and north; the eye's place in its texel.
     image_scale: vec4<f32>,
-    // Share of the image in the ground's colour.
+    // Share of the image in the ground's colour; 1 where its colours are not yet multiplied by alpha.
     image_share: vec4<f32>,
 }
 

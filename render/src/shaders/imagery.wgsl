@@ -18,7 +18,7 @@ struct Footprint {
     reach: vec2<f32>,
 }
 
-// From the finest resident tile that is not finer than a level. Colours are multiplied by alpha.
+// From the finest resident tile that is not finer than a level; colours multiplied by alpha.
 fn image_tile(f: Footprint, from_level: u32) -> vec4<f32> {
     for (var level = from_level; level < frame.image.x; level++) {
         let side = i32(frame.image.y << level);
@@ -34,7 +34,8 @@ fn image_tile(f: Footprint, from_level: u32) -> vec4<f32> {
             var sum = vec4(0.0);
             for (var i = 0.5; i < taps; i += 1.0) {
                 let tap = clamp(at + step * (i - 0.5 * taps), vec2(0.5), vec2(f32(frame.image.z) - 0.5));
-                sum += textureSampleLevel(image_layers, smooth_sampler, tap / f32(frame.image.z), entry - 1u, 0.0);
+                let texel = textureSampleLevel(image_layers, smooth_sampler, tap / f32(frame.image.z), entry - 1u, 0.0);
+                sum += vec4(texel.rgb * mix(1.0, texel.a, frame.image_share.y), texel.a);
             }
             return sum / taps;
         }

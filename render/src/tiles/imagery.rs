@@ -1,15 +1,19 @@
 //! Content for colour: a photograph, draped.
 //!
 //! Unlike slopes, which lie on the grid's points, texels are areas and the image has a place and a texel size of its own. Tiles carry a
-//! border, so that a filter as wide as [`IMAGE_TILE_BORDER`] needs one tile alone and there is no seam. Colours
-//! are multiplied by alpha (in linear light, as blocks without a fourth colour are anyway): what is
-//! filtered then fades into the ground below without a fringe.
+//! border, so that a filter as wide as [`IMAGE_TILE_BORDER`] needs one tile alone and there is no seam.
+//!
+//! What is filtered fades into the ground below without a fringe where colours are multiplied by alpha, in linear light. Transparent texels
+//! of BC1 are black, so they are; RGBA8 is multiplied on its way to the device, for which opaque tiles cost a look;
+//! BC7 can only be multiplied when it has been filtered.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use super::{Pyramid, Raster, TileId, TileLayout, TilePool, WantedTiles};
 use crate::error::{RenderError, Result};
 use crate::gpu::Capabilities;
+use crate::ramps::{encode, linear_of};
 use crate::view::{FrameView, TerrainShape};
 
 /// Stored texels a side of an image tile, border included.
@@ -19,15 +23,18 @@ pub const IMAGE_TILE_BORDER: u32 = 4;
 /// Texels a side that a tile is there for.
 pub const IMAGE_TILE_INNER: u32 = IMAGE_TILE_TEXELS - 2 * IMAGE_TILE_BORDER;
 
+/// Memory that a page table may take beside a small pool: that of an image of a million texels a side needs a third.
+const MOST_PAGE_TABLE_BYTES: u64 = 64 << 20;
+
 /// A tile of an image: level 0 the finest, x east and y north from the image's south-west corner, in tiles.
 pub type ImageTileId = TileId;
 
-/// How texels are stored; sRGB, with alpha.
+/// How texels are stored: sRGB, and alpha that they are not multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ImageryFormat {
     /// Blocks of 4 x 4 texels in 8 bytes; alpha 0 or 1.
     Bc1,
-    /// Blocks of 4 x 4 texels in 16 bytes.
+    /// Blocks of 4 x 4 texels in 16 bytes. Texels of alpha 0 should have a colour like their neighbours', which shows half a texel far.
     Bc7,
     /// 4 bytes a texel.
     Rgba8,
@@ -50,6 +57,11 @@ impl ImageryFormat {
 
     fn is_compressed(self) -> bool {
         self != Self::Rgba8
+    }
+
+    /// Whether the device gets colours that are not multiplied by alpha.
+    pub(crate) fn is_straight(self) -> bool {
+        self == Self::Bc7
     }
 }
 
@@ -156,10 +168,17 @@ impl Imagery {
             ));
         }
         let pyramid = shape.pyramid();
-        let side = pyramid.across(0).into_iter().max().unwrap_or(1).next_power_of_two();
-        if side > device.limits().max_texture_dimension_2d {
+        let [east, north] = pyramid.across(0).map(u32::next_power_of_two);
+        if east.max(north) > device.limits().max_texture_dimension_2d {
             return Err(RenderError::Usage(
                 "the image has more tiles in a row than the device's textures texels",
+            ));
+        }
+        // With all its levels the page table is a third larger.
+        let page_table_bytes = u64::from(east) * u64::from(north) * 16 / 3;
+        if page_table_bytes > pool_bytes.max(MOST_PAGE_TABLE_BYTES) {
+            return Err(RenderError::Usage(
+                "the image has so many tiles that the table of them is larger than the pool; give it more memory",
             ));
         }
         let coarsest = pyramid.roots().count();
@@ -199,6 +218,13 @@ impl Imagery {
             self.wanted_ahead.find_on(&self.pool.pyramid, &self.raster, view, |tile| !absent.contains(&tile));
         self.pool.residency.want_ahead(wanted);
         self.pool.residency.missing_ahead()
+    }
+
+    pub(crate) fn give(&mut self, queue: &wgpu::Queue, tile: TileId, bytes: &[u8]) -> Result<u64> {
+        match self.shape.format {
+            ImageryFormat::Rgba8 => self.pool.upload(queue, tile, &multiplied(bytes)),
+            ImageryFormat::Bc1 | ImageryFormat::Bc7 => self.pool.upload(queue, tile, bytes),
+        }
     }
 
     pub(crate) fn set_absent(&mut self, queue: &wgpu::Queue, tile: TileId) -> Result<()> {
@@ -247,6 +273,28 @@ impl Imagery {
     }
 }
 
+/// Colours multiplied by alpha, in linear light.
+fn multiplied(rgba: &[u8]) -> Cow<'_, [u8]> {
+    let (texels, _) = rgba.as_chunks::<4>();
+    if texels.iter().all(|t| t[3] == 255) {
+        return rgba.into();
+    }
+    // Each pair of colour and alpha is worked out once a tile.
+    let mut known = vec![None; 1 << 16];
+    let mut times = |code: u8, alpha: u8| {
+        *known[usize::from(code) << 8 | usize::from(alpha)].get_or_insert_with(|| {
+            let [linear, ..] = linear_of(u32::from(code) << 16);
+            (255.0 * encode(linear * f32::from(alpha) / 255.0)).round() as u8
+        })
+    };
+    let multiplied = texels.iter().map(|&[r, g, b, a]| match a {
+        255 => [r, g, b, a],
+        0 => [0; 4],
+        _ => [times(r, a), times(g, a), times(b, a), a],
+    });
+    multiplied.flatten().collect::<Vec<u8>>().into()
+}
+
 #[cfg(test)]
 mod tests {
     use std::time::Instant;
@@ -263,6 +311,15 @@ mod tests {
         origin_m: [0.0; 2],
         texel_m: [1.0; 2],
     };
+
+    #[test]
+    fn colours_are_multiplied_in_linear_light() {
+        let opaque = [9, 200, 77, 255];
+        assert!(matches!(multiplied(&opaque), Cow::Borrowed(_)));
+        // Half of the light of white is 188.
+        let texels = [255, 255, 0, 128, 90, 80, 70, 0, 1, 2, 3, 255];
+        assert_eq!(*multiplied(&texels), [188, 188, 0, 128, 0, 0, 0, 0, 1, 2, 3, 255]);
+    }
 
     #[test]
     fn tiles_have_the_bytes_of_their_format() {

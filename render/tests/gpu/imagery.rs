@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    FrameView, Gpu, Haze, ImageTileId, ImageryFormat, ImageryShape, Look, RenderError, Renderer,
-    RendererOptions, Sun, Surface, wgpu,
+    Contours, FrameView, Gpu, Haze, ImageTileId, ImageryFormat, ImageryShape, Look, RenderError, Renderer,
+    RendererOptions, Sun, Surface, Wireframe, wgpu,
 };
 
 use crate::support::image::{Image, Texel, drape, encoded, give, in_565, linear_of};
@@ -25,10 +25,12 @@ pub fn tests() -> Vec<(&'static str, Test)> {
         ("imagery::what_is_ahead_is_there_in_time", ahead),
         ("imagery::no_seam_between_tiles", seams),
         ("imagery::no_image_shows_the_tint", transparent),
+        ("imagery::half_transparent_is_half_the_light", half_transparent),
         ("imagery::absent_tiles_are_asked_for_once", absent),
         ("imagery::blocks_look_as_their_texels", blocks),
         ("imagery::flat_views_are_sharp_across_and_calm_along", anisotropy),
         ("imagery::light_does_not_double", light),
+        ("imagery::lines_and_edges_lie_over_it", lines),
         ("imagery::wrong_use_is_told", wrong_use),
     ]
 }
@@ -490,6 +492,41 @@ fn transparent(gpu: &Gpu) -> Outcome {
     ensure(inside > 1000 && outside > 1000, || format!("{inside} pixels inside, {outside} outside"))
 }
 
+/// Of every format that has such texels, BC7 of squares of one colour.
+fn half_transparent(gpu: &Gpu) -> Outcome {
+    let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
+    let mut scene = Scene::new(gpu, &square);
+    scene.show(&square.down_to(0));
+    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    // Heights whose colours are too dark for the shoulder.
+    let look = Look { tint_range_m: Some([0.0, 9000.0]), rock: 0.0, ..bare() };
+    let tint = scene.draw(&view, &Look { imagery: 0.0, ..look });
+    let colour = [151, 75, 201, 129];
+    for format in gpu.capabilities.imagery_formats().iter().filter(|f| **f != ImageryFormat::Bc1) {
+        let shape = ImageryShape { format: *format, ..Image::shape_over(&square.terrain, 1.0) };
+        let image = Image::new(shape, move |_, _, _| colour);
+        drape(&mut scene, &image, 16);
+        show_all(&mut scene, &image, &view);
+        let shown = scene.draw(&view, &look);
+        let share = 129.0 / 255.0;
+        let photo = linear_of(colour);
+        let depth = scene.depth_m();
+        for (i, depth_m) in (0..).zip(&depth).filter(|(_, d)| **d > 0.0) {
+            let [x, y] = [i % SIZE_PX[0], i / SIZE_PX[0]];
+            let below = linear_of(pixel(&tint, x, y));
+            for (channel, code) in pixel(&shown, x, y).iter().take(3).enumerate() {
+                let expected = encoded(share * photo[channel] + (1.0 - share) * below[channel]);
+                ensure((expected - f64::from(*code)).abs() < 3.0, || {
+                    format!(
+                        "{format:?}, {depth_m} m: pixel {x}, {y} is {code} in channel {channel}, not {expected:.1}"
+                    )
+                })?;
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Tiles without image are never asked for again, nor is anything below them, and what is there is not touched.
 fn absent(gpu: &Gpu) -> Outcome {
     let square = level_ground();
@@ -563,6 +600,19 @@ fn blocks(gpu: &Gpu) -> Outcome {
     }
     let most = pictures[0].rgba.iter().zip(&pictures[1].rgba).map(|(a, b)| a.abs_diff(*b)).max();
     ensure(most <= Some(3), || format!("the pictures differ by up to {most:?}"))?;
+    // Squares of one colour, in blocks of the other kind.
+    let plain = |_: u32, x: i64, y: i64| {
+        let [i, j] = [x.div_euclid(4), y.div_euclid(4)];
+        [(i * 37 % 200) as u8 | 1, (j * 53 % 200) as u8 | 1, ((i + j) * 11 % 200) as u8 | 1, 255]
+    };
+    let [seven, raw] = [ImageryFormat::Bc7, ImageryFormat::Rgba8].map(|format| {
+        let image = Image::new(ImageryShape { format, ..shape }, plain);
+        drape(&mut scene, &image, 32);
+        show_all(&mut scene, &image, &view);
+        scene.draw(&view, &look)
+    });
+    let most = seven.rgba.iter().zip(&raw.rgba).map(|(a, b)| a.abs_diff(*b)).max();
+    ensure(most <= Some(3), || format!("the pictures of BC7 differ by up to {most:?}"))?;
     let plain = scene.draw(&view, &Look::default());
     ensure(plain.difference(&pictures[0]) > 0.05, || "there is no image to see".into())
 }
@@ -658,6 +708,31 @@ fn light(gpu: &Gpu) -> Outcome {
     Ok(())
 }
 
+/// Edges that nobody sees change nothing though triangles have vertices of their own; contours are as dark as on bare ground.
+fn lines(gpu: &Gpu) -> Outcome {
+    let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
+    let mut scene = Scene::new(gpu, &square);
+    scene.show(&square.down_to(0));
+    let image = Image::new(Image::shape_over(&square.terrain, 1.0), |_, _, _| [150, 140, 130, 255]);
+    drape(&mut scene, &image, 16);
+    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    show_all(&mut scene, &image, &view);
+    let look = bare();
+    let plain = scene.draw(&view, &look);
+    let unseen = Wireframe { opacity: 0.0, ..Wireframe::default() };
+    let edges = scene.draw(&view, &Look { wireframe: Some(unseen), ..look });
+    ensure(edges.difference(&plain) < 0.001, || format!("unseen edges: {}", edges.difference(&plain)))?;
+    let black = Contours { colour: [0.0; 3], opacity: 1.0, interval_m: 40.0, ..Contours::default() };
+    let contours = Some(black);
+    let on_image = scene.draw(&view, &Look { contours, ..look });
+    let on_tint = scene.draw(&view, &Look { contours, imagery: 0.0, ..look });
+    let dark = |p: &Picture| p.rgba.chunks_exact(4).filter(|p| p[..3].iter().all(|c| *c < 20)).count();
+    let [on_image, on_tint, none] = [&on_image, &on_tint, &plain].map(dark);
+    ensure(on_tint > 100 && on_image.abs_diff(on_tint) * 20 < on_tint && none == 0, || {
+        format!("{on_image} pixels of lines on the image, {on_tint} on bare ground, {none} without")
+    })
+}
+
 fn wrong_use(gpu: &Gpu) -> Outcome {
     let square = level_ground();
     let mut scene = Scene::new(gpu, &square);
@@ -674,6 +749,8 @@ fn wrong_use(gpu: &Gpu) -> Outcome {
         ImageryShape { levels: 0, ..shape },
         ImageryShape { texel_m: [1.0, -1.0], ..shape },
         ImageryShape { origin_m: [f64::NAN, 0.0], ..shape },
+        // More tiles than anyone could list.
+        ImageryShape { texels: [1 << 22; 2], ..shape },
         // A coarsest level of many tiles in a pool of one.
         ImageryShape { levels: 1, ..shape },
     ] {

@@ -7,7 +7,7 @@ use terrasoar_render::{
 
 use super::scene::Scene;
 
-/// A texel: sRGB and alpha, the colour already multiplied by it.
+/// A texel: sRGB and straight alpha.
 pub type Texel = [u8; 4];
 
 /// An image whose texels are a function of level, column and row.
@@ -51,7 +51,7 @@ impl Image {
                     *s += part / 16.0;
                 }
             }
-            let [r, g, b] = [0, 1, 2].map(|i| encoded(sum[i]).round() as u8);
+            let [r, g, b] = [0, 1, 2].map(|i| encoded(sum[i] / sum[3].max(1e-9)).round() as u8);
             [r, g, b, (255.0 * sum[3]).round() as u8]
         })
     }
@@ -87,7 +87,11 @@ impl Image {
         (0..blocks * blocks)
             .flat_map(|n| {
                 let [x, y] = [4 * (n % blocks), 4 * (n / blocks)];
-                encode_bc1(std::array::from_fn(|i| texel(x + i as i64 % 4, y + i as i64 / 4)))
+                let block = std::array::from_fn(|i| texel(x + i as i64 % 4, y + i as i64 / 4));
+                match self.shape.format {
+                    ImageryFormat::Bc7 => encode_bc7(block).to_vec(),
+                    _ => encode_bc1(block).to_vec(),
+                }
             })
             .collect()
     }
@@ -143,6 +147,18 @@ fn encode_bc1(texels: [Texel; 16]) -> [u8; 8] {
     block[2..4].copy_from_slice(&high.to_le_bytes());
     block[4..].copy_from_slice(&indices.to_le_bytes());
     block
+}
+
+/// A block of one colour of odd numbers: mode 6, both ends of seven bits alike and the bit that ends them 1.
+fn encode_bc7(texels: [Texel; 16]) -> [u8; 16] {
+    let colour = texels[0];
+    assert!(texels.iter().all(|t| *t == colour) && colour.iter().all(|c| c % 2 == 1), "{texels:?}");
+    let mut bits = 1_u128 << 6;
+    for (i, channel) in colour.iter().enumerate() {
+        let end = u128::from(channel >> 1);
+        bits |= (end | end << 7) << (7 + 14 * i);
+    }
+    (bits | 3 << 63).to_le_bytes()
 }
 
 /// Puts an image on the terrain, in a pool of so many tiles.
