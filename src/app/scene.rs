@@ -333,7 +333,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Gives the renderer tiles of the image that the view lacks, and counts them in `drawn`. A frame of a window is given what has come.
-    fn serve_image(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
+    pub(crate) fn serve_image(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
         let Some(drape) = &mut self.drape else { return Ok(()) };
         let ahead = match self.ways {
             [Some(before), Some(now)] => ahead(&before, &now),

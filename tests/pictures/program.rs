@@ -7,6 +7,7 @@ use terrasoar_render::{Gpu, LOOKS};
 pub const TESTS: &[Test] = &[
     ("program::a_snapshot_repeats", snapshot_repeats),
     ("program::every_style_draws", every_style),
+    ("program::an_image_lies_where_it_belongs", draped),
     ("program::movies_repeat_and_leave_nothing_else", movies),
     ("program::a_film_needs_ffmpeg", film),
     ("program::compare_has_a_picture", report),
@@ -20,6 +21,44 @@ fn png_size(bytes: &[u8]) -> Option<[u32; 2]> {
 
 fn read(bench: &Bench, name: &str) -> Vec<u8> {
     std::fs::read(bench.path(name)).unwrap()
+}
+
+/// An image of four quarters, seen from above.
+fn draped(_: &Gpu) -> Outcome {
+    let bench = Bench::with_terrain();
+    std::fs::copy(bench.path("land.iqt"), bench.path("bare.iqt")).unwrap();
+    const QUARTERS: [[u8; 3]; 4] = [[220, 30, 30], [30, 200, 30], [40, 40, 220], [210, 200, 30]];
+    let quarter = |x: u32, y: u32| QUARTERS[(2 * (y / 32) + x / 32) as usize];
+    image::RgbImage::from_fn(64, 64, |x, y| image::Rgb(quarter(x, y)))
+        .save(bench.path("quarters.png"))
+        .unwrap();
+    bench.good(&["drape", "land.iqt", "--image", "quarters.png"]);
+    let shoot = |terrain: &str, name: &str, more: &[&str]| {
+        let from_above =
+            ["--at", "1280,1280,9000", "--look", "0,-90", "--fov", "18", "--size", "240x240", "--json"];
+        bench.json(&[&["snapshot", terrain, "-o", name][..], &from_above, more].concat())
+    };
+    let told = shoot("land.iqt", "a.png", &[]);
+    ensure(told["style"] == "photo", || format!("{told}"))?;
+    let picture = image::load_from_memory(&read(&bench, "a.png")).unwrap().to_rgb8();
+    for (i, colour) in QUARTERS.into_iter().enumerate() {
+        let seen = picture.get_pixel(80 + 80 * (i as u32 % 2), 80 + 80 * (i as u32 / 2)).0;
+        // Light and haze change how bright it is, hardly which colour.
+        let strongest = |c: [u8; 3]| [0, 1, 2].map(|k| c[k] >= 100 && c[k] + 40 >= *c.iter().max().unwrap());
+        ensure(strongest(seen) == strongest(colour), || {
+            format!("quarter {i} is {seen:?}, not about {colour:?}")
+        })?;
+    }
+    shoot("land.iqt", "off.png", &["--image", "0"]);
+    shoot("bare.iqt", "bare.png", &["--style", "photo"]);
+    ensure(read(&bench, "off.png") == read(&bench, "bare.png"), || {
+        "an image of which nothing shows shows".into()
+    })?;
+    ensure(read(&bench, "off.png") != read(&bench, "a.png"), || "an image that shows does not".into())?;
+    shoot("land.iqt", "again.png", &[]);
+    ensure(read(&bench, "again.png") == read(&bench, "a.png"), || "it does not repeat".into())?;
+    // A terrain without an image goes as before.
+    ensure(shoot("bare.iqt", "plain.png", &[])["style"] == "relief", || "the style is another".into())
 }
 
 fn snapshot_repeats(_: &Gpu) -> Outcome {
