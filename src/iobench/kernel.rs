@@ -1,7 +1,8 @@
 //! What the kernel says about reading: page faults, bytes fetched from storage, memory held; and how to make it forget a file.
 //!
 //! Linux tells all of it in files under /proc, and takes the order to forget through `posix_fadvise`. Elsewhere, and where /proc is not mounted, every answer is
-//! `None`: not known, which is not 0. How much of a file is resident is left out: `mincore` is unsafe and no kept crate wraps `cachestat` yet. Cost: one small
+//! `None`: not known, which is not 0. How much of a file is in memory is asked where files are mapped
+//! ([`resident_bytes`](terrasoar_layout::source::resident_bytes)). Cost: one small
 //! file read an answer, some tens of microseconds, so ask outside what is timed.
 
 use std::path::Path;

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::loader::{Loader, LoaderStats};
 use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::source::resident_bytes;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -131,9 +132,10 @@ pub fn fly_pooled(
     let (cold, frames, loader) = pass(path, views, options, &mut |i| done(i))?;
     let storage_bytes = kernel::read_bytes().zip(before).map(|(now, then)| now - then);
     let peak_memory_bytes = if knows_peak { kernel::peak_memory_bytes() } else { None };
+    let resident_bytes = resident_bytes(path)?;
     let (warm, ..) = pass(path, views, options, &mut |i| done(views.len() as u64 + i))?;
     Ok(Pooled {
-        timed: Timed { was_forgotten, cold, warm, peak_memory_bytes },
+        timed: Timed { resident_bytes, was_forgotten, cold, warm, peak_memory_bytes },
         frames,
         loader,
         storage_bytes,

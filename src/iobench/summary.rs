@@ -122,6 +122,8 @@ pub struct IoRun {
     pub disk_read_mb_total: Option<f64>,
     /// Most memory the program held during the cold pass, touched pages of the map included, MB.
     pub peak_rss_mb: Option<f64>,
+    /// MB of the file that the system held in memory after the cold pass.
+    pub resident_mb: Option<f64>,
     /// What streaming did, of runs over a pool.
     pub stream: Option<StreamCost>,
     /// The pages of this run read from a scratch file through a map.
@@ -223,6 +225,7 @@ impl IoRun {
             update_ms_cold: None,
             update_ms_p99: None,
             update_ms_p99_cold: None,
+            resident_mb: None,
             stream: None,
             io_ms_p99: None,
             first_frame_io_ms: None,
@@ -257,6 +260,7 @@ impl IoRun {
             self.disk_read_mb_total = read_mb(&timed.cold);
             self.was_cold = self.disk_read_mb_total.map(|mb| mb >= 0.9 * self.first_frame_mb);
         }
+        self.resident_mb = timed.resident_bytes.map(|bytes| bytes as f64 / 1e6);
         self.peak_rss_mb = timed.peak_memory_bytes.map(|bytes| bytes as f64 / 1e6);
         self
     }
@@ -353,6 +357,7 @@ mod tests {
             cold: vec![cost(50.0, Some(9)), cost(3.0, Some(2)), cost(1.0, Some(0))],
             warm: vec![cost(5.0, Some(0)), cost(1.0, Some(0)), cost(2.0, Some(0))],
             peak_memory_bytes: None,
+            resident_bytes: None,
         };
         let sums = IoRun::of(&run(&[1, 1, 1])).with_times(&known);
         assert_eq!((sums.io_ms_p99, sums.first_frame_io_ms), (Some(2.0), Some(45.0)));

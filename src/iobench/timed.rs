@@ -15,6 +15,7 @@ use crate::view::View;
 use std::path::Path;
 use std::time::Instant;
 use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::source::resident_bytes;
 use terrasoar_layout::terrain::{Records, Terrain};
 use terrasoar_layout::with_records;
 
@@ -38,6 +39,8 @@ pub struct Timed {
     pub cold: Vec<UpdateCost>,
     /// Each frame's cost, warm.
     pub warm: Vec<UpdateCost>,
+    /// Bytes of the file that the system held after the cold pass; `None` where not known.
+    pub resident_bytes: Option<u64>,
     /// Most memory held during the cold pass in bytes, mapped pages included; `None` where not known.
     pub peak_memory_bytes: Option<u64>,
 }
@@ -65,8 +68,9 @@ pub fn time(
         let knows_peak = kernel::reset_peak_memory();
         let cold = fly(&records, views, culling, reader, 0, done);
         let peak_memory_bytes = if knows_peak { kernel::peak_memory_bytes() } else { None };
+        let resident_bytes = resident_bytes(path)?;
         let warm = fly(&records, views, culling, reader, views.len() as u64, done);
-        Ok(Timed { was_forgotten, cold, warm, peak_memory_bytes })
+        Ok(Timed { resident_bytes, was_forgotten, cold, warm, peak_memory_bytes })
     })
 }
 

@@ -143,6 +143,7 @@ pub(super) mod tests {
                         cold: vec![cost; 5],
                         warm: vec![UpdateCost { ms: 0.25, ..cost }; 5],
                         peak_memory_bytes: None,
+                        resident_bytes: None,
                     });
                     runs.push((run, timed));
                 }

@@ -3,7 +3,7 @@
 use crate::support::{Bench, fields, text};
 use serde_json::Value;
 
-const RUN_FIELDS: [&str; 36] = [
+const RUN_FIELDS: [&str; 37] = [
     "engine",
     "layout",
     "source",
@@ -37,6 +37,7 @@ const RUN_FIELDS: [&str; 36] = [
     "first_frame_major_faults",
     "disk_read_mb_total",
     "peak_rss_mb",
+    "resident_mb",
     "stream",
     "scratch_map",
     "scratch_pread",

@@ -45,6 +45,34 @@ impl MapSource {
     }
 }
 
+/// Bytes of the file at `path` that the system holds in memory, whoever had them read, in whole pages; `None` where it does not tell. Touches none of them.
+///
+/// # Errors
+/// As [`MapSource::open`].
+pub fn resident_bytes(path: &Path) -> Result<Option<u64>, LayoutError> {
+    let source = MapSource::open(path)?;
+    Ok(source.resident_bytes())
+}
+
+impl MapSource {
+    #[cfg(target_os = "linux")]
+    fn resident_bytes(&self) -> Option<u64> {
+        let page_bytes = rustix::param::page_size();
+        let mut pages = vec![0u8; self.map.len().div_ceil(page_bytes)];
+        #[expect(unsafe_code, reason = "the call fills an array of the caller's")]
+        // SAFETY: address and length are those of a live map, which begins on a page; the array has a byte for each page that the map begins. The map is only asked about.
+        let answer =
+            unsafe { libc::mincore(self.map.as_ptr().cast_mut().cast(), self.map.len(), pages.as_mut_ptr()) };
+        let resident = pages.iter().filter(|page| **page & 1 == 1).count();
+        (answer == 0).then_some(resident as u64 * page_bytes as u64)
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn resident_bytes(&self) -> Option<u64> {
+        None
+    }
+}
+
 impl Source for MapSource {
     fn path(&self) -> &Path {
         self.file.path()
@@ -60,5 +88,23 @@ impl Source for MapSource {
 
     fn bytes(&self) -> Option<&[u8]> {
         Some(&self.map)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_file_just_written_is_in_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f");
+        std::fs::write(&path, vec![7; 100_001]).unwrap();
+        let resident = resident_bytes(&path).unwrap().unwrap();
+        // A file system without a cache of its own holds nothing.
+        assert!(resident == 0 || resident >= 100_001, "{resident}");
+        assert!(resident <= 100_001u64.next_multiple_of(65_536), "{resident}");
+        assert!(resident_bytes(&folder.path().join("none")).is_err());
     }
 }

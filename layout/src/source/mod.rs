@@ -12,7 +12,7 @@ mod testing;
 #[cfg(target_os = "linux")]
 mod uring;
 
-pub use map::MapSource;
+pub use map::{MapSource, resident_bytes};
 pub use memory::MemorySource;
 pub use pread::PreadSource;
 #[cfg(any(test, feature = "testing"))]
