@@ -8,6 +8,8 @@ use terrasoar_layout::loader::{PageRequest, STALE_FRAMES};
 
 /// A page needed earlier by no more frames than this is not asked for again.
 const SLACK: u64 = 4;
+/// What is needed in more frames than this is not asked for: it is wanted again when it is nearer.
+const FARTHEST: f32 = 1000.0;
 /// Frames until a page that failed once is tried again.
 const FIRST_RETRY: u64 = 8;
 /// Longest wait between two tries, in frames.
@@ -43,7 +45,8 @@ impl Requests {
 
     /// The request to be made for a page wanted in so many frames, if there is one to be made.
     pub(super) fn ask(&mut self, page: u64, now: u64, in_frames: f32) -> Option<PageRequest> {
-        if self.trouble.get(&page).is_some_and(|trouble| now < trouble.not_before) {
+        let is_near = (0.0..FARTHEST).contains(&in_frames);
+        if !is_near || self.trouble.get(&page).is_some_and(|trouble| now < trouble.not_before) {
             return None;
         }
         let due = now + in_frames as u64;
@@ -111,6 +114,9 @@ mod tests {
             "renewed before it is stale"
         );
         assert_eq!(requests.came(7, 145), Some(45));
+        for never in [1e9, 1e30, f32::INFINITY, f32::NAN] {
+            assert_eq!(requests.ask(8, 150, never), None);
+        }
         assert_eq!(requests.outstanding(), 0);
     }
 

@@ -4,6 +4,7 @@
 //! another.
 
 use super::Kinetic;
+use super::ahead::Ahead;
 use super::certificate::{expiry_of, with_certificate};
 use super::clocks::{BANDS, HORIZON, Kind, Pose, clock_id};
 use super::nodes::{SPLIT, STATUS};
@@ -98,21 +99,28 @@ impl<S: RecordStore> Kinetic<S> {
     fn move_words(&mut self, from: usize, to: usize, expiry: impl Fn(u32) -> u32) {
         let mut waiting = std::mem::take(&mut self.waiting);
         let nodes = &mut self.nodes;
-        let mut move_word = |entry: Entry| {
-            if let Some(word) = nodes.word_if(entry.node, entry.word) {
+        let mut moved = |entry: Entry| {
+            nodes.word_if(entry.node, entry.word).map(|word| {
                 let moved = with_certificate(entry.word, to, expiry(expiry_of(entry.word)));
                 *word = moved | (*word & SPLIT);
-                waiting.push(Entry { node: entry.node, word: moved });
-            }
+                Entry { node: entry.node, word: moved }
+            })
         };
-        self.queue.drain(from, &mut move_word);
+        self.queue.drain(from, |entry| waiting.extend(moved(entry)));
         self.queue.restart(from, self.clocks.now(from) as u32);
+        let near = waiting.len();
         if let Some(ahead) = &mut self.ahead {
-            ahead.far.drain(from, &mut move_word);
+            ahead.far.drain(from, |entry| waiting.extend(moved(entry)));
             ahead.far.restart(from, ahead.until[from].min(u64::from(u32::MAX)) as u32);
         }
-        for entry in waiting.drain(..) {
-            self.enter(to, entry);
+        for (i, entry) in waiting.drain(..).enumerate() {
+            let stays_near = |ahead: &Ahead| i < near && u64::from(expiry_of(entry.word)) <= ahead.until[to];
+            // What was near has been looked from; that another clock counts it brings nothing that it will need.
+            if self.ahead.as_deref().is_none_or(stays_near) {
+                self.queue.enter(to, entry);
+            } else {
+                self.enter(to, entry);
+            }
         }
         self.waiting = waiting;
     }
