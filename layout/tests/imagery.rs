@@ -86,7 +86,7 @@ fn texel(x: u32, y: u32, has_alpha: bool) -> [u8; 4] {
         1 if has_alpha => (x * 3 + y) as u8,
         _ => 255,
     };
-    [(x / 3) as u8, hash as u8, if (x / 8 + y / 8) % 2 == 0 { 3 } else { 250 }, alpha]
+    [(x / 3) as u8, hash as u8, if (x / 8 + y / 8).is_multiple_of(2) { 3 } else { 250 }, alpha]
 }
 
 #[test]
