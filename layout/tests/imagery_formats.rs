@@ -11,7 +11,7 @@ use terrasoar_layout::imagery::open_image;
 const SIZE: [u32; 2] = [72, 56];
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(format!("image-{name}"))
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/image_fixtures").join(name)
 }
 
 /// The colours all fixtures show.

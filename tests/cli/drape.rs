@@ -84,7 +84,7 @@ fn refusals_change_nothing_and_say_what_to_do() {
     }
     assert!(std::fs::read(bench.path("land.iqt")).unwrap() == before);
     // A picture that says nothing about its place is laid over everything, aloud.
-    let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/layout/tests/fixtures/image-baseline.jpg");
+    let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/layout/tests/image_fixtures/baseline.jpg");
     let output = bench.run(&["drape", "land.iqt", "--image", fixture]);
     assert!(output.status.success() && text(&output.stderr).contains("laid over the whole terrain"));
 }
