@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the small pictures in layout/tests/fixtures, image-*: one for each way of storing one that is read, and those that are refused.
+"""Makes the small pictures in layout/tests/image_fixtures: one for each way of storing one that is read, and those that are refused.
 
 Usage: data-scripts/make-image-fixtures.py        (from anywhere; needs gdal-bin 3.6 or later, no Python packages)
 
@@ -10,7 +10,7 @@ import pathlib
 import subprocess
 import tempfile
 
-OUT = pathlib.Path(__file__).resolve().parent.parent / "layout" / "tests" / "fixtures"
+OUT = pathlib.Path(__file__).resolve().parent.parent / "layout" / "tests" / "image_fixtures"
 WIDTH, HEIGHT = 72, 56
 PLACE = ["-a_ullr", "1000", "5000", "1144", "4888"]
 
@@ -56,7 +56,7 @@ def main():
         tiles = ["-co", "TILED=YES", "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=16"]
 
         def tiff(name, source, *options):
-            run("gdal_translate", "-q", "--config", "GDAL_PAM_ENABLED", "NO", *PLACE, *options, source, OUT / f"image-{name}.tif")
+            run("gdal_translate", "-q", "--config", "GDAL_PAM_ENABLED", "NO", *PLACE, *options, source, OUT / f"{name}.tif")
 
         tiff("rgb-strips", rgb)
         tiff("rgb-one-strip", rgb, "-co", "BLOCKYSIZE=56")
@@ -73,21 +73,21 @@ def main():
         tiff("refused-planes", rgb, "-co", "INTERLEAVE=BAND")
         tiff("refused-cmyk", rgba, "-co", "PHOTOMETRIC=CMYK", "-co", "COMPRESS=DEFLATE")
         run("gdal_translate", "-q", "-of", "PNG", "-co", "WORLDFILE=YES", *PLACE, rgba, folder / "rgba.png")
-        (OUT / "image-rgba.png").write_bytes((folder / "rgba.png").read_bytes())
-        (OUT / "image-rgba.pgw").write_bytes((folder / "rgba.wld").read_bytes())
-        run("gdal_translate", "-q", "-of", "PNG", rgb16, OUT / "image-rgb-16.png")
+        (OUT / "rgba.png").write_bytes((folder / "rgba.png").read_bytes())
+        (OUT / "rgba.pgw").write_bytes((folder / "rgba.wld").read_bytes())
+        run("gdal_translate", "-q", "-of", "PNG", rgb16, OUT / "rgb-16.png")
         for name, options in [("baseline", []), ("progressive", ["-co", "PROGRESSIVE=YES"])]:
-            run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", *options, rgb, OUT / f"image-{name}.jpg")
-        run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", grey, OUT / "image-grey.jpg")
-        run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=90", rgba, OUT / "image-refused-cmyk.jpg")
+            run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", *options, rgb, OUT / f"{name}.jpg")
+        run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", grey, OUT / "grey.jpg")
+        run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=90", rgba, OUT / "refused-cmyk.jpg")
         turned = folder / "turned.vrt"
         turned.write_text(
             f'<VRTDataset rasterXSize="{WIDTH}" rasterYSize="{HEIGHT}"><GeoTransform>1000, 2, 1, 5000, 1, -2</GeoTransform>'
             + bands.rsplit("<VRTRasterBand", 1)[0]
             + "</VRTDataset>"
         )
-        run("gdal_translate", "-q", "-co", "COMPRESS=DEFLATE", turned, OUT / "image-refused-turned.tif")
-    for aux in OUT.glob("image-*.aux.xml"):
+        run("gdal_translate", "-q", "-co", "COMPRESS=DEFLATE", turned, OUT / "refused-turned.tif")
+    for aux in OUT.glob("*.aux.xml"):
         aux.unlink()
 
 

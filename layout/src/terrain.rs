@@ -90,10 +90,11 @@ impl Terrain {
         &self.entries
     }
 
-    /// Bytes per sample of the DEM, everything counted.
+    /// Bytes per sample of the DEM, everything but imagery counted.
     pub fn bytes_per_sample(&self) -> f64 {
         let [wide, high] = self.grid().samples();
-        self.header.file_bytes as f64 / (f64::from(wide) * f64::from(high))
+        let imagery = self.header.imagery.map_or(0, |place| place.bytes);
+        (self.header.file_bytes - imagery) as f64 / (f64::from(wide) * f64::from(high))
     }
 
     /// The source it reads from.

@@ -86,7 +86,7 @@ fn texel(x: u32, y: u32, has_alpha: bool) -> [u8; 4] {
         1 if has_alpha => (x * 3 + y) as u8,
         _ => 255,
     };
-    [(x / 3) as u8, hash as u8, if (x / 8 + y / 8) % 2 == 0 { 3 } else { 250 }, alpha]
+    [(x / 3) as u8, hash as u8, if (x / 8 + y / 8).is_multiple_of(2) { 3 } else { 250 }, alpha]
 }
 
 #[test]
@@ -394,4 +394,28 @@ fn readers_go_on_while_an_image_is_draped() {
     let section = terrain.header().imagery.unwrap().bytes;
     let gap = unused_bytes(&terrain).unwrap() - 2 * section;
     assert!(gap < 4096, "{gap}");
+}
+
+/// A build that finishes meanwhile wins, and the drape says so.
+#[test]
+fn a_file_replaced_meanwhile_is_left_alone() {
+    struct Replacing<'p>(&'p std::path::Path);
+    impl BuildProgress for Replacing<'_> {
+        fn stage(&self, _: &'static str, _: u64) {}
+        fn advance(&self, texels: u64) {
+            if texels > 0 {
+                land(self.0);
+            }
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.iqt");
+    land(&path);
+    let before = std::fs::read(&path).unwrap();
+    let picture: Vec<Box<dyn ImageSource>> =
+        vec![Box::new(MemoryImage::from_fn([90, 60], |x, y| texel(x, y, false)))];
+    let error = drape(&path, &picture, &DrapeOptions::default(), &Replacing(&path)).unwrap_err().to_string();
+    assert!(error.contains("replaced by another") && error.contains("drape it again"), "{error}");
+    assert!(std::fs::read(&path).unwrap() == before);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }

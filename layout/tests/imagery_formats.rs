@@ -11,7 +11,7 @@ use terrasoar_layout::imagery::open_image;
 const SIZE: [u32; 2] = [72, 56];
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(format!("image-{name}"))
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/image_fixtures").join(name)
 }
 
 /// The colours all fixtures show.
@@ -90,15 +90,22 @@ fn jpeg_pictures_come_back_about() {
         ("progressive.jpg", false),
         ("grey.jpg", true),
     ] {
+        let (mut sum, mut most) = (0, 0);
         each(&texels(&fixture(name)).unwrap(), |x, y, texel| {
             let [r, g, b] = colour(x, y);
             let wanted = if is_grey { [r; 3] } else { [r, g, b] };
             for c in 0..3 {
-                assert!(texel[c].abs_diff(wanted[c]) <= 10, "{name} {x} {y}: {texel:?} {wanted:?}");
+                let difference = u32::from(texel[c].abs_diff(wanted[c]));
+                (sum, most) = (sum + difference, most.max(difference));
             }
             assert_eq!(texel[3], 255);
         });
+        // Halved chroma and what fills the tiles at the rim show in single texels, as they do in GDAL.
+        let mean = f64::from(sum) / f64::from(3 * SIZE[0] * SIZE[1]);
+        assert!(mean < 1.5 && most < 50, "{name}: {mean:.2} on average, {most} at most");
     }
+    // The very texel as GDAL 3.6 shows it.
+    assert_eq!(texels(&fixture("jpeg-ycbcr.tif")).unwrap()[71], [173, 149, 85, 255]);
 }
 
 #[test]

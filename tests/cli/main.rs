@@ -1,6 +1,7 @@
 //! The real program in a temporary folder: what it prints, what it leaves, how it ends.
 
 mod build;
+mod drape;
 mod engines;
 mod iobench;
 mod pictures;

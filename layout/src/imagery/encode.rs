@@ -45,7 +45,7 @@ pub(super) fn encode(format: TileFormat, texels: Texels<'_>) -> Vec<u8> {
         TileFormat::Bc7 => ispc::bc7(texels, is_opaque),
         TileFormat::Bc1 if !ispc::IS_HERE => {
             let mut blocks = vec![0; format.stored_bytes(texels.side)];
-            for_blocks(texels, &mut blocks, |texels, block| fit(texels, block));
+            for_blocks(texels, &mut blocks, fit);
             blocks
         }
         TileFormat::Bc1 => {

@@ -147,7 +147,7 @@ fn referenced(
     }
     let texels = image.info().texels.map(f64::from);
     let astray = (column[1] * texels[0] / row[1]).abs().max((row[0] * texels[1] / column[0]).abs());
-    if !(astray <= STRAIGHT_TEXELS) {
+    if astray.is_nan() || astray > STRAIGHT_TEXELS {
         return Err(refused("the image is rotated or sheared against the terrain"));
     }
     if column[0] <= 0.0 || row[1] >= 0.0 {

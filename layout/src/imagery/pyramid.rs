@@ -203,7 +203,7 @@ fn halve_row<T: Texel>(south: &[T], north: &[T], row: &mut [Linear]) {
             ((sum + 2) / 4) as u16
         })
     };
-    let pairs = (last + 1) / 2;
+    let pairs = south.len() / 2;
     for (x, texel) in row[..pairs].iter_mut().enumerate() {
         *texel = mean(2 * x, 2 * x + 1);
     }

@@ -1,9 +1,9 @@
 //! The terrain file as a read-only memory map. memmap2 is used in this file only.
 //!
 //! Contract: while a map is open nobody may truncate the file or the process gets SIGBUS at the next touch of a
-//! missing page. Opening takes a shared advisory lock and writers of this crate never change a file in place but
-//! rename a new one over it, which leaves the mapped one intact. Programs that ignore both are outside the
-//! contract; use [`PreadSource`](super::PreadSource) for files on storage others may truncate.
+//! missing page. Opening takes a shared advisory lock, and writers of this crate rename a new file over the old one, which leaves the mapped one
+//! intact, or append behind what a reader reaches and rewrite a header page that is never read through a map (FORMAT.md, section 8.5). Programs that
+//! do otherwise are outside the contract; use [`PreadSource`](super::PreadSource) for files on storage others may truncate.
 
 use super::{PreadSource, Source};
 use crate::error::LayoutError;
@@ -33,8 +33,9 @@ impl MapSource {
     pub fn map(file: PreadSource) -> Result<Self, LayoutError> {
         let length = crate::bytes::to_usize(file.byte_count())?;
         #[expect(unsafe_code, reason = "mapping a file is unsafe for what others may do to it")]
-        // SAFETY: the map is read-only. Nobody changes its bytes: writers of this crate replace files by renaming, and the
-        // shared lock taken at opening keeps out those that ask. Truncation by others raises SIGBUS, which is
+        // SAFETY: the map is read-only. Nobody changes bytes that are read through it: writers of this crate replace files by
+        // renaming or append behind what this reader's header counts (FORMAT.md, section 8.5), and the shared lock taken at opening
+        // keeps out those that ask. Truncation by others raises SIGBUS, which is
         // the documented contract of this type; any bytes decode to some record, so changed bytes are no undefined
         // behaviour of ours beyond what the operating system itself does.
         let map = unsafe { MmapOptions::new().len(length).map(file.file()) }

@@ -94,6 +94,8 @@ struct Painter<'t> {
     spacing_m: [f64; 2],
     /// Heights of the sea, or of the lowest land, and of the summit.
     range_m: [f64; 2],
+    /// Wavelengths of patches and of fields; no finer than texels can show.
+    forms_m: [f64; 2],
     seed: u32,
 }
 
@@ -103,11 +105,14 @@ impl<'t> Painter<'t> {
             return Err(LayoutError::Usage("the terrain must be opened as a map to be coloured".into()));
         }
         let [low, high] = terrain.header().height_range_m;
+        let spacing_m = terrain.grid().spacing_m();
+        let texel_m = spacing_m[0].max(spacing_m[1]) / f64::from(options.texels_a_sample);
         Ok(Self {
             terrain,
             texels,
             fine: options.texels_a_sample,
-            spacing_m: terrain.grid().spacing_m(),
+            spacing_m,
+            forms_m: [(48.0 * texel_m).max(700.0), (10.0 * texel_m).max(90.0)],
             range_m: [low.max(0.0).min(high), high.max(low + 1.0)],
             seed: hash(options.seed as u32, (options.seed >> 32) as u32, 41),
         })
@@ -132,26 +137,28 @@ impl<'t> Painter<'t> {
         let at = place.map(|p| (f64::from(p) + 0.5) / f64::from(self.fine));
         let (height_m, slope) = heights.at(at, self.spacing_m);
         let [x, y] = [at[0] * self.spacing_m[0], at[1] * self.spacing_m[1]];
-        let patches = fractal(self.seed, x / 700.0, y / 700.0, 3, 0.55);
-        let fields = fractal(self.seed ^ 0x5bd1, x / 90.0, y / 90.0, 2, 0.5);
+        let [patch_m, field_m] = self.forms_m;
+        let patches = fractal(self.seed, x / patch_m, y / patch_m, 3, 0.55);
+        let fields = fractal(self.seed ^ 0x5bd1, x / field_m, y / field_m, 2, 0.5);
         let grain = f64::from(signed_unit(hash(self.seed, place[0], place[1])));
+        let deep = 0.5 + 0.5 * patches;
+        let water = [24.0 + 10.0 * deep, 58.0 + 16.0 * deep, 84.0 + 14.0 * deep];
         if height_m <= 0.0 {
-            let deep = 0.5 + 0.5 * patches;
-            return shade([24.0 + 10.0 * deep, 58.0 + 16.0 * deep, 84.0 + 14.0 * deep], 1.0 + 0.006 * grain);
+            return shade(water, 1.0 + 0.006 * grain);
         }
         let [low, high] = self.range_m;
         let relative = (height_m - low) / (high - low) + 0.05 * patches;
-        let meadow = mix([96.0, 112.0, 58.0], [142.0, 132.0, 84.0], 0.5 + 0.7 * fields);
-        let woods = mix([44.0, 66.0, 38.0], [60.0, 80.0, 46.0], 0.5 + 0.5 * fields);
-        let mut colour = mix(meadow, woods, smoothstep(-0.25, 0.3, patches + 1.5 * (relative - 0.15)));
-        colour = mix([176.0, 164.0, 128.0], colour, smoothstep(1.0, 5.0, height_m));
-        let scree = mix([118.0, 110.0, 98.0], [142.0, 134.0, 120.0], 0.5 + 0.6 * fields);
-        colour = mix(colour, scree, smoothstep(0.42, 0.6, relative));
-        let rock = mix([92.0, 86.0, 80.0], [120.0, 112.0, 104.0], 0.5 + 0.8 * fields);
-        colour = mix(colour, rock, smoothstep(0.5, 1.1, slope));
-        let snow = smoothstep(0.62, 0.72, relative) * smoothstep(1.4, 0.7, slope);
-        colour = mix(colour, [232.0, 236.0, 242.0], snow);
-        shade(colour, 1.0 + 0.02 * grain + 0.05 * fields)
+        let meadow = mix([100.0, 112.0, 62.0], [134.0, 128.0, 80.0], 0.5 + 0.6 * fields);
+        let woods = mix([46.0, 66.0, 40.0], [58.0, 78.0, 46.0], 0.5 + 0.5 * fields);
+        let mut colour = mix(meadow, woods, smoothstep(-0.35, 0.45, patches + 1.5 * (relative - 0.15)));
+        let scree = mix([118.0, 110.0, 98.0], [136.0, 128.0, 114.0], 0.5 + 0.6 * fields);
+        colour = mix(colour, scree, smoothstep(0.36, 0.64, relative));
+        let rock = mix([94.0, 88.0, 82.0], [114.0, 107.0, 99.0], 0.5 + 0.6 * fields);
+        colour = mix(colour, rock, smoothstep(0.4, 1.6, slope));
+        let snow = smoothstep(0.56, 0.78, relative) * smoothstep(1.8, 0.6, slope);
+        colour = mix(colour, [222.0, 226.0, 232.0], snow);
+        colour = mix(water, colour, smoothstep(-1.0, 6.0, height_m));
+        shade(colour, 1.0 + 0.015 * grain + 0.04 * fields)
     }
 }
 
@@ -191,19 +198,26 @@ impl Heights {
         Self { from, wide, high, metres }
     }
 
-    /// Height and steepness (rise over run) at a place in samples, bilinear; both are continuous.
+    /// The sample at a column and row of this window; beyond it, the nearest.
+    fn sample(&self, x: usize, y: usize) -> f64 {
+        f64::from(self.metres[y.min(self.high - 1) * self.wide + x.min(self.wide - 1)])
+    }
+
+    /// Height and steepness (rise over run) at a place in samples, both interpolated bilinearly; slopes are those of central differences.
     fn at(&self, place: [f64; 2], spacing_m: [f64; 2]) -> (f64, f64) {
         let [x, y] = [0, 1].map(|i| place[i] - f64::from(self.from[i]));
         let (cell_x, cell_y) = ((x as usize).min(self.wide - 2), (y as usize).min(self.high - 2));
         let (fx, fy) = (x - cell_x as f64, y - cell_y as f64);
-        let row = |y: usize| {
-            let at = y * self.wide + cell_x;
-            [f64::from(self.metres[at]), f64::from(self.metres[at + 1])]
-        };
-        let ([sw, se], [nw, ne]) = (row(cell_y), row(cell_y + 1));
-        let height = (sw + (se - sw) * fx) * (1.0 - fy) + (nw + (ne - nw) * fx) * fy;
-        let east = ((se - sw) * (1.0 - fy) + (ne - nw) * fy) / spacing_m[0];
-        let north = ((nw - sw) * (1.0 - fx) + (ne - se) * fx) / spacing_m[1];
-        (height, east.hypot(north))
+        let (mut height, mut east, mut north) = (0.0, 0.0, 0.0);
+        for (x, wx) in [(cell_x, 1.0 - fx), (cell_x + 1, fx)] {
+            for (y, wy) in [(cell_y, 1.0 - fy), (cell_y + 1, fy)] {
+                let weight = wx * wy;
+                height += weight * self.sample(x, y);
+                let (west, south) = (x.saturating_sub(1), y.saturating_sub(1));
+                east += weight * (self.sample(x + 1, y) - self.sample(west, y));
+                north += weight * (self.sample(x, y + 1) - self.sample(x, south));
+            }
+        }
+        (height, (east / (2.0 * spacing_m[0])).hypot(north / (2.0 * spacing_m[1])))
     }
 }

@@ -211,7 +211,7 @@ impl TiffImage {
             ));
         }
         if channels == 3 {
-            decoder.set_color_transform(if is_rgb { ColorTransform::None } else { ColorTransform::YCbCr });
+            decoder.set_color_transform(if is_rgb { ColorTransform::RGB } else { ColorTransform::YCbCr });
         }
         Ok((decoder.decode().map_err(damaged)?, channels))
     }

@@ -54,6 +54,8 @@ pub(super) struct Table {
     pub(super) chunk_width: u32,
     pub(super) chunk_height: u32,
     tiled: bool,
+    /// Height of the chunks in the file, before they were cut.
+    declared_height: u32,
     pub(super) across: u32,
     places: Vec<(u64, u64)>,
     /// What is lost in reading it.
@@ -151,6 +153,7 @@ impl Table {
             chunk_width,
             chunk_height,
             tiled,
+            declared_height: chunk_height,
             across,
             places: offsets.into_iter().zip(counts).collect(),
             notes,
@@ -266,7 +269,7 @@ impl Table {
             ", {} of {} x {} {}-bit {colour}{}, {packing}",
             if self.tiled { "tiles" } else { "strips" },
             self.chunk_width,
-            self.chunk_height,
+            self.declared_height,
             8 * self.sample_bytes,
             if self.alpha.is_some() { " with alpha" } else { "" },
         )
