@@ -494,11 +494,11 @@ fn transparent(gpu: &Gpu) -> Outcome {
 
 /// Of every format that has such texels, BC7 of squares of one colour.
 fn half_transparent(gpu: &Gpu) -> Outcome {
-    let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
+    let square = level_ground();
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.down_to(0));
-    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
-    // Heights whose colours are too dark for the shoulder.
+    let view = down(640.0, 640.0, 1500.0);
+    // A height whose colour is too dark for the shoulder.
     let look = Look { tint_range_m: Some([0.0, 9000.0]), rock: 0.0, ..bare() };
     let tint = scene.draw(&view, &Look { imagery: 0.0, ..look });
     let colour = [151, 75, 201, 129];
@@ -510,16 +510,12 @@ fn half_transparent(gpu: &Gpu) -> Outcome {
         let shown = scene.draw(&view, &look);
         let share = 129.0 / 255.0;
         let photo = linear_of(colour);
-        let depth = scene.depth_m();
-        for (i, depth_m) in (0..).zip(&depth).filter(|(_, d)| **d > 0.0) {
-            let [x, y] = [i % SIZE_PX[0], i / SIZE_PX[0]];
+        for (x, y) in (0..SIZE_PX[1]).flat_map(|y| (0..SIZE_PX[0]).map(move |x| (x, y))) {
             let below = linear_of(pixel(&tint, x, y));
             for (channel, code) in pixel(&shown, x, y).iter().take(3).enumerate() {
                 let expected = encoded(share * photo[channel] + (1.0 - share) * below[channel]);
                 ensure((expected - f64::from(*code)).abs() < 3.0, || {
-                    format!(
-                        "{format:?}, {depth_m} m: pixel {x}, {y} is {code} in channel {channel}, not {expected:.1}"
-                    )
+                    format!("{format:?}: pixel {x}, {y} is {code} in channel {channel}, not {expected:.1}")
                 })?;
             }
         }
@@ -568,10 +564,6 @@ fn absent(gpu: &Gpu) -> Outcome {
 
 /// Squares of two colours a block and transparent ones, stored both ways.
 fn blocks(gpu: &Gpu) -> Outcome {
-    if !gpu.capabilities.imagery_formats().contains(&ImageryFormat::Bc1) {
-        println!("blocks: this device takes none");
-        return Ok(());
-    }
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
     let mut scene = Scene::new(gpu, &square);
     let view = FrameView::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX);
