@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    Contours, FrameView, Gpu, Haze, ImageTileId, ImageryFormat, ImageryShape, Look, RenderError, Renderer,
-    RendererOptions, Sun, Surface, Wireframe, wgpu,
+    Contours, DeviceWatch, FrameView, Gpu, Haze, ImageTileId, ImageryFormat, ImageryShape, Look, RenderError,
+    Sun, Surface, Wireframe, wgpu,
 };
 
 use crate::support::image::{Image, Texel, drape, encoded, give, in_565, linear_of};
@@ -28,6 +28,7 @@ pub fn tests() -> Vec<(&'static str, Test)> {
         ("imagery::half_transparent_is_half_the_light", half_transparent),
         ("imagery::absent_tiles_are_asked_for_once", absent),
         ("imagery::blocks_look_as_their_texels", blocks),
+        ("imagery::a_device_without_blocks_takes_texels", without_blocks),
         ("imagery::flat_views_are_sharp_across_and_calm_along", anisotropy),
         ("imagery::light_does_not_double", light),
         ("imagery::lines_and_edges_lie_over_it", lines),
@@ -609,6 +610,41 @@ fn blocks(gpu: &Gpu) -> Outcome {
     ensure(plain.difference(&pictures[0]) > 0.05, || "there is no image to see".into())
 }
 
+/// As some phones are: made here by not asking for the feature. The picture is the other device's.
+fn without_blocks(gpu: &Gpu) -> Outcome {
+    // An adapter of its own: on OpenGL devices of one adapter share what they are made of.
+    let Gpu { adapter, mut capabilities, .. } = Gpu::headless_blocking().map_err(|e| e.to_string())?;
+    capabilities.texture_compression_bc = false;
+    let request = adapter.request_device(&wgpu::DeviceDescriptor {
+        label: Some("no blocks"),
+        required_limits: adapter.limits(),
+        ..Default::default()
+    });
+    let (device, queue) = pollster::block_on(request).map_err(|e| e.to_string())?;
+    let watch = DeviceWatch::install(&device);
+    let plain = Gpu { adapter, device, queue, capabilities, watch };
+    ensure(plain.capabilities.imagery_formats() == [ImageryFormat::Rgba8], || "it takes blocks".into())?;
+    let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
+    let view = FrameView::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX);
+    let image = chart(Image::shape_over(&square.terrain, 4.0));
+    let pictures = [gpu, &plain].map(|gpu| {
+        let mut scene = Scene::new(gpu, &square);
+        scene.show(&square.refine(&view));
+        drape(&mut scene, &image, 32);
+        show_all(&mut scene, &image, &view);
+        scene.draw(&view, &Look { imagery: 1.0, ..Look::default() })
+    });
+    ensure(pictures[0] == pictures[1], || {
+        format!("they differ by {}", pictures[0].difference(&pictures[1]))
+    })?;
+    let mut scene = Scene::new(&plain, &square);
+    for format in [ImageryFormat::Bc1, ImageryFormat::Bc7] {
+        let refused = scene.renderer.set_imagery(Some(ImageryShape { format, ..image.shape }), 1 << 22);
+        ensure(refused.is_err_and(|e| e.to_string().contains("RGBA8")), || format!("{format:?} is taken"))?;
+    }
+    Ok(())
+}
+
 /// Stripes along the line of sight stay, stripes across it become their mean, on ground that is seen at some ten degrees.
 fn anisotropy(gpu: &Gpu) -> Outcome {
     let square = Square::new(6, [0, 0], [80.0, 80.0], |_, _| 100.0);
@@ -755,19 +791,6 @@ fn wrong_use(gpu: &Gpu) -> Outcome {
     let nowhere = ImageTileId { level: 0, x: 99, y: 0 };
     let outside = renderer.set_imagery_absent(nowhere);
     ensure(matches!(outside, Err(RenderError::NoSuchTile { .. })), || format!("{outside:?}"))?;
-    let plain = gpu
-        .adapter
-        .request_device(&wgpu::DeviceDescriptor { label: Some("no blocks"), ..Default::default() });
-    let (device, queue) = pollster::block_on(plain).map_err(|e| e.to_string())?;
-    let mut without_blocks = Renderer::new(&device, &queue, square.terrain, RendererOptions::default())
-        .map_err(|e| e.to_string())?;
-    let refused =
-        without_blocks.set_imagery(Some(ImageryShape { format: ImageryFormat::Bc1, ..shape }), 1 << 22);
-    ensure(refused.is_err_and(|e| e.to_string().contains("RGBA8")), || {
-        "blocks are taken for granted".into()
-    })?;
-    without_blocks.set_imagery(Some(shape), 1 << 22).map_err(|e| e.to_string())?;
-
     renderer.set_imagery(None, 0).map_err(|e| e.to_string())?;
     ensure(renderer.imagery().is_none() && renderer.imagery_stats() == Default::default(), || {
         "the image is still there".into()
