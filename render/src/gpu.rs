@@ -17,7 +17,7 @@ pub struct Capabilities {
     pub backend: String,
     /// Whether pixels are computed by the processor.
     pub software: bool,
-    /// Whether BC1 textures are understood.
+    /// Whether textures of BC1 and BC7 are understood ([`Capabilities::imagery_formats`]).
     pub texture_compression_bc: bool,
     /// Whether passes can be timed.
     pub timestamps: bool,

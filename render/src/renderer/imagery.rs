@@ -32,7 +32,7 @@ impl Renderer {
     /// Finds out which image tiles a view wants and returns those that are not on the device, most urgent first, at most `most`: those
     /// whose texels are about a pixel on ground anywhere in the terrain's range of heights, and all coarser ones above them,
     /// coarse before fine and near before far. To be called once a frame; what it returns is to be answered with
-    /// [`Renderer::give_imagery`] or [`Renderer::set_imagery_absent`], now or some frames later.
+    /// [`Renderer::give_imagery`] or [`Renderer::set_imagery_absent`], now or some frames later; until then it is asked for again.
     pub fn want_imagery(&mut self, view: &FrameView, most: usize) -> &[ImageTileId] {
         let missing = self.imagery.as_mut().map_or(&[][..], |i| i.want(view));
         &missing[..missing.len().min(most)]

@@ -23,7 +23,7 @@ type Outcome = Result<(), String>;
 type Test = fn(&Gpu) -> Outcome;
 
 /// What reads depth back, which not every device can.
-const READ_DEPTH: [&str; 3] = ["cover::", "places::depth", "places::morph"];
+const READ_DEPTH: [&str; 4] = ["cover::", "imagery::no_image", "places::depth", "places::morph"];
 
 fn main() -> ExitCode {
     let mut arguments = Arguments::from_args();
@@ -54,13 +54,12 @@ fn main() -> ExitCode {
     .into_iter()
     .map(|(name, test): (&str, Test)| (name.to_owned(), test))
     .collect();
-    let depth_copies = gpu.is_some_and(|g| g.capabilities.depth_copies);
     let trial = |name: String, run: Box<dyn Fn(&Gpu) -> Outcome + Send>| {
-        let unreadable = !depth_copies && READ_DEPTH.iter().any(|prefix| name.starts_with(prefix));
-        Trial::ignorable_test(name, move || match gpu {
-            Some(_) if unreadable => Ok(Completion::ignored_with("depth cannot be read on this device")),
-            Some(gpu) => run(gpu).map(|()| Completion::Completed).map_err(Failed::from),
-            None => Ok(Completion::ignored_with("no adapter")),
+        let lacks = gpu.and_then(|g| lacks(g, &name));
+        Trial::ignorable_test(name, move || match (gpu, lacks) {
+            (Some(_), Some(why)) => Ok(Completion::ignored_with(why)),
+            (Some(gpu), None) => run(gpu).map(|()| Completion::Completed).map_err(Failed::from),
+            (None, _) => Ok(Completion::ignored_with("no adapter")),
         })
     };
     let mut trials: Vec<_> = tests.into_iter().map(|(name, test)| trial(name, Box::new(test))).collect();
@@ -70,6 +69,16 @@ fn main() -> ExitCode {
         }),
     );
     libtest_mimic::run(&arguments, trials).exit_code()
+}
+
+/// What a test needs and the device has not.
+fn lacks(gpu: &Gpu, name: &str) -> Option<&'static str> {
+    let can = &gpu.capabilities;
+    if !can.depth_copies && READ_DEPTH.iter().any(|prefix| name.starts_with(prefix)) {
+        return Some("depth cannot be read on this device");
+    }
+    let blocks = name.starts_with("imagery::blocks") && !can.texture_compression_bc;
+    blocks.then_some("this device takes no BC textures")
 }
 
 /// Fails with words unless something holds.
