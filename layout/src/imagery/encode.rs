@@ -6,7 +6,7 @@
 
 use super::shape::TileFormat;
 use crate::error::LayoutError;
-use texpresso::{Algorithm, Format, Params};
+use texpresso::{Algorithm, COLOUR_WEIGHTS_UNIFORM, Format, Params};
 
 /// Alpha below which a texel of BC1 is transparent.
 const OPAQUE_ALPHA: u8 = 128;
@@ -64,7 +64,11 @@ pub(super) fn encode(format: TileFormat, texels: Texels<'_>) -> Vec<u8> {
 
 /// One block of BC1 by range fit.
 fn fit(texels: &[[u8; 4]; 16], block: &mut [u8]) {
-    let params = Params { algorithm: Algorithm::RangeFit, ..Params::default() };
+    let params = Params {
+        algorithm: Algorithm::RangeFit,
+        weights: COLOUR_WEIGHTS_UNIFORM,
+        weigh_colour_by_alpha: false,
+    };
     Format::Bc1.compress_block_masked(*texels, 0xffff, params, block);
 }
 
