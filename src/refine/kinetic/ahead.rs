@@ -23,8 +23,8 @@ use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::slot_of;
 use terrasoar_layout::store::RecordStore;
 
-/// Vertices that the looks of one frame may test, a millisecond or two; the rest is looked at in the next.
-const TESTS_A_FRAME: usize = 4000;
+/// Vertices that the looks of one frame may test, two to five milliseconds; the rest is looked at in the next.
+const TESTS_A_FRAME: usize = 8000;
 /// Share of the newest frame in a clock's pace.
 const RECENT: f32 = 0.2;
 /// A pace grows by no more than this a frame, lest one jump of the eye make everything urgent.
