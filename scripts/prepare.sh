@@ -30,9 +30,10 @@ need_cargo() {
 }
 
 need_c_compiler() {
-    command -v cc >/dev/null && return
-    apt_install "a C compiler builds the zstd library, which GeoTIFF needs, and links every program" gcc libc6-dev ||
-        fail "there is no C compiler (cc); install gcc and the C library's headers and run this again"
+    command -v cc >/dev/null && command -v c++ >/dev/null && return
+    apt_install "a C compiler builds the zstd library, which GeoTIFF needs, and links every program; the encoder of pictures needs the C++ library" \
+        gcc g++ libc6-dev ||
+        fail "there is no C compiler (cc) or no C++ library (g++ has it); install gcc, g++ and the C library's headers and run this again"
 }
 
 # need_component NAME WHY

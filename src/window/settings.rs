@@ -193,6 +193,7 @@ impl Settings {
         self.exaggeration = keep(self.exaggeration, EXAGGERATION, own.exaggeration);
         self.sun_azimuth_deg = keep_f32(self.sun_azimuth_deg, [0.0, 360.0], own.sun_azimuth_deg);
         self.sun_elevation_deg = keep_f32(self.sun_elevation_deg, [0.0, 90.0], own.sun_elevation_deg);
+        self.image = keep_f32(self.image, [0.0, 1.0], own.image);
         self.contour_interval_m =
             keep_f32(self.contour_interval_m, CONTOUR_INTERVAL_M, own.contour_interval_m);
         if Look::named(&self.style).is_none() {
@@ -260,13 +261,14 @@ mod tests {
         let path = folder.path().join("view.toml");
         std::fs::write(
             &path,
-            "tolerance_px = 1e9\nexaggeration = nan\nstyle = \"cubist\"\nramp = \"none such\"\nwindow = [0, 5]\nunknown = 1\n",
+            "tolerance_px = 1e9\nexaggeration = nan\nimage = -3.0\nstyle = \"cubist\"\nramp = \"none such\"\nwindow = [0, 5]\nunknown = 1\n",
         )
         .unwrap();
         let (settings, word) = Settings::load(&path);
         assert_eq!(word, None);
         assert_eq!(settings.tolerance_px, Some(50.0));
         assert_eq!((settings.exaggeration, settings.style.as_str()), (1.0, "relief"));
+        assert_eq!(settings.image, 0.0);
         assert_eq!((settings.ramp, settings.window), (None, [320, 240]));
     }
 
