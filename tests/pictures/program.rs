@@ -44,7 +44,9 @@ fn draped(_: &Gpu) -> Outcome {
     for (i, colour) in QUARTERS.into_iter().enumerate() {
         let seen = picture.get_pixel(80 + 80 * (i as u32 % 2), 80 + 80 * (i as u32 / 2)).0;
         // Light and haze change how bright it is, hardly which colour.
-        let strongest = |c: [u8; 3]| [0, 1, 2].map(|k| c[k] >= 100 && c[k].saturating_add(40) >= *c.iter().max().unwrap());
+        let strongest = |c: [u8; 3]| {
+            [0, 1, 2].map(|k| c[k] >= 100 && c[k].saturating_add(40) >= *c.iter().max().unwrap())
+        };
         ensure(strongest(seen) == strongest(colour), || {
             format!("quarter {i} is {seen:?}, not about {colour:?}")
         })?;
