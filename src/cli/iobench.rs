@@ -127,6 +127,11 @@ impl Args {
             let what = "--prefetch deadline is for the engine kinetic over the layout ours; add them, or preload by frustum or not at all";
             return Err(WrongUsage(what.into()).into());
         }
+        if self.fps != 0.0 && !(0.1..=10_000.0).contains(&self.fps) {
+            return Err(
+                WrongUsage(format!("--fps is 0 or a number from 0.1 to 10000, not {}", self.fps)).into()
+            );
+        }
         if let Some(folder) = &self.scratch
             && !folder.is_dir()
         {

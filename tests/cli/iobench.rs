@@ -189,7 +189,7 @@ fn a_cap_holds_or_is_said_not_to() {
 #[test]
 fn what_makes_no_sense_is_refused() {
     let bench = Bench::with_flight();
-    let wrong: [&[&str]; 14] = [
+    let wrong: [&[&str]; 17] = [
         &["--engines", "roam"],
         &["--engines", "naive"],
         &["--engines", "soar,soar"],
@@ -203,6 +203,9 @@ fn what_makes_no_sense_is_refused() {
         &["--cap", "64", "--cap-group", "."],
         &["--disk-pages", "0"],
         &["--block", "-1"],
+        &["--fps", "1e-320"],
+        &["--fps", "inf"],
+        &["--reads", "by-hand"],
         &["--tolerance-px", "0"],
     ];
     for flags in wrong {
