@@ -12,6 +12,7 @@ mod hgt;
 mod identify;
 mod parallel;
 mod png;
+pub(crate) mod png_stream;
 
 use std::path::PathBuf;
 

@@ -5,14 +5,13 @@
 //! [`crate::synth`] writes, give the spacing and the height of a unit; without them a PNG says nothing
 //! about where it lies and a unit is one metre. A sample equal to the transparent grey (`tRNS`) is void.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use ::png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Reader};
+use ::png::{BitDepth, ColorType, Transformations};
 
 use super::WINDOW_SAMPLES;
 use super::guard::guard;
+use super::png_stream::{self, PngRows, decoding_error};
 use crate::dem::{DemInfo, DemSource, Georeference, HorizontalUnit, SampleSink, SampleType, Window};
 use crate::error::LayoutError;
 
@@ -20,9 +19,6 @@ use crate::error::LayoutError;
 pub(crate) const SPACING_KEY: &str = "Terrasoar:spacing_m";
 /// Keyword of the text chunk with the metres of height a unit.
 pub(crate) const HEIGHT_SCALE_KEY: &str = "Terrasoar:height_scale_m";
-
-/// Memory the decoder may take: rows of 16 million samples, and text chunks.
-const DECODER_BYTES: usize = 256 << 20;
 
 /// A grey PNG.
 #[derive(Debug)]
@@ -35,7 +31,7 @@ pub(super) struct PngDem {
 impl PngDem {
     /// Reads the header and the text chunks before the image data.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
-        let reader = reader(path)?;
+        let reader = png_stream::open(path, Transformations::IDENTITY)?;
         let header = reader.info();
         let sample_type = match (header.color_type, header.bit_depth) {
             (ColorType::Grayscale, BitDepth::Sixteen) => SampleType::U16,
@@ -104,7 +100,7 @@ impl DemSource for PngDem {
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        let mut reader = reader(&self.path)?;
+        let mut reader = png_stream::open(&self.path, Transformations::IDENTITY)?;
         let width = u64::from(self.info.samples_wide);
         let header = reader.info();
         if (header.width, header.height) != (self.info.samples_wide, self.info.samples_high) {
@@ -131,12 +127,7 @@ impl DemSource for PngDem {
 }
 
 impl PngDem {
-    fn append_row(
-        &self,
-        reader: &mut Reader<BufReader<File>>,
-        row: u32,
-        samples: &mut Vec<f64>,
-    ) -> Result<(), LayoutError> {
+    fn append_row(&self, reader: &mut PngRows, row: u32, samples: &mut Vec<f64>) -> Result<(), LayoutError> {
         let place = || format!("row {row} of {}", self.info.samples_high);
         guard(&self.path, place, || {
             let decoded = reader.next_row().map_err(|error| decoding_error(&self.path, place(), error))?;
@@ -168,37 +159,6 @@ impl PngDem {
             ));
         }
         Ok(())
-    }
-}
-
-fn reader(path: &Path) -> Result<Reader<BufReader<File>>, LayoutError> {
-    let file =
-        File::open(path).map_err(|source| LayoutError::io(path, "cannot open the PNG file", source))?;
-    let decoder =
-        Decoder::new_with_limits(BufReader::with_capacity(1 << 16, file), Limits { bytes: DECODER_BYTES });
-    guard(
-        path,
-        || "header".into(),
-        || decoder.read_info().map_err(|error| decoding_error(path, "header".into(), error)),
-    )
-}
-
-fn decoding_error(path: &Path, place: String, error: DecodingError) -> LayoutError {
-    match error {
-        DecodingError::IoError(source) if source.raw_os_error().is_some() => {
-            LayoutError::io(path, "cannot read the PNG file", source)
-        }
-        DecodingError::IoError(_) => {
-            LayoutError::damaged(path, place, "the file is cut short; fetch it again")
-        }
-        DecodingError::LimitsExceeded => LayoutError::unsupported(
-            path,
-            format!(
-                "reading it would take more than {} MiB a row; convert it to a tiled GeoTIFF",
-                DECODER_BYTES >> 20
-            ),
-        ),
-        error => LayoutError::damaged(path, place, format!("{error}; fetch or write the file again")),
     }
 }
 

@@ -7,13 +7,12 @@ use super::super::source::{ImageInfo, ImageSource, RowReader};
 use super::world;
 use crate::error::LayoutError;
 use crate::import::guard;
-use ::png::{BitDepth, ColorType, Decoder, DecodingError, Limits, Reader, Transformations};
-use std::fs::File;
-use std::io::BufReader;
+use crate::import::png_stream::{self, PngRows, decoding_error};
+use ::png::{BitDepth, ColorType, Transformations};
 use std::path::{Path, PathBuf};
 
-/// Memory the decoder may take: a few rows, and text chunks.
-const DECODER_BYTES: usize = 256 << 20;
+/// Whatever the file holds comes as grey, grey and alpha, RGB or RGBA of 8 bits.
+const AS_COLOURS: Transformations = Transformations::EXPAND.union(Transformations::STRIP_16);
 
 /// A PNG picture.
 #[derive(Debug)]
@@ -25,7 +24,7 @@ pub(super) struct PngImage {
 impl PngImage {
     /// Reads the header.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
-        let reader = reader(path)?;
+        let reader = png_stream::open(path, AS_COLOURS)?;
         let header = reader.info();
         if header.interlaced {
             return Err(LayoutError::unsupported(
@@ -70,7 +69,7 @@ impl ImageSource for PngImage {
     }
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
-        let reader = reader(&self.path)?;
+        let reader = png_stream::open(&self.path, AS_COLOURS)?;
         let header = reader.info();
         if [header.width, header.height] != self.info.texels {
             return Err(LayoutError::damaged(
@@ -85,7 +84,7 @@ impl ImageSource for PngImage {
 
 struct Rows<'i> {
     image: &'i PngImage,
-    reader: Reader<BufReader<File>>,
+    reader: PngRows,
     y: u32,
 }
 
@@ -129,37 +128,5 @@ pub(super) fn spread(texels: &[u8], channels: usize, rgba: &mut [u8]) {
             [r, g, b, alpha, ..] => [r, g, b, alpha],
             [] => [0; 4],
         };
-    }
-}
-
-fn reader(path: &Path) -> Result<Reader<BufReader<File>>, LayoutError> {
-    let file =
-        File::open(path).map_err(|source| LayoutError::io(path, "cannot open the PNG file", source))?;
-    let mut decoder =
-        Decoder::new_with_limits(BufReader::with_capacity(1 << 18, file), Limits { bytes: DECODER_BYTES });
-    decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
-    guard(
-        path,
-        || "header".into(),
-        || decoder.read_info().map_err(|error| decoding_error(path, "header".into(), error)),
-    )
-}
-
-fn decoding_error(path: &Path, place: String, error: DecodingError) -> LayoutError {
-    match error {
-        DecodingError::IoError(source) if source.raw_os_error().is_some() => {
-            LayoutError::io(path, "cannot read the PNG file", source)
-        }
-        DecodingError::IoError(_) => {
-            LayoutError::damaged(path, place, "the file is cut short; fetch it again")
-        }
-        DecodingError::LimitsExceeded => LayoutError::unsupported(
-            path,
-            format!(
-                "reading it would take more than {} MiB; convert it to a tiled GeoTIFF",
-                DECODER_BYTES >> 20
-            ),
-        ),
-        error => LayoutError::damaged(path, place, format!("{error}; fetch or write the file again")),
     }
 }

@@ -1,15 +1,10 @@
-//! The table of chunks: where the strips or tiles of the image lie, how they are packed, and that all
-//! this is something that can be read here.
-//!
-//! Chunk `i` covers a rectangle of `chunk_width * chunk_height` samples, `across` of them side by side.
-//! Tiles at the right and lower edge are stored whole, strips at the lower edge only as far as the image.
+//! The chunks of an image of heights: how they are packed, what their samples are, and that all this is something that can be
+//! read here.
 
+use super::chunk_grid::{ChunkGrid, side};
 use super::tags::{self, Directory, TiffFile};
-use crate::dem::{SampleType, Window};
+use crate::dem::SampleType;
 use crate::error::LayoutError;
-
-/// Largest decoded chunk: the codecs need it in memory at once.
-const MAX_CHUNK_BYTES: u64 = 512 << 20;
 
 /// How chunks are packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,17 +53,11 @@ pub(super) enum Predictor {
 /// Where the samples of an image are.
 #[derive(Debug)]
 pub(super) struct Chunks {
-    pub(super) width: u32,
-    pub(super) height: u32,
+    pub(super) grid: ChunkGrid,
     pub(super) sample_type: SampleType,
     pub(super) big_endian: bool,
     pub(super) compression: Compression,
     pub(super) predictor: Predictor,
-    pub(super) chunk_width: u32,
-    pub(super) chunk_height: u32,
-    tiled: bool,
-    across: u32,
-    places: Vec<(u64, u64)>,
 }
 
 impl Chunks {
@@ -111,115 +100,32 @@ impl Chunks {
                 )));
             }
         };
-        let tile_width = file.number(directory, tags::TILE_WIDTH)?;
-        let tiled = tile_width.is_some();
-        let (chunk_width, chunk_height) = if tiled {
-            (
-                side(file, directory, tags::TILE_WIDTH, "tile width")?,
-                side(file, directory, tags::TILE_LENGTH, "tile height")?,
-            )
-        } else {
-            let rows =
-                file.number(directory, tags::ROWS_PER_STRIP)?.unwrap_or(u64::MAX).min(u64::from(height));
-            (width, rows as u32)
-        };
-        if chunk_width == 0 || chunk_height == 0 {
-            return Err(file.damaged("a strip or tile without samples is declared; write the file again"));
-        }
-        let across = width.div_ceil(chunk_width);
-        let wanted = u64::from(across) * u64::from(height.div_ceil(chunk_height));
-        let (offsets, counts) = if tiled {
-            (tags::TILE_OFFSETS, tags::TILE_BYTE_COUNTS)
-        } else {
-            (tags::STRIP_OFFSETS, tags::STRIP_BYTE_COUNTS)
-        };
-        let offsets = file.numbers(directory, offsets)?.unwrap_or_default();
-        let counts = file.numbers(directory, counts)?.unwrap_or_default();
-        if offsets.len() as u64 != wanted || counts.len() as u64 != wanted {
-            return Err(file.damaged(format!(
-                "{wanted} chunks make up the image, but {} places and {} lengths are listed; fetch the file again",
-                offsets.len(),
-                counts.len()
-            )));
-        }
-        let this = Self {
-            width,
-            height,
-            sample_type,
-            big_endian: file.is_big_endian(),
-            compression,
-            predictor,
-            chunk_width,
-            chunk_height,
-            tiled,
-            across,
-            places: offsets.into_iter().zip(counts).collect(),
-        };
+        let grid = ChunkGrid::read(file, directory, [width, height])?;
+        let this = Self { grid, sample_type, big_endian: file.is_big_endian(), compression, predictor };
         this.check_places(file)?;
         Ok(this)
     }
 
     /// Every chunk lies in the file, and is long enough for what it is to become.
     fn check_places(&self, file: &TiffFile) -> Result<(), LayoutError> {
-        if !self.is_raw() && self.decoded_bytes() > MAX_CHUNK_BYTES {
-            return Err(LayoutError::unsupported(
-                file.path(),
-                format!(
-                    "its {} would take {} MiB each in memory, more than the {} MiB allowed; write it again in tiles: \
-                     gdal_translate -co TILED=YES -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER INPUT output.tif",
-                    self.describe(),
-                    self.decoded_bytes() >> 20,
-                    MAX_CHUNK_BYTES >> 20
-                ),
-            ));
+        if !self.is_raw() {
+            self.grid.check_size(file, self.decoded_bytes())?;
         }
-        for chunk in 0..self.count() {
-            let Some((at, packed)) = self.place(chunk) else { continue };
+        for chunk in 0..self.grid.count() {
+            let Some((at, packed)) = self.grid.place(chunk) else { continue };
             let needed = if self.is_raw() { self.stored_bytes(chunk) } else { packed };
-            if at.checked_add(needed).is_none_or(|end| end > file.bytes()) {
-                return Err(LayoutError::damaged(
-                    file.path(),
-                    self.name(chunk),
-                    format!(
-                        "it would end beyond the {} bytes of the file, which is cut short; fetch it again",
-                        file.bytes()
-                    ),
-                ));
-            }
+            self.grid.check_end(file, chunk, at, needed)?;
             if !self.is_raw()
                 && packed.saturating_mul(self.compression.greatest_ratio()) < self.stored_bytes(chunk)
             {
                 return Err(LayoutError::damaged(
                     file.path(),
-                    self.name(chunk),
+                    self.grid.name(chunk),
                     format!("its {packed} bytes cannot hold the samples declared; fetch the file again"),
                 ));
             }
         }
         Ok(())
-    }
-
-    /// Number of chunks.
-    pub(super) fn count(&self) -> u64 {
-        self.places.len() as u64
-    }
-
-    /// Offset and packed length of a chunk; `None` if the file left it out.
-    pub(super) fn place(&self, chunk: u64) -> Option<(u64, u64)> {
-        self.places.get(chunk as usize).copied().filter(|(at, bytes)| *at != 0 && *bytes != 0)
-    }
-
-    /// The part of the image a chunk covers.
-    pub(super) fn window(&self, chunk: u64) -> Window {
-        // Both fit: there are `across` chunks in a row and the image's sides are 32-bit.
-        let col = (chunk % u64::from(self.across)) as u32 * self.chunk_width;
-        let row = (chunk / u64::from(self.across)) as u32 * self.chunk_height;
-        Window {
-            col,
-            row,
-            width: self.chunk_width.min(self.width - col),
-            height: self.chunk_height.min(self.height - row),
-        }
     }
 
     /// Whether the chunks can be read piecewise: they are not compressed.
@@ -239,18 +145,14 @@ impl Chunks {
 
     /// Bytes of a whole chunk when unpacked.
     pub(super) fn decoded_bytes(&self) -> u64 {
-        (u64::from(self.chunk_width) * u64::from(self.chunk_height)).saturating_mul(self.sample_bytes())
+        (u64::from(self.grid.chunk_width) * u64::from(self.grid.chunk_height))
+            .saturating_mul(self.sample_bytes())
     }
 
     /// Bytes that must be unpacked for the samples of a chunk that lie in the image.
     fn stored_bytes(&self, chunk: u64) -> u64 {
-        let rows = u64::from(self.window(chunk).height);
-        (u64::from(self.chunk_width) * rows).saturating_mul(self.sample_bytes())
-    }
-
-    /// Name of a chunk in messages.
-    pub(super) fn name(&self, chunk: u64) -> String {
-        format!("{} {chunk} of {}", if self.tiled { "tile" } else { "strip" }, self.count())
+        let rows = u64::from(self.grid.window(chunk).height);
+        (u64::from(self.grid.chunk_width) * rows).saturating_mul(self.sample_bytes())
     }
 
     /// "tiles of 512 x 512 uint16".
@@ -264,26 +166,9 @@ impl Chunks {
             SampleType::F32 => "float32",
             SampleType::F64 => "float64",
         };
-        let shape = if self.tiled { "tiles" } else { "strips" };
-        format!("{shape} of {} x {} {kind}", self.chunk_width, self.chunk_height)
+        let ChunkGrid { chunk_width, chunk_height, .. } = self.grid;
+        format!("{} of {chunk_width} x {chunk_height} {kind}", self.grid.kind())
     }
-}
-
-pub(super) fn side(
-    file: &mut TiffFile,
-    directory: &Directory,
-    tag: u16,
-    what: &str,
-) -> Result<u32, LayoutError> {
-    let value = file.number(directory, tag)?;
-    // Sides of 2^31 and more would overflow the sum of a chunk's place and its size.
-    let side = value.and_then(|value| u32::try_from(value).ok()).filter(|side| *side <= i32::MAX as u32);
-    side.ok_or_else(|| match value {
-        Some(value) => {
-            file.damaged(format!("a {what} of {value} samples is out of range; fetch the file again"))
-        }
-        None => file.damaged(format!("the {what} is missing; fetch or write the file again")),
-    })
 }
 
 fn sample_type(file: &mut TiffFile, directory: &Directory) -> Result<SampleType, LayoutError> {

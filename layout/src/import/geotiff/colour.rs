@@ -36,13 +36,13 @@ impl TiffImage {
         let directory = file.first_full_image()?;
         let table = Table::read(&mut file, &directory)?;
         let (georeference, _) = geokeys::read(&mut file, &directory)?;
-        let rows = u64::from(table.chunk_height) * u64::from(group_chunks(&table));
+        let rows = u64::from(table.grid.chunk_height) * u64::from(group_chunks(&table));
         let info = ImageInfo {
-            texels: [table.width, table.height],
+            texels: [table.grid.width, table.grid.height],
             georeference,
             format: format!("{}{}", if file.is_big() { "BigTIFF" } else { "TIFF" }, table.describe()),
             notes: table.notes.clone(),
-            memory_bytes: u64::from(table.width.max(table.chunk_width)) * rows * 4
+            memory_bytes: u64::from(table.grid.width.max(table.grid.chunk_width)) * rows * 4
                 + rayon::current_num_threads() as u64 * 2 * table.chunk_bytes(),
         };
         Ok(Self { path: path.to_owned(), info, table })
@@ -51,7 +51,7 @@ impl TiffImage {
 
 /// Rows of chunks unpacked at once.
 fn group_chunks(table: &Table) -> u32 {
-    GROUP_ROWS.div_ceil(table.chunk_height).min(table.height.div_ceil(table.chunk_height))
+    GROUP_ROWS.div_ceil(table.grid.chunk_height).min(table.grid.height.div_ceil(table.grid.chunk_height))
 }
 
 impl ImageSource for TiffImage {
@@ -84,13 +84,13 @@ struct Rows<'i> {
 impl RowReader for Rows<'_> {
     fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
         let table = &self.image.table;
-        let pitch = table.chunk_width as usize * 4;
-        for row in rgba.chunks_exact_mut(table.width as usize * 4) {
-            let wanted = self.y / table.chunk_height * table.across;
+        let pitch = table.grid.chunk_width as usize * 4;
+        for row in rgba.chunks_exact_mut(table.grid.width as usize * 4) {
+            let wanted = self.y / table.grid.chunk_height * table.grid.across;
             if !(self.first_chunk..self.first_chunk + self.chunks.len() as u32).contains(&wanted) {
                 self.unpack(wanted)?;
             }
-            let at = (self.y % table.chunk_height) as usize * pitch;
+            let at = (self.y % table.grid.chunk_height) as usize * pitch;
             let first = (wanted - self.first_chunk) as usize;
             for (part, chunk) in row.chunks_mut(pitch).zip(&self.chunks[first..]) {
                 part.copy_from_slice(&chunk[at..at + part.len()]);
@@ -104,7 +104,7 @@ impl RowReader for Rows<'_> {
 impl Rows<'_> {
     fn unpack(&mut self, first: u32) -> Result<(), LayoutError> {
         let table = &self.image.table;
-        let end = table.count().min(first + group_chunks(table) * table.across);
+        let end = (table.grid.count() as u32).min(first + group_chunks(table) * table.grid.across);
         self.chunks.resize((end - first) as usize, Vec::new());
         let image = self.image;
         let file = &self.file;
@@ -134,10 +134,10 @@ impl TiffImage {
         texels: &mut Vec<u8>,
     ) -> Result<(), LayoutError> {
         let table = &self.table;
-        let rows = table.chunk_height.min(table.height - chunk / table.across * table.chunk_height);
-        let count = table.chunk_width as usize * rows as usize;
+        let rows = table.grid.window(u64::from(chunk)).height;
+        let count = table.grid.chunk_width as usize * rows as usize;
         texels.resize(count * 4, 0);
-        let Some((at, length)) = table.place(chunk) else {
+        let Some((at, length)) = table.grid.place(u64::from(chunk)) else {
             texels.fill(0);
             return Ok(());
         };
@@ -146,7 +146,7 @@ impl TiffImage {
         read_at(file, &mut scratch.packed, at).map_err(|e| match e.kind() {
             ErrorKind::UnexpectedEof => LayoutError::damaged(
                 &self.path,
-                table.name(chunk),
+                table.grid.name(u64::from(chunk)),
                 "the file was cut short while it was read; start again",
             ),
             _ => LayoutError::io(&self.path, "cannot read the TIFF file", e),
@@ -154,13 +154,13 @@ impl TiffImage {
         let failed = |problem: String| {
             LayoutError::damaged(
                 &self.path,
-                table.name(chunk),
+                table.grid.name(u64::from(chunk)),
                 format!("{problem}; fetch or write the file again"),
             )
         };
         guard(
             &self.path,
-            || table.name(chunk),
+            || table.grid.name(u64::from(chunk)),
             || match &table.packing {
                 Packing::Jpeg { tables } => {
                     let image = join_tables(tables, &scratch.packed);
@@ -173,7 +173,7 @@ impl TiffImage {
                     scratch.bytes.resize(count * pixel, 0);
                     codec::unpack(*compression, &scratch.packed, &mut scratch.bytes).map_err(failed)?;
                     if table.differences {
-                        let stride = table.chunk_width as usize * pixel;
+                        let stride = table.grid.chunk_width as usize * pixel;
                         predictor::horizontal_bands(
                             &mut scratch.bytes,
                             stride,
@@ -195,7 +195,7 @@ impl TiffImage {
         decoder.read_info().map_err(damaged)?;
         let Some(info) = decoder.info() else { return Err("its JPEG stream has no size".into()) };
         let size = (u32::from(info.width), u32::from(info.height));
-        if size.0 != self.table.chunk_width || size.1 < rows || size.1 > self.table.chunk_height {
+        if size.0 != self.table.grid.chunk_width || size.1 < rows || size.1 > self.table.grid.chunk_height {
             return Err(format!("its JPEG stream is of {} x {} texels", size.0, size.1));
         }
         let channels = match info.pixel_format {

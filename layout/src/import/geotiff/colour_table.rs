@@ -1,14 +1,13 @@
-//! The table of a TIFF picture's chunks: where they lie, how they are packed, what their channels mean, and that all this can be read.
+//! The chunks of a TIFF picture: how they are packed, what their channels mean, and that all this can be read.
 //!
 //! Uncompressed chunks that are taller than needed are cut into lower ones here, so that one huge strip reads like many. Every size is
 //! held against the file before memory is taken for it.
 
-use super::chunks::{Compression, compression_of, side};
+use super::chunk_grid::{ChunkGrid, side};
+use super::chunks::{Compression, compression_of};
 use super::tags::{self, Directory, TiffFile};
 use crate::error::LayoutError;
 
-/// Largest unpacked chunk.
-const MAX_CHUNK_BYTES: u64 = 512 << 20;
 /// Rows that uncompressed chunks are cut to where that comes out even.
 const CUT_ROWS: u32 = 64;
 
@@ -37,8 +36,8 @@ pub(super) enum Paint {
 /// How a picture is stored.
 #[derive(Debug)]
 pub(super) struct Table {
-    pub(super) width: u32,
-    pub(super) height: u32,
+    /// Uncompressed chunks are cut into lower ones in it.
+    pub(super) grid: ChunkGrid,
     pub(super) bands: u64,
     /// 1, or 2 of which the upper one is taken.
     pub(super) sample_bytes: u64,
@@ -51,13 +50,8 @@ pub(super) struct Table {
     pub(super) packing: Packing,
     /// Whether differences to the texel on the left are stored.
     pub(super) differences: bool,
-    pub(super) chunk_width: u32,
-    pub(super) chunk_height: u32,
-    tiled: bool,
     /// Height of the chunks in the file, before they were cut.
     declared_height: u32,
-    pub(super) across: u32,
-    places: Vec<(u64, u64)>,
     /// What is lost in reading it.
     pub(super) notes: Vec<String>,
 }
@@ -110,38 +104,13 @@ impl Table {
             )));
         }
         let void = file.text(directory, tags::GDAL_NODATA)?.and_then(|text| text.trim().parse::<f64>().ok());
-        let tiled = file.number(directory, tags::TILE_WIDTH)?.is_some();
-        let (chunk_width, chunk_height) = if tiled {
-            (
-                side(file, directory, tags::TILE_WIDTH, "tile width")?,
-                side(file, directory, tags::TILE_LENGTH, "tile height")?,
-            )
-        } else {
-            let rows = file.number(directory, tags::ROWS_PER_STRIP)?.unwrap_or(u64::MAX);
-            (width, rows.min(u64::from(height)) as u32)
-        };
-        if chunk_width == 0 || chunk_height == 0 {
-            return Err(file.damaged("a strip or tile without texels is declared; write the file again"));
-        }
-        let across = width.div_ceil(chunk_width);
-        let wanted = u64::from(across) * u64::from(height.div_ceil(chunk_height));
-        let (offsets, counts) = if tiled {
-            (tags::TILE_OFFSETS, tags::TILE_BYTE_COUNTS)
-        } else {
-            (tags::STRIP_OFFSETS, tags::STRIP_BYTE_COUNTS)
-        };
-        let offsets = file.numbers(directory, offsets)?.unwrap_or_default();
-        let counts = file.numbers(directory, counts)?.unwrap_or_default();
-        if offsets.len() as u64 != wanted || counts.len() as u64 != wanted || wanted > u64::from(u32::MAX) {
-            return Err(file.damaged(format!(
-                "{wanted} chunks make up the image, but {} places and {} lengths are listed; fetch the file again",
-                offsets.len(),
-                counts.len()
-            )));
+        let grid = ChunkGrid::read(file, directory, [width, height])?;
+        if grid.count() > u64::from(u32::MAX) {
+            return Err(file.damaged("it has more chunks than a picture can have; fetch the file again"));
         }
         let mut table = Self {
-            width,
-            height,
+            declared_height: grid.chunk_height,
+            grid,
             bands,
             sample_bytes,
             big_endian: file.is_big_endian(),
@@ -150,12 +119,6 @@ impl Table {
             void: void.filter(|v| v.fract() == 0.0 && (0.0..=65535.0).contains(v)).map(|v| v as u16),
             packing,
             differences: predictor == 2 && !is_raw,
-            chunk_width,
-            chunk_height,
-            tiled,
-            declared_height: chunk_height,
-            across,
-            places: offsets.into_iter().zip(counts).collect(),
             notes,
         };
         if is_raw {
@@ -167,18 +130,19 @@ impl Table {
 
     /// Cuts uncompressed chunks into lower ones.
     fn cut(&mut self, file_bytes: u64) {
-        let one_strip = self.chunk_height >= self.height;
-        if self.chunk_height <= CUT_ROWS || !(one_strip || self.chunk_height.is_multiple_of(CUT_ROWS)) {
+        let grid = &mut self.grid;
+        let one_strip = grid.chunk_height >= grid.height;
+        if grid.chunk_height <= CUT_ROWS || !(one_strip || grid.chunk_height.is_multiple_of(CUT_ROWS)) {
             return;
         }
-        let row_bytes = u64::from(self.chunk_width) * self.bands * self.sample_bytes;
+        let row_bytes = u64::from(grid.chunk_width) * self.bands * self.sample_bytes;
         // A file that is too short for its chunks gets no table of more; the check says so.
-        if row_bytes.saturating_mul(u64::from(self.chunk_height)) > file_bytes {
+        if row_bytes.saturating_mul(u64::from(grid.chunk_height)) > file_bytes {
             return;
         }
-        let cuts = self.chunk_height.div_ceil(CUT_ROWS);
+        let cuts = grid.chunk_height.div_ceil(CUT_ROWS);
         let mut places = Vec::new();
-        for chunk_row in self.places.chunks(self.across as usize) {
+        for chunk_row in grid.places.chunks(grid.across as usize) {
             for cut in 0..u64::from(cuts) {
                 let skipped = cut * u64::from(CUT_ROWS) * row_bytes;
                 let rest = |&(at, bytes): &(u64, u64)| match bytes {
@@ -188,43 +152,27 @@ impl Table {
                 places.extend(chunk_row.iter().map(rest));
             }
         }
-        self.chunk_height = CUT_ROWS;
-        places.truncate(self.across as usize * self.height.div_ceil(CUT_ROWS) as usize);
-        self.places = places;
+        grid.chunk_height = CUT_ROWS;
+        places.truncate(grid.across as usize * grid.height.div_ceil(CUT_ROWS) as usize);
+        grid.places = places;
     }
 
     /// Every chunk lies in the file, and is no larger than it may be.
     fn check(&mut self, file: &TiffFile) -> Result<(), LayoutError> {
-        if self.chunk_bytes() > MAX_CHUNK_BYTES {
-            return Err(unsupported(
-                file,
-                &format!(
-                    "its strips or tiles would take {} MiB each in memory; write it again in tiles: gdal_translate \
-                     -co TILED=YES -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER INPUT output.tif",
-                    self.chunk_bytes() >> 20
-                ),
-            ));
-        }
+        self.grid.check_size(file, self.chunk_bytes())?;
         let is_raw = matches!(self.packing, Packing::Bytes(Compression::None));
         let pixel = self.bands * self.sample_bytes;
-        for chunk in 0..self.count() {
-            let Some((at, packed)) = self.place(chunk) else { continue };
-            let rows = self.chunk_height.min(self.height - chunk / self.across * self.chunk_height);
-            let needed = u64::from(self.chunk_width) * u64::from(rows) * pixel;
-            let ends = |bytes: u64| at.checked_add(bytes).is_some_and(|end| end <= file.bytes());
-            if !ends(if is_raw { needed } else { packed }) {
-                return Err(LayoutError::damaged(
-                    file.path(),
-                    self.name(chunk),
-                    "it would end beyond the end of the file, which is cut short; fetch it again",
-                ));
-            }
+        for chunk in 0..self.grid.count() {
+            let Some((at, packed)) = self.grid.place(chunk) else { continue };
+            let rows = self.grid.window(chunk).height;
+            let needed = u64::from(self.grid.chunk_width) * u64::from(rows) * pixel;
+            self.grid.check_end(file, chunk, at, if is_raw { needed } else { packed })?;
             if is_raw {
-                self.places[chunk as usize].1 = needed;
+                self.grid.places[chunk as usize].1 = needed;
             } else if packed > 2 * self.chunk_bytes() + (1 << 20) {
                 return Err(LayoutError::damaged(
                     file.path(),
-                    self.name(chunk),
+                    self.grid.name(chunk),
                     "it is much longer packed than unpacked; fetch the file again",
                 ));
             }
@@ -232,25 +180,10 @@ impl Table {
         Ok(())
     }
 
-    /// Number of chunks.
-    pub(super) fn count(&self) -> u32 {
-        self.places.len() as u32
-    }
-
     /// Bytes of a whole chunk when unpacked, as RGBA if that is more.
     pub(super) fn chunk_bytes(&self) -> u64 {
-        let texels = u64::from(self.chunk_width) * u64::from(self.chunk_height);
+        let texels = u64::from(self.grid.chunk_width) * u64::from(self.grid.chunk_height);
         texels.saturating_mul((self.bands.saturating_mul(self.sample_bytes)).max(4))
-    }
-
-    /// Offset and packed length of a chunk; `None` if the file left it out.
-    pub(super) fn place(&self, chunk: u32) -> Option<(u64, u64)> {
-        self.places.get(chunk as usize).copied().filter(|(at, bytes)| *at != 0 && *bytes != 0)
-    }
-
-    /// Name of a chunk in messages.
-    pub(super) fn name(&self, chunk: u32) -> String {
-        format!("{} {chunk} of {}", if self.tiled { "tile" } else { "strip" }, self.count())
     }
 
     /// ", tiles of 512 x 512 RGB with alpha, DEFLATE".
@@ -267,8 +200,8 @@ impl Table {
         };
         format!(
             ", {} of {} x {} {}-bit {colour}{}, {packing}",
-            if self.tiled { "tiles" } else { "strips" },
-            self.chunk_width,
+            self.grid.kind(),
+            self.grid.chunk_width,
             self.declared_height,
             8 * self.sample_bytes,
             if self.alpha.is_some() { " with alpha" } else { "" },

@@ -10,6 +10,7 @@
 //! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
 //! are not inverted for "white is zero" files. Masks in images of their own are not applied.
 
+mod chunk_grid;
 mod chunks;
 mod codec;
 mod colour;
@@ -55,8 +56,8 @@ impl TiffDem {
         let heights = metadata::heights(&bands);
         let unit_m = heights.unit_m.unwrap_or(vertical_unit_m);
         let info = DemInfo {
-            samples_wide: chunks.width,
-            samples_high: chunks.height,
+            samples_wide: chunks.grid.width,
+            samples_high: chunks.grid.height,
             sample_type: chunks.sample_type,
             height_scale: heights.scale * unit_m,
             height_offset_m: heights.offset * unit_m,

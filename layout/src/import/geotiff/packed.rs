@@ -39,24 +39,24 @@ pub(super) fn stream(
             File::open(path).map_err(|source| LayoutError::io(path, "cannot open the TIFF file", source))?;
         Ok(Worker { file, packed: Vec::new(), bytes: Vec::new(), row: Vec::new(), samples: Vec::new() })
     };
-    each_task(chunks.count(), workers, open, |worker, chunk| {
-        let window = chunks.window(chunk);
-        let Some((at, length)) = chunks.place(chunk) else {
+    each_task(chunks.grid.count(), workers, open, |worker, chunk| {
+        let window = chunks.grid.window(chunk);
+        let Some((at, length)) = chunks.grid.place(chunk) else {
             return put_constant(sink, window, void.absent());
         };
-        let stride = (u64::from(chunks.chunk_width) * chunks.sample_bytes()) as usize;
+        let stride = (u64::from(chunks.grid.chunk_width) * chunks.sample_bytes()) as usize;
         worker.read(path, chunks, chunk, at, length)?;
         // The table's check has shown that this is at most 512 MiB, and no more than the packed bytes can become.
         worker.bytes.resize(stride * window.height as usize, 0);
         // The codecs are others' work: a panic in one is damage in this chunk.
         guard(
             path,
-            || chunks.name(chunk),
+            || chunks.grid.name(chunk),
             || {
                 unpack(chunks.compression, &worker.packed, &mut worker.bytes).map_err(|problem| {
                     LayoutError::damaged(
                         path,
-                        chunks.name(chunk),
+                        chunks.grid.name(chunk),
                         format!("{problem}; fetch or write the file again"),
                     )
                 })
@@ -100,7 +100,7 @@ impl Worker {
         read.map_err(|source| match source.kind() {
             ErrorKind::UnexpectedEof => LayoutError::damaged(
                 path,
-                chunks.name(chunk),
+                chunks.grid.name(chunk),
                 "the file was cut short while it was read; start again",
             ),
             _ => LayoutError::io(path, "cannot read the TIFF file", source),

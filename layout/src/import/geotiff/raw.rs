@@ -27,26 +27,26 @@ pub(super) fn stream(
     void: &Void,
     sink: &dyn SampleSink,
 ) -> Result<(), LayoutError> {
-    let band_rows = rows_at_once(chunks.chunk_width).min(chunks.chunk_height);
-    let bands = u64::from(chunks.chunk_height.min(chunks.height).div_ceil(band_rows));
+    let band_rows = rows_at_once(chunks.grid.chunk_width).min(chunks.grid.chunk_height);
+    let bands = u64::from(chunks.grid.chunk_height.min(chunks.grid.height).div_ceil(band_rows));
     let open = || {
         let file =
             File::open(path).map_err(|source| LayoutError::io(path, "cannot open the TIFF file", source))?;
         Ok(Worker { file, bytes: Vec::new(), samples: Vec::new() })
     };
-    each_task(chunks.count() * bands, usize::MAX, open, |worker, task| {
+    each_task(chunks.grid.count() * bands, usize::MAX, open, |worker, task| {
         let (chunk, band) = (task / bands, task % bands);
-        let whole = chunks.window(chunk);
+        let whole = chunks.grid.window(chunk);
         // Less than the chunk's height.
         let first = band as u32 * band_rows;
         if first >= whole.height {
             return Ok(());
         }
         let window = Window { row: whole.row + first, height: band_rows.min(whole.height - first), ..whole };
-        let Some((at, _)) = chunks.place(chunk) else {
+        let Some((at, _)) = chunks.grid.place(chunk) else {
             return put_constant(sink, window, void.absent());
         };
-        let stride = u64::from(chunks.chunk_width) * chunks.sample_bytes();
+        let stride = u64::from(chunks.grid.chunk_width) * chunks.sample_bytes();
         // The table's check has shown that the file is this long.
         worker.bytes.resize((stride * u64::from(window.height)) as usize, 0);
         let read = worker
@@ -56,7 +56,7 @@ pub(super) fn stream(
         read.map_err(|source| match source.kind() {
             ErrorKind::UnexpectedEof => LayoutError::damaged(
                 path,
-                chunks.name(chunk),
+                chunks.grid.name(chunk),
                 "the file was cut short while it was read; start again",
             ),
             _ => LayoutError::io(path, "cannot read the TIFF file", source),
