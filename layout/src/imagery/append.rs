@@ -1,8 +1,9 @@
 //! A section appended to a terrain file so that the file reads as before or as after, wherever the work is cut off.
 //!
 //! Tiles, directory and the section's first page go behind what the current header counts as the file; when they are on the disk, the header slot that is not
-//! current gets the next generation, and is synced. Nothing that a reader of the old generation can reach is written to. An append that fails gives
-//! the space back; one that is killed leaves bytes behind the file that no header counts, and the next append writes over them.
+//! current gets the next generation, and is synced. Nothing that a reader of the old generation can reach is written to. An append that fails before it has begun on the
+//! header gives the space back; after that the new header may be on the disk, whatever the error says, and what it counts must stay. One that is killed leaves bytes behind the
+//! file that no header counts, and the next append writes over them.
 
 use super::pyramid::MadeTile;
 use super::section::{Section, TileEntry};
@@ -24,6 +25,9 @@ pub(super) trait Target: Sync {
 
     /// Returns when all that was written is on the disk.
     fn sync(&self) -> io::Result<()>;
+
+    /// Makes the file as long as it was.
+    fn give_back(&self, length: u64) -> io::Result<()>;
 }
 
 impl Target for File {
@@ -33,6 +37,10 @@ impl Target for File {
 
     fn sync(&self) -> io::Result<()> {
         self.sync_data()
+    }
+
+    fn give_back(&self, length: u64) -> io::Result<()> {
+        self.set_len(length)
     }
 }
 
@@ -141,6 +149,23 @@ impl<'t> Append<'t> {
         source: &str,
         may_commit: impl FnOnce() -> Result<(), LayoutError>,
     ) -> Result<Header, LayoutError> {
+        self.write_section(source)?;
+        may_commit()?;
+        let place = ImageryPlace { offset: self.begin, bytes: self.next - self.begin };
+        let header = Header {
+            generation: self.slots.header.generation.saturating_add(1),
+            file_bytes: place.end(),
+            imagery: Some(place),
+            ..self.slots.header.clone()
+        };
+        let page = header.amended(&self.slots.current);
+        self.write(&page[..], (1 - self.slots.current_slot) * PAGE)?;
+        self.sync()?;
+        Ok(header)
+    }
+
+    /// Writes directory and first page behind which the tiles lie, and brings all to the disk.
+    fn write_section(&self, source: &str) -> Result<(), LayoutError> {
         let section = Section {
             shape: self.shape,
             stored_tiles: self.stored_tiles,
@@ -153,18 +178,6 @@ impl<'t> Append<'t> {
         start.extend_from_slice(&self.directory);
         start.resize(start.len().next_multiple_of(PAGE_BYTES), 0);
         self.write(&start, self.begin)?;
-        let place = ImageryPlace { offset: self.begin, bytes: self.next - self.begin };
-        self.sync()?;
-        may_commit()?;
-        let header = Header {
-            generation: self.slots.header.generation.saturating_add(1),
-            file_bytes: place.end(),
-            imagery: Some(place),
-            ..self.slots.header.clone()
-        };
-        let page = header.amended(&self.slots.current);
-        self.write(&page[..], (1 - self.slots.current_slot) * PAGE)?;
-        self.sync()?;
-        Ok(header)
+        self.sync()
     }
 }

@@ -16,8 +16,9 @@ use crate::build::BuildProgress;
 use crate::bytes::{PAGE_BYTES, Page};
 use crate::error::LayoutError;
 use crate::header::Header;
-use crate::source::Source;
+use crate::source::{PreadSource, Source};
 use crate::terrain::Terrain;
+use std::cell::Cell;
 use std::fs::File;
 use std::path::Path;
 
@@ -64,13 +65,11 @@ pub fn drape(
     progress: &dyn BuildProgress,
 ) -> Result<Draped, LayoutError> {
     let _lock = WriteLock::take(path)?;
-    let terrain = Terrain::open_unmapped(path)?;
-    let file = File::options()
-        .read(true)
-        .write(true)
-        .open(path)
-        .map_err(|e| LayoutError::io(path, "cannot open the file for writing", e))?;
-    let length = terrain.source().byte_count();
+    let failed = |e| LayoutError::io(path, "cannot open the file for writing", e);
+    let file = File::options().read(true).write(true).open(path).map_err(failed)?;
+    // One file, opened once: what is read is what is written to.
+    let terrain =
+        Terrain::from_source(Box::new(PreadSource::over(path, file.try_clone().map_err(failed)?)?))?;
     let replaced = || {
         if is_named(&file, path) {
             return Ok(());
@@ -81,16 +80,29 @@ pub fn drape(
         )))
     };
     let images: Vec<&dyn ImageSource> = images.iter().map(|image| &**image).collect();
-    let done = drape_onto(terrain.source(), &file, &images, options, progress, replaced);
-    if done.is_err() {
-        // Gives back what was appended; nobody has read it. Failing costs space only.
-        let _ = file.set_len(length);
+    drape_onto(terrain.source(), &file, &images, options, progress, replaced)
+}
+
+/// As [`drape`], reading the terrain from `source` and writing to `target`, which is the same file.
+pub(super) fn drape_onto(
+    source: &dyn Source,
+    target: &dyn Target,
+    images: &[&dyn ImageSource],
+    options: &DrapeOptions,
+    progress: &dyn BuildProgress,
+    may_commit: impl FnOnce() -> Result<(), LayoutError>,
+) -> Result<Draped, LayoutError> {
+    let header_begun = Cell::new(false);
+    let may_commit = || may_commit().inspect(|()| header_begun.set(true));
+    let done = append_all(source, target, images, options, progress, may_commit);
+    if done.is_err() && !header_begun.get() {
+        // No header counts what was appended. Failing here costs space only.
+        let _ = target.give_back(source.byte_count());
     }
     done
 }
 
-/// As [`drape`], reading the terrain from `source` and writing to `target`.
-pub(super) fn drape_onto(
+fn append_all(
     source: &dyn Source,
     target: &dyn Target,
     images: &[&dyn ImageSource],
@@ -169,21 +181,29 @@ mod tests {
     use std::sync::Mutex;
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    /// A file in memory that stops for good at one of its writes and syncs, some of whose bytes still arrive.
+    /// How an append ends at one of its writes and syncs.
+    #[derive(Debug, Clone, Copy)]
+    struct End {
+        at: u64,
+        /// Share that still arrives of the write.
+        quarters: usize,
+        /// Whether the process ends with it, or hears an error and tidies up.
+        killed: bool,
+    }
+
+    /// A file in memory of which nothing after that arrives.
     struct Stopping {
         bytes: Mutex<Vec<u8>>,
         calls: AtomicU64,
-        stop_at: u64,
-        /// Share that arrives of the write that stops.
-        quarters: usize,
+        end: End,
     }
 
     impl Target for Stopping {
         fn write(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
             let call = self.calls.fetch_add(1, Ordering::Relaxed);
-            let arrived = match call.cmp(&self.stop_at) {
+            let arrived = match call.cmp(&self.end.at) {
                 std::cmp::Ordering::Less => bytes.len(),
-                std::cmp::Ordering::Equal => bytes.len() * self.quarters / 4,
+                std::cmp::Ordering::Equal => bytes.len() * self.end.quarters / 4,
                 std::cmp::Ordering::Greater => 0,
             };
             let mut file = self.bytes.lock().unwrap();
@@ -192,12 +212,19 @@ mod tests {
                 file.resize(end, 0);
             }
             file[offset as usize..end].copy_from_slice(&bytes[..arrived]);
-            if call < self.stop_at { Ok(()) } else { Err(io::ErrorKind::StorageFull.into()) }
+            if call < self.end.at { Ok(()) } else { Err(io::ErrorKind::StorageFull.into()) }
         }
 
         fn sync(&self) -> io::Result<()> {
             let call = self.calls.fetch_add(1, Ordering::Relaxed);
-            if call < self.stop_at { Ok(()) } else { Err(io::ErrorKind::Other.into()) }
+            if call < self.end.at { Ok(()) } else { Err(io::ErrorKind::Other.into()) }
+        }
+
+        fn give_back(&self, length: u64) -> io::Result<()> {
+            if !self.end.killed {
+                self.bytes.lock().unwrap().truncate(length as usize);
+            }
+            Ok(())
         }
     }
 
@@ -234,10 +261,12 @@ mod tests {
         (terrain.header().generation, records, tiles)
     }
 
-    fn append(before: &[u8], image: &MemoryImage, stop_at: u64, quarters: usize) -> (Vec<u8>, bool, u64) {
+    const NEVER: End = End { at: u64::MAX, quarters: 4, killed: false };
+
+    fn append(before: &[u8], image: &MemoryImage, end: End) -> (Vec<u8>, bool, u64) {
         let source = MemorySource::new("a.iqt", before.to_vec());
         let bytes = Mutex::new(before.to_vec());
-        let target = Stopping { bytes, calls: AtomicU64::new(0), stop_at, quarters };
+        let target = Stopping { bytes, calls: AtomicU64::new(0), end };
         let options = DrapeOptions::default();
         let done = drape_onto(&source, &target, &[image], &options, &Silent, || Ok(())).is_ok();
         let calls = target.calls.load(Ordering::Relaxed);
@@ -250,23 +279,27 @@ mod tests {
         let mut before = terrain_bytes();
         for seed in [1, 2] {
             let picture = image(seed);
-            let (after, done, writes) = append(&before, &picture, u64::MAX, 4);
+            let (after, done, writes) = append(&before, &picture, NEVER);
             assert!(done && writes > 8);
             let [wanted_before, wanted_after] = [before.clone(), after.clone()].map(seen);
             assert_ne!(wanted_before, wanted_after);
-            for stop_at in 0..writes {
-                for quarters in 0..=4 {
-                    let (stopped, done, _) = append(&before, &picture, stop_at, quarters);
-                    assert!(!done);
-                    let found = seen(stopped.clone());
-                    // Only the header's own write decides, and its sync may fail after it.
-                    let is_decided = stop_at + 1 == writes || stop_at + 2 == writes && quarters == 4;
-                    let wanted = if is_decided { &wanted_after } else { &wanted_before };
-                    assert!(found == *wanted, "stopped at {stop_at} of {writes}, {quarters} quarters");
-                    if quarters == 2 && !is_decided {
-                        let (again, done, _) = append(&stopped, &picture, u64::MAX, 4);
-                        assert!(done && seen(again) == wanted_after);
-                    }
+            let ends = (0..writes).flat_map(|at| (0..=4).map(move |quarters| (at, quarters)));
+            for end in
+                ends.flat_map(|(at, quarters)| [true, false].map(|killed| End { at, quarters, killed }))
+            {
+                let (stopped, done, _) = append(&before, &picture, end);
+                assert!(!done);
+                let found = seen(stopped.clone());
+                // Only the header's own write decides, and its sync may fail after it.
+                let is_decided = end.at + 1 == writes || end.at + 2 == writes && end.quarters == 4;
+                let wanted = if is_decided { &wanted_after } else { &wanted_before };
+                assert!(found == *wanted, "{end:?} of {writes}");
+                if !end.killed && end.at + 2 < writes {
+                    assert!(stopped == before, "{end:?} of {writes}: the space is not given back");
+                }
+                if end.quarters == 2 && !is_decided {
+                    let (again, done, _) = append(&stopped, &picture, NEVER);
+                    assert!(done && seen(again) == wanted_after);
                 }
             }
             before = after;

@@ -22,6 +22,11 @@ impl PreadSource {
     /// [`LayoutError::Io`] if it cannot be opened or someone is writing to it; [`LayoutError::NotThisFormat`] for what is not a regular file.
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
         let file = File::open(path).map_err(|e| LayoutError::io(path, "cannot open the file", e))?;
+        Self::over(path, file)
+    }
+
+    /// The file that `path` was opened as, for those who write to the very file that they read.
+    pub(crate) fn over(path: &Path, file: File) -> Result<Self, LayoutError> {
         let meta =
             file.metadata().map_err(|e| LayoutError::io(path, "cannot ask for the file's length", e))?;
         if !meta.is_file() {
