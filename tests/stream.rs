@@ -81,6 +81,8 @@ fn fly(terrain: &Arc<Terrain>, flown: &[View], how: How) -> Vec<StreamFrame> {
             for (i, view) in flown.iter().enumerate() {
                 let frame = streamed.update(view, &mut Unobserved);
                 assert_eq!(frame.failures, 0);
+                let held = streamed.engine().store().pages_held() as u64;
+                assert!(held <= how.cache_pages, "{held} pages in room for {}", how.cache_pages);
                 assert!(frame.work.late_error_px == 0.0 || frame.work.late > 0);
                 follow(&streamed, i);
                 frames.push(frame);

@@ -40,7 +40,7 @@ pub const fn child_slots(apex: u64, split: u64) -> [u64; 2] {
 
 /// Spreads the low 32 bits of `v` onto the even bits.
 #[inline(always)]
-const fn spread(v: u64) -> u64 {
+pub const fn spread(v: u64) -> u64 {
     let mut v = v & 0xffff_ffff;
     v = (v | v << 16) & 0x0000_ffff_0000_ffff;
     v = (v | v << 8) & 0x00ff_00ff_00ff_00ff;

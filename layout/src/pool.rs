@@ -119,11 +119,6 @@ impl<C: RecordCodec> PagePool<C> {
     pub fn pages_held(&self) -> usize {
         self.held.len()
     }
-
-    /// Pages it may hold.
-    pub fn capacity_pages(&self) -> usize {
-        self.capacity
-    }
 }
 
 impl<C: RecordCodec> RecordStore for PagePool<C> {

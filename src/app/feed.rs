@@ -38,8 +38,6 @@ pub(crate) struct Refined {
     pub pages_read: u64,
     /// Pages that came from storage; 0 where the file is mapped.
     pub pages_come: u64,
-    /// Pages that the mesh lacked; 0 where the file is mapped.
-    pub late_pages: u64,
 }
 
 /// An engine over a terrain.

@@ -88,7 +88,6 @@ impl<C: RecordCodec> Feed for StreamedFeed<C> {
             record_bytes_read: reads * C::BYTES as u64,
             pages_read,
             pages_come: self.frame.pages_come,
-            late_pages: self.frame.late_pages,
         }
     }
 

@@ -4,7 +4,6 @@
 //! Preloads come from a disk of stated speed: so many pages between two frames, the coarsest first. **Nothing here reads a clock or the state of the machine**: equal
 //! input gives equal counts.
 
-use super::cache::PageCache;
 use super::layouts::{LINE_BYTES, Layout, LayoutKind, UNIT_BYTES};
 use super::{FrameIo, IoBenchError, Prefetch, Reader, Run};
 use crate::flyover::EngineKind;
@@ -15,6 +14,8 @@ use crate::refine::soar::Soar;
 use crate::refine::{Culling, Engine, Probe};
 use crate::stream::ExtendedView;
 use crate::view::View;
+use lru::LruCache;
+use std::num::NonZeroUsize;
 use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::record::RecordCodec;
 use terrasoar_layout::terrain::{Records, Terrain};
@@ -30,7 +31,7 @@ pub struct CountOptions {
     pub layouts: Vec<LayoutKind>,
     /// Ways of preloading.
     pub preloads: Vec<Prefetch>,
-    /// Pages that the cache holds.
+    /// Pages that the cache holds; one at the least.
     pub cache_pages: usize,
     /// Pages that the disk delivers between two frames.
     pub disk_pages: usize,
@@ -132,7 +133,8 @@ struct LayoutCount<'t> {
 /// One way of preloading under one layout.
 struct Mode {
     kind: Prefetch,
-    cache: PageCache,
+    /// The page cache as it is imagined: the page not touched for longest goes first.
+    cache: LruCache<u64, ()>,
     frames: Vec<FrameIo>,
     /// Pages loaded since the last frame.
     preloaded: u64,
@@ -142,7 +144,7 @@ impl<'t> LayoutCount<'t> {
     fn new(layout: Layout<'t>, options: &CountOptions) -> Self {
         let mode = |kind: &Prefetch| Mode {
             kind: *kind,
-            cache: PageCache::new(options.cache_pages),
+            cache: page_cache(options.cache_pages),
             frames: Vec::new(),
             preloaded: 0,
         };
@@ -179,9 +181,9 @@ impl<'t> LayoutCount<'t> {
         let mut units: Vec<u64> = self.lines.iter().map(|line| line / LINES_PER_UNIT).collect();
         units.dedup();
         for mode in &mut self.modes {
-            let missing = self.pages.iter().filter(|page| !mode.cache.contains(**page)).count();
+            let missing = self.pages.iter().filter(|page| !mode.cache.contains(*page)).count();
             self.pages.iter().for_each(|page| {
-                mode.cache.touch(*page);
+                mode.cache.put(*page, ());
             });
             mode.frames.push(FrameIo {
                 frame,
@@ -207,11 +209,11 @@ impl<'t> LayoutCount<'t> {
         let wanted = in_order_of_first_touch(lines(extension).into_iter());
         for mode in self.modes.iter_mut().filter(|mode| mode.kind == Prefetch::Frustum) {
             let missing =
-                wanted.iter().filter(|p| view.binary_search(p).is_err() && !mode.cache.contains(**p));
+                wanted.iter().filter(|p| view.binary_search(p).is_err() && !mode.cache.contains(*p));
             let loads: Vec<u64> = missing.take(disk_pages).copied().collect();
             mode.preloaded = loads.len() as u64;
             for page in loads {
-                mode.cache.touch(page);
+                mode.cache.put(page, ());
             }
         }
     }
@@ -228,6 +230,13 @@ impl<'t> LayoutCount<'t> {
             trace: if mode.kind == Prefetch::None { trace.clone() } else { None },
         })
     }
+}
+
+/// An empty cache, which takes memory as it fills.
+fn page_cache(pages: usize) -> LruCache<u64, ()> {
+    let mut cache = LruCache::unbounded();
+    cache.resize(NonZeroUsize::new(pages).unwrap_or(NonZeroUsize::MIN));
+    cache
 }
 
 /// `pages` without repetition.

@@ -14,7 +14,7 @@
 use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::header::INERT_PAGE;
-use terrasoar_layout::order::{point_of, slot_count};
+use terrasoar_layout::order::{point_of, slot_count, spread};
 use terrasoar_layout::terrain::Terrain;
 
 /// Bytes of a record that holds what SOAR's does.
@@ -142,11 +142,6 @@ fn tiled_index(k: u32, p: GridPoint) -> u64 {
     } else {
         spread(x) | spread(y) << 1
     }
-}
-
-/// Puts a zero bit above every bit of a number below 2^17.
-fn spread(v: u64) -> u64 {
-    (0..17).fold(0, |sum, bit| sum | (v >> bit & 1) << (2 * bit))
 }
 
 #[cfg(test)]

@@ -11,7 +11,6 @@
 //!
 //! Counts repeat to the last page; times, faults and bytes are the machine's. A MB is 10^6 bytes, a page 4 KiB.
 
-mod cache;
 mod count;
 pub mod kernel;
 pub mod layouts;
@@ -20,7 +19,6 @@ pub mod scratch;
 mod summary;
 mod timed;
 
-pub use cache::PageCache;
 pub use count::{CountOptions, count};
 pub use layouts::LayoutKind;
 pub use pooled::{PoolOptions, Pooled, ReadBy, fly_pooled};

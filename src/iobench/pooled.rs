@@ -3,7 +3,7 @@
 //! Cold begins after the system was asked to forget the file; warm flies again from an empty pool over what the system then holds. The first frame waits for its pages,
 //! no other does. What comes too late depends on the machine and its storage: only flights over a model disk (`crate::stream::ModelDisk`) repeat.
 
-use super::timed::observed;
+use super::timed::{forget, observed};
 use super::{FrameIo, IoBenchError, LayoutKind, Reader, Run, Timed, kernel};
 use crate::refine::{Culling, Unobserved};
 use crate::stream::{Prefetch, StreamFrame, Streamed, Threads};
@@ -123,11 +123,7 @@ pub fn fly_pooled(
     options: PoolOptions,
     done: &mut dyn FnMut(u64),
 ) -> Result<Pooled, IoBenchError> {
-    let was_forgotten = kernel::forget_file(path).map_err(|source| IoBenchError::Io {
-        doing: "cannot drop the file from memory",
-        path: path.into(),
-        source,
-    })?;
+    let was_forgotten = forget(path)?;
     let (knows_peak, before) = (kernel::reset_peak_memory(), kernel::read_bytes());
     let (cold, frames, loader) = pass(path, views, options, &mut |i| done(i))?;
     let storage_bytes = kernel::read_bytes().zip(before).map(|(now, then)| now - then);

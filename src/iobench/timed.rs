@@ -56,11 +56,7 @@ pub fn time(
     reader: Reader,
     done: &mut dyn FnMut(u64),
 ) -> Result<Timed, IoBenchError> {
-    let was_forgotten = kernel::forget_file(path).map_err(|source| IoBenchError::Io {
-        doing: "cannot drop the file from memory",
-        path: path.into(),
-        source,
-    })?;
+    let was_forgotten = forget(path)?;
     let terrain = Terrain::open(path)?;
     let records =
         terrain.records().ok_or_else(|| IoBenchError::NotInAddressSpace(path.display().to_string()))?;
@@ -100,6 +96,15 @@ fn fly_with(mut engine: impl Engine, views: &[View], done: &mut dyn FnMut(u64)) 
         cost
     };
     views.iter().enumerate().map(update).collect()
+}
+
+/// Asks the system to forget the file; whether it can be asked.
+pub(super) fn forget(path: &Path) -> Result<bool, IoBenchError> {
+    kernel::forget_file(path).map_err(|source| IoBenchError::Io {
+        doing: "cannot drop the file from memory",
+        path: path.into(),
+        source,
+    })
 }
 
 /// What `work` costs.

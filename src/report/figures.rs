@@ -8,7 +8,7 @@ use super::{ComparisonReport, SweepPoint};
 use crate::stats::{FrameStats, median};
 
 /// Medians further apart than this factor share a logarithmic axis.
-pub(super) const WIDE: f64 = 12.0;
+const WIDE: f64 = 12.0;
 
 /// The charts of a report, in the order shown.
 pub(super) fn all(report: &ComparisonReport<'_>) -> Vec<Chart> {
@@ -81,7 +81,20 @@ pub(super) fn frame_axis() -> AxisPlan {
     }
 }
 
-pub(super) fn y_axis(name: String, shows: &[f64]) -> AxisPlan {
+/// An axis for `series`, logarithmic where their medians lie wide apart and nothing is 0.
+pub(super) fn scaled_axis(name: &str, series: &[Series]) -> AxisPlan {
+    let medians = series.iter().map(|s| median(&mut s.points.iter().map(|p| p[1]).collect::<Vec<_>>()));
+    let (low, high) = medians.fold((f64::INFINITY, 0.0f64), |(l, h), m| (l.min(m), h.max(m)));
+    let all_above_zero = series.iter().flat_map(|s| &s.points).all(|p| p[1] > 0.0);
+    let mut axis = y_axis(name.into(), &[]);
+    if high > WIDE * low && all_above_zero {
+        axis.scale = Scale::Logarithmic;
+        axis.name.push_str(" (logarithmic)");
+    }
+    axis
+}
+
+fn y_axis(name: String, shows: &[f64]) -> AxisPlan {
     AxisPlan { name, scale: Scale::Linear, ticks: Ticks::Round, shows: shows.to_vec() }
 }
 
@@ -172,18 +185,7 @@ fn per_frame(
         .enumerate()
         .map(|(look, (name, frames))| Series { name: name.clone(), look, points: later(frames) })
         .collect();
-    let medians: Vec<f64> = series
-        .iter()
-        .map(|s| median(&mut s.points.iter().map(|p| p[1]).collect::<Vec<_>>()))
-        .filter(|m| *m > 0.0)
-        .collect();
-    let (low, high) = medians.iter().fold((f64::INFINITY, 0.0f64), |(l, h), m| (l.min(*m), h.max(*m)));
-    let all_above_zero = series.iter().flat_map(|s| &s.points).all(|p| p[1] > 0.0);
-    let mut y = y_axis(y_name.into(), &[]);
-    if high > WIDE * low && all_above_zero {
-        y.scale = Scale::Logarithmic;
-        y.name.push_str(" (logarithmic)");
-    }
+    let y = scaled_axis(y_name, &series);
     Chart {
         stem,
         title: title.into(),

@@ -1,11 +1,10 @@
 //! Which charts a measurement of reading has: pages a frame by layout and by engine, and what preloading leaves to be read in real time.
 
-use super::chart::{Chart, Scale, Series};
-use super::figures::{WIDE, frame_axis, y_axis};
+use super::chart::{Chart, Series};
+use super::figures::{frame_axis, scaled_axis};
 use super::io::IoReport;
 use super::number::exact;
 use crate::iobench::{FrameIo, LayoutKind, Prefetch, Reader, Run};
-use crate::stats::median;
 
 /// The charts of a report, in the order shown.
 pub(super) fn all(report: &IoReport<'_>) -> Vec<Chart> {
@@ -74,15 +73,7 @@ fn chart<'r>(
     };
     let series: Vec<Series> =
         runs.enumerate().map(|(look, (name, run))| Series { name, look, points: points(run) }).collect();
-    let medians: Vec<f64> =
-        series.iter().map(|s| median(&mut s.points.iter().map(|p| p[1]).collect::<Vec<_>>())).collect();
-    let (low, high) = medians.iter().fold((f64::INFINITY, 0.0f64), |(l, h), m| (l.min(*m), h.max(*m)));
-    let all_above_zero = series.iter().flat_map(|s| &s.points).all(|p| p[1] > 0.0);
-    let mut y = y_axis(y_name.into(), &[]);
-    if high > WIDE * low && all_above_zero {
-        y.scale = Scale::Logarithmic;
-        y.name.push_str(" (logarithmic)");
-    }
+    let y = scaled_axis(y_name, &series);
     let bench = report.bench;
     let [wide, high] = bench.viewport_px;
     Chart {

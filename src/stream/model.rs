@@ -18,7 +18,6 @@ pub struct ModelDisk {
     /// Pages on their way, and the frame they come in.
     coming: VecDeque<(u64, u64)>,
     dropped: VecDeque<u64>,
-    pages: u64,
 }
 
 impl ModelDisk {
@@ -32,13 +31,7 @@ impl ModelDisk {
             waiting: BTreeMap::new(),
             coming: VecDeque::new(),
             dropped: VecDeque::new(),
-            pages: 0,
         }
-    }
-
-    /// Pages read so far.
-    pub fn pages(&self) -> u64 {
-        self.pages
     }
 }
 
@@ -68,7 +61,6 @@ impl Fetch for ModelDisk {
             return Some(Arrival { page, outcome: Outcome::Dropped });
         }
         let (_, page) = self.coming.pop_front_if(|(frame, _)| *frame <= now)?;
-        self.pages += 1;
         let outcome = match self.terrain.checked_page(page) {
             Ok(bytes) => Outcome::Read(bytes),
             Err(error) => Outcome::Failed(error),

@@ -135,11 +135,6 @@ impl Loader {
         self.arrivals.recv_timeout(longest).ok()
     }
 
-    /// Pages that wait to be read.
-    pub fn waiting(&self) -> usize {
-        self.shared.lock().waiting.len()
-    }
-
     /// What it did so far.
     pub fn stats(&self) -> LoaderStats {
         self.shared.lock().stats
