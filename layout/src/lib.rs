@@ -15,6 +15,7 @@ pub mod imagery;
 pub mod import;
 pub mod loader;
 pub mod octave;
+mod opening;
 pub mod order;
 pub mod pool;
 pub mod prefetch;

@@ -9,10 +9,11 @@
 
 use crate::bytes::{PAGE_BYTES, Page, to_usize};
 use crate::error::LayoutError;
+use crate::opening::inert_page;
 use crate::prefetch::prefetch;
 use crate::record::RecordCodec;
 use crate::store::{RawOf, RecordShape, RecordStore};
-use crate::terrain::{Terrain, inert_page};
+use crate::terrain::Terrain;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Least pages of a pool beside those that stay.

@@ -6,10 +6,11 @@
 //! Invariant: every page number in the table lies inside the source as it was when it was opened.
 
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
-use crate::directory::{ENTRY_BYTES, Entry, leaf_page};
+use crate::directory::Entry;
 use crate::error::LayoutError;
 use crate::grid::{Grid, GridPoint};
-use crate::header::{Header, INERT_PAGE, LEAF_ENTRIES};
+use crate::header::{Header, INERT_PAGE};
+use crate::opening::read_structure;
 use crate::order::slot_of;
 use crate::pool::PagePool;
 use crate::prefetch::prefetch;
@@ -369,114 +370,4 @@ impl<C: RecordCodec> RecordStore for Records<'_, C> {
     fn prefetch(&self, slot: u64) {
         Records::prefetch(self, slot);
     }
-}
-
-/// Reads and checks header and directory (FORMAT.md, section 6).
-fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>), LayoutError> {
-    let path = source.path();
-    let length = source.byte_count();
-    let page_bytes = PAGE_BYTES as u64;
-    let mut slot_a = Box::new([0; PAGE_BYTES]);
-    let mut slot_b = Box::new([0; PAGE_BYTES]);
-    if length < 4 * page_bytes {
-        let mut start = [0; 8];
-        let have = (length as usize).min(8);
-        source.read_at(0, &mut start[..have])?;
-        return Err(if have > 0 && crate::header::MAGIC.starts_with(&start[..have]) {
-            truncated(path, length, None)
-        } else {
-            LayoutError::not_this_format(
-                path,
-                "this is not a terrain file (.iqt); make one from elevation data with `terrasoar build`",
-            )
-        });
-    }
-    source.read_at(0, &mut slot_a[..])?;
-    source.read_at(page_bytes, &mut slot_b[..])?;
-    let header = Header::current(path, &slot_a, &slot_b)?;
-    if length < header.file_bytes {
-        return Err(truncated(path, length, Some(header.file_bytes)));
-    }
-    let damaged = |place: String, problem: &str| {
-        LayoutError::damaged(path, place, format!("{problem}; restore a copy of the file or build it again"))
-    };
-    check_inert_page(source, &header)?;
-    let root_bytes = to_usize(header.root_entries() * ENTRY_BYTES as u64)?;
-    let mut root = vec![0; root_bytes];
-    source.read_at(u64::from(header.root_page) * page_bytes, &mut root)?;
-    if checksum(&root) != header.root_checksum {
-        return Err(damaged("directory root".into(), "the checksum does not match"));
-    }
-    let in_file = |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * page_bytes <= header.file_bytes;
-    let count = to_usize(header.record_pages())?;
-    let mut entries = Vec::with_capacity(count);
-    let mut leaf = leaf_page(&[]);
-    for i in 0..header.root_entries() as usize {
-        let here = Entry::read(&root, i);
-        let in_leaf = (count - i * LEAF_ENTRIES as usize).min(LEAF_ENTRIES as usize);
-        if !here.is_present() {
-            entries.resize(entries.len() + in_leaf, Entry::default());
-            continue;
-        }
-        if !in_file(here.page) {
-            return Err(damaged(format!("directory leaf {i}"), "it lies outside the file"));
-        }
-        source.read_at(u64::from(here.page) * page_bytes, &mut leaf)?;
-        if checksum(&leaf) != here.checksum {
-            return Err(damaged(format!("directory leaf {i}"), "the checksum does not match"));
-        }
-        for j in 0..in_leaf {
-            let entry = Entry::read(&leaf, j);
-            if entry.is_present() && !in_file(entry.page) {
-                return Err(damaged(
-                    format!("directory entry of record page {}", entries.len()),
-                    "the page lies outside the file",
-                ));
-            }
-            entries.push(entry);
-        }
-    }
-    let stored = entries.iter().filter(|e| e.is_present()).count() as u64;
-    if stored != header.stored_pages {
-        return Err(damaged("directory".into(), "it holds another number of pages than the header says"));
-    }
-    Ok((header, entries))
-}
-
-fn check_inert_page(source: &dyn Source, header: &Header) -> Result<(), LayoutError> {
-    let mut page = Box::new([0; PAGE_BYTES]);
-    source.read_at(u64::from(INERT_PAGE) * PAGE_BYTES as u64, &mut page[..])?;
-    if page[..] != inert_page(header.record_kind)[..] {
-        return Err(LayoutError::damaged(
-            source.path(),
-            "inert page",
-            "it holds something else; restore a copy of the file or build it again",
-        ));
-    }
-    Ok(())
-}
-
-/// A page of inert records.
-pub(crate) fn inert_page(kind: RecordKind) -> Box<Page> {
-    fn fill<C: RecordCodec>() -> Box<Page> {
-        let mut page = Box::new([0; PAGE_BYTES]);
-        for record in page.chunks_exact_mut(C::BYTES) {
-            C::write(C::INERT, record);
-        }
-        page
-    }
-    match kind {
-        RecordKind::Compact => fill::<Compact>(),
-        RecordKind::Exact8 => fill::<Exact8>(),
-        RecordKind::Exact16 => fill::<Exact16>(),
-    }
-}
-
-fn truncated(path: &Path, length: u64, wanted: Option<u64>) -> LayoutError {
-    let wanted = wanted.map_or(String::new(), |w| format!(" of {w}"));
-    LayoutError::damaged(
-        path,
-        format!("byte {length}"),
-        format!("the file is cut short: it has {length} bytes{wanted}; copy it again or build it again"),
-    )
 }

@@ -3,10 +3,12 @@
 //! The engine knows no pixels and the renderer no terrain file; nothing but this module knows both. It uses the libraries only and no part of
 //! the command line, so tests and benchmarks take it in as it is.
 
+mod border;
 pub(crate) mod drape;
 pub(crate) mod feed;
 pub(crate) mod full_mesh;
 pub(crate) mod overview;
+mod pending;
 #[allow(dead_code, reason = "windows and tests use more of a scene than pictures do")]
 pub(crate) mod scene;
 #[allow(dead_code, reason = "pictures without a window are of mapped files")]

@@ -9,22 +9,21 @@
 //!
 //! Cost on the processor: the engine's update, a copy of its patch, some 2 ms a tile.
 
+use super::border::border;
 use super::drape::{Drape, Served};
-use super::feed::{Feed, PictureEngine, Refined, feed, mesh_vertex};
+use super::feed::{Feed, PictureEngine, Refined, feed};
+use super::pending::Pending;
 use super::streamed::streamed_feed;
-use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
-use std::ops::Range;
 use std::sync::Arc;
 use terrasoar::refine::Culling;
-use terrasoar::refine::kinetic::Patch;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{
-    DrawStats, Frame, FrameView, Gpu, Look, MeshPatch, MeshVertex, RenderError, Renderer, RendererOptions,
-    Target, TerrainShape, TileId, TileStats, UploadStats, wgpu,
+    DrawStats, Frame, FrameView, Gpu, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target,
+    TerrainShape, TileId, TileStats, UploadStats, wgpu,
 };
 
 /// Tiles that are asked for, for each that is given in a frame.
@@ -124,38 +123,6 @@ pub(crate) struct Scene<'a> {
     drape: Option<Drape>,
     /// The views of the last two updates, which say where the eye is going.
     ways: [Option<View>; 2],
-}
-
-/// What the engine changed and the device has not heard of.
-#[derive(Debug, Default)]
-struct Pending {
-    /// Whether the device has a mesh at all. While it has none nothing is kept: it gets the whole.
-    begun: bool,
-    /// Whether anything changed since the last picture, the visible ranges included.
-    changed: bool,
-    vertices: Vec<(u32, MeshVertex)>,
-    triangles: Vec<(u32, [u32; 3])>,
-    draws: Vec<Range<u32>>,
-    /// One past the highest triangle slot ever sent. Slots past it are empty, and the device has not heard of them.
-    end: u32,
-}
-
-impl Pending {
-    /// Adds a patch to those before it.
-    fn take(&mut self, patch: &Patch) {
-        self.vertices.extend(patch.vertices.iter().map(|(slot, vertex)| (*slot, mesh_vertex(vertex))));
-        self.triangles.extend_from_slice(&patch.triangles);
-        self.end = patch.triangles.iter().fold(self.end, |end, (slot, _)| end.max(slot + 1));
-        let end = self.end;
-        self.draws.clear();
-        self.draws.extend(patch.draws.iter().map(|r| r.start.min(end)..r.end.min(end)));
-    }
-
-    fn clear(&mut self) {
-        self.vertices.clear();
-        self.triangles.clear();
-        self.changed = false;
-    }
 }
 
 impl<'a> Scene<'a> {
@@ -374,7 +341,8 @@ impl<'a> Scene<'a> {
     /// What [`Renderer::new`] says.
     pub(crate) fn recover(&mut self, gpu: &Gpu) -> Result<(), SceneError> {
         self.renderer = new_renderer(*self.renderer.terrain(), self.drape.as_ref(), gpu, self.options)?;
-        self.pending = Pending { changed: true, ..Pending::default() };
+        self.pending = Pending::default();
+        self.pending.changed = true;
         if let Some((edges, bottom_m)) = &self.walls {
             self.renderer.set_walls(edges, *bottom_m);
         }
@@ -395,22 +363,6 @@ impl<'a> Scene<'a> {
     pub(crate) fn gpu_time_ms(&mut self) -> Option<f64> {
         self.renderer.gpu_time_ms()
     }
-}
-
-/// Edges of drawn triangles that lie on the border of the data, as vertex slots.
-fn border(whole: &Patch, samples: [u32; 2]) -> Vec<[u32; 2]> {
-    let sides: HashMap<u32, [bool; 4]> = whole
-        .vertices
-        .iter()
-        .map(|(slot, v)| (*slot, [v.x == 0, v.y == 0, v.x + 1 == samples[0], v.y + 1 == samples[1]]))
-        .filter(|(_, sides)| sides.contains(&true))
-        .collect();
-    let on_one_side = |[a, b]: &[u32; 2]| match (sides.get(a), sides.get(b)) {
-        (Some(a), Some(b)) => a.iter().zip(b).any(|(a, b)| *a && *b),
-        _ => false,
-    };
-    let drawn = whole.triangles.iter().map(|(_, corners)| *corners).filter(|[a, b, _]| a != b);
-    drawn.flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).filter(on_one_side).collect()
 }
 
 /// Where a steady eye will be in some frames.

@@ -70,6 +70,8 @@ pub struct PoolOptions {
     pub prefetch: Prefetch,
     /// Where what lies out of view is left out.
     pub culling: Culling,
+    /// How far the frustum is moved back for preloading, in metres; a sixteenth of the terrain's side without it.
+    pub block_m: Option<f64>,
     /// What reads.
     pub read_by: ReadBy,
     /// Frames a second; 0 flies as fast as frames are made, which leaves storage no time.
@@ -149,7 +151,8 @@ fn pass(
     let terrain = Arc::new(options.read_by.open(path)?);
     let loader = Threads::from(Loader::start(Arc::clone(&terrain), options.read_by.threads())?);
     Ok(with_records!(terrain.pool(options.cache_bytes)?, pool => {
-        let streamed = Streamed::new(pool, loader, options.culling, options.prefetch);
+        let mut streamed = Streamed::new(pool, loader, options.culling, options.prefetch);
+        options.block_m.into_iter().for_each(|block_m| streamed.set_block_m(block_m));
         fly(streamed, views, options.frames_per_second, done)
     }))
 }

@@ -11,7 +11,7 @@
 use crate::metric::{ALL_PLANES, Metric};
 use crate::refine::Culling;
 use crate::view::View;
-use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::grid::{Grid, GridPoint};
 use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
 use terrasoar_layout::store::RecordStore;
 
@@ -24,7 +24,16 @@ pub struct ExtendedView {
     pub extent: View,
 }
 
+/// Blocks a side of the terrain.
+const BLOCKS_A_SIDE: f64 = 16.0;
+
 impl ExtendedView {
+    /// The block length L that is taken where none is named: a sixteenth of the square's side, in metres.
+    pub fn block_m(grid: &Grid) -> f64 {
+        let [dx, dy] = grid.spacing_m();
+        f64::from(grid.side_steps()) / BLOCKS_A_SIDE * dx.max(dy)
+    }
+
     /// The view as it is.
     pub fn plain(view: &View) -> Self {
         Self { detail: *view, extent: *view }

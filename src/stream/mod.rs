@@ -34,8 +34,6 @@ use terrasoar_layout::store::RecordStore;
 
 /// Pages put into the pool in one frame at most: two megabytes are copied in a fraction of a millisecond.
 const INSTALLS_A_FRAME: usize = 512;
-/// Blocks a side of the terrain that the frustum's extension reckons with.
-const BLOCKS_A_SIDE: f64 = 16.0;
 /// Errors kept for whoever asks.
 const ERRORS_KEPT: usize = 64;
 
@@ -135,9 +133,7 @@ impl<C: RecordCodec, P: Probe> Probe for PagesRead<'_, C, P> {
 impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
     /// An engine over `pool`, whose pages come through `fetch`.
     pub fn new(pool: PagePool<C>, fetch: F, culling: Culling, prefetch: Prefetch) -> Self {
-        let grid = pool.grid();
-        let [dx, dy] = grid.spacing_m();
-        let block_m = f64::from(grid.side_steps()) / BLOCKS_A_SIDE * dx.max(dy);
+        let block_m = ExtendedView::block_m(pool.grid());
         let mut engine = Kinetic::new(pool, culling);
         let lead = Lead::default();
         if prefetch == Prefetch::Deadline {
@@ -158,6 +154,11 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             pages_read: Vec::new(),
             wanted: Vec::new(),
         }
+    }
+
+    /// Moves the frustum back by so many metres for [`Prefetch::Frustum`], instead of [`ExtendedView::block_m`].
+    pub fn set_block_m(&mut self, block_m: f64) {
+        self.block_m = block_m;
     }
 
     /// The engine: its mesh and patch.

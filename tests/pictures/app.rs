@@ -2,12 +2,16 @@
 
 #![allow(dead_code, reason = "tests use a part of it")]
 
+#[path = "../../src/app/border.rs"]
+mod border;
 #[path = "../../src/app/drape.rs"]
 pub mod drape;
 #[path = "../../src/app/feed.rs"]
 pub mod feed;
 #[path = "../../src/app/full_mesh.rs"]
 pub mod full_mesh;
+#[path = "../../src/app/pending.rs"]
+mod pending;
 #[path = "../../src/app/scene.rs"]
 pub mod scene;
 #[path = "../../src/app/streamed.rs"]
