@@ -67,7 +67,7 @@ fn every_call_of_the_disk_may_fail() {
     let mut failures = 0;
     // With little memory the samples take the way through a temporary file.
     for (memory_mib, least_calls) in [(512, 30), (25, 300)] {
-        for failure in [Failure::Once, Failure::Full, Failure::FullHalfWay] {
+        for failure in [Failure::Once, Failure::Full { quarters: 0 }, Failure::Full { quarters: 2 }] {
             let mut n = 0;
             loop {
                 let disk = FailingDisk::new(n, failure);
@@ -108,7 +108,7 @@ fn a_failing_disk_keeps_what_had_the_name() {
     let folder = Folder::new();
     std::fs::write(folder.target(), "what was there").unwrap();
     for n in (0..300).step_by(23) {
-        let disk = FailingDisk::new(n, Failure::Full);
+        let disk = FailingDisk::new(n, Failure::Full { quarters: 0 });
         build_on(&disk, &dem(), &folder.target(), &options(25), &Silent).unwrap_err();
         assert_eq!(std::fs::read_to_string(folder.target()).unwrap(), "what was there");
         folder.is_left(&["t.iqt"], &|| format!("call {n}"));

@@ -5,15 +5,21 @@ use std::fs::File;
 use std::io::{Error, ErrorKind, Result};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How a [`FailingDisk`] fails.
+/// How a [`FailingDisk`] fails. Of a write that fails some quarters of the bytes may still arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Failure {
     /// One call fails, later ones succeed: a bad sector.
     Once,
     /// That call and all later ones that need room fail for want of it.
-    Full,
-    /// As [`Failure::Full`], after half the bytes were written.
-    FullHalfWay,
+    Full {
+        /// 0 to 4.
+        quarters: usize,
+    },
+    /// Nothing succeeds any more: as if the process had been killed.
+    Killed {
+        /// 0 to 4.
+        quarters: usize,
+    },
 }
 
 /// Fails the `n`-th call, counted from 0, and perhaps later ones.
@@ -46,13 +52,14 @@ impl FailingDisk {
         let call = self.calls.fetch_add(1, Ordering::Relaxed);
         let fails = match self.failure {
             Failure::Once => call == self.n,
-            Failure::Full | Failure::FullHalfWay => call >= self.n && needs_room,
+            Failure::Full { .. } => call >= self.n && needs_room,
+            Failure::Killed { .. } => call >= self.n,
         };
         fails.then(|| {
             self.failed.fetch_add(1, Ordering::Relaxed);
             match self.failure {
-                Failure::Once => Error::other("injected failure"),
-                Failure::Full | Failure::FullHalfWay => ErrorKind::StorageFull.into(),
+                Failure::Once | Failure::Killed { .. } => Error::other("injected failure"),
+                Failure::Full { .. } => ErrorKind::StorageFull.into(),
             }
         })
     }
@@ -61,8 +68,10 @@ impl FailingDisk {
 impl Disk for FailingDisk {
     fn write_at(&self, file: &File, bytes: &[u8], offset: u64) -> Result<()> {
         let Some(error) = self.error(true) else { return SystemDisk.write_at(file, bytes, offset) };
-        if self.failure == Failure::FullHalfWay {
-            SystemDisk.write_at(file, &bytes[..bytes.len() / 2], offset)?;
+        if let Failure::Full { quarters } | Failure::Killed { quarters } = self.failure
+            && self.failed() == 1
+        {
+            SystemDisk.write_at(file, &bytes[..bytes.len() * quarters / 4], offset)?;
         }
         Err(error)
     }
@@ -72,7 +81,8 @@ impl Disk for FailingDisk {
     }
 
     fn set_len(&self, file: &File, length: u64) -> Result<()> {
-        self.error(true).map_or_else(|| SystemDisk.set_len(file, length), Err)
+        let grows = file.metadata()?.len() < length;
+        self.error(grows).map_or_else(|| SystemDisk.set_len(file, length), Err)
     }
 
     fn sync(&self, file: &File) -> Result<()> {

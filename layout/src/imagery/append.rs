@@ -9,40 +9,13 @@ use super::pyramid::MadeTile;
 use super::section::{Section, TileEntry};
 use super::shape::{ImageryShape, TileId};
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
-use crate::disk::write_at;
+use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::header::{Header, ImageryPlace};
 use std::fs::File;
-use std::io;
 use std::path::Path;
 
 const PAGE: u64 = PAGE_BYTES as u64;
-
-/// What an append does to a file; tests put failing ones in its place.
-pub(super) trait Target: Sync {
-    /// Writes all of `bytes` at `offset`.
-    fn write(&self, bytes: &[u8], offset: u64) -> io::Result<()>;
-
-    /// Returns when all that was written is on the disk.
-    fn sync(&self) -> io::Result<()>;
-
-    /// Makes the file as long as it was.
-    fn give_back(&self, length: u64) -> io::Result<()>;
-}
-
-impl Target for File {
-    fn write(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
-        write_at(self, bytes, offset)
-    }
-
-    fn sync(&self) -> io::Result<()> {
-        self.sync_data()
-    }
-
-    fn give_back(&self, length: u64) -> io::Result<()> {
-        self.set_len(length)
-    }
-}
 
 /// The two header slots, and which counts.
 pub(super) struct Slots {
@@ -68,7 +41,8 @@ impl Slots {
 /// An append under way.
 pub(super) struct Append<'t> {
     path: &'t Path,
-    target: &'t dyn Target,
+    disk: &'t dyn Disk,
+    file: &'t File,
     slots: Slots,
     shape: ImageryShape,
     begin: u64,
@@ -83,7 +57,8 @@ impl<'t> Append<'t> {
     /// Begins behind the file's current end. Nothing is written yet.
     pub(super) fn begin(
         path: &'t Path,
-        target: &'t dyn Target,
+        disk: &'t dyn Disk,
+        file: &'t File,
         slots: Slots,
         shape: ImageryShape,
     ) -> Result<Self, LayoutError> {
@@ -91,7 +66,8 @@ impl<'t> Append<'t> {
         let begin = slots.header.file_bytes.next_multiple_of(PAGE);
         Ok(Self {
             path,
-            target,
+            disk,
+            file,
             slots,
             shape,
             begin,
@@ -103,13 +79,16 @@ impl<'t> Append<'t> {
     }
 
     fn write(&self, bytes: &[u8], offset: u64) -> Result<(), LayoutError> {
-        self.target
-            .write(bytes, offset)
-            .map_err(|e| LayoutError::io(self.path, "cannot append to the file", e))
+        let when_full = "cannot append to the file, for which there is no room; make some on its disk, or copy it to another";
+        self.disk
+            .write_at(self.file, bytes, offset)
+            .map_err(|e| LayoutError::write(self.path, "cannot append to the file", when_full, e))
     }
 
     fn sync(&self) -> Result<(), LayoutError> {
-        self.target.sync().map_err(|e| LayoutError::io(self.path, "cannot bring the file to the disk", e))
+        self.disk
+            .sync(self.file)
+            .map_err(|e| LayoutError::io(self.path, "cannot bring the file to the disk", e))
     }
 
     /// Writes a tile behind the last one.

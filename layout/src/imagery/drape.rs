@@ -4,7 +4,7 @@
 //! ([`super::pyramid`]) while the next are read, and tiles are appended as they are made ([`super::append`]). Equal input gives
 //! equal bytes, whatever the number of threads. Cost: each image is read once, each tile written once, nothing is spooled.
 
-use super::append::{Append, Slots, Target};
+use super::append::{Append, Slots};
 use super::encode::check_format;
 use super::lock::{WriteLock, is_named};
 use super::mosaic::Mosaic;
@@ -14,6 +14,7 @@ use super::shape::{ImageryShape, TileFormat};
 use super::source::{ImageSource, RowReader};
 use crate::build::BuildProgress;
 use crate::bytes::{PAGE_BYTES, Page};
+use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::header::Header;
 use crate::source::{PreadSource, Source};
@@ -64,56 +65,56 @@ pub fn drape(
     options: &DrapeOptions,
     progress: &dyn BuildProgress,
 ) -> Result<Draped, LayoutError> {
+    drape_on(&SystemDisk, path, images, options, progress)
+}
+
+/// As [`drape`], with all writing done by `disk`.
+fn drape_on(
+    disk: &dyn Disk,
+    path: &Path,
+    images: &[Box<dyn ImageSource>],
+    options: &DrapeOptions,
+    progress: &dyn BuildProgress,
+) -> Result<Draped, LayoutError> {
     let _lock = WriteLock::take(path)?;
     let failed = |e| LayoutError::io(path, "cannot open the file for writing", e);
     let file = File::options().read(true).write(true).open(path).map_err(failed)?;
     // One file, opened once: what is read is what is written to.
     let terrain =
         Terrain::from_source(Box::new(PreadSource::over(path, file.try_clone().map_err(failed)?)?))?;
-    let replaced = || {
-        if is_named(&file, path) {
-            return Ok(());
-        }
-        Err(LayoutError::Usage(format!(
-            "{}: the file was replaced by another while the image was draped; drape it again",
-            path.display()
-        )))
-    };
-    let images: Vec<&dyn ImageSource> = images.iter().map(|image| &**image).collect();
-    drape_onto(terrain.source(), &file, &images, options, progress, replaced)
-}
-
-/// As [`drape`], reading the terrain from `source` and writing to `target`, which is the same file.
-pub(super) fn drape_onto(
-    source: &dyn Source,
-    target: &dyn Target,
-    images: &[&dyn ImageSource],
-    options: &DrapeOptions,
-    progress: &dyn BuildProgress,
-    may_commit: impl FnOnce() -> Result<(), LayoutError>,
-) -> Result<Draped, LayoutError> {
     let header_begun = Cell::new(false);
-    let may_commit = || may_commit().inspect(|()| header_begun.set(true));
-    let done = append_all(source, target, images, options, progress, may_commit);
+    let may_commit = || {
+        if !is_named(&file, path) {
+            return Err(LayoutError::Usage(format!(
+                "{}: the file was replaced by another while the image was draped; drape it again",
+                path.display()
+            )));
+        }
+        header_begun.set(true);
+        Ok(())
+    };
+    let done = append_all(disk, &file, terrain.source(), images, options, progress, may_commit);
     if done.is_err() && !header_begun.get() {
         // No header counts what was appended. Failing here costs space only.
-        let _ = target.give_back(source.byte_count());
+        let _ = disk.set_len(&file, terrain.source().byte_count());
     }
     done
 }
 
 fn append_all(
+    disk: &dyn Disk,
+    file: &File,
     source: &dyn Source,
-    target: &dyn Target,
-    images: &[&dyn ImageSource],
+    images: &[Box<dyn ImageSource>],
     options: &DrapeOptions,
     progress: &dyn BuildProgress,
     may_commit: impl FnOnce() -> Result<(), LayoutError>,
 ) -> Result<Draped, LayoutError> {
+    let images: Vec<&dyn ImageSource> = images.iter().map(|image| &**image).collect();
     check_format(options.format)?;
     let path = source.path();
     let slots = read_slots(source)?;
-    let mosaic = Mosaic::new(images, &slots.header, options.extent)?;
+    let mosaic = Mosaic::new(&images, &slots.header, options.extent)?;
     let shape = mosaic.shape(options.format);
     let needed = memory_bytes(&shape) + mosaic.memory_bytes();
     if needed > options.memory_mib << 20 {
@@ -127,7 +128,7 @@ fn append_all(
             options.memory_mib
         )));
     }
-    let mut append = Append::begin(path, target, slots, shape)?;
+    let mut append = Append::begin(path, disk, file, slots, shape)?;
     progress.stage("draping", u64::from(shape.texels[0]) * u64::from(shape.texels[1]));
     let mut pyramid = Pyramid::new(shape);
     let mut rows = mosaic.rows()?;
@@ -176,57 +177,8 @@ mod tests {
     use super::*;
     use crate::build::{BuildOptions, Silent, build};
     use crate::dem::{MemoryDem, SampleType};
+    use crate::disk::{FailingDisk, Failure};
     use crate::source::MemorySource;
-    use std::io;
-    use std::sync::Mutex;
-    use std::sync::atomic::{AtomicU64, Ordering};
-
-    /// How an append ends at one of its writes and syncs.
-    #[derive(Debug, Clone, Copy)]
-    struct End {
-        at: u64,
-        /// Share that still arrives of the write.
-        quarters: usize,
-        /// Whether the process ends with it, or hears an error and tidies up.
-        killed: bool,
-    }
-
-    /// A file in memory of which nothing after that arrives.
-    struct Stopping {
-        bytes: Mutex<Vec<u8>>,
-        calls: AtomicU64,
-        end: End,
-    }
-
-    impl Target for Stopping {
-        fn write(&self, bytes: &[u8], offset: u64) -> io::Result<()> {
-            let call = self.calls.fetch_add(1, Ordering::Relaxed);
-            let arrived = match call.cmp(&self.end.at) {
-                std::cmp::Ordering::Less => bytes.len(),
-                std::cmp::Ordering::Equal => bytes.len() * self.end.quarters / 4,
-                std::cmp::Ordering::Greater => 0,
-            };
-            let mut file = self.bytes.lock().unwrap();
-            let end = offset as usize + arrived;
-            if file.len() < end {
-                file.resize(end, 0);
-            }
-            file[offset as usize..end].copy_from_slice(&bytes[..arrived]);
-            if call < self.end.at { Ok(()) } else { Err(io::ErrorKind::StorageFull.into()) }
-        }
-
-        fn sync(&self) -> io::Result<()> {
-            let call = self.calls.fetch_add(1, Ordering::Relaxed);
-            if call < self.end.at { Ok(()) } else { Err(io::ErrorKind::Other.into()) }
-        }
-
-        fn give_back(&self, length: u64) -> io::Result<()> {
-            if !self.end.killed {
-                self.bytes.lock().unwrap().truncate(length as usize);
-            }
-            Ok(())
-        }
-    }
 
     fn terrain_bytes() -> Vec<u8> {
         let dem = MemoryDem::from_fn([40, 30], SampleType::I16, |x, y| f64::from(x * 3 + y));
@@ -237,11 +189,11 @@ mod tests {
         std::fs::read(path).unwrap()
     }
 
-    fn image(seed: u32) -> MemoryImage {
-        MemoryImage::from_fn([1200, 520], move |x, y| {
+    fn image(seed: u32) -> Box<dyn ImageSource> {
+        Box::new(MemoryImage::from_fn([1200, 520], move |x, y| {
             let hole = (700..1200).contains(&x) && y < 100;
             [x as u8, y as u8, (x / 16 + y / 16 + seed) as u8, if hole { 0 } else { 255 }]
-        })
+        }))
     }
 
     /// Everything a reader sees of a file: heights and tiles.
@@ -261,16 +213,20 @@ mod tests {
         (terrain.header().generation, records, tiles)
     }
 
-    const NEVER: End = End { at: u64::MAX, quarters: 4, killed: false };
+    const NEVER: (u64, Failure) = (u64::MAX, Failure::Once);
 
-    fn append(before: &[u8], image: &MemoryImage, end: End) -> (Vec<u8>, bool, u64) {
-        let source = MemorySource::new("a.iqt", before.to_vec());
-        let bytes = Mutex::new(before.to_vec());
-        let target = Stopping { bytes, calls: AtomicU64::new(0), end };
-        let options = DrapeOptions::default();
-        let done = drape_onto(&source, &target, &[image], &options, &Silent, || Ok(())).is_ok();
-        let calls = target.calls.load(Ordering::Relaxed);
-        (target.bytes.into_inner().unwrap(), done, calls)
+    /// The file after an append that ends as told, whether it went well, and how many calls it made.
+    fn append(
+        before: &[u8],
+        images: &[Box<dyn ImageSource>],
+        (at, failure): (u64, Failure),
+    ) -> (Vec<u8>, bool, u64) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.iqt");
+        std::fs::write(&path, before).unwrap();
+        let disk = FailingDisk::new(at, failure);
+        let done = drape_on(&disk, &path, images, &DrapeOptions::default(), &Silent).is_ok();
+        (std::fs::read(path).unwrap(), done, disk.calls())
     }
 
     /// Twice in a row, so that both header slots take their turn, and over the leavings of the append that was stopped.
@@ -278,28 +234,31 @@ mod tests {
     fn stopped_at_any_write_the_file_reads_as_before_or_after() {
         let mut before = terrain_bytes();
         for seed in [1, 2] {
-            let picture = image(seed);
-            let (after, done, writes) = append(&before, &picture, NEVER);
-            assert!(done && writes > 8);
+            let picture = [image(seed)];
+            let (after, done, calls) = append(&before, &picture, NEVER);
+            assert!(done && calls > 8);
             let [wanted_before, wanted_after] = [before.clone(), after.clone()].map(seen);
             assert_ne!(wanted_before, wanted_after);
-            let ends = (0..writes).flat_map(|at| (0..=4).map(move |quarters| (at, quarters)));
-            for end in
-                ends.flat_map(|(at, quarters)| [true, false].map(|killed| End { at, quarters, killed }))
-            {
-                let (stopped, done, _) = append(&before, &picture, end);
-                assert!(!done);
-                let found = seen(stopped.clone());
-                // Only the header's own write decides, and its sync may fail after it.
-                let is_decided = end.at + 1 == writes || end.at + 2 == writes && end.quarters == 4;
-                let wanted = if is_decided { &wanted_after } else { &wanted_before };
-                assert!(found == *wanted, "{end:?} of {writes}");
-                if !end.killed && end.at + 2 < writes {
-                    assert!(stopped == before, "{end:?} of {writes}: the space is not given back");
-                }
-                if end.quarters == 2 && !is_decided {
-                    let (again, done, _) = append(&stopped, &picture, NEVER);
-                    assert!(done && seen(again) == wanted_after);
+            for at in 0..calls {
+                for quarters in 0..=4 {
+                    // Only the header's own write decides, and its sync may fail after it.
+                    let is_decided = at + 1 == calls || at + 2 == calls && quarters == 4;
+                    let wanted = if is_decided { &wanted_after } else { &wanted_before };
+                    for failure in [Failure::Killed { quarters }, Failure::Full { quarters }] {
+                        let (stopped, done, _) = append(&before, &picture, (at, failure));
+                        assert!(!done);
+                        assert!(seen(stopped.clone()) == *wanted, "{failure:?} at {at} of {calls}");
+                        if matches!(failure, Failure::Full { .. }) && at + 2 < calls {
+                            assert!(
+                                stopped == before,
+                                "{failure:?} at {at} of {calls}: the space is not given back"
+                            );
+                        }
+                        if quarters == 2 && !is_decided {
+                            let (again, done, _) = append(&stopped, &picture, NEVER);
+                            assert!(done && seen(again) == wanted_after);
+                        }
+                    }
                 }
             }
             before = after;
