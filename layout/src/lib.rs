@@ -8,6 +8,7 @@ pub mod bytes;
 pub mod dem;
 pub mod directory;
 pub mod disk;
+pub mod edit;
 pub mod error;
 pub mod grid;
 pub mod header;
