@@ -45,6 +45,16 @@ pub enum LayoutError {
         /// What it uses, and what to do instead.
         problem: String,
     },
+    /// An edit leads to heights, or to slopes, that the file's records cannot hold.
+    #[error("{}: {problem}", path.display())]
+    OutOfRange {
+        /// The file.
+        path: PathBuf,
+        /// Lowest and highest height in metres that the edit asks for.
+        heights_m: [f64; 2],
+        /// What does not fit, and what to do.
+        problem: String,
+    },
     /// The request cannot be met as asked: a budget too small, a size out of range.
     #[error("{0}")]
     Usage(String),

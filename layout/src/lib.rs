@@ -3,6 +3,7 @@
 //! The way data takes: [`import`] turns a DEM into a [`dem::DemSource`]; [`build`] computes what refinement needs and writes
 //! the file that FORMAT.md specifies; [`terrain`] opens it. This crate knows bytes and knows no camera.
 pub mod atomic_file;
+mod bound;
 pub mod build;
 pub mod bytes;
 pub mod dem;

@@ -8,13 +8,10 @@
 //! Invariant: neither threads nor the memory budget change a byte of the file.
 
 mod band;
-mod extremes;
 mod gather;
 mod levels;
 mod memory;
-mod padding;
 mod plan;
-mod plane;
 mod saturate;
 mod scan;
 mod spacing;
@@ -23,6 +20,7 @@ mod survey;
 mod writer;
 
 use crate::atomic_file::AtomicFile;
+use crate::bound::{FIRST_SCANNED, Rules};
 use crate::dem::DemSource;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
@@ -35,7 +33,7 @@ use levels::{LevelShape, Levels};
 use memory::{LARGEST_TILE, MemoryPlan};
 use rayon::prelude::*;
 use saturate::Saturator;
-use scan::{FIRST_SCANNED, OwnErrors, scan_tile_row};
+use scan::{OwnErrors, scan_tile_row};
 use spool::Spool;
 use std::path::Path;
 use std::sync::atomic::AtomicU32;
@@ -218,10 +216,7 @@ impl Work<'_> {
             grid,
             tile: self.tile,
             saturator: Saturator {
-                grid,
-                codec,
-                scale: self.scale,
-                error_kind: header.error_kind,
+                rules: Rules { grid, codec, scale: self.scale, error_kind: header.error_kind },
                 has_voids: header.has_voids,
             },
             shapes: (0..grid.levels()).map(|l| LevelShape::new(&grid, l)).collect(),
@@ -360,7 +355,7 @@ impl<'a, C: RecordCodec> State<'a, C> {
         let records = corners(self.grid.k()).map(|corner| {
             let class = if self.band.is_void(corner) { VertexClass::FringeVoid } else { VertexClass::Plain };
             let code = self.band.code(corner);
-            self.saturator.codec.encode(0, code, class, 0.0, 0.0).unwrap_or(C::INERT)
+            self.saturator.rules.codec.encode(0, code, class, 0.0, 0.0).unwrap_or(C::INERT)
         });
         self.writer.set_corners(records)?;
         self.writer.close_queue();

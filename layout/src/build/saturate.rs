@@ -1,28 +1,20 @@
-//! One vertex's record from its own error and its children's records: classes, saturated error, nested radius.
+//! The records of a row of vertices, from the rows of heights around it and its children's rows of records.
 //!
-//! The radius is computed from decoded heights and decoded child radii, and rounded up with a margin, so that nesting holds on what
-//! the file says and survives the rounding of the engine's arithmetic (FORMAT.md, section 3).
+//! Nearly all vertices lie away from borders and voids; a row of those is looked up once and worked through in one go. The others are made one by one.
 
 use super::band::Band;
-use super::extremes::{larger, smaller};
 use super::levels::{LevelShape, Levels};
-use super::padding::{deviation, has_area};
-use super::scan::{FIRST_SCANNED, OwnErrors};
+use super::scan::OwnErrors;
+use crate::bound::{Below, FIRST_SCANNED, Rules};
 use crate::error::LayoutError;
 use crate::grid::{Grid, GridPoint};
 use crate::header::ErrorKind;
-use crate::record::{RecordCodec, RecordScale, Vertex, VertexClass};
+use crate::record::{RecordCodec, VertexClass};
 use std::sync::atomic::Ordering;
-
-/// Factor on nested radii: twice the margin that FORMAT.md promises.
-const MARGIN: f64 = 1.0 + 1.0 / (1 << 19) as f64;
 
 /// Makes records; one for a whole build.
 pub(super) struct Saturator<C> {
-    pub(super) grid: Grid,
-    pub(super) codec: C,
-    pub(super) scale: RecordScale,
-    pub(super) error_kind: ErrorKind,
+    pub(super) rules: Rules<C>,
     pub(super) has_voids: bool,
 }
 
@@ -37,10 +29,10 @@ impl<C: RecordCodec> Saturator<C> {
         records: &Levels<C::Raw>,
     ) -> Result<Box<[C::Raw]>, LayoutError> {
         let (y, step, level) = (shape.row_y(row), shape.step(), shape.level());
-        let [wide, high] = self.grid.samples();
+        let [wide, high] = self.rules.grid.samples();
         let voids_near = self.has_voids
             && band.may_have_voids(y.saturating_sub(step).min(high - 1)..=(y + step).min(high - 1));
-        let scanned = if self.error_kind == ErrorKind::Bounded && level >= FIRST_SCANNED {
+        let scanned = if self.rules.error_kind == ErrorKind::Bounded && level >= FIRST_SCANNED {
             own.row(level, row)
         } else {
             None
@@ -49,8 +41,9 @@ impl<C: RecordCodec> Saturator<C> {
         let columns = shape.columns(row);
         let mut made = Vec::with_capacity(columns);
         let is_inside = y >= step && y + step < high;
-        let open_row = (is_inside && !voids_near).then(|| OpenRow::new(self, &around, y)).flatten();
-        let void_row = (is_inside && voids_near).then(|| VoidRow::new(self, &around, y)).flatten();
+        let open_row = (is_inside && !voids_near).then(|| OpenRow::new(&self.rules, &around, y)).flatten();
+        let void_row =
+            (is_inside && voids_near).then(|| VoidRow::new(&self.rules.grid, &around, y)).flatten();
         for column in 0..columns {
             let v = shape.point(row, column);
             let folded = v.x() + step >= wide || y + step >= high;
@@ -73,32 +66,14 @@ impl<C: RecordCodec> Saturator<C> {
                 made.push(raw);
                 continue;
             }
-            let own_m = if own_m.is_nan() { self.own_error_m(v, shape, band, folded) } else { own_m };
+            let own_m = if own_m.is_nan() {
+                self.rules.own_error_m(v, self.edge_ends(v, shape), folded, |p| band.code(p))
+            } else {
+                own_m
+            };
             made.push(self.record(v, &around, own_m, folded, voids_near)?);
         }
         Ok(made.into())
-    }
-
-    /// Position in metres and height in metres of a grid point, folded.
-    fn point_m(&self, p: GridPoint, band: &Band) -> [f64; 3] {
-        let [x, y] = self.grid.position_m(p);
-        [x, y, band.code(p) * self.scale.height_step_m]
-    }
-
-    /// The vertex's own vertical distance from the triangles it splits, in metres.
-    fn own_error_m(&self, v: GridPoint, shape: &LevelShape, band: &Band, folded: bool) -> f64 {
-        if !folded {
-            let [b, d] = self.edge_ends(v, shape).map(|p| band.code(p));
-            return (band.code(v) - 0.5 * (b + d)).abs() * self.scale.height_step_m * (1.0 + 1e-9);
-        }
-        let base = self.grid.edge_ends(v).map(|p| self.point_m(p, band));
-        let apexes: Vec<[f64; 3]> = self.grid.apexes(v).map(|p| self.point_m(p, band)).collect();
-        let vertex = self.point_m(v, band);
-        match self.error_kind {
-            ErrorKind::Bounded => deviation(vertex, base, &apexes) * (1.0 + 1e-9),
-            ErrorKind::Step if has_area(base, &apexes) => (vertex[2] - 0.5 * (base[0][2] + base[1][2])).abs(),
-            ErrorKind::Step => 0.0,
-        }
     }
 
     /// As [`Grid::edge_ends`], without finding the level again.
@@ -106,7 +81,7 @@ impl<C: RecordCodec> Saturator<C> {
     fn edge_ends(&self, v: GridPoint, shape: &LevelShape) -> [GridPoint; 2] {
         let (s, x, y) = (shape.step(), v.x(), v.y());
         if shape.is_white() {
-            return self.grid.edge_ends(v);
+            return self.rules.grid.edge_ends(v);
         }
         if y & s == 0 {
             [GridPoint::new(x - s, y), GridPoint::new(x + s, y)]
@@ -131,12 +106,18 @@ impl<C: RecordCodec> Saturator<C> {
         let mut below = Below::default();
         if level == 0 {
             below.fringe = voids_near
-                && self.grid.edge_ends(v).into_iter().chain(self.grid.apexes(v)).any(|p| band.is_void(p));
+                && self
+                    .rules
+                    .grid
+                    .edge_ends(v)
+                    .into_iter()
+                    .chain(self.rules.grid.apexes(v))
+                    .any(|p| band.is_void(p));
         } else {
-            let child_shape = LevelShape::new(&self.grid, level - 1);
-            let [x, y] = self.grid.position_m(v);
-            let height_m = code * self.scale.height_step_m;
-            for child in children(v, shape, self.grid.side_steps()).into_iter().flatten() {
+            let child_shape = LevelShape::new(&self.rules.grid, level - 1);
+            let [x, y] = self.rules.grid.position_m(v);
+            let height_m = code * self.rules.scale.height_step_m;
+            for child in children(v, shape, self.rules.grid.side_steps()).into_iter().flatten() {
                 if child_shape.is_beyond(child) {
                     continue;
                 }
@@ -144,28 +125,17 @@ impl<C: RecordCodec> Saturator<C> {
                 let Some(raw) = records.row(level - 1, row).and_then(|r| r.get(column)) else {
                     return Err(internal(child));
                 };
-                let [cx, cy] = self.grid.position_m(child);
+                let [cx, cy] = self.rules.grid.position_m(child);
                 let ground2 = (x - cx) * (x - cx) + (y - cy) * (y - cy);
-                below.add(&self.codec.decode(*raw, level - 1), ground2, height_m, self.scale.height_base_m);
+                below.add(
+                    &self.rules.codec.decode(*raw, level - 1),
+                    ground2,
+                    height_m,
+                    self.rules.scale.height_base_m,
+                );
             }
         }
-        let class = match (is_void, below.any_alive, below.fringe) {
-            (true, false, _) => VertexClass::Inert,
-            (true, true, _) => VertexClass::FringeVoid,
-            (false, _, true) => VertexClass::Fringe,
-            (false, _, false) => VertexClass::Plain,
-        };
-        // A deformed diamond's children are drawn in other places than their parents: the bound is the sum.
-        let own_m =
-            if folded && self.error_kind == ErrorKind::Bounded { own_m + below.error_m } else { own_m };
-        self.encode(level, code, class, own_m, &below).ok_or_else(|| internal(v))
-    }
-
-    #[inline(always)]
-    fn encode(&self, level: u32, code: f64, class: VertexClass, own_m: f64, below: &Below) -> Option<C::Raw> {
-        // No triangle is farther from a sample than the range of heights, which lies a millionth below the top.
-        let error_m = larger(below.error_m, smaller(self.scale.error_top_m * (1.0 - 1e-7), own_m));
-        self.codec.encode(level, code, class, error_m, below.radius_m)
+        self.rules.record(level, code, is_void, own_m, folded, &below).ok_or_else(|| internal(v))
     }
 }
 
@@ -174,34 +144,6 @@ struct Surroundings<'r, C: RecordCodec> {
     shape: &'r LevelShape,
     band: &'r Band,
     records: &'r Levels<C::Raw>,
-}
-
-/// What a vertex's children add up to.
-#[derive(Debug, Default)]
-struct Below {
-    error_m: f64,
-    radius_m: f64,
-    /// Whether a child is next to a void or void throughout.
-    fringe: bool,
-    /// Whether a child can ever be refined.
-    any_alive: bool,
-}
-
-impl Below {
-    /// Adds a child `ground2` square metres away over the ground from a vertex at `height_m` above `base_m`.
-    #[inline(always)]
-    fn add(&mut self, child: &Vertex, ground2: f64, height_m: f64, base_m: f64) {
-        if child.class != VertexClass::Plain {
-            self.fringe = true;
-            if child.class == VertexClass::Inert {
-                return;
-            }
-        }
-        self.any_alive = true;
-        let dz = height_m - (child.height_m - base_m);
-        self.radius_m = larger(self.radius_m, ((ground2 + dz * dz).sqrt() + child.radius_m) * MARGIN);
-        self.error_m = larger(self.error_m, child.error_m);
-    }
 }
 
 /// The rows of records that hold the children of a row's vertices.
@@ -258,10 +200,10 @@ struct VoidRow<'r, C: RecordCodec> {
 
 impl<'r, C: RecordCodec> VoidRow<'r, C> {
     /// `None` if the row itself has no voids or is no longer in the band.
-    fn new(saturator: &Saturator<C>, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
+    fn new(grid: &Grid, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
         let voids = around.band.find_row_voids(y).filter(|voids| !voids.is_empty())?;
         let has_children = around.shape.level() > 0;
-        let children = if has_children { Some(ChildRows::new(&saturator.grid, around, y)?) } else { None };
+        let children = if has_children { Some(ChildRows::new(grid, around, y)?) } else { None };
         Some(Self { voids, children })
     }
 
@@ -278,7 +220,7 @@ impl<'r, C: RecordCodec> VoidRow<'r, C> {
 
 /// A row away from the data's borders and from voids, with the rows it depends on at hand.
 struct OpenRow<'r, C: RecordCodec> {
-    saturator: &'r Saturator<C>,
+    rules: &'r Rules<C>,
     level: u32,
     step: usize,
     codes: &'r [f64],
@@ -297,7 +239,7 @@ struct OpenRow<'r, C: RecordCodec> {
 
 impl<'r, C: RecordCodec> OpenRow<'r, C> {
     /// `None` if the rows are no longer in the band, as for levels larger than a tile.
-    fn new(saturator: &'r Saturator<C>, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
+    fn new(rules: &'r Rules<C>, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
         let Surroundings { shape, band, .. } = *around;
         let (s, level) = (shape.step(), shape.level());
         let codes = band.find_row(y)?;
@@ -306,15 +248,15 @@ impl<'r, C: RecordCodec> OpenRow<'r, C> {
         } else {
             ([codes; 2], [-(s as isize), s as isize])
         };
-        let children = ChildRows::new(&saturator.grid, around, y)?;
-        let [dx, dy] = saturator.grid.spacing_m().map(|d| d * f64::from(s));
+        let children = ChildRows::new(&rules.grid, around, y)?;
+        let [dx, dy] = rules.grid.spacing_m().map(|d| d * f64::from(s));
         let ground2 = match (level, shape.is_white()) {
             (0, _) => [0.0; 2],
             (_, true) => [dx * dx, dy * dy],
             (_, false) => [(0.5 * dx) * (0.5 * dx) + (0.5 * dy) * (0.5 * dy); 2],
         };
         Some(Self {
-            saturator,
+            rules,
             level,
             step: s as usize,
             codes,
@@ -346,26 +288,26 @@ impl<'r, C: RecordCodec> OpenRow<'r, C> {
     fn record(&self, x: u32, column: usize, own_m: f64) -> Option<C::Raw> {
         let x = x as usize;
         let code = self.codes[x];
-        let scale = &self.saturator.scale;
+        let rules = self.rules;
         let own_m = if own_m.is_nan() {
             let [b, d] = self.end_codes(x);
-            (code - 0.5 * (b + d)).abs() * scale.height_step_m * (1.0 + 1e-9)
+            rules.step_error_m(code, [b, d])
         } else {
             own_m
         };
         let mut below = Below::default();
         if self.level > 0 {
-            let height_m = code * scale.height_step_m;
+            let height_m = code * rules.scale.height_step_m;
             let children = self.children.of(x, column)?;
             for (i, raw) in children.into_iter().enumerate() {
-                let child = self.saturator.codec.decode(raw, self.level - 1);
-                below.add(&child, self.ground2[i / 2], height_m, scale.height_base_m);
+                let child = rules.codec.decode(raw, self.level - 1);
+                below.add(&child, self.ground2[i / 2], height_m, rules.scale.height_base_m);
             }
         }
         if below.fringe {
             return None;
         }
-        self.saturator.encode(self.level, code, VertexClass::Plain, own_m, &below)
+        rules.encode(self.level, code, VertexClass::Plain, own_m, &below)
     }
 }
 

@@ -3,21 +3,15 @@
 //!
 //! A tile scans the triangles inside it level by level and adds its samples to the larger triangles it lies in. Tiles share
 //! only maxima, kept in atomics, so they run in parallel and in any order. Cost: each sample is compared with one or two planes a level,
-//! about two nanoseconds of one core each. Triangles that padding deforms are left to [`super::padding`].
+//! about two nanoseconds of one core each. Triangles that padding deforms are left to [`crate::bound`].
 
 use super::band::Band;
-use super::extremes::larger;
 use super::levels::{Levels, index_in};
-use super::plane::Plane;
+use crate::bound::{Plane, larger, scanned_error_m};
 use crate::grid::{Grid, GridPoint};
 use crate::order::corners;
-use crate::record::f32_at_least;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
-
-/// First level whose own error needs a scan. At levels 0 and 1 every sample in the diamond is the vertex, a corner, or a child's vertex
-/// on the edge it splits.
-pub(super) const FIRST_SCANNED: u32 = 2;
 
 /// Own errors in metres, as the bits of non-negative singles, whose order is that of the numbers.
 pub(super) type OwnErrors = Levels<AtomicU32>;
@@ -279,8 +273,7 @@ fn for_each_triangle_around(
 impl OwnErrors {
     /// Raises the own error of `v` to at least `codes` height codes.
     fn raise(&self, v: GridPoint, codes: f64, step_m: f64) {
-        // Rounding of the distance itself is below 2^-40 of it and of the heights it came from.
-        let metres = f32_at_least(codes * step_m * (1.0 + 1e-9));
+        let metres = scanned_error_m(codes, step_m);
         let level = self.grid().level(v);
         let (row, column) = index_in(level, v);
         if let Some(cell) = self.row(level, row).and_then(|r| r.get(column)) {

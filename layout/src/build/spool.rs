@@ -5,7 +5,7 @@
 //! NaN. Samples that single precision holds exactly take 4 bytes, others 8. A void's bytes are zero, so rows of voids are never written: the
 //! file has a hole there, and no room is taken.
 
-use super::extremes::range;
+use crate::bound::range;
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
 use crate::disk::Disk;
 use crate::error::LayoutError;

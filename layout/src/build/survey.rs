@@ -1,7 +1,7 @@
 //! From statistics to a record kind and its scale, and from a pass over the rows to the steepest slope, which bounds the radii.
 
-use super::extremes::{larger, largest_difference};
 use super::spool::{CANDIDATE_STEPS, SampleStats, Spool};
+use crate::bound::{larger, largest_difference};
 use crate::dem::{DemInfo, SampleType};
 use crate::error::LayoutError;
 use crate::grid::Grid;

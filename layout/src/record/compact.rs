@@ -156,6 +156,12 @@ impl RecordCodec for Compact {
         Some(u32::from_le_bytes([low, high, error_code, radius_code]))
     }
 
+    #[inline(always)]
+    fn height_value(raw: u32) -> f64 {
+        f64::from(raw as u16)
+    }
+
+    #[inline]
     fn round_height(value: f64) -> f64 {
         value.round_ties_even()
     }

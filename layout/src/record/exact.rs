@@ -118,6 +118,11 @@ impl RecordCodec for Exact8 {
         Some(u64::from((value as f32).to_bits()) | u64::from(error) << 32 | u64::from(radius) << 48)
     }
 
+    #[inline(always)]
+    fn height_value(raw: u64) -> f64 {
+        finite(f64::from(f32::from_bits(raw as u32)))
+    }
+
     fn round_height(value: f64) -> f64 {
         f64::from(value as f32)
     }
@@ -175,6 +180,11 @@ impl RecordCodec for Exact16 {
             f32_at_least(self.0.error_m(level, class, error_m)).to_bits() | u32::from(error_sign) << 31;
         let radius = f32_at_least(radius_m).to_bits() | u32::from(radius_sign) << 31;
         Some(u128::from(value.to_bits()) | u128::from(error) << 64 | u128::from(radius) << 96)
+    }
+
+    #[inline(always)]
+    fn height_value(raw: u128) -> f64 {
+        finite(f64::from_bits(raw as u64))
     }
 
     fn round_height(value: f64) -> f64 {

@@ -120,6 +120,9 @@ pub trait RecordCodec: Clone + Send + Sync + 'static {
         radius_m: f64,
     ) -> Option<Self::Raw>;
 
+    /// The raw height of a record that is not inert, as [`RecordCodec::encode`] takes it.
+    fn height_value(raw: Self::Raw) -> f64;
+
     /// A raw height rounded to what the record keeps.
     fn round_height(value: f64) -> f64;
 }
@@ -156,6 +159,7 @@ mod tests {
             let v = codec.decode(raw, level);
             assert_eq!(v.class, class);
             assert_eq!(v.height_m, -12.5 + value * 0.25);
+            assert_eq!(C::height_value(raw), value);
             assert!(v.error_m >= error_m && v.radius_m >= radius_m, "{v:?} {error_m} {radius_m}");
             if class == VertexClass::Plain && error_m > 0.02 {
                 assert!(v.error_m <= error_m * 1.06, "{v:?} {error_m}");

@@ -4,12 +4,12 @@
 //! asks: tile size, memory budget and threads cannot change a bit of the result. On whole height codes all of
 //! it is exact.
 
-use super::extremes::larger;
+use super::larger;
 use crate::grid::GridPoint;
 
 /// `z = (zv + gy * (y - yv)) + gx * (x - xv)` in height codes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Plane {
+pub(crate) struct Plane {
     xv: f64,
     yv: f64,
     zv: f64,
@@ -19,7 +19,7 @@ pub(super) struct Plane {
 
 impl Plane {
     /// The plane through apex `a` and base `b`, `d` of a bin-tree triangle, each with its height code.
-    pub(super) fn of([a, b, d]: [(GridPoint, f64); 3]) -> Self {
+    pub(crate) fn of([a, b, d]: [(GridPoint, f64); 3]) -> Self {
         let x = |p: (GridPoint, f64)| f64::from(p.0.x());
         let y = |p: (GridPoint, f64)| f64::from(p.0.y());
         let (xv, yv, zv) = (0.5 * (x(b) + x(d)), 0.5 * (y(b) + y(d)), 0.5 * (b.1 + d.1));
@@ -37,7 +37,7 @@ impl Plane {
 
     /// Largest distance in codes of the samples `row` from the plane; the first lies at (`x`, `y`). Void samples are NaN and do not count.
     #[inline(always)]
-    pub(super) fn farthest_in_row(&self, x: u32, y: u32, row: &[f64]) -> f64 {
+    pub(crate) fn farthest_in_row(&self, x: u32, y: u32, row: &[f64]) -> f64 {
         let base = self.zv + self.gy * (f64::from(y) - self.yv);
         // A whole number, as are its sums with the lanes: no rounding depends on how the row is cut.
         let mut offset = f64::from(x) - self.xv;
@@ -61,5 +61,12 @@ impl Plane {
             offset += 1.0;
         }
         farthest
+    }
+
+    /// Codes that a sample with height code `value` at `p` lies above the plane: the same operations as in a row.
+    #[inline(always)]
+    pub(crate) fn above(&self, p: GridPoint, value: f64) -> f64 {
+        let base = self.zv + self.gy * (f64::from(p.y()) - self.yv);
+        value - (base + self.gx * (f64::from(p.x()) - self.xv))
     }
 }

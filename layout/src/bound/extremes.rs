@@ -7,18 +7,18 @@ const LANES: usize = 8;
 
 /// The larger of `best`, which is not NaN, and `other`; `best` if `other` is NaN.
 #[inline(always)]
-pub(super) fn larger(best: f64, other: f64) -> f64 {
+pub(crate) fn larger(best: f64, other: f64) -> f64 {
     if other > best { other } else { best }
 }
 
 /// The smaller of `best`, which is not NaN, and `other`; `best` if `other` is NaN.
 #[inline(always)]
-pub(super) fn smaller(best: f64, other: f64) -> f64 {
+pub(crate) fn smaller(best: f64, other: f64) -> f64 {
     if other < best { other } else { best }
 }
 
 /// Smallest and largest of `values`; infinite and the wrong way round if all are NaN.
-pub(super) fn range(values: &[f64]) -> [f64; 2] {
+pub(crate) fn range(values: &[f64]) -> [f64; 2] {
     let mut low = [f64::INFINITY; LANES];
     let mut high = [f64::NEG_INFINITY; LANES];
     let (chunks, rest) = values.as_chunks::<LANES>();
@@ -32,7 +32,7 @@ pub(super) fn range(values: &[f64]) -> [f64; 2] {
 }
 
 /// Largest difference between numbers of `a` and `b` that stand at the same place, as far as the shorter goes; 0 if there are none.
-pub(super) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     let mut largest = [0.0; LANES];
     let count = a.len().min(b.len());
     let ((a, a_rest), (b, b_rest)) = (a[..count].as_chunks::<LANES>(), b[..count].as_chunks::<LANES>());

@@ -36,7 +36,7 @@ fn heights_at_crossing([p, q]: [Point; 2], [r, s]: [Point; 2]) -> Option<(f64, f
 }
 
 /// Largest vertical distance between the triangles (apex; base) and those that inserting `vertex` makes of them; 0 if none has area.
-pub(super) fn deviation(vertex: Point, base: [Point; 2], apexes: &[Point]) -> f64 {
+pub(crate) fn deviation(vertex: Point, base: [Point; 2], apexes: &[Point]) -> f64 {
     let mut deviation = 0.0f64;
     for &apex in apexes {
         if let Some(height) = height_in([apex, base[0], base[1]], vertex) {
@@ -50,7 +50,7 @@ pub(super) fn deviation(vertex: Point, base: [Point; 2], apexes: &[Point]) -> f6
 }
 
 /// Whether any of the triangles (apex; base) has area.
-pub(super) fn has_area(base: [Point; 2], apexes: &[Point]) -> bool {
+pub(crate) fn has_area(base: [Point; 2], apexes: &[Point]) -> bool {
     apexes.iter().any(|apex| area(*apex, base[0], base[1]) != 0.0)
 }
 
