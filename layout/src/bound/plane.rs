@@ -69,4 +69,22 @@ impl Plane {
         let base = self.zv + self.gy * (f64::from(p.y()) - self.yv);
         value - (base + self.gx * (f64::from(p.x()) - self.xv))
     }
+
+    /// Codes by which rounding may move a sample's distance, up to `reach` steps from the middle of the base; 0 for a level plane, which is exact.
+    pub(crate) fn slack(&self, reach: f64) -> f64 {
+        if self.gx == 0.0 && self.gy == 0.0 {
+            return 0.0;
+        }
+        1e-14 * (self.zv.abs() + reach * (self.gx.abs() + self.gy.abs()))
+    }
+
+    /// Lowest and highest code of the plane over the samples from (`west`, `south`) to (`east`, `north`).
+    pub(crate) fn range(&self, [west, south]: [u32; 2], [east, north]: [u32; 2]) -> [f64; 2] {
+        let at = |x: u32, y: u32| -self.above(GridPoint::new(x, y), 0.0);
+        let corners = [at(west, south), at(east, south), at(west, north), at(east, north)];
+        [
+            corners.into_iter().fold(f64::INFINITY, f64::min),
+            corners.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        ]
+    }
 }

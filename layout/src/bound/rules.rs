@@ -75,6 +75,27 @@ impl<C: RecordCodec> Rules<C> {
         }
     }
 
+    /// An own error in metres as a record of this level and class says it: rounded up, and no larger than errors get.
+    pub(crate) fn stored_error_m(&self, level: u32, class: VertexClass, own_m: f64) -> f64 {
+        let raw = self.codec.encode(level, 0.0, class, smaller(self.largest_error_m(), own_m), 0.0);
+        raw.map_or(f64::INFINITY, |raw| self.codec.decode(raw, level).error_m)
+    }
+
+    /// What own errors are cut to: no triangle is farther from a sample than the range of heights, which lies a millionth below the top.
+    #[inline(always)]
+    fn largest_error_m(&self) -> f64 {
+        self.scale.error_top_m * (1.0 - 1e-7)
+    }
+
+    /// Square metres over the ground from a vertex to its child. Multiples of the spacing, so that it does not depend on where they lie.
+    #[inline(always)]
+    pub(crate) fn ground2(&self, v: GridPoint, child: GridPoint) -> f64 {
+        let (v, child) = (self.grid.fold(v), self.grid.fold(child));
+        let [dx, dy] = self.grid.spacing_m();
+        let (x, y) = (dx * f64::from(v.x().abs_diff(child.x())), dy * f64::from(v.y().abs_diff(child.y())));
+        x * x + y * y
+    }
+
     /// The record of any vertex; `None` if no record of the kind can say it.
     pub(crate) fn record(
         &self,
@@ -107,8 +128,7 @@ impl<C: RecordCodec> Rules<C> {
         own_m: f64,
         below: &Below,
     ) -> Option<C::Raw> {
-        // No triangle is farther from a sample than the range of heights, which lies a millionth below the top.
-        let error_m = larger(below.error_m, smaller(self.scale.error_top_m * (1.0 - 1e-7), own_m));
+        let error_m = larger(below.error_m, smaller(self.largest_error_m(), own_m));
         self.codec.encode(level, code, class, error_m, below.radius_m)
     }
 }

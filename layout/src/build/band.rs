@@ -18,10 +18,14 @@ pub(super) struct Row {
     voids: Arc<[bool]>,
 }
 
+/// Code to fill a void with, given its column and row; `None` where no vertex will say it.
+pub(super) type Fills<'f> = dyn Fn(u32, u32) -> Option<f64> + Sync + 'f;
+
 /// Reads rows of codes from the south, voids filled in; apart from the window, so that rows ahead of it can be read meanwhile.
 pub(super) struct RowReader<'s> {
     spool: &'s Spool<'s>,
     code: HeightCode,
+    fills: Option<&'s Fills<'s>>,
     next: u32,
     /// Filled codes of the row last read, which a wholly void row repeats.
     last: Arc<[f64]>,
@@ -31,11 +35,18 @@ pub(super) struct RowReader<'s> {
 
 impl<'s> RowReader<'s> {
     /// A reader at the southernmost row; rows of voids before any height have `fallback_code`.
-    pub(super) fn new(spool: &'s Spool<'s>, code: HeightCode, wide: u32, fallback_code: f64) -> Self {
+    pub(super) fn new(
+        spool: &'s Spool<'s>,
+        code: HeightCode,
+        fills: Option<&'s Fills<'s>>,
+        wide: u32,
+        fallback_code: f64,
+    ) -> Self {
         let wide = wide as usize;
         Self {
             spool,
             code,
+            fills,
             next: 0,
             last: vec![fallback_code; wide].into(),
             all_void: vec![true; wide].into(),
@@ -56,6 +67,15 @@ impl<'s> RowReader<'s> {
                 self.last = codes.as_slice().into();
                 voids.into()
             };
+            if let Some(fills) = self.fills.filter(|_| !voids.is_empty()) {
+                let mut filled = self.last.to_vec();
+                for x in (0..filled.len()).filter(|x| voids[*x]) {
+                    if let Some(fill) = fills(x as u32, self.next) {
+                        filled[x] = fill;
+                    }
+                }
+                self.last = filled.into();
+            }
             rows.push(Row { codes: Arc::clone(&self.last), voids });
             self.next += 1;
         }

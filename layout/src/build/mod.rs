@@ -12,6 +12,7 @@ mod gather;
 mod levels;
 mod memory;
 mod plan;
+mod rebuild;
 mod saturate;
 mod scan;
 mod spacing;
@@ -27,11 +28,12 @@ use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::header::{ErrorKind, Header};
 use crate::order::corners;
-use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
-use band::{Band, RowReader};
+use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, VertexClass};
+use band::{Band, Fills, RowReader};
 use levels::{LevelShape, Levels};
 use memory::{LARGEST_TILE, MemoryPlan};
 use rayon::prelude::*;
+pub use rebuild::{HeightRoom, rebuild};
 use saturate::Saturator;
 use scan::{OwnErrors, scan_tile_row};
 use spool::Spool;
@@ -165,12 +167,9 @@ pub fn build_on(
     };
 
     progress.stage("building", samples);
-    let work = Work { spool: &spool, code, scale, tile: memory.tile, file: &file, disk, advance: &advance };
-    match code.kind {
-        RecordKind::Compact => work.run(Compact::new(&grid, &scale), &mut header)?,
-        RecordKind::Exact8 => work.run(Exact8::new(&grid, &scale), &mut header)?,
-        RecordKind::Exact16 => work.run(Exact16::new(&grid, &scale), &mut header)?,
-    }
+    let work =
+        Work { spool: &spool, code, fills: None, tile: memory.tile, file: &file, disk, advance: &advance };
+    work.run_kind(&mut header)?;
     progress.stage("syncing", 0);
     drop(spool);
     file.publish_on(disk)?;
@@ -181,7 +180,8 @@ pub fn build_on(
 struct Work<'a> {
     spool: &'a Spool<'a>,
     code: HeightCode,
-    scale: RecordScale,
+    /// Heights to fill voids with, other than those that the samples around them suggest.
+    fills: Option<&'a Fills<'a>>,
     tile: u32,
     file: &'a AtomicFile,
     disk: &'a dyn Disk,
@@ -189,6 +189,16 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
+    /// Works with the codec of the header's kind of records.
+    fn run_kind(&self, header: &mut Header) -> Result<(), LayoutError> {
+        let (grid, scale) = (header.grid, header.scale);
+        match header.record_kind {
+            RecordKind::Compact => self.run(Compact::new(&grid, &scale), header),
+            RecordKind::Exact8 => self.run(Exact8::new(&grid, &scale), header),
+            RecordKind::Exact16 => self.run(Exact16::new(&grid, &scale), header),
+        }
+    }
+
     fn run<C: RecordCodec>(&self, codec: C, header: &mut Header) -> Result<(), LayoutError> {
         let (outgoing, incoming) = page_queue();
         let writer = std::thread::scope(|scope| {
@@ -216,7 +226,7 @@ impl Work<'_> {
             grid,
             tile: self.tile,
             saturator: Saturator {
-                rules: Rules { grid, codec, scale: self.scale, error_kind: header.error_kind },
+                rules: Rules { grid, codec, scale: header.scale, error_kind: header.error_kind },
                 has_voids: header.has_voids,
             },
             shapes: (0..grid.levels()).map(|l| LevelShape::new(&grid, l)).collect(),
@@ -230,7 +240,7 @@ impl Work<'_> {
         state.make_own_rows(0);
         let tile_rows = (high - 1).div_ceil(self.tile).max(1);
         let last_row = |tile_y: u32| ((tile_y + 1) * self.tile).min(high - 1);
-        let mut reader = RowReader::new(self.spool, self.code, wide, lowest);
+        let mut reader = RowReader::new(self.spool, self.code, self.fills, wide, lowest);
         let mut rows = reader.read(last_row(0))?;
         for tile_y in 0..tile_rows {
             let count = rows.len() as u64;
@@ -243,7 +253,7 @@ impl Work<'_> {
                 || if is_last { Ok(Vec::new()) } else { reader.read(last_row(tile_y + 1)) },
                 || {
                     if header.error_kind == ErrorKind::Bounded {
-                        let step_m = self.scale.height_step_m;
+                        let step_m = header.scale.height_step_m;
                         scan_tile_row(&grid, &state.band, &state.own, tile_y, self.tile, step_m);
                     }
                     state.advance()

@@ -115,7 +115,6 @@ impl<C: RecordCodec> Saturator<C> {
                     .any(|p| band.is_void(p));
         } else {
             let child_shape = LevelShape::new(&self.rules.grid, level - 1);
-            let [x, y] = self.rules.grid.position_m(v);
             let height_m = code * self.rules.scale.height_step_m;
             for child in children(v, shape, self.rules.grid.side_steps()).into_iter().flatten() {
                 if child_shape.is_beyond(child) {
@@ -125,8 +124,7 @@ impl<C: RecordCodec> Saturator<C> {
                 let Some(raw) = records.row(level - 1, row).and_then(|r| r.get(column)) else {
                     return Err(internal(child));
                 };
-                let [cx, cy] = self.rules.grid.position_m(child);
-                let ground2 = (x - cx) * (x - cx) + (y - cy) * (y - cy);
+                let ground2 = self.rules.ground2(v, child);
                 below.add(
                     &self.rules.codec.decode(*raw, level - 1),
                     ground2,

@@ -1,17 +1,32 @@
 //! Terrain edited while it is flown over: heights of a region change, and the records of the region and its ancestors follow, exactly as if the file were built
 //! from the edited heights.
+//!
+//! An [`Edit`] turns old heights into new ones; an [`Editor`] makes records of them, in memory. Which records an edit reaches and why few of them are looked at is told in
+//! `update` and `farthest`. Based on the bottom-up update of Yang et al. for libMini ("dynamic tiled terrain", section 3), done for saturated error bounds and nested spheres.
+//!
+//! Voids stay voids and samples stay samples: edits pass over voids, whose filled-in heights stay as they are, so that no vertex changes its class.
+//!
+//! Invariant: after any batch every record is the one that a build in the file's own scale makes of the edited heights; a batch that fails changes nothing.
 
+mod core;
+mod farthest;
+mod ground;
 mod operation;
+mod pages;
+mod update;
 mod window;
 
 pub use operation::{Crater, Edit};
 pub use window::{HeightWindow, SampleRect};
 
+use self::core::Core;
 use crate::bytes::Page;
 use crate::error::LayoutError;
 use crate::grid::GridPoint;
 use crate::header::Header;
-use crate::terrain::Terrain;
+use crate::record::{Compact, Exact8, Exact16, Vertex};
+use crate::terrain::{ByKind, Terrain};
+use crate::with_records;
 use std::sync::Arc;
 
 /// What a batch of edits, an undo or a redo changed.
@@ -30,34 +45,47 @@ pub struct Changes {
 /// A terrain with edits in memory: pages that differ from the file's, and the way from new heights to new records.
 #[derive(Debug)]
 pub struct Editor {
-    terrain: Arc<Terrain>,
+    core: ByKind<Core<Compact>, Core<Exact8>, Core<Exact16>>,
 }
 
 impl Editor {
     /// An editor over `terrain`, without edits.
-    ///
-    /// # Errors
-    /// I/O and damage of the pages it reads.
-    pub fn new(terrain: Arc<Terrain>) -> Result<Self, LayoutError> {
-        Ok(Self { terrain })
+    pub fn new(terrain: Arc<Terrain>) -> Self {
+        let (grid, scale) = (*terrain.grid(), terrain.header().scale);
+        let core = match terrain.header().record_kind {
+            crate::record::RecordKind::Compact => {
+                ByKind::Compact(Core::new(terrain, Compact::new(&grid, &scale)))
+            }
+            crate::record::RecordKind::Exact8 => {
+                ByKind::Exact8(Core::new(terrain, Exact8::new(&grid, &scale)))
+            }
+            crate::record::RecordKind::Exact16 => {
+                ByKind::Exact16(Core::new(terrain, Exact16::new(&grid, &scale)))
+            }
+        };
+        Self { core }
+    }
+
+    /// States what [`Edit::Restore`](Edit) restores; without it, the terrain under the edits.
+    pub fn set_original(&mut self, original: Arc<Terrain>) {
+        with_records!(&mut self.core, core => core.set_original(original));
     }
 
     /// Applies a batch, all of it or, on an error, nothing.
     ///
     /// # Errors
-    /// [`LayoutError::Usage`] for numbers that cannot be used; damage and I/O of pages that it needs.
+    /// [`LayoutError::Usage`] for numbers that cannot be used; [`LayoutError::OutOfRange`] if the file's records cannot hold the result; damage and I/O of
+    /// pages that it needs.
     pub fn apply(&mut self, edits: &[Edit]) -> Result<Changes, LayoutError> {
-        let _ = edits;
-        Ok(Changes::default())
+        with_records!(&mut self.core, core => core.apply(edits))
     }
 
-    /// Sets the heights of a window, voids passed over, all of it or, on an error, nothing.
+    /// Sets the heights of a window, all of it or, on an error, nothing. Voids are passed over; a height that is not a number leaves its sample as it is.
     ///
     /// # Errors
     /// As [`Editor::apply`].
     pub fn set_heights(&mut self, window: &HeightWindow) -> Result<Changes, LayoutError> {
-        let _ = window;
-        Ok(Changes::default())
+        with_records!(&mut self.core, core => core.set_heights(window))
     }
 
     /// Heights of the samples of `rect` as they are now.
@@ -65,51 +93,70 @@ impl Editor {
     /// # Errors
     /// Damage and I/O of the pages that hold them; [`LayoutError::Usage`] if it reaches beyond the data.
     pub fn heights(&mut self, rect: SampleRect) -> Result<HeightWindow, LayoutError> {
-        HeightWindow::new(rect, vec![f64::NAN; rect.count()])
+        with_records!(&mut self.core, core => core.heights(rect))
+    }
+
+    /// One vertex as it is now.
+    ///
+    /// # Errors
+    /// Damage and I/O of the page that holds it; [`LayoutError::Usage`] for a point outside the square.
+    pub fn vertex(&mut self, p: GridPoint) -> Result<Vertex, LayoutError> {
+        let n = self.terrain().grid().side_steps();
+        if p.x() > n || p.y() > n {
+            return Err(LayoutError::Usage(format!(
+                "sample ({}, {}) lies outside the terrain",
+                p.x(),
+                p.y()
+            )));
+        }
+        with_records!(&mut self.core, core => core.vertex(p))
     }
 
     /// The page with its edits; `None` if it is the terrain's own.
     pub fn edited_page(&self, logical_page: u64) -> Option<&Page> {
-        let _ = logical_page;
-        None
+        with_records!(&self.core, core => core.edited_page(logical_page))
+    }
+
+    /// All pages that are, or once were, other than the terrain's, in no order.
+    pub fn edited_pages(&self) -> Box<dyn Iterator<Item = (u64, &Page)> + '_> {
+        with_records!(&self.core, core => Box::new(core.all_edited()))
     }
 
     /// Logical pages edited since the last [`Editor::mark_committed`], ascending.
-    pub fn uncommitted(&self) -> &[u64] {
-        &[]
+    pub fn uncommitted(&self) -> Vec<u64> {
+        with_records!(&self.core, core => core.uncommitted())
     }
 
     /// Everything so far counts as committed.
-    pub fn mark_committed(&mut self) {}
-
-    /// Takes back everything since the last [`Editor::mark_committed`].
-    ///
-    /// # Errors
-    /// None, unless pages cannot be read.
-    pub fn roll_back(&mut self) -> Result<Changes, LayoutError> {
-        Ok(Changes::default())
+    pub fn mark_committed(&mut self) {
+        with_records!(&mut self.core, core => core.mark_committed());
     }
 
-    /// Puts other contents into pages, as undoing does, and counts them as committed. What changed is found by comparing records.
+    /// Takes back everything since the last [`Editor::mark_committed`].
+    pub fn roll_back(&mut self) -> Changes {
+        with_records!(&mut self.core, core => core.roll_back())
+    }
+
+    /// Puts other contents into pages, as undoing does, and takes over the range of heights of `header`, all of it committed. What changed is found by comparing
+    /// records.
     ///
     /// # Errors
-    /// [`LayoutError::Usage`] for pages the terrain has not; I/O.
+    /// [`LayoutError::Usage`] for pages that the terrain has not, and while edits are not committed; I/O.
     pub fn replace_pages(
         &mut self,
         pages: Vec<(u64, Box<Page>)>,
         header: &Header,
     ) -> Result<Changes, LayoutError> {
-        let _ = (pages, header);
-        Ok(Changes::default())
+        with_records!(&mut self.core, core => core.replace_pages(pages, header))
     }
 
     /// The terrain's header with the range of heights as edits have widened it.
     pub fn header(&self) -> &Header {
-        self.terrain.header()
+        with_records!(&self.core, core => core.header())
     }
 
     /// The terrain under the edits.
     pub fn terrain(&self) -> &Arc<Terrain> {
-        &self.terrain
+        with_records!(&self.core, core => core.terrain())
     }
 }

@@ -1,0 +1,223 @@
+//! A terrain built anew from its own heights: in its own scale, which must give the same records, or in one with room for other heights.
+//!
+//! The samples are read back from the records, so nothing is lost that the file had. Voids keep the heights they are filled with. Cost and memory are a build's.
+
+use super::survey::HeightCode;
+use super::{BuildOptions, BuildProgress, MemoryPlan, Work, spool::Spool};
+use crate::atomic_file::AtomicFile;
+use crate::dem::{DemInfo, DemSource, Georeference, SampleSink, SampleType, Window};
+use crate::disk::Disk;
+use crate::error::LayoutError;
+use crate::grid::GridPoint;
+use crate::header::Header;
+use crate::record::{RecordCodec, RecordKind, RecordScale};
+use crate::terrain::{Records, Terrain};
+use crate::with_records;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Heights that a file is to have room for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeightRoom {
+    /// Lowest height in metres.
+    pub lowest_m: f64,
+    /// Highest height in metres.
+    pub highest_m: f64,
+}
+
+/// Rows read at a time.
+const ROWS: u32 = 16;
+/// Largest height code of compact records.
+const LARGEST_CODE: f64 = 65_535.0;
+
+/// Heights of a terrain as a DEM whose raw samples are the records' height values.
+struct OwnHeights<'t, C: RecordCodec> {
+    info: DemInfo,
+    records: Records<'t, C>,
+}
+
+impl<C: RecordCodec> DemSource for OwnHeights<'_, C> {
+    fn info(&self) -> &DemInfo {
+        &self.info
+    }
+
+    fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let (wide, high) = (self.info.samples_wide, self.info.samples_high);
+        let k = self.records.grid().k();
+        (0..high.div_ceil(ROWS)).into_par_iter().try_for_each_init(Vec::new, |samples, block| {
+            let first = block * ROWS;
+            let rows = ROWS.min(high - first);
+            samples.clear();
+            for row in first..first + rows {
+                let y = high - 1 - row;
+                samples.extend((0..wide).map(|x| {
+                    let raw = self.records.raw(crate::order::slot_of(k, GridPoint::new(x, y)));
+                    let is_void = self.records.decode(raw, 0).class.is_void();
+                    if is_void { f64::NAN } else { C::height_value(raw) }
+                }));
+            }
+            sink.put(Window { col: 0, row: first, width: wide, height: rows }, samples)
+        })
+    }
+}
+
+/// Builds `out` from the heights of `terrain`, on the current rayon pool: with the same records if `room` is `None`, else in a scale that has room for these
+/// heights beside the terrain's own. `out` appears when it is complete; it has no imagery and no history.
+///
+/// # Errors
+/// As [`build()`](super::build()); [`LayoutError::Usage`] for a terrain whose source does not lend its bytes, and for heights beyond a million kilometres.
+pub fn rebuild(
+    disk: &dyn Disk,
+    terrain: &Terrain,
+    out: &Path,
+    room: Option<HeightRoom>,
+    memory_mib: u64,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
+    let Some(records) = terrain.records() else {
+        return Err(LayoutError::Usage(format!(
+            "{}: building it anew needs a mapped or in-memory terrain",
+            terrain.path().display()
+        )));
+    };
+    with_records!(records, records => rebuild_kind(disk, terrain, records, out, room, memory_mib, progress))
+}
+
+fn rebuild_kind<C: RecordCodec>(
+    disk: &dyn Disk,
+    terrain: &Terrain,
+    records: Records<'_, C>,
+    out: &Path,
+    room: Option<HeightRoom>,
+    memory_mib: u64,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
+    let old = terrain.header();
+    let (grid, [wide, high]) = (old.grid, old.grid.samples());
+    let info = DemInfo {
+        samples_wide: wide,
+        samples_high: high,
+        sample_type: match old.record_kind {
+            RecordKind::Compact => SampleType::U16,
+            RecordKind::Exact8 => SampleType::F32,
+            RecordKind::Exact16 => SampleType::F64,
+        },
+        height_scale: old.scale.height_step_m,
+        height_offset_m: old.scale.height_base_m,
+        georeference: Georeference::default(),
+        format: old.source.clone(),
+    };
+    let samples = u64::from(wide) * u64::from(high);
+    let options = BuildOptions { memory_mib, ..BuildOptions::default() };
+    let memory = MemoryPlan::new(&grid, info.sample_type, &options, rayon::current_num_threads() as u64)?;
+    let file = AtomicFile::create(out)?;
+    let advance = |n| progress.advance(n);
+    progress.stage("reading", samples);
+    let spool = Spool::new(disk, &info, None, out, memory.spool_bytes, &advance)?;
+    let source = OwnHeights { info, records };
+    source.stream(&spool)?;
+
+    let (code, scale) = match room {
+        None => (same_code(old), old.scale),
+        Some(room) => {
+            progress.stage("surveying", samples);
+            let code = roomy_code(old, room)?;
+            let steepest_m = super::survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
+            (code, roomy_scale(old, &code, room, steepest_m))
+        }
+    };
+    let fill_of = |x, y| kept_fill(&source.records, GridPoint::new(x, y)).map(|value| code.code(value));
+    let stats = spool.stats();
+    let mut header = Header {
+        record_kind: code.kind,
+        scale,
+        generation: 1,
+        height_range_m: stats.range.map(|raw| code.metres(code.code(raw))),
+        imagery: None,
+        ..old.clone()
+    };
+    progress.stage("building", samples);
+    Work {
+        spool: &spool,
+        code,
+        fills: Some(&fill_of),
+        tile: memory.tile,
+        file: &file,
+        disk,
+        advance: &advance,
+    }
+    .run_kind(&mut header)?;
+    progress.stage("syncing", 0);
+    drop(spool);
+    file.publish_on(disk)?;
+    Ok(header)
+}
+
+/// Height value that a void is filled with: what its record says, or that of a padding vertex with its position; `None` if all are inert.
+fn kept_fill<C: RecordCodec>(records: &Records<'_, C>, void: GridPoint) -> Option<f64> {
+    let (grid, [wide, high]) = (records.grid(), records.grid().samples());
+    // No vertex of a level stands farther from the data, and none on this row or column has a higher level than it allows.
+    let padding_to = |v: u32, count: u32, across: u32| {
+        if v + 1 < count {
+            return v;
+        }
+        let level = (2 * across.trailing_zeros().min(grid.k()) + 1).min(grid.levels() - 1);
+        (v + grid.reach_steps(level)).min(grid.side_steps())
+    };
+    let (x_to, y_to) = if void.x() + 1 == wide && void.y() + 1 == high {
+        (grid.side_steps(), grid.side_steps())
+    } else {
+        (padding_to(void.x(), wide, void.y()), padding_to(void.y(), high, void.x()))
+    };
+    let images = (void.y()..=y_to).flat_map(|y| (void.x()..=x_to).map(move |x| GridPoint::new(x, y)));
+    let mut raws = images.map(|p| records.raw(crate::order::slot_of(grid.k(), p)));
+    raws.find(|raw| *raw != C::INERT).map(C::height_value)
+}
+
+/// Raw samples are the records' own height values.
+fn same_code(old: &Header) -> HeightCode {
+    let RecordScale { height_base_m, height_step_m, .. } = old.scale;
+    HeightCode {
+        kind: old.record_kind,
+        raw_base: 0.0,
+        raw_step: 1.0,
+        rounds: old.heights_rounded,
+        base_m: height_base_m,
+        step_m: height_step_m,
+    }
+}
+
+/// Heights of the terrain and those it is to have room for.
+fn range_with(old: &Header, room: HeightRoom) -> [f64; 2] {
+    let [low, high] = old.height_range_m;
+    [low.min(room.lowest_m), high.max(room.highest_m)]
+}
+
+/// The smallest kind of records that keeps the terrain's heights exactly and has room for others.
+fn roomy_code(old: &Header, room: HeightRoom) -> Result<HeightCode, LayoutError> {
+    let [low, high] = range_with(old, room);
+    if !(low.abs() <= 1e9 && high.abs() <= 1e9) {
+        return Err(LayoutError::Usage(format!(
+            "heights from {low} to {high} m are beyond a million kilometres; a terrain does not go there"
+        )));
+    }
+    let same = same_code(old);
+    if old.record_kind != RecordKind::Compact {
+        return Ok(same);
+    }
+    // Whole steps, so that every height stays what it is.
+    let below = ((same.base_m - low) / same.step_m).ceil().max(0.0);
+    let above = ((high - same.base_m) / same.step_m).ceil();
+    if below + above <= LARGEST_CODE {
+        return Ok(HeightCode { raw_base: -below, base_m: same.base_m - below * same.step_m, ..same });
+    }
+    Ok(HeightCode { kind: RecordKind::Exact8, ..same })
+}
+
+/// Room for slopes too: as steep as the whole range over one step.
+fn roomy_scale(old: &Header, code: &HeightCode, room: HeightRoom, steepest_m: [f64; 2]) -> RecordScale {
+    let range_m = range_with(old, room);
+    let tall = range_m[1] - range_m[0];
+    let steepest_m = steepest_m.map(|s| s.max(tall));
+    super::survey::record_scale(&old.grid, code, range_m, steepest_m)
+}

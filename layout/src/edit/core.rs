@@ -1,0 +1,378 @@
+//! An editor for one kind of records: heights in, records out, whole or not at all.
+
+use super::ground::NewCodes;
+use super::pages::Pages;
+use super::update::{Scratch, Update};
+use super::window::{HeightWindow, SampleRect};
+use super::{Changes, Edit};
+use crate::bound::Rules;
+use crate::bytes::{PAGE_BYTES, Page};
+use crate::error::LayoutError;
+use crate::grid::GridPoint;
+use crate::header::Header;
+use crate::order::point_of;
+use crate::record::{RecordCodec, RecordKind, Vertex};
+use crate::terrain::Terrain;
+use std::sync::Arc;
+
+/// Largest height code of compact records.
+const LARGEST_CODE: f64 = 65_535.0;
+
+/// Edits of a terrain with records of kind `C`.
+#[derive(Debug)]
+pub(super) struct Core<C: RecordCodec> {
+    rules: Rules<C>,
+    pages: Pages<C>,
+    /// The terrain before all edits.
+    original: Option<Pages<C>>,
+    header: Header,
+    /// The header's range and error top as committed.
+    committed: ([f64; 2], f64),
+    scratch: Scratch<C::Raw>,
+    /// New height codes of the window being set.
+    codes: Vec<f64>,
+}
+
+impl<C: RecordCodec> Core<C> {
+    pub(super) fn new(terrain: Arc<Terrain>, codec: C) -> Self {
+        let header = terrain.header().clone();
+        let rules = Rules { grid: header.grid, codec, scale: header.scale, error_kind: header.error_kind };
+        Self {
+            rules,
+            committed: (header.height_range_m, header.scale.error_top_m),
+            header,
+            pages: Pages::new(terrain),
+            original: None,
+            scratch: Scratch::default(),
+            codes: Vec::new(),
+        }
+    }
+
+    pub(super) fn set_original(&mut self, original: Arc<Terrain>) {
+        self.original = Some(Pages::new(original));
+    }
+
+    pub(super) fn header(&self) -> &Header {
+        &self.header
+    }
+
+    pub(super) fn terrain(&self) -> &Arc<Terrain> {
+        self.pages.terrain()
+    }
+
+    pub(super) fn edited_page(&self, logical: u64) -> Option<&Page> {
+        self.pages.edited(logical)
+    }
+
+    pub(super) fn all_edited(&self) -> impl Iterator<Item = (u64, &Page)> {
+        self.pages.all_edited()
+    }
+
+    pub(super) fn uncommitted(&self) -> Vec<u64> {
+        self.pages.uncommitted()
+    }
+
+    pub(super) fn mark_committed(&mut self) {
+        self.committed = (self.header.height_range_m, self.header.scale.error_top_m);
+        self.pages.mark_committed();
+    }
+
+    pub(super) fn vertex(&mut self, p: GridPoint) -> Result<Vertex, LayoutError> {
+        let grid = self.rules.grid;
+        let level = if grid.is_corner(p) { 0 } else { grid.level(p) };
+        let raw = self.pages.raw_at(p);
+        self.pages.check()?;
+        Ok(self.rules.codec.decode(raw, level))
+    }
+
+    /// Applies a batch, all of it or nothing.
+    pub(super) fn apply(&mut self, edits: &[Edit]) -> Result<Changes, LayoutError> {
+        let grid = self.rules.grid;
+        for edit in edits {
+            edit.check(&grid)?;
+        }
+        self.whole(|core, changes| {
+            for edit in edits {
+                let Some(bounds) = edit.bounds(&grid) else { continue };
+                let around = bounds.grown(edit.margin(), &grid);
+                let mut window = core.heights(around)?;
+                let original =
+                    if edit.needs_original() { Some(core.original_heights(around)?) } else { None };
+                edit.apply(&grid, &mut window, original.as_ref());
+                core.set(&window, changes)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Sets heights, all or none.
+    pub(super) fn set_heights(&mut self, window: &HeightWindow) -> Result<Changes, LayoutError> {
+        self.check_rect(window.rect())?;
+        self.whole(|core, changes| core.set(window, changes))
+    }
+
+    /// Does `work` or, if that fails, nothing.
+    fn whole(
+        &mut self,
+        work: impl FnOnce(&mut Self, &mut Changes) -> Result<(), LayoutError>,
+    ) -> Result<Changes, LayoutError> {
+        let mark = self.pages.mark();
+        let former = (self.header.height_range_m, self.header.scale.error_top_m);
+        let mut changes = Changes::default();
+        let done = work(self, &mut changes);
+        if let Err(error) = done {
+            self.pages.take_back(mark);
+            self.set_range(former);
+            return Err(error);
+        }
+        self.tell(mark, &mut changes);
+        self.pages.tidy();
+        Ok(changes)
+    }
+
+    fn set_range(&mut self, (range_m, error_top_m): ([f64; 2], f64)) {
+        self.header.height_range_m = range_m;
+        self.header.scale.error_top_m = error_top_m;
+        self.rules.scale.error_top_m = error_top_m;
+    }
+
+    pub(super) fn roll_back(&mut self) -> Changes {
+        let mut changes = Changes::default();
+        self.tell(0, &mut changes);
+        // Where heights changed is not kept apart from the records that did.
+        changes.samples = rects_of(&self.rules.grid, &changes.vertices);
+        self.pages.take_back(0);
+        self.set_range(self.committed);
+        changes
+    }
+
+    /// Vertices and pages that were written to since `mark`, as far as they are not as they were.
+    fn tell(&mut self, mark: usize, changes: &mut Changes) {
+        let mut written: Vec<(u64, GridPoint, C::Raw)> =
+            self.pages.overwritten(mark).iter().map(|o| (o.slot, o.point, o.old)).collect();
+        // The first of several entries of a slot has the record from before all.
+        written.sort_by_key(|(slot, ..)| *slot);
+        written.dedup_by_key(|(slot, ..)| *slot);
+        for (slot, point, old) in written {
+            if self.pages.raw(slot) != old {
+                changes.vertices.push(point);
+                let page = slot / (PAGE_BYTES / C::BYTES) as u64;
+                if changes.pages.last() != Some(&page) {
+                    changes.pages.push(page);
+                }
+            }
+        }
+    }
+
+    fn check_rect(&self, rect: SampleRect) -> Result<(), LayoutError> {
+        let [wide, high] = self.rules.grid.samples();
+        if rect.west <= rect.east && rect.south <= rect.north && rect.east < wide && rect.north < high {
+            return Ok(());
+        }
+        Err(LayoutError::Usage(format!(
+            "the samples ({}, {}) to ({}, {}) do not all lie in the terrain, which has {wide} x {high}",
+            rect.west, rect.south, rect.east, rect.north
+        )))
+    }
+
+    pub(super) fn heights(&mut self, rect: SampleRect) -> Result<HeightWindow, LayoutError> {
+        self.check_rect(rect)?;
+        heights_of(&mut self.pages, &self.rules, rect)
+    }
+
+    fn original_heights(&mut self, rect: SampleRect) -> Result<HeightWindow, LayoutError> {
+        let terrain = Arc::clone(self.pages.terrain());
+        let original = self.original.get_or_insert_with(|| Pages::new(terrain));
+        let window = heights_of(original, &self.rules, rect);
+        original.tidy();
+        window
+    }
+
+    /// Sets the heights of a window that lies in the data.
+    fn set(&mut self, window: &HeightWindow, changes: &mut Changes) -> Result<(), LayoutError> {
+        let rect = window.rect();
+        let scale = self.rules.scale;
+        let k = self.rules.grid.k();
+        let mut codes = std::mem::take(&mut self.codes);
+        codes.clear();
+        // What changes: its bounds, and heights there before and after.
+        let mut changed: Option<SampleRect> = None;
+        let mut lowest = f64::INFINITY;
+        let mut highest = f64::NEG_INFINITY;
+        let mut at = 0;
+        for y in rect.south..=rect.north {
+            for x in rect.west..=rect.east {
+                let raw = self.pages.raw(crate::order::slot_of(k, GridPoint::new(x, y)));
+                let height_m = window.heights_m()[at];
+                at += 1;
+                let is_void = self.rules.codec.decode(raw, 0).class.is_void();
+                if is_void {
+                    changes.voids_passed += u64::from(!height_m.is_nan());
+                    codes.push(f64::NAN);
+                    continue;
+                }
+                let old = C::height_value(raw);
+                let new = if height_m.is_nan() {
+                    old
+                } else {
+                    C::round_height((height_m - scale.height_base_m) / scale.height_step_m)
+                };
+                if new != old {
+                    lowest = lowest.min(new);
+                    highest = highest.max(new);
+                    let here = SampleRect { west: x, south: y, east: x, north: y };
+                    changed = Some(changed.map_or(here, |r| SampleRect {
+                        west: r.west.min(x),
+                        south: r.south,
+                        east: r.east.max(x),
+                        north: y,
+                    }));
+                }
+                codes.push(new);
+            }
+        }
+        self.codes = codes;
+        self.pages.check()?;
+        let Some(changed) = changed else { return Ok(()) };
+        self.check_range([lowest, highest])?;
+        self.renew(rect, changed);
+        self.pages.check()?;
+        changes.samples.push(changed);
+        Ok(())
+    }
+
+    /// Updates the records around `changed`, whose new codes lie in those of `rect`.
+    fn renew(&mut self, rect: SampleRect, changed: SampleRect) {
+        let mut codes = std::mem::take(&mut self.codes);
+        if rect != changed {
+            // Moved to the front row by row; a row never moves past where it was.
+            let (mut to, wide) = (0, changed.wide() as usize);
+            for y in changed.south..=changed.north {
+                let from =
+                    (y - rect.south) as usize * rect.wide() as usize + (changed.west - rect.west) as usize;
+                codes.copy_within(from..from + wide, to);
+                to += wide;
+            }
+            codes.truncate(to);
+        }
+        let k = self.rules.grid.k();
+        let mut ranges = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        let points = (changed.south..=changed.north)
+            .flat_map(|y| (changed.west..=changed.east).map(move |x| GridPoint::new(x, y)));
+        for (p, now) in points.zip(&codes) {
+            if !now.is_nan() {
+                let then = C::height_value(self.pages.raw(crate::order::slot_of(k, p)));
+                for (range, code) in ranges.iter_mut().zip([then, *now]) {
+                    *range = [range[0].min(code), range[1].max(code)];
+                }
+            }
+        }
+        let new = NewCodes { rect: changed, codes: &codes, ranges };
+        Update::new(&self.rules, &mut self.pages, new, &mut self.scratch).run();
+        self.codes = codes;
+    }
+
+    /// Whether records can hold these height codes; notes the new range of heights.
+    fn check_range(&mut self, codes: [f64; 2]) -> Result<(), LayoutError> {
+        let scale = &mut self.rules.scale;
+        let metres = codes.map(|code| scale.height_base_m + code * scale.height_step_m);
+        let [low, high] = self.header.height_range_m;
+        let range_m = [low.min(metres[0]), high.max(metres[1])];
+        let needed_top_m = (range_m[1] - range_m[0]) * (1.0 + 1e-6);
+        let is_compact = self.header.record_kind == RecordKind::Compact;
+        let fits = if is_compact {
+            codes[0] >= 0.0 && codes[1] <= LARGEST_CODE && needed_top_m <= scale.error_top_m * (1.0 + 1e-12)
+        } else {
+            metres.iter().all(|m| m.abs() <= 1e9)
+        };
+        if !fits {
+            return Err(LayoutError::OutOfRange {
+                path: self.pages.terrain().path().to_owned(),
+                heights_m: metres,
+                problem: format!(
+                    "the edit leads to heights from {:.3} to {:.3} m, this file's records hold {low:.3} to {high:.3} m; rewrite it with room for them",
+                    metres[0], metres[1]
+                ),
+            });
+        }
+        if !is_compact {
+            scale.error_top_m = scale.error_top_m.max(needed_top_m);
+            self.header.scale.error_top_m = scale.error_top_m;
+        }
+        self.header.height_range_m = range_m;
+        Ok(())
+    }
+
+    /// Puts other contents into pages and takes over the range of heights of `header`.
+    pub(super) fn replace_pages(
+        &mut self,
+        pages: Vec<(u64, Box<Page>)>,
+        header: &Header,
+    ) -> Result<Changes, LayoutError> {
+        if self.pages.mark() > 0 {
+            return Err(LayoutError::Usage(
+                "edits that are not committed are in the way; commit them or take them back first".into(),
+            ));
+        }
+        let mut changes = Changes::default();
+        let (k, per_page) = (self.rules.grid.k(), (PAGE_BYTES / C::BYTES) as u64);
+        for (logical, page) in pages {
+            let old = self.pages.replace(logical, page)?;
+            let Some(new) = self.pages.edited(logical) else { continue };
+            let before = changes.vertices.len();
+            let records = old.chunks_exact(C::BYTES).zip(new.chunks_exact(C::BYTES));
+            for (i, _) in records.enumerate().filter(|(_, (old, new))| old != new) {
+                changes.vertices.extend(point_of(k, logical * per_page + i as u64));
+            }
+            if changes.vertices.len() > before {
+                changes.pages.push(logical);
+            }
+        }
+        changes.pages.sort_unstable();
+        changes.samples = rects_of(&self.rules.grid, &changes.vertices);
+        self.set_range((header.height_range_m, header.scale.error_top_m));
+        self.committed = (header.height_range_m, header.scale.error_top_m);
+        Ok(changes)
+    }
+}
+
+/// Heights of a rectangle that lies in the data.
+fn heights_of<C: RecordCodec>(
+    pages: &mut Pages<C>,
+    rules: &Rules<C>,
+    rect: SampleRect,
+) -> Result<HeightWindow, LayoutError> {
+    let points =
+        (rect.south..=rect.north).flat_map(|y| (rect.west..=rect.east).map(move |x| GridPoint::new(x, y)));
+    let heights_m = points
+        .map(|p| {
+            let vertex = rules.codec.decode(pages.raw_at(p), 0);
+            if vertex.class.is_void() { f64::NAN } else { vertex.height_m }
+        })
+        .collect();
+    pages.check()?;
+    HeightWindow::new(rect, heights_m)
+}
+
+/// Rectangles of samples that hold all of `vertices` that are samples of the finest three levels' cells: neighbours share one.
+fn rects_of(grid: &crate::grid::Grid, vertices: &[GridPoint]) -> Vec<SampleRect> {
+    /// Samples a side of the squares that changed samples are gathered in.
+    const SIDE: u32 = 64;
+    let mut squares: std::collections::BTreeMap<(u32, u32), SampleRect> = std::collections::BTreeMap::new();
+    for p in vertices.iter().filter(|p| !grid.is_padding(**p)) {
+        let (x, y) = (p.x(), p.y());
+        let rect = squares.entry((y / SIDE, x / SIDE)).or_insert(SampleRect {
+            west: x,
+            south: y,
+            east: x,
+            north: y,
+        });
+        *rect = SampleRect {
+            west: rect.west.min(x),
+            south: rect.south.min(y),
+            east: rect.east.max(x),
+            north: rect.north.max(y),
+        };
+    }
+    squares.into_values().collect()
+}

@@ -1,0 +1,67 @@
+//! Heights and records as they are in the middle of an update: new heights first, then whatever the records say.
+
+use super::pages::Pages;
+use super::window::SampleRect;
+use crate::grid::{Grid, GridPoint};
+use crate::order::slot_of;
+use crate::record::RecordCodec;
+
+/// New height codes of a rectangle of samples.
+#[derive(Debug)]
+pub(super) struct NewCodes<'u> {
+    /// Where something changed.
+    pub(super) rect: SampleRect,
+    /// Codes, rows from the south; NaN for voids, whose records keep what they say.
+    pub(super) codes: &'u [f64],
+    /// Lowest and highest code before and after.
+    pub(super) ranges: [[f64; 2]; 2],
+}
+
+impl NewCodes<'_> {
+    /// The new code of a data sample; `None` outside the rectangle and for voids.
+    #[inline(always)]
+    fn get(&self, q: GridPoint) -> Option<f64> {
+        let rect = &self.rect;
+        let (x, y) = (q.x().wrapping_sub(rect.west), q.y().wrapping_sub(rect.south));
+        if x >= rect.wide() || y >= rect.high() {
+            return None;
+        }
+        let code = self.codes[y as usize * rect.wide() as usize + x as usize];
+        (!code.is_nan()).then_some(code)
+    }
+}
+
+/// What an update reads.
+pub(super) struct Ground<'u, C: RecordCodec> {
+    pub(super) grid: Grid,
+    pub(super) pages: &'u mut Pages<C>,
+    pub(super) new: NewCodes<'u>,
+}
+
+impl<C: RecordCodec> Ground<'_, C> {
+    /// Height code of a grid point whose record is `raw`.
+    #[inline(always)]
+    pub(super) fn code_of(&self, p: GridPoint, raw: C::Raw) -> f64 {
+        self.new.get(self.grid.fold(p)).unwrap_or_else(|| C::height_value(raw))
+    }
+
+    /// Height code of a grid point.
+    #[inline(always)]
+    pub(super) fn code(&mut self, p: GridPoint) -> f64 {
+        match self.new.get(self.grid.fold(p)) {
+            Some(code) => code,
+            None => C::height_value(self.pages.raw(slot_of(self.grid.k(), p))),
+        }
+    }
+
+    /// Height code of a grid point; NaN for a void.
+    pub(super) fn code_unless_void(&mut self, p: GridPoint, codec: &C) -> f64 {
+        match self.new.get(self.grid.fold(p)) {
+            Some(code) => code,
+            None => {
+                let raw = self.pages.raw(slot_of(self.grid.k(), p));
+                if codec.decode(raw, 0).class.is_void() { f64::NAN } else { C::height_value(raw) }
+            }
+        }
+    }
+}

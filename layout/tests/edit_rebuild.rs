@@ -1,0 +1,230 @@
+//! An edited terrain against a build from the edited heights: every record of every page is the same.
+
+mod common;
+
+use common::{MemoryDem, build_bytes, open_bytes};
+use proptest::prelude::*;
+use std::sync::Arc;
+use terrasoar_layout::build::{BuildOptions, Silent, rebuild};
+use terrasoar_layout::bytes::Page;
+use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::disk::SystemDisk;
+use terrasoar_layout::edit::{Changes, Editor, HeightWindow, SampleRect};
+use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::header::ErrorKind;
+use terrasoar_layout::record::RecordKind;
+use terrasoar_layout::terrain::Terrain;
+
+/// A terrain in memory and its bytes.
+struct Bench {
+    bytes: Vec<u8>,
+    editor: Editor,
+}
+
+impl Bench {
+    fn new(dem: &MemoryDem, options: &BuildOptions) -> Self {
+        let bytes = build_bytes(dem, options).unwrap();
+        let editor = Editor::new(Arc::new(open_bytes(bytes.clone()).unwrap()));
+        Self { bytes, editor }
+    }
+
+    fn terrain(&self) -> &Terrain {
+        self.editor.terrain()
+    }
+
+    fn page(&self, logical: u64) -> Box<Page> {
+        match self.editor.edited_page(logical) {
+            Some(page) => Box::new(*page),
+            None => self.terrain().checked_page(logical).unwrap(),
+        }
+    }
+
+    /// A build from the heights as they are now.
+    fn rebuilt(&self) -> Terrain {
+        // Edited pages in their old places, which nobody checks.
+        let mut bytes = self.bytes.clone();
+        for (logical, page) in self.editor.edited_pages() {
+            let at = self.terrain().entries()[logical as usize].page as usize * 4096;
+            bytes[at..at + 4096].copy_from_slice(page);
+        }
+        // Exact records may have got a larger error top, which a build is to know.
+        let edited = open_bytes(bytes).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.iqt");
+        rebuild(&SystemDisk, &edited, &path, None, 512, &Silent).unwrap();
+        open_bytes(std::fs::read(path).unwrap()).unwrap()
+    }
+
+    fn check(&self) {
+        let rebuilt = self.rebuilt();
+        let grid = *self.terrain().grid();
+        let n = grid.side_steps();
+        for logical in 0..self.terrain().entries().len() as u64 {
+            if self.page(logical) != rebuilt.checked_page(logical).unwrap() {
+                // Which one, for whoever has to mend it.
+                let per_page = self.terrain().header().records_per_page();
+                let bytes = self.terrain().header().record_kind.bytes();
+                let (ours, theirs) = (self.page(logical), rebuilt.checked_page(logical).unwrap());
+                for i in 0..per_page as usize {
+                    let range = i * bytes..(i + 1) * bytes;
+                    if ours[range.clone()] != theirs[range.clone()] {
+                        let p = terrasoar_layout::order::point_of(grid.k(), logical * per_page + i as u64);
+                        let p = p.unwrap();
+                        panic!(
+                            "({}, {}) of {n}, level {}: {:?} instead of {:?}",
+                            p.x(),
+                            p.y(),
+                            grid.level(p),
+                            &ours[range.clone()],
+                            &theirs[range]
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Ground with slopes, plains and steps, in whole units of 0 to 1,000.
+fn height(seed: u64, x: u32, y: u32) -> f64 {
+    let mut h = seed ^ (u64::from(x) << 32 | u64::from(y)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    h = (h ^ h >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let rough = (h >> 40) % 40;
+    let (fx, fy) = (f64::from(x), f64::from(y));
+    let hill = 400.0 + 250.0 * ((fx * 0.11).sin() + (fy * 0.07).cos());
+    let plain = seed % 3 == 0 && (x / 16 + y / 16).is_multiple_of(3);
+    if plain { 300.0 } else { (hill + rough as f64).floor().clamp(0.0, 1000.0) }
+}
+
+fn dem(samples: [u32; 2], seed: u64, voids: bool, fractions: bool) -> MemoryDem {
+    let kind = if fractions { SampleType::F64 } else { SampleType::I16 };
+    MemoryDem::from_fn(samples, kind, move |x, y| {
+        // The ends of the range lie in corners that edits of this test leave alone.
+        match (x, y) {
+            (0, 0) => return 0.0,
+            (1, 0) => return 1000.0,
+            _ => {}
+        }
+        let hole = (x / 5 + y / 7).is_multiple_of(6) && (x * 7 + y * 3) % 11 < 8;
+        if voids && hole {
+            return f64::NAN;
+        }
+        height(seed, x, y) + if fractions { f64::from(x * 31 % 17) / 19.0 } else { 0.0 }
+    })
+}
+
+/// A rectangle in hundredths of the terrain, and what to do there.
+#[derive(Debug, Clone, Copy)]
+struct Stroke {
+    corner: [u32; 2],
+    size: [u32; 2],
+    kind: u8,
+    seed: u64,
+}
+
+fn strokes() -> impl Strategy<Value = Vec<Stroke>> {
+    let stroke = ([0u32..=100, 0u32..=100], [1u32..40, 1u32..40], 0u8..4, any::<u64>())
+        .prop_map(|(corner, size, kind, seed)| Stroke { corner, size, kind, seed });
+    prop::collection::vec(stroke, 1..8)
+}
+
+fn apply(bench: &mut Bench, stroke: Stroke) -> Changes {
+    let [wide, high] = bench.terrain().grid().samples();
+    let west = (stroke.corner[0] * (wide - 1) / 100).max(2).min(wide - 1);
+    let south = (stroke.corner[1] * (high - 1) / 100).max(1).min(high - 1);
+    let rect = SampleRect {
+        west,
+        south,
+        east: (west + stroke.size[0] - 1).min(wide - 1),
+        north: (south + stroke.size[1] - 1).min(high - 1),
+    };
+    let mut window = bench.editor.heights(rect).unwrap();
+    for y in rect.south..=rect.north {
+        for x in rect.west..=rect.east {
+            let at = window.index(x, y);
+            let old = window.heights_m()[at];
+            window.heights_m_mut()[at] = match stroke.kind {
+                0 => 500.0,
+                1 => height(stroke.seed, x, y),
+                2 => (old + 37.25).clamp(0.0, 1000.0),
+                _ if (x ^ y) & 3 == 0 => (old - 120.5).clamp(0.0, 1000.0),
+                _ => f64::NAN,
+            };
+        }
+    }
+    bench.editor.set_heights(&window).unwrap()
+}
+
+fn options(record: Option<RecordKind>, error: ErrorKind, spacing: [f64; 2]) -> BuildOptions {
+    BuildOptions { record, error, spacing_m: Some(spacing), ..BuildOptions::default() }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn edited_records_are_a_rebuilds(
+        wide in 5u32..90, high in 5u32..90, seed in any::<u64>(), voids in any::<bool>(), bounded in prop::bool::weighted(0.8),
+        exact in prop::bool::weighted(0.3), fractions in any::<bool>(), strokes in strokes(),
+    ) {
+        let error = if bounded { ErrorKind::Bounded } else { ErrorKind::Step };
+        let record = if exact { Some(RecordKind::Exact8) } else { Some(RecordKind::Compact) };
+        let dem = dem([wide, high], seed, voids, fractions);
+        let mut bench = Bench::new(&dem, &options(record, error, [10.3, 7.7]));
+        for stroke in strokes {
+            apply(&mut bench, stroke);
+            bench.check();
+        }
+        // Taking all back gives the file's bytes.
+        bench.editor.roll_back();
+        for logical in 0..bench.terrain().entries().len() as u64 {
+            prop_assert!(bench.page(logical) == bench.terrain().checked_page(logical).unwrap());
+        }
+    }
+}
+
+/// What changed is told: each vertex whose record is another, and only those.
+#[test]
+fn changes_are_what_changed() {
+    let mut bench = Bench::new(&dem([130, 97], 5, true, false), &BuildOptions::default());
+    let grid = *bench.terrain().grid();
+    let n = grid.side_steps();
+    let all: Vec<GridPoint> = (0..=n).flat_map(|y| (0..=n).map(move |x| GridPoint::new(x, y))).collect();
+    for (i, corner) in [[20, 30], [100, 100], [60, 61], [0, 99]].into_iter().enumerate() {
+        let stroke = Stroke { corner, size: [17, 9], kind: i as u8, seed: 8 };
+        let before: Vec<_> = all.iter().map(|p| bench.editor.vertex(*p).unwrap()).collect();
+        let changes = apply(&mut bench, stroke);
+        let mut expected = Vec::new();
+        for (p, old) in all.iter().zip(before) {
+            if bench.editor.vertex(*p).unwrap() != old {
+                expected.push(*p);
+            }
+        }
+        let mut told = changes.vertices.clone();
+        told.sort_by_key(|p| (p.y(), p.x()));
+        assert_eq!(told, expected);
+        assert!(changes.pages.is_sorted() && changes.vertices.is_empty() == changes.pages.is_empty());
+    }
+}
+
+/// What does not fit is refused whole.
+#[test]
+fn heights_beyond_the_range_are_refused_and_nothing_changes() {
+    let mut bench = Bench::new(&dem([65, 65], 3, false, false), &BuildOptions::default());
+    for height_m in [-1.0, 1001.0, 1e12, f64::INFINITY] {
+        let rect = SampleRect { west: 9, south: 9, east: 12, north: 12 };
+        let mut heights_m = vec![400.0; rect.count()];
+        heights_m[7] = height_m;
+        let window = HeightWindow::new(rect, heights_m).unwrap();
+        let error = bench.editor.set_heights(&window).unwrap_err();
+        assert!(matches!(error, LayoutError::OutOfRange { .. }), "{error}");
+    }
+    let outside = SampleRect { west: 60, south: 0, east: 65, north: 3 };
+    let window = HeightWindow::new(outside, vec![1.0; outside.count()]).unwrap();
+    assert!(matches!(bench.editor.set_heights(&window).unwrap_err(), LayoutError::Usage(_)));
+    assert_eq!(bench.editor.uncommitted(), Vec::<u64>::new());
+    for logical in 0..bench.terrain().entries().len() as u64 {
+        assert!(bench.page(logical) == bench.terrain().checked_page(logical).unwrap());
+    }
+}
