@@ -1,0 +1,127 @@
+//! What it costs to change the ground: craters of 16 x 16 samples, one by one and in batches, records and their ancestors brought up to date.
+//!
+//! Questions: how long does a crater take on one thread, where its pages are in memory and where they are not; how many records does it change; how many a second are
+//! made in batches? Data: a terrain file named on the command line, 4,097 x 4,097 samples for the figures of the README. Command:
+//!
+//!     cargo bench --bench craters -- TERRAIN.iqt [--craters N]
+//!
+//! Edits stay in memory; the file is not written to. Prints Markdown. Keep runs under benches/runs/.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+use terrasoar_layout::edit::{Crater, Edit, Editor};
+use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::terrain::Terrain;
+
+type Failure = Box<dyn std::error::Error>;
+
+/// Random numbers (Steele, Lea, Flood 2014, "Fast splittable pseudorandom number generators"), the same in every run.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, limit: f64) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ z >> 31) >> 11) as f64 / (1u64 << 53) as f64 * limit
+    }
+}
+
+fn main() -> Result<(), Failure> {
+    let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
+    let (mut count, mut path) = (10_000, None);
+    while let Some(word) = words.next() {
+        match word.as_str() {
+            "--craters" => count = words.next().ok_or("--craters wants a number")?.parse()?,
+            _ => path = Some(PathBuf::from(word)),
+        }
+    }
+    let Some(path) = path else {
+        println!("skipped: name a terrain file, such as `terrasoar synth --size 4097` and `terrasoar build` make");
+        return Ok(());
+    };
+    let terrain = Arc::new(Terrain::open(&path)?);
+    let [wide, high] = terrain.grid().samples();
+    println!("{} x {} samples, {} craters of 16 x 16 samples, one thread\n", wide, high, count);
+    println!("| craters | refused | median, us | 99 %, us | worst, us | a second | samples | records | pages |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let craters = craters(&terrain, count);
+    let mut editor = Editor::new(Arc::clone(&terrain));
+    one_by_one("pages read as needed", &mut editor, &craters)?;
+    editor.roll_back();
+    one_by_one("pages in memory", &mut editor, &craters)?;
+    one_by_one("the same again, on top", &mut editor, &craters)?;
+    editor.roll_back();
+    batches(&mut editor, &craters, 1000)?;
+    Ok(())
+}
+
+/// Craters whose rims fit 16 x 16 samples, wherever there is ground for them.
+fn craters(terrain: &Terrain, count: usize) -> Vec<Edit> {
+    let [dx, dy] = terrain.grid().spacing_m();
+    let extent = terrain.grid().extent_m();
+    let radius_m = 4.0 * dx.min(dy);
+    let mut dice = Dice(7);
+    (0..count)
+        .map(|_| {
+            Edit::Crater(Crater {
+                centre_m: extent.map(|e| dice.below(e)),
+                direction_deg: dice.below(360.0),
+                radius_m,
+                depth_m: radius_m / 4.0,
+            })
+        })
+        .collect()
+}
+
+fn one_by_one(name: &str, editor: &mut Editor, craters: &[Edit]) -> Result<(), Failure> {
+    let mut times_us = Vec::with_capacity(craters.len());
+    let (mut samples, mut records, mut pages, mut refused) = (0, 0, 0, 0);
+    for crater in craters {
+        let start = Instant::now();
+        let made = editor.apply(std::slice::from_ref(crater));
+        let took = start.elapsed();
+        match made {
+            Ok(changes) => {
+                times_us.push(took.as_secs_f64() * 1e6);
+                samples += changes.samples.iter().map(|r| r.count()).sum::<usize>();
+                records += changes.vertices.len();
+                pages += changes.pages.len();
+            }
+            Err(LayoutError::OutOfRange { .. }) => refused += 1,
+            Err(error) => return Err(error.into()),
+        }
+    }
+    times_us.sort_unstable_by(f64::total_cmp);
+    let made = times_us.len().max(1);
+    let at = |share: f64| times_us.get(((made - 1) as f64 * share) as usize).copied().unwrap_or(f64::NAN);
+    let total_s = times_us.iter().sum::<f64>() / 1e6;
+    println!(
+        "| {name} | {refused} | {:.1} | {:.1} | {:.1} | {:.0} | {:.0} | {:.0} | {:.1} |",
+        at(0.5),
+        at(0.99),
+        at(1.0),
+        made as f64 / total_s,
+        samples as f64 / made as f64,
+        records as f64 / made as f64,
+        pages as f64 / made as f64
+    );
+    Ok(())
+}
+
+fn batches(editor: &mut Editor, craters: &[Edit], size: usize) -> Result<(), Failure> {
+    let mut made = 0;
+    let start = Instant::now();
+    for batch in craters.chunks(size) {
+        match editor.apply(batch) {
+            Ok(_) => made += batch.len(),
+            Err(LayoutError::OutOfRange { .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+    let took = start.elapsed().as_secs_f64();
+    println!("\nIn batches of {size}: {made} craters in {took:.3} s, {:.0} a second.", made as f64 / took);
+    Ok(())
+}
