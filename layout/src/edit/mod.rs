@@ -1,10 +1,20 @@
 //! Terrain edited while it is flown over: heights of a region change, and the records of the region and its ancestors follow, exactly as if the file were built
 //! from the edited heights.
 
+mod area;
+mod brush;
+mod check;
+mod crater;
 mod operation;
+mod stamp;
 mod window;
 
-pub use operation::{Crater, Edit};
+pub use area::Area;
+pub use brush::{Brush, BrushAction, Falloff};
+pub use check::MAX_EDIT_SAMPLES;
+pub use crater::Crater;
+pub use operation::Edit;
+pub use stamp::{Stamp, StampMode};
 pub use window::{HeightWindow, SampleRect};
 
 use crate::bytes::Page;
