@@ -39,13 +39,17 @@ fn main() -> Result<(), Failure> {
         }
     }
     let Some(path) = path else {
-        println!("skipped: name a terrain file, such as `terrasoar synth --size 4097` and `terrasoar build` make");
+        println!(
+            "skipped: name a terrain file, such as `terrasoar synth --size 4097` and `terrasoar build` make"
+        );
         return Ok(());
     };
     let terrain = Arc::new(Terrain::open(&path)?);
     let [wide, high] = terrain.grid().samples();
     println!("{} x {} samples, {} craters of 16 x 16 samples, one thread\n", wide, high, count);
-    println!("| craters | refused | median, us | 99 %, us | worst, us | a second | samples | records | pages |");
+    println!(
+        "| craters | refused | median, us | 99 %, us | worst, us | a second | samples | records | pages |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|");
     let craters = craters(&terrain, count);
     let mut editor = Editor::new(Arc::clone(&terrain));

@@ -8,15 +8,33 @@
 //!
 //! Invariant: after any batch every record is the one that a build in the file's own scale makes of the edited heights; a batch that fails changes nothing.
 
+mod area;
+mod brush;
+mod check;
 mod core;
+mod crater;
 mod farthest;
 mod ground;
 mod operation;
 mod pages;
+mod stamp;
 mod update;
 mod window;
 
-pub use operation::{Crater, Edit};
+pub use area::Area;
+pub use brush::{Brush, BrushAction, Falloff};
+pub use check::MAX_EDIT_SAMPLES;
+pub use crater::Crater;
+pub use operation::Edit;
+pub use stamp::{Stamp, StampMode};
+mod window;
+
+pub use area::Area;
+pub use brush::{Brush, BrushAction, Falloff};
+pub use check::MAX_EDIT_SAMPLES;
+pub use crater::Crater;
+pub use operation::Edit;
+pub use stamp::{Stamp, StampMode};
 pub use window::{HeightWindow, SampleRect};
 
 use self::core::Core;

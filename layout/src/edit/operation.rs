@@ -1,5 +1,13 @@
 //! What an edit does to heights: a region and a function from old heights to new ones.
+//!
+//! **What becomes of a sample depends on the edit, the sample's place and old heights within the margin, never on the window it is looked at through**, and
+//! nothing outside the bounds changes. Voids stay voids. Cost: O(samples of the bounds), nothing allocated but by smoothing, which copies the window.
 
+use super::area::{Area, each_sample};
+use super::brush::Brush;
+use super::check::{checked_height, checked_size};
+use super::crater::Crater;
+use super::stamp::Stamp;
 use super::window::{HeightWindow, SampleRect};
 use crate::error::LayoutError;
 use crate::grid::Grid;
@@ -9,71 +17,111 @@ use crate::grid::Grid;
 pub enum Edit {
     /// The crater of a shell.
     Crater(Crater),
-    /// All samples of a rectangle to one height.
+    /// A stroke of a round brush.
+    Brush(Brush),
+    /// Heights from elsewhere.
+    Stamp(Stamp),
+    /// All samples of an area to one height.
     Set {
-        /// The samples.
-        rect: SampleRect,
+        /// Where.
+        area: Area,
         /// Their new height in metres.
         height_m: f64,
     },
-}
-
-/// A crater, after Xi et al. (position, direction, radius, depth).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Crater {
-    /// Its centre in metres east and north of the south-west sample.
-    pub centre_m: [f64; 2],
-    /// Where the shell flew to, degrees clockwise from north.
-    pub direction_deg: f64,
-    /// Radius of the bowl in metres. The rim reaches to twice that.
-    pub radius_m: f64,
-    /// Depth of the bowl's centre below the old ground in metres.
-    pub depth_m: f64,
+    /// All samples of an area back to their heights before all edits.
+    Restore(
+        /// Where.
+        Area,
+    ),
 }
 
 impl Edit {
+    /// All samples of a rectangle to one height in metres.
+    pub fn set(rect: SampleRect, height_m: f64) -> Self {
+        Self::Set { area: Area::Rect(rect), height_m }
+    }
+
+    /// Its name in scripts and messages.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Crater(_) => "crater",
+            Self::Brush(brush) => brush.action.name(),
+            Self::Stamp(_) => "stamp",
+            Self::Set { .. } => "set",
+            Self::Restore(_) => "restore",
+        }
+    }
+
     /// Checks that all numbers are usable.
     ///
     /// # Errors
     /// [`LayoutError::Usage`] that says which is not.
     pub fn check(&self, grid: &Grid) -> Result<(), LayoutError> {
-        let _ = grid;
-        Ok(())
+        self.check_numbers()?;
+        checked_size(self.name(), self.bounds(grid))
+    }
+
+    /// Checks all that can be checked without a terrain.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] that says which number is not usable.
+    pub fn check_numbers(&self) -> Result<(), LayoutError> {
+        match self {
+            Self::Crater(crater) => crater.check(),
+            Self::Brush(brush) => brush.check(),
+            Self::Stamp(stamp) => stamp.check(),
+            Self::Set { area, height_m } => {
+                area.check("set")?;
+                checked_height("set", *height_m)
+            }
+            Self::Restore(area) => area.check("restore"),
+        }
     }
 
     /// The samples that it may change; `None` if it lies wholly outside the data.
     pub fn bounds(&self, grid: &Grid) -> Option<SampleRect> {
-        let _ = grid;
         match self {
-            Self::Set { rect, .. } => Some(*rect),
-            Self::Crater(_) => None,
+            Self::Crater(crater) => crater.bounds(grid),
+            Self::Brush(brush) => brush.bounds(grid),
+            Self::Stamp(stamp) => stamp.bounds(grid),
+            Self::Set { area, .. } | Self::Restore(area) => area.samples(grid),
         }
     }
 
     /// Samples around its bounds whose heights it looks at.
     pub fn margin(&self) -> u32 {
-        0
+        match self {
+            Self::Brush(brush) => brush.margin(),
+            _ => 0,
+        }
     }
 
     /// Whether it looks at the heights before all edits.
     pub fn needs_original(&self) -> bool {
-        false
+        matches!(self, Self::Restore(_))
     }
 
     /// Changes the heights of `window`, which covers its bounds and the margin around them as far as the data goes. `original` are the heights before all
-    /// edits of the same rectangle, if it needs them. Voids (NaN) stay as they are.
+    /// edits of a rectangle that holds its bounds, if it needs them. Voids (NaN) stay as they are.
     pub fn apply(&self, grid: &Grid, window: &mut HeightWindow, original: Option<&HeightWindow>) {
-        let _ = (grid, original);
-        if let Self::Set { rect, height_m } = self {
-            let inner = window.rect();
-            for y in inner.south..=inner.north {
-                for x in inner.west..=inner.east {
-                    let at = window.index(x, y);
-                    let height = &mut window.heights_m_mut()[at];
-                    if rect.contains(x, y) && !height.is_nan() {
-                        *height = *height_m;
-                    }
+        match self {
+            Self::Crater(crater) => crater.apply(grid, window),
+            Self::Brush(brush) => brush.apply(grid, window),
+            Self::Stamp(stamp) => stamp.apply(grid, window),
+            Self::Set { area, height_m } => each_sample(window, area.samples(grid), |x, y, height| {
+                if area.contains(grid, x, y) {
+                    *height = *height_m;
                 }
+            }),
+            Self::Restore(area) => {
+                let Some(original) = original else { return };
+                each_sample(window, area.samples(grid), |x, y, height| {
+                    let is_known = area.contains(grid, x, y) && original.rect().contains(x, y);
+                    let before = if is_known { original.height_m(x, y) } else { f64::NAN };
+                    if !before.is_nan() {
+                        *height = before;
+                    }
+                });
             }
         }
     }
