@@ -27,14 +27,6 @@ pub use check::MAX_EDIT_SAMPLES;
 pub use crater::Crater;
 pub use operation::Edit;
 pub use stamp::{Stamp, StampMode};
-mod window;
-
-pub use area::Area;
-pub use brush::{Brush, BrushAction, Falloff};
-pub use check::MAX_EDIT_SAMPLES;
-pub use crater::Crater;
-pub use operation::Edit;
-pub use stamp::{Stamp, StampMode};
 pub use window::{HeightWindow, SampleRect};
 
 use self::core::Core;
