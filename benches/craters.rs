@@ -5,11 +5,13 @@
 //!
 //!     cargo bench --bench craters -- TERRAIN.iqt [--craters N]
 //!
-//! Edits stay in memory; the file is not written to. Prints Markdown. Keep runs under benches/runs/.
+//! The terrain is copied first, with room for heights beyond its own. Edits stay in memory; the file is not written to. Prints Markdown. Keep runs under benches/runs/.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
+use terrasoar_layout::build::{HeightRoom, Silent, rebuild};
+use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{Crater, Edit, Editor};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::terrain::Terrain;
@@ -44,7 +46,8 @@ fn main() -> Result<(), Failure> {
         );
         return Ok(());
     };
-    let terrain = Arc::new(Terrain::open(&path)?);
+    let folder = tempfile::tempdir()?;
+    let terrain = with_room(&path, &folder.path().join("roomy.iqt"))?;
     let [wide, high] = terrain.grid().samples();
     println!("{} x {} samples, {} craters of 16 x 16 samples, one thread\n", wide, high, count);
     println!(
@@ -60,6 +63,15 @@ fn main() -> Result<(), Failure> {
     editor.roll_back();
     batches(&mut editor, &craters, 1000)?;
     Ok(())
+}
+
+/// The terrain with room for craters on top of each other.
+fn with_room(path: &Path, copy: &Path) -> Result<Arc<Terrain>, Failure> {
+    let terrain = Terrain::open(path)?;
+    let [lowest_m, highest_m] = terrain.header().height_range_m;
+    let room = HeightRoom { lowest_m: lowest_m - 1000.0, highest_m: highest_m + 1000.0 };
+    rebuild(&SystemDisk, &terrain, copy, Some(room), 512, &Silent)?;
+    Ok(Arc::new(Terrain::open(copy)?))
 }
 
 /// Craters whose rims fit 16 x 16 samples, wherever there is ground for them.

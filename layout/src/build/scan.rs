@@ -7,7 +7,9 @@
 
 use super::band::Band;
 use super::levels::{Levels, index_in};
-use crate::bound::{Plane, larger, scanned_error_m};
+use crate::bound::{
+    Plane, Samples, farthest_diagonal, farthest_level, farthest_upright, larger, scanned_error_m,
+};
 use crate::grid::{Grid, GridPoint};
 use crate::order::corners;
 use rayon::prelude::*;
@@ -39,6 +41,21 @@ struct Tile<'a> {
     samples: [u32; 2],
     /// Filled codes with NaN at voids, rows of `side + 1`.
     codes: &'a [f64],
+}
+
+impl Samples for Tile<'_> {
+    #[inline(always)]
+    fn corner(&self, x: u32, y: u32) -> (GridPoint, f64) {
+        let inside = x < self.samples[0] && y < self.samples[1];
+        let at = || self.codes[y as usize * (self.side as usize + 1) + x as usize];
+        (GridPoint::new(self.x0 + x, self.y0 + y), if inside { at() } else { f64::NAN })
+    }
+
+    #[inline(always)]
+    fn row(&self, plane: &Plane, from: u32, to: u32, y: u32) -> f64 {
+        let at = y as usize * (self.side as usize + 1);
+        plane.farthest_in_row(self.x0 + from, self.y0 + y, &self.codes[at + from as usize..=at + to as usize])
+    }
 }
 
 impl<'a> Tile<'a> {
@@ -77,32 +94,6 @@ impl<'a> Tile<'a> {
         Some(Self { grid, band, x0, y0, side, samples, codes: buffer })
     }
 
-    /// Code at tile coordinates.
-    #[inline(always)]
-    fn at(&self, x: u32, y: u32) -> f64 {
-        self.codes[y as usize * (self.side as usize + 1) + x as usize]
-    }
-
-    /// A triangle's corners with codes, if it lies in the data and none of them is void.
-    #[inline(always)]
-    fn corners(&self, points: [[u32; 2]; 3]) -> Option<[(GridPoint, f64); 3]> {
-        let mut ok = true;
-        let corners = points.map(|[x, y]| {
-            let inside = x < self.samples[0] && y < self.samples[1];
-            let code = if inside { self.at(x, y) } else { f64::NAN };
-            ok &= !code.is_nan();
-            (GridPoint::new(self.x0 + x, self.y0 + y), code)
-        });
-        ok.then_some(corners)
-    }
-
-    /// Largest distance from `plane` over tile columns `from..=to` of tile row `y`.
-    #[inline(always)]
-    fn row(&self, plane: &Plane, from: u32, to: u32, y: u32) -> f64 {
-        let at = y as usize * (self.side as usize + 1);
-        plane.farthest_in_row(self.x0 + from, self.y0 + y, &self.codes[at + from as usize..=at + to as usize])
-    }
-
     /// Scans all triangles whose split vertex has a level of at least [`FIRST_SCANNED`] and that lie inside the tile.
     fn scan_inside(&self, own: &OwnErrors, step_m: f64) {
         let mut s = 2;
@@ -119,41 +110,8 @@ impl<'a> Tile<'a> {
             let odd_row = (y / s) & 1 == 1;
             let first = if odd_row { 0 } else { s };
             for x in (first..self.samples[0].min(self.side + 1)).step_by(2 * s as usize) {
-                let mut farthest = 0.0f64;
-                if odd_row {
-                    // Vertical edge; apexes to the west and the east.
-                    let ends = [[x, y - s], [x, y + s]];
-                    if let Some(c) = x.checked_sub(s).and_then(|w| self.corners([[w, y], ends[0], ends[1]])) {
-                        let plane = Plane::of(c);
-                        for row in y - s + 1..y + s {
-                            let reach = s - 1 - row.abs_diff(y);
-                            farthest = larger(farthest, self.row(&plane, x - reach, x, row));
-                        }
-                    }
-                    if let Some(c) = self.corners([[x + s, y], ends[0], ends[1]]) {
-                        let plane = Plane::of(c);
-                        for row in y - s + 1..y + s {
-                            let reach = s - 1 - row.abs_diff(y);
-                            farthest = larger(farthest, self.row(&plane, x, x + reach, row));
-                        }
-                    }
-                } else {
-                    let ends = [[x - s, y], [x + s, y]];
-                    if let Some(c) = y.checked_sub(s).and_then(|w| self.corners([[x, w], ends[0], ends[1]])) {
-                        let plane = Plane::of(c);
-                        for row in y - s + 1..=y {
-                            let reach = s - 1 - (y - row);
-                            farthest = larger(farthest, self.row(&plane, x - reach, x + reach, row));
-                        }
-                    }
-                    if let Some(c) = self.corners([[x, y + s], ends[0], ends[1]]) {
-                        let plane = Plane::of(c);
-                        for row in y..y + s {
-                            let reach = s - 1 - (row - y);
-                            farthest = larger(farthest, self.row(&plane, x - reach, x + reach, row));
-                        }
-                    }
-                }
+                let farthest =
+                    if odd_row { farthest_upright(self, x, y, s) } else { farthest_level(self, x, y, s) };
                 self.raise(own, x, y, farthest, step_m);
             }
         }
@@ -164,25 +122,10 @@ impl<'a> Tile<'a> {
         for y in (s..self.samples[1].min(self.side)).step_by(2 * s as usize) {
             for x in (s..self.samples[0].min(self.side)).step_by(2 * s as usize) {
                 let v = GridPoint::new(self.x0 + x, self.y0 + y);
-                let [b, d] = self.grid.edge_ends(v).map(|p| [p.x() - self.x0, p.y() - self.y0]);
+                let [b, d] = self.grid.edge_ends(v);
                 // Rising: the diagonal climbs from south-west to north-east.
-                let rising = (b[0] < d[0]) == (b[1] < d[1]);
-                let mut farthest = 0.0f64;
-                for apex_south in [true, false] {
-                    let apex_east = rising == apex_south;
-                    let apex =
-                        [if apex_east { x + s } else { x - s }, if apex_south { y - s } else { y + s }];
-                    let Some(corners) = self.corners([apex, b, d]) else { continue };
-                    let plane = Plane::of(corners);
-                    for row in y - s + 1..y + s {
-                        let along = row + s - y; // 1..2s from the south
-                        let diagonal = if rising { x - s + along } else { x + s - along };
-                        let (from, to) =
-                            if apex_east { (diagonal, x + s - 1) } else { (x - s + 1, diagonal) };
-                        farthest = larger(farthest, self.row(&plane, from, to, row));
-                    }
-                }
-                self.raise(own, x, y, farthest, step_m);
+                let rising = (b.x() < d.x()) == (b.y() < d.y());
+                self.raise(own, x, y, farthest_diagonal(self, x, y, s, rising), step_m);
             }
         }
     }
