@@ -100,13 +100,65 @@ pub fn slot_of(k: u32, p: GridPoint) -> u64 {
     let d = k - 1 - t;
     if tx == ty {
         let (cx, cy) = (x >> (t + 1), y >> (t + 1));
-        white_base(d) + 2 * spread(cy) + spread(cx ^ cy)
+        white_base(d) + 2 * spread16(cy) + spread16(cx ^ cy)
     } else {
         let (u, w) = (x >> t, y >> t);
         let (a, b) = black_block(d, u, w);
-        black_base(d) + 2 * spread(a ^ ((1 << d) - 1)) + spread(a ^ b ^ (1 << d))
+        black_base(d) + 2 * spread16(a ^ ((1 << d) - 1)) + spread16(a ^ b ^ (1 << d))
     }
 }
+
+/// Slots of the vertices of one row of a level: [`slot_of`] with the work for the row done once.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RowSlots {
+    is_white: bool,
+    t: u32,
+    d: u32,
+    base: u64,
+    /// Cell row of white vertices; row in steps of black ones.
+    row: u64,
+}
+
+impl RowSlots {
+    /// The row at `y` of `level` in a square of 2^k steps a side.
+    pub(crate) const fn new(k: u32, level: u32, y: u32) -> Self {
+        let t = level / 2;
+        let d = k - 1 - t;
+        if level & 1 == 1 {
+            let row = (y >> (t + 1)) as u64;
+            Self { is_white: true, t, d, base: white_base(d) + 2 * spread(row), row }
+        } else {
+            Self { is_white: false, t, d, base: black_base(d), row: (y >> t) as u64 }
+        }
+    }
+
+    /// Slot of the vertex at column `x`, which is one of the row's.
+    #[inline(always)]
+    pub(crate) const fn slot(&self, x: u32) -> u64 {
+        if self.is_white {
+            return self.base + spread16((x >> (self.t + 1)) as u64 ^ self.row);
+        }
+        let (a, b) = black_block(self.d, (x >> self.t) as u64, self.row);
+        self.base + 2 * spread16(a ^ ((1 << self.d) - 1)) + spread16(a ^ b ^ (1 << self.d))
+    }
+}
+
+/// [`spread`] of the low 16 bits, by table.
+#[inline(always)]
+const fn spread16(v: u64) -> u64 {
+    SPREAD[v as usize & 255] as u64 | (SPREAD[(v >> 8) as usize & 255] as u64) << 16
+}
+
+/// Spread bytes.
+const SPREAD: [u16; 256] = {
+    let mut table = [0; 256];
+    let mut i = 0;
+    while i < table.len() {
+        table[i] = spread(i as u64) as u16;
+        i += 1;
+    }
+    table
+};
 
 /// Coordinates of a black vertex in the turned quadtree.
 #[inline(always)]
@@ -241,6 +293,25 @@ mod tests {
                 assert_eq!(point_of(k, slot as u64).is_some(), *seen, "slot {slot}, k {k}");
             }
             assert_eq!(point_of(k, slot_count(k)), None);
+        }
+    }
+
+    /// Rows against the closed form, and its inverse where coordinates have their most bits.
+    #[test]
+    fn rows_give_the_slots_of_their_vertices() {
+        for k in [1, 2, 5, 9, 16] {
+            let n = 1u32 << k;
+            let step = (n / 64).max(1) - u32::from(k == 16);
+            for y in (0..=n).step_by(step as usize) {
+                for x in (0..=n).step_by(step as usize) {
+                    let p = GridPoint::new(x, y);
+                    assert_eq!(point_of(k, slot_of(k, p)), Some(p));
+                    if !grid(k).is_corner(p) {
+                        let row = RowSlots::new(k, grid(k).level(p), y);
+                        assert_eq!(row.slot(x), slot_of(k, p), "{p:?} of {k}");
+                    }
+                }
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! An editor for one kind of records: heights in, records out, whole or not at all.
 
 use super::ground::NewCodes;
-use super::pages::Pages;
+use super::pages::{Overwritten, Pages};
 use super::update::{Scratch, Update};
 use super::window::{HeightWindow, SampleRect};
 use super::{Changes, Edit};
@@ -28,9 +28,9 @@ pub(super) struct Core<C: RecordCodec> {
     header: Header,
     /// The header's range and error top as committed.
     committed: ([f64; 2], f64),
-    scratch: Scratch<C::Raw>,
-    /// New height codes of the window being set.
-    codes: Vec<f64>,
+    scratch: Scratch<C>,
+    /// Height codes of the window being set, before and after; NaN for voids.
+    codes: [Vec<f64>; 2],
 }
 
 impl<C: RecordCodec> Core<C> {
@@ -44,7 +44,7 @@ impl<C: RecordCodec> Core<C> {
             pages: Pages::new(terrain),
             original: None,
             scratch: Scratch::default(),
-            codes: Vec::new(),
+            codes: Default::default(),
         }
     }
 
@@ -148,20 +148,32 @@ impl<C: RecordCodec> Core<C> {
 
     /// Vertices and pages that were written to since `mark`, as far as they are not as they were.
     fn tell(&mut self, mark: usize, changes: &mut Changes) {
-        let mut written: Vec<(u64, GridPoint, C::Raw)> =
-            self.pages.overwritten(mark).iter().map(|o| (o.slot, o.point, o.old)).collect();
-        // The first of several entries of a slot has the record from before all.
-        written.sort_by_key(|(slot, ..)| *slot);
-        written.dedup_by_key(|(slot, ..)| *slot);
-        for (slot, point, old) in written {
-            if self.pages.raw(slot) != old {
+        let per_page = (PAGE_BYTES / C::BYTES) as u64;
+        let mut note = |pages: &mut Pages<C>, Overwritten { point, slot, old }: Overwritten<C::Raw>| {
+            if pages.raw(slot) != old {
                 changes.vertices.push(point);
-                let page = slot / (PAGE_BYTES / C::BYTES) as u64;
+                let page = slot / per_page;
                 if changes.pages.last() != Some(&page) {
                     changes.pages.push(page);
                 }
             }
+        };
+        let count = self.pages.mark() - mark;
+        if changes.samples.len() == 1 {
+            // One update writes a record once.
+            for i in mark..mark + count {
+                let written = self.pages.overwritten(0)[i];
+                note(&mut self.pages, written);
+            }
+        } else {
+            let mut written = self.pages.overwritten(mark).to_vec();
+            // The first of several entries of a slot has the record from before all.
+            written.sort_by_key(|w| w.slot);
+            written.dedup_by_key(|w| w.slot);
+            written.into_iter().for_each(|written| note(&mut self.pages, written));
         }
+        changes.pages.sort_unstable();
+        changes.pages.dedup();
     }
 
     fn check_rect(&self, rect: SampleRect) -> Result<(), LayoutError> {
@@ -193,8 +205,9 @@ impl<C: RecordCodec> Core<C> {
         let rect = window.rect();
         let scale = self.rules.scale;
         let k = self.rules.grid.k();
-        let mut codes = std::mem::take(&mut self.codes);
-        codes.clear();
+        let [mut then, mut now] = std::mem::take(&mut self.codes);
+        then.clear();
+        now.clear();
         // What changes: its bounds, and heights there before and after.
         let mut changed: Option<SampleRect> = None;
         let mut lowest = f64::INFINITY;
@@ -205,10 +218,11 @@ impl<C: RecordCodec> Core<C> {
                 let raw = self.pages.raw(crate::order::slot_of(k, GridPoint::new(x, y)));
                 let height_m = window.heights_m()[at];
                 at += 1;
-                let is_void = self.rules.codec.decode(raw, 0).class.is_void();
+                let is_void = C::is_void(raw);
                 if is_void {
                     changes.voids_passed += u64::from(!height_m.is_nan());
-                    codes.push(f64::NAN);
+                    then.push(f64::NAN);
+                    now.push(f64::NAN);
                     continue;
                 }
                 let old = C::height_value(raw);
@@ -228,10 +242,11 @@ impl<C: RecordCodec> Core<C> {
                         north: y,
                     }));
                 }
-                codes.push(new);
+                then.push(old);
+                now.push(new);
             }
         }
-        self.codes = codes;
+        self.codes = [then, now];
         self.pages.check()?;
         let Some(changed) = changed else { return Ok(()) };
         self.check_range([lowest, highest])?;
@@ -245,29 +260,10 @@ impl<C: RecordCodec> Core<C> {
     fn renew(&mut self, rect: SampleRect, changed: SampleRect) {
         let mut codes = std::mem::take(&mut self.codes);
         if rect != changed {
-            // Moved to the front row by row; a row never moves past where it was.
-            let (mut to, wide) = (0, changed.wide() as usize);
-            for y in changed.south..=changed.north {
-                let from =
-                    (y - rect.south) as usize * rect.wide() as usize + (changed.west - rect.west) as usize;
-                codes.copy_within(from..from + wide, to);
-                to += wide;
-            }
-            codes.truncate(to);
+            codes.iter_mut().for_each(|codes| cut_out(codes, rect, changed));
         }
-        let k = self.rules.grid.k();
-        let mut ranges = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-        let points = (changed.south..=changed.north)
-            .flat_map(|y| (changed.west..=changed.east).map(move |x| GridPoint::new(x, y)));
-        for (p, now) in points.zip(&codes) {
-            if !now.is_nan() {
-                let then = C::height_value(self.pages.raw(crate::order::slot_of(k, p)));
-                for (range, code) in ranges.iter_mut().zip([then, *now]) {
-                    *range = [range[0].min(code), range[1].max(code)];
-                }
-            }
-        }
-        let new = NewCodes { rect: changed, codes: &codes, ranges };
+        let ranges = [0, 1].map(|i| crate::bound::range(&codes[i]));
+        let new = NewCodes { rect: changed, codes: &codes[1], ranges };
         Update::new(&self.rules, &mut self.pages, new, &mut self.scratch).run();
         self.codes = codes;
     }
@@ -334,6 +330,18 @@ impl<C: RecordCodec> Core<C> {
         self.committed = (header.height_range_m, header.scale.error_top_m);
         Ok(changes)
     }
+}
+
+/// Leaves of `values`, one for each sample of `rect`, those of `part`, which lies in it.
+fn cut_out(values: &mut Vec<f64>, rect: SampleRect, part: SampleRect) {
+    // Moved to the front row by row; a row never moves past where it was.
+    let (mut to, wide) = (0, part.wide() as usize);
+    for y in part.south..=part.north {
+        let from = (y - rect.south) as usize * rect.wide() as usize + (part.west - rect.west) as usize;
+        values.copy_within(from..from + wide, to);
+        to += wide;
+    }
+    values.truncate(to);
 }
 
 /// Heights of a rectangle that lies in the data.

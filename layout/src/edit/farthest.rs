@@ -6,7 +6,7 @@
 //! reads every sample; the sample it finds is the same, and its distance comes from the same operations.
 
 use super::ground::Ground;
-use crate::bound::{Plane, Rules};
+use crate::bound::{Plane, Rules, larger};
 use crate::grid::GridPoint;
 use crate::order::{CENTRE_SLOT, child_slots, slot_of};
 use crate::record::{RecordCodec, Vertex, VertexClass};
@@ -33,8 +33,12 @@ pub(super) struct Search<'s, C: RecordCodec> {
     class: VertexClass,
     /// What rounding may add to distances of exact records, in codes.
     slack: f64,
+    /// Metres of error to codes.
+    per_step: f64,
     /// Farther than any before, in codes.
     farthest: f64,
+    /// Codes of distance that cannot change the record.
+    enough: f64,
     /// Error in metres that the record will say at least, as it will say it.
     pub(super) limit_m: f64,
 }
@@ -50,7 +54,16 @@ impl<'s, C: RecordCodec> Search<'s, C> {
     ) -> Self {
         // Planes through whole codes have dyadic slopes, and all distances from them are exact.
         let slack = if C::BYTES == 4 { 0.0 } else { plane.slack(f64::from(2u32 << (level / 2))) };
-        Self { rules, plane, level, class, slack, farthest: 0.0, limit_m }
+        let per_step = 1.0 / rules.scale.height_step_m;
+        let mut search =
+            Self { rules, plane, level, class, slack, per_step, farthest: 0.0, enough: 0.0, limit_m };
+        search.know_enough();
+        search
+    }
+
+    /// Single precision, to which own errors are rounded up, is exact to a part in 2^24.
+    fn know_enough(&mut self) {
+        self.enough = self.limit_m * self.per_step * (1.0 - 2e-7);
     }
 
     /// Searches the triangle (apex; b, d) with these slots of its apex and its split vertex, whose record is `raw`.
@@ -72,22 +85,19 @@ impl<'s, C: RecordCodec> Search<'s, C> {
         self.visit(ground, piece, raw, self.level);
     }
 
-    /// Own error in metres of a distance in codes.
-    fn metres(&self, codes: f64) -> f64 {
-        f64::from(self.rules.scanned_error_m(codes))
-    }
-
+    #[inline(always)]
     fn consider(&mut self, above: f64) {
         if above.abs() > self.farthest {
             self.farthest = above.abs();
-            let metres = self.metres(self.farthest);
+            let metres = f64::from(self.rules.scanned_error_m(self.farthest));
             if metres > self.limit_m {
                 self.limit_m = self.limit_m.max(self.rules.stored_error_m(self.level, self.class, metres));
+                self.know_enough();
             }
         }
     }
 
-    /// Looks at the vertex that splits `piece`, whose record is `raw` and whose level is `level`, and at what lies below it.
+    /// Looks at the vertex that splits `piece`, whose record is `raw` and whose level is `level`, 1 or more, and at what lies below it.
     fn visit(&mut self, ground: &mut Ground<'_, C>, piece: Piece, raw: C::Raw, level: u32) {
         let [a, b, d] = piece.corners;
         let v = b.midpoint(d);
@@ -99,9 +109,6 @@ impl<'s, C: RecordCodec> Search<'s, C> {
             if vertex.class.is_void() { f64::NAN } else { self.plane.above(v, ground.code_of(v, raw)) };
         if !piece.outside[0] && !above.is_nan() {
             self.consider(above);
-        }
-        if level == 0 {
-            return;
         }
         // The centre's triangles are no part of the walk that slots follow.
         let slots = if piece.split_slot == CENTRE_SLOT {
@@ -130,21 +137,25 @@ impl<'s, C: RecordCodec> Search<'s, C> {
         let raws = slots.map(|slot| ground.pages.raw(slot));
         if level == 1 {
             for (half, raw) in halves.into_iter().zip(raws) {
-                self.visit(ground, half, raw, 0);
+                let leaf = half.corners[1].midpoint(half.corners[2]);
+                if !half.outside[0] && !C::is_void(raw) {
+                    self.consider(self.plane.above(leaf, ground.code_of(leaf, raw)));
+                }
             }
             return;
         }
-        let bounds = [0, 1].map(|i| self.bound_m(&halves[i], &self.rules.codec.decode(raws[i], level - 1)));
+        let bounds = [0, 1].map(|i| self.bound(&halves[i], &self.rules.codec.decode(raws[i], level - 1)));
         let order = if bounds[1] > bounds[0] { [1, 0] } else { [0, 1] };
         for i in order {
-            if bounds[i] > self.limit_m {
+            if bounds[i] > self.enough {
                 self.visit(ground, halves[i], raws[i], level - 1);
             }
         }
     }
 
-    /// Own error in metres that no sample of `piece` exceeds, `split` being the vertex that splits it.
-    fn bound_m(&self, piece: &Piece, split: &Vertex) -> f64 {
+    /// Codes of distance that no sample of `piece` exceeds, `split` being the vertex that splits it.
+    #[inline(always)]
+    fn bound(&self, piece: &Piece, split: &Vertex) -> f64 {
         if split.class == VertexClass::Inert {
             return 0.0;
         }
@@ -153,7 +164,6 @@ impl<'s, C: RecordCodec> Search<'s, C> {
         if a.is_nan() || b.is_nan() || d.is_nan() || split.class.is_void() {
             return f64::INFINITY;
         }
-        let corner = a.max(b).max(d);
-        self.metres(corner + self.slack + split.error_m / self.rules.scale.height_step_m * (1.0 + 1e-9))
+        larger(larger(a, b), d) + self.slack + split.error_m * self.per_step
     }
 }

@@ -20,7 +20,7 @@ pub(super) struct NewCodes<'u> {
 impl NewCodes<'_> {
     /// The new code of a data sample; `None` outside the rectangle and for voids.
     #[inline(always)]
-    fn get(&self, q: GridPoint) -> Option<f64> {
+    pub(super) fn get(&self, q: GridPoint) -> Option<f64> {
         let rect = &self.rect;
         let (x, y) = (q.x().wrapping_sub(rect.west), q.y().wrapping_sub(rect.south));
         if x >= rect.wide() || y >= rect.high() {
@@ -55,12 +55,12 @@ impl<C: RecordCodec> Ground<'_, C> {
     }
 
     /// Height code of a grid point; NaN for a void.
-    pub(super) fn code_unless_void(&mut self, p: GridPoint, codec: &C) -> f64 {
+    pub(super) fn code_unless_void(&mut self, p: GridPoint) -> f64 {
         match self.new.get(self.grid.fold(p)) {
             Some(code) => code,
             None => {
                 let raw = self.pages.raw(slot_of(self.grid.k(), p));
-                if codec.decode(raw, 0).class.is_void() { f64::NAN } else { C::height_value(raw) }
+                if C::is_void(raw) { f64::NAN } else { C::height_value(raw) }
             }
         }
     }

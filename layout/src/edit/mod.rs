@@ -15,6 +15,7 @@ mod core;
 mod crater;
 mod farthest;
 mod ground;
+mod near;
 mod operation;
 mod pages;
 mod stamp;

@@ -7,9 +7,10 @@
 
 use super::farthest::Search;
 use super::ground::{Ground, NewCodes};
+use super::near::{NEAR_LEVELS, Near, first_of_row};
 use super::pages::Pages;
 use super::window::SampleRect;
-use crate::bound::{Below, FIRST_SCANNED, Plane, Rules};
+use crate::bound::{Below, FIRST_SCANNED, Plane, Rules, farthest_diagonal, farthest_level, farthest_upright};
 use crate::error::LayoutError;
 use crate::grid::{Grid, GridPoint};
 use crate::header::ErrorKind;
@@ -21,18 +22,19 @@ const FEW: usize = 64;
 
 /// Lists that outlive an update, so that none is allocated anew.
 #[derive(Debug)]
-pub(super) struct Scratch<R> {
-    /// Vertices of the level below whose error or radius changed, and their former records.
-    below: Vec<(GridPoint, R)>,
+pub(super) struct Scratch<C: RecordCodec> {
+    near: Near<C>,
+    /// Vertices of the level below that changed, and their former records.
+    below: Vec<(GridPoint, C::Raw)>,
     /// The same of this level.
-    here: Vec<(GridPoint, R)>,
+    here: Vec<(GridPoint, C::Raw)>,
     /// Parents of changed children that lie apart from what changed.
     apart: Vec<GridPoint>,
 }
 
-impl<R> Default for Scratch<R> {
+impl<C: RecordCodec> Default for Scratch<C> {
     fn default() -> Self {
-        Self { below: Vec::new(), here: Vec::new(), apart: Vec::new() }
+        Self { near: Near::default(), below: Vec::new(), here: Vec::new(), apart: Vec::new() }
     }
 }
 
@@ -42,7 +44,7 @@ pub(super) struct Update<'u, C: RecordCodec> {
     ground: Ground<'u, C>,
     /// Grid points whose height changed: the changed rectangle, and the padding that folds onto it.
     area: SampleRect,
-    scratch: &'u mut Scratch<C::Raw>,
+    scratch: &'u mut Scratch<C>,
 }
 
 impl<'u, C: RecordCodec> Update<'u, C> {
@@ -50,7 +52,7 @@ impl<'u, C: RecordCodec> Update<'u, C> {
         rules: &'u Rules<C>,
         pages: &'u mut Pages<C>,
         new: NewCodes<'u>,
-        scratch: &'u mut Scratch<C::Raw>,
+        scratch: &'u mut Scratch<C>,
     ) -> Self {
         let grid = rules.grid;
         let ([wide, high], n) = (grid.samples(), grid.side_steps());
@@ -68,6 +70,7 @@ impl<'u, C: RecordCodec> Update<'u, C> {
     pub(super) fn run(mut self) {
         let grid = self.rules.grid;
         self.scratch.below.clear();
+        self.scratch.near.load(&grid, self.area, &self.ground.new, self.ground.pages);
         for level in 0..grid.levels() {
             self.level(level);
             if self.ground.pages.has_failed() {
@@ -95,24 +98,23 @@ impl<'u, C: RecordCodec> Update<'u, C> {
 
     fn level(&mut self, level: u32) {
         let grid = self.rules.grid;
-        let (s, is_white) = (1u32 << (level / 2), level & 1 == 1);
+        let s = 1u32 << (level / 2);
         let reach = grid.reach_steps(level);
         let limit = grid.samples().map(|count| (count - 1 + reach - 1).min(grid.side_steps()));
         let span = |low: u32, high: u32, limit: u32| (low.saturating_sub(s), (high + s).min(limit));
         let (west, east) = span(self.area.west, self.area.east, limit[0]);
         let (south, north) = span(self.area.south, self.area.north, limit[1]);
-        // Multiples of the step; white vertices lie at odd ones both ways, black ones where one is odd and one even.
-        let first = |v: u32, is_odd: u32| {
-            let i = v.div_ceil(s);
-            (i + ((i & 1) ^ is_odd)) * s
-        };
-        let row_step = if is_white { 2 * s } else { s };
-        let first_row = if is_white { first(south, 1) } else { south.div_ceil(s) * s };
-        for y in (first_row..=north).step_by(row_step as usize) {
-            let first_x = first(west, if is_white { 1 } else { u32::from((y / s) & 1 == 0) });
-            for x in (first_x..=east).step_by(2 * s as usize) {
-                if is_white || self.steps_from_area(x, y) <= s {
-                    self.renew(GridPoint::new(x, y), level);
+        let is_near = level < NEAR_LEVELS;
+        let near = NearLevel::new(self.rules, level);
+        for y in (south.next_multiple_of(s)..=north).step_by(s as usize) {
+            let Some(first) = first_of_row(level, west, y) else { continue };
+            for x in (first..=east).step_by(2 * s as usize) {
+                if level & 1 == 0 && self.steps_from_area(x, y) > s {
+                    continue;
+                }
+                let v = GridPoint::new(x, y);
+                if !(is_near && self.renew_near(v, &near)) {
+                    self.renew(v, level);
                 }
             }
         }
@@ -138,7 +140,9 @@ impl<'u, C: RecordCodec> Update<'u, C> {
     fn renew_apart(&mut self, level: u32, limit: [u32; 2]) {
         let mut apart = std::mem::take(&mut self.scratch.apart);
         apart.clear();
-        for (child, _) in &self.scratch.below {
+        // Diamonds hold their children: those of a child inside the area touch it.
+        let outside = self.scratch.below.iter().filter(|(p, _)| !self.area.contains(p.x(), p.y()));
+        for (child, _) in outside {
             let parents = self.rules.grid.apexes(*child);
             apart.extend(parents.filter(|p| {
                 p.x() <= limit[0]
@@ -188,12 +192,59 @@ impl<'u, C: RecordCodec> Update<'u, C> {
             rules.own_error_m(v, grid.edge_ends(v), folded, |p| self.ground.code(p))
         };
         let new = rules.record(level, code, is_void, own_m, folded, &below);
-        if let Some(new) = self.put(v, slot, old, new) {
-            let is = rules.codec.decode(new, level);
-            if (is.error_m, is.radius_m, is.height_m) != (was.error_m, was.radius_m, was.height_m) {
-                self.scratch.here.push((v, old));
+        if self.put(v, slot, old, new).is_some() {
+            self.scratch.here.push((v, old));
+        }
+    }
+
+    /// Makes the record of a vertex of the finest levels anew, if nothing around it is void, padding or the square's border; else returns false.
+    #[inline(always)]
+    fn renew_near(&mut self, v: GridPoint, of: &NearLevel) -> bool {
+        let (rules, near) = (self.rules, &self.scratch.near);
+        let (s, [wide, high]) = (of.step, rules.grid.samples());
+        let (x, y) = (v.x(), v.y());
+        if x < s || y < s || x + s >= wide || y + s >= high {
+            return false;
+        }
+        let at = near.index(x, y);
+        let old = near.raw(at);
+        if rules.codec.decode(old, of.level).class != VertexClass::Plain {
+            return false;
+        }
+        let code = near.value(at);
+        let row = near.row_length();
+        let mut below = Below::default();
+        if of.level > 0 {
+            let height_m = code * rules.scale.height_step_m;
+            for (child, ground2) in of.children(at, row) {
+                let child = rules.codec.decode(near.raw(child), of.level - 1);
+                below.add(&child, ground2, height_m, rules.scale.height_base_m);
             }
         }
+        let own_m = if rules.error_kind == ErrorKind::Bounded && of.level >= FIRST_SCANNED {
+            let [x, y] = near.within(v);
+            let farthest = match of.edge(v) {
+                Edge::Upright => farthest_upright(near, x, y, s),
+                Edge::Level => farthest_level(near, x, y, s),
+                edge => farthest_diagonal(near, x, y, s, edge == Edge::Rising),
+            };
+            f64::from(rules.scanned_error_m(farthest))
+        } else {
+            let s = s as usize;
+            let (b, d) = match of.edge(v) {
+                Edge::Upright => (at - s * row, at + s * row),
+                Edge::Level => (at - s, at + s),
+                Edge::Rising => (at - s * row - s, at + s * row + s),
+                Edge::Falling => (at - s * row + s, at + s * row - s),
+            };
+            rules.step_error_m(code, [near.value(b), near.value(d)])
+        };
+        let slot = near.slot(at);
+        let new = rules.encode(of.level, code, VertexClass::Plain, own_m, &below);
+        if self.put(v, slot, old, new).is_some() {
+            self.scratch.here.push((v, old));
+        }
+        true
     }
 
     /// Stores a record; returns it if it is another one than before.
@@ -201,6 +252,7 @@ impl<'u, C: RecordCodec> Update<'u, C> {
         match new {
             Some(new) if new != old => {
                 self.ground.pages.write(v, slot, new);
+                self.scratch.near.note(v, new);
                 Some(new)
             }
             Some(_) => None,
@@ -222,11 +274,10 @@ impl<'u, C: RecordCodec> Update<'u, C> {
     /// The triangles that a vertex splits, none of whose corners is void, as (corners, height codes).
     fn triangles(&mut self, v: GridPoint) -> impl Iterator<Item = ([GridPoint; 3], [f64; 3])> + use<C> {
         let [b, d] = self.rules.grid.edge_ends(v);
-        let codec = &self.rules.codec;
-        let ends = [b, d].map(|p| self.ground.code_unless_void(p, codec));
+        let ends = [b, d].map(|p| self.ground.code_unless_void(p));
         let mut found = [None; 2];
         for (a, place) in self.rules.grid.apexes(v).zip(&mut found) {
-            let code = self.ground.code_unless_void(a, codec);
+            let code = self.ground.code_unless_void(a);
             if !(code.is_nan() || ends[0].is_nan() || ends[1].is_nan()) {
                 *place = Some(([a, b, d], [code, ends[0], ends[1]]));
             }
@@ -311,6 +362,60 @@ impl<'u, C: RecordCodec> Update<'u, C> {
             }
         }
         Some(before_m)
+    }
+}
+
+/// How the edge runs that a vertex splits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Edge {
+    Upright,
+    Level,
+    Rising,
+    Falling,
+}
+
+/// What the vertices of one of the finest levels have in common.
+struct NearLevel {
+    level: u32,
+    /// Steps from a vertex to its nearest ancestors.
+    step: u32,
+    /// Square metres over the ground to the children beside a vertex, and to those north and south.
+    ground2: [f64; 2],
+}
+
+impl NearLevel {
+    fn new<C: RecordCodec>(rules: &Rules<C>, level: u32) -> Self {
+        let step = 1u32 << (level / 2);
+        let [dx, dy] = rules.grid.spacing_m();
+        let [e, n] = [dx, dy].map(|d| d * f64::from(if level & 1 == 1 { step } else { step / 2 }));
+        let ground2 = if level & 1 == 1 { [e * e, n * n] } else { [e * e + n * n; 2] };
+        Self { level, step, ground2 }
+    }
+
+    /// Indices of the children of the vertex at index `at`, in rows of `row`, and square metres to them.
+    #[inline(always)]
+    fn children(&self, at: usize, row: usize) -> [(usize, f64); 4] {
+        let [beside, across] = self.ground2;
+        if self.level & 1 == 1 {
+            let s = self.step as usize;
+            [(at + s, beside), (at - s, beside), (at + s * row, across), (at - s * row, across)]
+        } else {
+            let h = self.step as usize / 2;
+            let (south, north) = (at - h * row, at + h * row);
+            [(south - h, beside), (south + h, beside), (north - h, beside), (north + h, beside)]
+        }
+    }
+
+    /// See [`Grid::edge_ends`].
+    #[inline(always)]
+    fn edge(&self, v: GridPoint) -> Edge {
+        let (column, row) = (v.x() >> (self.level / 2), v.y() >> (self.level / 2));
+        match (self.level & 1 == 1, row & 1 == 1) {
+            (false, true) => Edge::Upright,
+            (false, false) => Edge::Level,
+            (true, _) if (column ^ row) & 2 == 0 => Edge::Rising,
+            (true, _) => Edge::Falling,
+        }
     }
 }
 

@@ -157,6 +157,12 @@ impl RecordCodec for Compact {
     }
 
     #[inline(always)]
+    fn is_void(raw: u32) -> bool {
+        let [_, _, error_code, radius_code] = raw.to_le_bytes();
+        error_code >= FRINGE_VOID || (error_code == 0 && radius_code == 255)
+    }
+
+    #[inline(always)]
     fn height_value(raw: u32) -> f64 {
         f64::from(raw as u16)
     }

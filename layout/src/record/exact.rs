@@ -119,6 +119,12 @@ impl RecordCodec for Exact8 {
     }
 
     #[inline(always)]
+    fn is_void(raw: u64) -> bool {
+        let (error, radius) = ((raw >> 32) as u16, (raw >> 48) as u16);
+        (error >> 15 == 1 && radius >> 15 == 1) || (error == 0 && radius == 0xffff)
+    }
+
+    #[inline(always)]
     fn height_value(raw: u64) -> f64 {
         finite(f64::from(f32::from_bits(raw as u32)))
     }
@@ -180,6 +186,12 @@ impl RecordCodec for Exact16 {
             f32_at_least(self.0.error_m(level, class, error_m)).to_bits() | u32::from(error_sign) << 31;
         let radius = f32_at_least(radius_m).to_bits() | u32::from(radius_sign) << 31;
         Some(u128::from(value.to_bits()) | u128::from(error) << 64 | u128::from(radius) << 96)
+    }
+
+    #[inline(always)]
+    fn is_void(raw: u128) -> bool {
+        let (error, radius) = ((raw >> 64) as u32, (raw >> 96) as u32);
+        (error >> 31 == 1 && radius >> 31 == 1) || (error == 0 && radius == u32::MAX)
     }
 
     #[inline(always)]

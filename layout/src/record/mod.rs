@@ -120,6 +120,9 @@ pub trait RecordCodec: Clone + Send + Sync + 'static {
         radius_m: f64,
     ) -> Option<Self::Raw>;
 
+    /// Whether a record's sample is void, or the record inert: as [`Vertex::class`] says it, without decoding the rest.
+    fn is_void(raw: Self::Raw) -> bool;
+
     /// The raw height of a record that is not inert, as [`RecordCodec::encode`] takes it.
     fn height_value(raw: Self::Raw) -> f64;
 
@@ -160,6 +163,7 @@ mod tests {
             assert_eq!(v.class, class);
             assert_eq!(v.height_m, -12.5 + value * 0.25);
             assert_eq!(C::height_value(raw), value);
+            assert_eq!(C::is_void(raw), class.is_void());
             assert!(v.error_m >= error_m && v.radius_m >= radius_m, "{v:?} {error_m} {radius_m}");
             if class == VertexClass::Plain && error_m > 0.02 {
                 assert!(v.error_m <= error_m * 1.06, "{v:?} {error_m}");
@@ -192,6 +196,10 @@ mod tests {
             ] {
                 prop_assert!(v.height_m.is_finite() && v.error_m >= 0.0 && v.radius_m >= 0.0, "{v:?}");
             }
+            let is_void = |class: VertexClass| class.is_void();
+            prop_assert_eq!(Compact::is_void(raw as u32), is_void(Compact::new(&grid(), &SCALE).decode(raw as u32, level).class));
+            prop_assert_eq!(Exact8::is_void(raw as u64), is_void(Exact8::new(&grid(), &SCALE).decode(raw as u64, level).class));
+            prop_assert_eq!(Exact16::is_void(raw), is_void(Exact16::new(&grid(), &SCALE).decode(raw, level).class));
         }
     }
 }

@@ -1,0 +1,181 @@
+//! The records of the six finest levels around a changed rectangle, side by side as on the ground.
+//!
+//! Nearly all that an edit changes are vertices of these levels, each of which looks at a dozen others close by. Read once into rows, they are neighbours in memory,
+//! and samples can be compared with a plane row by row, as a build does.
+//!
+//! Invariant: what is written to the pages inside the rectangle is written here as well.
+
+use super::ground::NewCodes;
+use super::pages::Pages;
+use super::window::SampleRect;
+use crate::bound::{Plane, Samples};
+use crate::grid::{Grid, GridPoint};
+use crate::order::{RowSlots, slot_of};
+use crate::record::RecordCodec;
+
+/// Levels that are done here.
+pub(super) const NEAR_LEVELS: u32 = 6;
+/// Steps around the changed rectangle: a diamond of the coarsest of these levels that touches it reaches twice its step, and so do its children.
+const MARGIN: u32 = 8;
+/// Steps between the points that belong to coarser levels.
+const COARSER: u32 = 1 << (NEAR_LEVELS / 2);
+
+/// Records of a rectangle of grid points.
+#[derive(Debug)]
+pub(super) struct Near<C: RecordCodec> {
+    west: u32,
+    south: u32,
+    wide: u32,
+    high: u32,
+    /// Records, row by row from the south.
+    raws: Vec<C::Raw>,
+    /// Slots of these records.
+    slots: Vec<u64>,
+    /// Height codes; those of voids are what their records say.
+    values: Vec<f64>,
+    /// Height codes of samples; NaN for voids and padding.
+    samples: Vec<f64>,
+}
+
+impl<C: RecordCodec> Default for Near<C> {
+    fn default() -> Self {
+        Self {
+            west: 0,
+            south: 0,
+            wide: 0,
+            high: 0,
+            raws: Vec::new(),
+            slots: Vec::new(),
+            values: Vec::new(),
+            samples: Vec::new(),
+        }
+    }
+}
+
+impl<C: RecordCodec> Near<C> {
+    /// Reads the records around `area`, grid points whose height changed to what `new` says.
+    pub(super) fn load(&mut self, grid: &Grid, area: SampleRect, new: &NewCodes<'_>, pages: &mut Pages<C>) {
+        let n = grid.side_steps();
+        self.west = area.west.saturating_sub(MARGIN);
+        self.south = area.south.saturating_sub(MARGIN);
+        self.wide = (area.east + MARGIN).min(n) - self.west + 1;
+        self.high = (area.north + MARGIN).min(n) - self.south + 1;
+        let count = self.wide as usize * self.high as usize;
+        self.raws.clear();
+        self.raws.resize(count, C::INERT);
+        self.slots.clear();
+        self.slots.resize(count, 0);
+        self.values.clear();
+        self.values.resize(count, f64::NAN);
+        self.samples.clear();
+        self.samples.resize(count, f64::NAN);
+        let levels = NEAR_LEVELS.min(grid.levels());
+        for level in 0..levels {
+            for y in self.south..self.south + self.high {
+                let Some(first) = first_of_row(level, self.west, y) else { continue };
+                let row = RowSlots::new(grid.k(), level, y);
+                for x in (first..self.west + self.wide).step_by(2 << (level / 2)) {
+                    self.take(grid, GridPoint::new(x, y), row.slot(x), new, pages);
+                }
+            }
+        }
+        let step = COARSER.min(n);
+        for y in (self.south.next_multiple_of(step)..self.south + self.high).step_by(step as usize) {
+            for x in (self.west.next_multiple_of(step)..self.west + self.wide).step_by(step as usize) {
+                let p = GridPoint::new(x, y);
+                self.take(grid, p, slot_of(grid.k(), p), new, pages);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, grid: &Grid, p: GridPoint, slot: u64, new: &NewCodes<'_>, pages: &mut Pages<C>) {
+        let at = self.index(p.x(), p.y());
+        let raw = pages.raw(slot);
+        self.raws[at] = raw;
+        self.slots[at] = slot;
+        let is_void = C::is_void(raw);
+        let value = match new.get(grid.fold(p)) {
+            Some(code) if !is_void => code,
+            _ => C::height_value(raw),
+        };
+        self.values[at] = value;
+        if !is_void && !grid.is_padding(p) {
+            self.samples[at] = value;
+        }
+    }
+
+    /// Index of a grid point of the rectangle.
+    #[inline(always)]
+    pub(super) fn index(&self, x: u32, y: u32) -> usize {
+        (y - self.south) as usize * self.wide as usize + (x - self.west) as usize
+    }
+
+    /// Points a row.
+    #[inline(always)]
+    pub(super) fn row_length(&self) -> usize {
+        self.wide as usize
+    }
+
+    #[inline(always)]
+    pub(super) fn raw(&self, at: usize) -> C::Raw {
+        self.raws[at]
+    }
+
+    #[inline(always)]
+    pub(super) fn slot(&self, at: usize) -> u64 {
+        self.slots[at]
+    }
+
+    /// Height code at an index.
+    #[inline(always)]
+    pub(super) fn value(&self, at: usize) -> f64 {
+        self.values[at]
+    }
+
+    /// Notes a record that was written, if it lies here.
+    pub(super) fn note(&mut self, p: GridPoint, raw: C::Raw) {
+        let (x, y) = (p.x().wrapping_sub(self.west), p.y().wrapping_sub(self.south));
+        if x < self.wide && y < self.high {
+            self.raws[y as usize * self.wide as usize + x as usize] = raw;
+        }
+    }
+
+    /// Column and row of a grid point within the rectangle.
+    #[inline(always)]
+    pub(super) fn within(&self, p: GridPoint) -> [u32; 2] {
+        [p.x() - self.west, p.y() - self.south]
+    }
+}
+
+impl<C: RecordCodec> Samples for Near<C> {
+    #[inline(always)]
+    fn corner(&self, x: u32, y: u32) -> (GridPoint, f64) {
+        let p = GridPoint::new(self.west.wrapping_add(x), self.south.wrapping_add(y));
+        let is_here = x < self.wide && y < self.high;
+        let code =
+            if is_here { self.samples[y as usize * self.wide as usize + x as usize] } else { f64::NAN };
+        (p, code)
+    }
+
+    #[inline(always)]
+    fn row(&self, plane: &Plane, from: u32, to: u32, y: u32) -> f64 {
+        let at = y as usize * self.wide as usize;
+        let row = &self.samples[at + from as usize..=at + to as usize];
+        plane.farthest_in_row(self.west + from, self.south + y, row)
+    }
+}
+
+/// Column of the first vertex of `level` at or east of `west` in row `y`; `None` if the row has none.
+#[inline(always)]
+pub(super) fn first_of_row(level: u32, west: u32, y: u32) -> Option<u32> {
+    let (t, is_white) = (level / 2, level & 1 == 1);
+    let row = y >> t;
+    // White vertices lie at odd multiples of the step both ways, black ones where one is odd and one even.
+    if y & ((1 << t) - 1) != 0 || (is_white && row & 1 == 0) {
+        return None;
+    }
+    let is_odd = u32::from(is_white || row & 1 == 0);
+    let column = (west + (1 << t) - 1) >> t;
+    Some((column + ((column & 1) ^ is_odd)) << t)
+}
