@@ -1,6 +1,7 @@
 //! An editor for one kind of records: heights in, records out, whole or not at all.
 
 use super::ground::NewCodes;
+use super::near::MARGIN;
 use super::pages::{Overwritten, Pages};
 use super::update::{Scratch, Update};
 use super::window::{HeightWindow, SampleRect};
@@ -17,6 +18,11 @@ use std::sync::Arc;
 
 /// Largest height code of compact records.
 const LARGEST_CODE: f64 = 65_535.0;
+
+/// Side in samples of the blocks that large windows are set by.
+const BLOCK_SIDE: u32 = 256;
+/// Samples of a block.
+const BLOCK_SAMPLES: usize = (BLOCK_SIDE * BLOCK_SIDE) as usize;
 
 /// Edits of a terrain with records of kind `C`.
 #[derive(Debug)]
@@ -95,11 +101,18 @@ impl<C: RecordCodec> Core<C> {
             for edit in edits {
                 let Some(bounds) = edit.bounds(&grid) else { continue };
                 let around = bounds.grown(edit.margin(), &grid);
-                let mut window = core.heights(around)?;
                 let original =
                     if edit.needs_original() { Some(core.original_heights(around)?) } else { None };
-                edit.apply(&grid, &mut window, original.as_ref());
-                core.set(&window, changes)?;
+                if bounds.count() <= BLOCK_SAMPLES && edit.margin() <= MARGIN {
+                    core.load_block(bounds);
+                    let mut window = core.heights_in_block(around)?;
+                    edit.apply(&grid, &mut window, original.as_ref());
+                    core.set_block(bounds, &window, changes)?;
+                } else {
+                    let mut window = core.heights(around)?;
+                    edit.apply(&grid, &mut window, original.as_ref());
+                    core.set(&window, changes)?;
+                }
             }
             Ok(())
         })
@@ -200,38 +213,67 @@ impl<C: RecordCodec> Core<C> {
         window
     }
 
-    /// Sets the heights of a window that lies in the data.
+    /// Sets the heights of a window that lies in the data, block by block, so that little memory is taken for large ones.
     fn set(&mut self, window: &HeightWindow, changes: &mut Changes) -> Result<(), LayoutError> {
         let rect = window.rect();
+        for south in (rect.south..=rect.north).step_by(BLOCK_SIDE as usize) {
+            for west in (rect.west..=rect.east).step_by(BLOCK_SIDE as usize) {
+                let block = SampleRect {
+                    west,
+                    south,
+                    east: (west + BLOCK_SIDE - 1).min(rect.east),
+                    north: (south + BLOCK_SIDE - 1).min(rect.north),
+                };
+                self.load_block(block);
+                self.set_block(block, window, changes)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Brings the finest levels around a block to hand.
+    fn load_block(&mut self, block: SampleRect) {
+        self.scratch.near.load(&self.rules.grid, block, &mut self.pages);
+    }
+
+    /// Heights around the block that was loaded last.
+    fn heights_in_block(&self, rect: SampleRect) -> Result<HeightWindow, LayoutError> {
+        let (near, scale) = (&self.scratch.near, &self.rules.scale);
+        let mut heights_m = Vec::with_capacity(rect.count());
+        for y in rect.south..=rect.north {
+            let codes = (rect.west..=rect.east).map(|x| near.sample(x, y));
+            heights_m.extend(codes.map(|code| scale.height_base_m + code * scale.height_step_m));
+        }
+        HeightWindow::new(rect, heights_m)
+    }
+
+    /// Sets the heights of the block that was loaded last to those of `window`, which holds it.
+    fn set_block(
+        &mut self,
+        block: SampleRect,
+        window: &HeightWindow,
+        changes: &mut Changes,
+    ) -> Result<(), LayoutError> {
+        self.pages.check()?;
         let scale = self.rules.scale;
-        let k = self.rules.grid.k();
         let [mut then, mut now] = std::mem::take(&mut self.codes);
         then.clear();
         now.clear();
-        // What changes: its bounds, and heights there before and after.
+        // What changes: its bounds, and the range of new heights there.
         let mut changed: Option<SampleRect> = None;
-        let mut lowest = f64::INFINITY;
-        let mut highest = f64::NEG_INFINITY;
-        let mut at = 0;
-        for y in rect.south..=rect.north {
-            for x in rect.west..=rect.east {
-                let raw = self.pages.raw(crate::order::slot_of(k, GridPoint::new(x, y)));
-                let height_m = window.heights_m()[at];
-                at += 1;
-                let is_void = C::is_void(raw);
-                if is_void {
-                    changes.voids_passed += u64::from(!height_m.is_nan());
-                    then.push(f64::NAN);
-                    now.push(f64::NAN);
-                    continue;
-                }
-                let old = C::height_value(raw);
-                let new = if height_m.is_nan() {
+        let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for y in block.south..=block.north {
+            let first = window.index(block.west, y);
+            let heights_m = &window.heights_m()[first..first + block.wide() as usize];
+            for (x, height_m) in (block.west..).zip(heights_m) {
+                let old = self.scratch.near.sample(x, y);
+                let new = if height_m.is_nan() || old.is_nan() {
+                    changes.voids_passed += u64::from(old.is_nan() && !height_m.is_nan());
                     old
                 } else {
                     C::round_height((height_m - scale.height_base_m) / scale.height_step_m)
                 };
-                if new != old {
+                if new != old && !old.is_nan() {
                     lowest = lowest.min(new);
                     highest = highest.max(new);
                     let here = SampleRect { west: x, south: y, east: x, north: y };
@@ -247,22 +289,22 @@ impl<C: RecordCodec> Core<C> {
             }
         }
         self.codes = [then, now];
-        self.pages.check()?;
         let Some(changed) = changed else { return Ok(()) };
         self.check_range([lowest, highest])?;
-        self.renew(rect, changed);
+        self.renew(block, changed);
         self.pages.check()?;
         changes.samples.push(changed);
         Ok(())
     }
 
-    /// Updates the records around `changed`, whose new codes lie in those of `rect`.
-    fn renew(&mut self, rect: SampleRect, changed: SampleRect) {
+    /// Updates the records around `changed`, whose codes lie in those of `block`, which was loaded last.
+    fn renew(&mut self, block: SampleRect, changed: SampleRect) {
         let mut codes = std::mem::take(&mut self.codes);
-        if rect != changed {
-            codes.iter_mut().for_each(|codes| cut_out(codes, rect, changed));
+        if block != changed {
+            codes.iter_mut().for_each(|codes| cut_out(codes, block, changed));
         }
         let ranges = [0, 1].map(|i| crate::bound::range(&codes[i]));
+        self.scratch.near.set(changed, &codes[1]);
         let new = NewCodes { rect: changed, codes: &codes[1], ranges };
         Update::new(&self.rules, &mut self.pages, new, &mut self.scratch).run();
         self.codes = codes;

@@ -5,7 +5,6 @@
 //!
 //! Invariant: what is written to the pages inside the rectangle is written here as well.
 
-use super::ground::NewCodes;
 use super::pages::Pages;
 use super::window::SampleRect;
 use crate::bound::{Plane, Samples};
@@ -16,11 +15,14 @@ use crate::record::RecordCodec;
 /// Levels that are done here.
 pub(super) const NEAR_LEVELS: u32 = 6;
 /// Steps around the changed rectangle: a diamond of the coarsest of these levels that touches it reaches twice its step, and so do its children.
-const MARGIN: u32 = 8;
+pub(super) const MARGIN: u32 = 8;
 /// Steps between the points that belong to coarser levels.
 const COARSER: u32 = 1 << (NEAR_LEVELS / 2);
 
-/// Records of a rectangle of grid points.
+/// Bytes of a line of the processor's caches.
+const LINE_BYTES: u64 = 64;
+
+/// Records of a rectangle of samples, padding left out.
 #[derive(Debug)]
 pub(super) struct Near<C: RecordCodec> {
     west: u32,
@@ -33,7 +35,7 @@ pub(super) struct Near<C: RecordCodec> {
     slots: Vec<u64>,
     /// Height codes; those of voids are what their records say.
     values: Vec<f64>,
-    /// Height codes of samples; NaN for voids and padding.
+    /// Height codes; NaN for voids.
     samples: Vec<f64>,
 }
 
@@ -53,55 +55,68 @@ impl<C: RecordCodec> Default for Near<C> {
 }
 
 impl<C: RecordCodec> Near<C> {
-    /// Reads the records around `area`, grid points whose height changed to what `new` says.
-    pub(super) fn load(&mut self, grid: &Grid, area: SampleRect, new: &NewCodes<'_>, pages: &mut Pages<C>) {
-        let n = grid.side_steps();
-        self.west = area.west.saturating_sub(MARGIN);
-        self.south = area.south.saturating_sub(MARGIN);
-        self.wide = (area.east + MARGIN).min(n) - self.west + 1;
-        self.high = (area.north + MARGIN).min(n) - self.south + 1;
-        let count = self.wide as usize * self.high as usize;
+    /// Reads the records of `rect` and of the samples around it.
+    pub(super) fn load(&mut self, grid: &Grid, rect: SampleRect, pages: &mut Pages<C>) {
+        let around = rect.grown(MARGIN, grid);
+        (self.west, self.south) = (around.west, around.south);
+        (self.wide, self.high) = (around.wide(), around.high());
+        self.list_slots(grid);
+        // Asked of memory all at once, then waited for.
+        let mut line = u64::MAX;
+        for slot in &self.slots {
+            let here = slot * C::BYTES as u64 / LINE_BYTES;
+            if here != line {
+                pages.prefetch(*slot);
+                line = here;
+            }
+        }
         self.raws.clear();
-        self.raws.resize(count, C::INERT);
-        self.slots.clear();
-        self.slots.resize(count, 0);
+        self.raws.extend(self.slots.iter().map(|slot| pages.raw(*slot)));
         self.values.clear();
-        self.values.resize(count, f64::NAN);
+        self.values.extend(self.raws.iter().map(|raw| C::height_value(*raw)));
         self.samples.clear();
-        self.samples.resize(count, f64::NAN);
-        let levels = NEAR_LEVELS.min(grid.levels());
-        for level in 0..levels {
+        let known = self.raws.iter().zip(&self.values);
+        self.samples.extend(known.map(|(raw, value)| if C::is_void(*raw) { f64::NAN } else { *value }));
+    }
+
+    /// Fills in the slots of the rectangle, a level at a time.
+    fn list_slots(&mut self, grid: &Grid) {
+        self.slots.clear();
+        self.slots.resize(self.wide as usize * self.high as usize, 0);
+        let n = grid.side_steps();
+        for level in 0..NEAR_LEVELS.min(grid.levels()) {
             for y in self.south..self.south + self.high {
                 let Some(first) = first_of_row(level, self.west, y) else { continue };
                 let row = RowSlots::new(grid.k(), level, y);
                 for x in (first..self.west + self.wide).step_by(2 << (level / 2)) {
-                    self.take(grid, GridPoint::new(x, y), row.slot(x), new, pages);
+                    let at = self.index(x, y);
+                    self.slots[at] = row.slot(x);
                 }
             }
         }
         let step = COARSER.min(n);
         for y in (self.south.next_multiple_of(step)..self.south + self.high).step_by(step as usize) {
             for x in (self.west.next_multiple_of(step)..self.west + self.wide).step_by(step as usize) {
-                let p = GridPoint::new(x, y);
-                self.take(grid, p, slot_of(grid.k(), p), new, pages);
+                let at = self.index(x, y);
+                self.slots[at] = slot_of(grid.k(), GridPoint::new(x, y));
             }
         }
     }
 
+    /// Height code of a sample of the rectangle; NaN for voids.
     #[inline(always)]
-    fn take(&mut self, grid: &Grid, p: GridPoint, slot: u64, new: &NewCodes<'_>, pages: &mut Pages<C>) {
-        let at = self.index(p.x(), p.y());
-        let raw = pages.raw(slot);
-        self.raws[at] = raw;
-        self.slots[at] = slot;
-        let is_void = C::is_void(raw);
-        let value = match new.get(grid.fold(p)) {
-            Some(code) if !is_void => code,
-            _ => C::height_value(raw),
-        };
-        self.values[at] = value;
-        if !is_void && !grid.is_padding(p) {
-            self.samples[at] = value;
+    pub(super) fn sample(&self, x: u32, y: u32) -> f64 {
+        self.samples[self.index(x, y)]
+    }
+
+    /// Gives samples new height codes, those of `rect` row by row; NaN leaves one as it is.
+    pub(super) fn set(&mut self, rect: SampleRect, codes: &[f64]) {
+        for (y, row) in (rect.south..=rect.north).zip(codes.chunks_exact(rect.wide() as usize)) {
+            let at = self.index(rect.west, y);
+            for (i, code) in row.iter().enumerate().filter(|(_, code)| !code.is_nan()) {
+                self.samples[at + i] = *code;
+                self.values[at + i] = *code;
+            }
         }
     }
 

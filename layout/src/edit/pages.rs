@@ -9,6 +9,7 @@ use crate::bytes::{PAGE_BYTES, Page, to_usize};
 use crate::error::LayoutError;
 use crate::grid::GridPoint;
 use crate::order::slot_of;
+use crate::prefetch::prefetch;
 use crate::record::RecordCodec;
 use crate::terrain::Terrain;
 use std::sync::Arc;
@@ -94,6 +95,14 @@ impl<C: RecordCodec> Pages<C> {
     #[inline(always)]
     fn within(slot: u64) -> usize {
         (slot as usize & ((1 << Self::SHIFT) - 1)) * C::BYTES
+    }
+
+    /// Asks memory for the record of a slot, if its page is here.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, slot: u64) {
+        if let Some(page) = self.held.get(self.index[(slot >> Self::SHIFT) as usize] as usize) {
+            prefetch(&page.bytes[..], Self::within(slot));
+        }
     }
 
     #[inline(always)]

@@ -23,7 +23,7 @@ const FEW: usize = 64;
 /// Lists that outlive an update, so that none is allocated anew.
 #[derive(Debug)]
 pub(super) struct Scratch<C: RecordCodec> {
-    near: Near<C>,
+    pub(super) near: Near<C>,
     /// Vertices of the level below that changed, and their former records.
     below: Vec<(GridPoint, C::Raw)>,
     /// The same of this level.
@@ -55,14 +55,7 @@ impl<'u, C: RecordCodec> Update<'u, C> {
         scratch: &'u mut Scratch<C>,
     ) -> Self {
         let grid = rules.grid;
-        let ([wide, high], n) = (grid.samples(), grid.side_steps());
-        let SampleRect { west, south, east, north } = new.rect;
-        let area = SampleRect {
-            west,
-            south,
-            east: if east == wide - 1 { n } else { east },
-            north: if north == high - 1 { n } else { north },
-        };
+        let area = with_padding(&grid, new.rect);
         Self { rules, ground: Ground { grid, pages, new }, area, scratch }
     }
 
@@ -70,7 +63,6 @@ impl<'u, C: RecordCodec> Update<'u, C> {
     pub(super) fn run(mut self) {
         let grid = self.rules.grid;
         self.scratch.below.clear();
-        self.scratch.near.load(&grid, self.area, &self.ground.new, self.ground.pages);
         for level in 0..grid.levels() {
             self.level(level);
             if self.ground.pages.has_failed() {
@@ -362,6 +354,16 @@ impl<'u, C: RecordCodec> Update<'u, C> {
             }
         }
         Some(before_m)
+    }
+}
+
+/// A rectangle of samples and the padding that folds onto it.
+fn with_padding(grid: &Grid, rect: SampleRect) -> SampleRect {
+    let ([wide, high], n) = (grid.samples(), grid.side_steps());
+    SampleRect {
+        east: if rect.east == wide - 1 { n } else { rect.east },
+        north: if rect.north == high - 1 { n } else { rect.north },
+        ..rect
     }
 }
 
