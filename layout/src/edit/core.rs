@@ -129,17 +129,16 @@ impl<C: RecordCodec> Core<C> {
         &mut self,
         work: impl FnOnce(&mut Self, &mut Changes) -> Result<(), LayoutError>,
     ) -> Result<Changes, LayoutError> {
-        let mark = self.pages.mark();
         let former = (self.header.height_range_m, self.header.scale.error_top_m);
         let mut changes = Changes::default();
         let done = work(self, &mut changes);
         if let Err(error) = done {
-            self.pages.take_back(mark);
+            self.pages.take_back();
             self.set_range(former);
             return Err(error);
         }
-        self.tell(mark, &mut changes);
-        self.pages.tidy();
+        self.tell(&mut changes);
+        self.pages.keep();
         Ok(changes)
     }
 
@@ -150,40 +149,58 @@ impl<C: RecordCodec> Core<C> {
     }
 
     pub(super) fn roll_back(&mut self) -> Changes {
+        let until_now = self.pages.roll_back();
         let mut changes = Changes::default();
-        self.tell(0, &mut changes);
-        // Where heights changed is not kept apart from the records that did.
-        changes.samples = rects_of(&self.rules.grid, &changes.vertices);
-        self.pages.take_back(0);
+        for (logical, old) in until_now {
+            self.note_differences(logical, &old, &mut changes);
+        }
         self.set_range(self.committed);
+        self.end_replacing(changes)
+    }
+
+    /// Notes the vertices of a page whose records are others than they were in `old`.
+    fn note_differences(&self, logical: u64, old: &Page, changes: &mut Changes) {
+        let Some(new) = self.pages.edited(logical) else { return };
+        let (k, per_page) = (self.rules.grid.k(), (PAGE_BYTES / C::BYTES) as u64);
+        let before = changes.vertices.len();
+        let records = old.chunks_exact(C::BYTES).zip(new.chunks_exact(C::BYTES));
+        for (i, _) in records.enumerate().filter(|(_, (old, new))| old != new) {
+            changes.vertices.extend(point_of(k, logical * per_page + i as u64));
+        }
+        if changes.vertices.len() > before {
+            changes.pages.push(logical);
+        }
+    }
+
+    /// Where heights changed is not kept apart from the records that did.
+    fn end_replacing(&self, mut changes: Changes) -> Changes {
+        changes.pages.sort_unstable();
+        changes.samples = rects_of(&self.rules.grid, &changes.vertices);
         changes
     }
 
-    /// Vertices and pages that were written to since `mark`, as far as they are not as they were.
-    fn tell(&mut self, mark: usize, changes: &mut Changes) {
+    /// Vertices and pages that the batch wrote to, as far as they are not as they were.
+    fn tell(&mut self, changes: &mut Changes) {
         let per_page = (PAGE_BYTES / C::BYTES) as u64;
-        let mut note = |pages: &mut Pages<C>, Overwritten { point, slot, old }: Overwritten<C::Raw>| {
-            if pages.raw(slot) != old {
-                changes.vertices.push(point);
+        let mut written = Vec::new();
+        let written = if changes.samples.len() == 1 {
+            // One update writes a record once.
+            self.pages.overwritten()
+        } else {
+            written.extend_from_slice(self.pages.overwritten());
+            // The first of several entries of a slot has the record from before all.
+            written.sort_by_key(|w| w.slot);
+            written.dedup_by_key(|w| w.slot);
+            &written
+        };
+        for Overwritten { point, slot, old } in written {
+            if self.pages.raw_if_held(*slot) != Some(*old) {
+                changes.vertices.push(*point);
                 let page = slot / per_page;
                 if changes.pages.last() != Some(&page) {
                     changes.pages.push(page);
                 }
             }
-        };
-        let count = self.pages.mark() - mark;
-        if changes.samples.len() == 1 {
-            // One update writes a record once.
-            for i in mark..mark + count {
-                let written = self.pages.overwritten(0)[i];
-                note(&mut self.pages, written);
-            }
-        } else {
-            let mut written = self.pages.overwritten(mark).to_vec();
-            // The first of several entries of a slot has the record from before all.
-            written.sort_by_key(|w| w.slot);
-            written.dedup_by_key(|w| w.slot);
-            written.into_iter().for_each(|written| note(&mut self.pages, written));
         }
         changes.pages.sort_unstable();
         changes.pages.dedup();
@@ -209,7 +226,7 @@ impl<C: RecordCodec> Core<C> {
         let terrain = Arc::clone(self.pages.terrain());
         let original = self.original.get_or_insert_with(|| Pages::new(terrain));
         let window = heights_of(original, &self.rules, rect);
-        original.tidy();
+        original.keep();
         window
     }
 
@@ -347,30 +364,19 @@ impl<C: RecordCodec> Core<C> {
         pages: Vec<(u64, Box<Page>)>,
         header: &Header,
     ) -> Result<Changes, LayoutError> {
-        if self.pages.mark() > 0 {
+        if !self.pages.is_committed() {
             return Err(LayoutError::Usage(
                 "edits that are not committed are in the way; commit them or take them back first".into(),
             ));
         }
         let mut changes = Changes::default();
-        let (k, per_page) = (self.rules.grid.k(), (PAGE_BYTES / C::BYTES) as u64);
         for (logical, page) in pages {
             let old = self.pages.replace(logical, page)?;
-            let Some(new) = self.pages.edited(logical) else { continue };
-            let before = changes.vertices.len();
-            let records = old.chunks_exact(C::BYTES).zip(new.chunks_exact(C::BYTES));
-            for (i, _) in records.enumerate().filter(|(_, (old, new))| old != new) {
-                changes.vertices.extend(point_of(k, logical * per_page + i as u64));
-            }
-            if changes.vertices.len() > before {
-                changes.pages.push(logical);
-            }
+            self.note_differences(logical, &old, &mut changes);
         }
-        changes.pages.sort_unstable();
-        changes.samples = rects_of(&self.rules.grid, &changes.vertices);
         self.set_range((header.height_range_m, header.scale.error_top_m));
         self.committed = (header.height_range_m, header.scale.error_top_m);
-        Ok(changes)
+        Ok(self.end_replacing(changes))
     }
 }
 

@@ -3,7 +3,8 @@
 //! Pages come when they are touched and stay once they are edited; of those that are not, a bounded number is kept. A page that cannot be read does not stop
 //! the work halfway through: the first error is kept for whoever ends the batch, and takes it back.
 //!
-//! Invariant: the log holds every record that was overwritten since the last commit, in order, so that going back through it restores them.
+//! Invariants: the log holds every record that was overwritten since the batch began, in order, so that going back through it takes the batch back; a page that was
+//! written to since the last commit has a copy from before, which takes everything back.
 
 use crate::bytes::{PAGE_BYTES, Page, to_usize};
 use crate::error::LayoutError;
@@ -16,8 +17,6 @@ use std::sync::Arc;
 
 /// Pages kept that are as in the file: 64 MiB.
 const CLEAN_PAGES: usize = 16_384;
-/// Entries of the log from which on it is searched for records that were overwritten more than once.
-const LONG_LOG: usize = 1 << 20;
 /// The page is not here.
 const AWAY: u32 = u32::MAX;
 
@@ -27,9 +26,9 @@ struct Held {
     logical: u64,
     /// Whether it differs, or once differed, from the terrain's.
     edited: bool,
-    /// Whether it was written to since the last commit.
-    uncommitted: bool,
     bytes: Box<Page>,
+    /// What it held at the last commit, if it was written to since.
+    committed: Option<Box<Page>>,
 }
 
 /// A record that was overwritten.
@@ -50,8 +49,6 @@ pub(super) struct Pages<C: RecordCodec> {
     held: Vec<Held>,
     clean: usize,
     log: Vec<Overwritten<C::Raw>>,
-    /// Length of the log from which on it is compacted next.
-    long: usize,
     uncommitted: Vec<u64>,
     failure: Option<LayoutError>,
 }
@@ -68,7 +65,6 @@ impl<C: RecordCodec> Pages<C> {
             held: Vec::new(),
             clean: 0,
             log: Vec::new(),
-            long: LONG_LOG,
             uncommitted: Vec::new(),
             failure: None,
         }
@@ -83,6 +79,14 @@ impl<C: RecordCodec> Pages<C> {
     pub(super) fn raw(&mut self, slot: u64) -> C::Raw {
         let within = Self::within(slot);
         C::read(&self.page_of(slot).bytes[within..within + C::BYTES])
+    }
+
+    /// The record of a slot whose page is here.
+    #[inline(always)]
+    pub(super) fn raw_if_held(&self, slot: u64) -> Option<C::Raw> {
+        let page = self.held.get(self.index[(slot >> Self::SHIFT) as usize] as usize)?;
+        let within = Self::within(slot);
+        Some(C::read(&page.bytes[within..within + C::BYTES]))
     }
 
     /// The record of a grid point.
@@ -124,7 +128,7 @@ impl<C: RecordCodec> Pages<C> {
         let at = self.held.len() as u32;
         self.index[logical as usize] = at;
         self.clean += 1;
-        self.held.push(Held { logical, edited: false, uncommitted: false, bytes });
+        self.held.push(Held { logical, edited: false, bytes, committed: None });
         at
     }
 
@@ -132,16 +136,15 @@ impl<C: RecordCodec> Pages<C> {
     pub(super) fn write(&mut self, point: GridPoint, slot: u64, raw: C::Raw) {
         let within = Self::within(slot);
         let page = self.page_of(slot);
-        let place = &mut page.bytes[within..within + C::BYTES];
-        let old = C::read(place);
-        C::write(raw, place);
-        let (was_edited, was_uncommitted, logical) = (page.edited, page.uncommitted, page.logical);
-        page.edited = true;
-        page.uncommitted = true;
-        self.clean -= usize::from(!was_edited);
-        if !was_uncommitted {
+        let old = C::read(&page.bytes[within..within + C::BYTES]);
+        if page.committed.is_none() {
+            page.committed = Some(page.bytes.clone());
+            let was_edited = std::mem::replace(&mut page.edited, true);
+            let logical = page.logical;
+            self.clean -= usize::from(!was_edited);
             self.uncommitted.push(logical);
         }
+        C::write(raw, &mut self.page_of(slot).bytes[within..within + C::BYTES]);
         self.log.push(Overwritten { point, slot, old });
     }
 
@@ -176,27 +179,37 @@ impl<C: RecordCodec> Pages<C> {
         self.failure.is_some()
     }
 
-    /// What was overwritten since the last commit, from `mark` on.
-    pub(super) fn overwritten(&self, mark: usize) -> &[Overwritten<C::Raw>] {
-        self.log.get(mark..).unwrap_or_default()
+    /// What was overwritten since the batch began.
+    pub(super) fn overwritten(&self) -> &[Overwritten<C::Raw>] {
+        &self.log
     }
 
-    /// A mark for [`Pages::overwritten`] and [`Pages::take_back`].
-    pub(super) fn mark(&self) -> usize {
-        self.log.len()
+    /// Ends a batch that is to stay.
+    pub(super) fn keep(&mut self) {
+        self.log.clear();
+        if self.clean > CLEAN_PAGES {
+            self.drop_clean();
+        }
     }
 
-    /// Restores what was overwritten from `mark` on, without losing sight of which pages are uncommitted.
-    pub(super) fn take_back(&mut self, mark: usize) {
-        while self.log.len() > mark {
-            if let Some(Overwritten { slot, old, .. }) = self.log.pop() {
-                let within = Self::within(slot);
-                C::write(old, &mut self.page_of(slot).bytes[within..within + C::BYTES]);
+    /// Ends a batch that is not.
+    pub(super) fn take_back(&mut self) {
+        while let Some(Overwritten { slot, old, .. }) = self.log.pop() {
+            let within = Self::within(slot);
+            C::write(old, &mut self.page_of(slot).bytes[within..within + C::BYTES]);
+        }
+    }
+
+    /// Between batches: puts back what the pages held at the last commit; returns what they held until now.
+    pub(super) fn roll_back(&mut self) -> Vec<(u64, Box<Page>)> {
+        let mut until_now = Vec::with_capacity(self.uncommitted.len());
+        for logical in std::mem::take(&mut self.uncommitted) {
+            let page = self.held.get_mut(self.index[logical as usize] as usize);
+            if let Some((page, committed)) = page.and_then(|p| p.committed.take().map(|c| (p, c))) {
+                until_now.push((logical, std::mem::replace(&mut page.bytes, committed)));
             }
         }
-        if mark == 0 {
-            self.mark_committed();
-        }
+        until_now
     }
 
     /// Logical pages written to since the last commit, ascending.
@@ -208,14 +221,16 @@ impl<C: RecordCodec> Pages<C> {
 
     /// Everything so far counts as committed.
     pub(super) fn mark_committed(&mut self) {
-        self.log.clear();
-        self.long = LONG_LOG;
         for logical in std::mem::take(&mut self.uncommitted) {
-            let at = self.index[logical as usize];
-            if let Some(page) = self.held.get_mut(at as usize) {
-                page.uncommitted = false;
+            if let Some(page) = self.held.get_mut(self.index[logical as usize] as usize) {
+                page.committed = None;
             }
         }
+    }
+
+    /// Whether anything was written to since the last commit.
+    pub(super) fn is_committed(&self) -> bool {
+        self.uncommitted.is_empty()
     }
 
     /// A page that was edited.
@@ -229,21 +244,14 @@ impl<C: RecordCodec> Pages<C> {
         self.held.iter().filter(|page| page.edited).map(|page| (page.logical, &*page.bytes))
     }
 
-    /// Between batches: drops pages that can be read again, and log entries that a later one makes pointless.
-    pub(super) fn tidy(&mut self) {
-        if self.clean > CLEAN_PAGES {
-            self.held.retain(|page| page.edited);
-            self.index.fill(AWAY);
-            for (at, page) in self.held.iter().enumerate() {
-                self.index[page.logical as usize] = at as u32;
-            }
-            self.clean = 0;
+    /// Drops pages that can be read again.
+    #[cold]
+    fn drop_clean(&mut self) {
+        self.held.retain(|page| page.edited);
+        self.index.fill(AWAY);
+        for (at, page) in self.held.iter().enumerate() {
+            self.index[page.logical as usize] = at as u32;
         }
-        if self.log.len() > self.long {
-            // The oldest entry of a slot says all; a stable sort keeps it first.
-            self.log.sort_by_key(|entry| entry.slot);
-            self.log.dedup_by_key(|entry| entry.slot);
-            self.long = (2 * self.log.len()).max(LONG_LOG);
-        }
+        self.clean = 0;
     }
 }
