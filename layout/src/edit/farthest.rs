@@ -145,6 +145,10 @@ impl<'s, C: RecordCodec> Search<'s, C> {
             return;
         }
         let bounds = [0, 1].map(|i| self.bound(&halves[i], &self.rules.codec.decode(raws[i], level - 1)));
+        for i in [0, 1].into_iter().filter(|i| bounds[*i] > self.enough) {
+            // Siblings share a cache line more often than not.
+            ground.pages.prefetch(child_slots(halves[i].apex_slot, halves[i].split_slot)[0]);
+        }
         let order = if bounds[1] > bounds[0] { [1, 0] } else { [0, 1] };
         for i in order {
             if bounds[i] > self.enough {

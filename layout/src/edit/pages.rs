@@ -17,19 +17,11 @@ use std::sync::Arc;
 
 /// Pages kept that are as in the file: 64 MiB.
 const CLEAN_PAGES: usize = 16_384;
-/// The page is not here.
-const AWAY: u32 = u32::MAX;
 
-/// A page in memory.
-#[derive(Debug)]
-struct Held {
-    logical: u64,
-    /// Whether it differs, or once differed, from the terrain's.
-    edited: bool,
-    bytes: Box<Page>,
-    /// What it held at the last commit, if it was written to since.
-    committed: Option<Box<Page>>,
-}
+/// The page differs, or once differed, from the terrain's.
+const EDITED: u8 = 1;
+/// It was written to since the last commit.
+const UNCOMMITTED: u8 = 2;
 
 /// A record that was overwritten.
 #[derive(Debug, Clone, Copy)]
@@ -44,12 +36,15 @@ pub(super) struct Overwritten<R> {
 pub(super) struct Pages<C: RecordCodec> {
     terrain: Arc<Terrain>,
     k: u32,
-    /// Index in `held` of each logical page, or [`AWAY`].
-    index: Vec<u32>,
-    held: Vec<Held>,
+    /// What each logical page holds, as far as it is here.
+    held: Vec<Option<Box<Page>>>,
+    /// [`EDITED`], [`UNCOMMITTED`] of each logical page.
+    flags: Vec<u8>,
+    /// Pages here that are as in the file.
     clean: usize,
     log: Vec<Overwritten<C::Raw>>,
-    uncommitted: Vec<u64>,
+    /// Pages written to since the last commit, and what they held then.
+    uncommitted: Vec<(u64, Box<Page>)>,
     failure: Option<LayoutError>,
 }
 
@@ -58,11 +53,12 @@ impl<C: RecordCodec> Pages<C> {
     const SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
 
     pub(super) fn new(terrain: Arc<Terrain>) -> Self {
+        let count = terrain.entries().len();
         Self {
             k: terrain.grid().k(),
-            index: vec![AWAY; terrain.entries().len()],
             terrain,
-            held: Vec::new(),
+            held: std::iter::repeat_with(|| None).take(count).collect(),
+            flags: vec![0; count],
             clean: 0,
             log: Vec::new(),
             uncommitted: Vec::new(),
@@ -78,15 +74,15 @@ impl<C: RecordCodec> Pages<C> {
     #[inline(always)]
     pub(super) fn raw(&mut self, slot: u64) -> C::Raw {
         let within = Self::within(slot);
-        C::read(&self.page_of(slot).bytes[within..within + C::BYTES])
+        C::read(&self.page_of(slot)[within..within + C::BYTES])
     }
 
     /// The record of a slot whose page is here.
     #[inline(always)]
     pub(super) fn raw_if_held(&self, slot: u64) -> Option<C::Raw> {
-        let page = self.held.get(self.index[(slot >> Self::SHIFT) as usize] as usize)?;
+        let page = self.held[(slot >> Self::SHIFT) as usize].as_ref()?;
         let within = Self::within(slot);
-        Some(C::read(&page.bytes[within..within + C::BYTES]))
+        Some(C::read(&page[within..within + C::BYTES]))
     }
 
     /// The record of a grid point.
@@ -104,62 +100,49 @@ impl<C: RecordCodec> Pages<C> {
     /// Asks memory for the record of a slot, if its page is here.
     #[inline(always)]
     pub(super) fn prefetch(&self, slot: u64) {
-        if let Some(page) = self.held.get(self.index[(slot >> Self::SHIFT) as usize] as usize) {
-            prefetch(&page.bytes[..], Self::within(slot));
+        if let Some(Some(page)) = self.held.get((slot >> Self::SHIFT) as usize) {
+            prefetch(&page[..], Self::within(slot));
         }
     }
 
     #[inline(always)]
-    fn page_of(&mut self, slot: u64) -> &mut Held {
+    fn page_of(&mut self, slot: u64) -> &mut Page {
+        let Self { terrain, held, clean, failure, .. } = self;
         let logical = slot >> Self::SHIFT;
-        let mut at = self.index[logical as usize];
-        if at == AWAY {
-            at = self.load(logical);
-        }
-        &mut self.held[at as usize]
-    }
-
-    #[cold]
-    fn load(&mut self, logical: u64) -> u32 {
-        let bytes = self.terrain.checked_page(logical).unwrap_or_else(|error| {
-            self.failure.get_or_insert(error);
-            crate::opening::inert_page(self.terrain.header().record_kind)
-        });
-        let at = self.held.len() as u32;
-        self.index[logical as usize] = at;
-        self.clean += 1;
-        self.held.push(Held { logical, edited: false, bytes, committed: None });
-        at
+        held[logical as usize].get_or_insert_with(|| {
+            *clean += 1;
+            load(terrain, logical, failure)
+        })
     }
 
     /// Overwrites a record.
     pub(super) fn write(&mut self, point: GridPoint, slot: u64, raw: C::Raw) {
-        let within = Self::within(slot);
+        let (logical, within) = ((slot >> Self::SHIFT) as usize, Self::within(slot));
         let page = self.page_of(slot);
-        let old = C::read(&page.bytes[within..within + C::BYTES]);
-        if page.committed.is_none() {
-            page.committed = Some(page.bytes.clone());
-            let was_edited = std::mem::replace(&mut page.edited, true);
-            let logical = page.logical;
-            self.clean -= usize::from(!was_edited);
-            self.uncommitted.push(logical);
+        let place = &mut page[within..within + C::BYTES];
+        let old = C::read(place);
+        if self.flags[logical] & UNCOMMITTED == 0 {
+            let committed = Box::new(*self.page_of(slot));
+            self.uncommitted.push((logical as u64, committed));
+            self.clean -= usize::from(self.flags[logical] & EDITED == 0);
+            self.flags[logical] |= EDITED | UNCOMMITTED;
         }
-        C::write(raw, &mut self.page_of(slot).bytes[within..within + C::BYTES]);
+        C::write(raw, &mut self.page_of(slot)[within..within + C::BYTES]);
         self.log.push(Overwritten { point, slot, old });
     }
 
     /// Puts other contents into a page, which counts as committed; returns the old ones.
     pub(super) fn replace(&mut self, logical: u64, bytes: Box<Page>) -> Result<Box<Page>, LayoutError> {
-        if self.index.get(to_usize(logical)?).is_none() {
-            let pages = self.index.len();
+        let at = to_usize(logical)?;
+        if at >= self.held.len() {
+            let pages = self.held.len();
             return Err(LayoutError::Usage(format!(
                 "page {logical} does not exist; the terrain has {pages}"
             )));
         }
-        let page = self.page_of(logical << Self::SHIFT);
-        let old = std::mem::replace(&mut page.bytes, bytes);
-        let was_edited = std::mem::replace(&mut page.edited, true);
-        self.clean -= usize::from(!was_edited);
+        let old = Box::new(std::mem::replace(self.page_of(logical << Self::SHIFT), *bytes));
+        self.clean -= usize::from(self.flags[at] & EDITED == 0);
+        self.flags[at] |= EDITED;
         self.check()?;
         Ok(old)
     }
@@ -196,17 +179,17 @@ impl<C: RecordCodec> Pages<C> {
     pub(super) fn take_back(&mut self) {
         while let Some(Overwritten { slot, old, .. }) = self.log.pop() {
             let within = Self::within(slot);
-            C::write(old, &mut self.page_of(slot).bytes[within..within + C::BYTES]);
+            C::write(old, &mut self.page_of(slot)[within..within + C::BYTES]);
         }
     }
 
     /// Between batches: puts back what the pages held at the last commit; returns what they held until now.
     pub(super) fn roll_back(&mut self) -> Vec<(u64, Box<Page>)> {
         let mut until_now = Vec::with_capacity(self.uncommitted.len());
-        for logical in std::mem::take(&mut self.uncommitted) {
-            let page = self.held.get_mut(self.index[logical as usize] as usize);
-            if let Some((page, committed)) = page.and_then(|p| p.committed.take().map(|c| (p, c))) {
-                until_now.push((logical, std::mem::replace(&mut page.bytes, committed)));
+        for (logical, committed) in std::mem::take(&mut self.uncommitted) {
+            self.flags[logical as usize] &= !UNCOMMITTED;
+            if let Some(page) = &mut self.held[logical as usize] {
+                until_now.push((logical, std::mem::replace(page, committed)));
             }
         }
         until_now
@@ -214,44 +197,49 @@ impl<C: RecordCodec> Pages<C> {
 
     /// Logical pages written to since the last commit, ascending.
     pub(super) fn uncommitted(&self) -> Vec<u64> {
-        let mut pages = self.uncommitted.clone();
+        let mut pages: Vec<u64> = self.uncommitted.iter().map(|(logical, _)| *logical).collect();
         pages.sort_unstable();
         pages
     }
 
     /// Everything so far counts as committed.
     pub(super) fn mark_committed(&mut self) {
-        for logical in std::mem::take(&mut self.uncommitted) {
-            if let Some(page) = self.held.get_mut(self.index[logical as usize] as usize) {
-                page.committed = None;
-            }
+        for (logical, _) in self.uncommitted.drain(..) {
+            self.flags[logical as usize] &= !UNCOMMITTED;
         }
     }
 
-    /// Whether anything was written to since the last commit.
+    /// Whether nothing was written to since the last commit.
     pub(super) fn is_committed(&self) -> bool {
         self.uncommitted.is_empty()
     }
 
     /// A page that was edited.
     pub(super) fn edited(&self, logical: u64) -> Option<&Page> {
-        let at = *self.index.get(usize::try_from(logical).ok()?)?;
-        self.held.get(at as usize).filter(|page| page.edited).map(|page| &*page.bytes)
+        let at = usize::try_from(logical).ok()?;
+        let is_edited = self.flags.get(at)? & EDITED != 0;
+        self.held[at].as_deref().filter(|_| is_edited)
     }
 
-    /// All pages that were edited, in no order.
+    /// All pages that were edited, ascending.
     pub(super) fn all_edited(&self) -> impl Iterator<Item = (u64, &Page)> {
-        self.held.iter().filter(|page| page.edited).map(|page| (page.logical, &*page.bytes))
+        (0..self.held.len() as u64).filter_map(|logical| Some((logical, self.edited(logical)?)))
     }
 
     /// Drops pages that can be read again.
     #[cold]
     fn drop_clean(&mut self) {
-        self.held.retain(|page| page.edited);
-        self.index.fill(AWAY);
-        for (at, page) in self.held.iter().enumerate() {
-            self.index[page.logical as usize] = at as u32;
-        }
+        let pages = self.held.iter_mut().zip(&self.flags);
+        pages.filter(|(_, flags)| **flags & EDITED == 0).for_each(|(page, _)| *page = None);
         self.clean = 0;
     }
+}
+
+/// A page of the terrain; an inert one if it cannot be read, which `failure` tells.
+#[cold]
+fn load(terrain: &Terrain, logical: u64, failure: &mut Option<LayoutError>) -> Box<Page> {
+    terrain.checked_page(logical).unwrap_or_else(|error| {
+        failure.get_or_insert(error);
+        crate::opening::inert_page(terrain.header().record_kind)
+    })
 }
