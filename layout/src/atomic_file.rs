@@ -3,12 +3,17 @@
 //! On Linux the bytes go to a file without a name, so that even a killed process leaves nothing behind; elsewhere, and on file
 //! systems without nameless files, to a temporary file beside the target that is removed when dropped.
 //! Publishing syncs the bytes, then renames over whatever had the name.
+//!
+//! **A nameless file cannot replace another.** Where the target exists it gets a name of its own first, `.NAME.*.terrasoar-new`, and is renamed at once. A process killed between
+//! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away.
 
 pub(crate) use crate::disk::read_at;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+#[cfg(target_os = "linux")]
+use std::time::Duration;
 
 /// A file being written.
 #[derive(Debug)]
@@ -111,14 +116,52 @@ fn name_file(file: &File, target: &Path) -> std::io::Result<()> {
     use rustix::fs::{AtFlags, CWD, linkat};
     use std::os::fd::AsRawFd;
     let link = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
-    // A link cannot replace a name, a rename can: link to a fresh name first where the target exists.
     if !target.exists() && linkat(CWD, &link, CWD, target, AtFlags::SYMLINK_FOLLOW).is_ok() {
         return Ok(());
     }
-    let folder = tempfile::Builder::new().prefix(".terrasoar-").tempdir_in(folder_of(target))?;
-    let name = folder.path().join("complete");
-    linkat(CWD, &link, CWD, &name, AtFlags::SYMLINK_FOLLOW)?;
-    std::fs::rename(&name, target)
+    remove_left(target, STALE);
+    tempfile::Builder::new()
+        .prefix(&prefix_before(target))
+        .suffix(SUFFIX_BEFORE)
+        .make_in(folder_of(target), |name| Ok(linkat(CWD, &link, CWD, name, AtFlags::SYMLINK_FOLLOW)?))?
+        .into_temp_path()
+        .persist(target)
+        .map_err(|e| e.error)
+}
+
+/// A name that is there for longer than the moment between two calls was left by a process that was killed in it.
+#[cfg(target_os = "linux")]
+const STALE: Duration = Duration::from_secs(10);
+/// How names end that files have for that moment.
+#[cfg(target_os = "linux")]
+const SUFFIX_BEFORE: &str = ".terrasoar-new";
+
+/// How they begin.
+#[cfg(target_os = "linux")]
+fn prefix_before(target: &Path) -> std::ffi::OsString {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(target.file_name().unwrap_or_default());
+    name.push(".");
+    name
+}
+
+/// Removes what was left beside `target`, if it has been there for as long as `stale`. Whatever does not go stays for another time.
+#[cfg(target_os = "linux")]
+fn remove_left(target: &Path, stale: Duration) {
+    use std::os::unix::ffi::OsStrExt;
+    use std::os::unix::fs::MetadataExt;
+    let prefix = prefix_before(target);
+    let is_left =
+        |name: &[u8]| name.starts_with(prefix.as_bytes()) && name.ends_with(SUFFIX_BEFORE.as_bytes());
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    for entry in std::fs::read_dir(folder_of(target)).into_iter().flatten().flatten() {
+        if is_left(entry.file_name().as_bytes())
+            // When it got its name, which nobody can set.
+            && entry.metadata().is_ok_and(|meta| meta.ctime() + stale.as_secs() as i64 <= now.as_secs() as i64)
+        {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 #[cfg(test)]
@@ -142,7 +185,41 @@ mod tests {
             assert_eq!(std::fs::read_to_string(&target).unwrap(), text);
             assert_eq!(names(), 1);
         }
+        #[cfg(target_os = "linux")]
+        {
+            // What a process leaves that was killed in the wrong moment, and what is none of that.
+            for name in [".a.x1y2.terrasoar-new", ".b.x1y2.terrasoar-new", ".a.x1y2"] {
+                std::fs::write(folder.path().join(name), "left").unwrap();
+            }
+            remove_left(&target, STALE);
+            assert_eq!(names(), 4);
+            remove_left(&target, Duration::ZERO);
+            assert_eq!(names(), 3);
+            assert!(!folder.path().join(".a.x1y2.terrasoar-new").exists());
+        }
         assert!(AtomicFile::create(folder.path()).is_err());
         assert!(AtomicFile::create(&folder.path().join("missing/x")).is_err());
+    }
+
+    /// Many publish to one name at once: none fails, and one complete file is there in the end.
+    #[test]
+    fn several_may_publish_to_one_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a");
+        std::thread::scope(|scope| {
+            for i in 0..4u8 {
+                let target = &target;
+                scope.spawn(move || {
+                    for _ in 0..50 {
+                        let file = AtomicFile::create(target).unwrap();
+                        SystemDisk.write_at(file.file(), &[i; 9000], 0).unwrap();
+                        file.publish().unwrap();
+                        let there = std::fs::read(target).unwrap();
+                        assert!(there.len() == 9000 && there.iter().all(|b| *b == there[0]));
+                    }
+                });
+            }
+        });
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -93,7 +93,7 @@ fn height(seed: u64, x: u32, y: u32) -> f64 {
     let rough = (h >> 40) % 40;
     let (fx, fy) = (f64::from(x), f64::from(y));
     let hill = 400.0 + 250.0 * ((fx * 0.11).sin() + (fy * 0.07).cos());
-    let plain = seed % 3 == 0 && (x / 16 + y / 16).is_multiple_of(3);
+    let plain = seed.is_multiple_of(3) && (x / 16 + y / 16).is_multiple_of(3);
     if plain { 300.0 } else { (hill + rough as f64).floor().clamp(0.0, 1000.0) }
 }
 
