@@ -158,7 +158,7 @@ fn rebuild_kind<C: RecordCodec>(
         code,
         fills: Some(&fill_of),
         tile: memory.tile,
-        file: &file,
+        file,
         disk,
         advance: &advance,
     }
