@@ -379,6 +379,11 @@ impl<'a, C: RecordCodec> Records<'a, C> {
         self.shape.has_voids
     }
 
+    /// Logical pages.
+    pub fn page_count(&self) -> usize {
+        self.pages.len()
+    }
+
     /// Bytes a record.
     pub const fn record_bytes(&self) -> usize {
         C::BYTES
