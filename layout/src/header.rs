@@ -71,6 +71,15 @@ impl ImageryPlace {
     }
 }
 
+/// Where the journal of a file that was edited begins (FORMAT.md, section 7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct History {
+    /// Journal page of the commit that led to the state the file is in; 0 for the state in which it was built.
+    pub commit_page: u32,
+    /// Journal page of the newest commit that redoing leads to.
+    pub tip_page: u32,
+}
+
 /// What a terrain file says about itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
@@ -102,6 +111,8 @@ pub struct Header {
     pub file_bytes: u64,
     /// Where its imagery lies, if it has any.
     pub imagery: Option<ImageryPlace>,
+    /// Where its journal begins, if it was edited.
+    pub history: Option<History>,
     /// Samples (east, north of the south-west sample) to reference-system coordinates, if known.
     pub sample_to_crs: Option<[f64; 6]>,
     /// EPSG code, if known.
@@ -140,7 +151,8 @@ impl Header {
         let p = &mut page[..];
         p[..8].copy_from_slice(&MAGIC);
         put_u16(p, 0x008, 1);
-        put_u16(p, 0x00a, u16::from(self.imagery.is_some()));
+        let minor = if self.history.is_some() { 2 } else { u16::from(self.imagery.is_some()) };
+        put_u16(p, 0x00a, minor);
         put_u32(p, 0x00c, PAGE_BYTES as u32);
         p[0x010] = self.grid.k() as u8;
         p[0x011] = match self.record_kind {
@@ -194,26 +206,26 @@ impl Header {
         p[0x0d5] = origin;
         put_f64(p, 0x0d8, latitude);
         put_f64(p, 0x0e0, self.body_radius_m.unwrap_or(0.0));
+        put_u32(p, 0x0e8, self.history.map_or(0, |history| history.commit_page));
+        put_u32(p, 0x0ec, self.history.map_or(0, |history| history.tip_page));
         put_text(p, 0x200, &self.crs_name);
         put_text(p, 0x300, &self.source);
-        let sum = checksum(&p[..0xffc]);
-        put_u32(p, 0xffc, sum);
+        seal(&mut page);
         page
     }
 
-    /// The page of an older header with what an append changes: version, generation, length, imagery. Fields that this version does not know stay
-    /// as they are.
+    /// The page of an older header with what appends change: version, generation, range of heights, directory, length, imagery, journal. Fields that this version does
+    /// not know stay as they are.
     pub(crate) fn amended(&self, older: &Page) -> Box<Page> {
         let mut page = Box::new(*older);
         let ours = self.to_page();
-        if get_u16(&page[..], 0x00a) == 0 {
+        if get_u16(&page[..], 0x00a) < get_u16(&ours[..], 0x00a) {
             page[0x00a..0x00c].copy_from_slice(&ours[0x00a..0x00c]);
         }
-        for range in [0x01c..0x020, 0x088..0x0a0] {
+        for range in [0x01c..0x020, 0x040..0x058, 0x070..0x07c, 0x080..0x084, 0x088..0x0a0, 0x0e8..0x0f0] {
             page[range.clone()].copy_from_slice(&ours[range]);
         }
-        let sum = checksum(&page[..0xffc]);
-        put_u32(&mut page[..], 0xffc, sum);
+        seal(&mut page);
         page
     }
 
@@ -223,18 +235,28 @@ impl Header {
     /// [`LayoutError::NotThisFormat`] without the magic, [`LayoutError::Unsupported`] for another version,
     /// [`LayoutError::Damaged`] for anything out of place.
     pub fn current(path: &Path, slot_a: &Page, slot_b: &Page) -> Result<Self, LayoutError> {
-        if slot_a[..8] != MAGIC && slot_b[..8] != MAGIC {
+        Self::current_as(path, slot_a, slot_b, MAGIC)
+    }
+
+    /// As [`Header::current`], of a file that begins with `magic`.
+    pub(crate) fn current_as(
+        path: &Path,
+        slot_a: &Page,
+        slot_b: &Page,
+        magic: [u8; 8],
+    ) -> Result<Self, LayoutError> {
+        if slot_a[..8] != magic && slot_b[..8] != magic {
             return Err(LayoutError::not_this_format(
                 path,
                 "this is not a terrain file (.iqt); make one from elevation data with `terrasoar build`",
             ));
         }
-        match (Self::parse(path, slot_a), Self::parse(path, slot_b)) {
+        match (Self::parse_as(path, slot_a, magic), Self::parse_as(path, slot_b, magic)) {
             (Ok(a), Ok(b)) => Ok(if b.generation > a.generation { b } else { a }),
             (Ok(a), Err(_)) => Ok(a),
             (Err(_), Ok(b)) => Ok(b),
             // A slot that was never written says nothing; the other one's problem is the news.
-            (Err(a), Err(b)) => Err(if slot_a[..8] == MAGIC { a } else { b }),
+            (Err(a), Err(b)) => Err(if slot_a[..8] == magic { a } else { b }),
         }
     }
 
@@ -243,11 +265,16 @@ impl Header {
     /// # Errors
     /// As for [`Header::current`].
     pub fn parse(path: &Path, page: &Page) -> Result<Self, LayoutError> {
+        Self::parse_as(path, page, MAGIC)
+    }
+
+    /// As [`Header::parse`], of a file that begins with `magic`.
+    pub(crate) fn parse_as(path: &Path, page: &Page, magic: [u8; 8]) -> Result<Self, LayoutError> {
         let p = &page[..];
         let damaged = |problem: String| {
             LayoutError::damaged(path, "header", format!("{problem}; build the file again or restore a copy"))
         };
-        if p[..8] != MAGIC {
+        if p[..8] != magic {
             return Err(damaged("the magic bytes are missing".into()));
         }
         let major = get_u16(p, 0x008);
@@ -331,6 +358,10 @@ impl Header {
             [0, 0] => None,
             [offset, bytes] => Some(ImageryPlace { offset, bytes }),
         };
+        let history = match [get_u32(p, 0x0e8), get_u32(p, 0x0ec)] {
+            [0, 0] => None,
+            [commit_page, tip_page] => Some(History { commit_page, tip_page }),
+        };
         let header = Self {
             grid,
             record_kind,
@@ -346,6 +377,7 @@ impl Header {
             root_checksum: get_u32(p, 0x080),
             file_bytes: get_u64(p, 0x088),
             imagery,
+            history,
             sample_to_crs: (map != [0.0; 6]).then_some(map),
             epsg: Some(get_u32(p, 0x0d0)).filter(|code| *code != 0),
             crs_unit,
@@ -370,6 +402,18 @@ impl Header {
                 && place.end() <= header.file_bytes
         };
         check(header.imagery.is_none_or(fits), "imagery")?;
+        let is_page =
+            |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * PAGE_BYTES as u64 <= header.file_bytes;
+        let has_pages = |history: History| {
+            is_page(history.tip_page) && (history.commit_page == 0 || is_page(history.commit_page))
+        };
+        check(header.history.is_none_or(has_pages), "commit_page or tip_page")?;
         Ok(header)
     }
+}
+
+/// Stores the checksum of a page that ends with one.
+pub(crate) fn seal(page: &mut Page) {
+    let sum = checksum(&page[..0xffc]);
+    put_u32(page, 0xffc, sum);
 }

@@ -3,7 +3,7 @@
 //! Invariant: every page number of the directory that is handed out lies inside the source as it was when it was opened. Cost: a read a leaf page.
 
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
-use crate::directory::{ENTRY_BYTES, Entry, leaf_page};
+use crate::directory::{ENTRY_BYTES, Entry};
 use crate::error::LayoutError;
 use crate::header::{Header, INERT_PAGE, LEAF_ENTRIES};
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
@@ -36,50 +36,74 @@ pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>)
     if length < header.file_bytes {
         return Err(truncated(path, length, Some(header.file_bytes)));
     }
-    let damaged = |place: String, problem: &str| {
-        LayoutError::damaged(path, place, format!("{problem}; restore a copy of the file or build it again"))
-    };
     check_inert_page(source, &header)?;
+    let entries = read_directory(source, &header)?;
+    Ok((header, entries))
+}
+
+/// The directory's root: where the leaves lie.
+pub(crate) fn read_root(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
     let root_bytes = to_usize(header.root_entries() * ENTRY_BYTES as u64)?;
     let mut root = vec![0; root_bytes];
-    source.read_at(u64::from(header.root_page) * page_bytes, &mut root)?;
+    source.read_at(u64::from(header.root_page) * PAGE_BYTES as u64, &mut root)?;
     if checksum(&root) != header.root_checksum {
-        return Err(damaged("directory root".into(), "the checksum does not match"));
+        return Err(damaged(source, "directory root".into(), "the checksum does not match"));
     }
+    Ok((0..header.root_entries() as usize).map(|i| Entry::read(&root, i)).collect())
+}
+
+/// The entries of leaf `i`, which the root says lies at `here`.
+pub(crate) fn read_leaf(
+    source: &dyn Source,
+    header: &Header,
+    i: usize,
+    here: Entry,
+    entries: &mut Vec<Entry>,
+) -> Result<(), LayoutError> {
+    let page_bytes = PAGE_BYTES as u64;
     let in_file = |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * page_bytes <= header.file_bytes;
-    let count = to_usize(header.record_pages())?;
-    let mut entries = Vec::with_capacity(count);
-    let mut leaf = leaf_page(&[]);
-    for i in 0..header.root_entries() as usize {
-        let here = Entry::read(&root, i);
-        let in_leaf = (count - i * LEAF_ENTRIES as usize).min(LEAF_ENTRIES as usize);
-        if !here.is_present() {
-            entries.resize(entries.len() + in_leaf, Entry::default());
-            continue;
+    let first = i * LEAF_ENTRIES as usize;
+    let in_leaf = (to_usize(header.record_pages())? - first).min(LEAF_ENTRIES as usize);
+    if !here.is_present() {
+        entries.resize(entries.len() + in_leaf, Entry::default());
+        return Ok(());
+    }
+    if !in_file(here.page) {
+        return Err(damaged(source, format!("directory leaf {i}"), "it lies outside the file"));
+    }
+    let mut leaf = [0; PAGE_BYTES];
+    source.read_at(u64::from(here.page) * page_bytes, &mut leaf)?;
+    if checksum(&leaf) != here.checksum {
+        return Err(damaged(source, format!("directory leaf {i}"), "the checksum does not match"));
+    }
+    for j in 0..in_leaf {
+        let entry = Entry::read(&leaf, j);
+        if entry.is_present() && !in_file(entry.page) {
+            let place = format!("directory entry of record page {}", first + j);
+            return Err(damaged(source, place, "the page lies outside the file"));
         }
-        if !in_file(here.page) {
-            return Err(damaged(format!("directory leaf {i}"), "it lies outside the file"));
-        }
-        source.read_at(u64::from(here.page) * page_bytes, &mut leaf)?;
-        if checksum(&leaf) != here.checksum {
-            return Err(damaged(format!("directory leaf {i}"), "the checksum does not match"));
-        }
-        for j in 0..in_leaf {
-            let entry = Entry::read(&leaf, j);
-            if entry.is_present() && !in_file(entry.page) {
-                return Err(damaged(
-                    format!("directory entry of record page {}", entries.len()),
-                    "the page lies outside the file",
-                ));
-            }
-            entries.push(entry);
-        }
+        entries.push(entry);
+    }
+    Ok(())
+}
+
+/// The whole directory that `header` names, checked.
+pub(crate) fn read_directory(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
+    let mut entries = Vec::with_capacity(to_usize(header.record_pages())?);
+    for (i, here) in read_root(source, header)?.into_iter().enumerate() {
+        read_leaf(source, header, i, here, &mut entries)?;
     }
     let stored = entries.iter().filter(|e| e.is_present()).count() as u64;
     if stored != header.stored_pages {
-        return Err(damaged("directory".into(), "it holds another number of pages than the header says"));
+        let problem = "it holds another number of pages than the header says";
+        return Err(damaged(source, "directory".into(), problem));
     }
-    Ok((header, entries))
+    Ok(entries)
+}
+
+fn damaged(source: &dyn Source, place: String, problem: &str) -> LayoutError {
+    let problem = format!("{problem}; restore a copy of the file or build it again");
+    LayoutError::damaged(source.path(), place, problem)
 }
 
 fn check_inert_page(source: &dyn Source, header: &Header) -> Result<(), LayoutError> {

@@ -10,7 +10,8 @@ use crate::directory::Entry;
 use crate::error::LayoutError;
 use crate::grid::{Grid, GridPoint};
 use crate::header::{Header, INERT_PAGE};
-use crate::opening::read_structure;
+use crate::journal::Commit;
+use crate::opening::{read_directory, read_structure};
 use crate::order::slot_of;
 use crate::pool::PagePool;
 use crate::prefetch::prefetch;
@@ -44,9 +45,8 @@ impl Terrain {
     /// # Errors
     /// As FORMAT.md, section 6: not a terrain file, another version, truncated or damaged; or I/O.
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
-        let file = PreadSource::open(path)?;
-        let (header, entries) = read_structure(&file)?;
-        Ok(Self { source: Box::new(MapSource::map(file)?), header, entries, pages: OnceLock::new() })
+        let (file, header, entries) = open_settled(path)?;
+        Ok(Self::of(Box::new(MapSource::map(file)?), header, entries))
     }
 
     /// Opens the file at `path` without mapping it: for [`Terrain::pool`], whose pages are read. Files that others may truncate raise no signal then.
@@ -54,7 +54,48 @@ impl Terrain {
     /// # Errors
     /// As [`Terrain::open`].
     pub fn open_unmapped(path: &Path) -> Result<Self, LayoutError> {
-        Self::from_source(Box::new(PreadSource::open(path)?))
+        let (file, header, entries) = open_settled(path)?;
+        Ok(Self::of(Box::new(file), header, entries))
+    }
+
+    /// Opens the file at `path` as it was before all edits that its journal knows; as it is, if it has none. Mapped.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`]; a damaged journal.
+    pub fn open_original(path: &Path) -> Result<Self, LayoutError> {
+        Self::open(path)?.into_original()
+    }
+
+    /// This terrain before all edits that its journal knows.
+    ///
+    /// # Errors
+    /// I/O; a damaged journal or directory of that time.
+    pub fn into_original(self) -> Result<Self, LayoutError> {
+        let Some(history) = self.header.history else { return Ok(self) };
+        let tip = Commit::read(&*self.source, &self.header, history.tip_page)?;
+        let header = Header { history: None, ..tip.original.put_into(&self.header) };
+        let entries = read_directory(&*self.source, &header)?;
+        Ok(Self::of(self.source, header, entries))
+    }
+
+    /// Opens the terrain file `base` with the edits in `overlay` (see [`EditSession::open_overlay`](crate::edit::EditSession::open_overlay)). Both are mapped.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`] of either; [`LayoutError::Usage`] if the overlay belongs to another terrain, or to another state of this one.
+    pub fn open_with_overlay(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
+        crate::edit::open_layers(base, overlay, true)
+    }
+
+    /// As [`Terrain::open_with_overlay`], without maps.
+    ///
+    /// # Errors
+    /// As [`Terrain::open_with_overlay`].
+    pub fn open_with_overlay_unmapped(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
+        crate::edit::open_layers(base, overlay, false)
+    }
+
+    pub(crate) fn of(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Self {
+        Self { source, header, entries, pages: OnceLock::new() }
     }
 
     /// Opens any source.
@@ -63,7 +104,7 @@ impl Terrain {
     /// As [`Terrain::open`].
     pub fn from_source(source: Box<dyn Source>) -> Result<Self, LayoutError> {
         let (header, entries) = read_structure(&*source)?;
-        Ok(Self { source, header, entries, pages: OnceLock::new() })
+        Ok(Self::of(source, header, entries))
     }
 
     fn pages(&self) -> &[u32] {
@@ -195,7 +236,8 @@ impl Terrain {
 
     /// The records as refinement reads them. `None` if the source cannot lend its bytes as one slice.
     pub fn records(&self) -> Option<AnyRecords<'_>> {
-        let bytes = self.source.bytes()?;
+        let bytes =
+            Slices { first: self.source.bytes()?, behind: self.source.bytes_behind().unwrap_or_default() };
         Some(match self.codec() {
             ByKind::Compact(codec) => ByKind::Compact(Records::new(self, bytes, codec)),
             ByKind::Exact8(codec) => ByKind::Exact8(Records::new(self, bytes, codec)),
@@ -227,6 +269,19 @@ impl Terrain {
     fn shape<C>(&self, codec: C) -> RecordShape<C> {
         let Header { grid, height_range_m, has_voids, .. } = self.header;
         RecordShape { codec, grid, height_range_m, has_voids }
+    }
+}
+
+/// Opens and checks a file that others may append to at this moment.
+fn open_settled(path: &Path) -> Result<(PreadSource, Header, Vec<Entry>), LayoutError> {
+    loop {
+        let file = PreadSource::open(path)?;
+        match read_structure(&file) {
+            Ok((header, entries)) => return Ok((file, header, entries)),
+            // The header is newer than the length: whoever appends is quicker.
+            Err(LayoutError::Damaged { .. }) if file.has_grown() => {}
+            Err(error) => return Err(error),
+        }
     }
 }
 
@@ -265,10 +320,37 @@ macro_rules! with_records {
     };
 }
 
+/// The bytes of a source: one slice, or two.
+#[derive(Debug, Clone, Copy)]
+struct Slices<'a> {
+    first: &'a [u8],
+    /// Offset of the second, and it.
+    behind: (u64, &'a [u8]),
+}
+
+impl Slices<'_> {
+    /// The record at an offset. A second slice costs the first nothing: it takes the place of the end of a check of bounds.
+    #[inline(always)]
+    fn record<C: RecordCodec>(&self, at: usize) -> C::Raw {
+        match self.first.get(at..at + C::BYTES) {
+            Some(bytes) => C::read(bytes),
+            None => self.record_behind::<C>(at),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn record_behind<C: RecordCodec>(&self, at: usize) -> C::Raw {
+        let (start, bytes) = self.behind;
+        let at = at - start as usize;
+        C::read(&bytes[at..at + C::BYTES])
+    }
+}
+
 /// The records of a terrain, of kind `C`: the hot path from slot to vertex.
 #[derive(Debug, Clone)]
 pub struct Records<'a, C: RecordCodec> {
-    bytes: &'a [u8],
+    bytes: Slices<'a>,
     pages: &'a [u32],
     shape: RecordShape<C>,
 }
@@ -277,7 +359,7 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     /// Binary logarithm of the records a page.
     const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
 
-    fn new(terrain: &'a Terrain, bytes: &'a [u8], codec: C) -> Self {
+    fn new(terrain: &'a Terrain, bytes: Slices<'a>, codec: C) -> Self {
         Self { bytes, pages: terrain.pages(), shape: terrain.shape(codec) }
     }
 
@@ -316,8 +398,7 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     pub fn raw(&self, slot: u64) -> C::Raw {
         let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize;
         let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
-        let at = page * PAGE_BYTES + within;
-        C::read(&self.bytes[at..at + C::BYTES])
+        self.bytes.record::<C>(page * PAGE_BYTES + within)
     }
 
     /// Asks memory for the record at `slot`. A hint: reads nothing, and does nothing for a slot past the last page.
@@ -325,7 +406,7 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     pub fn prefetch(&self, slot: u64) {
         if let Some(page) = self.pages.get((slot >> Self::PAGE_SHIFT) as usize) {
             let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
-            prefetch(self.bytes, *page as usize * PAGE_BYTES + within);
+            prefetch(self.bytes.first, *page as usize * PAGE_BYTES + within);
         }
     }
 

@@ -5,7 +5,8 @@ use crate::directory::{ENTRY_BYTES, Entry};
 use crate::error::LayoutError;
 use crate::terrain::Terrain;
 
-/// Bytes of the file that neither header, directory nor imagery lead to, bytes behind its counted end included. Reads the directory's root.
+/// Bytes of the file that neither header, directory nor imagery lead to, bytes behind its counted end included: what undoing and redoing would need, if the file was
+/// edited, and what nobody needs any more. Reads the directory's root.
 ///
 /// # Errors
 /// I/O.
@@ -16,10 +17,7 @@ pub fn unused_bytes(terrain: &Terrain) -> Result<u64, LayoutError> {
     let mut root = vec![0; to_usize(root_bytes)?];
     terrain.source().read_at(u64::from(header.root_page) * page, &mut root)?;
     let leaves = (0..header.root_entries() as usize).filter(|i| Entry::read(&root, *i).is_present()).count();
-    // The root ends where its entries do when it ends the file, as builds leave it.
-    let root_end = u64::from(header.root_page) * page + root_bytes;
-    let root_used =
-        if root_end == header.file_bytes { root_bytes } else { root_bytes.next_multiple_of(page) };
+    let root_used = root_bytes.next_multiple_of(page);
     let imagery = header.imagery.map_or(0, |place| place.bytes);
     let used = (3 + header.stored_pages + leaves as u64) * page + root_used + imagery;
     Ok(terrain.source().byte_count().saturating_sub(used))

@@ -4,7 +4,8 @@
 //! Opening checks header, directory and inert page; this checks the rest, in three passes. `structure` looks at page numbers,
 //! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children.
 //! Cost: each page is read some ten times, never more than a few hundred kilobytes a thread are held. Not covered, for nothing depends
-//! on them: the header slot that is not current, the bytes after the directory root's last entry, pages that no directory reaches.
+//! on them: the header slot that is not current, the bytes after the directory root's last entry, pages that no directory reaches. Of the states
+//! that an edited file can go back to, the journal is read and nothing else.
 //!
 //! Invariant: a report without problems means that every promise refinement relies on holds for the bytes as they were read.
 
@@ -120,7 +121,14 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
         }
     };
     let (tiles, pictures) = imagery::check(terrain, progress)?;
-    let Findings { listed, count } = findings.merge(wrong_sums).merge(records).merge(pictures);
+    let mut journal = Findings::default();
+    match crate::edit::history(terrain) {
+        Ok(_) => {}
+        Err(LayoutError::Damaged { place, problem, .. }) => journal.add(place, problem),
+        Err(other) => return Err(other),
+    }
+    let findings = findings.merge(wrong_sums).merge(records).merge(pictures);
+    let Findings { listed, count } = findings.merge(journal);
     Ok(VerifyReport {
         pages_checked: present.len() as u64,
         vertices_checked: vertices,

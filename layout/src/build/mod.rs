@@ -157,6 +157,7 @@ pub fn build_on(
         root_checksum: 0,
         file_bytes: 0,
         imagery: None,
+        history: None,
         sample_to_crs: spacing::sample_to_crs(info),
         epsg: info.georeference.epsg,
         crs_unit: info.georeference.unit,

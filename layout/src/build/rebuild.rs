@@ -134,6 +134,7 @@ fn rebuild_kind<C: RecordCodec>(
         generation: 1,
         height_range_m: stats.range.map(|raw| code.metres(code.code(raw))),
         imagery: None,
+        history: None,
         ..old.clone()
     };
     progress.stage("building", samples);

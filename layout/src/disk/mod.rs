@@ -14,7 +14,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Result};
 
 /// Calls on files that are being written.
-pub trait Disk: Sync {
+pub trait Disk: Sync + std::fmt::Debug {
     /// Writes all of `bytes` at `offset`.
     ///
     /// # Errors

@@ -8,38 +8,19 @@
 use super::pyramid::MadeTile;
 use super::section::{Section, TileEntry};
 use super::shape::{ImageryShape, TileId};
-use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
+use crate::bytes::{PAGE_BYTES, checksum, to_usize};
 use crate::disk::Disk;
 use crate::error::LayoutError;
-use crate::header::{Header, ImageryPlace};
+use crate::header::{Header, History, ImageryPlace};
+use crate::journal::{Commit, State};
+use crate::slots::Slots;
 use std::fs::File;
 use std::path::Path;
 
 const PAGE: u64 = PAGE_BYTES as u64;
 
-/// The two header slots, and which counts.
-pub(super) struct Slots {
-    pub(super) current: Box<Page>,
-    /// 0 or 1.
-    pub(super) current_slot: u64,
-    pub(super) header: Header,
-}
-
-impl Slots {
-    pub(super) fn of(path: &Path, pages: [Box<Page>; 2]) -> Result<Self, LayoutError> {
-        let header = Header::current(path, &pages[0], &pages[1])?;
-        let [a, b] = pages;
-        let is_b = Header::parse(path, &b).is_ok_and(|b| b == header);
-        Ok(if is_b && !Header::parse(path, &a).is_ok_and(|a| a == header) {
-            Self { current: b, current_slot: 1, header }
-        } else {
-            Self { current: a, current_slot: 0, header }
-        })
-    }
-}
-
 /// An append under way.
-pub(super) struct Append<'t> {
+pub(crate) struct Append<'t> {
     path: &'t Path,
     disk: &'t dyn Disk,
     file: &'t File,
@@ -55,7 +36,7 @@ pub(super) struct Append<'t> {
 
 impl<'t> Append<'t> {
     /// Begins behind the file's current end. Nothing is written yet.
-    pub(super) fn begin(
+    pub(crate) fn begin(
         path: &'t Path,
         disk: &'t dyn Disk,
         file: &'t File,
@@ -92,7 +73,7 @@ impl<'t> Append<'t> {
     }
 
     /// Writes a tile behind the last one.
-    pub(super) fn put(&mut self, tile: &MadeTile) -> Result<(), LayoutError> {
+    pub(crate) fn put(&mut self, tile: &MadeTile) -> Result<(), LayoutError> {
         let page = u32::try_from(self.next / PAGE).map_err(|_| {
             LayoutError::Usage(format!(
                 "{}: with this imagery the file would be longer than 16 TiB",
@@ -118,29 +99,60 @@ impl<'t> Append<'t> {
     }
 
     /// Tiles written so far.
-    pub(super) fn stored_tiles(&self) -> u64 {
+    pub(crate) fn stored_tiles(&self) -> u64 {
         self.stored_tiles
     }
 
     /// Writes directory and first page, syncs, and makes the section the file's imagery. `may_commit` is asked right before the header.
-    pub(super) fn commit(
+    pub(crate) fn commit(
         self,
         source: &str,
         may_commit: impl FnOnce() -> Result<(), LayoutError>,
     ) -> Result<Header, LayoutError> {
-        self.write_section(source)?;
-        may_commit()?;
+        let old = &self.slots.header;
         let place = ImageryPlace { offset: self.begin, bytes: self.next - self.begin };
-        let header = Header {
-            generation: self.slots.header.generation.saturating_add(1),
+        let mut header = Header {
+            generation: old.generation.saturating_add(1),
             file_bytes: place.end(),
             imagery: Some(place),
-            ..self.slots.header.clone()
+            ..old.clone()
         };
+        // In a file that was edited, a picture can be undone as an edit can.
+        if let Some(commit) = self.journal_page(State::of(&header))? {
+            let page = (place.end() / PAGE) as u32;
+            self.write(&commit.to_page()[..], place.end())?;
+            header.history = Some(History { commit_page: page, tip_page: page });
+            header.file_bytes += PAGE;
+        }
+        self.write_section(source)?;
+        may_commit()?;
         let page = header.amended(&self.slots.current);
-        self.write(&page[..], (1 - self.slots.current_slot) * PAGE)?;
+        self.write(&page[..], self.slots.next_offset())?;
         self.sync()?;
         Ok(header)
+    }
+
+    /// What the journal is to say of the picture, if the file has a journal.
+    fn journal_page(&self, state: State) -> Result<Option<Commit>, LayoutError> {
+        let old = &self.slots.header;
+        let Some(history) = old.history else { return Ok(None) };
+        let read = |page: u32| -> Result<Commit, LayoutError> {
+            let mut bytes = Box::new([0; PAGE_BYTES]);
+            self.disk
+                .read_at(self.file, &mut bytes[..], u64::from(page) * PAGE)
+                .map_err(|e| LayoutError::io(self.path, "cannot read the file's journal", e))?;
+            Commit::parse(self.path, old, page, &bytes)
+        };
+        let original = read(history.tip_page)?.original;
+        let sequence = if history.commit_page > 0 { read(history.commit_page)?.sequence } else { 0 };
+        Ok(Some(Commit {
+            parent: history.commit_page,
+            sequence: sequence.saturating_add(1),
+            edits: 0,
+            state,
+            original,
+            label: "drape".into(),
+        }))
     }
 
     /// Writes directory and first page behind which the tiles lie, and brings all to the disk.

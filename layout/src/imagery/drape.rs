@@ -4,19 +4,19 @@
 //! ([`super::pyramid`]) while the next are read, and tiles are appended as they are made ([`super::append`]). Equal input gives
 //! equal bytes, whatever the number of threads. Cost: each image is read once, each tile written once, nothing is spooled.
 
-use super::append::{Append, Slots};
+use super::append::Append;
 use super::encode::check_format;
-use super::lock::{WriteLock, is_named};
 use super::mosaic::Mosaic;
 use super::place::{Extent, PlaceOrigin};
 use super::pyramid::{Pyramid, STEP_ROWS, memory_bytes};
 use super::shape::{ImageryShape, TileFormat};
 use super::source::{ImageSource, RowReader};
 use crate::build::BuildProgress;
-use crate::bytes::{PAGE_BYTES, Page};
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::header::Header;
+use crate::lock::{WriteLock, is_named};
+use crate::slots::Slots;
 use crate::source::{PreadSource, Source};
 use crate::terrain::Terrain;
 use std::cell::Cell;
@@ -113,7 +113,7 @@ fn append_all(
     let images: Vec<&dyn ImageSource> = images.iter().map(|image| &**image).collect();
     check_format(options.format)?;
     let path = source.path();
-    let slots = read_slots(source)?;
+    let slots = Slots::read(source, 0)?;
     let mosaic = Mosaic::new(&images, &slots.header, options.extent)?;
     let shape = mosaic.shape(options.format);
     let needed = memory_bytes(&shape) + mosaic.memory_bytes();
@@ -160,15 +160,6 @@ fn append_all(
     progress.stage("writing to disk", 0);
     let header = append.commit(&mosaic.format(), may_commit)?;
     Ok(Draped { header, shape, stored_tiles, place: mosaic.place() })
-}
-
-fn read_slots(source: &dyn Source) -> Result<Slots, LayoutError> {
-    let page = |number: u64| -> Result<Box<Page>, LayoutError> {
-        let mut page = Box::new([0; PAGE_BYTES]);
-        source.read_at(number * PAGE_BYTES as u64, &mut page[..])?;
-        Ok(page)
-    };
-    Slots::of(source.path(), [page(0)?, page(1)?])
 }
 
 #[cfg(test)]

@@ -23,10 +23,10 @@ const TILES_AT_ONCE: u32 = 32;
 
 /// A tile and what the directory says about it; its page is not known yet.
 #[derive(Debug)]
-pub(super) struct MadeTile {
-    pub(super) id: TileId,
-    pub(super) entry: TileEntry,
-    pub(super) bytes: Vec<u8>,
+pub(crate) struct MadeTile {
+    pub(crate) id: TileId,
+    pub(crate) entry: TileEntry,
+    pub(crate) bytes: Vec<u8>,
 }
 
 /// Bytes that the pyramid of an image takes in memory.

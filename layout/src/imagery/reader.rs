@@ -95,18 +95,32 @@ impl Imagery {
         id: TileId,
         texels: &mut Vec<u8>,
     ) -> Result<bool, LayoutError> {
-        texels.clear();
-        let Some(entry) = self.entry(id) else { return Ok(false) };
         let format = self.section.shape.format;
+        texels.clear();
         texels.reserve(format.tile_bytes());
+        let is_there = self.read_stored(terrain, id, texels)?.is_some();
+        if is_there {
+            widen(format, self.section.shape.stored_texels(id), texels);
+        }
+        Ok(is_there)
+    }
+
+    /// Fills `texels` with a tile as it is stored, and returns its entry; `None` where there is no tile.
+    pub(crate) fn read_stored(
+        &self,
+        terrain: &Terrain,
+        id: TileId,
+        texels: &mut Vec<u8>,
+    ) -> Result<Option<TileEntry>, LayoutError> {
+        texels.clear();
+        let Some(entry) = self.entry(id) else { return Ok(None) };
         texels.resize(entry.bytes as usize, 0);
         terrain.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, texels)?;
         if checksum(texels) != entry.checksum {
             let place = format!("imagery {} (file page {})", tile_name(id), entry.page);
             return Err(damaged(terrain.path(), place, "the checksum does not match"));
         }
-        widen(format, self.section.shape.stored_texels(id), texels);
-        Ok(true)
+        Ok(Some(entry))
     }
 
     /// First page of a tile in the file.

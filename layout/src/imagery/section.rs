@@ -19,7 +19,7 @@ pub(super) const TILE_ENTRY_BYTES: usize = 16;
 
 /// Where a tile lies, and what it is like from afar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct TileEntry {
+pub(crate) struct TileEntry {
     /// First page in the file; 0 if absent.
     pub(super) page: u32,
     /// Bytes stored; 0 if absent.

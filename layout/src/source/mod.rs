@@ -4,6 +4,7 @@
 //! A source's length is fixed when it is opened. A source may lend its bytes as one slice (a map, memory); the refinement's hot path
 //! needs that, everything else reads.
 
+mod layered;
 mod map;
 mod memory;
 mod pread;
@@ -12,6 +13,7 @@ mod testing;
 #[cfg(target_os = "linux")]
 mod uring;
 
+pub(crate) use layered::{LayeredSource, split_of};
 pub use map::{MapSource, resident_bytes};
 pub use memory::MemorySource;
 pub use pread::PreadSource;
@@ -68,8 +70,13 @@ pub trait Source: Send + Sync {
         1
     }
 
-    /// All bytes, if the source has them in its address space.
+    /// All bytes, if the source has them in its address space: in one slice, or from the start up to those that [`Source::bytes_behind`] has.
     fn bytes(&self) -> Option<&[u8]> {
+        None
+    }
+
+    /// Bytes that follow in another slice, and the offset of the first of them; `None` for all sources but those of two files.
+    fn bytes_behind(&self) -> Option<(u64, &[u8])> {
         None
     }
 }

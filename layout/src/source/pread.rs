@@ -50,6 +50,11 @@ impl PreadSource {
     pub(super) fn file(&self) -> &File {
         &self.file
     }
+
+    /// Whether the file is longer now than when it was opened.
+    pub(crate) fn has_grown(&self) -> bool {
+        self.file.metadata().is_ok_and(|meta| meta.len() > self.byte_count)
+    }
 }
 
 impl Source for PreadSource {

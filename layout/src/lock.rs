@@ -10,14 +10,14 @@ use std::path::{Path, PathBuf};
 
 /// The right to write to a terrain file.
 #[derive(Debug)]
-pub(super) struct WriteLock {
+pub(crate) struct WriteLock {
     path: PathBuf,
     _file: File,
 }
 
 impl WriteLock {
     /// Takes the lock of the terrain file `target`.
-    pub(super) fn take(target: &Path) -> Result<Self, LayoutError> {
+    pub(crate) fn take(target: &Path) -> Result<Self, LayoutError> {
         let mut name = target.as_os_str().to_owned();
         name.push(".lock");
         let path = PathBuf::from(name);
@@ -52,7 +52,7 @@ impl Drop for WriteLock {
 }
 
 /// Whether `path` still names the opened file.
-pub(super) fn is_named(file: &File, path: &Path) -> bool {
+pub(crate) fn is_named(file: &File, path: &Path) -> bool {
     #[cfg(unix)]
     {
         use std::os::unix::fs::MetadataExt;

@@ -1,0 +1,476 @@
+//! Edits of a file, in memory first and on the disk batch by batch, with undo and redo.
+//!
+//! [`EditSession::apply`] changes the ground at once, in memory; [`EditSession::commit`] makes all since the last one durable, as one batch. Undoing and redoing are commits of
+//! their own: a header that leads to a state that is in the file already. One session at a time has a file; readers need not stop.
+
+use super::commit::{Attempted, CommitJob, Content, Directory, Place};
+use super::overlay::{empty_overlay, overlay_slots};
+use super::{Changes, Edit, Editor, HeightWindow};
+use crate::bytes::{PAGE_BYTES, Page, checksum};
+use crate::directory::Entry;
+use crate::disk::{Disk, SystemDisk};
+use crate::error::LayoutError;
+use crate::header::{Header, History};
+use crate::journal::{Commit, State};
+use crate::lock::WriteLock;
+use crate::opening::{inert_page, read_directory, read_leaf, read_root, read_structure};
+use crate::slots::Slots;
+use crate::source::{LayeredSource, PreadSource, Source};
+use crate::terrain::Terrain;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What became of a commit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Committed {
+    /// Record pages written.
+    pub pages: u64,
+    /// Bytes by which the file grew.
+    pub bytes: u64,
+}
+
+/// A commit of a file's history.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HistoryEntry {
+    /// 1 for the first.
+    pub sequence: u32,
+    /// Edits in it.
+    pub edits: u64,
+    /// What it was, in words.
+    pub label: String,
+    /// Whether the file is in the state that it led to.
+    pub is_current: bool,
+}
+
+/// The right to edit a terrain file, or an overlay of one, and its edits so far.
+#[derive(Debug)]
+pub struct EditSession {
+    editor: Editor,
+    path: PathBuf,
+    file: File,
+    /// Offset of the file's first byte.
+    start: u64,
+    slots: Slots,
+    directory: Directory,
+    original: State,
+    /// Pages whose edits a commit took that has not succeeded.
+    unwritten: BTreeSet<u64>,
+    attempted: Attempted,
+    edits: u64,
+    has_original: bool,
+    is_committing: bool,
+    disk: Arc<dyn Disk + Send>,
+    _lock: WriteLock,
+}
+
+impl EditSession {
+    /// Opens the terrain file at `path` for editing.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`]; [`LayoutError::Usage`] while another program writes to it; [`LayoutError::Io`] if it cannot be written to.
+    pub fn open(path: &Path) -> Result<Self, LayoutError> {
+        Self::open_on(Arc::new(SystemDisk), path)
+    }
+
+    /// As [`EditSession::open`], with all writing done by `disk`.
+    ///
+    /// # Errors
+    /// As [`EditSession::open`].
+    pub fn open_on(disk: Arc<dyn Disk + Send>, path: &Path) -> Result<Self, LayoutError> {
+        let lock = WriteLock::take(path)?;
+        let file = open_for_writing(path)?;
+        let source = Box::new(over(path, &file)?);
+        let (header, entries) = read_structure(&*source)?;
+        let slots = Slots::read(&*source, 0)?;
+        let terrain = Terrain::of(source, header, entries);
+        Self::new(disk, terrain, path, file, 0, slots, lock)
+    }
+
+    /// Opens the terrain file `base`, which is not written to, with edits in the file `overlay`, which is made if it does not exist.
+    ///
+    /// # Errors
+    /// As [`EditSession::open`]; [`LayoutError::Usage`] if the overlay belongs to another terrain, or to another state of this one.
+    pub fn open_overlay(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
+        Self::open_overlay_on(Arc::new(SystemDisk), base, overlay)
+    }
+
+    /// As [`EditSession::open_overlay`], with all writing but the overlay's beginning done by `disk`.
+    ///
+    /// # Errors
+    /// As [`EditSession::open_overlay`].
+    pub fn open_overlay_on(
+        disk: Arc<dyn Disk + Send>,
+        base: &Path,
+        overlay: &Path,
+    ) -> Result<Self, LayoutError> {
+        let lock = WriteLock::take(overlay)?;
+        let base_file = PreadSource::open(base)?;
+        let (base_header, _) = read_structure(&base_file)?;
+        if !overlay.exists() {
+            let name = base.file_name().unwrap_or_default().to_string_lossy();
+            let new = crate::atomic_file::AtomicFile::create(overlay)?;
+            let bytes = empty_overlay(&Slots::read(&base_file, 0)?, &name);
+            SystemDisk
+                .write_at(new.file(), &bytes, 0)
+                .map_err(|e| LayoutError::io(overlay, "cannot write the overlay", e))?;
+            new.publish()?;
+        }
+        let file = open_for_writing(overlay)?;
+        let (slots, start) = overlay_slots(&base_file, &over(overlay, &file)?)?;
+        let source = Box::new(LayeredSource::new(
+            Box::new(base_file),
+            base_header.file_bytes,
+            Box::new(over(overlay, &file)?),
+        ));
+        let entries = read_directory(&*source, &slots.header)?;
+        let terrain = Terrain::of(source, slots.header.clone(), entries);
+        Self::new(disk, terrain, overlay, file, start, slots, lock)
+    }
+
+    fn new(
+        disk: Arc<dyn Disk + Send>,
+        terrain: Terrain,
+        path: &Path,
+        file: File,
+        start: u64,
+        slots: Slots,
+        lock: WriteLock,
+    ) -> Result<Self, LayoutError> {
+        let header = terrain.header().clone();
+        let directory =
+            Directory { entries: terrain.entries().to_vec(), root: read_root(terrain.source(), &header)? };
+        let original = match header.history {
+            Some(history) => Commit::read(terrain.source(), &header, history.tip_page)?.original,
+            None => State::of(&header),
+        };
+        Ok(Self {
+            editor: Editor::new(Arc::new(terrain)),
+            path: path.to_owned(),
+            file,
+            start,
+            slots,
+            directory,
+            original,
+            unwritten: BTreeSet::new(),
+            attempted: Attempted::default(),
+            edits: 0,
+            has_original: false,
+            is_committing: false,
+            disk,
+            _lock: lock,
+        })
+    }
+
+    /// The ground with its edits.
+    pub fn editor(&self) -> &Editor {
+        &self.editor
+    }
+
+    /// The ground with its edits, for looking at heights. Edits made here instead of by [`EditSession::apply`] are committed as well.
+    pub fn editor_mut(&mut self) -> &mut Editor {
+        &mut self.editor
+    }
+
+    /// The header as the file has it.
+    pub fn header(&self) -> &Header {
+        &self.slots.header
+    }
+
+    fn source(&self) -> &dyn Source {
+        self.editor.terrain().source()
+    }
+
+    /// Applies edits in memory, all of them or, on an error, none.
+    ///
+    /// # Errors
+    /// As [`Editor::apply`]; a damaged journal, if an edit restores what was there before.
+    pub fn apply(&mut self, edits: &[Edit]) -> Result<Changes, LayoutError> {
+        if !self.has_original && self.slots.header.history.is_some() && edits.iter().any(Edit::needs_original)
+        {
+            let header = Header { history: None, ..self.original.put_into(&self.slots.header) };
+            let entries = read_directory(self.source(), &header)?;
+            let original =
+                Terrain::of(Box::new(Borrowed(Arc::clone(self.editor.terrain()))), header, entries);
+            self.editor.set_original(Arc::new(original));
+            self.has_original = true;
+        }
+        let changes = self.editor.apply(edits)?;
+        self.edits += edits.len() as u64;
+        Ok(changes)
+    }
+
+    /// Sets heights in memory, as [`Editor::set_heights`] does.
+    ///
+    /// # Errors
+    /// As [`Editor::set_heights`].
+    pub fn set_heights(&mut self, window: &HeightWindow) -> Result<Changes, LayoutError> {
+        let changes = self.editor.set_heights(window)?;
+        self.edits += 1;
+        Ok(changes)
+    }
+
+    /// Takes back what was applied since the last commit.
+    pub fn discard(&mut self) -> Changes {
+        self.edits = 0;
+        self.editor.roll_back()
+    }
+
+    /// Whether everything applied so far is in the file.
+    pub fn is_committed(&self) -> bool {
+        self.unwritten.is_empty() && self.editor.uncommitted().is_empty()
+    }
+
+    /// Makes everything since the last commit durable, as one batch that `label` describes. Nothing is written if nothing changed.
+    ///
+    /// # Errors
+    /// As [`CommitJob::run`]; nothing is lost in memory, and the commit may be tried again.
+    pub fn commit(&mut self, label: &str) -> Result<Committed, LayoutError> {
+        let Some(job) = self.prepare_commit(label)? else { return Ok(Committed::default()) };
+        let done = job.run_on(&*self.disk);
+        self.finish_commit(job, done)
+    }
+
+    /// What [`EditSession::commit`] would write, to be written on another thread; `None` if there is nothing. Edits go on meanwhile;
+    /// [`EditSession::finish_commit`] is to be called with the outcome before the next commit.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] while another commit is under way, and for a file that would become too long.
+    pub fn prepare_commit(&mut self, label: &str) -> Result<Option<CommitJob>, LayoutError> {
+        self.check_idle()?;
+        let mut pages = self.unwritten.clone();
+        pages.extend(self.editor.uncommitted());
+        if pages.is_empty() {
+            // What failed may be in force on the disk all the same; a header then says again where we are.
+            let old = &self.slots.header;
+            if !self.attempted.is_after(old) {
+                return Ok(None);
+            }
+            let place = self.place()?;
+            let header = Header { generation: place.next_generation(old)?, ..old.clone() };
+            self.is_committing = true;
+            return Ok(Some(CommitJob::turn(place, &self.slots, header)));
+        }
+        let sequence = match self.slots.header.history {
+            Some(History { commit_page, .. }) if commit_page > 0 => {
+                Commit::read(self.source(), &self.slots.header, commit_page)?.sequence.saturating_add(1)
+            }
+            _ => 1,
+        };
+        let content = Content {
+            pages: pages.iter().filter_map(|page| Some((*page, self.editor.edited_page(*page)?))).collect(),
+            header: self.editor.header(),
+            edits: self.edits,
+            label,
+        };
+        let job =
+            CommitJob::new(self.place()?, &self.slots, &self.directory, self.original, sequence, &content)?;
+        self.editor.mark_committed();
+        self.unwritten = pages;
+        self.is_committing = true;
+        Ok(Some(job))
+    }
+
+    /// Takes notice of what became of a commit.
+    ///
+    /// # Errors
+    /// That of the commit; what it was to write is part of the next one.
+    pub fn finish_commit(
+        &mut self,
+        job: CommitJob,
+        outcome: Result<(), LayoutError>,
+    ) -> Result<Committed, LayoutError> {
+        self.is_committing = false;
+        self.attempted.note(&job);
+        outcome?;
+        let committed = Committed { pages: job.pages(), bytes: job.bytes() };
+        job.entries.iter().for_each(|(logical, entry)| self.directory.entries[*logical] = *entry);
+        job.leaves.iter().for_each(|(leaf, entry)| self.directory.root[*leaf] = *entry);
+        self.slots.flip(job.header_page, job.header);
+        self.unwritten.clear();
+        self.edits = 0;
+        Ok(committed)
+    }
+
+    fn check_idle(&self) -> Result<(), LayoutError> {
+        if self.is_committing {
+            return Err(LayoutError::Usage(format!(
+                "{}: a commit is under way; wait for it",
+                self.path.display()
+            )));
+        }
+        Ok(())
+    }
+
+    fn place(&self) -> Result<Place, LayoutError> {
+        let file = self
+            .file
+            .try_clone()
+            .map_err(|e| LayoutError::io(&self.path, "cannot open the file a second time", e))?;
+        Ok(Place { path: self.path.clone(), file, start: self.start, attempted: self.attempted })
+    }
+
+    /// Goes back to the state before the last commit, durably; `None` if there is none to go back to.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] while edits are not committed; damage and I/O of what the file holds of that state. The file reads as before then.
+    pub fn undo(&mut self) -> Result<Option<Changes>, LayoutError> {
+        let Some(History { commit_page, tip_page }) = self.slots.header.history else { return Ok(None) };
+        if commit_page == 0 {
+            return Ok(None);
+        }
+        let parent = Commit::read(self.source(), &self.slots.header, commit_page)?.parent;
+        self.turn_to(parent, tip_page).map(Some)
+    }
+
+    /// Goes forward again to the state after the commit that was undone last, durably; `None` if there is none.
+    ///
+    /// # Errors
+    /// As [`EditSession::undo`].
+    pub fn redo(&mut self) -> Result<Option<Changes>, LayoutError> {
+        let Some(History { commit_page, tip_page }) = self.slots.header.history else { return Ok(None) };
+        let mut at = tip_page;
+        while at != commit_page {
+            let parent = Commit::read(self.source(), &self.slots.header, at)?.parent;
+            if parent == commit_page {
+                return self.turn_to(at, tip_page).map(Some);
+            }
+            if parent == 0 {
+                return Err(LayoutError::damaged(
+                    &self.path,
+                    "journal",
+                    "what was undone does not lead on from here; `terrasoar compact` writes the file without its journal",
+                ));
+            }
+            at = parent;
+        }
+        Ok(None)
+    }
+
+    /// All commits that can be undone or redone, the first one first.
+    ///
+    /// # Errors
+    /// Damage of the journal; I/O.
+    pub fn history(&self) -> Result<Vec<HistoryEntry>, LayoutError> {
+        history_of(self.source(), &self.slots.header)
+    }
+
+    /// Brings the file, and the ground in memory, to the state of a journal page; 0 is how it was built.
+    fn turn_to(&mut self, commit_page: u32, tip_page: u32) -> Result<Changes, LayoutError> {
+        self.check_idle()?;
+        if !self.is_committed() {
+            return Err(LayoutError::Usage(format!(
+                "{}: there are edits that are not committed; commit them or take them back first",
+                self.path.display()
+            )));
+        }
+        let old = &self.slots.header;
+        let state = match commit_page {
+            0 => self.original,
+            page => Commit::read(self.source(), old, page)?.state,
+        };
+        let place = self.place()?;
+        let generation = place.next_generation(old)?;
+        let header =
+            Header { generation, history: Some(History { commit_page, tip_page }), ..state.put_into(old) };
+        let (root, entries) = self.differing(&header)?;
+        let mut pages = Vec::with_capacity(entries.len());
+        for (logical, entry) in &entries {
+            pages.push((*logical as u64, self.read_page(*logical, *entry)?));
+        }
+        let job = CommitJob::turn(place, &self.slots, header);
+        let done = job.run_on(&*self.disk);
+        self.attempted.note(&job);
+        done?;
+        let changes = self.editor.replace_pages(pages, &job.header)?;
+        entries.into_iter().for_each(|(logical, entry)| self.directory.entries[logical] = entry);
+        self.directory.root = root;
+        self.slots.flip(job.header_page, job.header);
+        Ok(changes)
+    }
+
+    /// The root of another state, and the entries in which its directory differs.
+    fn differing(&self, header: &Header) -> Result<(Vec<Entry>, Vec<(usize, Entry)>), LayoutError> {
+        let root = read_root(self.source(), header)?;
+        let mut differing = Vec::new();
+        let mut leaf = Vec::new();
+        for (i, here) in root.iter().enumerate().filter(|(i, here)| **here != self.directory.root[*i]) {
+            leaf.clear();
+            read_leaf(self.source(), header, i, *here, &mut leaf)?;
+            let first = i * crate::directory::ENTRIES_PER_LEAF;
+            let pairs = leaf.iter().zip(&self.directory.entries[first..]);
+            let others = pairs.enumerate().filter(|(_, (theirs, ours))| theirs != ours);
+            differing.extend(others.map(|(j, (theirs, _))| (first + j, *theirs)));
+        }
+        Ok((root, differing))
+    }
+
+    fn read_page(&self, logical: usize, entry: Entry) -> Result<Box<Page>, LayoutError> {
+        if !entry.is_present() {
+            return Ok(inert_page(self.slots.header.record_kind));
+        }
+        let mut page = Box::new([0; PAGE_BYTES]);
+        self.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, &mut page[..])?;
+        if checksum(&page[..]) == entry.checksum {
+            return Ok(page);
+        }
+        Err(LayoutError::damaged(
+            &self.path,
+            format!("record page {logical} (file page {})", entry.page),
+            "the checksum does not match; what was there before cannot be brought back",
+        ))
+    }
+}
+
+/// All commits of a file, the first one first.
+pub(super) fn history_of(source: &dyn Source, header: &Header) -> Result<Vec<HistoryEntry>, LayoutError> {
+    let Some(History { commit_page, tip_page }) = header.history else { return Ok(Vec::new()) };
+    let mut entries = Vec::new();
+    let mut at = tip_page;
+    while at != 0 {
+        let Commit { parent, sequence, edits, label, .. } = Commit::read(source, header, at)?;
+        entries.push(HistoryEntry { sequence, edits, label, is_current: at == commit_page });
+        at = parent;
+    }
+    entries.reverse();
+    Ok(entries)
+}
+
+/// The commits that can be undone or redone in an opened terrain, the first one first.
+///
+/// # Errors
+/// Damage of the journal; I/O.
+pub fn history(terrain: &Terrain) -> Result<Vec<HistoryEntry>, LayoutError> {
+    history_of(terrain.source(), terrain.header())
+}
+
+fn open_for_writing(path: &Path) -> Result<File, LayoutError> {
+    File::options().read(true).write(true).open(path).map_err(|e| {
+        LayoutError::io(path, "cannot open the file for writing; --overlay keeps edits apart from it", e)
+    })
+}
+
+/// Reads of the very file that is written to.
+fn over(path: &Path, file: &File) -> Result<PreadSource, LayoutError> {
+    let file =
+        file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
+    PreadSource::over(path, file)
+}
+
+/// The source of another terrain.
+struct Borrowed(Arc<Terrain>);
+
+impl Source for Borrowed {
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn byte_count(&self) -> u64 {
+        self.0.source().byte_count()
+    }
+
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
+        self.0.source().read_at(offset, buffer)
+    }
+}
