@@ -24,6 +24,7 @@ mod pages;
 mod session;
 mod stamp;
 mod update;
+mod widen;
 mod window;
 
 pub use area::Area;
@@ -36,6 +37,7 @@ pub use operation::Edit;
 pub(crate) use overlay::open_layers;
 pub use session::{Committed, EditSession, HistoryEntry, history};
 pub use stamp::{Stamp, StampMode};
+pub use widen::widen;
 pub use window::{HeightWindow, SampleRect};
 
 use self::core::Core;
