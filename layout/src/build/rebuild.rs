@@ -153,16 +153,8 @@ fn rebuild_kind<C: RecordCodec>(
         ..old.clone()
     };
     progress.stage("building", samples);
-    Work {
-        spool: &spool,
-        code,
-        fills: Some(&fill_of),
-        tile: memory.tile,
-        file,
-        disk,
-        advance: &advance,
-    }
-    .run_kind(&mut header)?;
+    Work { spool: &spool, code, fills: Some(&fill_of), tile: memory.tile, file, disk, advance: &advance }
+        .run_kind(&mut header)?;
     Ok(header)
 }
 
