@@ -94,6 +94,17 @@ impl Terrain {
         crate::edit::open_layers(base, overlay, false)
     }
 
+    /// Opens the file, with its overlay if it has one, once more, without maps.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn open_again_unmapped(&self) -> Result<Self, LayoutError> {
+        match self.source.base_path() {
+            Some(base) => Self::open_with_overlay_unmapped(base, self.path()),
+            None => Self::open_unmapped(self.path()),
+        }
+    }
+
     pub(crate) fn of(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Self {
         Self { source, header, entries, pages: OnceLock::new() }
     }

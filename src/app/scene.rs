@@ -137,7 +137,7 @@ impl<'a> Scene<'a> {
         let drape = match Imagery::open(terrain)? {
             None => None,
             Some(_) => Drape::of(
-                Arc::new(Terrain::open_unmapped(terrain.path())?),
+                Arc::new(terrain.open_again_unmapped()?),
                 &gpu.capabilities,
                 options.is_for_a_window(),
             )?,

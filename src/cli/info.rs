@@ -1,10 +1,9 @@
 //! `terrasoar info`: what a terrain file says about itself.
 
 use super::output::{decimal, grouped, print, print_json, table};
-use super::terrain;
+use super::terrain::{self, TerrainArgs};
 use anyhow::Result;
 use serde::Serialize;
-use std::path::PathBuf;
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::unused::unused_bytes;
@@ -18,8 +17,8 @@ Examples:
   terrasoar info alps.iqt
   terrasoar info alps.iqt --json | jq .spacing_m")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -182,6 +181,6 @@ impl Info {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let info = Info::of(&terrain::open(&args.file)?)?;
+    let info = Info::of(&args.terrain.open()?)?;
     if args.json { print_json(&info) } else { print(&info.text()) }
 }
