@@ -79,10 +79,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     script.write(out)?;
     let told = format!(
-        "{}: {} craters in {} batches",
+        "{}: {} crater{} in {} batch{}",
         out.display(),
         grouped(script.edits()),
-        grouped(script.batches.len() as u64)
+        if script.edits() == 1 { "" } else { "s" },
+        grouped(script.batches.len() as u64),
+        if script.batches.len() == 1 { "" } else { "es" }
     );
     // A script piped on to another program stays alone in the pipe.
     if out.is_file() {

@@ -11,7 +11,7 @@ use terrasoar::edits::LoadedBatch;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::HeightRoom;
 use terrasoar_layout::disk::SystemDisk;
-use terrasoar_layout::edit::{Changes, EditSession, Editor, widen};
+use terrasoar_layout::edit::{Changes, EditSession, Editor, Foresight, holds_heights, widen};
 use terrasoar_layout::grid::Grid;
 use terrasoar_layout::header::Header;
 use terrasoar_layout::record::RecordKind;
@@ -86,7 +86,7 @@ impl Told {
         };
         let file = self.overlay.as_ref().unwrap_or(&self.file);
         let mut text = format!(
-            "{file}: {} in {}, {:.2} s ({}edits/s)\n{} looked at, {} changed, {} passed over",
+            "{file}: {} in {}, {:.2} s ({} edits/s)\n{} looked at, {} changed, {} passed over",
             plural(self.edits, "edit", "edits"),
             plural(self.batches, "batch", "batches"),
             self.seconds,
@@ -132,7 +132,32 @@ impl Work<'_> {
         }
     }
 
-    /// Refuses a script of which not everything can be applied, before anything is.
+    /// Refuses a script of which not everything can be applied, before anything is; rewrites the file if it has no room for the heights that the script leads to.
+    fn prepare(&self) -> Result<u32> {
+        let terrain = self.target.terrain()?;
+        self.check(terrain.grid())?;
+        let header = terrain.header().clone();
+        let edits = self.batches.iter().map(|batch| batch.edits.len() as u64).sum();
+        self.progress.begin("looking ahead", edits);
+        let mut foresight = Foresight::new(Arc::new(terrain))?;
+        for edit in self.batches.iter().flat_map(|batch| &batch.edits) {
+            foresight.follow(edit)?;
+            self.progress.add(1);
+        }
+        let Some(heights_m) = foresight.heights_m().filter(|range| !holds_heights(&header, *range)) else {
+            return Ok(0);
+        };
+        drop(foresight);
+        let [low, high] = header.height_range_m.map(|m| decimal(m, 1));
+        let [lowest, highest] = heights_m.map(|m| decimal(m, 1));
+        self.widen(
+            &header,
+            heights_m,
+            &format!("the edits lead to heights from {lowest} to {highest} m, and records of a file from {low} to {high} m cannot hold them"),
+        )?;
+        Ok(1)
+    }
+
     fn check(&self, grid: &Grid) -> Result<()> {
         for (number, batch) in (1_u64..).zip(self.batches) {
             for edit in &batch.edits {
@@ -162,7 +187,10 @@ impl Work<'_> {
                 Ok(changes) => told.note(batch, &grid, &changes),
                 Err(LayoutError::OutOfRange { problem, .. }) => {
                     told.needs_widening = true;
-                    self.progress.note(&format!("note: {}: {problem}", self.named(number, batch)));
+                    self.progress.note(&format!(
+                        "note: {}: {problem}; without --dry-run it is",
+                        self.named(number, batch)
+                    ));
                     break;
                 }
                 Err(error) => return Err(anyhow!(error).context(self.named(number, batch))),
@@ -176,10 +204,11 @@ impl Work<'_> {
     /// Applies everything, batch by batch, each durable before the next.
     pub(super) fn perform(&self) -> Result<Told> {
         let start = Instant::now();
+        let widenings = self.prepare()?;
         let mut session = self.target.session()?;
         let grid = *session.editor().terrain().grid();
-        self.check(&grid)?;
         let mut told = self.begin(false);
+        told.widenings = widenings;
         for (number, batch) in (1_u64..).zip(self.batches) {
             let before = told.batches;
             let failed = || match before {
@@ -196,7 +225,11 @@ impl Work<'_> {
                     Ok(changes) => break changes,
                     Err(LayoutError::OutOfRange { heights_m, problem, .. }) if widenings < MOST_WIDENINGS => {
                         widenings += 1;
-                        session = self.widen(session, heights_m, &problem).with_context(failed)?;
+                        let header = session.header().clone();
+                        // The rewriting takes the lock for itself.
+                        drop(session);
+                        self.widen(&header, heights_m, &problem).with_context(failed)?;
+                        session = self.target.session()?;
                         self.progress
                             .begin("editing", self.batches.iter().map(|b| b.edits.len() as u64).sum());
                         self.progress.set(told.edits);
@@ -215,37 +248,35 @@ impl Work<'_> {
         Ok(told)
     }
 
-    /// Rewrites the file with room for other heights.
-    fn widen(&self, session: EditSession, heights_m: [f64; 2], problem: &str) -> Result<EditSession> {
+    /// Rewrites the file, which has this header, with room for other heights.
+    fn widen(&self, header: &Header, heights_m: [f64; 2], problem: &str) -> Result<()> {
+        let file = self.target.file.display();
         if let Some(overlay) = self.target.overlay {
+            let with =
+                if overlay.exists() { format!(" --overlay {}", overlay.display()) } else { String::new() };
             bail!(
-                "{problem}; an overlay cannot do that: make a terrain file of both with `terrasoar compact {} --overlay {} -o NEW.iqt` and edit that",
-                self.target.file.display(),
+                "{}: {problem}; an overlay cannot change that: make a file of its own with `terrasoar compact {file}{with} -o NEW.iqt` and edit that",
                 overlay.display()
             );
         }
-        let room = room_for(session.header(), heights_m);
-        let ends = if session.header().history.is_some() {
-            "; what was edited before can no longer be undone"
-        } else {
-            ""
-        };
+        let room = room_for(header, heights_m);
         let [lowest, highest] = [room.lowest_m, room.highest_m].map(|m| decimal(m, 1));
+        let ends = match header.history {
+            Some(_) => "; what was edited before can no longer be undone",
+            None => "",
+        };
         self.progress.note(&format!(
-            "note: {problem}: rewriting {} with room for {lowest} to {highest} m{ends}",
-            self.target.file.display()
+            "note: {file}: {problem}: rewriting it with room for {lowest} to {highest} m{ends}"
         ));
-        // The rewriting takes the lock for itself.
-        drop(session);
-        let header = widen(&SystemDisk, self.target.file, room, WIDEN_MIB, self.progress)?;
-        if header.record_kind != RecordKind::Compact {
+        let new = widen(&SystemDisk, self.target.file, room, WIDEN_MIB, self.progress)?;
+        if new.record_kind != header.record_kind {
+            let bytes = new.record_kind.bytes();
             complain(&format!(
-                "note: {}: records take {} bytes now",
-                self.target.file.display(),
+                "note: {file}: records take {bytes} bytes now instead of {}",
                 header.record_kind.bytes()
             ));
         }
-        Ok(self.target.session()?)
+        Ok(())
     }
 }
 
