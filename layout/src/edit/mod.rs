@@ -10,7 +10,7 @@
 
 mod area;
 mod brush;
-mod check;
+pub(crate) mod check;
 mod commit;
 mod compact;
 mod core;
