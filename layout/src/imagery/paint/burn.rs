@@ -59,7 +59,7 @@ impl Burn {
         let [along, across] = [east * ahead + north * left, north * ahead - east * left];
         let sum = along.abs() + across.abs();
         let cosine = if sum > 0.0 { along / (u * self.radius_m) } else { 0.0 };
-        let reach = 0.5 + self.ray(along, across, sum) * (0.37 + 0.13 * cosine);
+        let reach = 0.6 + self.ray(along, across, sum) * (0.28 + 0.12 * cosine);
         let lump = self.lump([east, north].map(|m| m / self.radius_m * LUMPS));
         let s = (u / reach * (0.8 + 0.4 * lump)).max(u);
         let t = ((1.0 - s) / (1.0 - CORE)).clamp(0.0, 1.0);

@@ -65,9 +65,8 @@ impl Level<'_> {
                 let centre_m =
                     [0, 1].map(|axis| origin_m[axis] + (f64::from(at[axis]) + 0.5) * texel_m[axis]);
                 let texel = &mut new[4 * v + u];
-                let painted = stored(format, brush.texel(at, centre_m, *texel));
-                bits |= u16::from(painted != *texel) << (4 * v + u);
-                *texel = painted;
+                let painted = brush.texel(at, centre_m, *texel);
+                bits |= u16::from(change(format, texel, painted)) << (4 * v + u);
             }
             self.add(block, new, bits);
         }
@@ -106,12 +105,13 @@ impl Level<'_> {
             if changed == [0; 4] {
                 continue;
             }
-            if puts_back && is_differing(self.grid, self.cache, block) {
-                let is_there = |b: &[i32; 2]| b[0] < finer.blocks[0] && b[1] < finer.blocks[1];
-                if !four.iter().any(|block| is_there(block) && is_differing(finer, self.cache, *block)) {
+            let is_there = |b: &[i32; 2]| b[0] < finer.blocks[0] && b[1] < finer.blocks[1];
+            if puts_back && !four.iter().any(|b| is_there(b) && is_differing(finer, self.cache, *b)) {
+                // Means of what is below would not be the old texels, which were filtered before anything was encoded.
+                if is_differing(self.grid, self.cache, block) {
                     self.put_back(block);
-                    continue;
                 }
+                continue;
             }
             let Some(new) = self.texels(block) else { continue };
             let (new, bits) = self.means(finer, block, four, changed, new);
@@ -147,9 +147,7 @@ impl Level<'_> {
                 }
                 let linear = mean(places.map(|place| TABLES.linear(below_texels[place])));
                 let texel = &mut texels[4 * t + s];
-                let made = stored(format, TABLES.srgb(linear));
-                bits |= u16::from(made != *texel) << (4 * t + s);
-                *texel = made;
+                bits |= u16::from(change(format, texel, TABLES.srgb(linear))) << (4 * t + s);
             }
         }
         (texels, bits)
@@ -267,12 +265,16 @@ fn source_of(i: usize, [dx, dy]: [i32; 2], [wide, high]: [usize; 2]) -> usize {
     4 * source(i / 4, dy, high) + source(i % 4, dx, wide)
 }
 
-/// A texel as the format can hold it, but for the colour.
-fn stored(format: TileFormat, texel: [u8; 4]) -> [u8; 4] {
-    let [r, g, b, a] = texel;
-    match format {
-        _ if is_transparent(format, a) => [0; 4],
-        TileFormat::Bc1 => [r, g, b, 255],
-        TileFormat::Bc7 | TileFormat::Rgba8 => [r, g, b, a],
+/// Gives a texel a new colour, as far as the format can hold it. Whether anything else is seen then.
+fn change(format: TileFormat, texel: &mut [u8; 4], new: [u8; 4]) -> bool {
+    let is_seen = !is_transparent(format, new[3]);
+    if new == *texel || !is_seen && is_transparent(format, texel[3]) {
+        return false;
     }
+    let [r, g, b, a] = new;
+    let alpha = if format == TileFormat::Bc1 { 255 } else { a };
+    let new = if is_seen { [r, g, b, alpha] } else { [0; 4] };
+    let is_other = new != *texel;
+    *texel = new;
+    is_other
 }
