@@ -169,6 +169,13 @@ impl Imagery {
         self.entry(id).map_or(0, |entry| u64::from(entry.bytes).div_ceil(PAGE_BYTES as u64))
     }
 
+    /// Pages that first page, directory and tiles take, wherever they lie.
+    pub(crate) fn used_pages(&self) -> u64 {
+        let page = PAGE_BYTES as u64;
+        let tiles = self.entries.iter().map(|entry| u64::from(entry.bytes).div_ceil(page));
+        1 + self.section.directory_bytes().div_ceil(page) + tiles.sum::<u64>()
+    }
+
     pub(super) fn entry(&self, id: TileId) -> Option<TileEntry> {
         let index = self.section.shape.index(id)?;
         self.entries.get(index as usize).copied().filter(|entry| entry.is_present())
