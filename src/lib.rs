@@ -4,6 +4,7 @@
 //! out. [`refine`] has the engines, [`flyover`] replays recorded [`flight`]s through them and counts, [`iobench`] counts what they
 //! read, [`report`] shows what they cost. EMBEDDING.md shows how to use it in a program, ARCHITECTURE.md how it is built.
 
+pub mod edits;
 pub mod flight;
 pub mod flyover;
 pub mod iobench;

@@ -94,6 +94,22 @@ impl Terrain {
         crate::edit::open_layers(base, overlay, false)
     }
 
+    /// The terrain file under an overlay; none if there is no overlay, whose name [`Terrain::path`] is then.
+    pub fn base_path(&self) -> Option<&Path> {
+        self.source.base_path()
+    }
+
+    /// Opens the file, with its overlay if it has one, once more, without maps.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn open_again_unmapped(&self) -> Result<Self, LayoutError> {
+        match self.source.base_path() {
+            Some(base) => Self::open_with_overlay_unmapped(base, self.path()),
+            None => Self::open_unmapped(self.path()),
+        }
+    }
+
     pub(crate) fn of(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Self {
         Self { source, header, entries, pages: OnceLock::new() }
     }
@@ -377,6 +393,11 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     /// Whether any sample is void.
     pub fn has_voids(&self) -> bool {
         self.shape.has_voids
+    }
+
+    /// Logical pages.
+    pub fn page_count(&self) -> usize {
+        self.pages.len()
     }
 
     /// Bytes a record.

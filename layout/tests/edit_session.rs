@@ -7,10 +7,11 @@ use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, HeightRoom, Silent, build};
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::disk::{Disk, FailingDisk, Failure, SystemDisk};
-use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, history};
+use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, history, widen};
+use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
@@ -258,6 +259,73 @@ fn compacting_drops_what_edits_replaced() {
     let before = pages(&reader);
     compact(&SystemDisk, &Terrain::open(&bench.terrain()).unwrap(), &bench.terrain(), &Silent).unwrap();
     assert!(pages(&reader) == before && pages(&Terrain::open(&bench.terrain()).unwrap()) == before);
+}
+
+/// A picture draped over an edited terrain is a commit of its own.
+#[test]
+fn a_picture_is_undone_like_an_edit() {
+    let bench = Bench::new();
+    let plain = pages(&Terrain::open(&bench.terrain()).unwrap());
+    let mut session = EditSession::open(&bench.terrain()).unwrap();
+    session.apply(&[set(3)]).unwrap();
+    session.commit("set").unwrap();
+    let edited = session_pages(&mut session);
+    drop(session);
+    let picture = MemoryImage::from_fn([300, 200], |x, y| [x as u8, y as u8, 9, 255]);
+    common::drape::draped(&bench.terrain(), picture, &DrapeOptions::default()).unwrap();
+    let draped = Terrain::open(&bench.terrain()).unwrap();
+    assert!(is_sound(&draped) && pages(&draped) == edited);
+    let mut session = EditSession::open(&bench.terrain()).unwrap();
+    let mut expect = |undo: bool, has_picture: bool, wanted: &[u8]| {
+        let changes = if undo { session.undo() } else { session.redo() };
+        assert!(changes.unwrap().is_some());
+        let there = Terrain::open(&bench.terrain()).unwrap();
+        assert!(is_sound(&there) && pages(&there) == wanted);
+        assert_eq!(there.header().imagery.is_some(), has_picture);
+    };
+    expect(true, false, &edited);
+    expect(true, false, &plain);
+    expect(false, false, &edited);
+    expect(false, true, &edited);
+    assert!(common::drape::same_picture(&draped, &Terrain::open(&bench.terrain()).unwrap()));
+}
+
+/// Heights beyond the file's are kept: it is rewritten with room for them, and nothing else changes.
+#[test]
+fn widening_keeps_every_height_and_the_picture() {
+    let bench = Bench::new();
+    let picture = MemoryImage::from_fn([700, 600], |x, y| [x as u8, y as u8, (x / 16 + y / 16) as u8, 255]);
+    common::drape::draped(&bench.terrain(), picture, &DrapeOptions::default()).unwrap();
+    let heights = |terrain: &Terrain| -> Vec<Option<f64>> {
+        let grid = *terrain.grid();
+        let [wide, high] = grid.samples();
+        let points = (0..high).flat_map(|y| (0..wide).map(move |x| [x, y]));
+        points.map(|p| terrain.height_m(f64::from(p[0]) * 10.0, f64::from(p[1]) * 10.0).unwrap()).collect()
+    };
+    let before = Terrain::open(&bench.terrain()).unwrap();
+    let abyss = Edit::Set {
+        area: Area::Rect(SampleRect { west: 30, south: 30, east: 50, north: 40 }),
+        height_m: -2500.0,
+    };
+    let mut session = EditSession::open(&bench.terrain()).unwrap();
+    let error = session.apply(std::slice::from_ref(&abyss)).unwrap_err();
+    assert!(matches!(error, LayoutError::OutOfRange { .. }), "{error}");
+    drop(session);
+    for lowest_m in [-3000.0, -300_000.0] {
+        let room = HeightRoom { lowest_m, highest_m: 0.0 };
+        widen(&SystemDisk, &bench.terrain(), room, 512, &Silent).unwrap();
+        let after = Terrain::open(&bench.terrain()).unwrap();
+        assert!(is_sound(&after) && heights(&after) == heights(&before));
+        assert_eq!(after.header().record_kind.bytes(), if lowest_m < -70_000.0 { 8 } else { 4 });
+        assert!(common::drape::same_picture(&before, &after));
+    }
+    let mut session = EditSession::open(&bench.terrain()).unwrap();
+    session.apply(&[abyss]).unwrap();
+    session.commit("abyss").unwrap();
+    let after = Terrain::open(&bench.terrain()).unwrap();
+    assert!(is_sound(&after));
+    assert_eq!(after.height_m(400.0, 350.0).unwrap(), Some(-2500.0));
+    assert_eq!(after.header().height_range_m[0], -2500.0);
 }
 
 /// An overlay belongs to one terrain in one state, and never writes to it.

@@ -3,7 +3,8 @@
 use super::output::{columns, complain, grouped, print, print_json};
 use super::progress::Progress;
 use super::replay::{QualityArgs, fly};
-use super::{WrongUsage, parse, sweep, terrain};
+use super::terrain::TerrainArgs;
+use super::{WrongUsage, parse, sweep};
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
@@ -25,8 +26,8 @@ Examples:
 Two sweeps redo the plots of the SMART paper: speed-up by tolerance (0.5 to 8 px) and by incoherence (0.6, 1.4, 5.3 %). They fly up to 120
 frames a point; --no-sweeps leaves them out.")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Flight file
     #[arg(long, value_name = "F")]
     flight: PathBuf,
@@ -64,7 +65,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.output.exists() && !args.output.is_dir() {
         bail!("{}: the report needs a folder and this is a file; name another", args.output.display());
     }
-    let terrain = terrain::open(&args.file)?;
+    let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
     let quality = args.quality.quality();
     let progress = Progress::new("frames");
@@ -90,7 +91,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     drop(progress);
     let picture = middle_frame(args, &terrain, &flight);
     let title = ReportTitle {
-        terrain: name(&args.file),
+        terrain: name(&args.terrain.file),
         flight: name(&args.flight),
         tolerance_px: quality.tolerance_px,
         viewport: quality.viewport,

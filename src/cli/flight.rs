@@ -4,7 +4,8 @@ use super::ground::TerrainGround;
 use super::output::{check_stream, complain, decimal, print};
 use super::progress::Progress;
 use super::replay::QualityArgs;
-use super::{WrongUsage, parse, terrain};
+use super::terrain::TerrainArgs;
+use super::{WrongUsage, parse};
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
@@ -29,8 +30,8 @@ pub(super) struct Args {
     /// What the flight does
     #[arg(value_name = "KIND", value_parser = parse::flight_kind())]
     kind: FlightKind,
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Flight file to write
     #[arg(short, long, value_name = "F.flight")]
     output: PathBuf,
@@ -86,8 +87,8 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let plan = args.plan()?;
-    check_stream(&args.output, &[&args.file])?;
-    let terrain = terrain::open(&args.file)?;
+    check_stream(&args.output, &args.terrain.inputs(&[]))?;
+    let terrain = args.terrain.open()?;
     let ground = TerrainGround::new(&terrain);
     let (mut flight, told) = match args.pace.incoherence {
         None => (generate(&ground, &plan)?, String::new()),
@@ -126,7 +127,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
 
 /// Adds the terrain's name, if it is one that a note can hold.
 fn note_terrain(flight: &mut Flight, args: &Args) {
-    let Some(name) = args.file.file_name().and_then(|name| name.to_str()) else { return };
+    let Some(name) = args.terrain.file.file_name().and_then(|name| name.to_str()) else { return };
     if name.len() <= 200 && name.trim() == name && !name.chars().any(char::is_control) {
         flight.notes.push(("terrain".into(), name.into()));
     }

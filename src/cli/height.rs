@@ -1,10 +1,10 @@
 //! `terrasoar height`: the height at a place.
 
 use super::output::{decimal, print, print_json};
-use super::{parse, terrain};
+use super::parse;
+use super::terrain::TerrainArgs;
 use anyhow::{Result, bail};
 use serde::Serialize;
-use std::path::PathBuf;
 
 /// Print the height at a place.
 ///
@@ -16,8 +16,8 @@ Examples:
   terrasoar height alps.iqt --at 1500,820.5
   terrasoar height alps.iqt --at 1500,820.5 --json")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Metres east and north of the south-west sample
     #[arg(long, value_name = "X,Y", value_parser = parse::place_m, allow_hyphen_values = true)]
     at: [f64; 2],
@@ -34,13 +34,13 @@ struct Answer {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let terrain = terrain::open(&args.file)?;
+    let terrain = args.terrain.open()?;
     let extent_m = terrain.grid().extent_m();
     let is_outside = |(at, extent): (f64, f64)| !(-1e-9 * extent..=extent * (1.0 + 1e-9)).contains(&at);
     if args.at.into_iter().zip(extent_m).any(is_outside) {
         bail!(
             "{}: {},{} lies outside the terrain, which extends from 0,0 to {},{} metres",
-            args.file.display(),
+            args.terrain.file.display(),
             args.at[0],
             args.at[1],
             decimal(extent_m[0], 4),

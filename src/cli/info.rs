@@ -1,10 +1,10 @@
 //! `terrasoar info`: what a terrain file says about itself.
 
 use super::output::{decimal, grouped, print, print_json, table};
-use super::terrain;
+use super::terrain::{self, TerrainArgs};
 use anyhow::Result;
 use serde::Serialize;
-use std::path::PathBuf;
+use terrasoar_layout::edit::history;
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::unused::unused_bytes;
@@ -18,8 +18,8 @@ Examples:
   terrasoar info alps.iqt
   terrasoar info alps.iqt --json | jq .spacing_m")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -52,6 +52,12 @@ struct Info {
     generation: u32,
     file_bytes: u64,
     bytes_per_sample: f64,
+    /// The file with the edits, if they lie apart.
+    overlay: Option<String>,
+    /// Batches of edits that can be undone or redone.
+    commits: u64,
+    /// The terrain is in the state after this one; 0: as built.
+    commit: u32,
     /// Bytes that nothing leads to: what edits and other imagery replaced.
     unused_bytes: u64,
     imagery: Option<Pictures>,
@@ -98,10 +104,11 @@ impl Pictures {
 }
 
 impl Info {
-    fn of(terrain: &Terrain) -> Result<Self> {
+    fn of(terrain: &Terrain, args: &TerrainArgs) -> Result<Self> {
         let header = terrain.header();
+        let commits = history(terrain)?;
         Ok(Self {
-            path: terrain.path().display().to_string(),
+            path: args.file.display().to_string(),
             source: header.source.clone(),
             samples: header.grid.samples(),
             k: header.grid.k(),
@@ -123,6 +130,9 @@ impl Info {
             generation: header.generation,
             file_bytes: header.file_bytes,
             bytes_per_sample: terrain.bytes_per_sample(),
+            overlay: args.overlay.as_ref().map(|overlay| overlay.display().to_string()),
+            commits: commits.len() as u64,
+            commit: commits.iter().find(|commit| commit.is_current).map_or(0, |commit| commit.sequence),
             unused_bytes: unused_bytes(terrain)?,
             imagery: Pictures::of(terrain)?,
         })
@@ -151,6 +161,16 @@ impl Info {
             ("file size", format!("{} bytes", grouped(self.file_bytes))),
             ("a sample", format!("{:.2} bytes", self.bytes_per_sample)),
         ];
+        if let Some(overlay) = &self.overlay {
+            rows.insert(1, ("with edits in", overlay.clone()));
+        }
+        if self.commits > 0 {
+            let state = match self.commit {
+                0 => "all undone".to_owned(),
+                commit => format!("the terrain is as after commit {commit}"),
+            };
+            rows.push(("edits", format!("{} batches in its history, {state}", grouped(self.commits))));
+        }
         if let Some(imagery) = &self.imagery {
             let [wide, high] = imagery.texels.map(|side| grouped(side.into()));
             let [east, north] = imagery.origin_m.map(|m| decimal(m, 2));
@@ -182,6 +202,6 @@ impl Info {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let info = Info::of(&terrain::open(&args.file)?)?;
+    let info = Info::of(&args.terrain.open()?, &args.terrain)?;
     if args.json { print_json(&info) } else { print(&info.text()) }
 }

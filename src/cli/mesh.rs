@@ -2,8 +2,9 @@
 
 use super::mesh_file::{self, Format};
 use super::output::{check_output, grouped, print};
+use super::parse;
 use super::replay::QualityArgs;
-use super::{parse, terrain};
+use super::terrain::TerrainArgs;
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
@@ -18,8 +19,8 @@ Examples:
   terrasoar mesh alps.iqt --flight low.flight --frame 0 -o frame.ply
   terrasoar mesh alps.iqt --flight low.flight --frame 99 --engine soar --tolerance-px 4 -o frame.obj")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Flight file
     #[arg(long, value_name = "F")]
     flight: PathBuf,
@@ -40,16 +41,16 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    check_output(&args.output, &[&args.file, &args.flight])?;
+    check_output(&args.output, &args.terrain.inputs(&[&args.flight]))?;
     let is_obj = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
     let format = match (is_obj, args.ascii) {
         (true, _) => Format::Obj,
         (false, true) => Format::PlyText,
         (false, false) => Format::PlyBinary,
     };
-    let terrain = terrain::open(&args.file)?;
+    let terrain = std::sync::Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
-    let mesh = frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine)?;
+    let mesh = frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine, &[])?;
     mesh_file::write(&args.output, &mesh, format)?;
     print(&format!(
         "{}: {} triangles, {} vertices",

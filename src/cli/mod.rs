@@ -8,6 +8,7 @@ mod build;
 mod cap;
 mod compare;
 mod drape;
+mod edit;
 mod flight;
 mod ground;
 mod height;
@@ -57,6 +58,7 @@ use std::process::ExitCode;
 Examples, in the order of the work:
   terrasoar build alps.tif -o alps.iqt
   terrasoar drape alps.iqt --image alps-photo.tif
+  terrasoar crater alps.iqt --at 1500,820 --radius 40 --depth 9
   terrasoar info alps.iqt
   terrasoar snapshot alps.iqt -o alps.png
   terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
@@ -74,6 +76,12 @@ struct Typed {
 enum Verb {
     Build(build::Args),
     Drape(drape::Args),
+    Edit(edit::Args),
+    Crater(edit::crater::Args),
+    Undo(edit::past::UndoArgs),
+    Redo(edit::past::RedoArgs),
+    History(edit::past::HistoryArgs),
+    Compact(edit::compact::Args),
     Info(info::Args),
     Verify(verify::Args),
     Height(height::Args),
@@ -107,6 +115,12 @@ pub(crate) fn run() -> ExitCode {
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
         Verb::Drape(args) => drape::run(&args),
+        Verb::Edit(args) => edit::run(&args),
+        Verb::Crater(args) => edit::crater::run(&args),
+        Verb::Undo(args) => edit::past::undo(&args),
+        Verb::Redo(args) => edit::past::redo(&args),
+        Verb::History(args) => edit::past::list(&args),
+        Verb::Compact(args) => edit::compact::run(&args),
         Verb::Info(args) => info::run(&args),
         Verb::Verify(args) => verify::run(&args),
         Verb::Height(args) => height::run(&args),

@@ -4,7 +4,8 @@ use super::movie_file::{MovieFile, MovieFormat};
 use super::output::{check_output, grouped, print, print_json};
 use super::picture::PictureArgs;
 use super::progress::Progress;
-use super::{WrongUsage, parse, terrain};
+use super::terrain::TerrainArgs;
+use super::{WrongUsage, parse};
 use crate::app::studio::Studio;
 use anyhow::Result;
 use serde::Serialize;
@@ -22,8 +23,8 @@ Examples:
   terrasoar movie alps.iqt --flight low.flight -o low.gif --size 480x270 --every 4 --fps 12
   terrasoar movie alps.iqt --flight low.flight -o frames --style contours")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Flight file
     #[arg(long, value_name = "F")]
     flight: PathBuf,
@@ -71,9 +72,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
         .into());
     };
     if format != MovieFormat::Folder {
-        check_output(&args.output, &[&args.file, &args.flight])?;
+        check_output(&args.output, &args.terrain.inputs(&[&args.flight]))?;
     }
-    let terrain = terrain::open(&args.file)?;
+    let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
     let picture = &args.picture;
     let mut studio = Studio::new(&terrain, picture.scene(), picture.size)?;

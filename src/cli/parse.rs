@@ -75,6 +75,17 @@ pub(super) fn place_m(text: &str) -> Result<[f64; 2], String> {
     Ok([number(east)?, number(north)?])
 }
 
+/// `A` or `A,B`: one number above 0, or the least and the greatest.
+pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
+    match text.split_once(',') {
+        None => positive(text).map(|value| [value, value]),
+        Some((low, high)) => match [positive(low)?, positive(high)?] {
+            [low, high] if low <= high => Ok([low, high]),
+            _ => Err("the first number must not be greater than the second".into()),
+        },
+    }
+}
+
 /// `W,S,E,N`: the sides of a rectangle.
 pub(super) fn extent(text: &str) -> Result<[f64; 4], String> {
     let sides: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
@@ -143,6 +154,9 @@ mod tests {
         assert_eq!(spacing_m("10").unwrap(), [10.0, 10.0]);
         assert_eq!(spacing_m("10.08,13.64").unwrap(), [10.08, 13.64]);
         assert_eq!(place_m("-3,4e2").unwrap(), [-3.0, 400.0]);
+        assert_eq!(range("2,3").unwrap(), [2.0, 3.0]);
+        assert_eq!(range("2").unwrap(), [2.0, 2.0]);
+        assert!(range("3,2").is_err() && range("0,2").is_err() && range("1,2,3").is_err());
         assert_eq!(viewport("800x600").unwrap(), Viewport::default());
         assert_eq!(synth_size("1025").unwrap(), 1025);
         assert!(with_extension("a.b/c.TIF", &["tif", "png"]).is_ok());

@@ -2,7 +2,8 @@
 
 use super::output::{check_stream, columns, grouped, print, print_json};
 use super::progress::Progress;
-use super::{WrongUsage, parse, terrain};
+use super::terrain::TerrainArgs;
+use super::{WrongUsage, parse};
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::{Flight, FlightFrame};
@@ -23,8 +24,8 @@ Examples:
   terrasoar replay alps.iqt --flight low.flight
   terrasoar replay alps.iqt --flight low.flight --engine soar --tolerance-px 2 --stats frames.csv --json")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Flight file
     #[arg(long, value_name = "F")]
     flight: PathBuf,
@@ -89,9 +90,9 @@ pub(super) fn fly(
 
 pub(super) fn run(args: &Args) -> Result<()> {
     if let Some(stats) = &args.stats {
-        check_stream(stats, &[&args.file, &args.flight])?;
+        check_stream(stats, &args.terrain.inputs(&[&args.flight]))?;
     }
-    let terrain = terrain::open(&args.file)?;
+    let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
     let progress = Progress::new("frames");
     let name = args.engine.name();

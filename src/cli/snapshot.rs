@@ -3,7 +3,8 @@
 use super::output::{check_output, decimal, grouped, print, print_json};
 use super::picture::{PictureArgs, angles, write_png};
 use super::progress::Progress;
-use super::{WrongUsage, parse, terrain};
+use super::terrain::TerrainArgs;
+use super::{WrongUsage, parse};
 use crate::app::overview::{FOV_DEG, overview, towards_middle, view_from};
 use crate::app::studio::Studio;
 use anyhow::Result;
@@ -27,8 +28,8 @@ Examples:
   terrasoar snapshot alps.iqt --flight low.flight --frame 99 --style wireframe -o frame.png
   terrasoar snapshot alps.iqt --at 1500,820.5,3000 --look 45,-20 --ramp atlas --contours 100 -o view.png")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Flight file
     #[arg(long, value_name = "F", requires = "frame")]
     flight: Option<PathBuf>,
@@ -97,9 +98,9 @@ struct Answer {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let inputs: Vec<_> = std::iter::once(args.file.as_path()).chain(args.flight.as_deref()).collect();
-    check_output(&args.output, &inputs)?;
-    let terrain = terrain::open(&args.file)?;
+    let flight: Vec<_> = args.flight.as_deref().into_iter().collect();
+    check_output(&args.output, &args.terrain.inputs(&flight))?;
+    let terrain = args.terrain.open()?;
     let views = args.views(&terrain)?;
     let picture = &args.picture;
     let mut studio = Studio::new(&terrain, picture.scene(), picture.size)?;

@@ -1,11 +1,45 @@
 //! The terrain file as an argument, and the words for what it says about itself.
 
 use anyhow::Result;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use terrasoar_layout::header::{Header, SpacingOrigin};
 use terrasoar_layout::terrain::Terrain;
 
 use super::output::decimal;
+
+/// Which terrain is read: a file, and edits of it in another.
+#[derive(Debug, clap::Args)]
+pub(super) struct TerrainArgs {
+    /// Terrain file (.iqt)
+    pub(super) file: PathBuf,
+    /// Edits of it that are kept apart (.iqo), as `terrasoar edit --overlay` makes them
+    #[arg(long, value_name = "O.iqo")]
+    pub(super) overlay: Option<PathBuf>,
+}
+
+impl TerrainArgs {
+    /// Opens it, mapped.
+    pub(super) fn open(&self) -> Result<Terrain> {
+        match &self.overlay {
+            Some(overlay) => Ok(Terrain::open_with_overlay(&self.file, overlay)?),
+            None => open(&self.file),
+        }
+    }
+
+    /// Opens it without maps: what is cut short while it is read is an error, where a map would be a signal.
+    pub(super) fn open_unmapped(&self) -> Result<Terrain> {
+        Ok(match &self.overlay {
+            Some(overlay) => Terrain::open_with_overlay_unmapped(&self.file, overlay)?,
+            None => Terrain::open_unmapped(&self.file)?,
+        })
+    }
+
+    /// Its files and others that are read, none of which an output may replace.
+    pub(super) fn inputs<'a>(&'a self, others: &[&'a Path]) -> Vec<&'a Path> {
+        let own = std::iter::once(self.file.as_path()).chain(self.overlay.as_deref());
+        own.chain(others.iter().copied()).collect()
+    }
+}
 
 /// Opens a terrain file, naming what to do when it is elevation data instead.
 pub(super) fn open(path: &Path) -> Result<Terrain> {

@@ -2,10 +2,8 @@
 
 use super::output::{grouped, print};
 use super::progress::Progress;
+use super::terrain::TerrainArgs;
 use anyhow::{Result, bail};
-use std::path::PathBuf;
-use terrasoar_layout::source::PreadSource;
-use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::{verify, verify_pages};
 
 /// Check every page of a terrain file.
@@ -17,13 +15,13 @@ use terrasoar_layout::verify::{verify, verify_pages};
 Example:
   terrasoar verify alps.iqt && echo sound")]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
     // Plain reads: a file that is cut while it is checked is an error, where a map would be a signal.
-    let terrain = Terrain::from_source(Box::new(PreadSource::open(&args.file)?))?;
+    let terrain = args.terrain.open_unmapped()?;
     let progress = Progress::new("pages");
     progress.begin("verifying", verify_pages(&terrain));
     let report = verify(&terrain, &|pages| progress.add(pages))?;
@@ -35,7 +33,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         };
         return print(&format!(
             "{}: sound: {} record pages match their checksums, {} vertices are nested{tiles}",
-            args.file.display(),
+            terrain.path().display(),
             grouped(report.pages_checked),
             grouped(report.vertices_checked)
         ));

@@ -1,5 +1,6 @@
 //! `terrasoar view`: a window to fly over a terrain in.
 
+use super::terrain::TerrainArgs;
 use super::{parse, picture};
 use crate::window::{self, Plan};
 use anyhow::Result;
@@ -15,8 +16,8 @@ use terrasoar_render::ramps::Ramp;
 #[derive(Debug, clap::Args)]
 #[command(after_help = after_help())]
 pub(super) struct Args {
-    /// Terrain file (.iqt)
-    file: PathBuf,
+    #[command(flatten)]
+    terrain: TerrainArgs,
     /// Flight to play
     #[arg(long, value_name = "F")]
     flight: Option<PathBuf>,
@@ -61,7 +62,8 @@ fn after_help() -> String {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     window::run(Plan {
-        file: args.file.clone(),
+        file: args.terrain.file.clone(),
+        overlay: args.terrain.overlay.clone(),
         flight: args.flight.clone(),
         style: args.style.clone(),
         ramp: args.ramp.map(|ramp| ramp.name.to_owned()),

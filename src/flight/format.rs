@@ -56,7 +56,7 @@ pub(super) fn fault_in(values: &[f64; 8]) -> Option<Fault> {
 }
 
 /// Whether `text` is a decimal as the format has it; narrower than what the standard library parses.
-pub(super) fn is_decimal(text: &str) -> bool {
+pub(crate) fn is_decimal(text: &str) -> bool {
     let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
     let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, Some(exponent)),
@@ -99,18 +99,23 @@ pub(super) fn push_frame(line: &mut String, values: &[f64; 8]) -> fmt::Result {
         if i > 0 {
             line.push(' ');
         }
-        let magnitude = value.abs();
-        if magnitude == 0.0 || (1e-6..1e15).contains(&magnitude) {
-            write!(line, "{value}")?;
-        } else {
-            write!(line, "{value:e}")?;
-        }
+        push_number(line, *value)?;
     }
     Ok(())
 }
 
+/// Appends a number: shortest digits that read back the same.
+pub(crate) fn push_number(line: &mut String, value: f64) -> fmt::Result {
+    let magnitude = value.abs();
+    if magnitude == 0.0 || (1e-6..1e15).contains(&magnitude) {
+        write!(line, "{value}")
+    } else {
+        write!(line, "{value:e}")
+    }
+}
+
 /// `text` for an error message: quoted, shortened, without control characters.
-pub(super) fn excerpt(text: &str) -> String {
+pub(crate) fn excerpt(text: &str) -> String {
     let mut short: String = text.chars().take(40).flat_map(char::escape_debug).collect();
     if text.chars().nth(40).is_some() {
         short.push('…');

@@ -4,7 +4,7 @@
 //! **A flight holds no clock and no chance: equal input gives equal frames.**
 
 mod error;
-mod format;
+pub(crate) mod format;
 pub mod generate;
 pub mod incoherence;
 mod reader;

@@ -19,7 +19,9 @@ mod pick;
 mod screen;
 mod settings;
 mod stage;
+mod tool;
 mod viewer;
+mod workshop;
 
 use anyhow::{Context, Result};
 use std::path::PathBuf;
@@ -33,6 +35,8 @@ pub(crate) use keys::list as list_of_keys;
 pub(crate) struct Plan {
     /// Terrain file.
     pub file: PathBuf,
+    /// Edits of it in a file of their own.
+    pub overlay: Option<PathBuf>,
     /// Flight to play.
     pub flight: Option<PathBuf>,
     /// Style, ramp, tolerance, exaggeration and size instead of what is remembered.
@@ -62,7 +66,10 @@ pub(crate) struct Plan {
 /// # Errors
 /// A terrain or flight that cannot be opened, before there is a window; no display; no adapter.
 pub(crate) fn run(plan: Plan) -> Result<()> {
-    let terrain = Terrain::open_unmapped(&plan.file)?;
+    let terrain = match &plan.overlay {
+        Some(overlay) => Terrain::open_with_overlay_unmapped(&plan.file, overlay)?,
+        None => Terrain::open_unmapped(&plan.file)?,
+    };
     let flight = plan.flight.as_deref().map(Flight::read).transpose()?;
     let event_loop = winit::event_loop::EventLoop::with_user_event().build().context(
         "no window can be opened: there is no display. Run it on a desktop, or with DISPLAY or WAYLAND_DISPLAY set \

@@ -50,7 +50,9 @@ impl Stage {
     /// As [`Stage::open`]; the stage is then as it was.
     pub(crate) fn set_culling(&mut self, culling: Culling, gpu: &Gpu) -> Result<()> {
         if culling != self.culling {
-            let other = Self::open(&self.path(), gpu, culling, self.cache_bytes);
+            let again = self.terrain.open_again_unmapped();
+            let other =
+                again.map_err(Into::into).and_then(|it| Self::new(it, gpu, culling, self.cache_bytes));
             *self = other.context("the way of culling stays as it was")?;
         }
         Ok(())

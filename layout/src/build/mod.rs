@@ -33,6 +33,7 @@ use band::{Band, Fills, RowReader};
 use levels::{LevelShape, Levels};
 use memory::{LARGEST_TILE, MemoryPlan};
 use rayon::prelude::*;
+pub(crate) use rebuild::rebuild_into;
 pub use rebuild::{HeightRoom, rebuild};
 use saturate::Saturator;
 use scan::{OwnErrors, scan_tile_row};

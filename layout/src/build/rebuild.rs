@@ -74,20 +74,36 @@ pub fn rebuild(
     memory_mib: u64,
     progress: &dyn BuildProgress,
 ) -> Result<Header, LayoutError> {
+    let file = AtomicFile::create(out)?;
+    let header = rebuild_into(disk, terrain, &file, room, memory_mib, progress)?;
+    progress.stage("syncing", 0);
+    file.publish_on(disk)?;
+    Ok(header)
+}
+
+/// As [`rebuild`], into a file that is published by the caller.
+pub(crate) fn rebuild_into(
+    disk: &dyn Disk,
+    terrain: &Terrain,
+    file: &AtomicFile,
+    room: Option<HeightRoom>,
+    memory_mib: u64,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
     let Some(records) = terrain.records() else {
         return Err(LayoutError::Usage(format!(
             "{}: building it anew needs a mapped or in-memory terrain",
             terrain.path().display()
         )));
     };
-    with_records!(records, records => rebuild_kind(disk, terrain, records, out, room, memory_mib, progress))
+    with_records!(records, records => rebuild_kind(disk, terrain, records, file, room, memory_mib, progress))
 }
 
 fn rebuild_kind<C: RecordCodec>(
     disk: &dyn Disk,
     terrain: &Terrain,
     records: Records<'_, C>,
-    out: &Path,
+    file: &AtomicFile,
     room: Option<HeightRoom>,
     memory_mib: u64,
     progress: &dyn BuildProgress,
@@ -110,10 +126,9 @@ fn rebuild_kind<C: RecordCodec>(
     let samples = u64::from(wide) * u64::from(high);
     let options = BuildOptions { memory_mib, ..BuildOptions::default() };
     let memory = MemoryPlan::new(&grid, info.sample_type, &options, rayon::current_num_threads() as u64)?;
-    let file = AtomicFile::create(out)?;
     let advance = |n| progress.advance(n);
     progress.stage("reading", samples);
-    let spool = Spool::new(disk, &info, None, out, memory.spool_bytes, &advance)?;
+    let spool = Spool::new(disk, &info, None, file.target(), memory.spool_bytes, &advance)?;
     let source = OwnHeights { info, records };
     source.stream(&spool)?;
 
@@ -138,19 +153,8 @@ fn rebuild_kind<C: RecordCodec>(
         ..old.clone()
     };
     progress.stage("building", samples);
-    Work {
-        spool: &spool,
-        code,
-        fills: Some(&fill_of),
-        tile: memory.tile,
-        file: &file,
-        disk,
-        advance: &advance,
-    }
-    .run_kind(&mut header)?;
-    progress.stage("syncing", 0);
-    drop(spool);
-    file.publish_on(disk)?;
+    Work { spool: &spool, code, fills: Some(&fill_of), tile: memory.tile, file, disk, advance: &advance }
+        .run_kind(&mut header)?;
     Ok(header)
 }
 

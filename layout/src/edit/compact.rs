@@ -35,10 +35,7 @@ pub fn compact(
     progress.stage("compacting", terrain.header().stored_pages * terrain.header().records_per_page());
     let mut writer = Writer { disk, file: &file, chunk: Vec::with_capacity(CHUNK_BYTES), offset: 0 };
     let slots = write_terrain(&mut writer, terrain, progress)?;
-    let header = match Imagery::open(terrain)? {
-        Some(imagery) => write_imagery(disk, &file, slots, terrain, &imagery)?,
-        None => slots.header,
-    };
+    let header = copy_imagery(disk, &file, slots, terrain)?;
     progress.stage("syncing", 0);
     file.publish_on(disk)?;
     Ok(header)
@@ -131,13 +128,14 @@ fn write_terrain(
     Ok(Slots { current: page, current_slot: 0, header })
 }
 
-fn write_imagery(
+/// Copies the imagery of `terrain`, if it has any, behind the file with these header slots; returns the file's header.
+pub(super) fn copy_imagery(
     disk: &dyn Disk,
     file: &AtomicFile,
     slots: Slots,
     terrain: &Terrain,
-    imagery: &Imagery,
 ) -> Result<Header, LayoutError> {
+    let Some(imagery) = Imagery::open(terrain)? else { return Ok(slots.header) };
     let mut append = Append::begin(file.target(), disk, file.file(), slots, imagery.shape())?;
     for id in imagery.shape().ids() {
         let mut bytes = Vec::new();

@@ -16,6 +16,7 @@ mod compact;
 mod core;
 mod crater;
 mod farthest;
+mod foresight;
 mod ground;
 mod near;
 mod operation;
@@ -24,6 +25,7 @@ mod pages;
 mod session;
 mod stamp;
 mod update;
+mod widen;
 mod window;
 
 pub use area::Area;
@@ -32,10 +34,12 @@ pub use check::MAX_EDIT_SAMPLES;
 pub use commit::CommitJob;
 pub use compact::compact;
 pub use crater::Crater;
+pub use foresight::{Foresight, holds_heights};
 pub use operation::Edit;
 pub(crate) use overlay::open_layers;
 pub use session::{Committed, EditSession, HistoryEntry, history};
 pub use stamp::{Stamp, StampMode};
+pub use widen::widen;
 pub use window::{HeightWindow, SampleRect};
 
 use self::core::Core;

@@ -391,7 +391,7 @@ impl EditSession {
     }
 
     /// The root of another state, and the entries in which its directory differs.
-    fn differing(&self, header: &Header) -> Result<(Vec<Entry>, Vec<(usize, Entry)>), LayoutError> {
+    fn differing(&self, header: &Header) -> Result<Difference, LayoutError> {
         let root = read_root(self.source(), header)?;
         let mut differing = Vec::new();
         let mut leaf = Vec::new();
@@ -422,6 +422,9 @@ impl EditSession {
         ))
     }
 }
+
+/// The root of another state, and the record pages whose entries differ.
+type Difference = (Vec<Entry>, Vec<(usize, Entry)>);
 
 /// All commits of a file, the first one first.
 pub(super) fn history_of(source: &dyn Source, header: &Header) -> Result<Vec<HistoryEntry>, LayoutError> {

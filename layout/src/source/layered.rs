@@ -31,6 +31,10 @@ impl Source for LayeredSource {
         self.overlay.path()
     }
 
+    fn base_path(&self) -> Option<&Path> {
+        Some(self.base.path())
+    }
+
     fn byte_count(&self) -> u64 {
         self.split + self.overlay.byte_count()
     }

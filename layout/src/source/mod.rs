@@ -49,6 +49,11 @@ pub trait Source: Send + Sync {
     /// Name for messages.
     fn path(&self) -> &Path;
 
+    /// The file under an overlay of edits, whose own name [`Source::path`] is.
+    fn base_path(&self) -> Option<&Path> {
+        None
+    }
+
     /// Length in bytes when it was opened.
     fn byte_count(&self) -> u64;
 

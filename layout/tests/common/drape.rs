@@ -54,3 +54,16 @@ impl Opened {
         Some(texels.as_chunks::<4>().0.to_vec())
     }
 }
+
+/// Whether two terrains show the same picture, byte by byte.
+pub fn same_picture(a: &Terrain, b: &Terrain) -> bool {
+    let (Some(in_a), Some(in_b)) = (Imagery::open(a).unwrap(), Imagery::open(b).unwrap()) else {
+        return false;
+    };
+    let tile = |imagery: &Imagery, terrain: &Terrain, id| {
+        let mut bytes = Vec::new();
+        imagery.read_tile(terrain, id, &mut bytes).unwrap();
+        (imagery.average(id), bytes)
+    };
+    in_a.shape() == in_b.shape() && in_a.shape().ids().all(|id| tile(&in_a, a, id) == tile(&in_b, b, id))
+}

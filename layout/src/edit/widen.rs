@@ -1,0 +1,36 @@
+//! A terrain file rewritten so that its records have room for other heights.
+
+use super::compact::copy_imagery;
+use crate::atomic_file::AtomicFile;
+use crate::build::{BuildProgress, HeightRoom, rebuild_into};
+use crate::disk::Disk;
+use crate::error::LayoutError;
+use crate::header::Header;
+use crate::lock::WriteLock;
+use crate::slots::Slots;
+use crate::terrain::Terrain;
+use std::path::Path;
+
+/// Rewrites the terrain file at `path` with room for the heights of `room` beside its own, and for slopes as steep as all of them over one sample. No height and nothing of the
+/// imagery changes; errors and radii are rounded up in another scale; where 16 bits do not hold the steps, records take 8 bytes instead of 4. The journal ends: what was edited before can no longer be undone. Readers go on reading
+/// the old file. Returns the new header.
+///
+/// # Errors
+/// Damage and I/O; [`LayoutError::Usage`] while another program writes to it, and as [`rebuild`](crate::build::rebuild). The file is as before then.
+pub fn widen(
+    disk: &dyn Disk,
+    path: &Path,
+    room: HeightRoom,
+    memory_mib: u64,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
+    let _lock = WriteLock::take(path)?;
+    let terrain = Terrain::open(path)?;
+    let file = AtomicFile::create(path)?;
+    let header = rebuild_into(disk, &terrain, &file, Some(room), memory_mib, progress)?;
+    let slots = Slots { current: header.to_page(), current_slot: 0, header };
+    let header = copy_imagery(disk, &file, slots, &terrain)?;
+    progress.stage("syncing", 0);
+    file.publish_on(disk)?;
+    Ok(header)
+}

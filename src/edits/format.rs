@@ -1,0 +1,289 @@
+//! The script's grammar, a line at a time: what each edit looks like as words (`EDITS.md`).
+//!
+//! Reader and writer both go through here, so what one accepts the other accepts. Nothing here does I/O.
+
+use super::words::{Fields, list, number, quoted, split, whole};
+use super::{Moment, StampFile, Step};
+use crate::flight::format::{excerpt, push_number};
+use terrasoar_layout::edit::{Area, Brush, BrushAction, Crater, Edit, Falloff, SampleRect, StampMode};
+
+/// Version of the format that is read and written.
+pub const VERSION: u32 = 1;
+/// Most edits a script may have.
+pub const MAX_EDITS: u64 = 1_000_000;
+/// Most bytes of a line, its end not counted.
+pub(super) const MAX_LINE_BYTES: usize = 4096;
+/// Most bytes of a batch's name.
+pub(super) const MAX_NAME_BYTES: usize = 200;
+/// First word of a script.
+pub(super) const MAGIC: &str = "terrasoar-edits";
+/// The words of the second line.
+pub(super) const UNITS: [&str; 3] = ["units", "metres", "degrees"];
+
+const CRATER: &str = "crater at X,Y radius M depth M direction DEG";
+const FLATTEN: &str = "flatten at X,Y radius M to M strength 0..1 falloff hard|linear|smooth";
+const LOWER: &str = "lower at X,Y radius M by M falloff hard|linear|smooth";
+const RAISE: &str = "raise at X,Y radius M by M falloff hard|linear|smooth";
+const RESTORE: &str = "restore rect W,S,E,N` or `restore disc X,Y radius M";
+const SET: &str = "set rect W,S,E,N to M` or `set disc X,Y radius M to M";
+const SMOOTH: &str = "smooth at X,Y radius M strength 0..1 falloff hard|linear|smooth";
+const STAMP: &str = "stamp FILE sample COLUMN,ROW mode set|add|max|min";
+
+const FALLOFFS: [(&str, Falloff); 3] =
+    [("hard", Falloff::Hard), ("linear", Falloff::Linear), ("smooth", Falloff::Smooth)];
+const MODES: [(&str, StampMode); 4] =
+    [("set", StampMode::Set), ("add", StampMode::Add), ("max", StampMode::Max), ("min", StampMode::Min)];
+
+/// What a line of a script is.
+#[derive(Debug, PartialEq)]
+pub(super) enum Line {
+    /// White space: ends a batch that has no name.
+    Blank,
+    Comment,
+    Moment(Moment),
+    Batch(String),
+    End,
+    Step(Step),
+}
+
+/// Reads a line; `Err` says what is wrong and what to write instead.
+pub(super) fn parse(line: &str) -> Result<Line, String> {
+    let line = line.trim_matches([' ', '\t']);
+    if line.is_empty() {
+        return Ok(Line::Blank);
+    }
+    if line.starts_with('#') {
+        return Ok(Line::Comment);
+    }
+    // A name is the rest of its line, whatever is in it.
+    if let Some(name) =
+        line.strip_prefix("batch").filter(|rest| rest.is_empty() || rest.starts_with([' ', '\t']))
+    {
+        let name = name.trim_matches([' ', '\t']);
+        return name_fault(name).map_or_else(|| Ok(Line::Batch(name.to_owned())), Err);
+    }
+    let words = split(line)?;
+    match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["end"] => Ok(Line::End),
+        ["frame", frame] => whole(frame).map(|frame| Line::Moment(Moment::Frame(frame))),
+        ["at", seconds] => match number(seconds)? {
+            seconds if (0.0..=1e9).contains(&seconds) => Ok(Line::Moment(Moment::Seconds(seconds))),
+            seconds => Err(format!("the moment is {seconds}; write seconds from 0 to 1e9")),
+        },
+        ["end" | "frame" | "at", ..] => {
+            Err("a line of its own is `end`, `frame N` or `at SECONDS`, and nothing beside it".into())
+        }
+        _ => step(&words).map(Line::Step),
+    }
+}
+
+/// Why a batch cannot be called so.
+pub(super) fn name_fault(name: &str) -> Option<String> {
+    if name.is_empty() {
+        return Some(
+            "the batch has no name; write `batch NAME`, or set its edits apart by blank lines".into(),
+        );
+    }
+    let is_name = name.len() <= MAX_NAME_BYTES
+        && name.trim_matches([' ', '\t']) == name
+        && !name.chars().any(char::is_control);
+    (!is_name)
+        .then(|| format!("{} is no name; write one line of at most {MAX_NAME_BYTES} bytes", excerpt(name)))
+}
+
+fn step(words: &[String]) -> Result<Step, String> {
+    let (verb, rest) = (words[0].as_str(), &words[1..]);
+    let edit = match verb {
+        "crater" => crater(Fields::new(rest, CRATER))?,
+        "raise" => brush(Fields::new(rest, RAISE), |f| f.required("by", number).map(BrushAction::Raise))?,
+        "lower" => brush(Fields::new(rest, LOWER), |f| f.required("by", number).map(BrushAction::Lower))?,
+        "flatten" => brush(Fields::new(rest, FLATTEN), |f| {
+            let height_m = f.optional("to", number)?;
+            Ok(BrushAction::Flatten { height_m, strength: strength(f)? })
+        })?,
+        "smooth" => brush(Fields::new(rest, SMOOTH), |f| Ok(BrushAction::Smooth { strength: strength(f)? }))?,
+        "set" => {
+            let mut fields = Fields::new(rest, SET);
+            let (area, height_m) = (area(&mut fields, SET)?, fields.required("to", number)?);
+            fields.finish()?;
+            Edit::Set { area, height_m }
+        }
+        "restore" => {
+            let mut fields = Fields::new(rest, RESTORE);
+            let area = area(&mut fields, RESTORE)?;
+            fields.finish()?;
+            Edit::Restore(area)
+        }
+        "stamp" => return stamp(rest).map(Step::Stamp),
+        _ => {
+            return Err(format!(
+                "{} is nothing that can be done; write crater, raise, lower, flatten, smooth, stamp, set or restore",
+                excerpt(verb)
+            ));
+        }
+    };
+    edit.check_numbers().map_err(|error| error.to_string())?;
+    Ok(Step::Edit(edit))
+}
+
+fn place(word: &str) -> Result<[f64; 2], String> {
+    list(word, "1500,820.5", number)
+}
+
+fn strength(fields: &mut Fields<'_>) -> Result<f64, String> {
+    Ok(fields.optional("strength", number)?.unwrap_or(1.0))
+}
+
+fn crater(mut fields: Fields<'_>) -> Result<Edit, String> {
+    let crater = Crater {
+        centre_m: fields.required("at", place)?,
+        radius_m: fields.required("radius", number)?,
+        depth_m: fields.required("depth", number)?,
+        direction_deg: fields.optional("direction", number)?.unwrap_or(0.0),
+    };
+    fields.finish()?;
+    Ok(Edit::Crater(crater))
+}
+
+fn brush<'a>(
+    mut fields: Fields<'a>,
+    action: impl FnOnce(&mut Fields<'a>) -> Result<BrushAction, String>,
+) -> Result<Edit, String> {
+    let brush = Brush {
+        centre_m: fields.required("at", place)?,
+        radius_m: fields.required("radius", number)?,
+        action: action(&mut fields)?,
+        falloff: fields.optional("falloff", |word| named(word, &FALLOFFS))?.unwrap_or_default(),
+    };
+    fields.finish()?;
+    Ok(Edit::Brush(brush))
+}
+
+fn area(fields: &mut Fields<'_>, form: &str) -> Result<Area, String> {
+    let rect = fields.optional("rect", |word| list(word, "10,10,20,20", whole::<u32>))?;
+    let disc = fields.optional("disc", place)?;
+    match (rect, disc) {
+        (Some([west, south, east, north]), None) => Ok(Area::Rect(SampleRect { west, south, east, north })),
+        (None, Some(centre_m)) => Ok(Area::Disc { centre_m, radius_m: fields.required("radius", number)? }),
+        _ => Err(format!("where is not said, or said twice; write `{form}`")),
+    }
+}
+
+fn stamp(words: &[String]) -> Result<StampFile, String> {
+    let Some((file, rest)) = words.split_first() else {
+        return Err(format!("the file is missing; write `{STAMP}`"));
+    };
+    if file.is_empty() {
+        return Err(format!("the file has no name; write `{STAMP}`"));
+    }
+    let mut fields = Fields::new(rest, STAMP);
+    let at = fields.required("sample", |word| list(word, "120,-4", whole::<i64>))?;
+    let mode = fields.optional("mode", |word| named(word, &MODES))?.unwrap_or_default();
+    fields.finish()?;
+    Ok(StampFile { file: file.clone(), at, mode })
+}
+
+fn named<T: Copy>(word: &str, names: &[(&str, T)]) -> Result<T, String> {
+    let found = names.iter().find(|(name, _)| *name == word).map(|(_, value)| *value);
+    found.ok_or_else(|| {
+        let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
+        format!("{} is none of {}", excerpt(word), known.join(", "))
+    })
+}
+
+fn name_of<T: PartialEq>(value: &T, names: &[(&'static str, T)]) -> &'static str {
+    names.iter().find(|(_, v)| v == value).map_or("", |(name, _)| name)
+}
+
+/// Appends a step's line without its end; `Err` says why it cannot be written.
+pub(super) fn push_step(line: &mut String, step: &Step) -> Result<(), String> {
+    match step {
+        Step::Stamp(stamp) => {
+            let file = quoted(&stamp.file).filter(|_| !stamp.file.is_empty());
+            let file = file.ok_or_else(|| {
+                format!("no line can hold the file name {}; rename the file", excerpt(&stamp.file))
+            })?;
+            let mode = name_of(&stamp.mode, &MODES);
+            line.push_str(&format!("stamp {file} sample {},{} mode {mode}", stamp.at[0], stamp.at[1]));
+        }
+        Step::Edit(Edit::Stamp(_)) => {
+            return Err("a stamp in memory has no file to be named; write its heights to one".into());
+        }
+        Step::Edit(edit) => {
+            edit.check_numbers().map_err(|error| error.to_string())?;
+            push_edit(line, edit);
+        }
+    }
+    if line.len() > MAX_LINE_BYTES {
+        return Err(format!("the line would be longer than {MAX_LINE_BYTES} bytes; use shorter names"));
+    }
+    Ok(())
+}
+
+fn push_edit(line: &mut String, edit: &Edit) {
+    line.push_str(edit.name());
+    match edit {
+        Edit::Crater(crater) => {
+            push_values(line, "at", &crater.centre_m);
+            push_values(line, "radius", &[crater.radius_m]);
+            push_values(line, "depth", &[crater.depth_m]);
+            push_values(line, "direction", &[crater.direction_deg]);
+        }
+        Edit::Brush(brush) => {
+            push_values(line, "at", &brush.centre_m);
+            push_values(line, "radius", &[brush.radius_m]);
+            match brush.action {
+                BrushAction::Raise(metres) | BrushAction::Lower(metres) => push_values(line, "by", &[metres]),
+                BrushAction::Flatten { height_m, strength } => {
+                    if let Some(height_m) = height_m {
+                        push_values(line, "to", &[height_m]);
+                    }
+                    push_values(line, "strength", &[strength]);
+                }
+                BrushAction::Smooth { strength } => push_values(line, "strength", &[strength]),
+            }
+            line.push_str(" falloff ");
+            line.push_str(name_of(&brush.falloff, &FALLOFFS));
+        }
+        Edit::Set { area, height_m } => {
+            push_area(line, area);
+            push_values(line, "to", &[*height_m]);
+        }
+        Edit::Restore(area) => push_area(line, area),
+        // Refused before.
+        Edit::Stamp(_) => {}
+    }
+}
+
+fn push_area(line: &mut String, area: &Area) {
+    match area {
+        Area::Rect(r) => {
+            line.push_str(&format!(" rect {},{},{},{}", r.west, r.south, r.east, r.north));
+        }
+        Area::Disc { centre_m, radius_m } => {
+            push_values(line, "disc", centre_m);
+            push_values(line, "radius", &[*radius_m]);
+        }
+    }
+}
+
+fn push_values(line: &mut String, name: &str, values: &[f64]) {
+    line.push(' ');
+    line.push_str(name);
+    for (i, value) in values.iter().enumerate() {
+        line.push(if i == 0 { ' ' } else { ',' });
+        // Formatting into a string cannot fail.
+        let _ = push_number(line, *value);
+    }
+}
+
+/// Appends a moment's line without its end.
+pub(super) fn push_moment(line: &mut String, moment: Moment) {
+    match moment {
+        Moment::Frame(frame) => line.push_str(&format!("frame {frame}")),
+        Moment::Seconds(seconds) => {
+            line.push_str("at ");
+            let _ = push_number(line, seconds);
+        }
+    }
+}

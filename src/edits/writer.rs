@@ -1,0 +1,92 @@
+//! Writes a script, and refuses what would not read back as itself. [`Script::write`] replaces the file only once it is complete.
+
+use super::format::{MAGIC, MAX_EDITS, UNITS, VERSION, name_fault, push_moment, push_step};
+use super::reader::order_fault;
+use super::{Script, ScriptError};
+use std::io::Write;
+use std::path::Path;
+
+impl Script {
+    /// Writes the script to `path`: to a file beside it first, which then takes its place. A path that is not a regular file, such as a pipe, is written
+    /// directly.
+    ///
+    /// # Errors
+    /// [`ScriptError::Write`], [`ScriptError::Unwritable`] or [`ScriptError::NoEdits`].
+    pub fn write(&self, path: &Path) -> Result<(), ScriptError> {
+        let text = self.to_text(path)?;
+        let failed = |source| ScriptError::Write { path: path.into(), source };
+        if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+            let mut file = std::fs::OpenOptions::new().write(true).open(path).map_err(failed)?;
+            return file.write_all(text.as_bytes()).map_err(failed);
+        }
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".edits-");
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut file = builder.tempfile_in(folder).map_err(failed)?;
+        file.write_all(text.as_bytes()).map_err(failed)?;
+        file.persist(path).map(drop).map_err(|e| failed(e.error))
+    }
+
+    /// The script as text; errors call it `path`.
+    ///
+    /// # Errors
+    /// [`ScriptError::Unwritable`] or [`ScriptError::NoEdits`].
+    pub fn to_text(&self, path: &Path) -> Result<String, ScriptError> {
+        if self.batches.is_empty() {
+            return Err(ScriptError::NoEdits { path: path.into() });
+        }
+        let mut text = format!("{MAGIC} {VERSION}\n{}\n", UNITS.join(" "));
+        let (mut before, mut edits) = (None, 0);
+        for (batch, number) in self.batches.iter().zip(1..) {
+            let refused = |problem| ScriptError::Unwritable { path: path.into(), batch: number, problem };
+            edits += batch.steps.len() as u64;
+            if batch.steps.is_empty() {
+                return Err(refused("it has no edits; drop it".into()));
+            }
+            if edits > MAX_EDITS {
+                return Err(refused(format!("a script has at most {MAX_EDITS} edits; split it")));
+            }
+            text.push('\n');
+            match (before, batch.moment) {
+                (None, None) => {}
+                (Some(_), None) => {
+                    return Err(refused("it has no moment, and the one before it has; put it first".into()));
+                }
+                (None, Some(moment)) => push_line(&mut text, |line| push_moment(line, moment)),
+                (Some(before), Some(moment)) => {
+                    if let Some(fault) = order_fault(before, moment) {
+                        return Err(refused(fault));
+                    }
+                    if before != moment {
+                        push_line(&mut text, |line| push_moment(line, moment));
+                    }
+                }
+            }
+            before = batch.moment;
+            if let Some(name) = &batch.name {
+                if let Some(fault) = name_fault(name) {
+                    return Err(refused(fault));
+                }
+                push_line(&mut text, |line| line.push_str(&format!("batch {name}")));
+            }
+            let mut line = String::new();
+            for step in &batch.steps {
+                line.clear();
+                push_step(&mut line, step).map_err(refused)?;
+                text.push_str(&line);
+                text.push('\n');
+            }
+            if batch.name.is_some() {
+                text.push_str("end\n");
+            }
+        }
+        Ok(text)
+    }
+}
+
+fn push_line(text: &mut String, write: impl FnOnce(&mut String)) {
+    write(text);
+    text.push('\n');
+}
