@@ -139,10 +139,11 @@ const SUFFIX_BEFORE: &str = ".terrasoar-new";
 /// How they begin.
 #[cfg(target_os = "linux")]
 fn prefix_before(target: &Path) -> std::ffi::OsString {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(target.file_name().unwrap_or_default());
-    name.push(".");
-    name
+    use std::os::unix::ffi::{OsStrExt, OsStringExt};
+    // A file system takes names of 255 bytes, and something is added to this one.
+    let target = target.file_name().unwrap_or_default().as_bytes();
+    let bytes = [b".", &target[..target.len().min(200)], b"."].concat();
+    std::ffi::OsString::from_vec(bytes)
 }
 
 /// Removes what was left beside `target`, if it has been there for as long as `stale`. Whatever does not go stays for another time.
@@ -199,6 +200,18 @@ mod tests {
         }
         assert!(AtomicFile::create(folder.path()).is_err());
         assert!(AtomicFile::create(&folder.path().join("missing/x")).is_err());
+    }
+
+    #[test]
+    fn names_of_any_length_are_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("n".repeat(255));
+        for text in ["one", "two"] {
+            let file = AtomicFile::create(&target).unwrap();
+            SystemDisk.write_at(file.file(), text.as_bytes(), 0).unwrap();
+            file.publish().unwrap();
+            assert_eq!(std::fs::read_to_string(&target).unwrap(), text);
+        }
     }
 
     /// Many publish to one name at once: none fails, and one complete file is there in the end.

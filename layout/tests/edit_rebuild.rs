@@ -208,6 +208,34 @@ fn changes_are_what_changed() {
     }
 }
 
+/// Ground too steep for the file's records is refused in the middle of the work; neither the ground nor what comes after it shows any of that.
+#[test]
+fn a_batch_that_fails_halfway_leaves_no_trace() {
+    let smooth = MemoryDem::from_fn([70, 61], SampleType::I16, |x, y| f64::from(6 * x + 7 * y + x * y % 5));
+    let mut bench = Bench::new(&smooth, &options(None, ErrorKind::Bounded, [0.3, 0.3]));
+    let set = |bench: &mut Bench, west: u32, south: u32, heights_m: [f64; 4]| {
+        let rect = SampleRect { west, south, east: west + 1, north: south + 1 };
+        bench.editor.set_heights(&HeightWindow::new(rect, heights_m.to_vec()).unwrap())
+    };
+    let mut refused = 0;
+    for i in 0..12 {
+        match set(&mut bench, 5 + 4 * i, 3 + 4 * i, [0.0, 800.0, 0.0, 800.0]) {
+            Err(LayoutError::OutOfRange { problem, .. }) => {
+                assert!(problem.contains("steeper"), "{problem}");
+                refused += 1;
+            }
+            other => drop(other.unwrap()),
+        }
+        let changes = set(&mut bench, 60, 1 + i, [370.0 + f64::from(9 * i); 4]).unwrap();
+        let mut told = changes.vertices.clone();
+        told.sort_unstable();
+        told.dedup();
+        assert_eq!(told.len(), changes.vertices.len());
+        bench.check();
+    }
+    assert!(refused > 5, "{refused}");
+}
+
 /// What does not fit is refused whole.
 #[test]
 fn heights_beyond_the_range_are_refused_and_nothing_changes() {

@@ -62,7 +62,9 @@ impl<'u, C: RecordCodec> Update<'u, C> {
     /// Brings all records up to date. What fails is kept by the pages.
     pub(super) fn run(mut self) {
         let grid = self.rules.grid;
+        // An update that failed may have left both as they were.
         self.scratch.below.clear();
+        self.scratch.here.clear();
         for level in 0..grid.levels() {
             self.level(level);
             if self.ground.pages.has_failed() {
