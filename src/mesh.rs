@@ -5,8 +5,7 @@
 //! section 1).
 
 use terrasoar_layout::grid::{Grid, GridPoint};
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::store::RecordStore;
 
 /// A triangle's corners in counter-clockwise order seen from above.
 pub type Triangle = [GridPoint; 3];
@@ -82,12 +81,12 @@ pub fn has_area(grid: &Grid, triangle: Triangle) -> bool {
 }
 
 /// Whether an unsplit triangle is drawn.
-pub fn is_drawn<C: RecordCodec>(records: &Records<'_, C>, triangle: Triangle) -> bool {
+pub fn is_drawn(records: &impl RecordStore, triangle: Triangle) -> bool {
     let grid = records.grid();
     if grid.has_padding() && !has_area(grid, triangle) {
         return false;
     }
-    if !records.has_voids() {
+    if !records.shape().has_voids {
         return true;
     }
     let [_, b, d] = with_apex_first(triangle);

@@ -39,6 +39,10 @@ pub struct FrameStats {
     pub test_us: f64,
     /// The part of it spent on splitting, merging and telling, in microseconds.
     pub apply_us: f64,
+    /// Records that edits changed before this frame.
+    pub edited_records: u64,
+    /// Time these edits took before the update, in milliseconds; that in which the engine hears of them is part of the update's.
+    pub edit_ms: f64,
     /// Hash of the set of triangles drawn, independent of their order.
     pub mesh_hash: u64,
 }
@@ -94,6 +98,10 @@ pub struct ReplaySummary {
     pub test_us_p50: f64,
     /// Median, in microseconds.
     pub apply_us_p50: f64,
+    /// Sum over all frames.
+    pub edited_records_total: u64,
+    /// Longest of all frames, in milliseconds.
+    pub edit_ms_max: f64,
     /// Hash over all frames, 16 hexadecimal digits.
     pub mesh_hash: String,
     /// Sum over all frames of the distinct pages of each.
@@ -181,6 +189,8 @@ impl ReplaySummary {
             scan_us_p50: TimeSpread::of(later.iter().map(|f| f.scan_us)).p50,
             test_us_p50: TimeSpread::of(later.iter().map(|f| f.test_us)).p50,
             apply_us_p50: TimeSpread::of(later.iter().map(|f| f.apply_us)).p50,
+            edited_records_total: frames.iter().map(|f| f.edited_records).sum(),
+            edit_ms_max: frames.iter().map(|f| f.edit_ms).fold(0.0, f64::max),
             mesh_hash: format!("{hash:016x}"),
             pages_touched_total: sum(|f| f.pages_touched),
             record_bytes_touched_total: sum(|f| f.record_bytes_touched),

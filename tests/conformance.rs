@@ -61,7 +61,7 @@ fn fly_culling(terrain: &Terrain, views: &[View], culling: Culling, check_sample
 fn check_mirror<C: RecordCodec>(
     records: &Records<'_, C>,
     kinetic: &Kinetic<Records<'_, C>>,
-    soar: &Soar<'_, C>,
+    soar: &Soar<Records<'_, C>>,
     mirror: &Mirror,
     expected: &[Triangle],
     (culling, view, i): (Culling, &View, usize),

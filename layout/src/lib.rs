@@ -10,6 +10,7 @@ pub mod dem;
 pub mod directory;
 pub mod disk;
 pub mod edit;
+pub mod edited;
 pub mod error;
 pub mod grid;
 pub mod header;

@@ -104,6 +104,11 @@ impl<C: RecordCodec> PagePool<C> {
         Ok(())
     }
 
+    /// States the lowest and highest height in metres that there is now.
+    pub fn set_height_range_m(&mut self, range_m: [f64; 2]) {
+        self.shape.height_range_m = range_m;
+    }
+
     /// Frees the frame that was not read for longest, by and large.
     fn give_up_one(&mut self) -> usize {
         loop {

@@ -1,9 +1,10 @@
 //! What refinement reads records from: all of a file, or what is at hand of it.
 //!
-//! [`Records`](crate::terrain::Records) lends every record of a mapped file; [`PagePool`](crate::pool::PagePool) holds some pages of a file of any size and
+//! [`Records`](crate::terrain::Records) lends every record of a mapped file, [`EditedRecords`](crate::edited::EditedRecords) those of one that is edited meanwhile; [`PagePool`](crate::pool::PagePool) holds some pages of a file of any size and
 //! says which it lacks. An engine written for the trait flies over both; where all records are at hand, what it does about absent ones compiles to nothing.
 
-use crate::grid::Grid;
+use crate::grid::{Grid, GridPoint};
+use crate::order::slot_of;
 use crate::record::{RecordCodec, Vertex};
 
 /// What a terrain's records have in common.
@@ -57,6 +58,21 @@ pub trait RecordStore: Send + Sync {
     #[inline(always)]
     fn grid(&self) -> &Grid {
         &self.shape().grid
+    }
+
+    /// The vertex at `slot`, whose level is `level` (0 for corners); an inert one if its record is not at hand.
+    ///
+    /// # Panics
+    /// For a slot past the last page.
+    #[inline(always)]
+    fn vertex(&self, slot: u64, level: u32) -> Vertex {
+        self.decode(self.get(slot).unwrap_or(Self::Codec::INERT), level)
+    }
+
+    /// The vertex at a grid point.
+    fn vertex_at(&self, p: GridPoint) -> Vertex {
+        let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };
+        self.vertex(slot_of(self.grid().k(), p), level)
     }
 
     /// The vertex of a record at `level` (0 for corners).

@@ -94,6 +94,11 @@ impl Terrain {
         crate::edit::open_layers(base, overlay, false)
     }
 
+    /// The terrain file under an overlay; none if there is no overlay, whose name [`Terrain::path`] is then.
+    pub fn base_path(&self) -> Option<&Path> {
+        self.source.base_path()
+    }
+
     /// Opens the file, with its overlay if it has one, once more, without maps.
     ///
     /// # Errors
@@ -388,6 +393,11 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     /// Whether any sample is void.
     pub fn has_voids(&self) -> bool {
         self.shape.has_voids
+    }
+
+    /// Logical pages.
+    pub fn page_count(&self) -> usize {
+        self.pages.len()
     }
 
     /// Bytes a record.

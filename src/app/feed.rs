@@ -8,6 +8,7 @@ use terrasoar::refine::{Culling, Engine, Probe, Work};
 use terrasoar::stream::sound;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
+use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::record::{RecordCodec, Vertex};
 use terrasoar_layout::store::RecordStore;
@@ -57,6 +58,12 @@ pub(crate) trait Feed {
 
     /// Height of the ground in metres at a place in metres east and north, where one is known.
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64>;
+
+    /// Takes over edits of the ground. Whether it can: only feeds of windows do.
+    fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<bool, LayoutError> {
+        let _ = (changes, editor);
+        Ok(false)
+    }
 
     /// Asks for what the exact height at a place needs.
     fn want_ground(&mut self, east_m: f64, north_m: f64) {

@@ -16,7 +16,7 @@ use terrasoar_render::TileId;
 
 /// SOAR and its mesh.
 pub(crate) struct FullMesh<'a, C: RecordCodec> {
-    engine: Soar<'a, C>,
+    engine: Soar<Records<'a, C>>,
     records: Records<'a, C>,
     patch: Patch,
 }

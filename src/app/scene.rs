@@ -19,6 +19,7 @@ use std::sync::Arc;
 use terrasoar::refine::Culling;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
+use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{
@@ -310,6 +311,20 @@ impl<'a> Scene<'a> {
             drape.serve(&mut self.renderer, &frame_view(view), &frame_view(&ahead), IMAGE_TILES_A_FRAME)?;
         drawn.image_missing = self.renderer.imagery_stats().missing;
         Ok(())
+    }
+
+    /// Takes over edits of the ground: the next update's mesh shows them, and light follows within some frames. Whether it can: only scenes of windows do.
+    ///
+    /// # Errors
+    /// Edits of another terrain.
+    pub(crate) fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<bool, LayoutError> {
+        if !self.feed.ground_changed(changes, editor)? {
+            return Ok(false);
+        }
+        for rect in &changes.samples {
+            self.renderer.change_heights([rect.west, rect.south], [rect.east, rect.north]);
+        }
+        Ok(true)
     }
 
     /// Whether an image is draped over the terrain.

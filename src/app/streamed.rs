@@ -12,6 +12,7 @@ use terrasoar::refine::kinetic::Patch;
 use terrasoar::stream::{Prefetch, StreamFrame, Streamed, Threads, sound};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
+use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::loader::Loader;
 use terrasoar_layout::order::slot_of;
 use terrasoar_layout::pool::PagePool;
@@ -140,6 +141,11 @@ impl<C: RecordCodec> Feed for StreamedFeed<C> {
 
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
         sound(self.streamed.engine().store(), east_m, north_m).height_m
+    }
+
+    fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<bool, LayoutError> {
+        self.streamed.ground_changed(changes, editor)?;
+        Ok(true)
     }
 
     fn want_ground(&mut self, east_m: f64, north_m: f64) {

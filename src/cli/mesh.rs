@@ -48,9 +48,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
         (false, true) => Format::PlyText,
         (false, false) => Format::PlyBinary,
     };
-    let terrain = args.terrain.open()?;
+    let terrain = std::sync::Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
-    let mesh = frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine)?;
+    let mesh = frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine, &[])?;
     mesh_file::write(&args.output, &mesh, format)?;
     print(&format!(
         "{}: {} triangles, {} vertices",

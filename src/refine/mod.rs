@@ -5,6 +5,7 @@
 //! read to a [`Probe`] that costs nothing when nobody listens.
 
 mod clock;
+pub mod ground;
 pub mod kinetic;
 pub mod naive;
 pub mod smart;
@@ -13,6 +14,9 @@ mod strip;
 
 use crate::mesh::Triangle;
 use crate::view::View;
+use ground::GroundChange;
+use terrasoar_layout::store::RecordStore;
+
 /// Where what lies out of view is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Culling {
@@ -96,6 +100,17 @@ impl Probe for Unobserved {}
 
 /// A refinement algorithm over one terrain.
 pub trait Engine {
+    /// Where its records come from.
+    type Store: RecordStore;
+
+    /// The store, to be given pages between two frames. What it holds may change in no other way; where a record changes that was there before,
+    /// [`Engine::ground_changed`] follows.
+    fn store_mut(&mut self) -> &mut Self::Store;
+
+    /// The ground was edited: called between two frames, after pages of the store that changed have been replaced. The next update's mesh is the one over the
+    /// edited ground.
+    fn ground_changed(&mut self, change: &GroundChange<'_>);
+
     /// Brings the mesh to `view`; returns the vertex tests that took.
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64;
 

@@ -3,28 +3,28 @@
 //! No tree is walked to decide, no answer is inherited or remembered. Cost: one test a vertex of the terrain a frame; for tests and
 //! small terrains.
 
+use super::ground::GroundChange;
 use super::{Culling, Engine, Probe};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{corners, slot_of};
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::store::RecordStore;
 
 /// Brute-force refinement.
 #[derive(Debug)]
-pub struct Naive<'a, C: RecordCodec> {
-    records: Records<'a, C>,
+pub struct Naive<S: RecordStore> {
+    records: S,
     culling: Culling,
     /// Whether each vertex is active, row by row.
     active: Vec<bool>,
     triangles: Vec<Triangle>,
 }
 
-impl<'a, C: RecordCodec> Naive<'a, C> {
-    /// An engine over `records` that culls as `culling` says.
-    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
+impl<S: RecordStore> Naive<S> {
+    /// An engine over `records`, all of which are at hand, that culls as `culling` says.
+    pub fn new(records: S, culling: Culling) -> Self {
         let side = records.grid().side_steps() as usize + 1;
         Self { active: vec![false; side * side], culling, records, triangles: Vec::new() }
     }
@@ -47,7 +47,16 @@ impl<'a, C: RecordCodec> Naive<'a, C> {
     }
 }
 
-impl<C: RecordCodec> Engine for Naive<'_, C> {
+impl<S: RecordStore> Engine for Naive<S> {
+    type Store = S;
+
+    fn store_mut(&mut self) -> &mut S {
+        &mut self.records
+    }
+
+    /// Nothing is kept from frame to frame.
+    fn ground_changed(&mut self, _: &GroundChange<'_>) {}
+
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
         let metric = Metric::new(view);
         let grid = *self.records.grid();

@@ -13,16 +13,17 @@
 //! once its arrays have grown.
 
 use super::clock::{EXPIRY_MASK, PathClock};
+use super::ground::{Areas, GroundChange};
 use super::soar::StripVertex;
 use super::strip::StripBuilder;
 use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::Metric;
 use crate::view::View;
+use std::ops::Range;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::store::RecordStore;
 
 /// Status bit: the vertex is selected and not culled.
 const ACTIVE: u32 = 1 << 31;
@@ -85,8 +86,8 @@ impl NodeArray {
 
 /// Refinement by live ranges.
 #[derive(Debug)]
-pub struct Smart<'a, C: RecordCodec> {
-    records: Records<'a, C>,
+pub struct Smart<S: RecordStore> {
+    records: S,
     culling: Culling,
     nodes: NodeArray,
     /// Where the next rebuild copies to.
@@ -94,13 +95,14 @@ pub struct Smart<'a, C: RecordCodec> {
     capacity: usize,
     clock: PathClock,
     last: Option<Metric>,
+    areas: Areas,
     /// Indices into the vertex array.
     strip: Vec<u32>,
 }
 
-impl<'a, C: RecordCodec> Smart<'a, C> {
-    /// An engine over `records` that culls as `culling` says, with nothing tested yet.
-    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
+impl<S: RecordStore> Smart<S> {
+    /// An engine over `records`, all of which are at hand, that culls as `culling` says, with nothing tested yet.
+    pub fn new(records: S, culling: Culling) -> Self {
         let grid = *records.grid();
         let c = corners(grid.k());
         let centre = (c[0].midpoint(c[2]), records.vertex(CENTRE_SLOT, grid.levels() - 1));
@@ -119,6 +121,7 @@ impl<'a, C: RecordCodec> Smart<'a, C> {
             capacity: LEAST_CAPACITY,
             clock: PathClock::new(tick_m),
             last: None,
+            areas: Areas::default(),
             strip: Vec::new(),
             records,
         }
@@ -154,8 +157,8 @@ struct Apex {
 }
 
 /// One frame's walk.
-struct Walk<'w, 'a, C: RecordCodec, P> {
-    records: &'w Records<'a, C>,
+struct Walk<'w, S: RecordStore, P> {
+    records: &'w S,
     nodes: &'w mut NodeArray,
     clock: &'w PathClock,
     metric: Metric,
@@ -166,7 +169,7 @@ struct Walk<'w, 'a, C: RecordCodec, P> {
     probe: &'w mut P,
 }
 
-impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
+impl<S: RecordStore, P: Probe> Walk<'_, S, P> {
     /// Visits the triangle (apex; b, d) of `node`. Inlined, so that only triangles that are split cost a call.
     #[inline(always)]
     fn visit(&mut self, height: u32, node: u32, apex: Apex, b: GridPoint, d: GridPoint, inside: bool) {
@@ -270,7 +273,54 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
     }
 }
 
-impl<C: RecordCodec> Engine for Smart<'_, C> {
+/// Ends the live ranges of all nodes that an edit can concern.
+struct Expiry<'e> {
+    nodes: &'e mut NodeArray,
+    areas: &'e mut Areas,
+}
+
+impl Expiry<'_> {
+    /// Visits the triangle (apex; b, d) of `node`.
+    fn visit(&mut self, level: u32, node: u32, [apex, b, d]: Triangle, above: &Range<usize>) {
+        let here = self.areas.narrow(above, [apex, b, d], level);
+        if here.is_empty() {
+            return;
+        }
+        let word = &mut self.nodes.words[node as usize];
+        let is_split = *word & SPLIT != 0;
+        *word &= SPLIT;
+        let children = self.nodes.children[node as usize];
+        if is_split && children != NONE {
+            let v = b.midpoint(d);
+            self.visit(level - 1, children, [v, b, apex], &here);
+            self.visit(level - 1, children + 1, [v, apex, d], &here);
+        }
+    }
+}
+
+impl<S: RecordStore> Engine for Smart<S> {
+    type Store = S;
+
+    fn store_mut(&mut self) -> &mut S {
+        &mut self.records
+    }
+
+    fn ground_changed(&mut self, change: &GroundChange<'_>) {
+        let grid = *self.records.grid();
+        let c = corners(grid.k());
+        let heights = (0..4).map(|i| (i, 0)).chain([(CENTRE_SLOT, grid.levels() - 1)]);
+        for (i, (slot, level)) in heights.enumerate() {
+            let height_m = self.records.vertex(slot, level).height_m as f32;
+            self.nodes.vertices[i].height_m = height_m;
+            self.spare.vertices[i].height_m = height_m;
+        }
+        let all = self.areas.start(&grid, change);
+        let mut expiry = Expiry { nodes: &mut self.nodes, areas: &mut self.areas };
+        for (root, (_, [b, d])) in ROOTS.into_iter().enumerate() {
+            expiry.visit(grid.levels() - 2, root as u32, [c[0].midpoint(c[2]), c[b], c[d]], &all);
+        }
+    }
+
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
         let grid = *self.records.grid();
         let metric = Metric::new(view);

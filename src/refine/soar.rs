@@ -5,6 +5,7 @@
 //!
 //! Cost: 2T - 1 nodes for T triangles, a record read and a test each. Allocates nothing once the strip has grown.
 
+use super::ground::GroundChange;
 use super::strip::StripBuilder;
 use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
@@ -12,8 +13,7 @@ use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::store::RecordStore;
 
 /// A vertex of the strip: 12 bytes, ready to be uploaded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,15 +35,15 @@ impl StripVertex {
 
 /// Full refinement every frame.
 #[derive(Debug)]
-pub struct Soar<'a, C: RecordCodec> {
-    records: Records<'a, C>,
+pub struct Soar<S: RecordStore> {
+    records: S,
     culling: Culling,
     strip: Vec<StripVertex>,
 }
 
-impl<'a, C: RecordCodec> Soar<'a, C> {
-    /// An engine over `records` that culls as `culling` says.
-    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
+impl<S: RecordStore> Soar<S> {
+    /// An engine over `records`, all of which are at hand, that culls as `culling` says.
+    pub fn new(records: S, culling: Culling) -> Self {
         Self { records, culling, strip: Vec::new() }
     }
 
@@ -62,15 +62,15 @@ struct Apex {
 }
 
 /// One frame's walk.
-struct Walk<'w, 'a, C: RecordCodec, P> {
-    records: &'w Records<'a, C>,
+struct Walk<'w, S: RecordStore, P> {
+    records: &'w S,
     metric: Metric,
     strip: StripBuilder<'w, StripVertex>,
     tests: u64,
     probe: &'w mut P,
 }
 
-impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
+impl<S: RecordStore, P: Probe> Walk<'_, S, P> {
     /// Visits the triangle (apex; b, d) whose split vertex has slot `split` and level `height - 1`; `planes` are those its ancestors cross.
     /// Inlined, so that only triangles that are split cost a call.
     #[inline(always)]
@@ -116,7 +116,16 @@ impl<C: RecordCodec, P: Probe> Walk<'_, '_, C, P> {
     }
 }
 
-impl<C: RecordCodec> Engine for Soar<'_, C> {
+impl<S: RecordStore> Engine for Soar<S> {
+    type Store = S;
+
+    fn store_mut(&mut self) -> &mut S {
+        &mut self.records
+    }
+
+    /// Nothing is kept from frame to frame.
+    fn ground_changed(&mut self, _: &GroundChange<'_>) {}
+
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
         let grid = *self.records.grid();
         let c = corners(grid.k());

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,update_ms,scan_us,test_us,apply_us,mesh_hash";
+const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,update_ms,scan_us,test_us,apply_us,edited_records,edit_ms,mesh_hash";
 
 /// Writes `frames` to the file at `path`, replacing it.
 ///
@@ -45,12 +45,14 @@ fn write_frames(to: &mut impl Write, frames: &[FrameStats]) -> std::io::Result<(
             scan_us,
             test_us,
             apply_us,
+            edited_records,
+            edit_ms,
             mesh_hash,
         } = f;
         writeln!(
             to,
             "{frame},{triangles},{new_triangles},{vertex_tests},{splits},{merges},{expired},{slots_written},{patch_bytes},{late},{late_error_px},\
-{pages_touched},{record_bytes_touched},{update_ms},{scan_us},{test_us},{apply_us},{mesh_hash:016x}"
+{pages_touched},{record_bytes_touched},{update_ms},{scan_us},{test_us},{apply_us},{edited_records},{edit_ms},{mesh_hash:016x}"
         )?;
     }
     Ok(())
@@ -74,7 +76,7 @@ mod tests {
         let mut text = Vec::new();
         write_frames(&mut text, &[frame]).unwrap();
         let text = String::from_utf8(text).unwrap();
-        assert_eq!(text.lines().nth(1), Some("7,5,0,0,0,0,0,0,0,0,0,0,0,0.1,0,0,0,00000000000000ab"));
+        assert_eq!(text.lines().nth(1), Some("7,5,0,0,0,0,0,0,0,0,0,0,0,0.1,0,0,0,0,0,00000000000000ab"));
     }
 
     #[test]

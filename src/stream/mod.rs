@@ -7,6 +7,7 @@
 //! Invariant: nothing here waits for storage but [`Streamed::fill`]. Once all has come the mesh is the one that an engine over the whole file makes. Cost beside the
 //! engine's: a copy of 4 KiB a page that comes, a look into a table a page that is wanted.
 
+mod edited;
 mod fetch;
 mod frustum;
 mod lead;
@@ -19,13 +20,16 @@ pub use frustum::ExtendedView;
 pub use model::ModelDisk;
 pub use surface::{Sounding, sound};
 
+use crate::refine::ground::GroundChange;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::{Culling, Engine, Probe, Work};
 use crate::view::View;
+use edited::EditedPages;
 use lead::Lead;
 use requests::Requests;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
+use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::loader::Outcome;
 use terrasoar_layout::pool::PagePool;
@@ -105,6 +109,7 @@ pub struct Streamed<C: RecordCodec, F> {
     pages_read: Vec<u64>,
     /// Pages wanted by others than the engine.
     wanted: Vec<(u64, f32)>,
+    edited: EditedPages,
 }
 
 /// Remembers pages read, and hands on.
@@ -153,6 +158,7 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             errors: VecDeque::new(),
             pages_read: Vec::new(),
             wanted: Vec::new(),
+            edited: EditedPages::default(),
         }
     }
 
@@ -224,6 +230,27 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
         frame
     }
 
+    /// Takes over edits of the ground that `editor` has made: the next update's mesh is the one over the edited ground, as far as its pages are at hand. Pages that come from the
+    /// file later are replaced by what the edits made of them.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] if the changes are of another terrain.
+    pub fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<(), LayoutError> {
+        let pool = self.engine.store_mut();
+        pool.set_height_range_m(editor.header().height_range_m);
+        for page in &changes.pages {
+            let Some(bytes) = editor.edited_page(*page) else { continue };
+            if pool.is_resident(*page) {
+                pool.install(*page, bytes)?;
+            }
+            self.edited.keep(*page, bytes);
+        }
+        let page = |logical: u64| editor.edited_page(logical);
+        let height_range_m = editor.header().height_range_m;
+        self.engine.ground_changed(&GroundChange { areas: &changes.samples, height_range_m, page: &page });
+        Ok(())
+    }
+
     /// Updates until the mesh of `view` lacks no page that can be read, waiting for those that come, `longest` at most. For the first frame of a flight: patches
     /// of the updates on the way are lost, the whole mesh is to be asked for. Returns the number of updates.
     pub fn fill<P: Probe>(&mut self, view: &View, longest: Duration, probe: &mut P) -> u64 {
@@ -252,8 +279,10 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
                         self.lead.came_after(frames);
                     }
                     frame.pages_come += 1;
+                    // What the file holds may be what was there before an edit.
+                    let page = self.edited.get(arrival.page).unwrap_or(&page);
                     // Only pages that exist are asked for.
-                    if let Err(error) = self.engine.store_mut().install(arrival.page, &page) {
+                    if let Err(error) = self.engine.store_mut().install(arrival.page, page) {
                         self.keep(error);
                     }
                 }
@@ -281,14 +310,14 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
         let pool = self.engine.store();
         for want in self.engine.wants() {
             // A page may have been given up, or put in, since.
-            if pool.is_resident(want.page) {
+            if pool.is_resident(want.page) || self.edited.bring(want.page) {
                 continue;
             }
             asked.extend(self.requests.ask(want.page, self.now, want.in_frames));
             frame.late_pages += u64::from(want.is_lacking && self.requests.is_newly_late(want.page));
         }
         for (page, in_frames) in self.wanted.drain(..) {
-            if !pool.is_resident(page) {
+            if !pool.is_resident(page) && !self.edited.bring(page) {
                 asked.extend(self.requests.ask(page, self.now, in_frames));
             }
         }
@@ -301,5 +330,6 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
         frame.pages_asked = asked.len() as u64;
         self.fetch.ask(self.now, &asked);
         self.requests.asked = asked;
+        frame.pages_come += self.edited.install(self.engine.store_mut());
     }
 }

@@ -86,7 +86,12 @@ impl Session {
     fn end(&mut self, event_loop: &ActiveEventLoop) {
         if let Some(viewer) = &mut self.viewer {
             viewer.end_recording();
+            let closed = viewer.close_workshop();
             self.failure = viewer.failure.take();
+            if let Err(error) = closed {
+                self.failure
+                    .get_or_insert(anyhow::Error::from(error).context("the last edits could not be saved"));
+            }
             if let Some(path) = &self.settings_path
                 && let Err(error) = viewer.settings_to_keep().save(path)
             {

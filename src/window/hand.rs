@@ -27,6 +27,8 @@ pub(crate) struct Hand {
     /// The pointer in pixels from the top left, while it is in the window.
     pub pointer: Option<[f64; 2]>,
     dragging: Option<MouseButton>,
+    /// Held by a tool.
+    working: Option<MouseButton>,
     look_px: [f64; 2],
     orbit_px: [f64; 2],
     clicked: Option<(Instant, [f64; 2])>,
@@ -45,7 +47,7 @@ impl Hand {
     /// Nothing is held any more, as when the window is left.
     pub(crate) fn release(&mut self) {
         self.held.clear();
-        self.dragging = None;
+        (self.dragging, self.working) = (None, None);
         (self.shift, self.ctrl) = (false, false);
     }
 
@@ -75,16 +77,23 @@ impl Hand {
         is_second
     }
 
+    /// A button goes down that a tool has taken: it drags nothing.
+    pub(crate) fn hold(&mut self, button: MouseButton) {
+        self.working = Some(button);
+    }
+
     /// A button goes up.
     pub(crate) fn lift(&mut self, button: MouseButton) {
-        if self.dragging == Some(button) {
-            self.dragging = None;
+        for held in [&mut self.dragging, &mut self.working] {
+            if *held == Some(button) {
+                *held = None;
+            }
         }
     }
 
     /// Whether a button is held that went down over the terrain.
     pub(crate) fn is_dragging(&self) -> bool {
-        self.dragging.is_some()
+        self.dragging.is_some() || self.working.is_some()
     }
 
     /// Whether something is held that flies.

@@ -19,6 +19,12 @@ pub(crate) enum Action {
     NextStyle,
     Contours,
     Wireframe,
+    NextTool,
+    SmallerTool,
+    LargerTool,
+    Undo,
+    Redo,
+    Rain,
     Screenshot,
     Record,
     Play,
@@ -66,6 +72,16 @@ pub(crate) const ROWS: &[Row] = &[
     pressed("V", "next style", Action::NextStyle, &[KeyCode::KeyV]),
     pressed("C", "contour lines", Action::Contours, &[KeyCode::KeyC]),
     pressed("X", "edges of the triangles", Action::Wireframe, &[KeyCode::KeyX]),
+    pressed(
+        "B",
+        "next tool for the left button: craters, brushes, or none",
+        Action::NextTool,
+        &[KeyCode::KeyB],
+    ),
+    pressed("[ ]", "a smaller tool, a larger one", Action::SmallerTool, &[KeyCode::BracketLeft]),
+    pressed("Ctrl+Z", "take the last edit of the ground back", Action::Undo, &[]),
+    pressed("Ctrl+Y", "bring it back", Action::Redo, &[]),
+    pressed("K", "a rain of craters, or no longer", Action::Rain, &[KeyCode::KeyK]),
     pressed("R", "record a flight, or end and keep it", Action::Record, &[KeyCode::KeyR]),
     pressed("Space", "play the flight, or pause", Action::Play, &[KeyCode::Space]),
     pressed(", .", "one frame of the flight back, one on", Action::StepBack, &[KeyCode::Comma]),
@@ -82,8 +98,11 @@ pub(crate) const ROWS: &[Row] = &[
 pub(crate) fn action(code: KeyCode, ctrl: bool) -> Option<Action> {
     match (ctrl, code) {
         (true, KeyCode::KeyQ) => Some(Action::Quit),
+        (true, KeyCode::KeyZ) => Some(Action::Undo),
+        (true, KeyCode::KeyY) => Some(Action::Redo),
         (true, _) => None,
         (false, KeyCode::Period) => Some(Action::StepForward),
+        (false, KeyCode::BracketRight) => Some(Action::LargerTool),
         (false, _) => ROWS.iter().find(|row| row.codes.contains(&code)).and_then(|row| row.action),
     }
 }
@@ -126,6 +145,8 @@ mod tests {
         assert_eq!(action(KeyCode::KeyQ, false), None);
         assert_eq!(action(KeyCode::KeyQ, true), Some(Action::Quit));
         assert_eq!(action(KeyCode::KeyT, true), None);
+        assert_eq!(action(KeyCode::KeyZ, true), Some(Action::Undo));
+        assert_eq!(action(KeyCode::BracketRight, false), Some(Action::LargerTool));
     }
 
     #[test]

@@ -19,7 +19,9 @@ mod pick;
 mod screen;
 mod settings;
 mod stage;
+mod tool;
 mod viewer;
+mod workshop;
 
 use anyhow::{Context, Result};
 use std::path::PathBuf;

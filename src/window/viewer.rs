@@ -5,6 +5,7 @@
 
 mod act;
 mod draw;
+mod edit;
 mod hear;
 mod lay_out;
 mod sight;
@@ -23,10 +24,13 @@ use super::pick::Hit;
 use super::screen::Screen;
 use super::settings::Settings;
 use super::stage::Stage;
+use super::tool::{Stroke, ToolBox};
+use super::workshop::Workshop;
 use anyhow::Result;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::flight::Flight;
+use terrasoar::flight::generate::Ground;
 use terrasoar::view::View;
 use terrasoar_layout::terrain::Terrain;
 use winit::event_loop::{EventLoopProxy, OwnedDisplayHandle};
@@ -72,6 +76,10 @@ pub(super) struct Viewer {
     notes: Vec<Note>,
     history: History,
     under: Option<Hit>,
+    tools: ToolBox,
+    stroke: Option<Stroke>,
+    workshop: Option<Workshop>,
+    rain: Option<edit::Rain>,
     frame_at: Option<Instant>,
     frames: u64,
     /// Whether the picture will be better when what it lacks has come.
@@ -105,6 +113,7 @@ impl Viewer {
         let overlay = Overlay::new(&window, &display, &screen);
         let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
         let rig = sight::start(&stage, &screen, &window, &settings);
+        let tools = ToolBox::new(stage.ground().extent_m());
         let mut viewer = Self {
             terrain_name: String::new(),
             window,
@@ -125,6 +134,10 @@ impl Viewer {
             notes: Vec::new(),
             history: History::default(),
             under: None,
+            tools,
+            stroke: None,
+            workshop: None,
+            rain: None,
             frame_at: None,
             frames: 0,
             unsettled: true,
@@ -192,6 +205,9 @@ impl Viewer {
         if let Some(hit) = &self.under {
             self.stage.scene.feed_mut().want_ground(hit.at_m.x, hit.at_m.y);
         }
+        self.look_after_edits();
+        self.go_on_with_stroke();
+        self.let_rain();
         let mut layer = self.lay_out();
         let again = layer.again;
         self.show(&mut layer, passed, now);
@@ -203,6 +219,7 @@ impl Viewer {
             || self.hand.is_dragging()
             || self.hand.is_flying()
             || self.recorder.is_some()
+            || self.rain.is_some()
             || self.player.as_ref().is_some_and(Player::is_playing);
         self.tell_motion(moving);
         if self.ending {
@@ -217,7 +234,8 @@ impl Viewer {
         let waits = [
             Some(again),
             // What cannot be read now is tried again.
-            (self.job.is_some() || self.unshown || self.stage.scene.feed().lacks_pages()).then_some(LOOKS),
+            (self.job.is_some() || self.is_saving() || self.unshown || self.stage.scene.feed().lacks_pages())
+                .then_some(LOOKS),
             news.map(|until| until.saturating_duration_since(now)),
         ];
         Next::In(waits.into_iter().flatten().min().unwrap_or(again))

@@ -6,8 +6,7 @@ use terrasoar::mesh::{Triangle, TriangleKey, has_area, is_drawn, twice_area, wit
 use terrasoar::refine::Engine;
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::store::RecordStore;
 
 pub const VIEWPORT: Viewport = Viewport { width_px: 320, height_px: 240 };
 
@@ -26,7 +25,7 @@ pub fn keys(triangles: &[Triangle]) -> HashSet<TriangleKey> {
 }
 
 /// Every triangle once, all counter-clockwise, exactly covering the square, no vertex inside another triangle's edge.
-pub fn check_conforming<C: RecordCodec>(records: &Records<'_, C>, triangles: &[Triangle]) {
+pub fn check_conforming(records: &impl RecordStore, triangles: &[Triangle]) {
     let grid = records.grid();
     let n = i64::from(grid.side_steps());
     assert_eq!(keys(triangles).len(), triangles.len(), "a triangle twice");
@@ -54,7 +53,7 @@ pub fn check_conforming<C: RecordCodec>(records: &Records<'_, C>, triangles: &[T
 }
 
 /// What is drawn covers the data, and leaves out only triangles that touch a void.
-pub fn check_drawn_cover<C: RecordCodec>(records: &Records<'_, C>, triangles: &[Triangle]) {
+pub fn check_drawn_cover(records: &impl RecordStore, triangles: &[Triangle]) {
     let grid = records.grid();
     let [wide, high] = grid.samples();
     let twice_data = 2 * i64::from(wide - 1) * i64::from(high - 1);
@@ -67,13 +66,13 @@ pub fn check_drawn_cover<C: RecordCodec>(records: &Records<'_, C>, triangles: &[
         if drawn {
             assert!(t.iter().all(|p| !records.vertex_at(*p).class.is_void()), "{t:?} has a void corner");
         } else {
-            assert!(records.has_voids(), "{t:?} is left out without reason");
+            assert!(records.shape().has_voids, "{t:?} is left out without reason");
         }
     }
 }
 
 /// Every sample in view is drawn within the tolerance, or hidden by a void within it.
-pub fn check_tolerance<C: RecordCodec>(records: &Records<'_, C>, view: &View, triangles: &[Triangle]) {
+pub fn check_tolerance(records: &impl RecordStore, view: &View, triangles: &[Triangle]) {
     let grid = records.grid();
     let [right, up, forward] = view.axes();
     let tan_y = (view.vertical_fov_rad / 2.0).tan();

@@ -3,8 +3,7 @@
 use terrasoar::mesh::{Triangle, TriangleKey, is_drawn};
 use terrasoar::refine::kinetic::{Kinetic, NO_LEVEL, Patch, PatchVertex};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::store::RecordStore;
 
 #[derive(Default)]
 pub struct Mirror {
@@ -41,8 +40,25 @@ impl Mirror {
         sorted(self.drawn().map(|t| t.map(|v| GridPoint::new(v.x, v.y).packed())))
     }
 
+    /// What is drawn has the same vertices, all their numbers included.
+    pub fn check_same(&self, other: &Self) {
+        // Which end comes first means nothing.
+        let known = |v: Option<PatchVertex>| {
+            v.map(|v| PatchVertex { ends: [v.ends[0].min(v.ends[1]), v.ends[0].max(v.ends[1])], ..v })
+        };
+        for (slot, corners) in self.triangles.iter().enumerate().filter(|(_, [a, b, _])| a != b) {
+            for v in corners.iter().map(|v| *v as usize) {
+                assert_eq!(
+                    known(self.vertices[v]),
+                    known(other.vertices[v]),
+                    "vertex {v} of triangle slot {slot}"
+                );
+            }
+        }
+    }
+
     /// Every vertex is where the terrain says, and on the edge between its ends.
-    pub fn check_vertices<C: RecordCodec>(&self, records: &Records<'_, C>) {
+    pub fn check_vertices(&self, records: &impl RecordStore) {
         for v in self.drawn().flatten() {
             let vertex = records.vertex_at(GridPoint::new(v.x, v.y));
             assert_eq!(v.height_m, vertex.height_m as f32);
@@ -66,17 +82,13 @@ fn sorted(triangles: impl Iterator<Item = [u64; 3]>) -> Vec<[u64; 3]> {
 }
 
 /// What of a full mesh is drawn, in the form of [`Mirror::triangles`].
-pub fn drawn<C: RecordCodec>(records: &Records<'_, C>, triangles: &[Triangle]) -> Vec<[u64; 3]> {
+pub fn drawn(records: &impl RecordStore, triangles: &[Triangle]) -> Vec<[u64; 3]> {
     let grid = records.grid();
     sorted(triangles.iter().filter(|t| is_drawn(records, **t)).map(|t| t.map(|p| grid.fold(p).packed())))
 }
 
 /// Clusters lie around their triangles, and each triangle of the mesh is in one of them.
-pub fn check_clusters<C: RecordCodec>(
-    engine: &Kinetic<Records<'_, C>>,
-    whole: &Patch,
-    expected: &[TriangleKey],
-) {
+pub fn check_clusters<S: RecordStore>(engine: &Kinetic<S>, whole: &Patch, expected: &[TriangleKey]) {
     let mut found = 0;
     for (bounds, range) in engine.clusters() {
         for (slot, corners) in &whole.triangles {

@@ -307,6 +307,14 @@ impl Renderer {
         self.tiles.upload(&self.queue, tile, bytes)
     }
 
+    /// Notes that heights changed between two samples, both included: tiles of slopes that show them are wanted anew, and stay until the new ones come.
+    pub fn change_heights(&mut self, south_west: [u32; 2], north_east: [u32; 2]) {
+        let TilePool { pyramid, residency, .. } = &mut self.tiles;
+        for tile in pyramid.around(south_west, north_east, crate::TILE_BORDER) {
+            residency.outdate(tile);
+        }
+    }
+
     /// Forgets a tile whose heights changed; it will be wanted again.
     pub fn forget_tile(&mut self, tile: TileId) {
         self.tiles.forget(&self.queue, tile);

@@ -72,6 +72,28 @@ impl Pyramid {
         self.tile_cells
     }
 
+    /// The tiles of all levels that show a sample between two, both included, or have it in their border of so many cells.
+    pub(crate) fn around(
+        &self,
+        south_west: [u32; 2],
+        north_east: [u32; 2],
+        border_cells: u32,
+    ) -> impl Iterator<Item = TileId> + use<> {
+        let cells = self.tile_cells;
+        self.tiles.clone().into_iter().zip(0u32..).flat_map(move |(across, level)| {
+            let side = u64::from(cells) << level;
+            // Slopes look one cell further than the samples that are shown.
+            let reach = u64::from(border_cells + 1) << level;
+            let span = |axis: usize| {
+                let first = u64::from(south_west[axis]).saturating_sub(reach) / side;
+                let last = (u64::from(north_east[axis]) + reach) / side;
+                first as u32..(last as u32 + 1).min(across[axis])
+            };
+            let columns = span(0);
+            span(1).flat_map(move |y| columns.clone().map(move |x| TileId { level, x, y }))
+        })
+    }
+
     /// Cells of level 0 from the south-west corner to a tile's south-west and north-east corners; the latter may lie beyond the data.
     pub fn corners(&self, tile: TileId) -> [[u64; 2]; 2] {
         let side = u64::from(self.tile_cells) << tile.level;

@@ -6,7 +6,7 @@
 //! the place of what neither view wants, and no more room than the current view leaves. Cost: a hash lookup
 //! a wanted tile; an insertion into a full pool looks at all layers.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::{Pyramid, TileId};
 
@@ -32,6 +32,8 @@ pub struct Residency {
     claimed: u32,
     missing: Vec<TileId>,
     missing_ahead: Vec<TileId>,
+    /// Tiles here whose content has changed elsewhere.
+    outdated: HashSet<TileId>,
 }
 
 /// Where a new tile goes.
@@ -56,6 +58,7 @@ impl Residency {
             claimed: 0,
             missing: Vec::new(),
             missing_ahead: Vec::new(),
+            outdated: HashSet::new(),
         }
     }
 
@@ -66,7 +69,7 @@ impl Residency {
         self.missing_ahead.clear();
         self.claimed = wanted.len().min(self.capacity as usize) as u32;
         for tile in &wanted[..self.claimed as usize] {
-            if !self.touch(*tile, self.now) {
+            if !self.touch(*tile, self.now) || self.outdated.contains(tile) {
                 self.missing.push(*tile);
             }
         }
@@ -134,6 +137,7 @@ impl Residency {
     pub fn insert(&mut self, tile: TileId) -> Option<Placement> {
         let urgent = self.missing.contains(&tile);
         self.withdraw(tile);
+        self.outdated.remove(&tile);
         // What comes too late counts as wanted ahead: the view may turn back.
         let held = Held { tile, last_wanted: self.now - u64::from(!urgent) };
         if let Some(&layer) = self.layer_of.get(&tile) {
@@ -146,6 +150,7 @@ impl Residency {
         };
         if let Some(gone) = evicted {
             self.layer_of.remove(&gone);
+            self.outdated.remove(&gone);
         }
         self.layer_of.insert(tile, layer);
         match self.layers.get_mut(layer as usize) {
@@ -174,9 +179,17 @@ impl Residency {
         self.missing_ahead.retain(|t| *t != tile);
     }
 
+    /// Notes that the content of a tile has changed: it is wanted anew whenever it is wanted, and stays until it comes.
+    pub fn outdate(&mut self, tile: TileId) {
+        if self.layer_of.contains_key(&tile) {
+            self.outdated.insert(tile);
+        }
+    }
+
     /// Forgets a tile whose content changed, so that it is wanted anew. Whether it was here.
     pub fn forget(&mut self, tile: TileId) -> bool {
         let layer = self.layer_of.remove(&tile);
+        self.outdated.remove(&tile);
         if let Some(layer) = layer {
             self.layers[layer as usize] = None;
             self.free.push(layer);
@@ -239,6 +252,24 @@ mod tests {
         assert_eq!(pool.missing(), [tile(0, 1)]);
         assert_eq!(pool.insert(tile(0, 1)), Some(Placement { layer: 1, evicted: None }));
         assert_eq!(pool.resident(), 2);
+    }
+
+    #[test]
+    fn outdated_tiles_stay_until_they_come_anew() {
+        let mut pool = pool(2);
+        pool.want(&[tile(6, 0), tile(0, 1)]);
+        pool.insert(tile(6, 0));
+        pool.insert(tile(0, 1));
+        pool.outdate(tile(0, 1));
+        pool.outdate(tile(0, 7));
+        pool.want(&[tile(6, 0), tile(0, 1)]);
+        assert_eq!(pool.missing(), [tile(0, 1)]);
+        assert_eq!(pool.layer(tile(0, 1)), Some(1));
+        assert_eq!(pool.insert(tile(0, 1)), Some(Placement { layer: 1, evicted: None }));
+        pool.want(&[tile(6, 0), tile(0, 1)]);
+        assert!(pool.missing().is_empty());
+        pool.want(&[tile(6, 0), tile(0, 7)]);
+        assert_eq!(pool.missing(), [tile(0, 7)], "what was not here is wanted as ever");
     }
 
     #[test]

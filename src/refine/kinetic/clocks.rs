@@ -145,6 +145,11 @@ pub(super) struct Moved {
 }
 
 impl Clocks {
+    /// Heights may lie so far from height 0 from now on. What was counted before moved nothing that was not there.
+    pub(super) fn raise_tallest(&mut self, tallest_m: f64) {
+        self.tallest_m = self.tallest_m.max(tallest_m);
+    }
+
     /// Clocks for a terrain whose samples are `spacing_m` apart and at most `tallest_m` from height 0.
     pub(super) fn new(spacing_m: f64, tallest_m: f64) -> Self {
         let shift = (spacing_m / 256.0 * UNITS_PER_M).log2().floor().clamp(0.0, 40.0) as u32;

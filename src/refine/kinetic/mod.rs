@@ -23,6 +23,7 @@ mod certificate;
 mod clocks;
 mod collect;
 mod compact;
+mod edited;
 mod labels;
 mod nodes;
 mod pages;
@@ -39,6 +40,7 @@ pub use bounds::Bounds;
 pub use budget::Budget;
 pub use patch::{NO_LEVEL, Patch, PatchVertex};
 
+use super::ground::{Areas, GroundChange};
 use super::{Culling, Engine, Phase, Probe, Work};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
@@ -103,6 +105,10 @@ pub struct Kinetic<S: RecordStore> {
     /// Entries on their way from one clock to another.
     waiting: Vec<Entry>,
     patch: Patch,
+    /// Vertices that edits have moved since the last update, for the next one's patch.
+    moved: Vec<(u32, PatchVertex)>,
+    /// Where edits are.
+    areas: Areas,
     work: Work,
 }
 
@@ -138,6 +144,8 @@ impl<S: RecordStore> Kinetic<S> {
             over: Vec::new(),
             waiting: Vec::new(),
             patch: Patch::default(),
+            moved: Vec::new(),
+            areas: Areas::default(),
             work: Work::default(),
             records,
         }
@@ -165,11 +173,6 @@ impl<S: RecordStore> Kinetic<S> {
     /// Where its records come from.
     pub fn store(&self) -> &S {
         &self.records
-    }
-
-    /// The store, to be given pages between two frames. What it holds may change in no other way.
-    pub fn store_mut(&mut self) -> &mut S {
-        &mut self.records
     }
 
     /// What the last update changed in the mesh.
@@ -204,7 +207,8 @@ impl<S: RecordStore> Kinetic<S> {
             + (self.over.capacity() + self.waiting.capacity()) * size_of::<Entry>()
             + self.ahead.as_ref().map_or(0, |ahead| ahead.bytes())
             + self.wants.capacity() * size_of::<Want>()
-            + self.patch.vertices.capacity() * size_of::<(u32, PatchVertex)>()
+            + (self.patch.vertices.capacity() + self.moved.capacity()) * size_of::<(u32, PatchVertex)>()
+            + self.areas.bytes()
             + self.patch.triangles.capacity() * size_of::<(u32, [u32; 3])>()
             + self.patch.draws.capacity() * size_of::<std::ops::Range<u32>>()
     }
@@ -326,6 +330,8 @@ fn root_label(side_slot: u64) -> usize {
 }
 
 impl<S: RecordStore> Engine for Kinetic<S> {
+    type Store = S;
+
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
         let metric = Metric::new(view);
         let pose = Pose {
@@ -337,6 +343,7 @@ impl<S: RecordStore> Engine for Kinetic<S> {
         };
         self.work = Work::default();
         self.patch.clear();
+        self.patch.vertices.append(&mut self.moved);
         probe.phase(Phase::Scan);
         if self.nodes.is_empty() {
             self.plant(probe);
@@ -381,5 +388,13 @@ impl<S: RecordStore> Engine for Kinetic<S> {
 
     fn work(&self) -> Work {
         self.work
+    }
+
+    fn store_mut(&mut self) -> &mut S {
+        &mut self.records
+    }
+
+    fn ground_changed(&mut self, change: &GroundChange<'_>) {
+        self.take_edit(change);
     }
 }

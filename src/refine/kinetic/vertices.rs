@@ -33,6 +33,11 @@ impl Vertices {
         self.all.len() as u32 - 1
     }
 
+    /// Moves a vertex up or down.
+    pub(super) fn set_height(&mut self, slot: u32, height_m: f64) {
+        self.all[slot as usize].height_m = height_m as f32;
+    }
+
     /// Gives a slot back.
     pub(super) fn remove(&mut self, slot: u32) {
         grow(&mut self.free, 1);

@@ -4,6 +4,7 @@
 
 mod figures;
 mod flights;
+mod ground;
 mod help;
 mod look;
 mod notes;
@@ -15,6 +16,7 @@ use super::history::History;
 use super::keys::Action;
 use super::pick::Hit;
 use super::settings::Settings;
+use super::tool::ToolBox;
 use egui::{CollapsingHeader, Frame, Margin, ScrollArea, Ui};
 
 pub(crate) use notes::Note;
@@ -33,6 +35,8 @@ pub(crate) enum Wish {
     Seek(usize),
     /// To fly by itself no longer: the flight is put away.
     CloseFlight,
+    /// Another tool, or another size of it.
+    Tools(ToolBox),
     /// A note is read.
     Dismiss(usize),
 }
@@ -65,6 +69,14 @@ pub(crate) struct Facts<'a> {
     pub player: Option<&'a Player>,
     /// Figures of the latest frames.
     pub history: &'a History,
+    /// What the left button does.
+    pub tools: ToolBox,
+    /// The ring within which it does, in points of the window.
+    pub ring: Vec<[f32; 2]>,
+    /// Whether craters rain.
+    pub raining: bool,
+    /// Whether edits are on their way to the disk.
+    pub saving: bool,
     /// File that is being built, its stage and which part of it is done.
     pub job: Option<(String, &'static str, f32)>,
     /// What is to be said.
@@ -90,6 +102,7 @@ pub(crate) fn show(
     memory: &mut Memory,
 ) -> Vec<Wish> {
     let mut wishes = Vec::new();
+    ground::ring(ui, facts);
     status::show(ui, facts, &mut wishes);
     if settings.panel {
         let frame = Frame::new().fill(super::overlay::PANEL).inner_margin(Margin::same(10));
@@ -100,6 +113,7 @@ pub(crate) fn show(
                 section(ui, "Look", true, |ui| look::show(ui, facts, settings));
                 section(ui, "Mesh", true, |ui| look::mesh(ui, facts, settings, &mut wishes));
                 section(ui, "Place", true, |ui| place::show(ui, facts, memory, &mut wishes));
+                section(ui, "Ground", true, |ui| ground::show(ui, facts, &mut wishes));
                 section(ui, "Flight", true, |ui| flights::show(ui, facts, &mut wishes));
             });
         });

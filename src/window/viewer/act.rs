@@ -9,6 +9,7 @@ use crate::window::keep;
 use crate::window::keys::Action;
 use crate::window::panel::Wish;
 use crate::window::stage::Stage;
+use crate::window::tool::{STEP, Tool, ToolBox};
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flight::generate::Ground;
@@ -59,6 +60,12 @@ impl Viewer {
             Action::NextStyle => self.settings.next_style(),
             Action::Contours => self.settings.contours = !self.settings.contours,
             Action::Wireframe => self.settings.wireframe = !self.settings.wireframe,
+            Action::NextTool => self.tools.tool = self.tools.tool.next(),
+            Action::SmallerTool => self.tools.grow(1.0 / STEP),
+            Action::LargerTool => self.tools.grow(STEP),
+            Action::Undo => self.undo(true),
+            Action::Redo => self.undo(false),
+            Action::Rain => self.toggle_rain(),
             Action::Screenshot => self.keep_picture(),
             Action::Record => self.record(),
             Action::Play => match &mut self.player {
@@ -71,6 +78,10 @@ impl Viewer {
             Action::StepForward => self.step(1),
             Action::Cancel => {
                 self.memory.help = false;
+                self.tools.tool = Tool::Look;
+                if self.rain.is_some() {
+                    self.toggle_rain();
+                }
                 self.pause();
                 self.rig.circling = None;
                 self.rig.place(self.rig.camera);
@@ -93,6 +104,7 @@ impl Viewer {
                 }
             }
             Wish::CloseFlight => self.player = None,
+            Wish::Tools(tools) => self.tools = tools,
             Wish::Dismiss(note) => {
                 if note < self.notes.len() {
                     self.notes.remove(note);
@@ -133,7 +145,11 @@ impl Viewer {
         match Stage::open(path, &self.screen.gpu, culling, cache_bytes) {
             Ok(stage) => {
                 self.end_recording();
+                if let Err(error) = self.close_workshop() {
+                    self.trouble(format!("edits of {} were lost: {error}", self.terrain_name));
+                }
                 self.stage = stage;
+                self.tools = ToolBox::new(self.stage.ground().extent_m());
                 self.rig = sight::start(&self.stage, &self.screen, &self.window, &self.settings);
                 (self.player, self.frozen) = (None, None);
                 self.name_terrain();

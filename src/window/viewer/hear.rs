@@ -46,9 +46,16 @@ impl Viewer {
         if !down {
             // What was dragged is still to be turned by, about its own pivot.
             self.hand.lift(button);
+            if button == MouseButton::Left {
+                self.end_stroke();
+            }
             return;
         }
         if self.overlay.has_pointer() {
+            return;
+        }
+        if button == MouseButton::Left && self.begin_stroke() {
+            self.hand.hold(button);
             return;
         }
         let double = self.hand.press(button, Instant::now());

@@ -31,6 +31,10 @@ impl Viewer {
             recorder: self.recorder.as_ref(),
             player: self.player.as_ref(),
             history: &self.history,
+            tools: self.tools,
+            ring: self.ring(),
+            raining: self.rain.is_some(),
+            saving: self.is_saving(),
             job,
             notes: &self.notes,
         };
@@ -56,6 +60,8 @@ impl Viewer {
             if let Err(error) = self.stage.set_culling(self.settings.culling(), &self.screen.gpu) {
                 self.settings.culling.clone_from(&before.culling);
                 self.trouble(format!("{error:#}"));
+            } else {
+                self.follow_all();
             }
             self.frozen = None;
         }

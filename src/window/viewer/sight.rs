@@ -38,6 +38,17 @@ impl Viewer {
         )
     }
 
+    /// Where a point of drawn space is seen, in pixels from the top left; none behind the eye.
+    pub(super) fn place_on_screen(&self, at_m: glam::DVec3) -> Option<[f64; 2]> {
+        let camera = self.rig.camera;
+        let [right, up, forward] = camera.axes();
+        let [width, height] = self.screen.size_px().map(f64::from);
+        let to = at_m - camera.eye_m;
+        let ahead_m = to.dot(forward);
+        let px_a_m = 0.5 * height / ((0.5 * camera.vertical_fov_deg.to_radians()).tan() * ahead_m);
+        (ahead_m > 0.0).then(|| [0.5 * width + to.dot(right) * px_a_m, 0.5 * height - to.dot(up) * px_a_m])
+    }
+
     /// What lies in the middle of the picture, or would.
     pub(super) fn ahead_m(&self) -> glam::DVec3 {
         let [width, height] = self.screen.size_px().map(f64::from);

@@ -1,0 +1,36 @@
+//! A frame's drawn triangles as a mesh for other programs.
+
+use crate::mesh::{Triangle, is_drawn};
+use crate::refine::Engine;
+use std::collections::HashMap;
+use terrasoar_layout::store::RecordStore;
+
+/// One frame's drawn triangles with shared vertices.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FrameMesh {
+    /// Vertices in metres east, north and up.
+    pub positions: Vec<[f64; 3]>,
+    /// Triangles, counter-clockwise seen from above, as indices into `positions`.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// The mesh of an engine over `records`.
+pub(super) fn collect_mesh(engine: &impl Engine, records: &impl RecordStore) -> FrameMesh {
+    let mut mesh = FrameMesh::default();
+    let mut indices: HashMap<u64, u32> = HashMap::new();
+    let grid = *records.grid();
+    engine.for_each_triangle(&mut |t: Triangle| {
+        if !is_drawn(records, t) {
+            return;
+        }
+        mesh.triangles.push(t.map(|p| {
+            // Folded points coincide; they become one vertex.
+            *indices.entry(grid.fold(p).packed()).or_insert_with(|| {
+                let [x, y] = grid.position_m(p);
+                mesh.positions.push([x, y, records.vertex_at(p).height_m]);
+                mesh.positions.len() as u32 - 1
+            })
+        }));
+    });
+    mesh
+}

@@ -1,0 +1,298 @@
+//! Replays: a recorded flight through an engine, frame by frame, with what each frame cost.
+//!
+//! A replay makes two passes. The first times the updates and looks at nothing else; the second counts tests, pages and triangles through a probe and
+//! compares each frame with the one before. Everything but the times is the same in every replay.
+
+mod edits;
+mod mesh;
+mod passes;
+mod sets;
+
+pub use edits::TimedBatch;
+pub use mesh::FrameMesh;
+
+use crate::flight::FlightFrame;
+use crate::refine::kinetic::{Budget, Kinetic};
+use crate::refine::naive::Naive;
+use crate::refine::smart::Smart;
+use crate::refine::soar::Soar;
+use crate::refine::{Culling, Engine, Unobserved};
+use crate::stats::FrameStats;
+use crate::view::{View, Viewport};
+use edits::{Changing, Still};
+use mesh::collect_mesh;
+use passes::{FrameTimes, count_frames, time_updates};
+use sets::{FrameSets, not_in};
+use std::sync::Arc;
+use terrasoar_layout::edited::EditedRecords;
+use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::with_records;
+
+/// The engines, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum EngineKind {
+    /// Brute force.
+    Naive,
+    /// Full refinement every frame.
+    Soar,
+    /// Live ranges, looked at every frame.
+    Smart,
+    /// Live ranges in a queue: only what is over is looked at.
+    #[default]
+    Kinetic,
+}
+
+impl EngineKind {
+    /// All engines.
+    pub const ALL: [Self; 4] = [Self::Naive, Self::Soar, Self::Smart, Self::Kinetic];
+
+    /// The word the command line uses.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Naive => "naive",
+            Self::Soar => "soar",
+            Self::Smart => "smart",
+            Self::Kinetic => "kinetic",
+        }
+    }
+}
+
+impl std::str::FromStr for EngineKind {
+    type Err = ReplayError;
+
+    fn from_str(word: &str) -> Result<Self, ReplayError> {
+        Self::ALL
+            .into_iter()
+            .find(|e| e.name() == word)
+            .ok_or_else(|| ReplayError::UnknownEngine(word.to_owned()))
+    }
+}
+
+/// Why a replay cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// No engine has that name.
+    #[error("there is no engine called {0:?}; the engines are naive, soar, smart and kinetic")]
+    UnknownEngine(String),
+    /// The tolerance is not usable.
+    #[error("a tolerance is a number of pixels from 0.01 to 10000, not {0}")]
+    Tolerance(f64),
+    /// The viewport is not usable.
+    #[error("a viewport is 1 to 65536 pixels wide and high, not {}x{}", .0.width_px, .0.height_px)]
+    Viewport(Viewport),
+    /// The vertical exaggeration is not usable.
+    #[error("a vertical exaggeration is a number from 0.01 to 100, not {0}")]
+    Exaggeration(f64),
+    /// The terrain's source does not lend its bytes.
+    #[error("{0}: refinement needs a mapped or in-memory terrain")]
+    NotInAddressSpace(String),
+    /// The terrain cannot be read, or not be edited as asked.
+    #[error(transparent)]
+    Terrain(#[from] LayoutError),
+    /// The frame asked for is not in the flight.
+    #[error("the flight has frames 0 to {last}, not {asked}")]
+    NoSuchFrame {
+        /// Frame asked for.
+        asked: usize,
+        /// Last frame.
+        last: usize,
+    },
+}
+
+/// Picture and precision of a replay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Size of the picture.
+    pub viewport: Viewport,
+    /// Tolerance in pixels, 0.01 to 10,000.
+    pub tolerance_px: f64,
+    /// What heights are multiplied by, 0.01 to 100.
+    pub vertical_exaggeration: f64,
+    /// Where what lies out of view is left out.
+    pub culling: Culling,
+    /// Vertex tests of one frame that [`EngineKind::Kinetic`] may make; other engines know no bounds.
+    pub budget_tests: Option<u64>,
+}
+
+impl Default for Quality {
+    fn default() -> Self {
+        Self {
+            viewport: Viewport::default(),
+            tolerance_px: 1.0,
+            vertical_exaggeration: 1.0,
+            culling: Culling::default(),
+            budget_tests: None,
+        }
+    }
+}
+
+impl Quality {
+    fn check(self) -> Result<Self, ReplayError> {
+        if !(0.01..=10_000.0).contains(&self.tolerance_px) {
+            return Err(ReplayError::Tolerance(self.tolerance_px));
+        }
+        if !(0.01..=100.0).contains(&self.vertical_exaggeration) {
+            return Err(ReplayError::Exaggeration(self.vertical_exaggeration));
+        }
+        let Viewport { width_px, height_px } = self.viewport;
+        if [width_px, height_px].iter().any(|p| !(1..=65_536).contains(p)) {
+            return Err(ReplayError::Viewport(self.viewport));
+        }
+        Ok(self)
+    }
+
+    fn view(self, frame: &FlightFrame) -> View {
+        let view = frame.view(self.viewport, self.tolerance_px);
+        View { vertical_exaggeration: self.vertical_exaggeration, ..view }
+    }
+}
+
+/// Runs `$body` with `$engine` bound to a new engine of `$kind` over `$records`, as `$quality` wants it.
+macro_rules! with_engine {
+    ($kind:expr, $records:expr, $quality:expr, $engine:ident => $body:expr) => {
+        match $kind {
+            EngineKind::Naive => {
+                let $engine = Naive::new($records, $quality.culling);
+                $body
+            }
+            EngineKind::Soar => {
+                let $engine = Soar::new($records, $quality.culling);
+                $body
+            }
+            EngineKind::Smart => {
+                let $engine = Smart::new($records, $quality.culling);
+                $body
+            }
+            EngineKind::Kinetic => {
+                let mut $engine = Kinetic::new($records, $quality.culling);
+                $engine.set_budget(Budget { tests: $quality.budget_tests, time: None });
+                $body
+            }
+        }
+    };
+}
+
+/// Flies `frames` over `terrain` with one engine. `done` hears the number of frame passes finished, twice the frames in all.
+///
+/// # Errors
+/// [`ReplayError`] for a tolerance, viewport or source that cannot be used.
+pub fn replay(
+    terrain: &Terrain,
+    frames: &[FlightFrame],
+    quality: Quality,
+    kind: EngineKind,
+    done: &mut dyn FnMut(u64),
+) -> Result<Vec<FrameStats>, ReplayError> {
+    let quality = quality.check()?;
+    with_records!(records_of(terrain)?, records => {
+        let times = with_engine!(kind, records.clone(), quality, engine => time_updates(engine, &mut Still, frames, quality, done))?;
+        let stats = with_engine!(kind, records.clone(), quality, engine => count_frames(engine, &mut Still, &records, frames, quality, done))?;
+        Ok(timed(stats, times))
+    })
+}
+
+/// As [`replay`], over ground that is edited on the way. The edits stay in memory; the time they take is told apart from the engine's.
+///
+/// ```no_run
+/// use std::{path::Path, sync::Arc};
+/// use terrasoar::flyover::{EngineKind, Quality, TimedBatch, replay_edited};
+/// use terrasoar_layout::edit::{Crater, Edit};
+/// use terrasoar_layout::terrain::Terrain;
+///
+/// let terrain = Arc::new(Terrain::open(Path::new("alps.iqt"))?);
+/// let crater = Crater { centre_m: [5e3, 4e3], direction_deg: 90.0, radius_m: 40.0, depth_m: 12.0 };
+/// let batches = [TimedBatch { frame: 10, edits: vec![Edit::Crater(crater)] }];
+/// # let frames: Vec<terrasoar::flight::FlightFrame> = Vec::new();
+/// let stats = replay_edited(&terrain, &frames, Quality::default(), EngineKind::Kinetic, &batches, &mut |_| {})?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// As [`replay`]; [`ReplayError::Terrain`] for edits that cannot be made.
+pub fn replay_edited(
+    terrain: &Arc<Terrain>,
+    frames: &[FlightFrame],
+    quality: Quality,
+    kind: EngineKind,
+    batches: &[TimedBatch],
+    done: &mut dyn FnMut(u64),
+) -> Result<Vec<FrameStats>, ReplayError> {
+    let quality = quality.check()?;
+    with_records!(records_of(terrain)?, records => {
+        let store = || EditedRecords::new(records.clone());
+        let mut ground = Changing::new(terrain, batches);
+        let times = with_engine!(kind, store(), quality, engine => time_updates(engine, &mut ground, frames, quality, done))?;
+        let mut ground = Changing::new(terrain, batches);
+        let stats = with_engine!(kind, store(), quality, engine => count_frames(engine, &mut ground, &records, frames, quality, done))?;
+        Ok(timed(stats, times))
+    })
+}
+
+/// Counts with the times of the other pass.
+fn timed(mut stats: Vec<FrameStats>, times: Vec<FrameTimes>) -> Vec<FrameStats> {
+    for (stats, times) in stats.iter_mut().zip(times) {
+        stats.update_ms = times.update_ms;
+        [stats.scan_us, stats.test_us, stats.apply_us] = times.phases_us;
+        stats.edit_ms = times.edit_ms;
+    }
+    stats
+}
+
+fn records_of(terrain: &Terrain) -> Result<terrasoar_layout::terrain::AnyRecords<'_>, ReplayError> {
+    terrain.records().ok_or_else(|| ReplayError::NotInAddressSpace(terrain.path().display().to_string()))
+}
+
+/// Mean over pairs of consecutive frames of the share of the second one's triangles that the first did not have, in percent.
+///
+/// # Errors
+/// As [`replay`].
+pub fn mean_incoherence_percent(
+    terrain: &Terrain,
+    pairs: &[(FlightFrame, FlightFrame)],
+    quality: Quality,
+) -> Result<f64, ReplayError> {
+    let quality = quality.check()?;
+    with_records!(records_of(terrain)?, records => {
+        let mut engine = Soar::new(records.clone(), quality.culling);
+        let mut sets = |frame: &FlightFrame| {
+            engine.update(&quality.view(frame), &mut Unobserved);
+            FrameSets::of(&engine, &records)
+        };
+        let mut sum = 0.0;
+        for (first, second) in pairs {
+            let (first, second) = (sets(first), sets(second));
+            sum += 100.0 * not_in(&second.triangles, &first.triangles) as f64 / second.triangles.len().max(1) as f64;
+        }
+        Ok(sum / pairs.len().max(1) as f64)
+    })
+}
+
+/// The mesh that an engine draws in frame `frame` after flying all frames before it, over ground that is edited on the way as `batches` say.
+///
+/// # Errors
+/// As [`replay_edited`], and [`ReplayError::NoSuchFrame`].
+pub fn frame_mesh(
+    terrain: &Arc<Terrain>,
+    frames: &[FlightFrame],
+    frame: usize,
+    quality: Quality,
+    kind: EngineKind,
+    batches: &[TimedBatch],
+) -> Result<FrameMesh, ReplayError> {
+    let quality = quality.check()?;
+    let Some(flown) = frames.get(..=frame) else {
+        return Err(ReplayError::NoSuchFrame { asked: frame, last: frames.len().saturating_sub(1) });
+    };
+    let mut ground = Changing::new(terrain, batches);
+    with_records!(records_of(terrain)?, records => with_engine!(kind, EditedRecords::new(records), quality, engine => {
+        let mut engine = engine;
+        for (i, frame) in flown.iter().enumerate() {
+            ground.edit_and_tell(i, &mut engine)?;
+            engine.update(&quality.view(frame), &mut Unobserved);
+        }
+        let records = engine.store_mut().clone();
+        Ok(collect_mesh(&engine, &records))
+    }))
+}
