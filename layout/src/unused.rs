@@ -3,10 +3,11 @@
 use crate::bytes::{PAGE_BYTES, to_usize};
 use crate::directory::{ENTRY_BYTES, Entry};
 use crate::error::LayoutError;
+use crate::imagery::Imagery;
 use crate::terrain::Terrain;
 
 /// Bytes of the file that neither header, directory nor imagery lead to, bytes behind its counted end included: what undoing and redoing would need, if the file was
-/// edited, and what nobody needs any more. Reads the directory's root.
+/// edited, and what nobody needs any more. Reads the directory's root and that of the imagery.
 ///
 /// # Errors
 /// I/O.
@@ -18,7 +19,12 @@ pub fn unused_bytes(terrain: &Terrain) -> Result<u64, LayoutError> {
     terrain.source().read_at(u64::from(header.root_page) * page, &mut root)?;
     let leaves = (0..header.root_entries() as usize).filter(|i| Entry::read(&root, *i).is_present()).count();
     let root_used = root_bytes.next_multiple_of(page);
-    let imagery = header.imagery.map_or(0, |place| place.bytes);
+    // A painted picture has tiles all over the file; of one that is damaged its section counts.
+    let imagery = match Imagery::open(terrain) {
+        Ok(imagery) => imagery.map_or(0, |imagery| imagery.used_pages() * page),
+        Err(error @ LayoutError::Io { .. }) => return Err(error),
+        Err(_) => header.imagery.map_or(0, |place| place.bytes),
+    };
     let used = (3 + header.stored_pages + leaves as u64) * page + root_used + imagery;
     Ok(terrain.source().byte_count().saturating_sub(used))
 }

@@ -78,7 +78,12 @@ impl Display {
 
     /// Opens a window on a screen with so many pixels a point.
     pub fn open_scaled(&self, arguments: &[&str], scale: &str) -> Result<Window<'_>, String> {
-        let all = [&["view", "puget.iqt", "--narrate"], arguments].concat();
+        self.open_file("puget.iqt", arguments, scale)
+    }
+
+    /// Opens a window with a file of the display's folder.
+    pub fn open_file(&self, file: &str, arguments: &[&str], scale: &str) -> Result<Window<'_>, String> {
+        let all = [&["view", file, "--narrate"], arguments].concat();
         let mut child = self
             .program(&all)
             .env("WINIT_X11_SCALE_FACTOR", scale)

@@ -5,6 +5,7 @@
 //! Nothing waits for a time: the program tells what happened (`--narrate`), and the tests wait to hear it.
 
 mod driver;
+mod edits;
 mod tour;
 mod troubles;
 
@@ -22,6 +23,8 @@ const TESTS: &[(&str, Test)] = &[
     ("tolerance_suits_the_adapter", tour::tolerance_suits_the_adapter),
     ("window_within_the_screen", tour::window_within_the_screen),
     ("dropped_files", tour::dropped_files),
+    ("ground_changed_by_hand", edits::ground_changed_by_hand),
+    ("edits_of_a_file_that_is_taken", edits::edits_of_a_file_that_is_taken),
     ("broken_settings", troubles::broken_settings),
     ("lost_device", troubles::lost_device),
     ("no_adapter", troubles::no_adapter),

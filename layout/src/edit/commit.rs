@@ -8,6 +8,7 @@ use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::header::{Header, History};
+use crate::imagery::PaintedSection;
 use crate::journal::{Commit, State};
 use crate::lock::is_named;
 use crate::slots::Slots;
@@ -32,6 +33,8 @@ pub(super) struct Content<'c> {
     pub(super) pages: Vec<(u64, &'c Page)>,
     /// Range of heights and error top now.
     pub(super) header: &'c Header,
+    /// Painted tiles, to lie at [`Place::end`].
+    pub(super) section: Option<PaintedSection>,
     pub(super) edits: u64,
     pub(super) label: &'c str,
 }
@@ -69,6 +72,11 @@ pub(super) struct Place {
 }
 
 impl Place {
+    /// Where what is written next goes: behind all that a header leads to.
+    pub(super) fn end(&self, header: &Header) -> u64 {
+        header.file_bytes.max(self.attempted.file_bytes).next_multiple_of(PAGE)
+    }
+
     /// The generation after `header`'s.
     pub(super) fn next_generation(&self, header: &Header) -> Result<u32, LayoutError> {
         header.generation.max(self.attempted.generation).checked_add(1).ok_or_else(|| {
@@ -93,6 +101,8 @@ pub struct CommitJob {
     /// Directory entries that change with it: (logical page or leaf, entry).
     pub(super) entries: Vec<(usize, Entry)>,
     pub(super) leaves: Vec<(usize, Entry)>,
+    /// Painted tiles in it, without their bytes.
+    pub(super) section: Option<PaintedSection>,
     /// Record pages in it.
     pub(super) pages: u64,
     header_begun: AtomicBool,
@@ -116,12 +126,12 @@ impl CommitJob {
         directory: &Directory,
         original: State,
         sequence: u32,
-        content: &Content<'_>,
+        mut content: Content<'_>,
     ) -> Result<Self, LayoutError> {
         let old = &slots.header;
         let generation = place.next_generation(old)?;
-        let begin = old.file_bytes.max(place.attempted.file_bytes).next_multiple_of(PAGE);
-        let mut data = Vec::new();
+        let begin = place.end(old);
+        let mut data = content.section.as_mut().map_or_else(Vec::new, |s| std::mem::take(&mut s.bytes));
         let page_at =
             |data: &Vec<u8>| u32::try_from((begin + data.len() as u64) / PAGE).map_err(|_| too_long(&place));
         let mut entries = Vec::with_capacity(content.pages.len());
@@ -152,7 +162,7 @@ impl CommitJob {
             stored_pages: old.stored_pages + added as u64,
             height_range_m: content.header.height_range_m,
             error_top_m: content.header.scale.error_top_m,
-            imagery: old.imagery,
+            imagery: content.section.as_ref().map_or(old.imagery, |section| Some(section.place)),
         };
         root_bytes.resize(root_bytes.len().next_multiple_of(PAGE_BYTES), 0);
         data.extend_from_slice(&root_bytes);
@@ -174,7 +184,8 @@ impl CommitJob {
         };
         let pages = entries.len() as u64;
         let data_offset = begin - place.start;
-        Ok(Self { data, data_offset, entries, leaves, pages, ..Self::turn(place, slots, header) })
+        let section = content.section;
+        Ok(Self { data, data_offset, entries, leaves, section, pages, ..Self::turn(place, slots, header) })
     }
 
     /// A header alone: another state that is in the file already.
@@ -187,6 +198,7 @@ impl CommitJob {
             header,
             entries: Vec::new(),
             leaves: Vec::new(),
+            section: None,
             pages: 0,
             header_begun: AtomicBool::new(false),
             place,

@@ -10,7 +10,7 @@
 
 mod area;
 mod brush;
-mod check;
+pub(crate) mod check;
 mod commit;
 mod compact;
 mod core;
@@ -22,6 +22,7 @@ mod near;
 mod operation;
 mod overlay;
 mod pages;
+mod picture;
 mod session;
 mod stamp;
 mod update;
@@ -37,6 +38,7 @@ pub use crater::Crater;
 pub use foresight::{Foresight, holds_heights};
 pub use operation::Edit;
 pub(crate) use overlay::open_layers;
+pub use picture::Repainted;
 pub use session::{Committed, EditSession, HistoryEntry, history};
 pub use stamp::{Stamp, StampMode};
 pub use widen::widen;

@@ -5,12 +5,13 @@
 
 use super::commit::{Attempted, CommitJob, Content, Directory, Place};
 use super::overlay::{empty_overlay, overlay_slots};
+use super::picture::Picture;
 use super::{Changes, Edit, Editor, HeightWindow};
 use crate::bytes::{PAGE_BYTES, Page, checksum};
 use crate::directory::Entry;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
-use crate::header::{Header, History};
+use crate::header::{Header, History, ImageryPlace};
 use crate::journal::{Commit, State};
 use crate::lock::WriteLock;
 use crate::opening::{inert_page, read_directory, read_leaf, read_root, read_structure};
@@ -48,6 +49,7 @@ pub struct HistoryEntry {
 #[derive(Debug)]
 pub struct EditSession {
     editor: Editor,
+    picture: Picture,
     path: PathBuf,
     file: File,
     /// Offset of the file's first byte.
@@ -147,6 +149,7 @@ impl EditSession {
         };
         Ok(Self {
             editor: Editor::new(Arc::new(terrain)),
+            picture: Picture::default(),
             path: path.to_owned(),
             file,
             start,
@@ -176,6 +179,23 @@ impl EditSession {
     /// The header as the file has it.
     pub fn header(&self) -> &Header {
         &self.slots.header
+    }
+
+    pub(super) fn picture(&self) -> &Picture {
+        &self.picture
+    }
+
+    pub(super) fn picture_mut(&mut self) -> &mut Picture {
+        &mut self.picture
+    }
+
+    /// Where the imagery before all commits lies.
+    pub(super) fn original_imagery(&self) -> Option<ImageryPlace> {
+        self.original.imagery
+    }
+
+    pub(super) fn count_edits(&mut self, edits: usize) {
+        self.edits += edits as u64;
     }
 
     fn source(&self) -> &dyn Source {
@@ -211,15 +231,16 @@ impl EditSession {
         Ok(changes)
     }
 
-    /// Takes back what was applied since the last commit.
+    /// Takes back what was applied and painted since the last commit.
     pub fn discard(&mut self) -> Changes {
         self.edits = 0;
+        self.picture.roll_back();
         self.editor.roll_back()
     }
 
     /// Whether everything applied so far is in the file.
     pub fn is_committed(&self) -> bool {
-        self.unwritten.is_empty() && self.editor.uncommitted().is_empty()
+        self.unwritten.is_empty() && self.editor.uncommitted().is_empty() && self.picture.is_committed()
     }
 
     /// Makes everything since the last commit durable, as one batch that `label` describes. Nothing is written if nothing changed.
@@ -241,13 +262,14 @@ impl EditSession {
         self.check_idle()?;
         let mut pages = self.unwritten.clone();
         pages.extend(self.editor.uncommitted());
-        if pages.is_empty() {
+        let place = self.place()?;
+        let section = self.picture.section(place.end(&self.slots.header) / PAGE_BYTES as u64)?;
+        if pages.is_empty() && section.is_none() {
             // What failed may be in force on the disk all the same; a header then says again where we are.
             let old = &self.slots.header;
             if !self.attempted.is_after(old) {
                 return Ok(None);
             }
-            let place = self.place()?;
             let header = Header { generation: place.next_generation(old)?, ..old.clone() };
             self.is_committing = true;
             return Ok(Some(CommitJob::turn(place, &self.slots, header)));
@@ -261,11 +283,11 @@ impl EditSession {
         let content = Content {
             pages: pages.iter().filter_map(|page| Some((*page, self.editor.edited_page(*page)?))).collect(),
             header: self.editor.header(),
+            section,
             edits: self.edits,
             label,
         };
-        let job =
-            CommitJob::new(self.place()?, &self.slots, &self.directory, self.original, sequence, &content)?;
+        let job = CommitJob::new(place, &self.slots, &self.directory, self.original, sequence, content)?;
         self.editor.mark_committed();
         self.unwritten = pages;
         self.is_committing = true;
@@ -288,6 +310,9 @@ impl EditSession {
         job.entries.iter().for_each(|(logical, entry)| self.directory.entries[*logical] = *entry);
         job.leaves.iter().for_each(|(leaf, entry)| self.directory.root[*leaf] = *entry);
         self.slots.flip(job.header_page, job.header);
+        if let Some(section) = job.section {
+            self.picture.committed(section);
+        }
         self.unwritten.clear();
         self.edits = 0;
         Ok(committed)
@@ -379,11 +404,14 @@ impl EditSession {
         for (logical, entry) in &entries {
             pages.push((*logical as u64, self.read_page(*logical, *entry)?));
         }
+        let (terrain, original) = (Arc::clone(self.editor.terrain()), self.original.imagery);
+        let turn = self.picture.turn(&terrain, &self.slots.header, original, state.imagery)?;
         let job = CommitJob::turn(place, &self.slots, header);
         let done = job.run_on(&*self.disk);
         self.attempted.note(&job);
         done?;
         let changes = self.editor.replace_pages(pages, &job.header)?;
+        self.picture.turn_to(turn);
         entries.into_iter().for_each(|(logical, entry)| self.directory.entries[logical] = entry);
         self.directory.root = root;
         self.slots.flip(job.header_page, job.header);

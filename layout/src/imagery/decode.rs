@@ -1,5 +1,6 @@
 //! Tiles as plain RGBA, for devices that know no block compression and for tests. Blocks are decoded by bcdec_rs.
 
+use super::encode::BlockTexels;
 use super::shape::{TILE_TEXELS, TileFormat};
 
 /// The texels of a whole tile as red, green, blue, alpha, a byte each, rows from the south: 1,048,576 bytes. `None` if `tile` has not
@@ -21,6 +22,17 @@ pub fn decode_tile(format: TileFormat, tile: &[u8]) -> Option<Vec<u8>> {
         decode(block, &mut texels[at..], pitch);
     }
     Some(texels)
+}
+
+/// The 16 texels of one block as it is stored, rows from the south; of Rgba8 of its 64 bytes.
+pub(super) fn decode_block(format: TileFormat, block: &[u8]) -> BlockTexels {
+    let mut texels = [[0; 4]; 16];
+    match format {
+        TileFormat::Rgba8 => texels.as_flattened_mut().copy_from_slice(block),
+        TileFormat::Bc1 => bcdec_rs::bc1(block, texels.as_flattened_mut(), 16),
+        TileFormat::Bc7 => bcdec_rs::bc7(block, texels.as_flattened_mut(), 16),
+    }
+    texels
 }
 
 #[cfg(test)]

@@ -62,8 +62,74 @@ pub(super) fn encode(format: TileFormat, texels: Texels<'_>) -> Vec<u8> {
     }
 }
 
+/// The 16 texels of a block, rows from the south.
+pub(super) type BlockTexels = [[u8; 4]; 16];
+
+/// Encodes blocks one by one: what becomes of a block depends on its own texels alone, not on those that it is encoded with. `out` is filled with
+/// [`TileFormat::block_bytes`] each; `strip` is room to work in.
+pub(super) fn encode_blocks(
+    format: TileFormat,
+    blocks: &[BlockTexels],
+    strip: &mut Vec<u8>,
+    out: &mut Vec<u8>,
+) {
+    out.clear();
+    out.resize(blocks.len() * format.block_bytes(), 0);
+    let places = out.chunks_exact_mut(format.block_bytes());
+    let is_opaque = |block: &BlockTexels| block.iter().all(|texel| texel[3] == 255);
+    match format {
+        TileFormat::Rgba8 => {
+            places.zip(blocks).for_each(|(place, block)| place.copy_from_slice(block.as_flattened()));
+        }
+        TileFormat::Bc1 if !ispc::IS_HERE => places.zip(blocks).for_each(|(place, block)| fit(block, place)),
+        TileFormat::Bc1 => {
+            ispc::bc1_into(stripped(blocks.iter(), blocks.len(), strip), out);
+            let places = out.chunks_exact_mut(format.block_bytes());
+            for (place, block) in places.zip(blocks).filter(|(_, block)| !is_opaque(block)) {
+                if block.iter().any(|texel| texel[3] < OPAQUE_ALPHA) {
+                    fit(block, place);
+                }
+            }
+        }
+        TileFormat::Bc7 => {
+            // The kernel has one setting for blocks with alpha and one for those without.
+            let opaque = blocks.iter().filter(|block| is_opaque(block)).count();
+            if opaque == 0 || opaque == blocks.len() {
+                ispc::bc7_into(stripped(blocks.iter(), blocks.len(), strip), opaque > 0, out);
+                return;
+            }
+            for (wanted, count) in [(true, opaque), (false, blocks.len() - opaque)] {
+                let some = blocks.iter().filter(|block| is_opaque(block) == wanted);
+                let made = ispc::bc7(stripped(some, count, strip), wanted);
+                let places = out.chunks_exact_mut(format.block_bytes()).zip(blocks);
+                let places = places.filter(|(_, block)| is_opaque(block) == wanted);
+                for ((place, _), made) in places.zip(made.chunks_exact(format.block_bytes())) {
+                    place.copy_from_slice(made);
+                }
+            }
+        }
+    }
+}
+
+/// `count` blocks side by side, as the kernels take them.
+fn stripped<'s, 'b>(
+    blocks: impl Iterator<Item = &'b BlockTexels>,
+    count: usize,
+    strip: &'s mut Vec<u8>,
+) -> Texels<'s> {
+    strip.clear();
+    strip.resize(count * 64, 0);
+    for (i, block) in blocks.enumerate() {
+        for (row, texels) in block.chunks_exact(4).enumerate() {
+            let at = (row * count + i) * 16;
+            strip[at..at + 16].copy_from_slice(texels.as_flattened());
+        }
+    }
+    Texels { side: [4 * count as u32, 4], rgba: strip }
+}
+
 /// One block of BC1 by range fit.
-fn fit(texels: &[[u8; 4]; 16], block: &mut [u8]) {
+fn fit(texels: &BlockTexels, block: &mut [u8]) {
     let params = Params {
         algorithm: Algorithm::RangeFit,
         weights: COLOUR_WEIGHTS_UNIFORM,
@@ -73,7 +139,7 @@ fn fit(texels: &[[u8; 4]; 16], block: &mut [u8]) {
 }
 
 /// Hands every block and its texels to `work`.
-fn for_blocks(texels: Texels<'_>, blocks: &mut [u8], mut work: impl FnMut(&[[u8; 4]; 16], &mut [u8])) {
+fn for_blocks(texels: Texels<'_>, blocks: &mut [u8], mut work: impl FnMut(&BlockTexels, &mut [u8])) {
     let across = texels.side[0] as usize / 4;
     let (rgba, _) = texels.rgba.as_chunks::<4>();
     for (i, block) in blocks.chunks_exact_mut(TileFormat::Bc1.block_bytes()).enumerate() {
@@ -114,10 +180,20 @@ mod ispc {
         bc1::compress_blocks(&surface(texels))
     }
 
+    pub(super) fn bc1_into(texels: Texels<'_>, blocks: &mut [u8]) {
+        bc1::compress_blocks_into(&surface(texels), blocks);
+    }
+
+    fn settings(is_opaque: bool) -> bc7::EncodeSettings {
+        if is_opaque { bc7::opaque_very_fast_settings() } else { bc7::alpha_very_fast_settings() }
+    }
+
     pub(super) fn bc7(texels: Texels<'_>, is_opaque: bool) -> Vec<u8> {
-        let settings =
-            if is_opaque { bc7::opaque_very_fast_settings() } else { bc7::alpha_very_fast_settings() };
-        bc7::compress_blocks(&settings, &surface(texels))
+        bc7::compress_blocks(&settings(is_opaque), &surface(texels))
+    }
+
+    pub(super) fn bc7_into(texels: Texels<'_>, is_opaque: bool, blocks: &mut [u8]) {
+        bc7::compress_blocks_into(&settings(is_opaque), &surface(texels), blocks);
     }
 }
 
@@ -139,9 +215,13 @@ mod ispc {
         Vec::new()
     }
 
+    pub(super) fn bc1_into(_: Texels<'_>, _: &mut [u8]) {}
+
     pub(super) fn bc7(_: Texels<'_>, _: bool) -> Vec<u8> {
         Vec::new()
     }
+
+    pub(super) fn bc7_into(_: Texels<'_>, _: bool, _: &mut [u8]) {}
 }
 
 #[cfg(test)]

@@ -59,6 +59,15 @@ impl Tables {
     }
 }
 
+/// Mean of four texels: one of the next coarser level.
+#[inline(always)]
+pub(super) fn mean(four: [Linear; 4]) -> Linear {
+    std::array::from_fn(|c| {
+        let sum: u32 = four.iter().map(|texel| u32::from(texel[c])).sum();
+        ((sum + 2) / 4) as u16
+    })
+}
+
 /// value * factor / divisor, rounded, at most 65535.
 #[inline(always)]
 fn scaled(value: u32, factor: u32, divisor: u32) -> u16 {

@@ -10,6 +10,7 @@ mod encode;
 mod image;
 mod linear;
 mod mosaic;
+mod paint;
 mod place;
 mod pyramid;
 mod reader;
@@ -21,6 +22,9 @@ pub(crate) use append::Append;
 pub use decode::decode_tile;
 pub use drape::{DrapeOptions, Draped, drape};
 pub use image::open as open_image;
+pub use paint::{
+    Fill, OtherState, Paint, PaintChanges, PaintedSection, PaintedTile, Painter, Region, Scorch, TexelRect,
+};
 pub use place::{Extent, PlaceOrigin};
 pub(crate) use pyramid::MadeTile;
 pub use reader::Imagery;

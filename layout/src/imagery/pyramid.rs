@@ -7,7 +7,7 @@
 //! Invariant: rows of a level arrive once each, in descending order; a tile is cut only when every row it repeats has arrived.
 
 use super::encode::{Texels, encode, is_transparent};
-use super::linear::{Linear, TABLES};
+use super::linear::{Linear, TABLES, mean};
 use super::section::TileEntry;
 use super::shape::{BORDER_TEXELS, INNER_TEXELS, ImageryShape, TILE_TEXELS, TileId};
 use crate::bytes::checksum;
@@ -196,12 +196,8 @@ fn halve_rows<T: Texel + Default>(
 /// A row of a level from two below it. The last texel of an odd row stands alone.
 fn halve_row<T: Texel>(south: &[T], north: &[T], row: &mut [Linear]) {
     let last = south.len() - 1;
-    let mean = |west: usize, east: usize| -> Linear {
-        let four = [south[west].linear(), south[east].linear(), north[west].linear(), north[east].linear()];
-        std::array::from_fn(|c| {
-            let sum: u32 = four.iter().map(|texel| u32::from(texel[c])).sum();
-            ((sum + 2) / 4) as u16
-        })
+    let mean = |west: usize, east: usize| {
+        mean([south[west].linear(), south[east].linear(), north[west].linear(), north[east].linear()])
     };
     let pairs = south.len() / 2;
     for (x, texel) in row[..pairs].iter_mut().enumerate() {

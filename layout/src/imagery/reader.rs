@@ -7,6 +7,7 @@ use super::section::{Section, TILE_ENTRY_BYTES, TileEntry, damaged};
 use super::shape::{ImageryShape, TILE_TEXELS, TileFormat, TileId};
 use crate::bytes::{PAGE_BYTES, checksum, to_usize};
 use crate::error::LayoutError;
+use crate::header::ImageryPlace;
 use crate::terrain::Terrain;
 
 /// The imagery section of a terrain file.
@@ -22,7 +23,16 @@ impl Imagery {
     /// # Errors
     /// [`LayoutError::Damaged`] for anything out of place in them, [`LayoutError::Unsupported`] for a later version of the section; I/O.
     pub fn open(terrain: &Terrain) -> Result<Option<Self>, LayoutError> {
-        let Some(place) = terrain.header().imagery else { return Ok(None) };
+        let header = terrain.header();
+        header.imagery.map(|place| Self::open_at(terrain, place, header.file_bytes)).transpose()
+    }
+
+    /// As [`Imagery::open`], of the section at `place` in a file of `file_bytes` bytes: that of another state of an edited file.
+    pub(crate) fn open_at(
+        terrain: &Terrain,
+        place: ImageryPlace,
+        file_bytes: u64,
+    ) -> Result<Self, LayoutError> {
         let (path, source) = (terrain.path(), terrain.source());
         let mut page = Box::new([0; PAGE_BYTES]);
         source.read_at(place.offset, &mut page[..])?;
@@ -35,7 +45,7 @@ impl Imagery {
         let entries: Vec<TileEntry> =
             (0..directory.len() / TILE_ENTRY_BYTES).map(|i| TileEntry::read(&directory, i)).collect();
         for (id, entry) in section.shape.ids().zip(&entries) {
-            if !section.is_entry(id, *entry, terrain.header().file_bytes) {
+            if !section.is_entry(id, *entry, file_bytes) {
                 let place = format!("imagery directory entry of {}", tile_name(id));
                 return Err(damaged(path, place, "the tile has another length or lies outside the file"));
             }
@@ -46,7 +56,7 @@ impl Imagery {
             let problem = "it holds another number of tiles or bytes than the imagery header says";
             return Err(damaged(path, "imagery directory".into(), problem));
         }
-        Ok(Some(Self { section, entries }))
+        Ok(Self { section, entries })
     }
 
     /// What all tiles have in common, and where the image lies.
@@ -123,6 +133,32 @@ impl Imagery {
         Ok(Some(entry))
     }
 
+    /// What the section's first page says.
+    pub(super) fn section(&self) -> &Section {
+        &self.section
+    }
+
+    /// The tiles' entries, in the order of the directory.
+    pub(super) fn entries(&self) -> &[TileEntry] {
+        &self.entries
+    }
+
+    /// Imagery from what its first page says and its directory.
+    pub(super) fn of(section: Section, entries: Vec<TileEntry>) -> Self {
+        Self { section, entries }
+    }
+
+    /// Whether a tile lies at the same place in the file as that of `other`.
+    pub(super) fn has_same_tile(&self, other: &Self, id: TileId) -> bool {
+        self.entry(id) == other.entry(id)
+    }
+
+    /// Tiles that are not the same in two states of a file whose imagery has one shape.
+    pub(super) fn differing(&self, other: &Self) -> Vec<TileId> {
+        let pairs = self.entries.iter().zip(&other.entries);
+        self.section.shape.ids().zip(pairs).filter(|(_, (a, b))| a != b).map(|(id, _)| id).collect()
+    }
+
     /// First page of a tile in the file.
     pub(crate) fn first_page(&self, id: TileId) -> Option<u64> {
         self.entry(id).map(|entry| entry.page.into())
@@ -133,7 +169,14 @@ impl Imagery {
         self.entry(id).map_or(0, |entry| u64::from(entry.bytes).div_ceil(PAGE_BYTES as u64))
     }
 
-    fn entry(&self, id: TileId) -> Option<TileEntry> {
+    /// Pages that first page, directory and tiles take, wherever they lie.
+    pub(crate) fn used_pages(&self) -> u64 {
+        let page = PAGE_BYTES as u64;
+        let tiles = self.entries.iter().map(|entry| u64::from(entry.bytes).div_ceil(page));
+        1 + self.section.directory_bytes().div_ceil(page) + tiles.sum::<u64>()
+    }
+
+    pub(super) fn entry(&self, id: TileId) -> Option<TileEntry> {
         let index = self.section.shape.index(id)?;
         self.entries.get(index as usize).copied().filter(|entry| entry.is_present())
     }
@@ -145,7 +188,7 @@ pub(crate) fn tile_name(id: TileId) -> String {
 }
 
 /// Makes a tile stored with fewer texels whole: repeats the last column of blocks (of Rgba8: of texels) eastwards, then the last row northwards.
-fn widen(format: TileFormat, stored: [u32; 2], texels: &mut Vec<u8>) {
+pub(super) fn widen(format: TileFormat, stored: [u32; 2], texels: &mut Vec<u8>) {
     let (unit, unit_texels) = match format {
         TileFormat::Bc1 | TileFormat::Bc7 => (format.block_bytes(), 4),
         TileFormat::Rgba8 => (4, 1),

@@ -9,9 +9,10 @@ use crate::imagery::{Imagery, TileId};
 use crate::terrain::Terrain;
 use rayon::prelude::*;
 
-/// Pages of work that the imagery's part reports.
+/// Pages of work that the imagery's part reports; of damaged imagery those of its section.
 pub(super) fn pages(terrain: &Terrain) -> u64 {
-    terrain.header().imagery.map_or(0, |place| place.bytes / PAGE_BYTES as u64)
+    let section = || terrain.header().imagery.map_or(0, |place| place.bytes / PAGE_BYTES as u64);
+    Imagery::open(terrain).map_or_else(|_| section(), |imagery| imagery.map_or(0, |i| i.used_pages()))
 }
 
 /// Tiles checked, and what is wrong.
@@ -36,7 +37,19 @@ pub(super) fn check(
         }
         Err(other) => return Err(other),
     };
-    check_places(&imagery, &mut findings);
+    let places = check_places(&imagery, &mut findings);
+    // Painted tiles lie between the pages of edits.
+    for (page, entry) in terrain.entries().iter().enumerate().filter(|(_, entry)| entry.is_present()) {
+        let number = u64::from(entry.page);
+        let behind = places.partition_point(|(first, ..)| *first <= number);
+        if let Some((first, pages, id)) = behind.checked_sub(1).map(|i| places[i])
+            && number < first + pages
+            && !section.contains(&number)
+        {
+            let problem = format!("its page is also that of imagery {}", crate::imagery::tile_name(id));
+            findings.add(super::record_page(terrain, page), problem);
+        }
+    }
     let ids: Vec<TileId> = imagery.shape().ids().filter(|id| imagery.has_tile(*id)).collect();
     let task = |tile: &mut Vec<u8>, id: &TileId| match imagery.read_tile(terrain, *id, tile) {
         Ok(_) => {
@@ -54,8 +67,8 @@ pub(super) fn check(
     Ok((ids.len() as u64, findings))
 }
 
-/// No two tiles share a page.
-fn check_places(imagery: &Imagery, findings: &mut Findings) {
+/// No two tiles share a page. Returns first page, pages and name of each tile, in the order of the file.
+fn check_places(imagery: &Imagery, findings: &mut Findings) -> Vec<(u64, u64, TileId)> {
     let mut places: Vec<(u64, u64, TileId)> = imagery
         .shape()
         .ids()
@@ -71,4 +84,5 @@ fn check_places(imagery: &Imagery, findings: &mut Findings) {
             );
         }
     }
+    places
 }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 pub mod drape;
+pub mod paint;
 
 pub use terrasoar_layout::dem::MemoryDem;
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, SampleType, Window};

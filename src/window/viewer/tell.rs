@@ -58,6 +58,8 @@ impl Viewer {
         self.tell_state("tolerance", format!("{} px", self.settings.tolerance_px()));
         self.tell_state("style", self.settings.style.clone());
         self.tell_state("playing", self.player.as_ref().is_some_and(Player::is_playing).to_string());
+        self.tell_state("tool", self.tools.tool.name().into());
+        self.tell_state("raining", self.rain.is_some().to_string());
         self.tell_state("recording", self.recorder.is_some().to_string());
         self.tell_state("full-screen", self.window.fullscreen().is_some().to_string());
         if !moving && !self.unsettled {

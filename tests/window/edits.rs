@@ -1,0 +1,137 @@
+//! The ground changed by hand: what is seen, what is on the disk, and back again.
+
+use super::driver::{Display, Window};
+use super::{Outcome, ensure};
+use std::path::Path;
+use std::sync::Arc;
+use terrasoar_layout::build::{HeightRoom, Silent, rebuild};
+use terrasoar_layout::disk::SystemDisk;
+use terrasoar_layout::edit::{EditSession, history};
+use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::verify::verify;
+
+/// A copy of the terrain with room for other heights.
+fn copy(display: &Display, name: &str) -> Result<std::path::PathBuf, String> {
+    let path = display.folder.path().join(name);
+    let terrain = Terrain::open(&display.folder.path().join("puget.iqt")).map_err(|e| e.to_string())?;
+    let [low, high] = terrain.header().height_range_m;
+    let room = HeightRoom { lowest_m: low - 30_000.0, highest_m: high + 30_000.0 };
+    rebuild(&SystemDisk, &terrain, &path, Some(room), 512, &Silent).map_err(|e| e.to_string())?;
+    Ok(path)
+}
+
+/// Keeps a picture and reads it.
+fn picture(window: &mut Window<'_>) -> Result<image::RgbImage, String> {
+    window.key("p")?;
+    let path = window.hear("picture ")?;
+    window.rest()?;
+    Ok(image::open(path).map_err(|e| e.to_string())?.to_rgb8())
+}
+
+/// Pixels that differ.
+fn differing(a: &image::RgbImage, b: &image::RgbImage) -> usize {
+    a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count()
+}
+
+pub fn ground_changed_by_hand(display: &Display) -> Outcome {
+    let path = copy(display, "edited.iqt")?;
+    let original = std::fs::read(&path).map_err(|e| e.to_string())?;
+    let mut window = display.open_file("edited.iqt", &["--size", "800x600", "--style", "relief"], "1")?;
+    window.rest()?;
+    let id = window.focus()?;
+    window.xdotool(&["mousemove", "--window", &id, "560", "330"])?;
+    let before = picture(&mut window)?;
+
+    window.key("b")?;
+    window.hear("tool crater")?;
+    window.key("bracketright")?;
+    window.key("bracketright")?;
+    window.xdotool(&["click", "1"])?;
+    window.hear("saved")?;
+    let cratered = picture(&mut window)?;
+    let seen = differing(&before, &cratered);
+    ensure(seen > 200, || format!("a crater is seen: {seen} pixels differ"))?;
+
+    window.key("b")?;
+    window.hear("tool raise")?;
+    window.xdotool(&["mousedown", "1"])?;
+    for _ in 0..6 {
+        window.xdotool(&["mousemove_relative", "--", "15", "6"])?;
+    }
+    window.xdotool(&["mouseup", "1"])?;
+    window.hear("saved")?;
+    let raised = picture(&mut window)?;
+    ensure(differing(&cratered, &raised) > 200, || "a wall is seen".into())?;
+
+    window.key("ctrl+z")?;
+    window.hear("undone")?;
+    let undone = picture(&mut window)?;
+    ensure(differing(&cratered, &undone) == 0, || "the wall is gone to the last pixel".into())?;
+    window.key("ctrl+z")?;
+    window.hear("undone")?;
+    let nothing = picture(&mut window)?;
+    ensure(differing(&before, &nothing) == 0, || "the crater is gone to the last pixel".into())?;
+    window.key("ctrl+z")?;
+    window.hear("news There is nothing to undo")?;
+    window.key("ctrl+y")?;
+    window.hear("redone")?;
+    let redone = picture(&mut window)?;
+    ensure(differing(&cratered, &redone) == 0, || "it is back to the last pixel".into())?;
+
+    window.key("k")?;
+    window.hear("raining true")?;
+    window.hear("saved")?;
+    window.key("k")?;
+    window.hear("raining false")?;
+    window.key("ctrl+q")?;
+    let (code, words, heard) = window.end()?;
+    ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))?;
+    ensure(!heard.iter().any(|line| line.starts_with("trouble")), || format!("{heard:?}"))?;
+
+    // What was told as saved is in the file, and can be taken back from elsewhere.
+    let terrain = Terrain::open(&path).map_err(|e| e.to_string())?;
+    let report = verify(&terrain, &|_| {}).map_err(|e| e.to_string())?;
+    ensure(report.is_sound(), || format!("{:?}", report.problems))?;
+    let told = history(&terrain).map_err(|e| e.to_string())?;
+    ensure(told.len() >= 2 && told[0].label == "crater", || format!("{told:?}"))?;
+    drop(terrain);
+    let mut session = EditSession::open(&path).map_err(|e| e.to_string())?;
+    while session.undo().map_err(|e| e.to_string())?.is_some() {}
+    drop(session);
+    same_pages(&path, &original)
+}
+
+/// Whether the ground is that of another file, page by page.
+fn same_pages(path: &Path, original: &[u8]) -> Outcome {
+    let open = |bytes: Vec<u8>| {
+        Terrain::from_source(Box::new(terrasoar_layout::source::MemorySource::new("original", bytes)))
+    };
+    let now = Terrain::open(path).map_err(|e| e.to_string())?;
+    let then = open(original.to_vec()).map_err(|e| e.to_string())?;
+    for page in 0..now.header().record_pages() {
+        let [now, then] = [&now, &then].map(|terrain| terrain.checked_page(page).map_err(|e| e.to_string()));
+        ensure(now? == then?, || format!("page {page} is another"))?;
+    }
+    Ok(())
+}
+
+/// Another program edits the file: the window says so, shows it, and changes nothing.
+pub fn edits_of_a_file_that_is_taken(display: &Display) -> Outcome {
+    let path = Arc::new(copy(display, "taken.iqt")?);
+    let session = EditSession::open(&path).map_err(|e| e.to_string())?;
+    let mut window = display.open_file("taken.iqt", &["--size", "640x480"], "1")?;
+    window.rest()?;
+    let id = window.focus()?;
+    window.xdotool(&["mousemove", "--window", &id, "450", "260"])?;
+    window.key("b")?;
+    window.hear("tool crater")?;
+    window.xdotool(&["click", "1"])?;
+    let words = window.hear("trouble ")?;
+    ensure(words.contains("another program is writing"), || words.clone())?;
+    drop(session);
+    window.xdotool(&["click", "1"])?;
+    window.hear("saved")?;
+    window.key("ctrl+q")?;
+    let (code, words, _) = window.end()?;
+    ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))
+}
