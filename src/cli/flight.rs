@@ -118,7 +118,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let told =
         format!("{}: {} flight of {} frames{told}", args.output.display(), args.kind.name(), args.frames);
     // A flight piped on to another program stays alone in the pipe.
-    if args.output.is_file() {
+    if std::fs::symlink_metadata(&args.output).is_ok_and(|meta| meta.is_file()) {
         return print(&told);
     }
     complain(&told);

@@ -3,7 +3,7 @@
 use super::mesh_file::{self, Format};
 use super::output::{check_output, grouped, print};
 use super::parse;
-use super::replay::QualityArgs;
+use super::replay::{QualityArgs, batches_of};
 use super::terrain::TerrainArgs;
 use anyhow::Result;
 use std::path::PathBuf;
@@ -32,6 +32,9 @@ pub(super) struct Args {
     engine: EngineKind,
     #[command(flatten)]
     quality: QualityArgs,
+    /// Edit the ground on the way, in memory only, by this script
+    #[arg(long, value_name = "E.edits")]
+    edits: Option<PathBuf>,
     /// File to write: binary PLY or OBJ by its extension
     #[arg(short, long, value_name = "OUT.(ply|obj)", value_parser = |text: &str| parse::with_extension(text, &["ply", "obj"]))]
     output: PathBuf,
@@ -50,7 +53,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     let terrain = std::sync::Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
-    let mesh = frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine, &[])?;
+    let batches = match &args.edits {
+        Some(script) => batches_of(script, &flight.frames)?,
+        None => Vec::new(),
+    };
+    let mesh =
+        frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine, &batches)?;
     mesh_file::write(&args.output, &mesh, format)?;
     print(&format!(
         "{}: {} triangles, {} vertices",

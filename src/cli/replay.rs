@@ -1,13 +1,15 @@
 //! `terrasoar replay`: a recorded flight through one engine.
 
-use super::output::{check_stream, columns, grouped, print, print_json};
+use super::output::{check_stream, columns, complain, grouped, print, print_json};
 use super::progress::Progress;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
-use anyhow::Result;
-use std::path::PathBuf;
+use anyhow::{Context, Result};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use terrasoar::edits::{Loader, Script, timed};
 use terrasoar::flight::{Flight, FlightFrame};
-use terrasoar::flyover::{EngineKind, Quality, replay};
+use terrasoar::flyover::{EngineKind, Quality, TimedBatch, replay, replay_edited};
 use terrasoar::refine::Culling;
 use terrasoar::report::write_frames_csv;
 use terrasoar::stats::{FrameStats, ReplaySummary};
@@ -22,7 +24,8 @@ use terrasoar_layout::terrain::Terrain;
 #[command(after_help = "\
 Examples:
   terrasoar replay alps.iqt --flight low.flight
-  terrasoar replay alps.iqt --flight low.flight --engine soar --tolerance-px 2 --stats frames.csv --json")]
+  terrasoar replay alps.iqt --flight low.flight --engine soar --tolerance-px 2 --stats frames.csv --json
+  terrasoar replay alps.iqt --flight low.flight --edits war.edits")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
@@ -34,6 +37,9 @@ pub(super) struct Args {
     engine: EngineKind,
     #[command(flatten)]
     quality: QualityArgs,
+    /// Edit the ground on the way, in memory only, by this script's moments (`frame N`, `at SECONDS`)
+    #[arg(long, value_name = "E.edits")]
+    edits: Option<PathBuf>,
     /// Make at most N vertex tests a frame (kinetic only); what is late stays coarse, and the figures say how much
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     budget_tests: Option<u64>,
@@ -90,9 +96,11 @@ pub(super) fn fly(
 
 pub(super) fn run(args: &Args) -> Result<()> {
     if let Some(stats) = &args.stats {
-        check_stream(stats, &args.terrain.inputs(&[&args.flight]))?;
+        let others: Vec<_> =
+            [Some(&args.flight), args.edits.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+        check_stream(stats, &args.terrain.inputs(&others))?;
     }
-    let terrain = args.terrain.open()?;
+    let terrain = Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
     let progress = Progress::new("frames");
     let name = args.engine.name();
@@ -103,13 +111,45 @@ pub(super) fn run(args: &Args) -> Result<()> {
         ))
         .into());
     }
-    let frames = fly(&terrain, &flight.frames, quality, args.engine, name, &progress)?;
+    let frames = match &args.edits {
+        None => fly(&terrain, &flight.frames, quality, args.engine, name, &progress)?,
+        Some(script) => {
+            let batches = batches_of(script, &flight.frames)?;
+            progress.begin(name, 2 * flight.frames.len() as u64);
+            let done = &mut |done| progress.set(done);
+            replay_edited(&terrain, &flight.frames, quality, args.engine, &batches, done)
+                .with_context(|| not_replayed(script, &args.terrain.file))?
+        }
+    };
     drop(progress);
     if let Some(path) = &args.stats {
         write_frames_csv(path, &frames)?;
     }
     let summary = ReplaySummary::of(name, &frames);
     if args.json { print_json(&summary) } else { print(&text(&summary)) }
+}
+
+/// A script's batches at their frames. Those whose moment never comes are told.
+pub(super) fn batches_of(script: &Path, frames: &[FlightFrame]) -> Result<Vec<TimedBatch>> {
+    let batches = Loader::new(script).script(&Script::read(script)?)?;
+    let late = batches.iter().filter(|batch| batch.frame(frames).is_none()).count();
+    if late > 0 {
+        complain(&format!(
+            "note: {}: {late} of {} batches would come after the flight's last frame and are left out",
+            script.display(),
+            batches.len()
+        ));
+    }
+    Ok(timed(&batches, frames))
+}
+
+/// What is said of a script that cannot be replayed.
+pub(super) fn not_replayed(script: &Path, terrain: &Path) -> String {
+    format!(
+        "{} cannot be replayed over {} (terrasoar edit applies it to a copy, with more room if need be)",
+        script.display(),
+        terrain.display()
+    )
 }
 
 fn text(s: &ReplaySummary) -> String {
@@ -137,6 +177,8 @@ fn text(s: &ReplaySummary) -> String {
         row("scan, median", format!("{:.1} us", s.scan_us_p50)),
         row("test, median", format!("{:.1} us", s.test_us_p50)),
         row("apply, median", format!("{:.1} us", s.apply_us_p50)),
+        row("records edited", grouped(s.edited_records_total)),
+        row("edits of a frame, worst", format!("{:.3} ms", s.edit_ms_max)),
         row("mesh hash", s.mesh_hash.clone()),
     ])
 }

@@ -10,6 +10,7 @@ pub mod rain;
 mod reader;
 #[cfg(test)]
 mod tests;
+mod timed;
 mod words;
 mod writer;
 
@@ -18,6 +19,7 @@ use terrasoar_layout::edit::{Edit, StampMode};
 pub use error::ScriptError;
 pub use format::{MAX_EDITS, VERSION};
 pub use load::{LoadedBatch, Loader};
+pub use timed::timed;
 
 /// A script: batches in the order in which they are done.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -7,16 +7,17 @@ use std::io::Write;
 use std::path::Path;
 
 impl Script {
-    /// Writes the script to `path`: to a file beside it first, which then takes its place. A path that is not a regular file, such as a pipe, is written
-    /// directly.
+    /// Writes the script to `path`: to a file beside it first, which then takes its place. A path that is not a regular file, such as a link or a
+    /// pipe, is written directly.
     ///
     /// # Errors
     /// [`ScriptError::Write`], [`ScriptError::Unwritable`] or [`ScriptError::NoEdits`].
     pub fn write(&self, path: &Path) -> Result<(), ScriptError> {
         let text = self.to_text(path)?;
         let failed = |source| ScriptError::Write { path: path.into(), source };
-        if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
-            let mut file = std::fs::OpenOptions::new().write(true).open(path).map_err(failed)?;
+        // A link is followed: /dev/stdout is one, and must not be replaced.
+        if std::fs::symlink_metadata(path).is_ok_and(|m| !m.is_file()) {
+            let mut file = std::fs::File::create(path).map_err(failed)?;
             return file.write_all(text.as_bytes()).map_err(failed);
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

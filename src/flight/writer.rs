@@ -22,14 +22,15 @@ pub struct FlightWriter<W> {
 
 impl Flight {
     /// Writes the flight to `path`: to a file beside it first, which then takes its place. A path that is not a
-    /// regular file, such as a pipe, is written directly.
+    /// regular file, such as a link or a pipe, is written directly.
     ///
     /// # Errors
     /// [`FlightError::Write`], or why a note, a frame or their number does not fit the format.
     pub fn write(&self, path: &Path) -> Result<(), FlightError> {
         let failed = |source| FlightError::Write { path: path.into(), source };
-        if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
-            let file = std::fs::OpenOptions::new().write(true).open(path).map_err(failed)?;
+        // A link is followed: /dev/stdout is one, and must not be replaced.
+        if std::fs::symlink_metadata(path).is_ok_and(|m| !m.is_file()) {
+            let file = std::fs::File::create(path).map_err(failed)?;
             return self.write_to(BufWriter::new(file), path).map(drop);
         }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -58,8 +58,14 @@ pub(super) struct Changing<'b> {
 }
 
 impl<'b> Changing<'b> {
-    pub(super) fn new(terrain: &Arc<Terrain>, batches: &'b [TimedBatch]) -> Self {
-        Self { editor: Editor::new(Arc::clone(terrain)), batches, changes: Vec::new() }
+    /// Over a terrain as it is; what edits restore is what it was before all that its journal knows.
+    pub(super) fn new(terrain: &Arc<Terrain>, batches: &'b [TimedBatch]) -> Result<Self, ReplayError> {
+        let mut editor = Editor::new(Arc::clone(terrain));
+        let is_restoring = batches.iter().flat_map(|batch| &batch.edits).any(Edit::needs_original);
+        if is_restoring && terrain.header().history.is_some() {
+            editor.set_original(Arc::new(terrain.open_again_unmapped()?.into_original()?));
+        }
+        Ok(Self { editor, batches, changes: Vec::new() })
     }
 }
 

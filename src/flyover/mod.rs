@@ -222,9 +222,9 @@ pub fn replay_edited(
     let quality = quality.check()?;
     with_records!(records_of(terrain)?, records => {
         let store = || EditedRecords::new(records.clone());
-        let mut ground = Changing::new(terrain, batches);
+        let mut ground = Changing::new(terrain, batches)?;
         let times = with_engine!(kind, store(), quality, engine => time_updates(engine, &mut ground, frames, quality, done))?;
-        let mut ground = Changing::new(terrain, batches);
+        let mut ground = Changing::new(terrain, batches)?;
         let stats = with_engine!(kind, store(), quality, engine => count_frames(engine, &mut ground, &records, frames, quality, done))?;
         Ok(timed(stats, times))
     })
@@ -285,7 +285,7 @@ pub fn frame_mesh(
     let Some(flown) = frames.get(..=frame) else {
         return Err(ReplayError::NoSuchFrame { asked: frame, last: frames.len().saturating_sub(1) });
     };
-    let mut ground = Changing::new(terrain, batches);
+    let mut ground = Changing::new(terrain, batches)?;
     with_records!(records_of(terrain)?, records => with_engine!(kind, EditedRecords::new(records), quality, engine => {
         let mut engine = engine;
         for (i, frame) in flown.iter().enumerate() {

@@ -2,6 +2,7 @@
 
 mod build;
 mod drape;
+mod edit;
 mod engines;
 mod iobench;
 mod pictures;

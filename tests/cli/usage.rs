@@ -2,8 +2,10 @@
 
 use crate::support::{Bench, text};
 
-const VERBS: [&str; 11] =
-    ["build", "drape", "info", "verify", "height", "synth", "flight", "replay", "compare", "iobench", "mesh"];
+const VERBS: [&str; 17] = [
+    "build", "drape", "edit", "crater", "undo", "redo", "history", "compact", "info", "verify", "height",
+    "synth", "flight", "replay", "compare", "iobench", "mesh",
+];
 /// Verbs of the feature `view`.
 const DRAWING: &[&str] = if cfg!(feature = "view") { &["snapshot", "movie"] } else { &[] };
 

@@ -39,16 +39,16 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DEG", value_parser = parse::finite, allow_negative_numbers = true, conflicts_with = "rain")]
     direction: Option<f64>,
     /// Which rain
-    #[arg(long, value_name = "S", requires = "rain")]
+    #[arg(long, value_name = "S", conflicts_with = "at")]
     seed: Option<u64>,
     /// Where it rains, the whole terrain without it
-    #[arg(long, value_name = "W,S,E,N", value_parser = parse::extent, allow_hyphen_values = true, requires = "rain")]
+    #[arg(long, value_name = "W,S,E,N", value_parser = parse::extent, allow_hyphen_values = true, conflicts_with = "at")]
     extent: Option<[f64; 4]>,
     /// Depths as parts of the radii, 0.15 to 0.3 without it
-    #[arg(long, value_name = "A[,B]", value_parser = parse::range, requires = "rain")]
+    #[arg(long, value_name = "A[,B]", value_parser = parse::range, conflicts_with = "at")]
     depth_ratio: Option<[f64; 2]>,
     /// Craters a batch of the rain, all without it
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), requires = "rain")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), conflicts_with = "at")]
     batch: Option<u64>,
     /// Write a script instead of editing
     #[arg(short, long, value_name = "E.edits", conflicts_with_all = ["dry_run", "json", "overlay"])]
@@ -87,7 +87,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         if script.batches.len() == 1 { "" } else { "es" }
     );
     // A script piped on to another program stays alone in the pipe.
-    if out.is_file() {
+    if std::fs::symlink_metadata(out).is_ok_and(|meta| meta.is_file()) {
         return print(&told);
     }
     complain(&told);

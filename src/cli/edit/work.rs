@@ -133,7 +133,7 @@ impl Work<'_> {
     }
 
     /// Refuses a script of which not everything can be applied, before anything is; rewrites the file if it has no room for the heights that the script leads to.
-    fn prepare(&self) -> Result<u32> {
+    fn prepare(&self, held: Option<EditSession>) -> Result<u32> {
         let terrain = self.target.terrain()?;
         self.check(terrain.grid())?;
         let header = terrain.header().clone();
@@ -147,7 +147,8 @@ impl Work<'_> {
         let Some(heights_m) = foresight.heights_m().filter(|range| !holds_heights(&header, *range)) else {
             return Ok(0);
         };
-        drop(foresight);
+        // The rewriting takes the lock for itself.
+        drop((foresight, held));
         let [low, high] = header.height_range_m.map(|m| decimal(m, 1));
         let [lowest, highest] = heights_m.map(|m| decimal(m, 1));
         self.widen(
@@ -204,7 +205,9 @@ impl Work<'_> {
     /// Applies everything, batch by batch, each durable before the next.
     pub(super) fn perform(&self) -> Result<Told> {
         let start = Instant::now();
-        let widenings = self.prepare()?;
+        // The lock first, so that a second writer hears of it before anything else; an overlay is not made for a script that is refused.
+        let held = if self.target.overlay.is_none() { Some(self.target.session()?) } else { None };
+        let widenings = self.prepare(held)?;
         let mut session = self.target.session()?;
         let grid = *session.editor().terrain().grid();
         let mut told = self.begin(false);
