@@ -151,8 +151,10 @@ impl ApplicationHandler<Wake> for Session {
                 viewer.hand.shift = modifiers.state().shift_key();
                 viewer.hand.ctrl = modifiers.state().control_key();
             }
-            WindowEvent::KeyboardInput { event: key, .. } => {
-                if let PhysicalKey::Code(code) = key.physical_key {
+            // A key that was held when the window got the keyboard was pressed for another, or is about to be heard of by itself.
+            WindowEvent::KeyboardInput { event: key, is_synthetic, .. } => {
+                let is_pressed_for_us = !is_synthetic || key.state == ElementState::Released;
+                if let (PhysicalKey::Code(code), true) = (key.physical_key, is_pressed_for_us) {
                     viewer.key(code, key.state == ElementState::Pressed, key.repeat);
                 }
             }

@@ -141,6 +141,22 @@ impl Window<'_> {
         }
     }
 
+    /// Waits for lines that begin with each of these, in any order.
+    pub fn hear_all(&mut self, beginnings: &[&str]) -> Result<(), String> {
+        let mut left = beginnings.to_vec();
+        while !left.is_empty() {
+            self.hear("")?;
+            let line = self.heard.last().cloned().unwrap_or_default();
+            left.retain(|beginning| !line.starts_with(beginning));
+        }
+        Ok(())
+    }
+
+    /// All that was heard so far.
+    pub fn heard(&self) -> &[String] {
+        &self.heard
+    }
+
     /// Waits until nothing moves; gives east, north, up, yaw and pitch.
     pub fn rest(&mut self) -> Result<[f64; 5], String> {
         let place = self.hear("at-rest ")?;

@@ -24,7 +24,6 @@ fn copy(display: &Display, name: &str) -> Result<std::path::PathBuf, String> {
 fn picture(window: &mut Window<'_>) -> Result<image::RgbImage, String> {
     window.key("p")?;
     let path = window.hear("picture ")?;
-    window.rest()?;
     Ok(image::open(path).map_err(|e| e.to_string())?.to_rgb8())
 }
 
@@ -44,10 +43,11 @@ pub fn ground_changed_by_hand(display: &Display) -> Outcome {
 
     window.key("b")?;
     window.hear("tool crater")?;
-    window.key("bracketright")?;
-    window.key("bracketright")?;
+    for _ in 0..8 {
+        window.key("bracketright")?;
+    }
     window.xdotool(&["click", "1"])?;
-    window.hear("saved")?;
+    window.hear_all(&["saved", "at-rest"])?;
     let cratered = picture(&mut window)?;
     let seen = differing(&before, &cratered);
     ensure(seen > 200, || format!("a crater is seen: {seen} pixels differ"))?;
@@ -59,22 +59,24 @@ pub fn ground_changed_by_hand(display: &Display) -> Outcome {
         window.xdotool(&["mousemove_relative", "--", "15", "6"])?;
     }
     window.xdotool(&["mouseup", "1"])?;
-    window.hear("saved")?;
+    window.hear_all(&["saved", "at-rest"])?;
     let raised = picture(&mut window)?;
-    ensure(differing(&cratered, &raised) > 200, || "a wall is seen".into())?;
+    let seen = differing(&cratered, &raised);
+    cratered.save("/tmp/ed-a.png").unwrap(); raised.save("/tmp/ed-b.png").unwrap(); before.save("/tmp/ed-0.png").unwrap();
+    ensure(seen > 200, || format!("a wall is seen: {seen} pixels differ; {:?}", window.heard()))?;
 
     window.key("ctrl+z")?;
-    window.hear("undone")?;
+    window.hear_all(&["undone", "at-rest"])?;
     let undone = picture(&mut window)?;
     ensure(differing(&cratered, &undone) == 0, || "the wall is gone to the last pixel".into())?;
     window.key("ctrl+z")?;
-    window.hear("undone")?;
+    window.hear_all(&["undone", "at-rest"])?;
     let nothing = picture(&mut window)?;
     ensure(differing(&before, &nothing) == 0, || "the crater is gone to the last pixel".into())?;
     window.key("ctrl+z")?;
     window.hear("news There is nothing to undo")?;
     window.key("ctrl+y")?;
-    window.hear("redone")?;
+    window.hear_all(&["redone", "at-rest"])?;
     let redone = picture(&mut window)?;
     ensure(differing(&cratered, &redone) == 0, || "it is back to the last pixel".into())?;
 

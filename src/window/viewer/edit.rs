@@ -11,7 +11,7 @@ use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{Changes, Edit};
 
 /// Edits that a frame makes of a stroke at most: a hand faster than that is caught up with.
-const EDITS_A_FRAME: usize = 12;
+const EDITS_A_FRAME: usize = 24;
 /// Craters that fall in a frame of rain.
 const CRATERS_A_FRAME: u64 = 2;
 /// How often rain is brought to the disk.
@@ -57,7 +57,11 @@ impl Viewer {
 
     /// Ends a stroke and has it brought to the disk.
     pub(super) fn end_stroke(&mut self) {
-        if self.stroke.take().is_some() {
+        if self.stroke.is_some() {
+            // The hand may have moved since the last frame.
+            self.under = self.pick(self.hand.pointer);
+            self.go_on_with_stroke();
+            self.stroke = None;
             self.commit(self.tools.tool.name());
         }
     }
@@ -109,6 +113,8 @@ impl Viewer {
     fn follow(&mut self, changes: &Changes) -> bool {
         let Some(workshop) = &self.workshop else { return false };
         self.touched = true;
+        // The picture is another one once this is drawn.
+        self.said.retain(|(name, _)| *name != "at-rest");
         match self.stage.scene.ground_changed(changes, workshop.session().editor()) {
             Ok(is_followed) => is_followed,
             Err(error) => {
