@@ -19,11 +19,11 @@ use std::sync::Arc;
 use terrasoar::refine::Culling;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::edit::{Changes, Editor};
-use terrasoar_layout::imagery::Imagery;
+use terrasoar_layout::edit::{Changes, Edit, EditSession, Editor, Repainted};
+use terrasoar_layout::imagery::{Imagery, Paint, Painter};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{
-    DrawStats, Frame, FrameView, Gpu, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target,
+    DrawStats, Frame, FrameView, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target,
     TerrainShape, TileId, TileStats, UploadStats, wgpu,
 };
 
@@ -32,6 +32,8 @@ const TILES_ASKED: usize = 8;
 
 /// Tiles of the image that a frame of a window is given at most: a megabyte of BC1.
 const IMAGE_TILES_A_FRAME: usize = 8;
+/// Texels across the scorch of a crater at most: one as wide takes a third of a second.
+const WIDEST_SCORCH: f64 = 2048.0;
 /// Frames ahead of the eye that tiles of the image are asked for.
 const FRAMES_AHEAD: f64 = 24.0;
 
@@ -122,6 +124,8 @@ pub(crate) struct Scene<'a> {
     heights_m: Vec<f32>,
     wanted: Vec<TileId>,
     drape: Option<Drape>,
+    /// What the device takes of images.
+    formats: &'static [ImageryFormat],
     /// The views of the last two updates, which say where the eye is going.
     ways: [Option<View>; 2],
 }
@@ -139,7 +143,7 @@ impl<'a> Scene<'a> {
             None => None,
             Some(_) => Drape::of(
                 Arc::new(terrain.open_again_unmapped()?),
-                &gpu.capabilities,
+                gpu.capabilities.imagery_formats(),
                 options.is_for_a_window(),
             )?,
         };
@@ -158,7 +162,8 @@ impl<'a> Scene<'a> {
         options: SceneOptions,
     ) -> Result<Self, SceneError> {
         let feed = streamed_feed(terrain, cache_bytes, options.culling)?;
-        let drape = Drape::of(Arc::clone(terrain), &gpu.capabilities, options.is_for_a_window())?;
+        let formats = gpu.capabilities.imagery_formats();
+        let drape = Drape::of(Arc::clone(terrain), formats, options.is_for_a_window())?;
         Self::over(feed, drape, terrain, gpu, options)
     }
 
@@ -172,6 +177,7 @@ impl<'a> Scene<'a> {
         let renderer = new_renderer(shape(terrain), drape.as_ref(), gpu, options)?;
         Ok(Self {
             drape,
+            formats: gpu.capabilities.imagery_formats(),
             ways: [None; 2],
             feed,
             renderer,
@@ -325,6 +331,47 @@ impl<'a> Scene<'a> {
             self.renderer.change_heights([rect.west, rect.south], [rect.east, rect.north]);
         }
         Ok(true)
+    }
+
+    /// Takes over what became of the image in an editing session: the next picture shows paint, an undo and a redo. To be called after each of them, and after a commit.
+    ///
+    /// # Errors
+    /// Another image, which an undo or a redo led to, cannot be read or shown.
+    pub(crate) fn repainted(&mut self, session: &mut EditSession) -> Result<(), SceneError> {
+        let Repainted { tiles, is_another } = session.take_repainted();
+        let place = session.header().imagery;
+        if is_another {
+            let (formats, threads) = (self.formats, self.options.is_for_a_window());
+            let over = |painter: &Painter| {
+                let (terrain, imagery) = (Arc::clone(painter.terrain()), painter.imagery().clone());
+                Drape::over(terrain, imagery, place, formats, threads)
+            };
+            self.drape = session.open_picture()?.map(over).transpose()?;
+            let shape = self.drape.as_ref().map(Drape::shape);
+            self.renderer.set_imagery(shape, self.options.imagery_bytes)?;
+        }
+        if let (Some(drape), Some(painter)) = (&mut self.drape, session.painter()) {
+            drape.repainted(&mut self.renderer, &tiles, painter, place);
+        }
+        Ok(())
+    }
+
+    /// What craters among these edits burn into the image: nothing where there is none, or none that this build can paint, and by none that is too wide for a frame to
+    /// wait for.
+    pub(crate) fn scorches_of(&self, edits: &[Edit]) -> Vec<Paint> {
+        let Some(drape) = self.drape.as_ref().filter(|drape| drape.can_be_painted()) else {
+            return Vec::new();
+        };
+        let [east_m, north_m] = drape.shape().texel_m;
+        let widest_m = WIDEST_SCORCH * (east_m * north_m).sqrt();
+        let scorch = |edit: &Edit| match edit {
+            Edit::Crater(crater) => match Paint::scorch_of(crater) {
+                Paint::Scorch(scorch) if 2.0 * scorch.radius_m > widest_m => None,
+                paint => Some(paint),
+            },
+            _ => None,
+        };
+        edits.iter().filter_map(scorch).collect()
     }
 
     /// Whether an image is draped over the terrain.

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{Changes, CommitJob, Edit, EditSession};
+use terrasoar_layout::imagery::Paint;
 use terrasoar_layout::terrain::Terrain;
 
 /// A commit that has run, and how that went.
@@ -45,12 +46,17 @@ impl Workshop {
         &self.session
     }
 
-    /// Applies edits in memory.
+    /// The session, for a scene to take over what became of the picture.
+    pub(crate) fn session_mut(&mut self) -> &mut EditSession {
+        &mut self.session
+    }
+
+    /// Applies edits, and paint on the picture, in memory.
     ///
     /// # Errors
-    /// As [`EditSession::apply`].
-    pub(crate) fn apply(&mut self, edits: &[Edit]) -> Result<Changes, LayoutError> {
-        self.session.apply(edits)
+    /// As [`EditSession::apply_and_paint`].
+    pub(crate) fn apply(&mut self, edits: &[Edit], paints: &[Paint]) -> Result<Changes, LayoutError> {
+        self.session.apply_and_paint(edits, paints).map(|(changes, _)| changes)
     }
 
     /// Has everything since the last time written to the disk, on a thread; `wake` is called when it is there.

@@ -151,13 +151,25 @@ impl EditSession {
         std::mem::take(&mut self.picture_mut().repainted)
     }
 
+    /// The picture as it is now, opened if need be; `None` without imagery.
+    ///
+    /// # Errors
+    /// As [`Painter::open_at`].
+    pub fn open_picture(&mut self) -> Result<Option<&Painter>, LayoutError> {
+        Ok(self.painter_if_any()?.map(|painter| &*painter))
+    }
+
     fn opened_painter(&mut self) -> Result<&mut Painter, LayoutError> {
-        let (terrain, header) = (Arc::clone(self.editor().terrain()), self.header().clone());
-        let original = self.original_imagery();
         let missing = LayoutError::Usage(format!(
             "{}: there is no picture to paint on; drape one with `terrasoar drape`",
-            terrain.path().display()
+            self.editor().terrain().path().display()
         ));
-        self.picture_mut().open(&terrain, &header, original)?.ok_or(missing)
+        self.painter_if_any()?.ok_or(missing)
+    }
+
+    fn painter_if_any(&mut self) -> Result<Option<&mut Painter>, LayoutError> {
+        let (terrain, header) = (Arc::clone(self.editor().terrain()), self.header().clone());
+        let original = self.original_imagery();
+        self.picture_mut().open(&terrain, &header, original)
     }
 }

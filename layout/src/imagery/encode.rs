@@ -19,6 +19,13 @@ pub(super) struct Texels<'t> {
     pub(super) rgba: &'t [u8],
 }
 
+impl TileFormat {
+    /// Whether this build makes tiles of this format, so that a picture in it can be painted.
+    pub fn can_be_made(self) -> bool {
+        check_format(self).is_ok()
+    }
+}
+
 /// Refuses a format that this build cannot encode.
 pub(super) fn check_format(format: TileFormat) -> Result<(), LayoutError> {
     if format == TileFormat::Bc7 && !ispc::IS_HERE {

@@ -64,6 +64,14 @@ impl Renderer {
         self.imagery.as_mut().ok_or(NO_IMAGE)?.set_absent(&self.queue, tile)
     }
 
+    /// Notes that texels of these tiles changed, or that tiles said to be absent exist by now: whenever a view wants them they are asked for anew, coarse before
+    /// fine as ever, and what is on the device shows until the new ones come.
+    pub fn change_imagery(&mut self, tiles: &[ImageTileId]) {
+        if let Some(imagery) = &mut self.imagery {
+            tiles.iter().for_each(|tile| imagery.outdate(*tile));
+        }
+    }
+
     /// Forgets a tile whose texels changed, or one that exists by now; it will be wanted again.
     pub fn forget_imagery(&mut self, tile: ImageTileId) {
         if let Some(imagery) = &mut self.imagery {

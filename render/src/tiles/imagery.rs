@@ -126,7 +126,7 @@ pub struct ImageryStats {
     pub absent: u32,
     /// Tiles the last view wants.
     pub wanted: u32,
-    /// Tiles the last view wants, has room for and lacks.
+    /// Tiles the last view wants, has room for and lacks, or has as they were before a change.
     pub missing: u32,
     /// Tiles uploaded since the image was set.
     pub uploads: u64,
@@ -240,6 +240,12 @@ impl Imagery {
     pub(crate) fn forget(&mut self, queue: &wgpu::Queue, tile: TileId) {
         self.absent.remove(&tile);
         self.pool.forget(queue, tile);
+    }
+
+    /// Notes that texels of a tile changed, or that it exists by now.
+    pub(crate) fn outdate(&mut self, tile: TileId) {
+        self.absent.remove(&tile);
+        self.pool.residency.outdate(tile);
     }
 
     pub(crate) fn stats(&self) -> ImageryStats {

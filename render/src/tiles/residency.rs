@@ -88,7 +88,7 @@ impl Residency {
                 break;
             }
             room -= 1;
-            if !self.touch(*tile, self.now - 1) {
+            if !self.touch(*tile, self.now - 1) || self.outdated.contains(tile) {
                 self.missing_ahead.push(*tile);
             }
         }
@@ -107,12 +107,12 @@ impl Residency {
         true
     }
 
-    /// Wanted tiles that are not here, most urgent first.
+    /// Wanted tiles that are not here, or outdated, most urgent first.
     pub fn missing(&self) -> &[TileId] {
         &self.missing
     }
 
-    /// Tiles that a view ahead will want and that are not here, most urgent first.
+    /// Tiles that a view ahead will want and that are not here, or outdated, most urgent first.
     pub fn missing_ahead(&self) -> &[TileId] {
         &self.missing_ahead
     }

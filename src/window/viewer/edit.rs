@@ -1,4 +1,4 @@
-//! The ground changed by hand: strokes, undo and redo, a rain of craters.
+//! The ground changed by hand: strokes, undo and redo, a rain of craters. A crater scorches the picture, where one is draped.
 
 use super::Viewer;
 use crate::window::events::Wake;
@@ -74,13 +74,14 @@ impl Viewer {
         self.apply(&edits);
     }
 
-    /// Applies edits, and shows them in the next picture. Whether that went well.
+    /// Applies edits, scorches the picture where craters are, and shows them in the next picture. Whether that went well.
     fn apply(&mut self, edits: &[Edit]) -> bool {
         if edits.is_empty() {
             return true;
         }
+        let scorches = self.stage.scene.scorches_of(edits);
         let applied = match self.workshop() {
-            Ok(workshop) => workshop.apply(edits),
+            Ok(workshop) => workshop.apply(edits, &scorches),
             Err(error) => Err(error),
         };
         match applied {
@@ -109,8 +110,18 @@ impl Viewer {
         Ok(self.workshop.insert(opened))
     }
 
+    /// Has the scene follow what became of the picture.
+    fn follow_picture(&mut self) {
+        if let Some(workshop) = &mut self.workshop
+            && let Err(error) = self.stage.scene.repainted(workshop.session_mut())
+        {
+            self.trouble(error.to_string());
+        }
+    }
+
     /// Has the scene follow what changed. Whether it could.
     fn follow(&mut self, changes: &Changes) -> bool {
+        self.follow_picture();
         let Some(workshop) = &self.workshop else { return false };
         self.touched = true;
         // The picture is another one once this is drawn.
@@ -156,6 +167,7 @@ impl Viewer {
             Ok(false) => {}
             Err(error) => self.trouble(format!("the edits are not on the disk yet: {error}")),
         }
+        self.follow_picture();
     }
 
     /// Whether edits are on their way to the disk.

@@ -107,6 +107,16 @@ impl Painter {
         self.files.current.shape()
     }
 
+    /// The picture as the file has it, before what is painted in memory.
+    pub fn imagery(&self) -> &Imagery {
+        &self.files.current
+    }
+
+    /// How the file is read: tiles of [`Painter::imagery`] through this one, whatever state it was opened in.
+    pub fn terrain(&self) -> &Arc<Terrain> {
+        &self.files.terrain
+    }
+
     /// Paints a batch in order, all of it or, on an error, nothing.
     ///
     /// # Errors

@@ -19,6 +19,7 @@ pub fn tests() -> Vec<(&'static str, Test)> {
         ("imagery::to_and_fro_in_a_small_pool", to_and_fro),
         ("imagery::what_is_ahead_is_there_in_time", ahead),
         ("imagery::absent_tiles_are_asked_for_once", absent),
+        ("imagery::changed_tiles_show_until_they_come_anew", changed),
         ("imagery::wrong_use_is_told", wrong_use),
     ]
 }
@@ -271,6 +272,54 @@ fn absent(gpu: &Gpu) -> Outcome {
     ensure(levels[2] > 1000, || format!("{levels:?}"))?;
     scene.renderer.forget_imagery(gone);
     ensure(scene.renderer.want_imagery(&view, 8).first() == Some(&gone), || "it stays absent".into())
+}
+
+/// Tiles whose texels changed are asked for anew, coarse before fine and so many a frame; the old ones show until then, and the others are not touched.
+fn changed(gpu: &Gpu) -> Outcome {
+    let square = level_ground();
+    let mut scene = Scene::new(gpu, &square);
+    scene.show(&square.down_to(0));
+    let shape = Image::shape_over(&square.terrain, 0.5);
+    let (before, after) = (painted(shape), Image::new(shape, |_, _, _| LEVELS[5]));
+    // Around the meeting point of four of the finest tiles, of which one changes, and all above it.
+    let view = down(504.0, 504.0, 80.0);
+    let all = (SIZE_PX[0] * SIZE_PX[1]) as usize;
+    drape(&mut scene, &before, 64);
+    show_all(&mut scene, &before, &view);
+    let unchanged = scene.draw(&view, &bare());
+    let stats = scene.renderer.imagery_stats();
+    let tile = ImageTileId { level: 0, x: 2, y: 1 };
+    let elsewhere = ImageTileId { level: 0, x: 0, y: 0 };
+    let mut tiles: Vec<_> = (0..shape.pyramid().levels())
+        .map(|level| ImageTileId { level, x: tile.x >> level, y: tile.y >> level })
+        .collect();
+    tiles.push(elsewhere);
+    scene.renderer.change_imagery(&tiles);
+    tiles.pop();
+    tiles.reverse();
+    for i in 0..tiles.len() {
+        let asked = scene.renderer.want_imagery(&view, 9).to_vec();
+        ensure(asked == tiles[i..], || format!("{asked:?} are asked for of {tiles:?}"))?;
+        ensure(scene.draw(&view, &bare()) == unchanged, || format!("frame {i} shows another picture"))?;
+        give(&mut scene.renderer, &after, &view, 1, |_| false);
+    }
+    let picture = scene.draw(&view, &bare());
+    let (levels, none) = count(&picture);
+    ensure(none == 0 && levels[5].abs_diff(all / 4) < 300 && levels[0] + levels[5] == all, || {
+        format!("one of four tiles changed: {levels:?}, {none} of no level")
+    })?;
+    let pairs = picture.rgba.chunks_exact(4).zip(unchanged.rgba.chunks_exact(4));
+    let differing = pairs.filter(|(a, b)| a != b).count();
+    ensure(differing == levels[5], || format!("{differing} pixels differ, {} are new", levels[5]))?;
+    let later = scene.renderer.imagery_stats();
+    ensure((later.resident, later.evicted, later.missing) == (stats.resident, stats.evicted, 0), || {
+        format!("{later:?}")
+    })?;
+    // What is absent may come to be.
+    scene.renderer.set_imagery_absent(tile).map_err(|e| e.to_string())?;
+    ensure(scene.renderer.want_imagery(&view, 9).is_empty(), || "an absent tile is asked for".into())?;
+    scene.renderer.change_imagery(&[tile]);
+    ensure(scene.renderer.want_imagery(&view, 9) == [tile], || "it stays absent".into())
 }
 
 fn wrong_use(gpu: &Gpu) -> Outcome {
