@@ -56,6 +56,9 @@ pub(crate) trait Feed {
     /// have been asked for.
     fn heights_m(&mut self, tile: TileId, heights_m: &mut Vec<f32>) -> bool;
 
+    /// Lowest and highest height in metres, edits included.
+    fn height_range_m(&self) -> [f64; 2];
+
     /// Height of the ground in metres at a place in metres east and north, where one is known.
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64>;
 
@@ -161,6 +164,10 @@ impl<C: RecordCodec> Feed for KineticFeed<'_, C> {
     fn heights_m(&mut self, tile: TileId, heights_m: &mut Vec<f32>) -> bool {
         tile_heights_m(&self.records, tile, heights_m);
         true
+    }
+
+    fn height_range_m(&self) -> [f64; 2] {
+        self.records.height_range_m()
     }
 
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {

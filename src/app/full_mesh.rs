@@ -89,6 +89,10 @@ impl<C: RecordCodec> Feed for FullMesh<'_, C> {
         true
     }
 
+    fn height_range_m(&self) -> [f64; 2] {
+        self.records.height_range_m()
+    }
+
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
         sound(&self.records, east_m, north_m).height_m
     }

@@ -23,8 +23,8 @@ use terrasoar_layout::edit::{Changes, Edit, EditSession, Editor, Repainted};
 use terrasoar_layout::imagery::{Imagery, Paint, Painter};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{
-    DrawStats, Frame, FrameView, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target,
-    TerrainShape, TileId, TileStats, UploadStats, wgpu,
+    DrawStats, Frame, FrameView, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions,
+    Target, TerrainShape, TileId, TileStats, UploadStats, wgpu,
 };
 
 /// Tiles that are asked for, for each that is given in a frame.

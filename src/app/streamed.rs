@@ -139,6 +139,10 @@ impl<C: RecordCodec> Feed for StreamedFeed<C> {
         false
     }
 
+    fn height_range_m(&self) -> [f64; 2] {
+        self.streamed.engine().store().shape().height_range_m
+    }
+
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
         sound(self.streamed.engine().store(), east_m, north_m).height_m
     }
@@ -153,7 +157,7 @@ impl<C: RecordCodec> Feed for StreamedFeed<C> {
     }
 
     fn is_waiting(&self) -> bool {
-        self.frame.outstanding > 0
+        self.frame.outstanding > 0 || self.streamed.has_wants()
     }
 
     fn lacks_pages(&self) -> bool {

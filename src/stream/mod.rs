@@ -193,6 +193,11 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
         surface::pages_away(self.engine.store(), east_m, north_m, |page| wanted.push((page, 0.0)));
     }
 
+    /// Whether pages were asked for since the last update, which it knows nothing of yet.
+    pub fn has_wants(&self) -> bool {
+        !self.wanted.is_empty()
+    }
+
     /// Whether a page could not be read when it was last tried.
     pub fn is_in_trouble(&self, page: u64) -> bool {
         self.requests.is_in_trouble(page)

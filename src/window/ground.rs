@@ -11,13 +11,12 @@ use terrasoar_layout::terrain::Terrain;
 pub(crate) struct SceneGround<'a> {
     feed: &'a dyn Feed,
     grid: Grid,
-    height_range_m: [f64; 2],
 }
 
 impl<'a> SceneGround<'a> {
     /// The ground of `terrain`, as `feed` knows it now.
     pub(crate) fn new(terrain: &Terrain, feed: &'a dyn Feed) -> Self {
-        Self { feed, grid: *terrain.grid(), height_range_m: terrain.header().height_range_m }
+        Self { feed, grid: *terrain.grid() }
     }
 
     /// Metres from sample to sample, east and north.
@@ -36,6 +35,6 @@ impl Ground for SceneGround<'_> {
     }
 
     fn height_range_m(&self) -> [f64; 2] {
-        self.height_range_m
+        self.feed.height_range_m()
     }
 }

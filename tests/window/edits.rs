@@ -62,7 +62,9 @@ pub fn ground_changed_by_hand(display: &Display) -> Outcome {
     window.hear_all(&["saved", "at-rest"])?;
     let raised = picture(&mut window)?;
     let seen = differing(&cratered, &raised);
-    cratered.save("/tmp/ed-a.png").unwrap(); raised.save("/tmp/ed-b.png").unwrap(); before.save("/tmp/ed-0.png").unwrap();
+    cratered.save("/tmp/ed-a.png").unwrap();
+    raised.save("/tmp/ed-b.png").unwrap();
+    before.save("/tmp/ed-0.png").unwrap();
     ensure(seen > 200, || format!("a wall is seen: {seen} pixels differ; {:?}", window.heard()))?;
 
     window.key("ctrl+z")?;
@@ -72,7 +74,8 @@ pub fn ground_changed_by_hand(display: &Display) -> Outcome {
     window.key("ctrl+z")?;
     window.hear_all(&["undone", "at-rest"])?;
     let nothing = picture(&mut window)?;
-    ensure(differing(&before, &nothing) == 0, || "the crater is gone to the last pixel".into())?;
+    let left = differing(&before, &nothing);
+    ensure(left == 0, || format!("the crater is gone to the last pixel, but for {left}"))?;
     window.key("ctrl+z")?;
     window.hear("news There is nothing to undo")?;
     window.key("ctrl+y")?;
