@@ -7,29 +7,16 @@
 //!
 //! The terrain is copied first, with room for heights beyond its own. Edits stay in memory; the file is not written to. Prints Markdown. Keep runs under benches/runs/.
 
-use std::path::{Path, PathBuf};
+#[path = "support/craters.rs"]
+mod craters;
+
+use craters::{Dice, Failure, crater, with_room};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
-use terrasoar_layout::build::{HeightRoom, Silent, rebuild};
-use terrasoar_layout::disk::SystemDisk;
-use terrasoar_layout::edit::{Crater, Edit, Editor};
+use terrasoar_layout::edit::{Edit, Editor};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::terrain::Terrain;
-
-type Failure = Box<dyn std::error::Error>;
-
-/// Random numbers (Steele, Lea, Flood 2014, "Fast splittable pseudorandom number generators"), the same in every run.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, limit: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ z >> 31) >> 11) as f64 / (1u64 << 53) as f64 * limit
-    }
-}
 
 fn main() -> Result<(), Failure> {
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
@@ -54,7 +41,7 @@ fn main() -> Result<(), Failure> {
         "| craters | refused | median, us | 99 %, us | worst, us | a second | samples | records | pages |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    let craters = craters(&terrain, count);
+    let craters = anywhere(&terrain, count);
     let mut editor = Editor::new(Arc::clone(&terrain));
     one_by_one("pages read as needed", &mut editor, &craters)?;
     editor.roll_back();
@@ -65,29 +52,14 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The terrain with room for craters on top of each other.
-fn with_room(path: &Path, copy: &Path) -> Result<Arc<Terrain>, Failure> {
-    let terrain = Terrain::open(path)?;
-    let [lowest_m, highest_m] = terrain.header().height_range_m;
-    let room = HeightRoom { lowest_m: lowest_m - 1000.0, highest_m: highest_m + 1000.0 };
-    rebuild(&SystemDisk, &terrain, copy, Some(room), 512, &Silent)?;
-    Ok(Arc::new(Terrain::open(copy)?))
-}
-
-/// Craters whose rims fit 16 x 16 samples, wherever there is ground for them.
-fn craters(terrain: &Terrain, count: usize) -> Vec<Edit> {
-    let [dx, dy] = terrain.grid().spacing_m();
+/// Craters wherever there is ground for them.
+fn anywhere(terrain: &Terrain, count: usize) -> Vec<Edit> {
     let extent = terrain.grid().extent_m();
-    let radius_m = 4.0 * dx.min(dy);
     let mut dice = Dice(7);
     (0..count)
         .map(|_| {
-            Edit::Crater(Crater {
-                centre_m: extent.map(|e| dice.below(e)),
-                direction_deg: dice.below(360.0),
-                radius_m,
-                depth_m: radius_m / 4.0,
-            })
+            let centre_m = extent.map(|e| dice.below(e));
+            crater(terrain, centre_m, dice.below(360.0))
         })
         .collect()
 }

@@ -4,8 +4,9 @@ mod common;
 
 use common::checks::{VIEWPORT, check_conforming, keys, triangles};
 use common::mirror::{Mirror, check_clusters, drawn};
-use common::{frame, noise, rugged, terrain_of};
+use common::{frame, install, noise, roomy_terrain, rugged, terrain_of};
 use proptest::prelude::*;
+use std::collections::HashSet;
 use std::sync::Arc;
 use terrasoar::flight::FlightFrame;
 use terrasoar::flyover::{EngineKind, Quality, TimedBatch, frame_mesh, replay_edited};
@@ -26,18 +27,8 @@ use terrasoar_layout::record::{RecordCodec, RecordKind};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::with_records;
 
-/// Ground with room for edits below and above: two corner samples lie far off.
 fn terrain(samples: [u32; 2], seed: u64, holes: bool) -> Arc<Terrain> {
-    let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| match (x, y) {
-        (0, 0) => -2000.0,
-        (1, 0) => 4000.0,
-        _ if holes && (x.abs_diff(40).pow(2) + y.abs_diff(50).pow(2) < 80 || noise(seed, y, x) < 0.002) => {
-            f64::NAN
-        }
-        _ => rugged(seed, x, y),
-    });
-    let options = BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() };
-    Arc::new(terrain_of(&dem, &options))
+    Arc::new(roomy_terrain(samples, seed, holes))
 }
 
 /// Ground without room, of records that need none.
@@ -67,10 +58,7 @@ fn tell<'r, C: RecordCodec>(
     changes: &Changes,
 ) {
     let height_range_m = editor.header().height_range_m;
-    engine.store_mut().set_height_range_m(height_range_m);
-    for page in &changes.pages {
-        engine.store_mut().install(*page, editor.edited_page(*page).unwrap()).unwrap();
-    }
+    install(engine.store_mut(), editor, changes);
     let page = |logical| editor.edited_page(logical);
     engine.ground_changed(&GroundChange { areas: &changes.samples, height_range_m, page: &page });
 }
@@ -86,7 +74,7 @@ fn fly(terrain: &Arc<Terrain>, views: &[View], edits: &[(usize, Vec<Edit>)], cul
         let mut kinetic = Kinetic::new(store(), culling);
         let mut hasty = Kinetic::new(store(), culling);
         hasty.set_budget(Budget { tests: Some(60), time: None });
-        let mut mirror = Mirror::default();
+        let (mut mirror, mut hasty_mirror) = (Mirror::default(), Mirror::default());
         for (i, view) in views.iter().enumerate() {
             for (_, edits) in edits.iter().filter(|(frame, _)| *frame == i) {
                 let changes = match editor.apply(edits) {
@@ -109,7 +97,16 @@ fn fly(terrain: &Arc<Terrain>, views: &[View], edits: &[(usize, Vec<Edit>)], cul
             let expected = triangles(&naive);
             let edited = soar.store_mut().clone();
             check_conforming(&edited, &expected);
-            check_conforming(&edited, &triangles(&hasty));
+            let late = triangles(&hasty);
+            check_conforming(&edited, &late);
+            hasty_mirror.apply(hasty.patch());
+            hasty_mirror.check_vertices(&edited);
+            let mut hasty_anew = Mirror::default();
+            hasty_anew.apply(&hasty.whole_patch());
+            hasty_mirror.check_same(&hasty_anew);
+            if culling == Culling::Vertices {
+                assert!(hasty_mirror.triangles() == drawn(&edited, &late), "late in frame {i}");
+            }
             for (name, got) in [("soar", triangles(&soar)), ("smart", triangles(&smart)), ("kinetic", triangles(&kinetic))] {
                 assert!(keys(&got) == keys(&expected), "{name} draws another mesh than naive in frame {i}");
             }
@@ -160,7 +157,7 @@ proptest! {
 
     #[test]
     fn engines_draw_the_edited_ground(
-        which in 0usize..4, clusters in any::<bool>(), seed in any::<u64>(),
+        which in 0usize..4, clusters in any::<bool>(), seed in any::<u64>(), exaggerate in any::<bool>(),
         edits in prop::collection::vec((0usize..24, prop::collection::vec(edit(), 1..4)), 1..8),
     ) {
         let terrain = &terrains()[which];
@@ -176,7 +173,9 @@ proptest! {
                 vertical_fov_deg: if phase == 2 { 20.0 + 2.0 * step } else { 45.0 },
                 ..frame(terrain, at, 1500.0 - 10.0 * step, turn, -35.0)
             };
-            frame.view(VIEWPORT, 2.0)
+            // Every third frame another one, in the midst of whatever else goes on.
+            let vertical_exaggeration = if exaggerate { 0.5 + random(i / 3, 3) } else { 1.0 };
+            View { vertical_exaggeration, ..frame.view(VIEWPORT, 2.0) }
         }).collect();
         fly(terrain, &views, &edits, culling);
     }
@@ -215,4 +214,107 @@ fn replays_bomb_alike() {
         positions
     };
     assert_eq!(sorted(mesh(EngineKind::Kinetic).positions), sorted(mesh(EngineKind::Soar).positions));
+}
+
+/// A small crater, somewhere.
+fn small_crater(i: u32) -> Edit {
+    let centre_m = [200.0 + 800.0 * noise(1, i, 0), 200.0 + 1000.0 * noise(1, i, 1)];
+    Edit::Crater(Crater { centre_m, direction_deg: 0.0, radius_m: 40.0, depth_m: 2.0 })
+}
+
+/// However many edits come between two frames, each vertex that they move is sent once, and no triangle unless the mesh changes.
+#[test]
+fn each_vertex_that_moves_is_sent_once() {
+    let terrain = terrain([129, 129], 8, false);
+    let mut editor = Editor::new(Arc::clone(&terrain));
+    with_records!(terrain.records().unwrap(), records => {
+        for culling in Culling::ALL {
+            let mut kinetic = Kinetic::new(EditedRecords::new(records.clone()), culling);
+            let view = frame(&terrain, [0.5, 0.1], 2500.0, 0.0, -60.0).view(VIEWPORT, 4.0);
+            let (mut still, mut once) = (0, HashSet::new());
+            for i in 0..60 {
+                kinetic.update(&view, &mut Unobserved);
+                // On top of each other, and two apart.
+                for edit in [small_crater(i), small_crater(i), small_crater(i + 100)] {
+                    let changes = editor.apply(&[edit]).unwrap();
+                    tell(&mut kinetic, &editor, &changes);
+                }
+                kinetic.update(&view, &mut Unobserved);
+                let work = kinetic.work();
+                once.clear();
+                let twice = kinetic.patch().vertices.iter().filter(|(slot, _)| !once.insert(*slot)).count();
+                if (work.splits, work.merges) == (0, 0) {
+                    still += usize::from(!once.is_empty());
+                    assert_eq!(twice, 0, "{culling:?}, edit {i}");
+                    assert_eq!(kinetic.patch().triangles, []);
+                }
+                let sent = kinetic.patch().clone();
+                kinetic.update(&view, &mut Unobserved);
+                assert!(kinetic.patch().vertices.is_empty(), "{} again", sent.vertices.len());
+            }
+            assert!(still > 5, "{still} edits changed nothing but heights");
+        }
+    });
+}
+
+/// Hills that are taken away leave no cluster higher than its triangles for long.
+#[test]
+fn bounds_follow_ground_that_falls() {
+    let terrain = exact_terrain([129, 129], 9);
+    let mut editor = Editor::new(Arc::clone(&terrain));
+    with_records!(terrain.records().unwrap(), records => {
+        let mut kinetic = Kinetic::new(EditedRecords::new(records), Culling::Clusters);
+        let view = frame(&terrain, [0.5, 0.1], 2500.0, 0.0, -60.0).view(VIEWPORT, 0.2);
+        let highest_m = |kinetic: &Kinetic<_>| {
+            kinetic.clusters().map(|(bounds, _)| bounds.largest[2]).fold(f32::MIN, f32::max)
+        };
+        kinetic.update(&view, &mut Unobserved);
+        let before_m = highest_m(&kinetic);
+        let rect = SampleRect { west: 30, south: 30, east: 90, north: 90 };
+        for height_m in [2000.0, 100.0] {
+            let changes = editor.apply(&[Edit::set(rect, height_m)]).unwrap();
+            tell(&mut kinetic, &editor, &changes);
+            kinetic.update(&view, &mut Unobserved);
+            assert_eq!(highest_m(&kinetic), 2000.0);
+        }
+        // As many frames as there are clusters.
+        let clusters = kinetic.clusters().count();
+        (0..2 * clusters).for_each(|_| { kinetic.update(&view, &mut Unobserved); });
+        assert_eq!(kinetic.work().merges, 0);
+        assert!(highest_m(&kinetic) <= before_m, "{clusters} clusters");
+    });
+}
+
+#[test]
+fn a_warm_edit_allocates_nothing() {
+    let terrain = terrain([257, 257], 3, false);
+    let mut editor = Editor::new(Arc::clone(&terrain));
+    with_records!(terrain.records().unwrap(), records => {
+        for culling in Culling::ALL {
+            let mut kinetic = Kinetic::new(EditedRecords::new(records.clone()), culling);
+            let view = frame(&terrain, [0.5, 0.2], 1500.0, 0.0, -30.0).view(VIEWPORT, 2.0);
+            kinetic.update(&view, &mut Unobserved);
+            let mut sent = 0;
+            // The same ground up and down, over and over.
+            for round in 0..160 {
+                for i in 0..10u32 {
+                    let [west, south] = [60 + 10 * i, 90 + 7 * i];
+                    let rect = SampleRect { west, south, east: west + 12, north: south + 12 };
+                    let edit = Edit::set(rect, if round % 2 == 0 { 900.0 } else { 700.0 });
+                    let changes = editor.apply(&[edit]).unwrap();
+                    let height_range_m = editor.header().height_range_m;
+                    install(kinetic.store_mut(), &editor, &changes);
+                    let page = |logical| editor.edited_page(logical);
+                    let change = GroundChange { areas: &changes.samples, height_range_m, page: &page };
+                    let counted = allocation_counter::measure(|| {
+                        kinetic.ground_changed(&change);
+                        kinetic.update(&view, &mut Unobserved);
+                    });
+                    sent += kinetic.patch().vertices.len();
+                    assert!(round < 140 || counted.count_total == 0, "{culling:?} in round {round}: {counted:?}");
+                }
+            }
+            assert!(sent > 1000, "{sent}");
+        }
+    });
 }

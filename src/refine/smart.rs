@@ -282,7 +282,8 @@ struct Expiry<'e> {
 impl Expiry<'_> {
     /// Visits the triangle (apex; b, d) of `node`.
     fn visit(&mut self, level: u32, node: u32, [apex, b, d]: Triangle, above: &Range<usize>) {
-        let here = self.areas.narrow(above, [apex, b, d], level);
+        let v = b.midpoint(d);
+        let here = self.areas.narrow(above, v, level);
         if here.is_empty() {
             return;
         }
@@ -291,7 +292,6 @@ impl Expiry<'_> {
         *word &= SPLIT;
         let children = self.nodes.children[node as usize];
         if is_split && children != NONE {
-            let v = b.midpoint(d);
             self.visit(level - 1, children, [v, b, apex], &here);
             self.visit(level - 1, children + 1, [v, apex, d], &here);
         }

@@ -267,7 +267,7 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             }
             if frame.outstanding > 0 {
                 self.fetch.wait();
-            } else if frame.work.unread > 0 && !self.fetch.has_arrivals() {
+            } else if frame.work.unread > 0 && frame.pages_come == 0 && !self.fetch.has_arrivals() {
                 // What is left cannot be read; waiting until it is tried again would keep us here for ever.
                 return self.now - start;
             }

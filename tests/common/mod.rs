@@ -7,6 +7,9 @@ pub mod mirror;
 use terrasoar::flight::FlightFrame;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
+use terrasoar_layout::edit::{Changes, Editor};
+use terrasoar_layout::edited::EditedRecords;
+use terrasoar_layout::record::RecordCodec;
 use terrasoar_layout::source::MemorySource;
 use terrasoar_layout::terrain::Terrain;
 
@@ -48,6 +51,27 @@ pub fn rugged_terrain(samples: [u32; 2], seed: u64, holes: bool) -> Terrain {
         if holes && hole && (x, y) != (0, 0) { f64::NAN } else { rugged(seed, x, y) }
     });
     terrain_of(&dem, &BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() })
+}
+
+/// Rugged ground of compact records with room for edits below and above: two samples in a corner lie far off.
+pub fn roomy_terrain(samples: [u32; 2], seed: u64, holes: bool) -> Terrain {
+    let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| match (x, y) {
+        (0, 0) => -2000.0,
+        (1, 0) => 4000.0,
+        _ if holes && (x.abs_diff(40).pow(2) + y.abs_diff(50).pow(2) < 80 || noise(seed, y, x) < 0.002) => {
+            f64::NAN
+        }
+        _ => rugged(seed, x, y),
+    });
+    terrain_of(&dem, &BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() })
+}
+
+/// Replaces pages of a store that an edit changed.
+pub fn install<C: RecordCodec>(store: &mut EditedRecords<'_, C>, editor: &Editor, changes: &Changes) {
+    store.set_height_range_m(editor.header().height_range_m);
+    for page in &changes.pages {
+        store.install(*page, editor.edited_page(*page).unwrap()).unwrap();
+    }
 }
 
 /// A frame looking along yaw and pitch, in degrees, from a point given as fractions of the terrain's extent and metres up.

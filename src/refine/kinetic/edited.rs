@@ -1,26 +1,75 @@
 //! The ground was edited: nodes take over records that changed, and their words are over.
 //!
-//! One descent from the roots, into triangles only that an edit can concern, compares each node's record with the page that now holds it. A node whose record is another one
-//! keeps its place; its word is due in the next update, which tests it as any other, and a vertex in the mesh is sent anew. Errors and radii are saturated as
-//! before, so the mesh conforms, and without a budget it is SOAR's over the edited ground in the same frame. Cost: the triangles around what changed and their ancestors; nothing is
-//! allocated once the lists have grown.
+//! One walk down the refinement graph, to vertices only that an edit can concern ([`Areas`]) and to each of them once, compares each node's record with the one that there is
+//! now. A node whose record is another one keeps its place; its word is due in the next update, which tests it as any other, and a vertex in the mesh is sent anew, once
+//! however many edits come between two frames. Errors and radii are saturated as before, so the mesh conforms, and without a budget it is SOAR's over the edited ground in the same frame.
+//! What looks ahead have seen below a leaf may no longer be so: they look again.
+//!
+//! Invariant: after the walk every node that has a record has the one that there is. Cost: the nodes met, which are those whose record changed, their ancestors and a few around each
+//! area; nothing is allocated once the lists have grown.
 
-use super::labels::level_of;
-use super::nodes::{CENTRE, STATUS, body, half};
+use super::certificate::{clock_of, expiry_of};
+use super::labels::{child_point, level_of};
+use super::nodes::{CENTRE, NONE, STATUS, body};
+use super::queue::Entry;
 use super::{Kinetic, root_label};
 use crate::refine::ground::{Areas, GroundChange};
 use std::ops::Range;
 use terrasoar_layout::bytes::PAGE_BYTES;
-use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{ROOTS, corners, slot_of};
+use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
+use terrasoar_layout::prefetch::prefetch;
 use terrasoar_layout::record::RecordCodec;
 use terrasoar_layout::store::{RawOf, RecordStore};
 
-/// The record at `slot` in a page that holds changed ones.
-fn record<S: RecordStore>(change: &GroundChange<'_>, slot: u64) -> Option<RawOf<S>> {
-    let page = (change.page)(S::page_of(slot))?;
-    let at = (slot as usize % (PAGE_BYTES / S::Codec::BYTES)) * S::Codec::BYTES;
-    Some(S::Codec::read(&page[at..]))
+/// Lists below this length are left as they are.
+const SHORT: usize = 4096;
+
+/// What edits have done since the last update, and where.
+#[derive(Debug, Default)]
+pub(super) struct Edits {
+    areas: Areas,
+    /// Calls since the last update.
+    calls: u32,
+    /// Vertex slots, the nodes that split there ([`NONE`] for corners of the square), and the vertex slots of their edges' ends.
+    moved: Vec<(u32, u32, [u32; 2])>,
+    /// Leaves that may have a corner that moved, if clusters have bounds.
+    leaves: Vec<u32>,
+    /// Leaves to look ahead from again.
+    looks: Vec<u32>,
+    /// Clusters whose bounds edits may have left too large.
+    pub loose: usize,
+}
+
+impl Edits {
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        self.areas.bytes()
+            + self.moved.capacity() * size_of::<(u32, u32, [u32; 2])>()
+            + (self.leaves.capacity() + self.looks.capacity()) * size_of::<u32>()
+    }
+
+    /// Leaves each entry of the lists once. Sorted by vertex or node, so that patches are the same whatever the order of the walk.
+    fn unite(&mut self) {
+        self.moved.sort_unstable();
+        self.moved.dedup();
+        for list in [&mut self.leaves, &mut self.looks] {
+            list.sort_unstable();
+            list.dedup();
+        }
+    }
+
+    /// Gives back what exceeds a mesh of so many nodes.
+    pub(super) fn settle(&mut self, nodes: usize) {
+        let most = nodes.max(SHORT);
+        if self.moved.capacity() > 2 * most {
+            self.moved.shrink_to(most);
+        }
+        for list in [&mut self.leaves, &mut self.looks] {
+            if list.capacity() > 2 * most {
+                list.shrink_to(most);
+            }
+        }
+    }
 }
 
 impl<S: RecordStore> Kinetic<S> {
@@ -28,107 +77,175 @@ impl<S: RecordStore> Kinetic<S> {
     pub(in super::super) fn take_edit(&mut self, change: &GroundChange<'_>) {
         let [low, high] = change.height_range_m;
         self.clocks.raise_tallest(low.abs().max(high.abs()));
-        if self.nodes.is_empty() {
+        if self.nodes.is_empty() || change.areas.is_empty() {
             return;
         }
-        let grid = *self.records.grid();
-        let mut areas = std::mem::take(&mut self.areas);
-        let all = areas.start(&grid, change);
-        let square = corners(grid.k());
-        for (i, at) in square.into_iter().enumerate() {
-            if let Some(raw) = record::<S>(change, i as u64) {
-                let vertex = self.records.decode(raw, 0);
-                if vertex != self.corners[i] {
-                    self.corners[i] = vertex;
-                    self.vertices.set_height(i as u32, vertex.height_m);
-                    self.moved.push((i as u32, self.patch_vertex(at, &vertex, [i as u32; 2])));
-                }
-            }
-        }
-        let centre_slot = self.nodes.get(CENTRE).body[body::HERE];
-        self.take_record(CENTRE, [centre_slot; 2], change);
-        let centre = self.nodes.get(CENTRE).point;
+        let mut edits = std::mem::take(&mut self.edits);
+        edits.calls += 1;
+        self.renew_top(&mut edits, change);
+        let all = edits.areas.start(self.records.grid(), change);
         for (side, [b, d]) in ROOTS {
             let label = root_label(side);
-            let node = self.nodes.get(CENTRE).body[label];
-            let slots = [centre_slot, b as u32, d as u32];
-            self.descend(node, label >> 1, slots, [centre, square[b], square[d]], &all, &mut areas, change);
+            let root = self.nodes.get(CENTRE).body[label];
+            self.descend(root, turned([b as u32, d as u32], label), &all, &mut edits, change);
         }
-        self.areas = areas;
+        if self.nodes.pages.has_bounds() {
+            edits.loose = self.nodes.pages.len();
+        }
+        // Frames may be far between.
+        if edits.moved.len().max(edits.leaves.len()).max(edits.looks.len()) > 2 * self.nodes.pages.taken() {
+            edits.unite();
+        }
+        self.edits = edits;
     }
 
-    /// Looks at a node through its triangle on one side: corners (apex; p, q) by vertex slot and point.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "a triangle, by slots and points, and what goes down with it"
-    )]
+    /// The record at `slot` that there is now. One that is neither in the store nor in a page with changes is what it was.
+    #[inline(always)]
+    fn record_now(&self, change: &GroundChange<'_>, slot: u64) -> Option<RawOf<S>> {
+        let raw = self.records.get(slot);
+        if S::IS_COMPLETE || raw.is_some() {
+            return raw;
+        }
+        let page = (change.page)(S::page_of(slot))?;
+        let at = (slot as usize % (PAGE_BYTES / S::Codec::BYTES)) * S::Codec::BYTES;
+        Some(S::Codec::read(&page[at..]))
+    }
+
+    /// Renews the square's corners and centre, which are never tested.
+    fn renew_top(&mut self, edits: &mut Edits, change: &GroundChange<'_>) {
+        for slot in 0..4u32 {
+            let Some(raw) = self.record_now(change, slot.into()) else { continue };
+            let vertex = self.records.decode(raw, 0);
+            if vertex != self.corners[slot as usize] {
+                self.corners[slot as usize] = vertex;
+                self.vertices.set_height(slot, vertex.height_m);
+                edits.moved.push((slot, NONE, [slot; 2]));
+            }
+        }
+        if let Some(raw) = self.record_now(change, CENTRE_SLOT)
+            && raw != self.nodes.get(CENTRE).raw
+        {
+            self.nodes.get_mut(CENTRE).raw = raw;
+            let slot = self.nodes.get(CENTRE).body[body::HERE];
+            self.vertices.set_height(slot, self.vertex_of(CENTRE).height_m);
+            edits.moved.push((slot, CENTRE, [slot; 2]));
+        }
+    }
+
+    /// Looks at a node and what is below it. `ends` are the vertex slots of the edge that it splits, as its triangle of side 0 has them. Of a node's parents
+    /// the first one that it has leads to it.
     fn descend(
         &mut self,
         node: u32,
-        side: usize,
-        slots: [u32; 3],
-        points: [GridPoint; 3],
+        ends: [u32; 2],
         above: &Range<usize>,
-        areas: &mut Areas,
+        edits: &mut Edits,
         change: &GroundChange<'_>,
     ) {
-        let point = self.nodes.get(node).point;
-        let level = level_of(point);
-        let here = areas.narrow(above, points, level);
+        let record = *self.nodes.get(node);
+        let level = level_of(record.point);
+        let here = edits.areas.narrow(above, record.point, level);
         if here.is_empty() {
             return;
         }
-        if !self.nodes.is_unread(node) {
-            self.take_record(node, [slots[1], slots[2]], change);
+        let is_inner = self.nodes.is_split(node) && level > 0;
+        if is_inner {
+            for (label, child) in record.body[..4].iter().enumerate().filter(|(_, child)| **child != NONE) {
+                prefetch(&self.nodes.all, *child as usize);
+                let at = child_point(record.point, level, label);
+                self.records.prefetch(slot_of(self.records.grid().k(), at));
+            }
         }
-        let record = *self.nodes.get(node);
-        if !self.nodes.is_split(node) {
-            self.cover(node, &slots);
+        if !self.nodes.is_unread(node)
+            && let Some(raw) = self.record_now(change, slot_of(self.records.grid().k(), record.point))
+            && raw != record.raw
+        {
+            self.renew(node, raw, ends, edits);
+        } else if !S::IS_COMPLETE && !self.nodes.is_split(node) && self.has_been_looked_from(node) {
+            edits.looks.push(node);
+        }
+        if !is_inner {
+            if self.nodes.pages.has_bounds() {
+                edits.leaves.push(node);
+            }
             return;
         }
-        let own = record.body[body::HERE];
-        if level == 0 {
-            let [_, apex, p, q] = half(&record, side);
-            self.cover(node, &[own, apex, p, q]);
-            self.cover(record.body[body::ANNEX], &[own, apex, p, q]);
-            return;
-        }
-        let Some(side) = self.nodes.sides(node, level)[side] else { return };
-        let [apex, p, q] = slots;
-        let [apex_at, p_at, q_at] = points;
-        let halves = [
-            (side.first, [own, apex, p], [point, apex_at, p_at]),
-            (side.last, [own, q, apex], [point, q_at, apex_at]),
-        ];
-        for (label, slots, points) in halves {
-            self.descend(record.body[label], label >> 1, slots, points, &here, areas, change);
-        }
-    }
-
-    /// Gives a node the record that its page holds now. `ends` are the vertex slots of the edge that it splits.
-    fn take_record(&mut self, node: u32, ends: [u32; 2], change: &GroundChange<'_>) {
-        let point = self.nodes.get(node).point;
-        let Some(raw) = record::<S>(change, slot_of(self.records.grid().k(), point)) else { return };
-        if raw == self.nodes.get(node).raw {
-            return;
-        }
-        self.nodes.get_mut(node).raw = raw;
-        if self.nodes.is_split(node) || node == CENTRE {
-            let vertex = self.vertex_of(node);
-            let here = self.nodes.get(node).body[body::HERE];
-            self.vertices.set_height(here, vertex.height_m);
-            // As a split would order them.
-            let record = self.nodes.get(node);
-            let ends = if level_of(point) == 0 { [record.body[body::P], record.body[body::Q]] } else { ends };
-            self.moved.push((here, self.patch_vertex(point, &vertex, ends)));
-        }
-        if node != CENTRE {
-            let word = &mut self.nodes.get_mut(node).word;
-            // One that is due already is in the list.
-            if *word & !STATUS != 0 {
-                *word &= STATUS;
-                self.late.push(node);
+        for (i, side) in self.nodes.sides(node, level).into_iter().enumerate() {
+            let Some(side) = side else { continue };
+            let apex = self.nodes.get(side.parent).body[body::HERE];
+            let [p, q] = if i == 0 { ends } else { [ends[1], ends[0]] };
+            for (label, edge) in [(side.first, [apex, p]), (side.last, [q, apex])] {
+                let child = record.body[label];
+                if label >> 1 == 0 || self.nodes.get(child).parents[0] == NONE {
+                    self.descend(child, turned(edge, label), &here, edits, change);
+                }
             }
         }
     }
+
+    /// Gives a node another record.
+    fn renew(&mut self, node: u32, raw: RawOf<S>, ends: [u32; 2], edits: &mut Edits) {
+        let is_split = self.nodes.is_split(node);
+        let record = self.nodes.get_mut(node);
+        record.raw = raw;
+        let slot = record.body[body::HERE];
+        // One that is due already is in the list.
+        if record.word & !STATUS != 0 {
+            record.word &= STATUS;
+            self.late.push(node);
+        }
+        if is_split {
+            self.vertices.set_height(slot, self.vertex_of(node).height_m);
+            edits.moved.push((slot, node, ends));
+        }
+    }
+
+    /// Whether a leaf is near enough to being over for a look to have begun there.
+    fn has_been_looked_from(&self, node: u32) -> bool {
+        let word = self.nodes.get(node).word;
+        let is_near = |until: u64| word & !STATUS != 0 && u64::from(expiry_of(word)) <= until;
+        !self.nodes.is_unread(node)
+            && self.ahead.as_ref().is_some_and(|ahead| is_near(ahead.until[clock_of(word)]))
+    }
+
+    /// At the start of an update: sends the vertices that edits have moved, covers them, and looks ahead where what is seen may be another thing. The patch is empty yet: what
+    /// splits and merges do to slots comes after.
+    pub(super) fn tell_edits(&mut self) {
+        if self.edits.calls == 0 {
+            return;
+        }
+        let mut edits = std::mem::take(&mut self.edits);
+        if std::mem::take(&mut edits.calls) > 1 {
+            edits.unite();
+        }
+        let square = corners(self.records.grid().k());
+        for (slot, node, ends) in edits.moved.drain(..) {
+            let (point, vertex) = if node == NONE {
+                (square[slot as usize], self.corners[slot as usize])
+            } else {
+                (self.nodes.get(node).point, self.vertex_of(node))
+            };
+            self.patch.vertices.push((slot, self.patch_vertex(point, &vertex, ends)));
+        }
+        for node in edits.leaves.drain(..) {
+            let annex = if self.nodes.is_split(node) { self.nodes.get(node).body[body::ANNEX] } else { NONE };
+            for place in [node, annex].into_iter().filter(|place| *place != NONE) {
+                for corners in self.nodes.triangles(place).into_iter().flatten() {
+                    self.cover(place, &corners);
+                }
+            }
+        }
+        for node in edits.looks.drain(..) {
+            if let Some(ahead) = &mut self.ahead {
+                ahead.near(Entry { node, word: self.nodes.get(node).word });
+            }
+        }
+        self.edits = edits;
+    }
+}
+
+/// The ends of a child's edge as its triangle of side 0 has them, from those of the triangle that it has with `label` at its parent.
+#[inline(always)]
+fn turned([p, q]: [u32; 2], label: usize) -> [u32; 2] {
+    if label >> 1 == 0 { [p, q] } else { [q, p] }
 }

@@ -40,7 +40,7 @@ pub use bounds::Bounds;
 pub use budget::Budget;
 pub use patch::{NO_LEVEL, Patch, PatchVertex};
 
-use super::ground::{Areas, GroundChange};
+use super::ground::GroundChange;
 use super::{Culling, Engine, Phase, Probe, Work};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
@@ -50,6 +50,7 @@ use budget::Allowance;
 use capacity::settle;
 use certificate::Judge;
 use clocks::{Clocks, Pose};
+use edited::Edits;
 use glam::DVec3;
 use labels::level_of;
 use nodes::{CENTRE, NONE, Nodes, SPLIT, STATUS, body};
@@ -63,6 +64,8 @@ use vertices::Vertices;
 
 /// Levels of the largest terrain.
 const LEVELS: usize = 32;
+/// Sweeps of a queue in one frame.
+const MOST_SWEEPS: usize = 16;
 
 /// Refinement by certificates.
 #[derive(Debug)]
@@ -105,10 +108,7 @@ pub struct Kinetic<S: RecordStore> {
     /// Entries on their way from one clock to another.
     waiting: Vec<Entry>,
     patch: Patch,
-    /// Vertices that edits have moved since the last update, for the next one's patch.
-    moved: Vec<(u32, PatchVertex)>,
-    /// Where edits are.
-    areas: Areas,
+    edits: Edits,
     work: Work,
 }
 
@@ -144,8 +144,7 @@ impl<S: RecordStore> Kinetic<S> {
             over: Vec::new(),
             waiting: Vec::new(),
             patch: Patch::default(),
-            moved: Vec::new(),
-            areas: Areas::default(),
+            edits: Edits::default(),
             work: Work::default(),
             records,
         }
@@ -207,8 +206,8 @@ impl<S: RecordStore> Kinetic<S> {
             + (self.over.capacity() + self.waiting.capacity()) * size_of::<Entry>()
             + self.ahead.as_ref().map_or(0, |ahead| ahead.bytes())
             + self.wants.capacity() * size_of::<Want>()
-            + (self.patch.vertices.capacity() + self.moved.capacity()) * size_of::<(u32, PatchVertex)>()
-            + self.areas.bytes()
+            + self.patch.vertices.capacity() * size_of::<(u32, PatchVertex)>()
+            + self.edits.bytes()
             + self.patch.triangles.capacity() * size_of::<(u32, [u32; 3])>()
             + self.patch.draws.capacity() * size_of::<std::ops::Range<u32>>()
     }
@@ -290,6 +289,7 @@ impl<S: RecordStore> Kinetic<S> {
         settle(&mut self.verdicts, used);
         settle(&mut self.patch.vertices, used);
         settle(&mut self.patch.triangles, used);
+        self.edits.settle(self.nodes.pages.taken());
     }
 
     /// A record of the first page.
@@ -343,7 +343,7 @@ impl<S: RecordStore> Engine for Kinetic<S> {
         };
         self.work = Work::default();
         self.patch.clear();
-        self.patch.vertices.append(&mut self.moved);
+        self.tell_edits();
         probe.phase(Phase::Scan);
         if self.nodes.is_empty() {
             self.plant(probe);
@@ -369,7 +369,8 @@ impl<S: RecordStore> Engine for Kinetic<S> {
         let nodes = &self.nodes.all;
         let is_true = |e: Entry| nodes.get(e.node as usize).is_some_and(|n| n.word & !SPLIT == e.word);
         for queue in std::iter::once(&mut self.queue).chain(self.ahead.as_mut().map(|ahead| &mut ahead.far)) {
-            if queue.len() > 2 * self.nodes.pages.taken() {
+            // The more, the faster: edits end many words long before their time.
+            for _ in 0..(queue.len() / (2 * self.nodes.pages.taken())).min(MOST_SWEEPS) {
                 queue.sweep_some(is_true);
             }
         }

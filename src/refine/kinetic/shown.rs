@@ -51,7 +51,8 @@ impl<S: RecordStore> Kinetic<S> {
             self.patch.draws.push(0..2 * self.nodes.pages.places() as u32);
             return;
         }
-        if self.work.merges > 0 {
+        if self.work.merges > 0 || self.edits.loose > 0 {
+            self.edits.loose = self.edits.loose.saturating_sub(1);
             self.stale = (self.stale + 1) % self.nodes.pages.len();
             self.tighten(self.stale);
         }

@@ -65,7 +65,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
     }
 
-    /// Makes the bounds of a page anew, which merges leave too large.
+    /// Makes the bounds of a page anew, which merges and edits leave too large.
     pub(super) fn tighten(&mut self, page: usize) {
         let mut bounds = Bounds::EMPTY;
         for node in self.nodes.pages.places_of(page) {
