@@ -3,7 +3,7 @@
 use crate::support::{Bench, fields, text};
 use serde_json::Value;
 
-const REPLAY_FIELDS: [&str; 19] = [
+const REPLAY_FIELDS: [&str; 21] = [
     "engine",
     "frames",
     "triangles_mean",
@@ -23,6 +23,8 @@ const REPLAY_FIELDS: [&str; 19] = [
     "scan_us_p50",
     "test_us_p50",
     "apply_us_p50",
+    "edit_ms_max",
+    "edited_records_total",
 ];
 
 fn sorted(mut names: Vec<&str>) -> Vec<&str> {
