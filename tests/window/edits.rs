@@ -7,6 +7,7 @@ use std::sync::Arc;
 use terrasoar_layout::build::{HeightRoom, Silent, rebuild};
 use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{EditSession, history};
+use terrasoar_layout::imagery::{DrapeOptions, ImageSource, MemoryImage, TileFormat, drape};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
@@ -99,6 +100,68 @@ pub fn ground_changed_by_hand(display: &Display) -> Outcome {
     while session.undo().map_err(|e| e.to_string())?.is_some() {}
     drop(session);
     same_pages(&path, &original)
+}
+
+/// Pixels that are much darker.
+fn darker(before: &image::RgbImage, after: &image::RgbImage) -> usize {
+    let light = |p: &image::Rgb<u8>| p.0.iter().map(|c| u32::from(*c)).sum::<u32>();
+    before.pixels().zip(after.pixels()).filter(|(a, b)| 4 * light(b) < 3 * light(a)).count()
+}
+
+/// A crater scorches the picture on the ground, and an undo takes both back.
+pub fn ground_and_picture_changed_by_hand(display: &Display) -> Outcome {
+    let path = copy(display, "draped.iqt")?;
+    let picture_of_land = MemoryImage::from_fn([4096, 4096], |x, y| {
+        let grain = ((x * 7 + y * 13) % 32) as u8;
+        [150 + grain, 160 + grain, 110 + (x / 64 % 2 * 40) as u8, 255]
+    });
+    let pictures: Vec<Box<dyn ImageSource>> = vec![Box::new(picture_of_land)];
+    let options = DrapeOptions { format: TileFormat::Bc1, ..DrapeOptions::default() };
+    drape(&path, &pictures, &options, &Silent).map_err(|e| e.to_string())?;
+    let imagery = || -> Result<_, String> {
+        Ok(Terrain::open(&path).map_err(|e| e.to_string())?.header().imagery)
+    };
+    let original = imagery()?;
+    let mut window = display.open_file("draped.iqt", &["--size", "800x600", "--style", "photo"], "1")?;
+    window.rest()?;
+    let id = window.focus()?;
+    window.xdotool(&["mousemove", "--window", &id, "560", "330"])?;
+    let before = picture(&mut window)?;
+    window.key("b")?;
+    window.hear("tool crater")?;
+    window.key("bracketright")?;
+    window.key("bracketright")?;
+    window.xdotool(&["click", "1"])?;
+    window.hear("saved")?;
+    let cratered = picture(&mut window)?;
+    let burnt = darker(&before, &cratered);
+    ensure(burnt > 200, || format!("a scorch is seen: {burnt} pixels are darker"))?;
+    ensure(imagery()? != original, || "the scorch is in the file".into())?;
+    window.key("ctrl+z")?;
+    window.hear("undone")?;
+    let undone = picture(&mut window)?;
+    ensure(differing(&before, &undone) == 0, || "ground and picture are back to the last pixel".into())?;
+    window.key("ctrl+y")?;
+    window.hear("redone")?;
+    let redone = picture(&mut window)?;
+    ensure(differing(&cratered, &redone) == 0, || "the scorch is back to the last pixel".into())?;
+    window.key("k")?;
+    window.hear("raining true")?;
+    window.hear("saved")?;
+    window.key("k")?;
+    window.hear("raining false")?;
+    window.key("ctrl+q")?;
+    let (code, words, heard) = window.end()?;
+    ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))?;
+    ensure(!heard.iter().any(|line| line.starts_with("trouble")), || format!("{heard:?}"))?;
+    let terrain = Terrain::open(&path).map_err(|e| e.to_string())?;
+    let report = verify(&terrain, &|_| {}).map_err(|e| e.to_string())?;
+    ensure(report.is_sound(), || format!("{:?}", report.problems))?;
+    drop(terrain);
+    let mut session = EditSession::open(&path).map_err(|e| e.to_string())?;
+    while session.undo().map_err(|e| e.to_string())?.is_some() {}
+    drop(session);
+    ensure(imagery()? == original, || "the picture is the old one again".into())
 }
 
 /// Whether the ground is that of another file, page by page.
