@@ -7,6 +7,7 @@ mod app;
 mod cracks;
 mod depth;
 mod engines;
+mod paint;
 mod program;
 mod rig;
 #[path = "../cli/support.rs"]
@@ -39,7 +40,7 @@ fn main() -> ExitCode {
         }
     };
     let reads_depth = |name: &str| ["cracks::", "depth::"].iter().any(|part| name.starts_with(part));
-    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, program::TESTS].concat().into_iter().map(
+    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, paint::TESTS, program::TESTS].concat().into_iter().map(
         |(name, test): Test| {
             Trial::ignorable_test(name, move || match gpu {
                 None => Ok(Completion::ignored_with("no adapter")),

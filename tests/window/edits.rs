@@ -7,6 +7,7 @@ use std::sync::Arc;
 use terrasoar_layout::build::{HeightRoom, Silent, rebuild};
 use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{EditSession, history};
+use terrasoar_layout::imagery::{DrapeOptions, ImageSource, MemoryImage, TileFormat, drape};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
@@ -104,6 +105,87 @@ pub fn ground_changed_by_hand(display: &Display) -> Outcome {
     while session.undo().map_err(|e| e.to_string())?.is_some() {}
     drop(session);
     same_pages(&path, &original)
+}
+
+/// Takes pictures until one is as it should be, and as the two before it.
+fn picture_that(
+    window: &mut Window<'_>,
+    what: &str,
+    is_as_it_should: impl Fn(&image::RgbImage) -> bool,
+) -> Result<image::RgbImage, String> {
+    let mut alike = 0;
+    let mut before: Option<image::RgbImage> = None;
+    for _ in 0..40 {
+        window.key("p")?;
+        let path = window.hear("picture ")?;
+        let now = image::open(path).map_err(|e| e.to_string())?.to_rgb8();
+        alike = if before.as_ref() == Some(&now) { alike + 1 } else { 0 };
+        if alike >= 2 && is_as_it_should(&now) {
+            return Ok(now);
+        }
+        before = Some(now);
+    }
+    Err(format!("{what}, but not in any of 40 pictures"))
+}
+
+/// Pixels that are much darker.
+fn darker(before: &image::RgbImage, after: &image::RgbImage) -> usize {
+    let light = |p: &image::Rgb<u8>| p.0.iter().map(|c| u32::from(*c)).sum::<u32>();
+    before.pixels().zip(after.pixels()).filter(|(a, b)| 6 * light(b) < 5 * light(a)).count()
+}
+
+/// A crater scorches the picture on the ground, and an undo takes both back.
+pub fn ground_and_picture_changed_by_hand(display: &Display) -> Outcome {
+    let path = copy(display, "draped.iqt")?;
+    let picture_of_land = MemoryImage::from_fn([4096, 4096], |x, y| {
+        let grain = ((x * 7 + y * 13) % 32) as u8;
+        [150 + grain, 160 + grain, 110 + (x / 64 % 2 * 40) as u8, 255]
+    });
+    let pictures: Vec<Box<dyn ImageSource>> = vec![Box::new(picture_of_land)];
+    let options = DrapeOptions { format: TileFormat::Bc1, ..DrapeOptions::default() };
+    drape(&path, &pictures, &options, &Silent).map_err(|e| e.to_string())?;
+    let imagery = || -> Result<_, String> {
+        Ok(Terrain::open(&path).map_err(|e| e.to_string())?.header().imagery)
+    };
+    let original = imagery()?;
+    let mut window = display.open_file("draped.iqt", &["--size", "800x600", "--style", "photo"], "1")?;
+    window.rest()?;
+    let id = window.focus()?;
+    window.xdotool(&["mousemove", "--window", &id, "560", "330"])?;
+    let before = picture_that(&mut window, "it comes to rest", |_| true)?;
+    window.key("b")?;
+    window.hear("tool crater")?;
+    for _ in 0..11 {
+        window.key("bracketright")?;
+    }
+    window.xdotool(&["click", "1"])?;
+    window.hear("saved")?;
+    let is_burnt = |now: &image::RgbImage| darker(&before, now) > 200;
+    let cratered = picture_that(&mut window, "a scorch is seen", is_burnt)?;
+    ensure(imagery()? != original, || "the scorch is in the file".into())?;
+    window.key("ctrl+z")?;
+    window.hear("undone")?;
+    picture_that(&mut window, "ground and picture are back to the last pixel", |now| *now == before)?;
+    window.key("ctrl+y")?;
+    window.hear("redone")?;
+    picture_that(&mut window, "the scorch is back to the last pixel", |now| *now == cratered)?;
+    window.key("k")?;
+    window.hear("raining true")?;
+    window.hear("saved")?;
+    window.key("k")?;
+    window.hear("raining false")?;
+    window.key("ctrl+q")?;
+    let (code, words, heard) = window.end()?;
+    ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))?;
+    ensure(!heard.iter().any(|line| line.starts_with("trouble")), || format!("{heard:?}"))?;
+    let terrain = Terrain::open(&path).map_err(|e| e.to_string())?;
+    let report = verify(&terrain, &|_| {}).map_err(|e| e.to_string())?;
+    ensure(report.is_sound(), || format!("{:?}", report.problems))?;
+    drop(terrain);
+    let mut session = EditSession::open(&path).map_err(|e| e.to_string())?;
+    while session.undo().map_err(|e| e.to_string())?.is_some() {}
+    drop(session);
+    ensure(imagery()? == original, || "the picture is the old one again".into())
 }
 
 /// Whether the ground is that of another file, page by page.

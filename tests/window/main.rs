@@ -24,6 +24,7 @@ const TESTS: &[(&str, Test)] = &[
     ("window_within_the_screen", tour::window_within_the_screen),
     ("dropped_files", tour::dropped_files),
     ("ground_changed_by_hand", edits::ground_changed_by_hand),
+    ("ground_and_picture_changed_by_hand", edits::ground_and_picture_changed_by_hand),
     ("edits_of_a_file_that_is_taken", edits::edits_of_a_file_that_is_taken),
     ("broken_settings", troubles::broken_settings),
     ("lost_device", troubles::lost_device),
