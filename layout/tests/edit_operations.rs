@@ -21,7 +21,7 @@ fn whole() -> SampleRect {
 fn ground(seed: u64) -> HeightWindow {
     let heights = (0..u64::from(SAMPLES[0] * SAMPLES[1])).map(|i| {
         let x = (i ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
-        if x % 11 == 0 { f64::NAN } else { x as f64 / 1e5 - 40.0 }
+        if x.is_multiple_of(11) { f64::NAN } else { x as f64 / 1e5 - 40.0 }
     });
     HeightWindow::new(whole(), heights.collect()).unwrap()
 }

@@ -220,7 +220,7 @@ fn a_batch_that_cannot_be_painted_edits_nothing() {
     let (edit, paint) = shell(1);
     let Paint::Scorch(scorch) = paint else { panic!("no scorch") };
     let wrong = Paint::Scorch(terrasoar_layout::imagery::Scorch { strength: 7.0, ..scorch });
-    assert!(session.apply_and_paint(&[edit.clone()], &[paint, wrong]).is_err());
+    assert!(session.apply_and_paint(std::slice::from_ref(&edit), &[paint, wrong]).is_err());
     let too_deep = Edit::Crater(Crater {
         centre_m: [600.0, 40.0],
         direction_deg: 0.0,

@@ -40,8 +40,10 @@ fn main() -> ExitCode {
         }
     };
     let reads_depth = |name: &str| ["cracks::", "depth::"].iter().any(|part| name.starts_with(part));
-    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, paint::TESTS, program::TESTS].concat().into_iter().map(
-        |(name, test): Test| {
+    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, paint::TESTS, program::TESTS]
+        .concat()
+        .into_iter()
+        .map(|(name, test): Test| {
             Trial::ignorable_test(name, move || match gpu {
                 None => Ok(Completion::ignored_with("no adapter")),
                 Some(gpu) if reads_depth(name) && !gpu.capabilities.depth_copies => {
@@ -49,8 +51,7 @@ fn main() -> ExitCode {
                 }
                 Some(gpu) => test(gpu).map(|()| Completion::Completed).map_err(Failed::from),
             })
-        },
-    );
+        });
     libtest_mimic::run(&arguments, trials.collect()).exit_code()
 }
 

@@ -9,9 +9,7 @@ use terrasoar::view::View;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Crater, Edit, EditSession};
-use terrasoar_layout::imagery::{
-    DrapeOptions, ImageSource, MemoryImage, Paint, Scorch, TileFormat, drape,
-};
+use terrasoar_layout::imagery::{DrapeOptions, ImageSource, MemoryImage, Paint, Scorch, TileFormat, drape};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{Gpu, Look, Offscreen};
 

@@ -139,9 +139,8 @@ pub fn ground_and_picture_changed_by_hand(display: &Display) -> Outcome {
     let pictures: Vec<Box<dyn ImageSource>> = vec![Box::new(picture_of_land)];
     let options = DrapeOptions { format: TileFormat::Bc1, ..DrapeOptions::default() };
     drape(&path, &pictures, &options, &Silent).map_err(|e| e.to_string())?;
-    let imagery = || -> Result<_, String> {
-        Ok(Terrain::open(&path).map_err(|e| e.to_string())?.header().imagery)
-    };
+    let imagery =
+        || -> Result<_, String> { Ok(Terrain::open(&path).map_err(|e| e.to_string())?.header().imagery) };
     let original = imagery()?;
     let mut window = display.open_file("draped.iqt", &["--size", "800x600", "--style", "photo"], "1")?;
     window.rest()?;

@@ -133,7 +133,7 @@ impl Paint {
     /// Makes it ready to be asked for many texels; `None` for what changes no colour of its own.
     pub(super) fn brush(&self) -> Option<Brush> {
         match self {
-            Self::Scorch(scorch) => Some(Brush::Burn(Burn::of(scorch))),
+            Self::Scorch(scorch) => Some(Brush::Burn(Box::new(Burn::of(scorch)))),
             Self::Fill(fill) => {
                 let [r, g, b] = fill.colour;
                 Some(Brush::Fill(*fill, TABLES.linear([r, g, b, 255])))
@@ -199,7 +199,7 @@ pub(super) const WHOLE: u32 = 1 << 16;
 /// A paint ready to be asked for texels.
 #[derive(Debug)]
 pub(super) enum Brush {
-    Burn(Burn),
+    Burn(Box<Burn>),
     Fill(Fill, Linear),
 }
 
