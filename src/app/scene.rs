@@ -124,6 +124,8 @@ pub(crate) struct Scene<'a> {
     heights_m: Vec<f32>,
     wanted: Vec<TileId>,
     drape: Option<Drape>,
+    /// Whether the last picture had the image in it.
+    shows_image: bool,
     /// What the device takes of images.
     formats: &'static [ImageryFormat],
     /// The views of the last two updates, which say where the eye is going.
@@ -177,6 +179,7 @@ impl<'a> Scene<'a> {
         let renderer = new_renderer(shape(terrain), drape.as_ref(), gpu, options)?;
         Ok(Self {
             drape,
+            shows_image: false,
             formats: gpu.capabilities.imagery_formats(),
             ways: [None; 2],
             feed,
@@ -229,6 +232,8 @@ impl<'a> Scene<'a> {
         }
         if look.imagery > 0.0 {
             self.serve_image(view, &mut tiles)?;
+        } else {
+            self.shows_image = false;
         }
         let drawn = self.draw_served(encoder, target, view, look, refined_for)?;
         Ok(Drawn { upload: drawn.upload, draw: drawn.draw, ..tiles })
@@ -309,6 +314,7 @@ impl<'a> Scene<'a> {
     /// Gives the renderer tiles of the image that the view lacks, and counts them in `drawn`. A frame of a window is given what has come.
     pub(crate) fn serve_image(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
         let Some(drape) = &mut self.drape else { return Ok(()) };
+        self.shows_image = true;
         let ahead = match self.ways {
             [Some(before), Some(now)] => ahead(&before, &now),
             _ => *view,
@@ -381,7 +387,7 @@ impl<'a> Scene<'a> {
 
     /// Whether something that the last picture lacked is on its way.
     pub(crate) fn is_waiting(&self) -> bool {
-        self.feed.is_waiting() || self.drape.as_ref().is_some_and(Drape::is_waiting)
+        self.feed.is_waiting() || self.shows_image && self.drape.as_ref().is_some_and(Drape::is_waiting)
     }
 
     /// What could not be read and nobody has heard of yet.
