@@ -528,3 +528,44 @@ fn a_flight_is_replayed_over_ground_that_changes() {
     let message = bench.bad(1, &[&fly[..], &["--edits", "land.flight"]].concat());
     assert!(message.contains("not a script of edits"), "{message}");
 }
+
+/// Craters scorch the picture over the ground, in the same commit; undoing brings both back.
+#[test]
+fn craters_scorch_the_picture() {
+    use terrasoar_layout::imagery::Imagery;
+    let bench = with_script("crater at 1200,1200 radius 60 depth 5\n");
+    bench.good(&["synth", "--colour", "land.iqt", "--texels", "4", "--seed", "2", "-o", "photo.tif"]);
+    bench.good(&["drape", "land.iqt", "--image", "photo.tif"]);
+    let tiles = || {
+        let terrain = Terrain::open(&bench.path("land.iqt")).unwrap();
+        let imagery = Imagery::open(&terrain).unwrap().unwrap();
+        let tile = |id| {
+            let mut bytes = Vec::new();
+            imagery.read_tile(&terrain, id, &mut bytes).unwrap();
+            bytes
+        };
+        imagery.shape().ids().map(tile).collect::<Vec<_>>()
+    };
+    let (ground, picture) = (heights_of(&bench, "land.iqt"), tiles());
+    let told = bench.json(&["edit", "land.iqt", "--script", "a.edits", "--no-scorch", "--json"]);
+    assert_eq!(told["tiles_painted"], 0);
+    assert!(tiles() == picture && heights_of(&bench, "land.iqt") != ground);
+    bench.good(&["undo", "land.iqt"]);
+    let told = bench.json(&["edit", "land.iqt", "--script", "a.edits", "--json"]);
+    assert!(told["tiles_painted"].as_u64() > Some(1), "{told}");
+    assert!(tiles() != picture && heights_of(&bench, "land.iqt") != ground);
+    bench.good(&["verify", "land.iqt"]);
+    write(&bench, "back.edits", "restore disc 1200,1200 radius 200\n");
+    bench.good(&["edit", "land.iqt", "--script", "back.edits"]);
+    // A file that was rewritten with room counts its heights from elsewhere.
+    let is_ground = || {
+        let now = heights_of(&bench, "land.iqt");
+        now.iter().zip(&ground).all(|(now, then)| (now - then).abs() < 1e-9)
+    };
+    assert!(is_ground());
+    let differing: Vec<usize> = (0..picture.len()).filter(|i| tiles()[*i] != picture[*i]).collect();
+    assert!(differing.is_empty(), "{differing:?} of {}", picture.len());
+    bench.good(&["undo", "land.iqt", "2"]);
+    assert!(tiles() == picture && is_ground());
+    bench.good(&["verify", "land.iqt"]);
+}

@@ -2,6 +2,7 @@
 
 pub(super) mod compact;
 pub(super) mod crater;
+mod paint;
 pub(super) mod past;
 mod work;
 
@@ -17,7 +18,7 @@ use work::{Target, Work};
 /// A script (src/edits/EDITS.md) has craters, brushes, stamps of other elevation data, and areas set to a height or back to the one they were built with. Each of its
 /// batches is applied whole or not at all and becomes durable before the next; `terrasoar undo` takes it back. Programs that have the file open go on reading it as
 /// it was. With --overlay, the edits go to a file of their own and the terrain is not touched. Heights that the file's records cannot hold make it rewrite the file with
-/// room for them, which ends its history; it says so.
+/// room for them, which ends its history; it says so. Where a picture is draped, craters scorch it, in the same commits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -26,7 +27,7 @@ Examples:
   terrasoar edit alps.iqt --script dam.edits --overlay what-if.iqo
 
 Fields of --json: file, overlay, dry_run, batches, edits, edits_outside (that lie beyond the terrain), samples (of the rectangles that hold all changed heights), records_changed,
-voids_passed, pages_written, bytes_appended, widenings (times the file was rewritten), needs_widening (a dry run that got no further), seconds.")]
+voids_passed, tiles_painted, pages_written, bytes_appended, widenings (times the file was rewritten), needs_widening (a dry run that got no further), seconds.")]
 pub(super) struct Args {
     #[command(flatten)]
     target: TargetArgs,
@@ -56,6 +57,9 @@ impl TargetArgs {
 /// How edits are made and told.
 #[derive(Debug, clap::Args)]
 struct HowArgs {
+    /// Leave the picture over the terrain as it is: craters scorch it otherwise, and what restores ground restores it
+    #[arg(long)]
+    no_scorch: bool,
     /// Apply everything in memory and write nothing
     #[arg(long)]
     dry_run: bool,
@@ -73,7 +77,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
 fn apply(target: Target<'_>, script: &Script, path: &Path, how: &HowArgs) -> Result<()> {
     let progress = Progress::new("edits");
     let batches = Loader::new(path).script(script)?;
-    let work = Work { target, batches: &batches, progress: &progress };
+    let work = Work { target, batches: &batches, paints: !how.no_scorch, progress: &progress };
     let told = if how.dry_run { work.rehearse()? } else { work.perform()? };
     drop(progress);
     if how.json { print_json(&told) } else { super::output::print(&told.text()) }

@@ -1,5 +1,6 @@
 //! Batches applied to a file, one durable commit each, or in memory only; the file rewritten with more room where it must be.
 
+use super::paint::paints_of;
 use crate::cli::output::{complain, decimal, grouped};
 use crate::cli::progress::{Progress, short};
 use anyhow::{Context, Result, anyhow, bail};
@@ -63,6 +64,7 @@ pub(super) struct Told {
     samples: u64,
     records_changed: u64,
     voids_passed: u64,
+    tiles_painted: u64,
     pages_written: u64,
     bytes_appended: u64,
     widenings: u32,
@@ -95,6 +97,9 @@ impl Told {
             plural(self.records_changed, "record", "records"),
             plural(self.voids_passed, "void", "voids"),
         );
+        if self.tiles_painted > 0 {
+            text += &format!("\n{} of the picture painted", plural(self.tiles_painted, "tile", "tiles"));
+        }
         if self.edits_outside > 0 {
             text += &format!("\n{} beyond the terrain", plural(self.edits_outside, "edit lies", "edits lie"));
         }
@@ -117,6 +122,8 @@ impl Told {
 pub(super) struct Work<'a> {
     pub(super) target: Target<'a>,
     pub(super) batches: &'a [LoadedBatch],
+    /// Whether the picture follows, where there is one.
+    pub(super) paints: bool,
     pub(super) progress: &'a Progress,
 }
 
@@ -224,8 +231,15 @@ impl Work<'_> {
             };
             let mut widenings = 0;
             let changes = loop {
-                match session.apply(&batch.edits) {
-                    Ok(changes) => break changes,
+                let paints = match session.header().imagery {
+                    Some(_) if self.paints => paints_of(&batch.edits, &grid),
+                    _ => Vec::new(),
+                };
+                match session.apply_and_paint(&batch.edits, &paints) {
+                    Ok((changes, painted)) => {
+                        told.tiles_painted += painted.tiles.len() as u64;
+                        break changes;
+                    }
                     Err(LayoutError::OutOfRange { heights_m, problem, .. }) if widenings < MOST_WIDENINGS => {
                         widenings += 1;
                         let header = session.header().clone();
