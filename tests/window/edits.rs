@@ -63,9 +63,6 @@ pub fn ground_changed_by_hand(display: &Display) -> Outcome {
     window.hear_all(&["saved", "at-rest"])?;
     let raised = picture(&mut window)?;
     let seen = differing(&cratered, &raised);
-    cratered.save("/tmp/ed-a.png").unwrap();
-    raised.save("/tmp/ed-b.png").unwrap();
-    before.save("/tmp/ed-0.png").unwrap();
     ensure(seen > 200, || format!("a wall is seen: {seen} pixels differ; {:?}", window.heard()))?;
 
     window.key("ctrl+z")?;
