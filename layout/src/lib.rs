@@ -25,6 +25,7 @@ pub mod order;
 pub mod pool;
 pub mod prefetch;
 pub mod record;
+mod records;
 mod slots;
 pub mod source;
 pub mod store;

@@ -1,9 +1,10 @@
 //! An opened terrain file: checked header and directory over a source, and the way from a slot to a vertex.
 //!
-//! [`Terrain`] owns the source and knows what the header knows. [`Records`] is what refinement holds: a codec, the page
-//! table and the bytes, resolved once, so that a vertex costs one table lookup, one load and a decode.
+//! [`Terrain`] owns the source and knows what the header knows. [`Records`] is what refinement holds.
 //!
 //! Invariant: every page number in the table lies inside the source as it was when it was opened.
+
+pub use crate::records::Records;
 
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::directory::Entry;
@@ -14,10 +15,10 @@ use crate::journal::Commit;
 use crate::opening::{read_directory, read_structure};
 use crate::order::slot_of;
 use crate::pool::PagePool;
-use crate::prefetch::prefetch;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
+use crate::records::Slices;
 use crate::source::{MapSource, PreadSource, Source};
-use crate::store::{RecordShape, RecordStore};
+use crate::store::RecordShape;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -123,7 +124,7 @@ impl Terrain {
         Ok(Self::of(source, header, entries))
     }
 
-    fn pages(&self) -> &[u32] {
+    pub(crate) fn pages(&self) -> &[u32] {
         let page = |entry: &Entry| if entry.is_present() { entry.page } else { INERT_PAGE };
         self.pages.get_or_init(|| self.entries.iter().map(page).collect())
     }
@@ -282,7 +283,7 @@ impl Terrain {
         }
     }
 
-    fn shape<C>(&self, codec: C) -> RecordShape<C> {
+    pub(crate) fn shape<C>(&self, codec: C) -> RecordShape<C> {
         let Header { grid, height_range_m, has_voids, .. } = self.header;
         RecordShape { codec, grid, height_range_m, has_voids }
     }
@@ -334,142 +335,4 @@ macro_rules! with_records {
             $crate::terrain::ByKind::Exact16($records) => $body,
         }
     };
-}
-
-/// The bytes of a source: one slice, or two.
-#[derive(Debug, Clone, Copy)]
-struct Slices<'a> {
-    first: &'a [u8],
-    /// Offset of the second, and it.
-    behind: (u64, &'a [u8]),
-}
-
-impl Slices<'_> {
-    /// The record at an offset. A second slice costs the first nothing: it takes the place of the end of a check of bounds.
-    #[inline(always)]
-    fn record<C: RecordCodec>(&self, at: usize) -> C::Raw {
-        match self.first.get(at..at + C::BYTES) {
-            Some(bytes) => C::read(bytes),
-            None => self.record_behind::<C>(at),
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn record_behind<C: RecordCodec>(&self, at: usize) -> C::Raw {
-        let (start, bytes) = self.behind;
-        let at = at - start as usize;
-        C::read(&bytes[at..at + C::BYTES])
-    }
-}
-
-/// The records of a terrain, of kind `C`: the hot path from slot to vertex.
-#[derive(Debug, Clone)]
-pub struct Records<'a, C: RecordCodec> {
-    bytes: Slices<'a>,
-    pages: &'a [u32],
-    shape: RecordShape<C>,
-}
-
-impl<'a, C: RecordCodec> Records<'a, C> {
-    /// Binary logarithm of the records a page.
-    const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
-
-    fn new(terrain: &'a Terrain, bytes: Slices<'a>, codec: C) -> Self {
-        Self { bytes, pages: terrain.pages(), shape: terrain.shape(codec) }
-    }
-
-    /// Grid shape and spacing.
-    #[inline(always)]
-    pub fn grid(&self) -> &Grid {
-        &self.shape.grid
-    }
-
-    /// Lowest and highest height in metres.
-    pub fn height_range_m(&self) -> [f64; 2] {
-        self.shape.height_range_m
-    }
-
-    /// Whether any sample is void.
-    pub fn has_voids(&self) -> bool {
-        self.shape.has_voids
-    }
-
-    /// Logical pages.
-    pub fn page_count(&self) -> usize {
-        self.pages.len()
-    }
-
-    /// Bytes a record.
-    pub const fn record_bytes(&self) -> usize {
-        C::BYTES
-    }
-
-    /// Logical page of a slot.
-    #[inline(always)]
-    pub fn page_of(slot: u64) -> u64 {
-        slot >> Self::PAGE_SHIFT
-    }
-
-    /// The record at `slot`, not yet decoded. Reading records early, before they are needed, hides the time memory takes.
-    ///
-    /// # Panics
-    /// For a slot past the last page.
-    #[inline(always)]
-    pub fn raw(&self, slot: u64) -> C::Raw {
-        let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize;
-        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
-        self.bytes.record::<C>(page * PAGE_BYTES + within)
-    }
-
-    /// Asks memory for the record at `slot`. A hint: reads nothing, and does nothing for a slot past the last page.
-    #[inline(always)]
-    pub fn prefetch(&self, slot: u64) {
-        if let Some(page) = self.pages.get((slot >> Self::PAGE_SHIFT) as usize) {
-            let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
-            prefetch(self.bytes.first, *page as usize * PAGE_BYTES + within);
-        }
-    }
-
-    /// The vertex of a record at `level` (0 for corners).
-    #[inline(always)]
-    pub fn decode(&self, raw: C::Raw, level: u32) -> Vertex {
-        self.shape.codec.decode(raw, level)
-    }
-
-    /// The vertex at `slot`, whose level is `level` (0 for corners).
-    ///
-    /// # Panics
-    /// For a slot past the last page.
-    #[inline(always)]
-    pub fn vertex(&self, slot: u64, level: u32) -> Vertex {
-        self.decode(self.raw(slot), level)
-    }
-
-    /// The vertex at a grid point.
-    pub fn vertex_at(&self, p: GridPoint) -> Vertex {
-        let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };
-        self.vertex(slot_of(self.grid().k(), p), level)
-    }
-}
-
-impl<C: RecordCodec> RecordStore for Records<'_, C> {
-    type Codec = C;
-
-    const IS_COMPLETE: bool = true;
-
-    #[inline(always)]
-    fn shape(&self) -> &RecordShape<C> {
-        &self.shape
-    }
-
-    #[inline(always)]
-    fn get(&self, slot: u64) -> Option<C::Raw> {
-        Some(self.raw(slot))
-    }
-
-    #[inline(always)]
-    fn prefetch(&self, slot: u64) {
-        Records::prefetch(self, slot);
-    }
 }
