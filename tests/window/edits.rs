@@ -33,6 +33,19 @@ fn differing(a: &image::RgbImage, b: &image::RgbImage) -> usize {
     a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count()
 }
 
+/// Lets craters rain until some are saved, then quits: it ends well and had no trouble.
+fn rain_and_quit(mut window: Window<'_>) -> Outcome {
+    window.key("k")?;
+    window.hear("raining true")?;
+    window.hear("saved")?;
+    window.key("k")?;
+    window.hear("raining false")?;
+    window.key("ctrl+q")?;
+    let (code, words, heard) = window.end()?;
+    ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))?;
+    ensure(!heard.iter().any(|line| line.starts_with("trouble")), || format!("{heard:?}"))
+}
+
 pub fn ground_changed_by_hand(display: &Display) -> Outcome {
     let path = copy(display, "edited.iqt")?;
     let original = std::fs::read(&path).map_err(|e| e.to_string())?;
@@ -81,15 +94,7 @@ pub fn ground_changed_by_hand(display: &Display) -> Outcome {
     let redone = picture(&mut window)?;
     ensure(differing(&cratered, &redone) == 0, || "it is back to the last pixel".into())?;
 
-    window.key("k")?;
-    window.hear("raining true")?;
-    window.hear("saved")?;
-    window.key("k")?;
-    window.hear("raining false")?;
-    window.key("ctrl+q")?;
-    let (code, words, heard) = window.end()?;
-    ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))?;
-    ensure(!heard.iter().any(|line| line.starts_with("trouble")), || format!("{heard:?}"))?;
+    rain_and_quit(window)?;
 
     // What was told as saved is in the file, and can be taken back from elsewhere.
     let terrain = Terrain::open(&path).map_err(|e| e.to_string())?;
@@ -165,15 +170,7 @@ pub fn ground_and_picture_changed_by_hand(display: &Display) -> Outcome {
     window.key("ctrl+y")?;
     window.hear("redone")?;
     picture_that(&mut window, "the scorch is back to the last pixel", |now| *now == cratered)?;
-    window.key("k")?;
-    window.hear("raining true")?;
-    window.hear("saved")?;
-    window.key("k")?;
-    window.hear("raining false")?;
-    window.key("ctrl+q")?;
-    let (code, words, heard) = window.end()?;
-    ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))?;
-    ensure(!heard.iter().any(|line| line.starts_with("trouble")), || format!("{heard:?}"))?;
+    rain_and_quit(window)?;
     let terrain = Terrain::open(&path).map_err(|e| e.to_string())?;
     let report = verify(&terrain, &|_| {}).map_err(|e| e.to_string())?;
     ensure(report.is_sound(), || format!("{:?}", report.problems))?;
