@@ -1,29 +1,27 @@
-//! Edits by the real program: what it says and leaves, what it refuses, undoing, overlays, kills, readers in other processes.
+//! Edits by the real program: what it says and leaves, what it refuses, undoing, overlays.
 
 use crate::support::{Bench, text};
 use serde_json::json;
-use std::path::Path;
-use std::time::Duration;
 use terrasoar_layout::terrain::Terrain;
 
 const HEAD: &str = "terrasoar-edits 1\nunits metres degrees\n";
 
-fn with_script(lines: &str) -> Bench {
+pub fn with_script(lines: &str) -> Bench {
     let bench = Bench::with_terrain();
     write(&bench, "a.edits", lines);
     bench
 }
 
-fn write(bench: &Bench, name: &str, lines: &str) {
+pub fn write(bench: &Bench, name: &str, lines: &str) {
     std::fs::write(bench.path(name), format!("{HEAD}{lines}")).unwrap();
 }
 
-fn read(bench: &Bench, name: &str) -> Vec<u8> {
+pub fn read(bench: &Bench, name: &str) -> Vec<u8> {
     std::fs::read(bench.path(name)).unwrap()
 }
 
 /// Heights in metres at all samples.
-fn heights(terrain: &Terrain) -> Vec<f64> {
+pub fn heights(terrain: &Terrain) -> Vec<f64> {
     let [dx, dy] = terrain.grid().spacing_m();
     let [wide, high] = terrain.grid().samples();
     let samples = (0..high).flat_map(|y| (0..wide).map(move |x| [f64::from(x) * dx, f64::from(y) * dy]));
@@ -361,116 +359,6 @@ fn heights_beyond_the_files_range_make_it_rewrite_itself_aloud() {
     // All batches of the script can be undone, for the file was rewritten before the first.
     assert_eq!(bench.json(&["undo", "land.iqt", "9", "--json"])["batches"], 3);
     assert_eq!(bench.names(), ["a.edits", "land.iqt", "land.tif"]);
-}
-
-#[test]
-fn a_second_writer_is_told() {
-    let bench = with_script("set rect 10,10,20,20 to 100\n");
-    bench.good(&["edit", "land.iqt", "--script", "a.edits"]);
-    let lock = std::fs::File::create(bench.path("land.iqt.lock")).unwrap();
-    lock.lock().unwrap();
-    let before = read(&bench, "land.iqt");
-    for args in [
-        &["edit", "land.iqt", "--script", "a.edits"][..],
-        &["crater", "land.iqt", "--at", "900,900", "--radius", "50", "--depth", "5"],
-        &["undo", "land.iqt"],
-        &["compact", "land.iqt"],
-    ] {
-        let message = bench.bad(1, args);
-        assert!(message.contains("another program is writing"), "{args:?}: {message}");
-    }
-    assert!(read(&bench, "land.iqt") == before);
-    // Looking and an overlay need no lock of the terrain.
-    bench.good(&["edit", "land.iqt", "--script", "a.edits", "--dry-run"]);
-    bench.good(&["edit", "land.iqt", "--script", "a.edits", "--overlay", "o.iqo"]);
-    drop(lock);
-    bench.good(&["undo", "land.iqt"]);
-}
-
-/// Rectangles that every batch sets to one same height, far from each other.
-const RECTS: [[u32; 4]; 4] = [[3, 3, 6, 6], [60, 5, 70, 9], [100, 100, 103, 110], [8, 90, 8, 100]];
-
-/// A script of `batches` that each set all of [`RECTS`] to another height, from 10 m on, a tenth of a metre up each.
-fn in_step(batches: u32) -> String {
-    let mut lines = String::new();
-    for i in 0..batches {
-        for [west, south, east, north] in RECTS {
-            lines +=
-                &format!("set rect {west},{south},{east},{north} to {}\n", 10.0 + f64::from(i % 300) / 10.0);
-        }
-        lines.push('\n');
-    }
-    lines
-}
-
-/// The one height of all rectangles.
-fn height_in_step(path: &Path) -> f64 {
-    let terrain = Terrain::open(path).unwrap();
-    let at = |x: u32, y: u32| terrain.height_m(f64::from(x) * 20.0, f64::from(y) * 20.0).unwrap().unwrap();
-    let first = at(RECTS[0][0], RECTS[0][1]);
-    for [west, south, east, north] in RECTS {
-        for (x, y) in (west..=east).flat_map(|x| (south..=north).map(move |y| (x, y))) {
-            assert_eq!(at(x, y), first, "a batch is seen in part");
-        }
-    }
-    first
-}
-
-/// Killed at twenty moments: the file is sound, as before or after a whole batch, and the next edit goes on from there.
-#[test]
-fn a_killed_edit_leaves_whole_batches() {
-    let bench = with_script(&in_step(400));
-    write(&bench, "one.edits", &in_step(1));
-    bench.good(&["edit", "land.iqt", "--script", "one.edits"]);
-    let mut commits = 1;
-    for moment in 0..20_u64 {
-        let mut child = bench
-            .command(&["edit", "land.iqt", "--script", "a.edits"])
-            .stdout(std::process::Stdio::null())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(Duration::from_millis(3 + moment * 7));
-        let _ = child.kill();
-        child.wait().unwrap();
-        height_in_step(&bench.path("land.iqt"));
-        bench.good(&["verify", "land.iqt"]);
-        let now = bench.json(&["history", "land.iqt", "--json"])["commit"].as_u64().unwrap();
-        assert!(now >= commits);
-        commits = now;
-    }
-    assert!(commits > 20, "the kills came too early: {commits}");
-    // A killed writer's lock is taken over; what it left can be undone.
-    bench.good(&["undo", "land.iqt", "5"]);
-    height_in_step(&bench.path("land.iqt"));
-    bench.good(&["undo", "land.iqt", "100000"]);
-    bench.good(&["compact", "land.iqt"]);
-    assert_eq!(bench.names(), ["a.edits", "land.iqt", "land.tif", "one.edits"]);
-}
-
-/// A reader in another process that opens the file again and again while batches are committed sees each whole.
-#[test]
-fn a_reader_sees_whole_batches_while_another_process_commits() {
-    let bench = with_script(&in_step(250));
-    write(&bench, "one.edits", &in_step(1));
-    bench.good(&["edit", "land.iqt", "--script", "one.edits"]);
-    let mut child = bench
-        .command(&["edit", "land.iqt", "--script", "a.edits"])
-        .stdout(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
-    let kept = Terrain::open(&bench.path("land.iqt")).unwrap();
-    let view = heights(&kept);
-    let mut seen = std::collections::BTreeSet::new();
-    let mut looks = 0;
-    while child.try_wait().unwrap().is_none() {
-        seen.insert((height_in_step(&bench.path("land.iqt")) * 10.0).round() as i64);
-        looks += 1;
-    }
-    assert!(child.wait().unwrap().success());
-    assert!(looks > 10 && seen.len() > 5, "{looks} looks, {} states", seen.len());
-    assert_eq!(height_in_step(&bench.path("land.iqt")), 34.9);
-    // What was opened before goes on being what it was.
-    assert!(heights(&kept) == view);
 }
 
 #[test]

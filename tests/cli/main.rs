@@ -3,6 +3,7 @@
 mod build;
 mod drape;
 mod edit;
+mod edit_processes;
 mod engines;
 mod iobench;
 mod pictures;
