@@ -7,7 +7,7 @@
 
 use super::noise::{fractal, hash, signed_unit, smoothstep};
 use super::tiff_header;
-use crate::atomic_file::AtomicFile;
+use crate::file::atomic::AtomicFile;
 use crate::disk::write_at;
 use crate::error::LayoutError;
 use crate::grid::GridPoint;
