@@ -48,7 +48,8 @@ fn seen(base: &Path, overlay: Option<&Path>) -> Option<Vec<u8>> {
     let report = verify(&terrain, &|_| {}).unwrap();
     assert!(report.is_sound(), "{:?}", report.problems);
     let pages = terrain.header().record_pages();
-    let mut seen: Vec<u8> = (0..pages).flat_map(|page| terrain.checked_page(page).unwrap().to_vec()).collect();
+    let mut seen: Vec<u8> =
+        (0..pages).flat_map(|page| terrain.checked_page(page).unwrap().to_vec()).collect();
     if let Some(imagery) = Imagery::open(&terrain).unwrap() {
         for id in imagery.shape().ids() {
             let mut tile = Vec::new();

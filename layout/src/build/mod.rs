@@ -20,12 +20,12 @@ mod spool;
 mod survey;
 mod writer;
 
-use crate::file::atomic::AtomicFile;
-use crate::file::publish::publish_terrain;
 use crate::bound::{FIRST_SCANNED, Rules};
 use crate::dem::DemSource;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::publish::publish_terrain;
 use crate::grid::Grid;
 use crate::header::{ErrorKind, Header};
 use crate::order::corners;

@@ -4,11 +4,11 @@
 
 use super::survey::HeightCode;
 use super::{BuildOptions, BuildProgress, MemoryPlan, Work, spool::Spool};
-use crate::file::atomic::AtomicFile;
-use crate::file::publish::publish_terrain;
 use crate::dem::{DemInfo, DemSource, Georeference, SampleSink, SampleType, Window};
 use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::publish::publish_terrain;
 use crate::grid::GridPoint;
 use crate::header::Header;
 use crate::record::{RecordCodec, RecordKind, RecordScale};

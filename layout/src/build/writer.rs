@@ -7,11 +7,11 @@
 use super::gather::gather;
 use super::levels::{LevelShape, Levels};
 use super::plan::{LevelPlan, Plan};
-use crate::file::atomic::AtomicFile;
 use crate::bytes::{PAGE_BYTES, Page, checksum};
 use crate::directory::Entry;
 use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
 use crate::file::directory::{put_all_leaves, root_bytes};
 use crate::grid::Grid;
 use crate::header::{Header, INERT_PAGE};

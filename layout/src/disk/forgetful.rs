@@ -126,7 +126,12 @@ impl ForgetfulDisk {
             });
             std::fs::write(into.join(path.strip_prefix(&self.folder).unwrap_or(&path)), content.safe)?;
         }
-        Ok(log.promises.iter().rev().find(|(calls, _)| *calls <= cut.after).map_or(0, |(_, promise)| *promise))
+        Ok(log
+            .promises
+            .iter()
+            .rev()
+            .find(|(calls, _)| *calls <= cut.after)
+            .map_or(0, |(_, promise)| *promise))
     }
 }
 

@@ -118,7 +118,10 @@ impl Disk for SystemDisk {
         {
             // A folder that may be written to and not be read cannot be opened, and some file systems sync no folders: there is no more to be had there.
             let cannot = |e: &std::io::Error| {
-                matches!(e.kind(), ErrorKind::PermissionDenied | ErrorKind::InvalidInput | ErrorKind::Unsupported)
+                matches!(
+                    e.kind(),
+                    ErrorKind::PermissionDenied | ErrorKind::InvalidInput | ErrorKind::Unsupported
+                )
             };
             match File::open(folder).and_then(|folder| folder.sync_all()) {
                 Err(error) if cannot(&error) => Ok(()),

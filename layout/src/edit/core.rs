@@ -82,6 +82,13 @@ impl<C: RecordCodec> Core<C> {
         self.pages.all_edited()
     }
 
+    pub(super) fn keep_at_most(&mut self, pages: usize) {
+        self.pages.keep_at_most(pages);
+        if let Some(original) = &mut self.original {
+            original.keep_at_most(pages);
+        }
+    }
+
     pub(super) fn held_pages(&self) -> usize {
         self.pages.held_pages()
     }
@@ -401,7 +408,12 @@ impl<C: RecordCodec> Core<C> {
         for (logical, entry) in places {
             // What is there now is compared with it, and must not fail to come then.
             let now = Box::new(*self.pages.page(*logical)?);
-            pages.push(NewPage { logical: *logical, entry: *entry, now, new: self.pages.read_at(*logical, *entry)? });
+            pages.push(NewPage {
+                logical: *logical,
+                entry: *entry,
+                now,
+                new: self.pages.read_at(*logical, *entry)?,
+            });
         }
         Ok(Replacement { pages, range: (header.height_range_m, header.scale.error_top_m) })
     }

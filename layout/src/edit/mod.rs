@@ -161,6 +161,11 @@ impl Editor {
         with_records!(&self.core, core => core.held_pages())
     }
 
+    /// Keeps at most so many pages in memory, after each batch, that can be read again from the file; default 16,384, which are 64 MiB.
+    pub fn keep_at_most(&mut self, pages: usize) {
+        with_records!(&mut self.core, core => core.keep_at_most(pages));
+    }
+
     /// Logical pages edited since the last commit, ascending.
     pub fn uncommitted(&self) -> Vec<u64> {
         with_records!(&self.core, core => core.uncommitted())
@@ -192,11 +197,7 @@ impl Editor {
     }
 
     /// Gets ready to put the contents into pages that the file has at other places, as undoing does, and to take over the range of heights of `header`. Nothing changes yet.
-    fn replacement(
-        &mut self,
-        places: &[(u64, Entry)],
-        header: &Header,
-    ) -> Result<Replacement, LayoutError> {
+    fn replacement(&mut self, places: &[(u64, Entry)], header: &Header) -> Result<Replacement, LayoutError> {
         with_records!(&mut self.core, core => core.replacement(places, header))
     }
 

@@ -7,9 +7,9 @@ use crate::bytes::{PAGE_BYTES, Page, get_text, get_u32, get_u64, put_text, put_u
 use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
+use crate::file::slots::Slots;
 use crate::header::{Header, seal};
 use crate::opening::{read_directory, read_growing};
-use crate::file::slots::Slots;
 use crate::source::{LayeredSource, MapSource, PreadSource, Source, split_of};
 use crate::terrain::Terrain;
 use std::path::Path;
@@ -61,7 +61,8 @@ pub(super) fn create_overlay(
     }
     let file = AtomicFile::create(overlay)?;
     let name = base.file_name().unwrap_or_default().to_string_lossy();
-    let when_full = "cannot write the overlay, for which there is no room; make some on its disk, or name one on another";
+    let when_full =
+        "cannot write the overlay, for which there is no room; make some on its disk, or name one on another";
     disk.write_at(file.file(), &empty_overlay(slots, &name), 0)
         .map_err(|e| LayoutError::write(overlay, "cannot write the overlay", when_full, e))?;
     // Another who made one meanwhile was as quick to be right.
@@ -89,7 +90,10 @@ fn empty_overlay(base: &Slots, base_name: &str) -> Vec<u8> {
 }
 
 /// The header slots of the overlay over `base`, and where in the two together it begins.
-pub(super) fn overlay_slots(base: &PreadSource, overlay: &mut PreadSource) -> Result<(Slots, u64), LayoutError> {
+pub(super) fn overlay_slots(
+    base: &PreadSource,
+    overlay: &mut PreadSource,
+) -> Result<(Slots, u64), LayoutError> {
     let base_slots = Slots::read(base, 0)?;
     if overlay.byte_count() < FIRST_PAGES * PAGE_BYTES as u64 {
         return Err(not_an_overlay(overlay.path()));

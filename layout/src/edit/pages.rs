@@ -17,7 +17,7 @@ use crate::terrain::Terrain;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Pages kept that can be read again: 64 MiB.
+/// Pages kept that can be read again, unless another number is asked for: 64 MiB.
 const CLEAN_PAGES: usize = 16_384;
 
 /// The page differs, or once differed, from the terrain's.
@@ -46,8 +46,9 @@ pub(super) struct Pages<C: RecordCodec> {
     flags: Vec<u8>,
     /// Where pages lie that commits have moved.
     moved: HashMap<u64, Entry>,
-    /// Pages here that can be read again.
+    /// Pages here that can be read again, and how many of them are kept.
     clean: usize,
+    most_clean: usize,
     log: Vec<Overwritten<C::Raw>>,
     /// Pages written to since the last commit began, and what they held then.
     uncommitted: Vec<(u64, Box<Page>)>,
@@ -69,6 +70,7 @@ impl<C: RecordCodec> Pages<C> {
             flags: vec![0; count],
             moved: HashMap::new(),
             clean: 0,
+            most_clean: CLEAN_PAGES,
             log: Vec::new(),
             uncommitted: Vec::new(),
             taken: Vec::new(),
@@ -179,6 +181,11 @@ impl<C: RecordCodec> Pages<C> {
         self.moved.insert(logical, entry);
     }
 
+    /// Keeps at most so many pages that can be read again.
+    pub(super) fn keep_at_most(&mut self, pages: usize) {
+        self.most_clean = pages;
+    }
+
     /// The first error since this was last asked.
     pub(super) fn check(&mut self) -> Result<(), LayoutError> {
         self.failure.take().map_or(Ok(()), Err)
@@ -202,7 +209,7 @@ impl<C: RecordCodec> Pages<C> {
     /// Ends a batch that is to stay.
     pub(super) fn keep(&mut self) {
         self.log.clear();
-        if self.clean > CLEAN_PAGES {
+        if self.clean > self.most_clean {
             self.drop_clean();
         }
     }
@@ -258,7 +265,8 @@ impl<C: RecordCodec> Pages<C> {
 
     /// It is not: the copies from before it are those to go back to again.
     pub(super) fn fail_commit(&mut self) {
-        let since: HashMap<u64, usize> = self.uncommitted.iter().map(|(logical, _)| *logical).zip(0..).collect();
+        let since: HashMap<u64, usize> =
+            self.uncommitted.iter().map(|(logical, _)| *logical).zip(0..).collect();
         for (logical, before) in std::mem::take(&mut self.taken) {
             let flags = &mut self.flags[logical as usize];
             *flags = *flags & !TAKEN | UNCOMMITTED;

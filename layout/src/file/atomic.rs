@@ -140,8 +140,7 @@ impl AtomicFile {
     fn finish(self, disk: &dyn Disk, replaced: Replaced<'_>) -> Result<bool, LayoutError> {
         let Self { name, target, inner } = self;
         let failed = |e| {
-            let when_full =
-                "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
+            let when_full = "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
             LayoutError::write(&name, "cannot write the file", when_full, e)
         };
         let file = match &inner {
@@ -184,7 +183,9 @@ const NEW_FILE_MODE: u32 = 0o666;
 fn check_replaceable(name: &Path, target: &Path) -> Result<(), LayoutError> {
     let problem = match std::fs::symlink_metadata(target) {
         Ok(meta) if meta.is_dir() => "the output is a folder; name a file in it",
-        Ok(meta) if !meta.is_file() => "the output is no regular file but a device, a pipe or the like; name a file",
+        Ok(meta) if !meta.is_file() => {
+            "the output is no regular file but a device, a pipe or the like; name a file"
+        }
         _ => return Ok(()),
     };
     Err(LayoutError::Usage(format!("{}: {problem}", name.display())))

@@ -140,8 +140,7 @@ impl Tail {
     }
 
     fn sync(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
-        disk.sync(&self.file)
-            .map_err(|e| LayoutError::io(&self.path, "cannot bring the file to the disk", e))
+        disk.sync(&self.file).map_err(|e| LayoutError::io(&self.path, "cannot bring the file to the disk", e))
     }
 
     /// The header that follows, with this tail's generation.

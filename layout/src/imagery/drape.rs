@@ -14,11 +14,11 @@ use super::source::{ImageSource, RowReader};
 use crate::build::BuildProgress;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
-use crate::header::Header;
 use crate::file::journal::Lineage;
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
 use crate::file::tail::{Attempted, Tail};
+use crate::header::Header;
 use crate::source::{PreadSource, Source};
 use crate::terrain::Terrain;
 use std::fs::File;
@@ -82,7 +82,8 @@ pub fn drape_on(
 ) -> Result<Draped, LayoutError> {
     let lock = WriteLock::take(path)?;
     let file = lock.file();
-    let again = file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
+    let again =
+        file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
     // One file, opened once: what is read is what is written to.
     let terrain = Terrain::from_source(Box::new(PreadSource::over(path, again)?))?;
     append_all(disk, file, terrain.source(), images, options, progress)
@@ -159,10 +160,7 @@ fn append_tiles(
         }
     }
     if append.stored_tiles() == 0 {
-        return Err(LayoutError::Usage(format!(
-            "{}: the image is transparent throughout",
-            first.display()
-        )));
+        return Err(LayoutError::Usage(format!("{}: the image is transparent throughout", first.display())));
     }
     Ok(())
 }

@@ -21,7 +21,8 @@ impl PreadSource {
     /// # Errors
     /// [`LayoutError::Io`] if it cannot be opened or someone is writing to it; [`LayoutError::NotThisFormat`] for what is not a regular file.
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
-        let file = open_without_waiting(path).map_err(|e| LayoutError::io(path, "cannot open the file", e))?;
+        let file =
+            open_without_waiting(path).map_err(|e| LayoutError::io(path, "cannot open the file", e))?;
         Self::over(path, file)
     }
 

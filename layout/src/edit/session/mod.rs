@@ -370,11 +370,13 @@ impl EditSession {
 /// The right to edit a file.
 fn take_lock(path: &Path) -> Result<WriteLock, LayoutError> {
     WriteLock::take(path).map_err(|error| match error {
-        LayoutError::Io { path, source, .. } if source.kind() != std::io::ErrorKind::NotFound => LayoutError::io(
-            &path,
-            "cannot open the file for writing; an overlay keeps edits apart from it",
-            source,
-        ),
+        LayoutError::Io { path, source, .. } if source.kind() != std::io::ErrorKind::NotFound => {
+            LayoutError::io(
+                &path,
+                "cannot open the file for writing; an overlay keeps edits apart from it",
+                source,
+            )
+        }
         other => other,
     })
 }

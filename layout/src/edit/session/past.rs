@@ -5,8 +5,8 @@ use crate::directory::Entry;
 use crate::edit::Changes;
 use crate::edit::commit::CommitJob;
 use crate::error::LayoutError;
-use crate::header::{Header, History};
 use crate::file::journal::Commit;
+use crate::header::{Header, History};
 use crate::opening::{read_leaf, read_root};
 use crate::source::Source;
 use crate::terrain::Terrain;
@@ -29,8 +29,9 @@ impl EditSession {
     /// Goes back to the state before the last commit, durably; `None` if there is none to go back to.
     ///
     /// # Errors
-    /// [`LayoutError::Usage`] while edits are not committed; damage and I/O of what the file holds of that state. The file reads as before then.
+    /// [`LayoutError::Usage`] while edits are not committed or a commit is under way; damage and I/O of what the file holds of that state. The file reads as before then.
     pub fn undo(&mut self) -> Result<Option<Changes>, LayoutError> {
+        self.check_idle()?;
         let Some(History { commit_page, tip_page }) = self.slots.header.history else { return Ok(None) };
         if commit_page == 0 {
             return Ok(None);
@@ -44,6 +45,7 @@ impl EditSession {
     /// # Errors
     /// As [`EditSession::undo`].
     pub fn redo(&mut self) -> Result<Option<Changes>, LayoutError> {
+        self.check_idle()?;
         let Some(History { commit_page, tip_page }) = self.slots.header.history else { return Ok(None) };
         let mut at = tip_page;
         while at != commit_page {
@@ -73,7 +75,6 @@ impl EditSession {
 
     /// Brings the file, and the ground in memory, to the state of a journal page; 0 is how it was built.
     fn turn_to(&mut self, commit_page: u32, tip_page: u32) -> Result<Changes, LayoutError> {
-        self.check_idle()?;
         if !self.is_committed() {
             return Err(LayoutError::Usage(format!(
                 "{}: there are edits that are not committed; commit them or take them back first",
