@@ -26,6 +26,7 @@ pub mod pool;
 pub mod prefetch;
 pub mod record;
 mod records;
+pub mod remedy;
 mod slots;
 pub mod source;
 pub mod store;
@@ -33,5 +34,7 @@ pub mod synth;
 pub mod terrain;
 pub mod unused;
 pub mod verify;
+mod words;
 
 pub use error::LayoutError;
+pub use remedy::Remedy;

@@ -16,6 +16,7 @@ use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::header::Header;
 use crate::lock::{WriteLock, is_named};
+use crate::remedy::Remedy;
 use crate::slots::Slots;
 use crate::source::{PreadSource, Source};
 use crate::terrain::Terrain;
@@ -118,15 +119,17 @@ fn append_all(
     let shape = mosaic.shape(options.format);
     let needed = memory_bytes(&shape) + mosaic.memory_bytes();
     if needed > options.memory_mib << 20 {
+        let needed_mib = needed.div_ceil(1 << 20);
         return Err(LayoutError::Usage(format!(
-            "{} x {} texels of {} take {} MiB of memory and {} are allowed: allow more with --memory, or give a tiled GeoTIFF: \
+            "{} x {} texels of {} take {} MiB of memory and {} are allowed: allow more, or give a tiled GeoTIFF: \
              gdal_translate -co TILED=YES -co BIGTIFF=IF_SAFER INPUT output.tif",
             shape.texels[0],
             shape.texels[1],
             mosaic.format(),
-            (needed >> 20) + 1,
+            needed_mib,
             options.memory_mib
-        )));
+        ))
+        .mended_by(Remedy::Memory { enough_mib: Some(needed_mib) }));
     }
     let mut append = Append::begin(path, disk, file, slots, shape)?;
     progress.stage("draping", u64::from(shape.texels[0]) * u64::from(shape.texels[1]));

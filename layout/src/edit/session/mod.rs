@@ -18,6 +18,7 @@ use crate::header::{Header, History, ImageryPlace};
 use crate::journal::{Commit, State};
 use crate::lock::WriteLock;
 use crate::opening::{read_directory, read_root, read_structure};
+use crate::remedy::Remedy;
 use crate::slots::Slots;
 use crate::source::{LayeredSource, PreadSource, Source};
 use crate::terrain::Terrain;
@@ -329,7 +330,12 @@ impl EditSession {
 
 fn open_for_writing(path: &Path) -> Result<File, LayoutError> {
     File::options().read(true).write(true).open(path).map_err(|e| {
-        LayoutError::io(path, "cannot open the file for writing; --overlay keeps edits apart from it", e)
+        LayoutError::io(
+            path,
+            "cannot open the file for writing; edits can be kept apart from it in an overlay",
+            e,
+        )
+        .mended_by(Remedy::Overlay)
     })
 }
 
