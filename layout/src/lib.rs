@@ -24,12 +24,15 @@ pub mod pool;
 pub mod prefetch;
 pub mod record;
 mod records;
+pub mod remedy;
 pub mod source;
 pub mod store;
 pub mod synth;
 pub mod terrain;
 pub mod unused;
 pub mod verify;
+mod words;
 
 pub use error::LayoutError;
 pub use file::atomic as atomic_file;
+pub use remedy::Remedy;

@@ -27,6 +27,7 @@ mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
 mod progress;
+mod remedy;
 mod replay;
 #[cfg(unix)]
 mod signals;
@@ -138,7 +139,7 @@ pub(crate) fn run() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            output::complain(&format!("error: {}", message(&error)));
+            output::complain(&format!("error: {}", remedy::spoken(&error)));
             ExitCode::from(if error.is::<WrongUsage>() { 2 } else { 1 })
         }
     }

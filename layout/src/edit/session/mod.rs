@@ -22,6 +22,7 @@ use crate::file::slots::Slots;
 use crate::file::tail::{Attempt, Attempted, Tail};
 use crate::header::{Header, ImageryPlace};
 use crate::opening::{read_directory, read_growing, read_root, read_structure};
+use crate::remedy::Remedy;
 use crate::source::{LayeredSource, PreadSource, Source};
 use crate::terrain::Terrain;
 use std::path::{Path, PathBuf};
@@ -370,13 +371,12 @@ impl EditSession {
 /// The right to edit a file.
 fn take_lock(path: &Path) -> Result<WriteLock, LayoutError> {
     WriteLock::take(path).map_err(|error| match error {
-        LayoutError::Io { path, source, .. } if source.kind() != std::io::ErrorKind::NotFound => {
-            LayoutError::io(
-                &path,
-                "cannot open the file for writing; an overlay keeps edits apart from it",
-                source,
-            )
-        }
+        LayoutError::Io { path, source, .. } if source.kind() != std::io::ErrorKind::NotFound => LayoutError::io(
+            &path,
+            "cannot open the file for writing; edits can be kept apart from it in an overlay",
+            source,
+        )
+        .mended_by(Remedy::Overlay),
         other => other,
     })
 }
