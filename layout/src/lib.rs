@@ -31,6 +31,7 @@ pub mod source;
 pub mod store;
 pub mod synth;
 pub mod terrain;
+pub mod unfinished;
 pub mod unused;
 pub mod verify;
 
