@@ -21,6 +21,7 @@ mod movie;
 #[cfg(feature = "view")]
 mod movie_file;
 mod output;
+mod outputs;
 mod parse;
 #[cfg(feature = "view")]
 mod picture;

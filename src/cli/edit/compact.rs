@@ -1,7 +1,8 @@
 //! `terrasoar compact`: a file without what edits left behind.
 
 use crate::cli::WrongUsage;
-use crate::cli::output::{check_output, grouped, print, print_json};
+use crate::cli::output::{grouped, print, print_json};
+use crate::cli::outputs::{Force, Kind};
 use crate::cli::progress::Progress;
 use crate::cli::terrain::TerrainArgs;
 use anyhow::Result;
@@ -29,6 +30,8 @@ pub(crate) struct Args {
     /// File to write instead of replacing the terrain file
     #[arg(short, long, value_name = "OUT.iqt")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -48,7 +51,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let start = Instant::now();
     let out = match (&args.output, &args.terrain.overlay) {
         (Some(out), _) => {
-            check_output(out, &args.terrain.inputs(&[]))?;
+            args.force.file(out, Kind::Terrain, &args.terrain.inputs(&[]))?;
             out
         }
         (None, None) => &args.terrain.file,
