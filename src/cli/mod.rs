@@ -7,6 +7,7 @@
 mod build;
 mod cap;
 mod compare;
+mod defect;
 mod drape;
 mod edit;
 mod flight;
@@ -113,6 +114,10 @@ impl std::error::Error for WrongUsage {}
 pub(crate) fn run() -> ExitCode {
     #[cfg(unix)]
     signals::heed();
+    defect::guarded(carry_out)
+}
+
+fn carry_out() -> ExitCode {
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
         Verb::Drape(args) => drape::run(&args),

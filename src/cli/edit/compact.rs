@@ -10,11 +10,11 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use terrasoar_layout::disk::SystemDisk;
-use terrasoar_layout::edit::compact;
+use terrasoar_layout::edit::{compact, history};
 
 /// Write a terrain file anew without what edits left behind.
 ///
-/// The ground and the imagery stay as they are, pages come in order again, and the history ends: what was edited can no longer be undone or redone. Without -o the file itself
+/// The ground and the imagery stay as they are, pages come in order again, and the history ends: what was edited can no longer be undone or redone, and it says so. Without -o the file itself
 /// is replaced, when the new one is complete; programs that have it open go on reading the old one. With --overlay, -o is the terrain with those edits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -65,6 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     let terrain = args.terrain.open_unmapped()?;
     let bytes_before = terrain.source().byte_count();
+    let commits = if args.output.is_none() { history(&terrain)?.len() as u64 } else { 0 };
     let progress = Progress::new("records");
     let header = compact(&SystemDisk, &terrain, out, &progress)?;
     drop(progress);
@@ -79,8 +80,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.json {
         return print_json(&answer);
     }
+    let ended = match commits {
+        0 => String::new(),
+        1 => "; 1 commit of edits can no longer be undone".into(),
+        more => format!("; {} commits of edits can no longer be undone", grouped(more)),
+    };
     print(&format!(
-        "{}: {} bytes instead of {}, {} record pages, {:.1} s",
+        "{}: {} bytes instead of {}, {} record pages, {:.1} s{ended}",
         answer.output,
         grouped(answer.bytes_after),
         grouped(answer.bytes_before),
