@@ -31,6 +31,7 @@ pub mod synth;
 pub mod terrain;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
+pub mod unfinished;
 pub mod unused;
 pub mod verify;
 mod words;

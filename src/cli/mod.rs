@@ -7,6 +7,7 @@
 mod build;
 mod cap;
 mod compare;
+mod defect;
 mod drape;
 mod edit;
 mod flight;
@@ -21,6 +22,7 @@ mod movie;
 #[cfg(feature = "view")]
 mod movie_file;
 mod output;
+mod outputs;
 mod parse;
 #[cfg(feature = "view")]
 mod picture;
@@ -113,6 +115,10 @@ impl std::error::Error for WrongUsage {}
 pub(crate) fn run() -> ExitCode {
     #[cfg(unix)]
     signals::heed();
+    defect::guarded(carry_out)
+}
+
+fn carry_out() -> ExitCode {
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
         Verb::Drape(args) => drape::run(&args),

@@ -6,6 +6,7 @@ mod edit;
 mod edit_processes;
 mod engines;
 mod iobench;
+mod outputs;
 mod pictures;
 mod support;
 mod usage;
