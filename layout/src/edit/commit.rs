@@ -214,7 +214,11 @@ impl CommitJob {
         self.run_on(&crate::disk::SystemDisk)
     }
 
-    pub(super) fn run_on(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
+    /// As [`CommitJob::run`], on another disk than the system's.
+    ///
+    /// # Errors
+    /// As [`CommitJob::run`].
+    pub fn run_on(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
         let Place { path, file, .. } = &self.place;
         let write = |bytes: &[u8], offset: u64| {
             let when_full = "cannot append the edits to the file, for which there is no room; make some on its disk, and try again";

@@ -12,6 +12,7 @@ use super::overlay::{empty_overlay, overlay_slots};
 use super::picture::Picture;
 use super::{Changes, Edit, Editor, HeightWindow};
 use crate::bytes::PAGE_BYTES;
+use crate::directory::Entry;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::header::{Header, History, ImageryPlace};
@@ -27,12 +28,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What became of a commit.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Committed {
     /// Record pages written.
     pub pages: u64,
     /// Bytes by which the file grew.
     pub bytes: u64,
+    /// The logical pages written, ascending, and where each lies now.
+    pub places: Vec<(u64, Entry)>,
 }
 
 /// The right to edit a terrain file, or an overlay of one, and its edits so far.
@@ -171,6 +174,17 @@ impl EditSession {
         &self.slots.header
     }
 
+    /// Where a logical page lies in the file as it is now, edits that are not committed apart; absent for pages that the terrain has not.
+    pub fn place_of(&self, logical_page: u64) -> Entry {
+        let at = usize::try_from(logical_page).ok();
+        at.and_then(|at| self.directory.entries.get(at)).copied().unwrap_or_default()
+    }
+
+    /// What does the session's writing, for jobs of [`EditSession::prepare_commit`] that run elsewhere.
+    pub fn disk(&self) -> Arc<dyn Disk + Send> {
+        Arc::clone(&self.disk)
+    }
+
     pub(super) fn picture(&self) -> &Picture {
         &self.picture
     }
@@ -296,7 +310,8 @@ impl EditSession {
         self.is_committing = false;
         self.attempted.note(&job);
         outcome?;
-        let committed = Committed { pages: job.pages(), bytes: job.bytes() };
+        let places = job.entries.iter().map(|(logical, entry)| (*logical as u64, *entry)).collect();
+        let committed = Committed { pages: job.pages(), bytes: job.bytes(), places };
         job.entries.iter().for_each(|(logical, entry)| self.directory.entries[*logical] = *entry);
         job.leaves.iter().for_each(|(leaf, entry)| self.directory.root[*leaf] = *entry);
         self.slots.flip(job.header_page, job.header);
