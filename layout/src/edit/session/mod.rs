@@ -180,6 +180,17 @@ impl EditSession {
         &self.slots.header
     }
 
+    /// Where a logical page lies in the file as it is now, edits that are not committed apart; absent for pages that the terrain has not.
+    pub fn place_of(&self, logical_page: u64) -> Entry {
+        let at = usize::try_from(logical_page).ok();
+        at.and_then(|at| self.directory.entries.get(at)).copied().unwrap_or_default()
+    }
+
+    /// What does the session's writing, for jobs of [`EditSession::prepare_commit`] that run elsewhere.
+    pub fn disk(&self) -> Arc<dyn Disk + Send> {
+        Arc::clone(&self.disk)
+    }
+
     pub(super) fn picture(&self) -> &Picture {
         &self.picture
     }
