@@ -31,6 +31,8 @@ pub mod source;
 pub mod store;
 pub mod synth;
 pub mod terrain;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
 pub mod unused;
 pub mod verify;
 
