@@ -13,31 +13,41 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Memory is counted for the whole process, so one body runs at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
+/// Findings of a target that are listed.
+const LISTED: usize = 8;
+
 fn replay(name: &str) {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let target = TARGETS.iter().find(|target| target.name == name).expect("a target");
     let seeds = (target.seeds)();
     assert!(seeds.len() > 3, "only {} seeds", seeds.len());
-    for (input, bytes) in seeds.iter().chain(&target.regressions()) {
-        run(target, input, bytes);
-    }
     let mutations = std::env::var("TERRASOAR_MUTATIONS").map_or(MUTATIONS, |number| number.parse().expect("a number"));
-    for number in 0..mutations {
+    let mutated = (0..mutations).map(|number| {
         let (input, bytes) = &seeds[number as usize % seeds.len()];
-        run(target, &format!("{input}, mutation {number}"), &mutate(bytes, number, target.is_text));
-    }
+        (format!("{input}, mutation {number}"), mutate(bytes, number, target.is_text))
+    });
+    let inputs = seeds.iter().cloned().chain(target.regressions()).chain(mutated);
+    let findings: Vec<String> = inputs.filter_map(|(input, bytes)| run(target, &input, &bytes)).take(LISTED).collect();
+    assert!(findings.is_empty(), "{}", findings.join("\n"));
 }
 
-fn run(target: &Target, input: &str, bytes: &[u8]) {
+/// Runs a body over an input; what it breaks and where the input is kept.
+fn run(target: &Target, input: &str, bytes: &[u8]) -> Option<String> {
     let begun = Instant::now();
-    if let Err(panic) = std::panic::catch_unwind(|| target.run(bytes)) {
-        // Kept for whoever looks into it; a name in the folder of temporary files can always be made.
-        let kept = std::env::temp_dir().join(format!("terrasoar-{}-finding", target.name));
-        let _ = std::fs::write(&kept, bytes);
-        eprintln!("{} over {input}: the input is in {}", target.name, kept.display());
-        std::panic::resume_unwind(panic);
+    let panic = std::panic::catch_unwind(|| target.run(bytes)).err();
+    if panic.is_none() && begun.elapsed() < PATIENCE {
+        return None;
     }
-    assert!(begun.elapsed() < PATIENCE, "{} over {input} took {:?}", target.name, begun.elapsed());
+    let words = panic.as_ref().map(|panic| match (panic.downcast_ref::<String>(), panic.downcast_ref::<&str>()) {
+        (Some(words), _) => words.clone(),
+        (None, Some(words)) => (*words).to_owned(),
+        (None, None) => "a panic without words".to_owned(),
+    });
+    let words = words.unwrap_or_else(|| format!("it took {:?}", begun.elapsed()));
+    let file: String = input.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let kept = std::env::temp_dir().join(format!("terrasoar-{}-{file}", target.name));
+    let _ = std::fs::write(&kept, bytes);
+    Some(format!("{} over {input}: {words}; the input is in {}", target.name, kept.display()))
 }
 
 #[test]
@@ -84,7 +94,8 @@ fn every_target_is_replayed_and_has_a_program() {
     }
     let folders = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/regressions")).unwrap();
     for folder in folders {
-        let name = folder.unwrap().file_name();
-        assert!(TARGETS.iter().any(|target| name == target.name), "{name:?} is no target's");
+        let folder = folder.unwrap();
+        let name = folder.file_name();
+        assert!(!folder.path().is_dir() || TARGETS.iter().any(|target| name == target.name), "{name:?} is no target's");
     }
 }
