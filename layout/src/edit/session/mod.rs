@@ -382,12 +382,14 @@ impl EditSession {
 /// The right to edit a file.
 fn take_lock(path: &Path) -> Result<WriteLock, LayoutError> {
     WriteLock::take(path).map_err(|error| match error {
-        LayoutError::Io { path, source, .. } if source.kind() != std::io::ErrorKind::NotFound => LayoutError::io(
-            &path,
-            "cannot open the file for writing; edits can be kept apart from it in an overlay",
-            source,
-        )
-        .mended_by(Remedy::Overlay),
+        LayoutError::Io { path, source, .. } if source.kind() != std::io::ErrorKind::NotFound => {
+            LayoutError::io(
+                &path,
+                "cannot open the file for writing; edits can be kept apart from it in an overlay",
+                source,
+            )
+            .mended_by(Remedy::Overlay)
+        }
         other => other,
     })
 }
