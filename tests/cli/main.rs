@@ -6,6 +6,8 @@ mod edit;
 mod edit_processes;
 mod engines;
 mod iobench;
+#[cfg(unix)]
+mod killed;
 mod outputs;
 mod pictures;
 mod support;

@@ -65,7 +65,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     let terrain = args.terrain.open_unmapped()?;
     let bytes_before = terrain.source().byte_count();
-    let commits = if args.output.is_none() { history(&terrain)?.len() as u64 } else { 0 };
+    // A journal that cannot be read any more is no obstacle: it ends here.
+    let ended = match history(&terrain) {
+        _ if args.output.is_some() => String::new(),
+        Ok(commits) if commits.is_empty() => String::new(),
+        Ok(commits) => {
+            let (count, s) = (grouped(commits.len() as u64), if commits.len() == 1 { "" } else { "s" });
+            format!("; the history ends: {count} commit{s} of edits can no longer be undone")
+        }
+        Err(_) => "; the history ends: edits can no longer be undone".into(),
+    };
     let progress = Progress::new("records");
     let header = compact(&SystemDisk, &terrain, out, &progress)?;
     drop(progress);
@@ -80,11 +89,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.json {
         return print_json(&answer);
     }
-    let ended = match commits {
-        0 => String::new(),
-        1 => "; 1 commit of edits can no longer be undone".into(),
-        more => format!("; {} commits of edits can no longer be undone", grouped(more)),
-    };
     print(&format!(
         "{}: {} bytes instead of {}, {} record pages, {:.1} s{ended}",
         answer.output,
