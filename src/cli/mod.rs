@@ -29,6 +29,7 @@ mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
 mod progress;
+mod remedy;
 mod replay;
 #[cfg(unix)]
 mod signals;
@@ -144,7 +145,7 @@ fn carry_out() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            output::complain(&format!("error: {}", message(&error)));
+            output::complain(&format!("error: {}", remedy::spoken(&error)));
             ExitCode::from(if error.is::<WrongUsage>() { 2 } else { 1 })
         }
     }

@@ -5,7 +5,6 @@
 //! copied out can leave that hidden folder. Files of other names are left alone. Cost: everything is written twice, and takes twice the room for a moment.
 
 use super::file::FileSink;
-use std::ffi::OsString;
 use std::fs::{File, Permissions};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -115,9 +114,9 @@ fn publish_new(folder: &Path, spool: &mut File, files: &[(String, u64)]) -> Resu
 
 /// A new folder in `parent`, where `folder` will be, with a name that says so.
 fn hidden_in(parent: &Path, folder: &Path) -> io::Result<tempfile::TempDir> {
-    let mut prefix = OsString::from(".");
-    prefix.push(folder.file_name().unwrap_or_default());
-    prefix.push(".");
+    // A file system takes names of 255 bytes, and something is added to this one.
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let prefix = format!(".{}.", &name[..name.floor_char_boundary(200)]);
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(".terrasoar-new");
     #[cfg(unix)]

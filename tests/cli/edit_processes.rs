@@ -45,8 +45,19 @@ fn in_step(batches: u32) -> String {
     lines
 }
 
+/// A script of batches that each set all of [`RECTS`] to one height.
+pub fn batches_in_step(heights_m: impl IntoIterator<Item = f64>) -> String {
+    let batch = |height_m: f64| {
+        let edit = |[west, south, east, north]: [u32; 4]| {
+            format!("set rect {west},{south},{east},{north} to {height_m}\n")
+        };
+        RECTS.into_iter().map(edit).collect::<String>() + "\n"
+    };
+    heights_m.into_iter().map(batch).collect()
+}
+
 /// The one height of all rectangles.
-fn height_in_step(path: &Path) -> f64 {
+pub fn height_in_step(path: &Path) -> f64 {
     let terrain = Terrain::open(path).unwrap();
     let at = |x: u32, y: u32| terrain.height_m(f64::from(x) * 20.0, f64::from(y) * 20.0).unwrap().unwrap();
     let first = at(RECTS[0][0], RECTS[0][1]);

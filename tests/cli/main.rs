@@ -1,5 +1,7 @@
 //! The real program in a temporary folder: what it prints, what it leaves, how it ends.
 
+#[cfg(target_os = "linux")]
+mod aliases;
 mod build;
 mod drape;
 mod edit;
@@ -8,6 +10,8 @@ mod engines;
 mod iobench;
 #[cfg(unix)]
 mod killed;
+#[cfg(unix)]
+mod kills;
 mod outputs;
 mod pictures;
 mod support;

@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use terrasoar_layout::disk::SystemDisk;
-use terrasoar_layout::edit::{compact, history};
+use terrasoar_layout::edit::{Compacted, compact};
 
 /// Write a terrain file anew without what edits left behind.
 ///
@@ -63,23 +63,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             .into());
         }
     };
-    let terrain = args.terrain.open_unmapped()?;
-    let bytes_before = terrain.source().byte_count();
-    // A journal that cannot be read any more is no obstacle: it ends here.
-    let ended = match history(&terrain) {
-        _ if args.output.is_some() => String::new(),
-        Ok(commits) if commits.is_empty() => String::new(),
-        Ok(commits) => {
-            let (count, s) = (grouped(commits.len() as u64), if commits.len() == 1 { "" } else { "s" });
-            format!("; the history ends: {count} commit{s} of edits can no longer be undone")
-        }
-        Err(_) => "; the history ends: edits can no longer be undone".into(),
-    };
     let progress = Progress::new("records");
-    let header = compact(&SystemDisk, &terrain, out, &progress)?;
+    let TerrainArgs { file, overlay } = &args.terrain;
+    let Compacted { header, bytes_before, commits_before, .. } =
+        compact(&SystemDisk, file, overlay.as_deref(), out, &progress)?;
     drop(progress);
     let answer = Answer {
-        file: terrain.path().display().to_string(),
+        file: overlay.as_ref().unwrap_or(file).display().to_string(),
         output: out.display().to_string(),
         bytes_before,
         bytes_after: header.file_bytes,
@@ -89,6 +79,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.json {
         return print_json(&answer);
     }
+    let ended = match commits_before {
+        commits if commits == 0 || args.output.is_some() => String::new(),
+        1 => "; the history ends: 1 commit of edits can no longer be undone".into(),
+        commits => {
+            format!("; the history ends: {} commits of edits can no longer be undone", grouped(commits))
+        }
+    };
     print(&format!(
         "{}: {} bytes instead of {}, {} record pages, {:.1} s{ended}",
         answer.output,
