@@ -9,11 +9,12 @@
 //! writing to is not replaced either ([`lock`](super::lock)).
 //!
 //! **A nameless file cannot replace another.** Where the target exists it gets a name of its own first, `.NAME.*.terrasoar-new`, and is renamed at once. A process killed between
-//! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away.
+//! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away. What has a name before it is complete is on the list of [`unfinished`].
 
 use super::lock::{ReplaceLock, WriteLock};
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
+use crate::unfinished;
 use std::fs::{File, Metadata};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -34,7 +35,7 @@ pub struct AtomicFile {
 enum Inner {
     #[cfg(target_os = "linux")]
     Nameless(File),
-    Named(tempfile::NamedTempFile),
+    Named(unfinished::Guard, tempfile::NamedTempFile),
 }
 
 /// Whom a file replaces.
@@ -95,8 +96,12 @@ impl AtomicFile {
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(std::fs::Permissions::from_mode(NEW_FILE_MODE));
         }
-        let file = builder.tempfile_in(folder_of(&target)).map_err(failed)?;
-        Ok(Self { name, target, inner: Inner::Named(file) })
+        let (guard, file) = unfinished::make(|| {
+            let file = builder.tempfile_in(folder_of(&target))?;
+            Ok((file.path().to_owned(), file))
+        })
+        .map_err(failed)?;
+        Ok(Self { name, target, inner: Inner::Named(guard, file) })
     }
 
     /// The file to write to.
@@ -104,7 +109,7 @@ impl AtomicFile {
         match &self.inner {
             #[cfg(target_os = "linux")]
             Inner::Nameless(file) => file,
-            Inner::Named(file) => file.as_file(),
+            Inner::Named(_, file) => file.as_file(),
         }
     }
 
@@ -146,7 +151,7 @@ impl AtomicFile {
         let file = match &inner {
             #[cfg(target_os = "linux")]
             Inner::Nameless(file) => file,
-            Inner::Named(file) => file.as_file(),
+            Inner::Named(_, file) => file.as_file(),
         };
         let old = std::fs::symlink_metadata(&target).ok().filter(Metadata::is_file);
         if let (Some(old), Replaced::Any | Replaced::Held(_)) = (&old, replaced) {
@@ -239,22 +244,25 @@ fn give_name(disk: &dyn Disk, inner: Inner, target: &Path, replaced: Replaced<'_
                 }
             }
             remove_left(target, STALE);
-            let before = tempfile::Builder::new()
-                .prefix(&prefix_before(target))
-                .suffix(SUFFIX_BEFORE)
-                .make_in(folder_of(target), |name| disk.link(&file, name))?
-                .into_temp_path();
+            let (_guard, before) = unfinished::make(|| {
+                let before = tempfile::Builder::new()
+                    .prefix(&prefix_before(target))
+                    .suffix(SUFFIX_BEFORE)
+                    .make_in(folder_of(target), |name| disk.link(&file, name))?
+                    .into_temp_path();
+                Ok((before.to_path_buf(), before))
+            })?;
             disk.rename(&before, target)?;
             // It is not called that any more.
             let _ = before.keep();
             Ok(true)
         }
-        Inner::Named(file) if only_new => match file.persist_noclobber(target) {
+        Inner::Named(_guard, file) if only_new => match file.persist_noclobber(target) {
             Ok(_) => Ok(true),
             Err(e) if e.error.kind() == ErrorKind::AlreadyExists => Ok(false),
             Err(e) => Err(e.error),
         },
-        Inner::Named(file) => {
+        Inner::Named(_guard, file) => {
             let before = file.into_temp_path();
             disk.rename(&before, target)?;
             let _ = before.keep();
