@@ -2,7 +2,6 @@
 //!
 //! The way data takes: [`import`] turns a DEM into a [`dem::DemSource`]; [`build`] computes what refinement needs and writes
 //! the file that FORMAT.md specifies; [`terrain`] opens it. This crate knows bytes and knows no camera.
-pub mod atomic_file;
 mod bound;
 pub mod build;
 pub mod bytes;
@@ -12,13 +11,12 @@ pub mod disk;
 pub mod edit;
 pub mod edited;
 pub mod error;
+pub mod file;
 pub mod grid;
 pub mod header;
 pub mod imagery;
 pub mod import;
-mod journal;
 pub mod loader;
-mod lock;
 pub mod octave;
 mod opening;
 pub mod order;
@@ -26,7 +24,6 @@ pub mod pool;
 pub mod prefetch;
 pub mod record;
 mod records;
-mod slots;
 pub mod source;
 pub mod store;
 pub mod synth;
@@ -37,3 +34,4 @@ pub mod unused;
 pub mod verify;
 
 pub use error::LayoutError;
+pub use file::atomic as atomic_file;

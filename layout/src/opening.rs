@@ -7,11 +7,27 @@ use crate::directory::{ENTRY_BYTES, Entry};
 use crate::error::LayoutError;
 use crate::header::{Header, INERT_PAGE, LEAF_ENTRIES};
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
-use crate::source::Source;
+use crate::source::{PreadSource, Source};
 use std::path::Path;
 
 /// Reads and checks header and directory (FORMAT.md, section 6).
 pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>), LayoutError> {
+    let header = read_header(source)?;
+    let entries = check_structure(source, &header)?;
+    Ok((header, entries))
+}
+
+/// As [`read_structure`], of a file that others may append to at this moment.
+pub(crate) fn read_growing(file: &mut PreadSource) -> Result<(Header, Vec<Entry>), LayoutError> {
+    // The header first and then the length: what a header counts was in the file before the header was.
+    let header = read_header(file)?;
+    file.measure_again()?;
+    let entries = check_structure(file, &header)?;
+    Ok((header, entries))
+}
+
+/// The current header.
+fn read_header(source: &dyn Source) -> Result<Header, LayoutError> {
     let path = source.path();
     let length = source.byte_count();
     let page_bytes = PAGE_BYTES as u64;
@@ -32,13 +48,17 @@ pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>)
     }
     source.read_at(0, &mut slot_a[..])?;
     source.read_at(page_bytes, &mut slot_b[..])?;
-    let header = Header::current(path, &slot_a, &slot_b)?;
+    Header::current(path, &slot_a, &slot_b)
+}
+
+/// Whether all that a header leads to is there; the directory.
+fn check_structure(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
+    let length = source.byte_count();
     if length < header.file_bytes {
-        return Err(truncated(path, length, Some(header.file_bytes)));
+        return Err(truncated(source.path(), length, Some(header.file_bytes)));
     }
-    check_inert_page(source, &header)?;
-    let entries = read_directory(source, &header)?;
-    Ok((header, entries))
+    check_inert_page(source, header)?;
+    read_directory(source, header)
 }
 
 /// The directory's root: where the leaves lie.

@@ -9,10 +9,10 @@ pub use crate::records::Records;
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::directory::Entry;
 use crate::error::LayoutError;
+use crate::file::journal::Commit;
 use crate::grid::{Grid, GridPoint};
 use crate::header::{Header, INERT_PAGE};
-use crate::journal::Commit;
-use crate::opening::{read_directory, read_structure};
+use crate::opening::{read_directory, read_growing, read_structure};
 use crate::order::slot_of;
 use crate::pool::PagePool;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
@@ -166,7 +166,6 @@ impl Terrain {
     /// # Errors
     /// [`LayoutError::Damaged`] naming the page if it does not match; I/O.
     pub fn checked_page(&self, logical_page: u64) -> Result<Box<Page>, LayoutError> {
-        let mut page = Box::new([0; PAGE_BYTES]);
         let index = to_usize(logical_page)?;
         let Some(entry) = self.entries.get(index) else {
             return Err(LayoutError::Usage(format!(
@@ -174,10 +173,16 @@ impl Terrain {
                 self.entries.len()
             )));
         };
+        self.page_at(logical_page, *entry)
+    }
+
+    /// What a record page holds at the place that `entry` says, which may be one that another state of the file has it at. Checked.
+    pub(crate) fn page_at(&self, logical_page: u64, entry: Entry) -> Result<Box<Page>, LayoutError> {
+        let mut page = Box::new([0; PAGE_BYTES]);
         let number = if entry.is_present() { entry.page } else { INERT_PAGE };
         self.source.read_at(u64::from(number) * PAGE_BYTES as u64, &mut page[..])?;
         if entry.is_present() {
-            self.check_page(logical_page, *entry, &page)?;
+            self.check_page(logical_page, entry, &page)?;
         }
         Ok(page)
     }
@@ -291,15 +296,9 @@ impl Terrain {
 
 /// Opens and checks a file that others may append to at this moment.
 fn open_settled(path: &Path) -> Result<(PreadSource, Header, Vec<Entry>), LayoutError> {
-    loop {
-        let file = PreadSource::open(path)?;
-        match read_structure(&file) {
-            Ok((header, entries)) => return Ok((file, header, entries)),
-            // The header is newer than the length: whoever appends is quicker.
-            Err(LayoutError::Damaged { .. }) if file.has_grown() => {}
-            Err(error) => return Err(error),
-        }
-    }
+    let mut file = PreadSource::open(path)?;
+    let (header, entries) = read_growing(&mut file)?;
+    Ok((file, header, entries))
 }
 
 /// Positions a hair off a sample, from spacings that are not exact in binary, mean the sample.

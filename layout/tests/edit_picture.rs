@@ -255,7 +255,7 @@ fn compacting_keeps_the_paint_and_nothing_else() {
     let grown = std::fs::metadata(&path).unwrap().len() - before;
     assert!(unused > whole && unused <= whole + grown, "{unused} of {grown}");
     let out = folder.path().join("b.iqt");
-    compact(&SystemDisk, &terrain, &out, &Silent).unwrap();
+    compact(&SystemDisk, &path, None, &out, &Silent).unwrap();
     let compacted = open(&out, None);
     assert!(State::of(&compacted) == State::of(&terrain));
     assert_eq!(unused_bytes(&compacted).unwrap(), 0);

@@ -139,8 +139,7 @@ impl Workshop {
 
     /// Everything that differs from the file as it was opened, for a scene that is made anew.
     pub(crate) fn all_changes(&self) -> Changes {
-        let mut pages: Vec<u64> = self.session.editor().edited_pages().map(|(page, _)| page).collect();
-        pages.sort_unstable();
+        let pages = self.session.editor().edited_pages();
         Changes { pages, ..Changes::default() }
     }
 

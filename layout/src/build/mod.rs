@@ -20,11 +20,12 @@ mod spool;
 mod survey;
 mod writer;
 
-use crate::atomic_file::AtomicFile;
 use crate::bound::{FIRST_SCANNED, Rules};
 use crate::dem::DemSource;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::publish::publish_terrain;
 use crate::grid::Grid;
 use crate::header::{ErrorKind, Header};
 use crate::order::corners;
@@ -174,8 +175,7 @@ pub fn build_on(
     work.run_kind(&mut header)?;
     progress.stage("syncing", 0);
     drop(spool);
-    file.publish_on(disk)?;
-    Ok(header)
+    publish_terrain(disk, file, None)
 }
 
 /// What the work on one file needs to know.

@@ -7,9 +7,9 @@
 
 use super::noise::{fractal, hash, signed_unit, smoothstep};
 use super::tiff_header;
-use crate::atomic_file::AtomicFile;
 use crate::disk::write_at;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
 use crate::grid::GridPoint;
 use crate::terrain::Terrain;
 use crate::with_records;

@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use terrasoar_layout::disk::SystemDisk;
-use terrasoar_layout::edit::compact;
+use terrasoar_layout::edit::{Compacted, compact};
 
 /// Write a terrain file anew without what edits left behind.
 ///
@@ -60,13 +60,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             .into());
         }
     };
-    let terrain = args.terrain.open_unmapped()?;
-    let bytes_before = terrain.source().byte_count();
     let progress = Progress::new("records");
-    let header = compact(&SystemDisk, &terrain, out, &progress)?;
+    let TerrainArgs { file, overlay } = &args.terrain;
+    let Compacted { header, bytes_before, .. } =
+        compact(&SystemDisk, file, overlay.as_deref(), out, &progress)?;
     drop(progress);
     let answer = Answer {
-        file: terrain.path().display().to_string(),
+        file: overlay.as_ref().unwrap_or(file).display().to_string(),
         output: out.display().to_string(),
         bytes_before,
         bytes_after: header.file_bytes,

@@ -8,7 +8,7 @@
 
 use super::colour_table::{Packing, Paint, Table};
 use super::{codec, geokeys, predictor, tags};
-use crate::atomic_file::read_at;
+use crate::disk::read_at;
 use crate::error::LayoutError;
 use crate::imagery::{ImageInfo, ImageSource, RowReader};
 use crate::import::guard::guard;
