@@ -29,7 +29,8 @@ pub(crate) fn body(data: &[u8]) {
         Ok(text) => text,
         Err(error) => panic!("read and cannot be written: {error}"),
     };
-    let again = Script::parse(text.as_bytes(), &path).unwrap_or_else(|error| panic!("written and cannot be read: {error}\n{text}"));
+    let again = Script::parse(text.as_bytes(), &path)
+        .unwrap_or_else(|error| panic!("written and cannot be read: {error}\n{text}"));
     assert_eq!(again, script, "what is written reads back as another script");
     if script.edits() > MOST_EDITS {
         return;
@@ -66,19 +67,23 @@ fn does(batches: &[LoadedBatch], folder: &Path) {
     let path = folder.join("land.iqt");
     seeds::write(&path, &PLAIN);
     let before = pages(&open(&path));
-    let Some(mut session) = told(EditSession::open(&path)) else { panic!("a sound terrain cannot be edited") };
+    let Some(mut session) = told(EditSession::open(&path)) else {
+        panic!("a sound terrain cannot be edited")
+    };
     let mut states = vec![before];
     for batch in batches {
         if told(session.apply(&batch.edits)).is_none() {
             assert!(session.is_committed(), "a batch was refused and has changed something");
             continue;
         }
-        let written = session.commit(&batch.label).unwrap_or_else(|error| panic!("a commit on a sound disk: {error}"));
+        let written =
+            session.commit(&batch.label).unwrap_or_else(|error| panic!("a commit on a sound disk: {error}"));
         if written.pages > 0 {
             states.push(pages(&open(&path)));
         }
     }
-    let report = verify(&open(&path), &|_| {}).unwrap_or_else(|error| panic!("committed and cannot be read: {error}"));
+    let report =
+        verify(&open(&path), &|_| {}).unwrap_or_else(|error| panic!("committed and cannot be read: {error}"));
     assert!(report.is_sound(), "committed and not sound: {:?}", report.problems);
     for state in states.iter().rev().skip(1) {
         let undone = session.undo().unwrap_or_else(|error| panic!("an undo on a sound disk: {error}"));
@@ -95,7 +100,11 @@ fn does(batches: &[LoadedBatch], folder: &Path) {
 fn replays(batches: &[LoadedBatch], folder: &Path) {
     let terrain = Arc::new(open(&folder.join("land.iqt")));
     let frames = crate::fly::frames_over(&terrain);
-    let quality = Quality { viewport: Viewport { width_px: 64, height_px: 48 }, tolerance_px: 4.0, ..Quality::default() };
+    let quality = Quality {
+        viewport: Viewport { width_px: 64, height_px: 48 },
+        tolerance_px: 4.0,
+        ..Quality::default()
+    };
     let batches = timed(batches, &frames);
     let fly = |engine| replay_edited(&terrain, &frames, quality, engine, &batches, &mut |_| {});
     match (fly(EngineKind::Soar), fly(EngineKind::Kinetic)) {
@@ -107,6 +116,8 @@ fn replays(batches: &[LoadedBatch], folder: &Path) {
             refused(&one);
             refused(&other);
         }
-        (soar, kinetic) => panic!("one engine refuses what the other flies: {:?} {:?}", soar.err(), kinetic.err()),
+        (soar, kinetic) => {
+            panic!("one engine refuses what the other flies: {:?} {:?}", soar.err(), kinetic.err())
+        }
     }
 }

@@ -16,12 +16,15 @@ pub(crate) fn body(data: &[u8]) {
     let path = Path::new("f.flight");
     let Some(flight) = told(read(data, path)) else { return };
     assert!(!flight.frames.is_empty());
-    let text = flight.write_to(Vec::new(), path).unwrap_or_else(|error| panic!("read and cannot be written: {error}"));
+    let text = flight
+        .write_to(Vec::new(), path)
+        .unwrap_or_else(|error| panic!("read and cannot be written: {error}"));
     let again = read(&text, path).unwrap_or_else(|error| panic!("written and cannot be read: {error}"));
     assert_eq!(again, flight, "what is written reads back as another flight");
     // Over a terrain with voids, and over one that was edited.
     for land in TERRAINS.iter().filter(|land| ["compact", "edited, exact"].contains(&land.name)) {
-        let terrain = land.files.open().unwrap_or_else(|error| panic!("a sound terrain does not open: {error}"));
+        let terrain =
+            land.files.open().unwrap_or_else(|error| panic!("a sound terrain does not open: {error}"));
         flies(&Arc::new(terrain), &flight.frames, true);
     }
 }

@@ -5,8 +5,8 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 use terrasoar::flight::FlightFrame;
-use terrasoar::iobench::{CountOptions, LayoutKind, Reader, count};
 use terrasoar::flyover::EngineKind;
+use terrasoar::iobench::{CountOptions, LayoutKind, Reader, count};
 use terrasoar::mesh::TriangleKey;
 use terrasoar::refine::kinetic::{Budget, Kinetic};
 use terrasoar::refine::naive::Naive;
@@ -29,7 +29,11 @@ const VIEWPORT: Viewport = Viewport { width_px: 64, height_px: 48 };
 pub(crate) fn frames_over(terrain: &Terrain) -> Vec<FlightFrame> {
     let [east, north] = terrain.grid().extent_m();
     let [low, high] = terrain.header().height_range_m;
-    let places = [(0.5, 0.1, high + 0.7 * north, -60.0), (0.45, 0.15, high + 0.02 * north, -10.0), (0.4, 0.2, 0.5 * (low + high), 5.0)];
+    let places = [
+        (0.5, 0.1, high + 0.7 * north, -60.0),
+        (0.45, 0.15, high + 0.02 * north, -10.0),
+        (0.4, 0.2, 0.5 * (low + high), 5.0),
+    ];
     let frame = |(i, (x, y, up, pitch)): (usize, (f64, f64, f64, f64))| FlightFrame {
         time_s: i as f64 / 30.0,
         eye_m: [x * east, y * north, up],

@@ -21,7 +21,11 @@ const MEMORY_MIB: u64 = 64;
 pub(crate) fn seeds() -> Inputs {
     let mut seeds = seeds::folder("layout/tests/image_fixtures", &["png", "jpg", "tif"]);
     // Elevation data are pictures too, as far as one can tell.
-    seeds.extend(seeds::folder("layout/tests/fixtures", &["tif"]).into_iter().filter(|(name, _)| name.starts_with("byte")));
+    seeds.extend(
+        seeds::folder("layout/tests/fixtures", &["tif"])
+            .into_iter()
+            .filter(|(name, _)| name.starts_with("byte")),
+    );
     seeds
 }
 
@@ -48,7 +52,9 @@ pub(crate) fn reads_and_drapes(image: Box<dyn ImageSource>, folder: &Path) {
         return;
     }
     let images = [image];
-    for (extent, format) in [(None, TileFormat::Bc1), (Some(Extent::Metres([50.0, 60.0, 400.0, 300.0])), TileFormat::Rgba8)] {
+    for (extent, format) in
+        [(None, TileFormat::Bc1), (Some(Extent::Metres([50.0, 60.0, 400.0, 300.0])), TileFormat::Rgba8)]
+    {
         let options = DrapeOptions { format, extent, memory_mib: MEMORY_MIB };
         let is_draped = drapes(&images, &options, folder);
         assert!(!is_draped || whole, "a picture was draped that cannot be read");
@@ -78,20 +84,29 @@ fn drapes(images: &[Box<dyn ImageSource>], options: &DrapeOptions, folder: &Path
     seeds::write(&path, &PLAIN);
     let is_draped = match drape(&path, images, options, &Silent) {
         Ok(draped) => {
-            let terrain = Terrain::open(&path).unwrap_or_else(|error| panic!("draped and does not open: {error}"));
-            assert!(terrain.header().to_page() == draped.header.to_page(), "what was draped is not what was told");
-            let report = verify(&terrain, &|_| {}).unwrap_or_else(|error| panic!("draped and not readable: {error}"));
+            let terrain =
+                Terrain::open(&path).unwrap_or_else(|error| panic!("draped and does not open: {error}"));
+            assert!(
+                terrain.header().to_page() == draped.header.to_page(),
+                "what was draped is not what was told"
+            );
+            let report =
+                verify(&terrain, &|_| {}).unwrap_or_else(|error| panic!("draped and not readable: {error}"));
             assert!(report.is_sound(), "draped and not sound: {:?}", report.problems);
             reads_tiles(&terrain, true);
             true
         }
         Err(error) => {
             refused(&error);
-            assert!(std::fs::read(&path).is_ok_and(|bytes| bytes == *PLAIN), "refused, and the terrain is another: {error}");
+            assert!(
+                std::fs::read(&path).is_ok_and(|bytes| bytes == *PLAIN),
+                "refused, and the terrain is another: {error}"
+            );
             false
         }
     };
-    let left: Vec<_> = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
+    let left: Vec<_> =
+        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
     assert!(left.len() <= 3, "{left:?}");
     is_draped
 }

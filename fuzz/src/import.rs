@@ -23,7 +23,10 @@ pub(crate) fn seeds() -> Inputs {
 
 pub(crate) fn body(data: &[u8]) {
     let folder = crate::scratch::folder();
-    let is_hgt = !(data.starts_with(b"\x89PNG") || data.starts_with(b"binterr") || data.starts_with(b"II") || data.starts_with(b"MM"));
+    let is_hgt = !(data.starts_with(b"\x89PNG")
+        || data.starts_with(b"binterr")
+        || data.starts_with(b"II")
+        || data.starts_with(b"MM"));
     // These tiles alone are told by their name.
     let path = folder.path().join(if is_hgt { "N10E010.hgt" } else { "dem" });
     seeds::write(&path, &seeds::with_png_sums(data));
@@ -46,9 +49,11 @@ fn builds(dem: &dyn DemSource, folder: &Path) {
     let options = BuildOptions { memory_mib: 48, ..BuildOptions::default() };
     match build(dem, &out, &options, &Silent) {
         Ok(header) => {
-            let terrain = Terrain::open(&out).unwrap_or_else(|error| panic!("built and does not open: {error}"));
+            let terrain =
+                Terrain::open(&out).unwrap_or_else(|error| panic!("built and does not open: {error}"));
             assert!(terrain.header().to_page() == header.to_page(), "what was built is not what was told");
-            let report = verify(&terrain, &|_| {}).unwrap_or_else(|error| panic!("built and cannot be verified: {error}"));
+            let report = verify(&terrain, &|_| {})
+                .unwrap_or_else(|error| panic!("built and cannot be verified: {error}"));
             assert!(report.is_sound(), "built and not sound: {:?}", report.problems);
         }
         Err(error) => {
@@ -56,7 +61,8 @@ fn builds(dem: &dyn DemSource, folder: &Path) {
             assert!(!out.exists(), "refused, and something was published: {error}");
         }
     }
-    let names: Vec<_> = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
+    let names: Vec<_> =
+        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
     assert!(names.len() <= 2, "{names:?}");
 }
 
@@ -87,13 +93,18 @@ impl SampleSink for Sink {
         let [wide, high] = self.samples.map(u64::from);
         assert_eq!(samples.len() as u64, u64::from(width) * u64::from(height), "{window:?}");
         assert!(width > 0 && height > 0, "{window:?}");
-        assert!(u64::from(col) + u64::from(width) <= wide && u64::from(row) + u64::from(height) <= high, "{window:?}");
+        assert!(
+            u64::from(col) + u64::from(width) <= wide && u64::from(row) + u64::from(height) <= high,
+            "{window:?}"
+        );
         let mut arrived = self.arrived.lock().unwrap_or_else(PoisonError::into_inner);
         arrived.1 += samples.len() as u64;
         if self.is_small {
             for line in 0..height as usize {
                 let at = (row as usize + line) * wide as usize + col as usize;
-                arrived.0[at..at + width as usize].iter_mut().for_each(|times| *times = times.saturating_add(1));
+                arrived.0[at..at + width as usize]
+                    .iter_mut()
+                    .for_each(|times| *times = times.saturating_add(1));
             }
         } else if arrived.1 > 4 * MOST_SAMPLES {
             return Err(LayoutError::Usage("that is enough for a try".into()));

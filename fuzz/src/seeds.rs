@@ -31,10 +31,12 @@ pub(crate) fn folder(name: &str, extensions: &[&str]) -> Inputs {
 
 /// Every finding of a target so far.
 pub(crate) fn regressions(target: &str) -> Inputs {
-    let entries = std::fs::read_dir(root().join("fuzz/regressions").join(target)).into_iter().flatten().flatten();
+    let entries =
+        std::fs::read_dir(root().join("fuzz/regressions").join(target)).into_iter().flatten().flatten();
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| path.is_file()).collect();
     paths.sort();
-    let read = |path: PathBuf| Some((path.file_name()?.to_string_lossy().into_owned(), std::fs::read(&path).ok()?));
+    let read =
+        |path: PathBuf| Some((path.file_name()?.to_string_lossy().into_owned(), std::fs::read(&path).ok()?));
     paths.into_iter().filter_map(read).collect()
 }
 
@@ -66,8 +68,9 @@ fn grey_png() -> Vec<u8> {
         png.extend([0; 4]);
     };
     chunk(b"IHDR", &[0, 0, 0, 6, 0, 0, 0, 5, 16, 0, 0, 0, 0]);
-    let rows: Vec<u8> =
-        (0..5u8).flat_map(|y| std::iter::once(0).chain((0..6u8).flat_map(move |x| [1, x * 20 + y]))).collect();
+    let rows: Vec<u8> = (0..5u8)
+        .flat_map(|y| std::iter::once(0).chain((0..6u8).flat_map(move |x| [1, x * 20 + y])))
+        .collect();
     let length = rows.len() as u16;
     let mut packed = vec![0x78, 0x01, 1];
     packed.extend(length.to_le_bytes());
@@ -104,7 +107,12 @@ pub(crate) fn with_png_sums(data: &[u8]) -> Vec<u8> {
 pub(crate) fn flights() -> Inputs {
     let head = "terrasoar-flight 1\nunits metres degrees seconds\n";
     let inputs = [
-        ("plain", format!("{head}# terrain: land\n0 100 100 400 0 -15 0 45\n0.1 110 105 390 3 -16 1 45\n0.2 120 110 380 6 -17 2 45\n")),
+        (
+            "plain",
+            format!(
+                "{head}# terrain: land\n0 100 100 400 0 -15 0 45\n0.1 110 105 390 3 -16 1 45\n0.2 120 110 380 6 -17 2 45\n"
+            ),
+        ),
         ("far", format!("{head}0 -1e9 1e9 1e9 1e9 -90 -1e9 179.999\n1e9 0 0 -1e9 0 90 0 1e-300\n")),
         ("inside", format!("\u{feff}{head}0 200 200 150 90 0 0 60\r\n\n# a remark\n0 200 200 150 90 0 0 60")),
         ("at-a-sample", format!("{head}0 200 200 150 0 -90 0 90\n0 10 10 152 0 0 0 90\n")),
@@ -124,9 +132,24 @@ pub(crate) fn scripts() -> Inputs {
                  smooth at 110,130 radius 80 strength 0.5 falloff smooth\nframe 1\nlower at 300,300 radius 50 by 3 falloff hard\nrestore disc 150,182 radius 200\n"
             ),
         ),
-        ("beyond", format!("{head}set rect 0,0,60,50 to 1e7\n\nset rect 0,0,9,9 to -1e7\n\nrestore rect 0,0,4294967295,4294967295\n")),
-        ("seconds", format!("{head}raise at 200,200 radius 1e7 by 1e-300\nat 0.1\nlower at -1e9,1e9 radius 1e-300 by 1e7\nat 1e9\nflatten at 1,1 radius 30\n")),
-        ("stamps", format!("{head}stamp x sample -3,-4 mode add\nstamp x sample 1048576,1048576\nstamp x sample 55,45 mode min\n")),
+        (
+            "beyond",
+            format!(
+                "{head}set rect 0,0,60,50 to 1e7\n\nset rect 0,0,9,9 to -1e7\n\nrestore rect 0,0,4294967295,4294967295\n"
+            ),
+        ),
+        (
+            "seconds",
+            format!(
+                "{head}raise at 200,200 radius 1e7 by 1e-300\nat 0.1\nlower at -1e9,1e9 radius 1e-300 by 1e7\nat 1e9\nflatten at 1,1 radius 30\n"
+            ),
+        ),
+        (
+            "stamps",
+            format!(
+                "{head}stamp x sample -3,-4 mode add\nstamp x sample 1048576,1048576\nstamp x sample 55,45 mode min\n"
+            ),
+        ),
     ];
     inputs.into_iter().map(|(name, text)| (name.to_owned(), text.into_bytes())).collect()
 }

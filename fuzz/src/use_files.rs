@@ -12,7 +12,7 @@ use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{HeightRoom, Silent};
 use terrasoar_layout::disk::SystemDisk;
-use terrasoar_layout::edit::{Area, Edit, EditSession, compact, history, widen};
+use terrasoar_layout::edit::{Area, Compacted, Edit, EditSession, compact, history, widen};
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage, TileFormat, drape};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::testing::Sealed;
@@ -91,21 +91,34 @@ fn looks(terrain: &Terrain) -> bool {
         assert!(height.is_some() || !is_sound, "called sound, and a height cannot be read");
     }
     let original = terrain.base_path().is_none().then(|| told(Terrain::open_original(terrain.path())));
-    assert!(original.is_none_or(|original| original.is_some()) || !is_sound, "called sound, and what was before does not open");
+    assert!(
+        original.is_none_or(|original| original.is_some()) || !is_sound,
+        "called sound, and what was before does not open"
+    );
     is_sound
 }
 
 /// Compacts into another file.
 fn writes_anew(terrain: &Terrain, folder: &Path, is_sound: bool) {
     let out = folder.join("anew.iqt");
-    match compact(&SystemDisk, terrain, &out, &Silent) {
-        Ok(header) => {
-            let anew = Terrain::open(&out).unwrap_or_else(|error| panic!("compacted and does not open: {error}"));
+    let (file, overlay) = match terrain.base_path() {
+        Some(base) => (base, Some(terrain.path())),
+        None => (terrain.path(), None),
+    };
+    match compact(&SystemDisk, file, overlay, &out, &Silent) {
+        Ok(Compacted { header, .. }) => {
+            let anew =
+                Terrain::open(&out).unwrap_or_else(|error| panic!("compacted and does not open: {error}"));
             assert!(anew.header().to_page() == header.to_page(), "what was written is not what was told");
             let (before, after) = (terrain.source().byte_count(), anew.source().byte_count());
             assert!(after <= 2 * before + (1 << 20), "{before} bytes became {after}");
-            let report = verify(&anew, &|_| {}).unwrap_or_else(|error| panic!("compacted and not readable: {error}"));
-            assert!(report.is_sound() || !is_sound, "sound and compacted, and no longer sound: {:?}", report.problems);
+            let report =
+                verify(&anew, &|_| {}).unwrap_or_else(|error| panic!("compacted and not readable: {error}"));
+            assert!(
+                report.is_sound() || !is_sound,
+                "sound and compacted, and no longer sound: {:?}",
+                report.problems
+            );
         }
         Err(error) => {
             refused(&error);
@@ -130,7 +143,9 @@ fn edits(trial: &Trial, is_sound: bool) {
         vec![level(0, 0, low), Edit::Restore(Area::Disc { centre_m: place, radius_m: 40.0 })],
     ];
     for batch in batches {
-        if told(session.apply_and_paint(&batch, &[burn(place)])).is_none() && told(session.apply(&batch)).is_none() {
+        if told(session.apply_and_paint(&batch, &[burn(place)])).is_none()
+            && told(session.apply(&batch)).is_none()
+        {
             session.discard();
         }
         if told(session.commit("a try")).is_none() {
@@ -146,7 +161,11 @@ fn turns(trial: &Trial, session: &mut EditSession, is_sound: bool) {
     for turn in [EditSession::undo, EditSession::redo] {
         for _ in 0..MOST_STEPS {
             let turned = turn(session);
-            assert!(turned.is_ok() || !is_sound, "called sound, and its past cannot be gone through: {:?}", turned.err());
+            assert!(
+                turned.is_ok() || !is_sound,
+                "called sound, and its past cannot be gone through: {:?}",
+                turned.err()
+            );
             let turned = told(turned);
             trial.still_opens("going back or forth");
             if turned.flatten().is_none() {

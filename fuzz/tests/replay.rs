@@ -21,13 +21,15 @@ fn replay(name: &str) {
     let target = TARGETS.iter().find(|target| target.name == name).expect("a target");
     let seeds = (target.seeds)();
     assert!(seeds.len() > 3, "only {} seeds", seeds.len());
-    let mutations = std::env::var("TERRASOAR_MUTATIONS").map_or(MUTATIONS, |number| number.parse().expect("a number"));
+    let mutations =
+        std::env::var("TERRASOAR_MUTATIONS").map_or(MUTATIONS, |number| number.parse().expect("a number"));
     let mutated = (0..mutations).map(|number| {
         let (input, bytes) = &seeds[number as usize % seeds.len()];
         (format!("{input}, mutation {number}"), mutate(bytes, number, target.is_text))
     });
     let inputs = seeds.iter().cloned().chain(target.regressions()).chain(mutated);
-    let findings: Vec<String> = inputs.filter_map(|(input, bytes)| run(target, &input, &bytes)).take(LISTED).collect();
+    let findings: Vec<String> =
+        inputs.filter_map(|(input, bytes)| run(target, &input, &bytes)).take(LISTED).collect();
     assert!(findings.is_empty(), "{}", findings.join("\n"));
 }
 
@@ -38,11 +40,12 @@ fn run(target: &Target, input: &str, bytes: &[u8]) -> Option<String> {
     if panic.is_none() && begun.elapsed() < PATIENCE {
         return None;
     }
-    let words = panic.as_ref().map(|panic| match (panic.downcast_ref::<String>(), panic.downcast_ref::<&str>()) {
-        (Some(words), _) => words.clone(),
-        (None, Some(words)) => (*words).to_owned(),
-        (None, None) => "a panic without words".to_owned(),
-    });
+    let words =
+        panic.as_ref().map(|panic| match (panic.downcast_ref::<String>(), panic.downcast_ref::<&str>()) {
+            (Some(words), _) => words.clone(),
+            (None, Some(words)) => (*words).to_owned(),
+            (None, None) => "a panic without words".to_owned(),
+        });
     let words = words.unwrap_or_else(|| format!("it took {:?}", begun.elapsed()));
     let file: String = input.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     let kept = std::env::temp_dir().join(format!("terrasoar-{}-{file}", target.name));
@@ -96,6 +99,9 @@ fn every_target_is_replayed_and_has_a_program() {
     for folder in folders {
         let folder = folder.unwrap();
         let name = folder.file_name();
-        assert!(!folder.path().is_dir() || TARGETS.iter().any(|target| name == target.name), "{name:?} is no target's");
+        assert!(
+            !folder.path().is_dir() || TARGETS.iter().any(|target| name == target.name),
+            "{name:?} is no target's"
+        );
     }
 }

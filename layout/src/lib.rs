@@ -24,14 +24,18 @@ pub mod pool;
 pub mod prefetch;
 pub mod record;
 mod records;
+pub mod remedy;
 pub mod source;
 pub mod store;
 pub mod synth;
 pub mod terrain;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
+pub mod unfinished;
 pub mod unused;
 pub mod verify;
+mod words;
 
 pub use error::LayoutError;
 pub use file::atomic as atomic_file;
+pub use remedy::Remedy;

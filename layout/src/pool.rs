@@ -104,6 +104,38 @@ impl<C: RecordCodec> PagePool<C> {
         Ok(())
     }
 
+    /// Moves everything to another pool. This one has no pages then, not even those that stay: it is to be dropped, and panics when it is asked for a record.
+    pub fn take(&mut self) -> Self {
+        Self {
+            shape: self.shape.clone(),
+            bytes: std::mem::take(&mut self.bytes),
+            frames: std::mem::take(&mut self.frames),
+            held: std::mem::take(&mut self.held),
+            recent: std::mem::take(&mut self.recent),
+            capacity: std::mem::take(&mut self.capacity),
+            hand: self.hand,
+        }
+    }
+
+    /// States whether a page is in the file now. One that has come to be there is away until it is installed; one that is no longer there is inert. Others, and pages that the terrain has
+    /// not, are as they were.
+    pub fn set_present(&mut self, logical_page: u64, is_present: bool) {
+        let Some(frame) = usize::try_from(logical_page).ok().and_then(|at| self.frames.get_mut(at)) else {
+            return;
+        };
+        match (*frame, is_present) {
+            (0, true) => *frame = AWAY,
+            (0, false) | (_, true) => {}
+            (AWAY, false) => *frame = 0,
+            (here, false) => {
+                *frame = 0;
+                // Free for the next page that comes past the hand.
+                self.held[here as usize] = AWAY;
+                *self.recent[here as usize].get_mut() = false;
+            }
+        }
+    }
+
     /// States the lowest and highest height in metres that there is now.
     pub fn set_height_range_m(&mut self, range_m: [f64; 2]) {
         self.shape.height_range_m = range_m;
@@ -114,8 +146,10 @@ impl<C: RecordCodec> PagePool<C> {
         loop {
             self.hand = if self.hand + 1 < self.capacity { self.hand + 1 } else { STAYING };
             if !std::mem::replace(self.recent[self.hand].get_mut(), false) {
-                let gone = self.held[self.hand];
-                self.frames[gone as usize] = AWAY;
+                // A frame whose page is no longer in the file holds none.
+                if let Some(frame) = self.frames.get_mut(self.held[self.hand] as usize) {
+                    *frame = AWAY;
+                }
                 return self.hand;
             }
         }

@@ -166,18 +166,22 @@ impl Terrain {
     /// # Errors
     /// [`LayoutError::Damaged`] naming the page if it does not match; I/O.
     pub fn checked_page(&self, logical_page: u64) -> Result<Box<Page>, LayoutError> {
-        let index = to_usize(logical_page)?;
-        let Some(entry) = self.entries.get(index) else {
+        let entry = self.entries.get(to_usize(logical_page)?).copied();
+        self.checked_page_at(logical_page, entry.unwrap_or_default())
+    }
+
+    /// One record page where `entry` says it lies: where a commit has written it since the terrain was opened, or where it lay in another state of the file. Sources that read reach
+    /// what was appended since then; one that holds its bytes in memory does not grow.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`].
+    pub fn checked_page_at(&self, logical_page: u64, entry: Entry) -> Result<Box<Page>, LayoutError> {
+        if to_usize(logical_page)? >= self.entries.len() {
             return Err(LayoutError::Usage(format!(
                 "page {logical_page} does not exist; the file has {}",
                 self.entries.len()
             )));
-        };
-        self.page_at(logical_page, *entry)
-    }
-
-    /// What a record page holds at the place that `entry` says, which may be one that another state of the file has it at. Checked.
-    pub(crate) fn page_at(&self, logical_page: u64, entry: Entry) -> Result<Box<Page>, LayoutError> {
+        }
         let mut page = Box::new([0; PAGE_BYTES]);
         let number = if entry.is_present() { entry.page } else { INERT_PAGE };
         self.source.read_at(u64::from(number) * PAGE_BYTES as u64, &mut page[..])?;

@@ -307,7 +307,7 @@ fn georeferences_and_extents_lead_to_the_right_metre() {
     refused(picture(Some(upright), Some(25832)), &raw(), "gdalwarp -t_srs EPSG:32610");
     refused(picture(Some([9e6, 2.0, 0.0, 4699.0, 0.0, -2.0]), None), &raw(), "do not meet");
     refused(picture(None, None), &stated(Extent::Metres([0.0, 0.0, 1e-9, 1.0])), "out of range");
-    refused(picture(None, None), &DrapeOptions { memory_mib: 1, ..raw() }, "--memory");
+    refused(picture(None, None), &DrapeOptions { memory_mib: 1, ..raw() }, "of memory");
     refused(MemoryImage::from_fn([700, 20], |_, _| [9, 9, 9, 0]), &raw(), "transparent throughout");
 }
 

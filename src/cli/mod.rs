@@ -7,6 +7,7 @@
 mod build;
 mod cap;
 mod compare;
+mod defect;
 mod drape;
 mod edit;
 mod flight;
@@ -21,12 +22,14 @@ mod movie;
 #[cfg(feature = "view")]
 mod movie_file;
 mod output;
+mod outputs;
 mod parse;
 #[cfg(feature = "view")]
 mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
 mod progress;
+mod remedy;
 mod replay;
 #[cfg(unix)]
 mod signals;
@@ -112,6 +115,10 @@ impl std::error::Error for WrongUsage {}
 pub(crate) fn run() -> ExitCode {
     #[cfg(unix)]
     signals::heed();
+    defect::guarded(carry_out)
+}
+
+fn carry_out() -> ExitCode {
     let done = match Typed::parse().verb {
         Verb::Build(args) => build::run(&args),
         Verb::Drape(args) => drape::run(&args),
@@ -138,7 +145,7 @@ pub(crate) fn run() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            output::complain(&format!("error: {}", message(&error)));
+            output::complain(&format!("error: {}", remedy::spoken(&error)));
             ExitCode::from(if error.is::<WrongUsage>() { 2 } else { 1 })
         }
     }

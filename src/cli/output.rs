@@ -1,9 +1,8 @@
-//! What a verb prints: text or one JSON object on standard output, complaints on standard error, and checks of where files may go.
+//! What a verb prints: text or one JSON object on standard output, complaints on standard error.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use serde::Serialize;
 use std::io::{self, Write};
-use std::path::Path;
 
 /// What fails when standard output does.
 const TO_STDOUT: &str = "cannot write to standard output";
@@ -32,34 +31,6 @@ pub(super) fn is_broken_pipe(error: &anyhow::Error) -> bool {
     let is_pipe = |e: &io::Error| e.kind() == io::ErrorKind::BrokenPipe;
     error.to_string() == TO_STDOUT
         && error.chain().any(|cause| cause.downcast_ref::<io::Error>().is_some_and(is_pipe))
-}
-
-/// Refuses an output file that would replace one of the inputs, a folder, or something that is not a plain file.
-pub(super) fn check_output(out: &Path, inputs: &[&Path]) -> Result<()> {
-    if let Ok(meta) = std::fs::metadata(out)
-        && !meta.is_file()
-        && !meta.is_dir()
-    {
-        bail!(
-            "{}: the output is a device or pipe, which would be replaced by a file; name a file",
-            out.display()
-        );
-    }
-    check_stream(out, inputs)
-}
-
-/// Refuses an output that would replace one of the inputs or a folder; devices and pipes may be written to.
-pub(super) fn check_stream(out: &Path, inputs: &[&Path]) -> Result<()> {
-    if out.is_dir() {
-        bail!("{}: the output is a folder; name a file in it", out.display());
-    }
-    let Ok(real) = std::fs::canonicalize(out) else { return Ok(()) };
-    for input in inputs {
-        if std::fs::canonicalize(input).is_ok_and(|input| input == real) {
-            bail!("{}: the output is the input, which would be lost; name another file", out.display());
-        }
-    }
-    Ok(())
 }
 
 /// Lines of names and values, the values aligned.

@@ -1,11 +1,40 @@
-//! Pages that edits have changed, kept beside a pool: the file may hold what was there before, or hold it at another place by now.
+//! Pages that edits have changed and that are not in the file yet, kept beside a pool; and what edits made of the ground, on its way from who edits to who draws.
 //!
-//! Such a page never comes from storage; where the mesh wants one that the pool has given up it is brought from here. Cost: 4 KiB a page that was ever edited.
+//! Such a page never comes from storage; where the mesh wants one that the pool has given up it is brought from here. Once it is committed it is dropped, and is a page of
+//! the file as any other, which lies elsewhere. Cost: 4 KiB a page that differs from the file, as many as a stroke touches where strokes are committed.
 
 use std::collections::HashMap;
 use terrasoar_layout::bytes::Page;
+use terrasoar_layout::directory::Entry;
+use terrasoar_layout::edit::{Changes, Editor, SampleRect};
 use terrasoar_layout::pool::PagePool;
 use terrasoar_layout::record::RecordCodec;
+
+/// What edits, an undo or a redo made of the ground, apart from the editor that did it: what one thread does another may show.
+#[derive(Debug, Clone, Default)]
+pub struct GroundPatch {
+    /// Rectangles that hold all samples whose height changed.
+    pub samples: Vec<SampleRect>,
+    /// Logical pages that hold records which changed, and what they hold now.
+    pub pages: Vec<(u64, Box<Page>)>,
+    /// Lowest and highest height in metres that there is now.
+    pub height_range_m: [f64; 2],
+    /// Where those of the pages lie that are in the file as they are now. The others are kept in memory until [`Streamed::relocate`](super::Streamed::relocate) tells of them.
+    pub places: Vec<(u64, Entry)>,
+}
+
+impl GroundPatch {
+    /// What `editor` has just made, of which nothing is in the file.
+    pub fn of(changes: &Changes, editor: &Editor) -> Self {
+        let page = |page: &u64| Some((*page, Box::new(*editor.edited_page(*page)?)));
+        Self {
+            samples: changes.samples.clone(),
+            pages: changes.pages.iter().filter_map(page).collect(),
+            height_range_m: editor.header().height_range_m,
+            places: Vec::new(),
+        }
+    }
+}
 
 /// Edited pages.
 #[derive(Debug, Default)]
@@ -17,13 +46,22 @@ pub(super) struct EditedPages {
 
 impl EditedPages {
     /// Keeps what a page holds now.
-    pub(super) fn keep(&mut self, logical: u64, bytes: &Page) {
-        match self.pages.get_mut(&logical) {
-            Some(page) => page.copy_from_slice(bytes),
-            None => {
-                self.pages.insert(logical, Box::new(*bytes));
-            }
+    pub(super) fn keep(&mut self, logical: u64, bytes: Box<Page>) {
+        self.pages.insert(logical, bytes);
+    }
+
+    /// Lets go of a page that is in the file.
+    pub(super) fn forget(&mut self, logical: u64) {
+        self.pages.remove(&logical);
+        // A long stroke leaves no large table behind.
+        if self.pages.is_empty() {
+            self.pages = HashMap::new();
         }
+    }
+
+    /// Pages kept.
+    pub(super) fn len(&self) -> usize {
+        self.pages.len()
     }
 
     /// What an edited page holds.

@@ -1,12 +1,16 @@
 //! What brings pages: threads that read a file, or a model of a disk that makes every replay the same.
 
 use std::time::Duration;
+use terrasoar_layout::directory::Entry;
 use terrasoar_layout::loader::{Arrival, Loader, PageRequest};
 
 /// Brings pages that were asked for.
 pub trait Fetch {
     /// Asks for pages; it is frame `now`. Asking again changes when a page is due.
     fn ask(&mut self, now: u64, requests: &[PageRequest]);
+
+    /// Says where pages lie from now on. What comes after that was read there, or says that it could not be.
+    fn relocate(&mut self, places: &[(u64, Entry)]);
 
     /// A page that has come by frame `now`; does not wait.
     fn take(&mut self, now: u64) -> Option<Arrival>;
@@ -41,6 +45,14 @@ impl Threads {
 impl Fetch for Threads {
     fn ask(&mut self, now: u64, requests: &[PageRequest]) {
         self.loader.ask(now, requests);
+    }
+
+    fn relocate(&mut self, places: &[(u64, Entry)]) {
+        self.loader.relocate(places);
+        let is_moved = |arrival: &mut Arrival| places.iter().any(|(page, _)| *page == arrival.page);
+        if let Some(arrival) = self.waited_for.take_if(is_moved) {
+            self.loader.read_again(arrival.page);
+        }
     }
 
     fn take(&mut self, _: u64) -> Option<Arrival> {

@@ -15,6 +15,7 @@ mod model;
 mod requests;
 mod surface;
 
+pub use edited::GroundPatch;
 pub use fetch::{Fetch, Threads};
 pub use frustum::ExtendedView;
 pub use model::ModelDisk;
@@ -27,8 +28,10 @@ use crate::view::View;
 use edited::EditedPages;
 use lead::Lead;
 use requests::Requests;
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::time::{Duration, Instant};
+use terrasoar_layout::bytes::Page;
+use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::loader::Outcome;
@@ -235,25 +238,60 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
         frame
     }
 
-    /// Takes over edits of the ground that `editor` has made: the next update's mesh is the one over the edited ground, as far as its pages are at hand. Pages that come from the
-    /// file later are replaced by what the edits made of them.
+    /// Takes over edits of the ground that `editor` has made, as [`Streamed::take_ground`] does, with copies of the pages.
+    ///
+    /// # Errors
+    /// As [`Streamed::take_ground`].
+    pub fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<(), LayoutError> {
+        self.take_ground(GroundPatch::of(changes, editor))
+    }
+
+    /// Takes over edits of the ground: the next update's mesh is the one over the edited ground, as far as its pages are at hand. Pages that come from the
+    /// file later are replaced by what the edits made of them, until they are committed ([`Streamed::relocate`]).
     ///
     /// # Errors
     /// [`LayoutError::Usage`] if the changes are of another terrain.
-    pub fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<(), LayoutError> {
+    pub fn take_ground(&mut self, patch: GroundPatch) -> Result<(), LayoutError> {
+        let GroundPatch { samples, pages, height_range_m, places } = patch;
         let pool = self.engine.store_mut();
-        pool.set_height_range_m(editor.header().height_range_m);
-        for page in &changes.pages {
-            let Some(bytes) = editor.edited_page(*page) else { continue };
+        pool.set_height_range_m(height_range_m);
+        for (page, bytes) in &pages {
+            pool.set_present(*page, true);
             if pool.is_resident(*page) {
                 pool.install(*page, bytes)?;
             }
-            self.edited.keep(*page, bytes);
         }
-        let page = |logical: u64| editor.edited_page(logical);
-        let height_range_m = editor.header().height_range_m;
-        self.engine.ground_changed(&GroundChange { areas: &changes.samples, height_range_m, page: &page });
+        let now: HashMap<u64, &Page> = pages.iter().map(|(page, bytes)| (*page, &**bytes)).collect();
+        let page = |logical: u64| now.get(&logical).copied();
+        self.engine.ground_changed(&GroundChange { areas: &samples, height_range_m, page: &page });
+        pages.into_iter().for_each(|(page, bytes)| self.edited.keep(page, bytes));
+        self.relocate(&places);
         Ok(())
+    }
+
+    /// Pages are in the file now, at these places, as they were told last: copies of them are dropped, and they are read from there.
+    pub fn relocate(&mut self, places: &[(u64, Entry)]) {
+        self.fetch.relocate(places);
+        for (page, entry) in places {
+            self.edited.forget(*page);
+            self.requests.moved(*page);
+            self.engine.store_mut().set_present(*page, entry.is_present());
+        }
+    }
+
+    /// Edited pages kept in memory beside the pool, for they are not in the file yet.
+    pub fn held_pages(&self) -> usize {
+        self.edited.len()
+    }
+
+    /// Culls in another way from now on. The mesh is made anew by the next update, of the pages at hand, as in a first frame; the engine has no budget then.
+    pub fn set_culling(&mut self, culling: Culling) {
+        let pool = self.engine.store_mut().take();
+        self.engine = Kinetic::new(pool, culling);
+        self.culling = culling;
+        if self.prefetch == Prefetch::Deadline {
+            self.engine.look_ahead(self.lead.frames());
+        }
     }
 
     /// Updates until the mesh of `view` lacks no page that can be read, waiting for those that come, `longest` at most. For the first frame of a flight: patches

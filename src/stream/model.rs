@@ -1,8 +1,9 @@
 //! A model of a disk: so many reads a frame, each after so many frames, the earliest deadline first. Replays over it are the same every time, on any machine.
 
 use super::Fetch;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::Arc;
+use terrasoar_layout::directory::Entry;
 use terrasoar_layout::loader::{Arrival, Outcome, PageRequest, STALE_FRAMES};
 use terrasoar_layout::terrain::Terrain;
 
@@ -18,6 +19,8 @@ pub struct ModelDisk {
     /// Pages on their way, and the frame they come in.
     coming: VecDeque<(u64, u64)>,
     dropped: VecDeque<u64>,
+    /// Where pages lie that have moved since the terrain was opened.
+    places: HashMap<u64, Entry>,
 }
 
 impl ModelDisk {
@@ -31,6 +34,7 @@ impl ModelDisk {
             waiting: BTreeMap::new(),
             coming: VecDeque::new(),
             dropped: VecDeque::new(),
+            places: HashMap::new(),
         }
     }
 }
@@ -56,12 +60,20 @@ impl Fetch for ModelDisk {
         }
     }
 
+    fn relocate(&mut self, places: &[(u64, Entry)]) {
+        self.places.extend(places.iter().copied());
+    }
+
     fn take(&mut self, now: u64) -> Option<Arrival> {
         if let Some(page) = self.dropped.pop_front() {
             return Some(Arrival { page, outcome: Outcome::Dropped });
         }
         let (_, page) = self.coming.pop_front_if(|(frame, _)| *frame <= now)?;
-        let outcome = match self.terrain.checked_page(page) {
+        let read = match self.places.get(&page) {
+            Some(entry) => self.terrain.checked_page_at(page, *entry),
+            None => self.terrain.checked_page(page),
+        };
+        let outcome = match read {
             Ok(bytes) => Outcome::Read(bytes),
             Err(error) => Outcome::Failed(error),
         };

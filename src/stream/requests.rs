@@ -90,6 +90,11 @@ impl Requests {
         self.trouble.contains_key(&page)
     }
 
+    /// A page lies elsewhere: where it lay before says nothing about how it can be read now.
+    pub(super) fn moved(&mut self, page: u64) {
+        self.trouble.remove(&page);
+    }
+
     /// A page was not read, for nobody seemed to need it.
     pub(super) fn dropped(&mut self, page: u64) {
         self.pending.remove(&page);

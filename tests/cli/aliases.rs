@@ -31,7 +31,8 @@ fn names_of(bench: Bench, name: &str) -> Names {
     std::fs::hard_link(at(name), at("hard")).unwrap();
     std::fs::hard_link(at(name), at("below/hard")).unwrap();
     let opened = File::open(at(name)).unwrap();
-    let mut names: Vec<PathBuf> = [name, "link", "link-to-link", "below/up", "hard", "below/hard"].map(PathBuf::from).to_vec();
+    let mut names: Vec<PathBuf> =
+        [name, "link", "link-to-link", "below/up", "hard", "below/hard"].map(PathBuf::from).to_vec();
     names.push(format!("./below/../{name}").into());
     names.push(format!("folder/{name}").into());
     names.push(at(name));
@@ -57,7 +58,8 @@ fn under_no_name_is_there_a_second_writer_in_one_process() {
     let names = names_of(bench(), "land.iqt");
     let paths: Vec<PathBuf> = names.names.iter().map(|name| names.bench.path("").join(name)).collect();
     for first in &paths {
-        let mut held = EditSession::open(first).unwrap_or_else(|error| panic!("{}: {error}", first.display()));
+        let mut held =
+            EditSession::open(first).unwrap_or_else(|error| panic!("{}: {error}", first.display()));
         for second in &paths {
             match EditSession::open(second) {
                 Ok(_) => panic!("{} is written to as {}", second.display(), first.display()),

@@ -48,7 +48,9 @@ fn in_step(batches: u32) -> String {
 /// A script of batches that each set all of [`RECTS`] to one height.
 pub fn batches_in_step(heights_m: impl IntoIterator<Item = f64>) -> String {
     let batch = |height_m: f64| {
-        let edit = |[west, south, east, north]: [u32; 4]| format!("set rect {west},{south},{east},{north} to {height_m}\n");
+        let edit = |[west, south, east, north]: [u32; 4]| {
+            format!("set rect {west},{south},{east},{north} to {height_m}\n")
+        };
         RECTS.into_iter().map(edit).collect::<String>() + "\n"
     };
     heights_m.into_iter().map(batch).collect()

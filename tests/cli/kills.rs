@@ -43,12 +43,19 @@ impl Past {
         let done = entries.iter().position(|entry| entry.is_current).map_or(0, |at| at + 1);
         let has_picture = Imagery::open(&terrain).unwrap().is_some();
         let is_height = (height_in_step(path) - self.height_m()).abs() < 0.051;
-        (done, entries.len() - done, has_picture) == (self.done_m.len(), self.undone_m.len(), self.has_picture) && is_height
+        (done, entries.len() - done, has_picture)
+            == (self.done_m.len(), self.undone_m.len(), self.has_picture)
+            && is_height
     }
 
     /// As another file made of this one has it.
     fn rewritten(&self) -> Self {
-        Self { built_m: self.height_m(), done_m: Vec::new(), undone_m: Vec::new(), has_picture: self.has_picture }
+        Self {
+            built_m: self.height_m(),
+            done_m: Vec::new(),
+            undone_m: Vec::new(),
+            has_picture: self.has_picture,
+        }
     }
 
     fn with(&self, height_m: f64) -> Self {
@@ -61,7 +68,10 @@ impl Past {
 #[derive(Debug, Clone, PartialEq)]
 enum Deed {
     /// So many batches; of heights that the file has no room for, or not.
-    Edit { heights_m: Vec<f64>, widens: bool },
+    Edit {
+        heights_m: Vec<f64>,
+        widens: bool,
+    },
     Undo(u64),
     Redo(u64),
     Compact,
@@ -111,7 +121,11 @@ impl Deed {
     fn args(&self, bench: &Bench) -> Vec<String> {
         let words = match self {
             Self::Edit { heights_m, .. } => {
-                write(bench, "deed.edits", &crate::edit_processes::batches_in_step(heights_m.iter().copied()));
+                write(
+                    bench,
+                    "deed.edits",
+                    &crate::edit_processes::batches_in_step(heights_m.iter().copied()),
+                );
                 vec!["edit", "land.iqt", "--script", "deed.edits", "--no-scorch"]
             }
             Self::Undo(count) => return ["undo", "land.iqt", &count.to_string()].map(String::from).to_vec(),
@@ -194,7 +208,13 @@ fn kills_over_one_file(bench: &Bench, random: &mut Random, kills: u64) -> u64 {
             3 if !has_widened => Deed::Edit { heights_m: heights(3, 3000.0), widens: true },
             4 => Deed::Undo(1 + random.below(4)),
             6 => Deed::Redo(1 + random.below(4)),
-            _ => Deed::Edit { heights_m: { let count = 1 + number % 9; heights(count, 10.0) }, widens: false },
+            _ => Deed::Edit {
+                heights_m: {
+                    let count = 1 + number % 9;
+                    heights(count, 10.0)
+                },
+                widens: false,
+            },
         };
         let Some(states) = deed.states(&past) else { continue };
         let args = deed.args(bench);
@@ -208,9 +228,16 @@ fn kills_over_one_file(bench: &Bench, random: &mut Random, kills: u64) -> u64 {
         let output = child.wait_with_output().unwrap();
         killed += u64::from(output.status.code().is_none());
         let at = states.iter().rposition(|state| state.is_that_of(&land));
-        let at = at.unwrap_or_else(|| panic!("{deed:?} over {past:?}, {}: the file is in no state on the way", output.status));
+        let at = at.unwrap_or_else(|| {
+            panic!("{deed:?} over {past:?}, {}: the file is in no state on the way", output.status)
+        });
         if output.status.success() {
-            assert_eq!(at, states.len() - 1, "{deed:?} over {past:?} was told as done: {}", text(&output.stdout));
+            assert_eq!(
+                at,
+                states.len() - 1,
+                "{deed:?} over {past:?} was told as done: {}",
+                text(&output.stdout)
+            );
         } else {
             assert_eq!(output.status.code(), None, "{deed:?} over {past:?}: {}", text(&output.stderr));
         }

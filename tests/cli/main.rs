@@ -10,6 +10,7 @@ mod engines;
 mod iobench;
 #[cfg(unix)]
 mod kills;
+mod outputs;
 mod pictures;
 mod support;
 mod usage;

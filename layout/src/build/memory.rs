@@ -7,6 +7,7 @@ use crate::dem::SampleType;
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::record::RecordKind;
+use crate::remedy::Remedy;
 
 /// Mebibyte.
 const MIB: u64 = 1 << 20;
@@ -66,10 +67,13 @@ impl MemoryPlan {
         }
         match largest_within(available) {
             Some(tile) => Ok(Self { tile, spool_bytes: 0 }),
-            None => Err(LayoutError::Usage(format!(
-                "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; give at least --memory {}",
-                (fixed + tiles().map(work).min().unwrap_or(0)).div_ceil(MIB)
-            ))),
+            None => {
+                let enough_mib = (fixed + tiles().map(work).min().unwrap_or(0)).div_ceil(MIB);
+                Err(LayoutError::Usage(format!(
+                    "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; allow at least {enough_mib}"
+                ))
+                .mended_by(Remedy::Memory { enough_mib: Some(enough_mib) }))
+            }
         }
     }
 }
@@ -94,8 +98,11 @@ mod tests {
     fn the_budget_that_a_refusal_names_is_the_least_that_is_enough() {
         for side in [4097, 16_385, 30_000, 65_537] {
             for sample_type in [SampleType::I16, SampleType::F32, SampleType::F64] {
-                let refusal = plan(side, sample_type, 24).unwrap_err().to_string();
-                let named: u64 = refusal.rsplit(' ').next().unwrap().parse().unwrap();
+                let refusal = plan(side, sample_type, 24).unwrap_err();
+                let Some(Remedy::Memory { enough_mib: Some(named) }) = refusal.remedy() else {
+                    panic!("{refusal}")
+                };
+                assert!(refusal.to_string().ends_with(&format!(" {named}")), "{refusal}");
                 assert!(plan(side, sample_type, named).is_ok(), "{refusal}");
                 assert!(plan(side, sample_type, named - 1).is_err(), "{refusal}");
             }

@@ -30,6 +30,7 @@ use crate::grid::Grid;
 use crate::header::{ErrorKind, Header};
 use crate::order::corners;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, VertexClass};
+use crate::remedy::Remedy;
 use band::{Band, Fills, RowReader};
 use levels::{LevelShape, Levels};
 use memory::{LARGEST_TILE, MemoryPlan};
@@ -122,7 +123,11 @@ pub fn build_on(
 ) -> Result<Header, LayoutError> {
     let info = dem.info();
     if !(options.z_scale.is_finite() && options.z_scale > 0.0) {
-        return Err(LayoutError::Usage(format!("--z-scale is a positive factor, not {}", options.z_scale)));
+        return Err(LayoutError::Usage(format!(
+            "the factor on heights is a positive number, not {}",
+            options.z_scale
+        ))
+        .mended_by(Remedy::HeightFactor));
     }
     let (spacing_m, spacing_origin) = spacing::resolve(info, options.spacing_m)?;
     let grid = Grid::new([info.samples_wide, info.samples_high], spacing_m)?;

@@ -3,6 +3,7 @@
 use crate::dem::{DemInfo, Georeference, HorizontalUnit};
 use crate::error::LayoutError;
 use crate::header::SpacingOrigin;
+use crate::remedy::Remedy;
 
 /// Equatorial radius of WGS 84, metres.
 const EARTH_RADIUS_M: f64 = 6_378_137.0;
@@ -36,8 +37,9 @@ pub(super) fn resolve(
             if latitude.is_nan() || latitude.abs() >= 89.9 {
                 return Err(LayoutError::Usage(format!(
                     "the elevation model is in degrees and its centre lies at latitude {latitude}, where degrees have no \
-                     useful length; state the spacing in metres with --spacing, or reproject the model"
-                )));
+                     useful length; state the spacing in metres, or reproject the model"
+                ))
+                .mended_by(Remedy::Spacing));
             }
             let [lon_m, lat_m] = degree_m(latitude, reference);
             let spacing = [(map[1] * lon_m).hypot(map[4] * lat_m), (map[2] * lon_m).hypot(map[5] * lat_m)];

@@ -124,7 +124,11 @@ impl CommitJob {
         self.run_on(&crate::disk::SystemDisk)
     }
 
-    pub(super) fn run_on(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
+    /// As [`CommitJob::run`], on another disk than the system's.
+    ///
+    /// # Errors
+    /// As [`CommitJob::run`].
+    pub fn run_on(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
         if !self.data.is_empty() {
             self.tail.write(disk, &self.data, self.tail.begin())?;
         }

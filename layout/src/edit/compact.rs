@@ -29,6 +29,8 @@ pub struct Compacted {
     pub header: Header,
     /// Bytes of the old one, with its overlay if it had one.
     pub bytes_before: u64,
+    /// Commits that could be undone or redone in the old one; 0 if its journal cannot be read.
+    pub commits_before: u64,
 }
 
 /// Writes the terrain file `file` with the edits of `overlay`, if there is one, as it is now to `out`: the same records and imagery, in order, without journal. `out` may be `file` itself, by
@@ -50,8 +52,10 @@ pub fn compact(
         None => Terrain::open_unmapped(file)?,
     };
     let bytes_before = terrain.source().byte_count();
+    // A file whose journal is damaged is written anew all the same.
+    let commits_before = super::history(&terrain).map_or(0, |commits| commits.len() as u64);
     let header = rewrite(disk, &terrain, AtomicFile::create(out)?, lock.as_ref(), progress)?;
-    Ok(Compacted { header, bytes_before })
+    Ok(Compacted { header, bytes_before, commits_before })
 }
 
 /// The lock of `file` if it is to be replaced.

@@ -129,7 +129,7 @@ pub(super) fn overlay_slots(
 fn not_an_overlay(path: &Path) -> LayoutError {
     LayoutError::not_this_format(
         path,
-        "this is no overlay of edits (.iqo); `terrasoar edit FILE --overlay NEW` makes one",
+        "this is no overlay of edits (.iqo); name one, or a new file for one, when the terrain is edited",
     )
 }
 

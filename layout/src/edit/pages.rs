@@ -133,7 +133,7 @@ impl<C: RecordCodec> Pages<C> {
         let at = to_usize(logical)?;
         if self.held[at].is_none() {
             let page = match self.moved.get(&logical) {
-                Some(entry) => self.terrain.page_at(logical, *entry)?,
+                Some(entry) => self.terrain.checked_page_at(logical, *entry)?,
                 None => self.terrain.checked_page(logical)?,
             };
             self.held[at] = Some(page);
@@ -145,7 +145,7 @@ impl<C: RecordCodec> Pages<C> {
     /// What a page holds at another place in the file.
     pub(super) fn read_at(&self, logical: u64, entry: Entry) -> Result<Box<Page>, LayoutError> {
         self.check_index(logical)?;
-        self.terrain.page_at(logical, entry)
+        self.terrain.checked_page_at(logical, entry)
     }
 
     fn check_index(&self, logical: u64) -> Result<(), LayoutError> {
@@ -317,7 +317,7 @@ fn load(
     failure: &mut Option<LayoutError>,
 ) -> Box<Page> {
     let read = match moved {
-        Some(entry) => terrain.page_at(logical, *entry),
+        Some(entry) => terrain.checked_page_at(logical, *entry),
         None => terrain.checked_page(logical),
     };
     read.unwrap_or_else(|error| {

@@ -19,6 +19,7 @@ use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
 use crate::file::tail::{Attempted, Tail};
 use crate::header::Header;
+use crate::remedy::Remedy;
 use crate::source::{PreadSource, Source};
 use crate::terrain::Terrain;
 use std::fs::File;
@@ -105,15 +106,17 @@ fn append_all(
     let shape = mosaic.shape(options.format);
     let needed = memory_bytes(&shape) + mosaic.memory_bytes();
     if needed > options.memory_mib << 20 {
+        let needed_mib = needed.div_ceil(1 << 20);
         return Err(LayoutError::Usage(format!(
-            "{} x {} texels of {} take {} MiB of memory and {} are allowed: allow more with --memory, or give a tiled GeoTIFF: \
+            "{} x {} texels of {} take {} MiB of memory and {} are allowed: allow more, or give a tiled GeoTIFF: \
              gdal_translate -co TILED=YES -co BIGTIFF=IF_SAFER INPUT output.tif",
             shape.texels[0],
             shape.texels[1],
             mosaic.format(),
-            (needed >> 20) + 1,
+            needed_mib,
             options.memory_mib
-        )));
+        ))
+        .mended_by(Remedy::Memory { enough_mib: Some(needed_mib) }));
     }
     let old = slots.header.clone();
     let lineage = old.history.map(|_| Lineage::read(source, &old)).transpose()?;

@@ -8,6 +8,7 @@ use super::shape::{ImageryShape, MAX_TEXELS, TileFormat};
 use super::source::{ImageSource, RowReader};
 use crate::error::LayoutError;
 use crate::header::Header;
+use crate::remedy::Remedy;
 
 /// How far off the common grid an image may lie, in texels.
 const GRID_TEXELS: f64 = 0.1;
@@ -32,7 +33,7 @@ impl<'i> Mosaic<'i> {
         extent: Option<Extent>,
     ) -> Result<Self, LayoutError> {
         let Some(first) = images.first() else {
-            return Err(LayoutError::Usage("no image was named; name one with --image".into()));
+            return Err(LayoutError::Usage("no image was named; name one".into()).mended_by(Remedy::Image));
         };
         if images.len() > 1 && extent.is_some() {
             return Err(LayoutError::Usage(

@@ -7,6 +7,7 @@ use super::section::is_place;
 use super::source::ImageSource;
 use crate::error::LayoutError;
 use crate::header::Header;
+use crate::remedy::Remedy;
 
 /// Largest turn and shear, as a share of a texel over the length of the image.
 const STRAIGHT_TEXELS: f64 = 0.25;
@@ -64,9 +65,10 @@ pub(super) fn place(
         (Some(Extent::Crs(_)), _, None) => {
             return Err(LayoutError::Usage(
                 "the terrain does not say where it lies, so an extent in its reference system means nothing; state it in \
-                 metres from the terrain's south-west sample: --extent W,S,E,N"
+                 metres from the terrain's south-west sample: west, south, east, north"
                     .into(),
-            ));
+            )
+            .mended_by(Remedy::Extent));
         }
         (None, Some(pixels), Some(map)) => {
             if let (Some(ours), Some(theirs)) = (header.epsg, georeference.epsg)
@@ -97,11 +99,12 @@ pub(super) fn place(
     if west >= whole[2] || south >= whole[3] || east <= 0.0 || north <= 0.0 {
         return Err(LayoutError::Usage(format!(
             "{}: the image lies from {west:.1}, {south:.1} to {east:.1}, {north:.1} m and the terrain from 0, 0 to {:.1}, {:.1}: they do \
-             not meet; check the reference systems, or state where the image lies with --extent",
+             not meet; check the reference systems, or state where the image lies",
             image.path().display(),
             whole[2],
             whole[3]
-        )));
+        ))
+        .mended_by(Remedy::Extent));
     }
     Ok(found)
 }
@@ -128,9 +131,10 @@ fn referenced(
         LayoutError::unsupported(
             image.path(),
             format!(
-                "{what}; turn it north-up into the terrain's reference system with gdalwarp, or state where it lies with --extent"
+                "{what}; turn it north-up into the terrain's reference system with gdalwarp, or state where it lies"
             ),
         )
+        .mended_by(Remedy::Extent)
     };
     // Metres of a step in the reference system.
     let step = |x: f64, y: f64| {

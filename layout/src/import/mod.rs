@@ -10,6 +10,7 @@ mod geotiff;
 mod guard;
 mod hgt;
 mod identify;
+pub(crate) mod input;
 mod parallel;
 mod png;
 pub(crate) mod png_stream;

@@ -1,6 +1,6 @@
 //! A PNG file as the decoder's rows, whatever they hold: heights ([`super::png`]) or colours (`crate::imagery`).
 
-use super::guard;
+use super::{guard, input};
 use crate::error::LayoutError;
 use ::png::{Decoder, DecodingError, Limits, Reader, Transformations};
 use std::fs::File;
@@ -15,8 +15,7 @@ pub(crate) type PngRows = Reader<BufReader<File>>;
 
 /// Opens the file at `path` and reads its header.
 pub(crate) fn open(path: &Path, transformations: Transformations) -> Result<PngRows, LayoutError> {
-    let file =
-        File::open(path).map_err(|source| LayoutError::io(path, "cannot open the PNG file", source))?;
+    let file = input::open(path, "cannot open the PNG file")?;
     let mut decoder =
         Decoder::new_with_limits(BufReader::with_capacity(1 << 18, file), Limits { bytes: DECODER_BYTES });
     decoder.set_transformations(transformations);

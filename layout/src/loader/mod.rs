@@ -4,17 +4,23 @@
 //! again. Pages that wait and lie within the same aligned 64 KiB of the file are read together, for a long read costs little more than a short one. Every page is
 //! checked against its checksum before it is handed over.
 //!
-//! Invariant: whatever was asked for comes back once: read, failed or dropped. A page that nobody has asked for again for [`STALE_FRAMES`] after
-//! it was due is dropped unread: the eye has gone elsewhere. Cost: a lock a frame and two a read.
+//! Edits move pages: a commit writes them elsewhere in the file, an undo leads back to where they lay. Whoever commits says so ([`Loader::relocate`]), and pages are read from where
+//! they lie by then. A read that was under way at that moment may bring what the page held before; it is made again before anybody sees it.
+//!
+//! Invariants: whatever was asked for comes back once: read, failed or dropped. What comes is what the page held where the newest relocation says it lies. A page that nobody has asked
+//! for again for [`STALE_FRAMES`] after it was due is dropped unread: the eye has gone elsewhere. Cost: a lock a frame, one a page that comes and two a read; some 24 bytes a page that has moved.
 
+mod places;
 mod queue;
 
 pub use queue::PageRequest;
 
 use crate::bytes::{PAGE_BYTES, Page};
+use crate::directory::Entry;
 use crate::error::LayoutError;
 use crate::source::ReadJob;
 use crate::terrain::Terrain;
+use places::Places;
 use queue::Waiting;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -66,8 +72,11 @@ pub struct LoaderStats {
 #[derive(Debug)]
 pub struct Loader {
     shared: Arc<Shared>,
-    arrivals: Receiver<Arrival>,
+    arrivals: Receiver<Sent>,
 }
+
+/// An arrival on its way, and where its page was read from. None for what was not read.
+type Sent = (Arrival, Option<Entry>);
 
 #[derive(Debug)]
 struct Shared {
@@ -79,6 +88,7 @@ struct Shared {
 #[derive(Debug, Default)]
 struct State {
     waiting: Waiting,
+    places: Places,
     now: u64,
     stopped: bool,
     stats: LoaderStats,
@@ -125,14 +135,51 @@ impl Loader {
         }
     }
 
+    /// Says where pages lie from now on: (logical page, entry) of pages that were committed elsewhere, or that an undo or a redo led back to. Absent entries read as inert pages.
+    /// Pages that the terrain has not are passed over.
+    pub fn relocate(&self, places: &[(u64, Entry)]) {
+        let mut state = self.shared.lock();
+        places.iter().for_each(|(page, entry)| state.places.set(&self.shared.terrain, *page, *entry));
+    }
+
+    /// Reads a page again that was taken and not used: it comes once more, whatever it is.
+    pub fn read_again(&self, page: u64) {
+        let mut state = self.shared.lock();
+        let due = state.now;
+        state.waiting.ask(PageRequest { page, due });
+        drop(state);
+        self.shared.work.notify_one();
+    }
+
     /// A page that has come, if any; never waits.
     pub fn take(&self) -> Option<Arrival> {
-        self.arrivals.try_recv().ok()
+        loop {
+            let sent = self.arrivals.try_recv().ok()?;
+            if let Some(arrival) = self.if_valid(sent) {
+                return Some(arrival);
+            }
+        }
     }
 
     /// A page that comes within `longest`.
     pub fn take_within(&self, longest: Duration) -> Option<Arrival> {
-        self.arrivals.recv_timeout(longest).ok()
+        let begun = Instant::now();
+        loop {
+            let sent = self.arrivals.recv_timeout(longest.saturating_sub(begun.elapsed())).ok()?;
+            if let Some(arrival) = self.if_valid(sent) {
+                return Some(arrival);
+            }
+        }
+    }
+
+    /// What was read, unless its page lies elsewhere by now: then it is read again.
+    fn if_valid(&self, (arrival, read_from): Sent) -> Option<Arrival> {
+        let Some(read_from) = read_from else { return Some(arrival) };
+        if self.shared.lock().places.of(&self.shared.terrain, arrival.page) == read_from {
+            return Some(arrival);
+        }
+        self.read_again(arrival.page);
+        None
     }
 
     /// What it did so far.
@@ -149,15 +196,15 @@ impl Drop for Loader {
     }
 }
 
-/// Pages that are read together, in the order of the file, and what they are read into.
+/// Pages that are read together and where they lie, in the order of the file, and what they are read into.
 #[derive(Debug)]
 struct Run {
-    pages: Vec<u64>,
+    pages: Vec<(u64, Entry)>,
     buffer: Vec<u8>,
 }
 
 /// One thread's life.
-fn serve(shared: &Shared, arrivals: &Sender<Arrival>) {
+fn serve(shared: &Shared, arrivals: &Sender<Sent>) {
     let terrain = &*shared.terrain;
     let depth = terrain.source().depth().max(1);
     let new_run = || Run {
@@ -175,12 +222,13 @@ fn serve(shared: &Shared, arrivals: &Sender<Arrival>) {
             && let Some(first) = state.waiting.pop()
         {
             if first.due + STALE_FRAMES < state.now {
-                if arrivals.send(Arrival { page: first.page, outcome: Outcome::Dropped }).is_err() {
+                let dropped = Arrival { page: first.page, outcome: Outcome::Dropped };
+                if arrivals.send((dropped, None)).is_err() {
                     return;
                 }
                 continue;
             }
-            gather(terrain, first.page, &mut state.waiting, &mut runs[begun].pages);
+            gather(terrain, first.page, &mut state, &mut runs[begun].pages);
             begun += 1;
         }
         if begun == 0 {
@@ -203,30 +251,27 @@ fn serve(shared: &Shared, arrivals: &Sender<Arrival>) {
 }
 
 /// Puts `page` and what waits besides in its run of the file into `wanted`, in the order of the file.
-fn gather(terrain: &Terrain, page: u64, waiting: &mut Waiting, wanted: &mut Vec<u64>) {
+fn gather(terrain: &Terrain, page: u64, state: &mut State, wanted: &mut Vec<(u64, Entry)>) {
     wanted.clear();
-    let run_of = |page: u64| file_page(terrain, page).map(|p| p / RUN_PAGES);
-    let run = run_of(page);
+    let State { waiting, places, .. } = state;
+    let run_of = |entry: Entry| entry.is_present().then(|| u64::from(entry.page) / RUN_PAGES);
+    let run = run_of(places.of(terrain, page));
     // Files that were edited or have holes keep neighbours elsewhere; then there is less to gather.
     for near in page.saturating_sub(RUN_PAGES - 1)..page + RUN_PAGES {
-        if near == page || (run.is_some() && run_of(near) == run && waiting.take(near)) {
-            wanted.push(near);
+        let entry = places.of(terrain, near);
+        if near == page || (run.is_some() && run_of(entry) == run && waiting.take(near)) {
+            wanted.push((near, entry));
         }
     }
-    wanted.sort_unstable_by_key(|page| file_page(terrain, *page));
-}
-
-/// Where a logical page lies in the file, if it is there.
-fn file_page(terrain: &Terrain, logical_page: u64) -> Option<u64> {
-    terrain.entries().get(logical_page as usize).filter(|e| e.is_present()).map(|e| u64::from(e.page))
+    wanted.sort_unstable_by_key(|(_, entry)| entry.page);
 }
 
 /// Reads runs and hands their pages over. `None` if nobody listens any more.
-fn read_runs(terrain: &Terrain, runs: &mut [Run], arrivals: &Sender<Arrival>) -> Option<LoaderStats> {
+fn read_runs(terrain: &Terrain, runs: &mut [Run], arrivals: &Sender<Sent>) -> Option<LoaderStats> {
     let mut done = LoaderStats { reads: runs.len() as u64, ..LoaderStats::default() };
     let mut jobs: Vec<ReadJob<'_>> = Vec::with_capacity(runs.len());
     for Run { pages, buffer } in runs.iter_mut() {
-        let page = |at: Option<&u64>| at.and_then(|page| file_page(terrain, *page)).unwrap_or(0);
+        let page = |at: Option<&(u64, Entry)>| at.map_or(0, |(_, entry)| u64::from(entry.page));
         let (first, last) = (page(pages.first()), page(pages.last()));
         // All lie in one aligned run, which the buffer holds.
         let bytes = ((last - first + 1) as usize * PAGE_BYTES).min(buffer.len());
@@ -236,11 +281,11 @@ fn read_runs(terrain: &Terrain, runs: &mut [Run], arrivals: &Sender<Arrival>) ->
     let outcomes: Vec<bool> = jobs.iter().map(|job| job.outcome.is_ok()).collect();
     done.bytes = jobs.iter().map(|job| job.buffer.len() as u64).sum();
     for (Run { pages, buffer }, is_read) in runs.iter().zip(outcomes) {
-        let first = pages.first().and_then(|page| file_page(terrain, *page));
-        for page in pages {
+        let first = pages.first().map(|(_, entry)| *entry).filter(|entry| is_read && entry.is_present());
+        for (page, entry) in pages {
             // A read that fails says nothing of each of its pages: each is tried by itself, so that an error names the page it is about.
-            let read = first.filter(|_| is_read).map(|first| cut_out(terrain, *page, first, buffer));
-            let outcome = match read.unwrap_or_else(|| terrain.checked_page(*page)) {
+            let read = first.map(|first| cut_out(terrain, *page, *entry, first.page, buffer));
+            let outcome = match read.unwrap_or_else(|| terrain.checked_page_at(*page, *entry)) {
                 Ok(page) => Outcome::Read(page),
                 Err(error) => Outcome::Failed(error),
             };
@@ -249,7 +294,7 @@ fn read_runs(terrain: &Terrain, runs: &mut [Run], arrivals: &Sender<Arrival>) ->
             } else {
                 done.failures += 1;
             }
-            arrivals.send(Arrival { page: *page, outcome }).ok()?;
+            arrivals.send((Arrival { page: *page, outcome }, Some(*entry))).ok()?;
         }
     }
     Some(done)
@@ -259,11 +304,11 @@ fn read_runs(terrain: &Terrain, runs: &mut [Run], arrivals: &Sender<Arrival>) ->
 fn cut_out(
     terrain: &Terrain,
     logical_page: u64,
-    first: u64,
+    entry: Entry,
+    first: u32,
     buffer: &[u8],
 ) -> Result<Box<Page>, LayoutError> {
-    let entry = terrain.entries().get(logical_page as usize).copied().unwrap_or_default();
-    let at = (u64::from(entry.page) - first) as usize * PAGE_BYTES;
+    let at = (entry.page - first) as usize * PAGE_BYTES;
     let mut page = Box::new([0; PAGE_BYTES]);
     page.copy_from_slice(&buffer[at..at + PAGE_BYTES]);
     terrain.check_page(logical_page, entry, &page)?;

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// Texels a side of the tiles written.
-const TILE: u32 = 512;
+pub(super) const TILE: u32 = 512;
 /// Most texels a side.
 const MAX_TEXELS: u64 = 1 << 22;
 

@@ -1,7 +1,8 @@
 //! `terrasoar compact`: a file without what edits left behind.
 
 use crate::cli::WrongUsage;
-use crate::cli::output::{check_output, grouped, print, print_json};
+use crate::cli::output::{grouped, print, print_json};
+use crate::cli::outputs::{Force, Kind};
 use crate::cli::progress::Progress;
 use crate::cli::terrain::TerrainArgs;
 use anyhow::Result;
@@ -13,7 +14,7 @@ use terrasoar_layout::edit::{Compacted, compact};
 
 /// Write a terrain file anew without what edits left behind.
 ///
-/// The ground and the imagery stay as they are, pages come in order again, and the history ends: what was edited can no longer be undone or redone. Without -o the file itself
+/// The ground and the imagery stay as they are, pages come in order again, and the history ends: what was edited can no longer be undone or redone, and it says so. Without -o the file itself
 /// is replaced, when the new one is complete; programs that have it open go on reading the old one. With --overlay, -o is the terrain with those edits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -29,6 +30,8 @@ pub(crate) struct Args {
     /// File to write instead of replacing the terrain file
     #[arg(short, long, value_name = "OUT.iqt")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -48,7 +51,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let start = Instant::now();
     let out = match (&args.output, &args.terrain.overlay) {
         (Some(out), _) => {
-            check_output(out, &args.terrain.inputs(&[]))?;
+            args.force.file(out, Kind::Terrain, &args.terrain.inputs(&[]))?;
             out
         }
         (None, None) => &args.terrain.file,
@@ -62,9 +65,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     let progress = Progress::new("records");
     let TerrainArgs { file, overlay } = &args.terrain;
-    let Compacted { header, bytes_before, .. } =
+    let Compacted { header, bytes_before, commits_before, .. } =
         compact(&SystemDisk, file, overlay.as_deref(), out, &progress)?;
     drop(progress);
+    let commits = if args.output.is_none() { commits_before } else { 0 };
     let answer = Answer {
         file: overlay.as_ref().unwrap_or(file).display().to_string(),
         output: out.display().to_string(),
@@ -76,8 +80,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.json {
         return print_json(&answer);
     }
+    let ended = match commits {
+        0 => String::new(),
+        1 => "; 1 commit of edits can no longer be undone".into(),
+        more => format!("; {} commits of edits can no longer be undone", grouped(more)),
+    };
     print(&format!(
-        "{}: {} bytes instead of {}, {} record pages, {:.1} s",
+        "{}: {} bytes instead of {}, {} record pages, {:.1} s{ended}",
         answer.output,
         grouped(answer.bytes_after),
         grouped(answer.bytes_before),

@@ -22,6 +22,7 @@ use crate::file::slots::Slots;
 use crate::file::tail::{Attempt, Attempted, Tail};
 use crate::header::{Header, ImageryPlace};
 use crate::opening::{read_directory, read_growing, read_root, read_structure};
+use crate::remedy::Remedy;
 use crate::source::{LayeredSource, PreadSource, Source};
 use crate::terrain::Terrain;
 use std::path::{Path, PathBuf};
@@ -177,6 +178,17 @@ impl EditSession {
     /// The header as the file has it.
     pub fn header(&self) -> &Header {
         &self.slots.header
+    }
+
+    /// Where a logical page lies in the file as it is now, edits that are not committed apart; absent for pages that the terrain has not.
+    pub fn place_of(&self, logical_page: u64) -> Entry {
+        let at = usize::try_from(logical_page).ok();
+        at.and_then(|at| self.directory.entries.get(at)).copied().unwrap_or_default()
+    }
+
+    /// What does the session's writing, for jobs of [`EditSession::prepare_commit`] that run elsewhere.
+    pub fn disk(&self) -> Arc<dyn Disk + Send> {
+        Arc::clone(&self.disk)
     }
 
     pub(super) fn picture(&self) -> &Picture {
@@ -373,9 +385,10 @@ fn take_lock(path: &Path) -> Result<WriteLock, LayoutError> {
         LayoutError::Io { path, source, .. } if source.kind() != std::io::ErrorKind::NotFound => {
             LayoutError::io(
                 &path,
-                "cannot open the file for writing; an overlay keeps edits apart from it",
+                "cannot open the file for writing; edits can be kept apart from it in an overlay",
                 source,
             )
+            .mended_by(Remedy::Overlay)
         }
         other => other,
     })

@@ -8,6 +8,7 @@
 use super::tags::{self, Directory, TiffFile};
 use crate::dem::{Georeference, HorizontalUnit};
 use crate::error::LayoutError;
+use crate::words::harmless;
 
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
@@ -152,7 +153,7 @@ impl Keys {
         let bytes = self.texts.as_bytes().get(at..at.checked_add(count)?.min(self.texts.len()))?;
         let text = String::from_utf8_lossy(bytes);
         let text = text.trim_end_matches(['|', '\0']).trim();
-        let shown: String = text.chars().filter(|c| !c.is_control()).take(MAX_NAME_CHARS).collect();
+        let shown = harmless(text, MAX_NAME_CHARS);
         (!shown.is_empty()).then_some(shown)
     }
 }
