@@ -57,7 +57,7 @@ impl<C: RecordCodec> Pages<C> {
         Self {
             k: terrain.grid().k(),
             terrain,
-            held: std::iter::repeat_with(|| None).take(count).collect(),
+            held: vec![None; count],
             flags: vec![0; count],
             clean: 0,
             log: Vec::new(),

@@ -1,6 +1,7 @@
 //! Back and forth through a file's history: a header that names a state which is in the file already.
 
 use super::EditSession;
+use super::checked_state::check_state;
 use crate::bytes::{PAGE_BYTES, Page, checksum};
 use crate::directory::Entry;
 use crate::edit::Changes;
@@ -8,7 +9,7 @@ use crate::edit::commit::CommitJob;
 use crate::error::LayoutError;
 use crate::header::{Header, History};
 use crate::journal::Commit;
-use crate::opening::{inert_page, read_leaf, read_root};
+use crate::opening::inert_page;
 use crate::source::Source;
 use crate::terrain::Terrain;
 use std::sync::Arc;
@@ -90,9 +91,10 @@ impl EditSession {
         let generation = place.next_generation(old)?;
         let header =
             Header { generation, history: Some(History { commit_page, tip_page }), ..state.put_into(old) };
-        let (root, entries) = self.differing(&header)?;
-        let mut pages = Vec::with_capacity(entries.len());
-        for (logical, entry) in &entries {
+        let page = header.amended(&self.slots.current);
+        let checked = check_state(self.editor.terrain(), &self.directory, &page)?;
+        let mut pages = Vec::with_capacity(checked.differing.len());
+        for (logical, entry) in &checked.differing {
             pages.push((*logical as u64, self.read_page(*logical, *entry)?));
         }
         let (terrain, original) = (Arc::clone(self.editor.terrain()), self.original.imagery);
@@ -103,26 +105,9 @@ impl EditSession {
         done?;
         let changes = self.editor.replace_pages(pages, &job.header)?;
         self.picture.turn_to(turn);
-        entries.into_iter().for_each(|(logical, entry)| self.directory.entries[logical] = entry);
-        self.directory.root = root;
+        self.directory = checked.directory;
         self.slots.flip(job.header_page, job.header);
         Ok(changes)
-    }
-
-    /// The root of another state, and the entries in which its directory differs.
-    fn differing(&self, header: &Header) -> Result<Difference, LayoutError> {
-        let root = read_root(self.source(), header)?;
-        let mut differing = Vec::new();
-        let mut leaf = Vec::new();
-        for (i, here) in root.iter().enumerate().filter(|(i, here)| **here != self.directory.root[*i]) {
-            leaf.clear();
-            read_leaf(self.source(), header, i, *here, &mut leaf)?;
-            let first = i * crate::directory::ENTRIES_PER_LEAF;
-            let pairs = leaf.iter().zip(&self.directory.entries[first..]);
-            let others = pairs.enumerate().filter(|(_, (theirs, ours))| theirs != ours);
-            differing.extend(others.map(|(j, (theirs, _))| (first + j, *theirs)));
-        }
-        Ok((root, differing))
     }
 
     fn read_page(&self, logical: usize, entry: Entry) -> Result<Box<Page>, LayoutError> {
@@ -141,9 +126,6 @@ impl EditSession {
         ))
     }
 }
-
-/// The root of another state, and the record pages whose entries differ.
-type Difference = (Vec<Entry>, Vec<(usize, Entry)>);
 
 /// All commits of a file, the first one first.
 fn history_of(source: &dyn Source, header: &Header) -> Result<Vec<HistoryEntry>, LayoutError> {
