@@ -6,7 +6,7 @@ use super::Findings;
 use super::states::States;
 use crate::error::LayoutError;
 use crate::header::{Header, History};
-use crate::journal::{Commit, State};
+use crate::file::journal::{Commit, State};
 use crate::terrain::Terrain;
 
 /// A commit and the journal page it is on.

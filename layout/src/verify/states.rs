@@ -11,7 +11,7 @@ use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses};
 use crate::error::LayoutError;
 use crate::header::Header;
 use crate::imagery::Imagery;
-use crate::journal::State;
+use crate::file::journal::State;
 use crate::opening::{read_leaf, read_root};
 use crate::terrain::Terrain;
 use rayon::prelude::*;
