@@ -41,7 +41,7 @@ pub fn exercise(files: &Sealed, folder: &Path) -> bool {
     };
     look(&terrain);
     let out = folder.join("compact.iqt");
-    if compact(&SystemDisk, &terrain, &out, &Silent).is_ok() {
+    if compact(&SystemDisk, &path, overlay.as_deref(), &out, &Silent).is_ok() {
         let bytes = std::fs::metadata(&out).expect("it was made").len();
         let allowed = terrain.source().byte_count() + ROOM_BYTES;
         assert!(bytes <= allowed, "{bytes} bytes out of {allowed}");

@@ -5,8 +5,8 @@
 use super::Findings;
 use super::states::States;
 use crate::error::LayoutError;
-use crate::header::{Header, History};
 use crate::file::journal::{Commit, State};
+use crate::header::{Header, History};
 use crate::terrain::Terrain;
 
 /// A commit and the journal page it is on.

@@ -5,7 +5,7 @@
 //! [`BLOCK`] chunks, as long as chunks are asked for in order.
 
 use super::tags::whole_number;
-use crate::atomic_file::read_at;
+use crate::disk::read_at;
 use crate::error::LayoutError;
 use std::fs::File;
 use std::io::ErrorKind;

@@ -15,7 +15,7 @@ use super::codec::{Failure, Unpacker};
 use super::convert::Void;
 use super::zstd_frame;
 use super::{parts, predictor, put_constant};
-use crate::atomic_file::read_at;
+use crate::disk::read_at;
 use crate::dem::{SampleSink, Window};
 use crate::error::LayoutError;
 

@@ -14,7 +14,7 @@ use super::chunks::Chunks;
 use super::convert::Void;
 use super::listing::Places;
 use super::{put_constant, rows_at_once};
-use crate::atomic_file::read_at;
+use crate::disk::read_at;
 use crate::dem::{SampleSink, Window};
 use crate::error::LayoutError;
 
