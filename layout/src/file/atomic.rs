@@ -25,7 +25,7 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct AtomicFile {
     /// What it was asked for as, for messages.
-    name: PathBuf,
+    asked: PathBuf,
     /// Where that leads.
     target: PathBuf,
     inner: Inner,
@@ -82,11 +82,11 @@ impl AtomicFile {
     /// [`LayoutError::Io`] if its folder does not exist or cannot be written to; [`LayoutError::Usage`] if `target` is something other than a regular file: a folder, a device, a FIFO.
     pub fn create(target: &Path) -> Result<Self, LayoutError> {
         let failed = |e| LayoutError::io(target, "cannot create the file", e);
-        let (name, target) = (target.to_owned(), resolved(target).map_err(failed)?);
-        check_replaceable(&name, &target)?;
+        let (asked, target) = (target.to_owned(), resolved(target).map_err(failed)?);
+        check_replaceable(&asked, &target)?;
         #[cfg(target_os = "linux")]
         if let Some(file) = nameless(folder_of(&target)) {
-            return Ok(Self { name, target, inner: Inner::Nameless(file) });
+            return Ok(Self { asked, target, inner: Inner::Nameless(file) });
         }
         let mut builder = tempfile::Builder::new();
         builder.prefix(".terrasoar-").suffix(".partial");
@@ -101,7 +101,7 @@ impl AtomicFile {
             Ok((file.path().to_owned(), file))
         })
         .map_err(failed)?;
-        Ok(Self { name, target, inner: Inner::Named(guard, file) })
+        Ok(Self { asked, target, inner: Inner::Named(guard, file) })
     }
 
     /// The file to write to.
@@ -115,7 +115,7 @@ impl AtomicFile {
 
     /// Name it will have, as it was asked for.
     pub fn target(&self) -> &Path {
-        &self.name
+        &self.asked
     }
 
     /// Syncs what was written and gives the file its name, replacing what had it.
@@ -143,10 +143,10 @@ impl AtomicFile {
     }
 
     fn finish(self, disk: &dyn Disk, replaced: Replaced<'_>) -> Result<bool, LayoutError> {
-        let Self { name, target, inner } = self;
+        let Self { asked, target, inner } = self;
         let failed = |e| {
             let when_full = "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
-            LayoutError::write(&name, "cannot write the file", when_full, e)
+            LayoutError::write(&asked, "cannot write the file", when_full, e)
         };
         let file = match &inner {
             #[cfg(target_os = "linux")]
@@ -160,17 +160,17 @@ impl AtomicFile {
         disk.sync(file).map_err(failed)?;
         let _lock = match replaced {
             Replaced::Any => Some(ReplaceLock::take(&target)?),
-            Replaced::Held(lock) if !lock.is_of(&target) => return Err(replaced_meanwhile(&name)),
+            Replaced::Held(lock) if !lock.is_of(&target) => return Err(replaced_meanwhile(&asked)),
             Replaced::Held(_) | Replaced::None => None,
         };
         if !matches!(replaced, Replaced::None) {
-            check_replaceable(&name, &target)?;
+            check_replaceable(&asked, &target)?;
         }
         let is_named = give_name(disk, inner, &target, replaced).map_err(failed)?;
         if is_named {
             disk.sync_folder(folder_of(&target)).map_err(|e| {
                 LayoutError::io(
-                    &name,
+                    &asked,
                     "the file is complete, but its name cannot be brought to the disk and may be lost at a power cut",
                     e,
                 )
