@@ -24,6 +24,7 @@ mod opening;
 pub mod order;
 pub mod pool;
 pub mod prefetch;
+pub mod printable;
 pub mod record;
 mod records;
 mod slots;

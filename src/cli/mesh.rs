@@ -36,7 +36,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "E.edits")]
     edits: Option<PathBuf>,
     /// File to write: binary PLY or OBJ by its extension
-    #[arg(short, long, value_name = "OUT.(ply|obj)", value_parser = |text: &str| parse::with_extension(text, &["ply", "obj"]))]
+    #[arg(short, long, value_name = "OUT.(ply|obj)", value_parser = parse::with_extension(&["ply", "obj"]))]
     output: PathBuf,
     /// Write PLY as text
     #[arg(long)]

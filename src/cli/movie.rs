@@ -51,7 +51,7 @@ fn rate(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Serialize)]
 struct Answer {
-    output: PathBuf,
+    output: String,
     size_px: [u32; 2],
     style: String,
     ramp: &'static str,
@@ -101,7 +101,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let triangles_mean = triangles as f64 / f64::from(pictures.max(1));
     if args.json {
         return print_json(&Answer {
-            output: args.output.clone(),
+            output: args.output.display().to_string(),
             size_px: [width, height],
             style: picture.style(has_image).to_owned(),
             ramp: look.ramp.name,

@@ -1,6 +1,6 @@
 //! Words of the command line that are more than a number: each parser says what it takes when it refuses.
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 use terrasoar::flight::generate::FlightKind;
 use terrasoar::flyover::EngineKind;
@@ -116,9 +116,12 @@ pub(super) fn synth_size(text: &str) -> Result<u32, String> {
     }
 }
 
-/// A path whose extension is one of `allowed`, in lower case.
-pub(super) fn with_extension(text: &str, allowed: &[&str]) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
+/// A path, in whatever encoding the system has it, whose extension is one of `allowed`, in lower case.
+pub(super) fn with_extension(allowed: &'static [&'static str]) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| extension_of(path, allowed))
+}
+
+fn extension_of(path: PathBuf, allowed: &[&str]) -> Result<PathBuf, String> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if allowed.contains(&extension.as_str()) {
         Ok(path)
@@ -131,6 +134,17 @@ pub(super) fn with_extension(text: &str, allowed: &[&str]) -> Result<PathBuf, St
 pub(super) fn engine() -> impl TypedValueParser<Value = EngineKind> {
     PossibleValuesParser::new(EngineKind::ALL.map(EngineKind::name))
         .try_map(|word| word.parse::<EngineKind>())
+}
+
+/// Frames a second; 0 for no pace.
+pub(super) fn pace(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| {
+        if v == 0.0 || (0.001..=1e6).contains(&v) {
+            Ok(v)
+        } else {
+            Err("it must be 0, or from 0.001 to 1000000".into())
+        }
+    })
 }
 
 /// A way of culling by name.
@@ -159,7 +173,7 @@ mod tests {
         assert!(range("3,2").is_err() && range("0,2").is_err() && range("1,2,3").is_err());
         assert_eq!(viewport("800x600").unwrap(), Viewport::default());
         assert_eq!(synth_size("1025").unwrap(), 1025);
-        assert!(with_extension("a.b/c.TIF", &["tif", "png"]).is_ok());
+        assert!(extension_of("a.b/c.TIF".into(), &["tif", "png"]).is_ok());
         for wrong in ["", "0", "-1", "nan", "inf", "1,2,3", "10,", "1e9"] {
             assert!(spacing_m(wrong).is_err(), "{wrong}");
         }
@@ -177,6 +191,6 @@ mod tests {
             assert!(synth_size(wrong).is_err(), "{wrong}");
         }
         assert!(percent("100.5").is_err() && tolerance_px("0").is_err() && not_negative("-1").is_err());
-        assert!(with_extension("a", &["ply"]).is_err());
+        assert!(extension_of("a".into(), &["ply"]).is_err());
     }
 }

@@ -48,7 +48,7 @@ pub(super) struct Args {
     #[command(flatten)]
     picture: PictureArgs,
     /// Picture to write
-    #[arg(short, long, value_name = "OUT.png", value_parser = |text: &str| parse::with_extension(text, &["png"]))]
+    #[arg(short, long, value_name = "OUT.png", value_parser = parse::with_extension(&["png"]))]
     output: PathBuf,
     /// Print one JSON object
     #[arg(long)]
@@ -79,7 +79,7 @@ fn field_of_view(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Serialize)]
 struct Answer {
-    output: PathBuf,
+    output: String,
     size_px: [u32; 2],
     style: String,
     ramp: &'static str,
@@ -126,7 +126,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let adapter = studio.capabilities();
     if args.json {
         return print_json(&Answer {
-            output: args.output.clone(),
+            output: args.output.display().to_string(),
             size_px: [width, height],
             style: picture.style(has_image).to_owned(),
             ramp: look.ramp.name,

@@ -38,7 +38,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "colour", value_parser = clap::value_parser!(u32).range(1..=64))]
     texels: u32,
     /// File to write: GeoTIFF or 16-bit PNG by its extension
-    #[arg(short, long, value_name = "OUT.(tif|png)", value_parser = |text: &str| parse::with_extension(text, &["tif", "tiff", "png"]))]
+    #[arg(short, long, value_name = "OUT.(tif|png)", value_parser = parse::with_extension(&["tif", "tiff", "png"]))]
     output: PathBuf,
 }
 

@@ -5,6 +5,7 @@ mod drape;
 mod edit;
 mod edit_processes;
 mod engines;
+mod harmless;
 mod iobench;
 mod pictures;
 mod support;
