@@ -27,6 +27,8 @@ mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
 mod progress;
+#[cfg(feature = "view")]
+mod quiet;
 mod replay;
 #[cfg(unix)]
 mod signals;
@@ -112,7 +114,12 @@ impl std::error::Error for WrongUsage {}
 pub(crate) fn run() -> ExitCode {
     #[cfg(unix)]
     signals::heed();
-    let done = match Typed::parse().verb {
+    let verb = Typed::parse().verb;
+    #[cfg(feature = "view")]
+    if matches!(verb, Verb::Compare(_) | Verb::Snapshot(_) | Verb::Movie(_) | Verb::View(_)) {
+        quiet::begin();
+    }
+    let done = match verb {
         Verb::Build(args) => build::run(&args),
         Verb::Drape(args) => drape::run(&args),
         Verb::Edit(args) => edit::run(&args),
