@@ -29,6 +29,8 @@ mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
 mod progress;
+#[cfg(feature = "view")]
+mod quiet;
 mod remedy;
 mod replay;
 #[cfg(unix)]
@@ -147,7 +149,12 @@ pub(crate) fn run() -> ExitCode {
 }
 
 fn carry_out() -> ExitCode {
-    let done = match Typed::try_parse().unwrap_or_else(|error| refuse(&error)).verb {
+    let verb = Typed::try_parse().unwrap_or_else(|error| refuse(&error)).verb;
+    #[cfg(feature = "view")]
+    if matches!(verb, Verb::Compare(_) | Verb::Snapshot(_) | Verb::Movie(_) | Verb::View(_)) {
+        quiet::begin();
+    }
+    let done = match verb {
         Verb::Build(args) => build::run(&args),
         Verb::Drape(args) => drape::run(&args),
         Verb::Edit(args) => edit::run(&args),

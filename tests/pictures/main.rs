@@ -7,6 +7,7 @@ mod app;
 mod cracks;
 mod depth;
 mod engines;
+mod loss;
 mod paint;
 mod program;
 mod rig;
@@ -40,7 +41,7 @@ fn main() -> ExitCode {
         }
     };
     let reads_depth = |name: &str| ["cracks::", "depth::"].iter().any(|part| name.starts_with(part));
-    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, paint::TESTS, program::TESTS]
+    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, loss::TESTS, paint::TESTS, program::TESTS]
         .concat()
         .into_iter()
         .map(|(name, test): Test| {
