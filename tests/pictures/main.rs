@@ -7,7 +7,12 @@ mod app;
 mod cracks;
 mod depth;
 mod engines;
+#[cfg(unix)]
+#[path = "../cli/killed.rs"]
+#[allow(dead_code, reason = "shared with the tests of the other verbs")]
+mod killed;
 mod loss;
+mod outputs;
 mod paint;
 mod program;
 mod rig;
@@ -41,7 +46,15 @@ fn main() -> ExitCode {
         }
     };
     let reads_depth = |name: &str| ["cracks::", "depth::"].iter().any(|part| name.starts_with(part));
-    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, loss::TESTS, paint::TESTS, program::TESTS]
+    let trials = [
+        cracks::TESTS,
+        depth::TESTS,
+        engines::TESTS,
+        loss::TESTS,
+        outputs::TESTS,
+        paint::TESTS,
+        program::TESTS,
+    ]
         .concat()
         .into_iter()
         .map(|(name, test): Test| {
