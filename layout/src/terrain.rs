@@ -27,7 +27,7 @@ pub struct Terrain {
     source: Box<dyn Source>,
     header: Header,
     entries: Vec<Entry>,
-    /// Page number of each logical page, absent ones replaced by the inert page. Made when records are first asked for.
+    /// Page of each logical page, counted from the inert page, which absent ones read as. Made when records are first asked for.
     pages: OnceLock<Vec<u32>>,
 }
 
@@ -124,9 +124,15 @@ impl Terrain {
         Ok(Self::of(source, header, entries))
     }
 
+    /// Page of each logical page, counted from [`INERT_PAGE`].
     pub(crate) fn pages(&self) -> &[u32] {
-        let page = |entry: &Entry| if entry.is_present() { entry.page } else { INERT_PAGE };
-        self.pages.get_or_init(|| self.entries.iter().map(page).collect())
+        self.pages.get_or_init(|| {
+            // Zeros that are never written take no memory: most of a void terrain.
+            let mut pages = vec![0; self.entries.len()];
+            let present = self.entries.iter().zip(&mut pages).filter(|(entry, _)| entry.is_present());
+            present.for_each(|(entry, page)| *page = entry.page - INERT_PAGE);
+            pages
+        })
     }
 
     /// The file's name for messages.

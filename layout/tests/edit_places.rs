@@ -14,6 +14,7 @@ use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::{Area, Changes, Edit, EditSession, SampleRect};
 use terrasoar_layout::loader::{Arrival, Loader, Outcome, PageRequest};
+use terrasoar_layout::record::{Compact, RecordCodec};
 use terrasoar_layout::source::{Fault, HostileSource, Hostility, PreadSource};
 use terrasoar_layout::store::RecordStore;
 use terrasoar_layout::terrain::{ByKind, Terrain};
@@ -197,17 +198,17 @@ fn a_pool_follows_pages_that_come_and_go() {
     }
     let per_page = terrain.header().records_per_page();
     // One that says something, unlike those of padding.
-    let slots = 3 * per_page..4 * per_page;
-    let slot = slots.max_by_key(|slot| pool.get(*slot)).unwrap();
-    let record = pool.get(slot);
+    let mut slots = per_page..count * per_page;
+    let slot = slots.find(|slot| pool.get(*slot) != Some(Compact::INERT)).unwrap();
+    let (page, record) = (slot / per_page, pool.get(slot));
     let held = pool.pages_held();
-    pool.set_present(3, false);
-    assert!(pool.is_resident(3) && pool.get(slot).is_some() && pool.get(slot) != record, "inert");
-    pool.set_present(3, true);
-    assert!(!pool.is_resident(3) && pool.get(slot).is_none());
-    pool.install(3, &terrain.checked_page(3).unwrap()).unwrap();
+    pool.set_present(page, false);
+    assert!(pool.is_resident(page) && pool.get(slot) == Some(Compact::INERT));
+    pool.set_present(page, true);
+    assert!(!pool.is_resident(page) && pool.get(slot).is_none());
+    pool.install(page, &terrain.checked_page(page).unwrap()).unwrap();
     assert_eq!(pool.get(slot), record);
-    pool.set_present(3, true);
+    pool.set_present(page, true);
     pool.set_present(1 << 40, true);
     assert_eq!(pool.get(slot), record);
     // The frames of pages that are gone are used again, and no other page is lost with them.

@@ -5,22 +5,20 @@
 //! where the eye no longer is. Where a tile cannot be read its ancestor shows; it is told once and tried again later.
 //!
 //! What is painted in an editing session is in memory and asked before the file. Tiles that changed are wanted anew; those that are painted, and those that an undo or a redo brought
-//! back, are given in the very next frame, so many at most. After a commit, an undo or a redo tiles are read from the section that counts by then; reads
-//! that were begun before are thrown away when they come.
+//! back and that were read with it, are given in the very next frame, so many at most. After a commit, an undo or a redo tiles are read from the section that counts by then; reads
+//! that were begun before are thrown away when they come. So are those for a device that is gone: another may take other formats.
 //!
-//! Invariant: a frame with threads never waits for storage, but that after an undo or a redo, which has waited itself. Cost: a lock and a copy of each tile that comes.
+//! Invariant: a frame with threads never waits for storage. Cost: a lock and a copy of each tile that comes.
 
-use std::collections::{BTreeSet, HashMap, HashSet, VecDeque};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use super::repaint::{Picture, PictureFile, Repaint};
+use super::tile_reader::{Reader, Threads, Tile};
+use std::collections::{HashMap, VecDeque};
+use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::header::ImageryPlace;
-use terrasoar_layout::imagery::{Imagery, PaintedTile, Painter, TileFormat, TileId, decode_tile};
+use terrasoar_layout::imagery::{Imagery, PaintedTile, TileFormat, TileId};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{FrameView, ImageTileId, ImageryFormat, ImageryShape, RenderError, Renderer};
 
-/// Threads that read and decode.
-const THREADS: usize = 2;
 /// Tiles of the current view on a frame's list.
 const WANTED: usize = 64;
 /// Tiles of the view ahead on it.
@@ -45,67 +43,16 @@ pub(crate) struct Drape {
     reader: Arc<Reader>,
     threads: Option<Threads>,
     shape: ImageryShape,
-    /// Where in the file the reader's imagery lies.
-    place: Option<ImageryPlace>,
-    /// Whether an editing session has been followed.
-    follows: bool,
     /// Tiles that are not the file's.
     painted: HashMap<ImageTileId, PaintedTile>,
-    /// Tiles of the file that are others since the last frame.
-    turned: HashSet<ImageTileId>,
+    /// Tiles of the file that are others since the last frame, as they were read.
+    at_hand: HashMap<ImageTileId, Option<Vec<u8>>>,
     /// Whether tiles in memory are left for the next frame.
     is_behind: bool,
     frame: u64,
     /// Tiles that could not be read, and the frame to try them again in.
     trouble: HashMap<ImageTileId, u64>,
     errors: VecDeque<LayoutError>,
-}
-
-/// What reads tiles.
-#[derive(Debug)]
-struct Reader {
-    terrain: Arc<Terrain>,
-    imagery: Imagery,
-    /// Whether tiles are decoded to plain texels.
-    decodes: bool,
-}
-
-/// A tile that was read; none if there is none.
-type Tile = Result<Option<Vec<u8>>, LayoutError>;
-
-#[derive(Debug)]
-struct Threads {
-    shared: Arc<Shared>,
-    arrivals: Receiver<Arrival>,
-    under_way: HashSet<ImageTileId>,
-    turn: u64,
-}
-
-/// A tile that was read, and in which turn.
-type Arrival = (u64, ImageTileId, Tile);
-
-#[derive(Debug)]
-struct Shared {
-    list: Mutex<List>,
-    work: Condvar,
-}
-
-#[derive(Debug)]
-struct List {
-    reader: Arc<Reader>,
-    /// Number of the reader: which one a tile was read by.
-    turn: u64,
-    wanted: VecDeque<ImageTileId>,
-    /// Taken from the list since the last frame looked.
-    begun: Vec<ImageTileId>,
-    stopped: bool,
-}
-
-impl Shared {
-    /// No code that holds the lock can panic halfway through a change.
-    fn lock(&self) -> MutexGuard<'_, List> {
-        self.list.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Drape {
@@ -119,30 +66,22 @@ impl Drape {
         threads: bool,
     ) -> Result<Option<Self>, LayoutError> {
         let Some(imagery) = Imagery::open(&terrain)? else { return Ok(None) };
-        let place = terrain.header().imagery;
-        Self::over(terrain, imagery, place, formats, threads).map(Some)
+        Self::over(PictureFile { terrain, imagery }, formats, threads).map(Some)
     }
 
-    /// As [`Drape::of`], of imagery that was found at `place` in the file.
+    /// As [`Drape::of`], of a picture that was opened.
     ///
     /// # Errors
     /// The system gives no thread.
     pub(crate) fn over(
-        terrain: Arc<Terrain>,
-        imagery: Imagery,
-        place: Option<ImageryPlace>,
+        PictureFile { terrain, imagery }: PictureFile,
         formats: &[ImageryFormat],
         threads: bool,
     ) -> Result<Self, LayoutError> {
         let own = imagery.shape();
-        let format = match own.format {
-            TileFormat::Bc1 => ImageryFormat::Bc1,
-            TileFormat::Bc7 => ImageryFormat::Bc7,
-            TileFormat::Rgba8 => ImageryFormat::Rgba8,
-        };
-        let decodes = !formats.contains(&format);
+        let (format, decodes) = taken_as(own.format, formats);
         let shape = ImageryShape {
-            format: if decodes { ImageryFormat::Rgba8 } else { format },
+            format,
             texels: own.texels,
             levels: own.levels,
             origin_m: own.origin_m,
@@ -154,15 +93,23 @@ impl Drape {
             reader,
             threads,
             shape,
-            place,
-            follows: false,
             painted: HashMap::new(),
-            turned: HashSet::new(),
+            at_hand: HashMap::new(),
             is_behind: false,
             frame: 0,
             trouble: HashMap::new(),
             errors: VecDeque::new(),
         })
+    }
+
+    /// Suits the tiles to a device that takes such formats, in place of the one before.
+    pub(crate) fn suit(&mut self, formats: &[ImageryFormat]) {
+        let (format, decodes) = taken_as(self.reader.imagery.shape().format, formats);
+        self.shape.format = format;
+        if decodes != self.reader.decodes {
+            let Reader { terrain, imagery, .. } = &*self.reader;
+            self.turn_to(Reader { terrain: Arc::clone(terrain), imagery: imagery.clone(), decodes });
+        }
     }
 
     /// What the renderer is told of the image.
@@ -175,42 +122,25 @@ impl Drape {
         self.reader.imagery.shape().format.can_be_made()
     }
 
-    /// Takes over what was painted, committed, undone or redone: these tiles changed, and the file's header says now that the image lies at `place`.
-    pub(crate) fn repainted(
-        &mut self,
-        renderer: &mut Renderer,
-        tiles: &BTreeSet<TileId>,
-        painter: &Painter,
-        place: Option<ImageryPlace>,
-    ) {
-        if self.follows && tiles.is_empty() && place == self.place {
-            return;
+    /// Takes over what was painted, committed, undone or redone of this picture.
+    pub(crate) fn repainted(&mut self, renderer: &mut Renderer, repaint: Repaint) {
+        if let Picture::Moved(PictureFile { terrain, imagery }) = repaint.picture {
+            self.turn_to(Reader { terrain, imagery, decodes: self.reader.decodes });
         }
-        self.follows = true;
-        if place != self.place {
-            self.place = place;
-            self.turn_to(Reader {
-                terrain: Arc::clone(painter.terrain()),
-                imagery: painter.imagery().clone(),
-                decodes: self.reader.decodes,
-            });
-        }
-        let painted = |id: TileId| Some((of_renderer(id), painter.painted_tile(id)?));
-        self.painted = painter.painted().into_iter().filter_map(painted).collect();
-        let tiles: Vec<ImageTileId> = tiles.iter().copied().map(of_renderer).collect();
+        self.painted = repaint.painted.into_iter().map(|(id, tile)| (of_renderer(id), tile)).collect();
+        let tiles: Vec<ImageTileId> = repaint.tiles.into_iter().map(of_renderer).collect();
         renderer.change_imagery(&tiles);
-        self.turned.extend(tiles.into_iter().filter(|id| !self.painted.contains_key(id)));
+        tiles.iter().for_each(|id| {
+            self.at_hand.remove(id);
+        });
+        self.at_hand.extend(repaint.read.into_iter().map(|(id, texels)| (of_renderer(id), texels)));
     }
 
     /// Reads by another reader from now on.
     fn turn_to(&mut self, reader: Reader) {
         self.reader = Arc::new(reader);
         if let Some(threads) = &mut self.threads {
-            threads.turn += 1;
-            let mut list = threads.shared.lock();
-            list.reader = Arc::clone(&self.reader);
-            list.turn = threads.turn;
-            list.wanted.clear();
+            threads.turn_to(&self.reader);
         }
     }
 
@@ -238,11 +168,7 @@ impl Drape {
 
     /// Whether tiles that the last frame wanted are on their way.
     pub(crate) fn is_waiting(&self) -> bool {
-        let is_reading = |threads: &Threads| {
-            let list = threads.shared.lock();
-            !threads.under_way.is_empty() || !list.begun.is_empty() || !list.wanted.is_empty()
-        };
-        self.is_behind || self.threads.as_ref().is_some_and(is_reading)
+        self.is_behind || self.threads.as_ref().is_some_and(Threads::is_reading)
     }
 
     /// What could not be read and nobody has heard of yet.
@@ -252,7 +178,7 @@ impl Drape {
 
     fn serve_all(&mut self, renderer: &mut Renderer, view: &FrameView) -> Result<Served, RenderError> {
         let mut served = Served::default();
-        self.turned.clear();
+        self.at_hand.clear();
         loop {
             let wanted: Vec<ImageTileId> = renderer.want_imagery(view, usize::MAX).to_vec();
             let before = served.tiles;
@@ -279,11 +205,11 @@ impl Drape {
         let mut served = Served::default();
         let mut come = Vec::new();
         while (served.tiles as usize) < most
-            && let Ok((turn, id, tile)) = threads.arrivals.try_recv()
+            && let Some((is_valid, id, tile)) = threads.take()
         {
             come.push(id);
             // What was read before it changed is not what it is.
-            if turn == threads.turn && !self.painted.contains_key(&id) {
+            if is_valid && !self.painted.contains_key(&id) {
                 self.give(renderer, id, tile, &mut served)?;
             }
         }
@@ -292,25 +218,11 @@ impl Drape {
         // Decoding a tile takes as long as sending many.
         let at_hand = if self.reader.decodes { most } else { AT_HAND };
         self.serve_at_hand(renderer, &mut wanted, at_hand, &mut served)?;
-        let mut list = threads.shared.lock();
-        // What has come was begun, in this frame perhaps.
-        threads.under_way.extend(list.begun.drain(..));
-        come.iter().for_each(|id| {
-            threads.under_way.remove(id);
-        });
-        list.wanted.clear();
-        list.wanted.extend(
-            wanted.into_iter().filter(|id| !threads.under_way.contains(id) && !self.is_in_trouble(*id)),
-        );
-        let any = !list.wanted.is_empty();
-        drop(list);
-        if any {
-            threads.shared.work.notify_all();
-        }
+        threads.ask(&come, wanted.into_iter().filter(|id| !self.is_in_trouble(*id)));
         Ok(served)
     }
 
-    /// Gives those of the wanted tiles that are in memory or were turned to, `most` at most, and takes what need not be read off the list.
+    /// Gives those of the wanted tiles that are in memory, `most` at most, and takes what need not be read off the list.
     fn serve_at_hand(
         &mut self,
         renderer: &mut Renderer,
@@ -318,19 +230,22 @@ impl Drape {
         most: usize,
         served: &mut Served,
     ) -> Result<(), RenderError> {
-        let turned = std::mem::take(&mut self.turned);
+        let mut at_hand = std::mem::take(&mut self.at_hand);
         let before = served.tiles;
         let (mut given, mut left) = (0, 0);
         let mut to_read = Vec::with_capacity(wanted.len());
         for id in wanted.drain(..) {
             let is_painted = self.painted.contains_key(&id);
-            if !is_painted && (given == most || self.is_in_trouble(id) || !turned.contains(&id)) {
+            if !is_painted && (given == most || !at_hand.contains_key(&id)) {
                 to_read.push(id);
             } else if given == most {
                 left += 1;
             } else {
                 given += 1;
-                let tile = self.tile(id);
+                let tile = match at_hand.remove(&id).filter(|_| !is_painted) {
+                    Some(texels) => Ok(texels.and_then(|texels| self.reader.as_taken(texels))),
+                    None => self.tile(id),
+                };
                 self.give(renderer, id, tile, served)?;
             }
         }
@@ -380,73 +295,16 @@ impl Drape {
     }
 }
 
-impl Reader {
-    fn read(&self, id: ImageTileId) -> Tile {
-        let id = TileId { level: id.level, x: id.x, y: id.y };
-        let mut tile = Vec::new();
-        let is_there = self.imagery.read_tile(&self.terrain, id, &mut tile)?;
-        Ok(if is_there { self.as_taken(tile) } else { None })
-    }
-
-    /// A tile as the device takes it. One that was read has the length of one.
-    fn as_taken(&self, tile: Vec<u8>) -> Option<Vec<u8>> {
-        if self.decodes { decode_tile(self.imagery.shape().format, &tile) } else { Some(tile) }
-    }
-}
-
-impl Threads {
-    fn start(reader: &Arc<Reader>) -> Result<Self, LayoutError> {
-        let list = List {
-            reader: Arc::clone(reader),
-            turn: 0,
-            wanted: VecDeque::new(),
-            begun: Vec::new(),
-            stopped: false,
-        };
-        let shared = Arc::new(Shared { list: Mutex::new(list), work: Condvar::new() });
-        let (sender, arrivals) = channel();
-        let threads = Self { shared, arrivals, under_way: HashSet::new(), turn: 0 };
-        let path = reader.terrain.path();
-        for i in 0..THREADS {
-            let (shared, sender) = (Arc::clone(&threads.shared), sender.clone());
-            std::thread::Builder::new()
-                .name(format!("image reader {i}"))
-                .spawn(move || serve(&shared, &sender))
-                .map_err(|e| LayoutError::io(path, "cannot start a thread that reads the image", e))?;
-        }
-        Ok(threads)
-    }
-}
-
-impl Drop for Threads {
-    fn drop(&mut self) {
-        self.shared.lock().stopped = true;
-        // Threads end by themselves; one that storage keeps waiting must not keep the program from ending.
-        self.shared.work.notify_all();
-    }
-}
-
 fn of_renderer(TileId { level, x, y }: TileId) -> ImageTileId {
     ImageTileId { level, x, y }
 }
 
-/// One thread's life.
-fn serve(shared: &Shared, arrivals: &Sender<Arrival>) {
-    let mut list = shared.lock();
-    loop {
-        if list.stopped {
-            return;
-        }
-        let Some(id) = list.wanted.pop_front() else {
-            list = shared.work.wait(list).unwrap_or_else(PoisonError::into_inner);
-            continue;
-        };
-        list.begun.push(id);
-        let (turn, reader) = (list.turn, Arc::clone(&list.reader));
-        drop(list);
-        if arrivals.send((turn, id, reader.read(id))).is_err() {
-            return;
-        }
-        list = shared.lock();
-    }
+/// How a device that takes such formats is given tiles of a format, and whether they are decoded for that.
+fn taken_as(own: TileFormat, formats: &[ImageryFormat]) -> (ImageryFormat, bool) {
+    let format = match own {
+        TileFormat::Bc1 => ImageryFormat::Bc1,
+        TileFormat::Bc7 => ImageryFormat::Bc7,
+        TileFormat::Rgba8 => ImageryFormat::Rgba8,
+    };
+    if formats.contains(&format) { (format, false) } else { (ImageryFormat::Rgba8, true) }
 }

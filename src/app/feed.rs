@@ -5,10 +5,10 @@
 use super::full_mesh::FullMesh;
 use terrasoar::refine::kinetic::{Kinetic, Patch, PatchVertex};
 use terrasoar::refine::{Culling, Engine, Probe, Work};
-use terrasoar::stream::sound;
+use terrasoar::stream::{GroundPatch, sound};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::edit::{Changes, Editor};
+use terrasoar_layout::directory::Entry;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::record::{RecordCodec, Vertex};
 use terrasoar_layout::store::RecordStore;
@@ -63,9 +63,25 @@ pub(crate) trait Feed {
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64>;
 
     /// Takes over edits of the ground. Whether it can: only feeds of windows do.
-    fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<bool, LayoutError> {
-        let _ = (changes, editor);
+    fn ground_changed(&mut self, patch: GroundPatch) -> Result<bool, LayoutError> {
+        let _ = patch;
         Ok(false)
+    }
+
+    /// Takes notice that edited pages are in the file, at these places.
+    fn relocate(&mut self, places: &[(u64, Entry)]) {
+        let _ = places;
+    }
+
+    /// Edited pages kept in memory, for they are not in the file yet.
+    fn held_pages(&self) -> usize {
+        0
+    }
+
+    /// Culls in another way; the next update begins anew. Whether it can: only feeds of windows do.
+    fn set_culling(&mut self, culling: Culling) -> bool {
+        let _ = culling;
+        false
     }
 
     /// Asks for what the exact height at a place needs.

@@ -7,10 +7,14 @@ mod border;
 pub(crate) mod drape;
 pub(crate) mod feed;
 pub(crate) mod full_mesh;
+mod options;
 pub(crate) mod overview;
 mod pending;
+pub(crate) mod repaint;
 #[allow(dead_code, reason = "windows and tests use more of a scene than pictures do")]
 pub(crate) mod scene;
+mod sight;
 #[allow(dead_code, reason = "pictures without a window are of mapped files")]
 pub(crate) mod streamed;
 pub(crate) mod studio;
+mod tile_reader;

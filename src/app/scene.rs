@@ -4,27 +4,32 @@
 //! come one by one, so refinement may be frozen while the eye goes on: draw without update, and say which view the mesh is for. Updates that
 //! are not drawn cost nothing but memory for their changes; before the first picture not even that.
 //!
-//! **The device holds nothing that is not here.** After its loss [`Scene::recover`] takes a new one, and the next picture is the same. Light comes
-//! from tiles of heights: a bounded number a frame for a window, all of them for a picture that must repeat byte by byte.
+//! **The device holds nothing that is not here.** After its loss [`Scene::recover`] takes a new one, which may be able to do other things, and the next picture is the same. Light
+//! comes from tiles of heights: a bounded number a frame for a window, all of them for a picture that must repeat byte by byte.
 //!
 //! Cost on the processor: the engine's update, a copy of its patch, some 2 ms a tile.
 
+pub(crate) use super::options::{Drawn, SceneError, SceneOptions, TileService};
+
 use super::border::border;
-use super::drape::{Drape, Served};
-use super::feed::{Feed, PictureEngine, Refined, feed};
+use super::drape::Drape;
+use super::feed::{Feed, Refined, feed};
 use super::pending::Pending;
+use super::repaint::{Picture, Repaint};
+use super::sight::{ahead, frame_view, shape};
 use super::streamed::streamed_feed;
-use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 use terrasoar::refine::Culling;
+use terrasoar::stream::GroundPatch;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::edit::{Changes, Edit, EditSession, Editor, Repainted};
-use terrasoar_layout::imagery::{Imagery, Paint, Painter};
+use terrasoar_layout::directory::Entry;
+use terrasoar_layout::edit::Edit;
+use terrasoar_layout::imagery::{Imagery, Paint};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{
-    DrawStats, Frame, FrameView, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions,
-    Target, TerrainShape, TileId, TileStats, UploadStats, wgpu,
+    Frame, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target, TerrainShape,
+    TileId, TileStats, UploadStats, wgpu,
 };
 
 /// Tiles that are asked for, for each that is given in a frame.
@@ -34,84 +39,6 @@ const TILES_ASKED: usize = 8;
 const IMAGE_TILES_A_FRAME: usize = 8;
 /// Texels across the scorch of a crater at most: one as wide takes a third of a second.
 const WIDEST_SCORCH: f64 = 2048.0;
-/// Frames ahead of the eye that tiles of the image are asked for.
-const FRAMES_AHEAD: f64 = 24.0;
-
-/// How a scene is made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct SceneOptions {
-    /// What makes the mesh.
-    pub engine: PictureEngine,
-    /// Where what lies out of view is left out.
-    pub culling: Culling,
-    /// Normal tiles given a frame.
-    pub tiles: TileService,
-    /// Device memory for the tiles of the image, in bytes.
-    pub imagery_bytes: u64,
-    /// Whether frames are timed on the device, where it can ([`Scene::gpu_time_ms`]).
-    pub timestamps: bool,
-}
-
-impl SceneOptions {
-    /// Whether frames must not wait.
-    fn is_for_a_window(self) -> bool {
-        self.tiles != TileService::All
-    }
-}
-
-impl Default for SceneOptions {
-    fn default() -> Self {
-        Self {
-            engine: PictureEngine::default(),
-            culling: Culling::default(),
-            tiles: TileService::default(),
-            imagery_bytes: Renderer::IMAGERY_BYTES,
-            timestamps: false,
-        }
-    }
-}
-
-/// How many of the normal tiles that a view lacks it is given before it is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum TileService {
-    /// All: the picture depends on the view alone.
-    #[default]
-    All,
-    /// So many a frame, the coarsest first; what is missing shows coarser shading for some frames.
-    AFrame(usize),
-}
-
-/// Why there is no scene or picture.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub(crate) enum SceneError {
-    /// The terrain's source does not lend its bytes.
-    #[error("{0}: pictures need a mapped or in-memory terrain")]
-    NotInAddressSpace(String),
-    /// The terrain cannot be read.
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// The renderer or its device failed. [`RenderError::DeviceLost`] is over with [`Scene::recover`].
-    #[error(transparent)]
-    Render(#[from] RenderError),
-}
-
-/// What a picture cost.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Drawn {
-    /// Mesh sent to the device.
-    pub upload: UploadStats,
-    /// Draw calls.
-    pub draw: DrawStats,
-    /// Tiles given and their bytes.
-    pub tiles: [u64; 2],
-    /// Tiles that the view still lacks.
-    pub tiles_missing: u32,
-    /// Tiles of the image given.
-    pub image: Served,
-    /// Tiles of the image that the view still lacks.
-    pub image_missing: u32,
-}
 
 /// An opened terrain, its engine and its renderer.
 pub(crate) struct Scene<'a> {
@@ -329,41 +256,51 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// Edits of another terrain.
-    pub(crate) fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<bool, LayoutError> {
-        if !self.feed.ground_changed(changes, editor)? {
+    pub(crate) fn ground_changed(&mut self, patch: GroundPatch) -> Result<bool, LayoutError> {
+        let areas = patch.samples.clone();
+        if !self.feed.ground_changed(patch)? {
             return Ok(false);
         }
-        for rect in &changes.samples {
+        for rect in &areas {
             self.renderer.change_heights([rect.west, rect.south], [rect.east, rect.north]);
         }
         Ok(true)
     }
 
-    /// Takes over what became of the image in an editing session: the next picture shows paint, an undo and a redo. To be called after each of them, and after a commit.
+    /// Takes notice that edits are in the file: these pages lie there now, as they were told last.
+    pub(crate) fn committed(&mut self, places: &[(u64, Entry)]) {
+        self.feed.relocate(places);
+    }
+
+    /// Takes over what became of the image in an editing session: the next picture shows paint, an undo and a redo.
     ///
     /// # Errors
-    /// Another image, which an undo or a redo led to, cannot be read or shown.
-    pub(crate) fn repainted(&mut self, session: &mut EditSession) -> Result<(), SceneError> {
-        let Repainted { tiles, is_another } = session.take_repainted();
-        let place = session.header().imagery;
-        if is_another {
-            let (formats, threads) = (self.formats, self.options.is_for_a_window());
-            let over = |painter: &Painter| {
-                let (terrain, imagery) = (Arc::clone(painter.terrain()), painter.imagery().clone());
-                Drape::over(terrain, imagery, place, formats, threads)
-            };
-            self.drape = session.open_picture()?.map(over).transpose()?;
-            let shape = self.drape.as_ref().map(Drape::shape);
-            self.renderer.set_imagery(shape, self.options.imagery_bytes)?;
+    /// Another image, which an undo or a redo led to, cannot be shown.
+    pub(crate) fn repainted(&mut self, mut repaint: Repaint) -> Result<(), SceneError> {
+        match std::mem::replace(&mut repaint.picture, Picture::Same) {
+            Picture::Another(file) => {
+                let threads = self.options.is_for_a_window();
+                self.drape = Some(Drape::over(file, self.formats, threads)?);
+                self.show_drape()?;
+            }
+            Picture::Gone => {
+                self.drape = None;
+                self.show_drape()?;
+            }
+            same => repaint.picture = same,
         }
-        if let (Some(drape), Some(painter)) = (&mut self.drape, session.painter()) {
-            drape.repainted(&mut self.renderer, &tiles, painter, place);
+        if let Some(drape) = &mut self.drape {
+            drape.repainted(&mut self.renderer, repaint);
         }
         Ok(())
     }
 
-    /// What craters among these edits burn into the image: nothing where there is none, or none that this build can paint, and by none that is too wide for a frame to
-    /// wait for.
+    fn show_drape(&mut self) -> Result<(), RenderError> {
+        let shape = self.drape.as_ref().map(Drape::shape);
+        self.renderer.set_imagery(shape, self.options.imagery_bytes)
+    }
+
+    /// What craters among these edits burn into the image: nothing where there is none, or none that this build can paint, and by none that is too wide to follow the hand.
     pub(crate) fn scorches_of(&self, edits: &[Edit]) -> Vec<Paint> {
         let Some(drape) = self.drape.as_ref().filter(|drape| drape.can_be_painted()) else {
             return Vec::new();
@@ -403,11 +340,16 @@ impl<'a> Scene<'a> {
         self.walls = Some((edges, bottom_m));
     }
 
-    /// Goes on with another device, after the loss of the old one: the next picture is as if nothing had happened. The engine is not touched.
+    /// Goes on with another device, after the loss of the old one: the next picture is as if nothing had happened. All that follows from what a device can do follows from the new
+    /// one: formats and decoding of the image's tiles, sizes of pools, how ranges are drawn. The engine is not touched.
     ///
     /// # Errors
-    /// What [`Renderer::new`] says.
+    /// What [`Renderer::new`] says; an image that the new device cannot show.
     pub(crate) fn recover(&mut self, gpu: &Gpu) -> Result<(), SceneError> {
+        self.formats = gpu.capabilities.imagery_formats();
+        if let Some(drape) = &mut self.drape {
+            drape.suit(self.formats);
+        }
         self.renderer = new_renderer(*self.renderer.terrain(), self.drape.as_ref(), gpu, self.options)?;
         self.pending = Pending::default();
         self.pending.changed = true;
@@ -415,6 +357,24 @@ impl<'a> Scene<'a> {
             self.renderer.set_walls(edges, *bottom_m);
         }
         Ok(())
+    }
+
+    /// Culls in another way from now on; whatever was edited stays so. The next update makes the mesh anew, and it goes to the device as a whole. Whether it can: only scenes of
+    /// windows do.
+    ///
+    /// # Errors
+    /// As [`Scene::recover`]; the scene is then as it was.
+    pub(crate) fn set_culling(&mut self, culling: Culling, gpu: &Gpu) -> Result<bool, SceneError> {
+        let renderer = new_renderer(*self.renderer.terrain(), self.drape.as_ref(), gpu, self.options)?;
+        if !self.feed.set_culling(culling) {
+            return Ok(false);
+        }
+        self.options.culling = culling;
+        self.renderer = renderer;
+        self.pending = Pending::default();
+        // They stood along the old mesh.
+        self.walls = None;
+        Ok(true)
     }
 
     /// The renderer, for what it counts: tiles, bytes, depth, time.
@@ -433,17 +393,6 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Where a steady eye will be in some frames.
-fn ahead(before: &View, now: &View) -> View {
-    let turned = |before: f64, now: f64| now + FRAMES_AHEAD * (now - before).sin();
-    View {
-        eye_m: now.eye_m + FRAMES_AHEAD * (now.eye_m - before.eye_m),
-        yaw_rad: turned(before.yaw_rad, now.yaw_rad),
-        pitch_rad: turned(before.pitch_rad, now.pitch_rad).clamp(-FRAC_PI_2, FRAC_PI_2),
-        ..*now
-    }
-}
-
 fn new_renderer(
     shape: TerrainShape,
     drape: Option<&Drape>,
@@ -455,29 +404,4 @@ fn new_renderer(
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shape, renderer_options)?;
     renderer.set_imagery(drape.map(Drape::shape), options.imagery_bytes)?;
     Ok(renderer)
-}
-
-/// What the renderer needs to know of a terrain.
-pub(crate) fn shape(terrain: &Terrain) -> TerrainShape {
-    let grid = terrain.grid();
-    TerrainShape {
-        spacing_m: grid.spacing_m(),
-        samples: grid.samples(),
-        height_range_m: terrain.header().height_range_m,
-    }
-}
-
-/// A view as the renderer takes it.
-pub(crate) fn frame_view(view: &View) -> FrameView {
-    let [right, up, forward] = view.axes();
-    FrameView {
-        eye_m: view.eye_m,
-        right,
-        up,
-        forward,
-        vertical_fov_rad: view.vertical_fov_rad,
-        viewport_px: [view.viewport.width_px, view.viewport.height_px],
-        tolerance_px: view.tolerance_px,
-        vertical_exaggeration: view.vertical_exaggeration,
-    }
 }

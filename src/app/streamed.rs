@@ -9,10 +9,10 @@ use std::sync::Arc;
 use std::time::Duration;
 use terrasoar::refine::Culling;
 use terrasoar::refine::kinetic::Patch;
-use terrasoar::stream::{Prefetch, StreamFrame, Streamed, Threads, sound};
+use terrasoar::stream::{GroundPatch, Prefetch, StreamFrame, Streamed, Threads, sound};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::edit::{Changes, Editor};
+use terrasoar_layout::directory::Entry;
 use terrasoar_layout::loader::Loader;
 use terrasoar_layout::order::slot_of;
 use terrasoar_layout::pool::PagePool;
@@ -147,9 +147,23 @@ impl<C: RecordCodec> Feed for StreamedFeed<C> {
         sound(self.streamed.engine().store(), east_m, north_m).height_m
     }
 
-    fn ground_changed(&mut self, changes: &Changes, editor: &Editor) -> Result<bool, LayoutError> {
-        self.streamed.ground_changed(changes, editor)?;
+    fn ground_changed(&mut self, patch: GroundPatch) -> Result<bool, LayoutError> {
+        self.streamed.take_ground(patch)?;
         Ok(true)
+    }
+
+    fn relocate(&mut self, places: &[(u64, Entry)]) {
+        self.streamed.relocate(places);
+    }
+
+    fn held_pages(&self) -> usize {
+        self.streamed.held_pages()
+    }
+
+    fn set_culling(&mut self, culling: Culling) -> bool {
+        self.streamed.set_culling(culling);
+        (self.begun, self.frame) = (false, StreamFrame::default());
+        true
     }
 
     fn want_ground(&mut self, east_m: f64, north_m: f64) {

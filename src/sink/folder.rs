@@ -5,7 +5,6 @@
 //! copied out can leave that hidden folder. Files of other names are left alone. Cost: everything is written twice, and takes twice the room for a moment.
 
 use super::file::FileSink;
-use std::ffi::OsString;
 use std::fs::{File, Permissions};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -84,32 +83,40 @@ impl FolderSink {
 
 fn publish_new(folder: &Path, spool: &mut File, files: &[(String, u64)]) -> Result<(), LayoutError> {
     let failed = |source| LayoutError::io(folder, CANNOT_MAKE, source);
-    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(parent).map_err(failed)?;
+    // Folders above it that are missing come into being with it, by one call.
+    let top = folder.ancestors().take_while(|above| !above.as_os_str().is_empty() && !above.exists()).last();
+    let top = top.unwrap_or(folder);
+    let parent = top.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let (_guard, hidden) = unfinished::make(|| {
-        let hidden = hidden_in(parent, folder)?;
+        let hidden = hidden_in(parent, top)?;
         Ok((hidden.path().to_owned(), hidden))
     })
     .map_err(failed)?;
+    let inside = folder.strip_prefix(top).unwrap_or(Path::new(""));
+    let filled =
+        if inside.as_os_str().is_empty() { hidden.path().to_owned() } else { hidden.path().join(inside) };
+    std::fs::create_dir_all(&filled).map_err(failed)?;
     for (name, bytes) in files {
-        let written = File::create_new(hidden.path().join(name)).and_then(|mut file| {
+        let written = File::create_new(filled.join(name)).and_then(|mut file| {
             copy(spool, *bytes, &mut file)?;
             file.sync_all()
         });
         written.map_err(|source| LayoutError::io(&folder.join(name), CANNOT_WRITE, source))?;
     }
-    sync_folder(hidden.path()).map_err(failed)?;
-    std::fs::rename(hidden.path(), folder).map_err(failed)?;
+    for synced in filled.ancestors().take_while(|above| above.starts_with(hidden.path())) {
+        sync_folder(synced).map_err(failed)?;
+    }
+    std::fs::rename(hidden.path(), top).map_err(failed)?;
     // What had this name has another now.
     let _ = hidden.keep();
     sync_folder(parent).map_err(failed)
 }
 
-/// A new folder beside `folder`, with a name that says what it will be.
+/// A new folder in `parent`, where `folder` will be, with a name that says so.
 fn hidden_in(parent: &Path, folder: &Path) -> io::Result<tempfile::TempDir> {
-    let mut prefix = OsString::from(".");
-    prefix.push(folder.file_name().unwrap_or_default());
-    prefix.push(".");
+    // A file system takes names of 255 bytes, and something is added to this one.
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let prefix = format!(".{}.", &name[..name.floor_char_boundary(200)]);
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(".terrasoar-new");
     #[cfg(unix)]
@@ -170,14 +177,17 @@ mod tests {
     #[test]
     fn nothing_is_there_before_the_end_and_everything_then() {
         let outside = tempfile::tempdir().unwrap();
-        let folder = outside.path().join("x/report");
+        let folder = outside.path().join("x/y/report");
         let sink = filled(&folder, &[("a", "one"), ("b", ""), ("c", "three")]);
         assert!(names(outside.path()).is_empty());
         drop(sink);
         assert!(names(outside.path()).is_empty());
         let paths = filled(&folder, &[("a", "one"), ("b", ""), ("c", "three")]).publish().unwrap();
         assert_eq!(paths, ["a", "b", "c"].map(|name| folder.join(name)));
-        assert_eq!((names(&folder).len(), names(&outside.path().join("x"))), (3, vec!["report".to_owned()]));
+        assert_eq!(
+            (names(&folder).len(), names(&outside.path().join("x/y"))),
+            (3, vec!["report".to_owned()])
+        );
         assert_eq!(std::fs::read_to_string(folder.join("c")).unwrap(), "three");
 
         // What else lies in a folder stays.
@@ -185,7 +195,8 @@ mod tests {
         filled(&folder, &[("c", "3"), ("d", "4")]).publish().unwrap();
         assert_eq!(names(&folder), ["a", "b", "c", "d", "mine"]);
         assert_eq!(std::fs::read_to_string(folder.join("c")).unwrap(), "3");
-        assert_eq!(names(&outside.path().join("x")), ["report"]);
+        assert_eq!(names(&outside.path().join("x/y")), ["report"]);
+        assert_eq!(names(outside.path()), ["x"]);
     }
 
     #[test]

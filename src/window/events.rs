@@ -88,9 +88,8 @@ impl Session {
             viewer.end_recording();
             let closed = viewer.close_workshop();
             self.failure = viewer.failure.take();
-            if let Err(error) = closed {
-                self.failure
-                    .get_or_insert(anyhow::Error::from(error).context("the last edits could not be saved"));
+            if let Err(words) = closed {
+                self.failure.get_or_insert(anyhow::anyhow!("the last edits could not be saved: {words}"));
             }
             if let Some(path) = &self.settings_path
                 && let Err(error) = viewer.settings_to_keep().save(path)

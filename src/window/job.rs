@@ -1,8 +1,9 @@
-//! Making a terrain file from elevation data that was dropped on the window, on a thread of its own.
+//! Making a terrain file from elevation data that was dropped on the window, on threads of its own.
 //!
 //! The file goes beside the elevation data where nothing has its name yet, else into the folder for temporary files. **Whatever goes wrong comes back as
 //! words.** A window that closes meanwhile leaves nothing: a build's output has no name before it is complete.
 
+use super::threads;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -56,7 +57,11 @@ impl Job {
         let thread = std::thread::Builder::new()
             .name("build".into())
             .spawn(move || {
-                let built = make(&from, &heard);
+                // Frames share their work out to the other pool, and would wait for parts of the build there.
+                let built = match threads::pool("build", usize::MAX) {
+                    Ok(pool) => pool.install(|| make(&from, &heard)),
+                    Err(e) => Err(format!("{}: no threads to build with: {e}", from.display())),
+                };
                 wake();
                 built
             })

@@ -44,16 +44,22 @@ impl Stage {
         Self::new(Terrain::open_unmapped(path)?, gpu, culling, cache_bytes)
     }
 
-    /// The same terrain culled in another way.
+    /// The same terrain as it is in the file now, on another scene.
     ///
     /// # Errors
-    /// As [`Stage::open`]; the stage is then as it was.
+    /// As [`Stage::open`].
+    pub(crate) fn again(&self, gpu: &Gpu) -> Result<Self> {
+        Self::new(self.terrain.open_again_unmapped()?, gpu, self.culling, self.cache_bytes)
+    }
+
+    /// The same terrain culled in another way, with whatever was edited.
+    ///
+    /// # Errors
+    /// As [`Scene::set_culling`]; the stage is then as it was.
     pub(crate) fn set_culling(&mut self, culling: Culling, gpu: &Gpu) -> Result<()> {
         if culling != self.culling {
-            let again = self.terrain.open_again_unmapped();
-            let other =
-                again.map_err(Into::into).and_then(|it| Self::new(it, gpu, culling, self.cache_bytes));
-            *self = other.context("the way of culling stays as it was")?;
+            self.scene.set_culling(culling, gpu).context("the way of culling stays as it was")?;
+            self.culling = culling;
         }
         Ok(())
     }

@@ -78,7 +78,9 @@ pub(super) struct Viewer {
     under: Option<Hit>,
     tools: ToolBox,
     stroke: Option<Stroke>,
-    workshop: Option<Workshop>,
+    /// Number of the stroke or rain that was begun last.
+    strokes: u64,
+    workshop: Workshop,
     rain: Option<edit::Rain>,
     frame_at: Option<Instant>,
     frames: u64,
@@ -114,6 +116,7 @@ impl Viewer {
         let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
         let rig = sight::start(&stage, &screen, &window, &settings);
         let tools = ToolBox::new(stage.ground().extent_m());
+        let workshop = edit::workshop_for(&stage, &proxy);
         let mut viewer = Self {
             terrain_name: String::new(),
             window,
@@ -136,7 +139,8 @@ impl Viewer {
             under: None,
             tools,
             stroke: None,
-            workshop: None,
+            strokes: 0,
+            workshop,
             rain: None,
             frame_at: None,
             frames: 0,

@@ -9,6 +9,8 @@ mod edit_processes;
 mod engines;
 mod iobench;
 #[cfg(unix)]
+mod killed;
+#[cfg(unix)]
 mod kills;
 mod outputs;
 mod pictures;

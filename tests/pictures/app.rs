@@ -10,9 +10,17 @@ pub mod drape;
 pub mod feed;
 #[path = "../../src/app/full_mesh.rs"]
 pub mod full_mesh;
+#[path = "../../src/app/options.rs"]
+mod options;
 #[path = "../../src/app/pending.rs"]
 mod pending;
+#[path = "../../src/app/repaint.rs"]
+pub mod repaint;
 #[path = "../../src/app/scene.rs"]
 pub mod scene;
+#[path = "../../src/app/sight.rs"]
+mod sight;
 #[path = "../../src/app/streamed.rs"]
 pub mod streamed;
+#[path = "../../src/app/tile_reader.rs"]
+mod tile_reader;

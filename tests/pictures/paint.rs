@@ -1,5 +1,6 @@
 //! Paint of an editing session on a draped picture, as a window's scene shows it: in the very next frame, and gone in the next after it is taken back.
 
+use super::app::repaint::PictureWatch;
 use super::app::scene::{Scene, SceneOptions, TileService};
 use super::rig::view;
 use super::{Outcome, Test, ensure};
@@ -45,6 +46,7 @@ struct Window<'a> {
     scene: Scene<'a>,
     offscreen: Offscreen,
     look: Look,
+    watch: PictureWatch,
 }
 
 impl<'a> Window<'a> {
@@ -53,7 +55,21 @@ impl<'a> Window<'a> {
         let options = SceneOptions { tiles: TileService::AFrame(8), ..SceneOptions::default() };
         let scene = Scene::streamed(&terrain, 64 << 20, gpu, options).map_err(|e| e.to_string())?;
         let offscreen = Offscreen::new(&gpu.device, SIZE_PX).map_err(|e| e.to_string())?;
-        Ok(Self { gpu, scene, offscreen, look: Look { imagery: 1.0, ..Look::default() } })
+        Ok(Self {
+            gpu,
+            scene,
+            offscreen,
+            look: Look { imagery: 1.0, ..Look::default() },
+            watch: PictureWatch::default(),
+        })
+    }
+
+    /// Has the scene follow what became of the picture.
+    fn repainted(&mut self, session: &mut EditSession) -> Outcome {
+        match self.watch.look(session).map_err(|e| e.to_string())? {
+            Some(repaint) => self.scene.repainted(repaint).map_err(|e| e.to_string()),
+            None => Ok(()),
+        }
     }
 
     fn frame(&mut self, view: &View) -> Vec<u8> {
@@ -102,32 +118,32 @@ fn in_the_next_frame(gpu: &Gpu) -> Outcome {
 
     // Over a corner of four tiles.
     session.paint(&[burn([2016.0, 2080.0], 150.0)]).map_err(|e| e.to_string())?;
-    window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+    window.repainted(&mut session)?;
     let burnt = window.frame(&view);
     let seen = differing(&before, &burnt);
     ensure((1000..20_000).contains(&seen), || format!("{seen} pixels differ"))?;
     ensure(window.settled(&view)? == burnt, || "some of it comes late".into())?;
     session.commit("burnt").map_err(|e| e.to_string())?;
-    window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+    window.repainted(&mut session)?;
     ensure(window.settled(&view)? == burnt, || "a commit changes the picture".into())?;
 
     session.undo().map_err(|e| e.to_string())?;
-    window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+    window.repainted(&mut session)?;
     ensure(window.frame(&view) == before, || "an undo does not bring the picture back at once".into())?;
     session.redo().map_err(|e| e.to_string())?;
-    window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+    window.repainted(&mut session)?;
     ensure(window.frame(&view) == burnt, || "a redo does not bring the paint back at once".into())?;
 
     session.paint(&[burn([1800.0, 2000.0], 60.0)]).map_err(|e| e.to_string())?;
-    window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+    window.repainted(&mut session)?;
     ensure(window.frame(&view) != burnt, || "a second scorch is not seen".into())?;
     // A scene made anew shows what is not in the file too.
     let twice = window.settled(&view)?;
     let mut another = Window::open(gpu, &path)?;
-    another.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+    another.repainted(&mut session)?;
     ensure(another.settled(&view)? == twice, || "a scene made anew shows another picture".into())?;
     session.discard();
-    window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+    window.repainted(&mut session)?;
     ensure(window.frame(&view) == burnt, || "what is taken back stays".into())?;
 
     // Another device has nothing of it and shows the same.
@@ -149,16 +165,16 @@ fn reads_from_before(gpu: &Gpu) -> Outcome {
             window.frame(&view);
         }
         session.paint(&[burn([2016.0, 2080.0], 150.0)]).map_err(|e| e.to_string())?;
-        window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+        window.repainted(&mut session)?;
         window.frame(&view);
         session.commit("burnt").map_err(|e| e.to_string())?;
-        window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+        window.repainted(&mut session)?;
         if frames % 2 == 0 {
             window.frame(&view);
         }
         pictures.push(window.settled(&view)?);
         session.undo().map_err(|e| e.to_string())?;
-        window.scene.repainted(&mut session).map_err(|e| e.to_string())?;
+        window.repainted(&mut session)?;
         let after = window.settled(&view)?;
         ensure(after == before, || format!("after {frames} frames {} differ", differing(&after, &before)))?;
     }

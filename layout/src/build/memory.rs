@@ -31,9 +31,20 @@ impl MemoryPlan {
         sample_type: SampleType,
         options: &BuildOptions,
         threads: u64,
+        reading_bytes: u64,
     ) -> Result<Self, LayoutError> {
         let memory_mib = options.memory_mib;
-        let budget = memory_mib * MIB;
+        let budget = memory_mib.saturating_mul(MIB);
+        // While samples are read nothing is worked on yet, so this is beside the spool alone.
+        let reading = RESERVED_BYTES.saturating_add(reading_bytes);
+        if reading > budget {
+            let enough_mib = reading.div_ceil(MIB);
+            return Err(LayoutError::Usage(format!(
+                "{memory_mib} MiB are too few to read this elevation model, whose compression needs {} MiB at once; allow at least {enough_mib}",
+                reading_bytes.div_ceil(MIB)
+            ))
+            .mended_by(Remedy::Memory { enough_mib: Some(enough_mib) }));
+        }
         let [wide, high] = grid.samples().map(u64::from);
         let n = grid.side_steps();
         let single = sample_type.fits_f32();
@@ -61,7 +72,8 @@ impl MemoryPlan {
         let available = budget.saturating_sub(fixed);
         let tiles = || (0..=8).rev().map(|m| 1 << m).filter(|s| (smallest..=largest).contains(s));
         let largest_within = |bytes: u64| tiles().find(|s| work(*s) <= bytes);
-        if let Some(tile) = largest_within(available.saturating_sub(spool)).filter(|t| *t >= largest.min(128))
+        if let Some(tile) = largest_within(available.saturating_sub(spool))
+            .filter(|t| *t >= largest.min(128) && reading + spool <= budget)
         {
             return Ok(Self { tile, spool_bytes: spool });
         }
@@ -84,7 +96,7 @@ mod tests {
 
     fn plan(side: u32, sample_type: SampleType, memory_mib: u64) -> Result<MemoryPlan, LayoutError> {
         let grid = Grid::new([side, side - 1], [1.0, 1.0]).unwrap();
-        MemoryPlan::new(&grid, sample_type, &BuildOptions { memory_mib, ..Default::default() }, 2)
+        MemoryPlan::new(&grid, sample_type, &BuildOptions { memory_mib, ..Default::default() }, 2, 0)
     }
 
     #[test]
@@ -107,5 +119,19 @@ mod tests {
                 assert!(plan(side, sample_type, named - 1).is_err(), "{refusal}");
             }
         }
+    }
+
+    #[test]
+    fn what_reading_takes_counts() {
+        let grid = Grid::new([2049; 2], [1.0; 2]).unwrap();
+        let with = |memory_mib, reading_mib| {
+            let options = BuildOptions { memory_mib, ..Default::default() };
+            MemoryPlan::new(&grid, SampleType::U16, &options, 2, reading_mib * MIB)
+        };
+        assert!(with(512, 10).unwrap().spool_bytes > 0);
+        assert_eq!(with(512, 480).unwrap().spool_bytes, 0);
+        let refusal = with(64, 128).unwrap_err();
+        assert_eq!(refusal.remedy(), Some(Remedy::Memory { enough_mib: Some(152) }), "{refusal}");
+        assert!(with(152, 128).is_ok());
     }
 }

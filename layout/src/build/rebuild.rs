@@ -125,7 +125,7 @@ fn rebuild_kind<C: RecordCodec>(
     };
     let samples = u64::from(wide) * u64::from(high);
     let options = BuildOptions { memory_mib, ..BuildOptions::default() };
-    let memory = MemoryPlan::new(&grid, info.sample_type, &options, rayon::current_num_threads() as u64)?;
+    let memory = MemoryPlan::new(&grid, info.sample_type, &options, rayon::current_num_threads() as u64, 0)?;
     let advance = |n| progress.advance(n);
     progress.stage("reading", samples);
     let spool = Spool::new(disk, &info, None, file.target(), memory.spool_bytes, &advance)?;

@@ -68,7 +68,7 @@ impl<C: RecordCodec> Pages<C> {
         Self {
             k: terrain.grid().k(),
             terrain,
-            held: std::iter::repeat_with(|| None).take(count).collect(),
+            held: vec![None; count],
             flags: vec![0; count],
             moved: HashMap::new(),
             clean: 0,

@@ -9,11 +9,12 @@
 //! writing to is not replaced either ([`lock`](super::lock)).
 //!
 //! **A nameless file cannot replace another.** Where the target exists it gets a name of its own first, `.NAME.*.terrasoar-new`, and is renamed at once. A process killed between
-//! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away.
+//! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away. What has a name before it is complete is on the list of [`unfinished`].
 
 use super::lock::{ReplaceLock, WriteLock};
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
+use crate::unfinished;
 use std::fs::{File, Metadata};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -24,9 +25,9 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct AtomicFile {
     /// What it was asked for as, for messages.
-    name: PathBuf,
-    /// Where that leads.
     target: PathBuf,
+    /// Where that leads.
+    place: PathBuf,
     inner: Inner,
 }
 
@@ -34,7 +35,7 @@ pub struct AtomicFile {
 enum Inner {
     #[cfg(target_os = "linux")]
     Nameless(File),
-    Named(tempfile::NamedTempFile),
+    Named(unfinished::Guard, tempfile::NamedTempFile),
 }
 
 /// Whom a file replaces.
@@ -81,11 +82,11 @@ impl AtomicFile {
     /// [`LayoutError::Io`] if its folder does not exist or cannot be written to; [`LayoutError::Usage`] if `target` is something other than a regular file: a folder, a device, a FIFO.
     pub fn create(target: &Path) -> Result<Self, LayoutError> {
         let failed = |e| LayoutError::io(target, "cannot create the file", e);
-        let (name, target) = (target.to_owned(), resolved(target).map_err(failed)?);
-        check_replaceable(&name, &target)?;
+        let (target, place) = (target.to_owned(), resolved(target).map_err(failed)?);
+        check_replaceable(&target, &place)?;
         #[cfg(target_os = "linux")]
-        if let Some(file) = nameless(folder_of(&target)) {
-            return Ok(Self { name, target, inner: Inner::Nameless(file) });
+        if let Some(file) = nameless(folder_of(&place)) {
+            return Ok(Self { target, place, inner: Inner::Nameless(file) });
         }
         let mut builder = tempfile::Builder::new();
         builder.prefix(".terrasoar-").suffix(".partial");
@@ -95,8 +96,12 @@ impl AtomicFile {
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(std::fs::Permissions::from_mode(NEW_FILE_MODE));
         }
-        let file = builder.tempfile_in(folder_of(&target)).map_err(failed)?;
-        Ok(Self { name, target, inner: Inner::Named(file) })
+        let (guard, file) = unfinished::make(|| {
+            let file = builder.tempfile_in(folder_of(&place))?;
+            Ok((file.path().to_owned(), file))
+        })
+        .map_err(failed)?;
+        Ok(Self { target, place, inner: Inner::Named(guard, file) })
     }
 
     /// The file to write to.
@@ -104,13 +109,13 @@ impl AtomicFile {
         match &self.inner {
             #[cfg(target_os = "linux")]
             Inner::Nameless(file) => file,
-            Inner::Named(file) => file.as_file(),
+            Inner::Named(_, file) => file.as_file(),
         }
     }
 
     /// Name it will have, as it was asked for.
     pub fn target(&self) -> &Path {
-        &self.name
+        &self.target
     }
 
     /// Syncs what was written and gives the file its name, replacing what had it.
@@ -138,34 +143,34 @@ impl AtomicFile {
     }
 
     fn finish(self, disk: &dyn Disk, replaced: Replaced<'_>) -> Result<bool, LayoutError> {
-        let Self { name, target, inner } = self;
+        let Self { target, place, inner } = self;
         let failed = |e| {
             let when_full = "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
-            LayoutError::write(&name, "cannot write the file", when_full, e)
+            LayoutError::write(&target, "cannot write the file", when_full, e)
         };
         let file = match &inner {
             #[cfg(target_os = "linux")]
             Inner::Nameless(file) => file,
-            Inner::Named(file) => file.as_file(),
+            Inner::Named(_, file) => file.as_file(),
         };
-        let old = std::fs::symlink_metadata(&target).ok().filter(Metadata::is_file);
+        let old = std::fs::symlink_metadata(&place).ok().filter(Metadata::is_file);
         if let (Some(old), Replaced::Any | Replaced::Held(_)) = (&old, replaced) {
             take_over(file, old).map_err(failed)?;
         }
         disk.sync(file).map_err(failed)?;
         let _lock = match replaced {
-            Replaced::Any => Some(ReplaceLock::take(&target)?),
-            Replaced::Held(lock) if !lock.is_of(&target) => return Err(replaced_meanwhile(&name)),
+            Replaced::Any => Some(ReplaceLock::take(&place)?),
+            Replaced::Held(lock) if !lock.is_of(&place) => return Err(replaced_meanwhile(&target)),
             Replaced::Held(_) | Replaced::None => None,
         };
         if !matches!(replaced, Replaced::None) {
-            check_replaceable(&name, &target)?;
+            check_replaceable(&target, &place)?;
         }
-        let is_named = give_name(disk, inner, &target, replaced).map_err(failed)?;
+        let is_named = give_name(disk, inner, &place, replaced).map_err(failed)?;
         if is_named {
-            disk.sync_folder(folder_of(&target)).map_err(|e| {
+            disk.sync_folder(folder_of(&place)).map_err(|e| {
                 LayoutError::io(
-                    &name,
+                    &target,
                     "the file is complete, but its name cannot be brought to the disk and may be lost at a power cut",
                     e,
                 )
@@ -239,22 +244,25 @@ fn give_name(disk: &dyn Disk, inner: Inner, target: &Path, replaced: Replaced<'_
                 }
             }
             remove_left(target, STALE);
-            let before = tempfile::Builder::new()
-                .prefix(&prefix_before(target))
-                .suffix(SUFFIX_BEFORE)
-                .make_in(folder_of(target), |name| disk.link(&file, name))?
-                .into_temp_path();
+            let (_guard, before) = unfinished::make(|| {
+                let before = tempfile::Builder::new()
+                    .prefix(&prefix_before(target))
+                    .suffix(SUFFIX_BEFORE)
+                    .make_in(folder_of(target), |name| disk.link(&file, name))?
+                    .into_temp_path();
+                Ok((before.to_path_buf(), before))
+            })?;
             disk.rename(&before, target)?;
             // It is not called that any more.
             let _ = before.keep();
             Ok(true)
         }
-        Inner::Named(file) if only_new => match file.persist_noclobber(target) {
+        Inner::Named(_guard, file) if only_new => match file.persist_noclobber(target) {
             Ok(_) => Ok(true),
             Err(e) if e.error.kind() == ErrorKind::AlreadyExists => Ok(false),
             Err(e) => Err(e.error),
         },
-        Inner::Named(file) => {
+        Inner::Named(_guard, file) => {
             let before = file.into_temp_path();
             disk.rename(&before, target)?;
             let _ = before.keep();

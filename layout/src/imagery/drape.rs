@@ -104,8 +104,8 @@ fn append_all(
     let slots = Slots::read(source, 0)?;
     let mosaic = Mosaic::new(&images, &slots.header, options.extent)?;
     let shape = mosaic.shape(options.format);
-    let needed = memory_bytes(&shape) + mosaic.memory_bytes();
-    if needed > options.memory_mib << 20 {
+    let needed = memory_bytes(&shape).saturating_add(mosaic.memory_bytes());
+    if needed.div_ceil(1 << 20) > options.memory_mib {
         let needed_mib = needed.div_ceil(1 << 20);
         return Err(LayoutError::Usage(format!(
             "{} x {} texels of {} take {} MiB of memory and {} are allowed: allow more, or give a tiled GeoTIFF: \

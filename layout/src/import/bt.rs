@@ -22,7 +22,7 @@
 //! half a spacing inside, as GDAL reads and writes BT (VTP's own programs divide by samples - 1; a
 //! file of 1025 columns then differs by 0.1 %). A void is -32768 in every sample type. The `.prj`
 //! file beside a BT is not read; the header's zone and datum stand. The grid is read in blocks of 64
-//! columns and transposed; blocks in parallel, 2 MiB of samples a worker.
+//! columns and transposed; blocks in parallel, half a mebibyte of samples a worker.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};

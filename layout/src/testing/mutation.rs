@@ -361,7 +361,7 @@ impl Mutation {
         let at = part.at + if self.place & 1 == 0 { 0x014 } else { 0x018 };
         let value = match self.value & 3 {
             0 => self.value >> 8,
-            _ => 2 + (self.value >> 8) % (2 * image.u32_at(at)).max(1),
+            _ => 2 + (self.value >> 8) % image.u32_at(at).saturating_mul(2).max(1),
         };
         image.put(at, &value.to_le_bytes());
     }

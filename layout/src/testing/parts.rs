@@ -38,6 +38,8 @@ pub(super) struct Root {
     pub(super) page: u32,
     /// As the header says.
     pub(super) entries: usize,
+    /// Entries of all leaves, as the header says.
+    pub(super) record_pages: u64,
     /// Where root page, checksum and pages stored are said.
     pub(super) page_at: usize,
     pub(super) checksum_at: usize,
@@ -65,13 +67,15 @@ impl Parts {
     /// Follows headers and journal.
     pub(super) fn of(image: &Image<'_>) -> Self {
         let mut parts = Self::default();
-        let mut entries = 0;
+        let (mut entries, mut record_pages) = (0, 0);
         for at in image.headers() {
             let most = image.end() / ENTRY_BYTES;
             entries = (image.u32_at(at + 0x07c) as usize).min(most);
+            record_pages = image.u64_at(at + 0x068);
             parts.roots.insert(Root {
                 page: image.u32_at(at + 0x078),
                 entries,
+                record_pages,
                 page_at: at + 0x078,
                 checksum_at: at + 0x080,
                 stored_at: at + 0x070,
@@ -86,6 +90,7 @@ impl Parts {
                 parts.roots.insert(Root {
                     page: image.u32_at(state),
                     entries,
+                    record_pages,
                     page_at: state,
                     checksum_at: state + 0x04,
                     stored_at: state + 0x08,

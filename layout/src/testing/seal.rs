@@ -86,7 +86,8 @@ fn round(image: &mut Image<'_>, counts: Counts) -> bool {
         for i in 0..root.entries {
             let leaf = image.u32_at(at + i * ENTRY_BYTES);
             let Some(page) = page_of(image, leaf).filter(|_| leaf != 0) else { continue };
-            let entries = page.chunks_exact(ENTRY_BYTES);
+            let left = root.record_pages.saturating_sub(i as u64 * LEAF_ENTRIES);
+            let entries = page.chunks_exact(ENTRY_BYTES).take(left.min(LEAF_ENTRIES) as usize);
             stored += entries.filter(|entry| get_u32(entry, 0) != 0).count() as u64;
             let sum = checksum(page);
             changed |= image.put(at + i * ENTRY_BYTES + 4, &sum.to_le_bytes());

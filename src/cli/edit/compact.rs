@@ -68,7 +68,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let Compacted { header, bytes_before, commits_before, .. } =
         compact(&SystemDisk, file, overlay.as_deref(), out, &progress)?;
     drop(progress);
-    let commits = if args.output.is_none() { commits_before } else { 0 };
     let answer = Answer {
         file: overlay.as_ref().unwrap_or(file).display().to_string(),
         output: out.display().to_string(),
@@ -80,10 +79,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.json {
         return print_json(&answer);
     }
-    let ended = match commits {
-        0 => String::new(),
-        1 => "; 1 commit of edits can no longer be undone".into(),
-        more => format!("; {} commits of edits can no longer be undone", grouped(more)),
+    let ended = match commits_before {
+        commits if commits == 0 || args.output.is_some() => String::new(),
+        1 => "; the history ends: 1 commit of edits can no longer be undone".into(),
+        commits => {
+            format!("; the history ends: {} commits of edits can no longer be undone", grouped(commits))
+        }
     };
     print(&format!(
         "{}: {} bytes instead of {}, {} record pages, {:.1} s{ended}",

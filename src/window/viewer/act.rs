@@ -141,21 +141,28 @@ impl Viewer {
     }
 
     pub(super) fn open_terrain(&mut self, path: &Path) {
+        // First, for it may be the same file.
+        let closed = self.close_workshop();
+        if let Err(words) = &closed {
+            self.trouble(format!("edits of {} were lost: {words}", self.terrain_name));
+        }
         let (culling, cache_bytes) = (self.settings.culling(), self.plan.cache_bytes);
         match Stage::open(path, &self.screen.gpu, culling, cache_bytes) {
             Ok(stage) => {
                 self.end_recording();
-                if let Err(error) = self.close_workshop() {
-                    self.trouble(format!("edits of {} were lost: {error}", self.terrain_name));
-                }
-                self.stage = stage;
+                self.take_stage(stage);
                 self.tools = ToolBox::new(self.stage.ground().extent_m());
                 self.rig = sight::start(&self.stage, &self.screen, &self.window, &self.settings);
-                (self.player, self.frozen) = (None, None);
+                self.player = None;
                 self.name_terrain();
                 self.tell(&format!("opened {}", path.display()));
             }
-            Err(error) => self.trouble(format!("{error:#}")),
+            Err(error) => {
+                self.trouble(format!("{error:#}"));
+                if closed.is_err() {
+                    self.show_file();
+                }
+            }
         }
     }
 

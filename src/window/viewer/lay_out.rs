@@ -60,8 +60,6 @@ impl Viewer {
             if let Err(error) = self.stage.set_culling(self.settings.culling(), &self.screen.gpu) {
                 self.settings.culling.clone_from(&before.culling);
                 self.trouble(format!("{error:#}"));
-            } else {
-                self.follow_all();
             }
             self.frozen = None;
         }

@@ -62,7 +62,8 @@ impl Viewer {
         self.tell_state("raining", self.rain.is_some().to_string());
         self.tell_state("recording", self.recorder.is_some().to_string());
         self.tell_state("full-screen", self.window.fullscreen().is_some().to_string());
-        if !moving && !self.unsettled {
+        // What is ordered and not seen yet will make another picture.
+        if !moving && !self.unsettled && self.workshop.in_flight() == 0 {
             let Camera { eye_m, yaw_deg, pitch_deg, .. } = self.rig.camera;
             let place = format!("{:.2} {:.2} {:.2} {yaw_deg:.3} {pitch_deg:.3}", eye_m.x, eye_m.y, eye_m.z);
             self.tell_state("at-rest", place);

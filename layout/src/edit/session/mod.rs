@@ -3,6 +3,7 @@
 //! [`EditSession::apply`] changes the ground at once, in memory; [`EditSession::commit`] makes all since the last one durable, as one batch. Undoing and redoing are commits of
 //! their own: a header that leads to a state that is in the file already. One session at a time has a file; readers need not stop.
 
+mod checked_state;
 mod past;
 
 pub use past::{HistoryEntry, history};
@@ -413,6 +414,10 @@ impl Source for Borrowed {
 
     fn byte_count(&self) -> u64 {
         self.0.source().byte_count()
+    }
+
+    fn own_start(&self) -> u64 {
+        self.0.source().own_start()
     }
 
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {

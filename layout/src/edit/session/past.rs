@@ -1,13 +1,13 @@
 //! Back and forth through a file's history: a header that names a state which is in the file already.
 
 use super::EditSession;
+use super::checked_state::check_state;
 use crate::directory::Entry;
 use crate::edit::Changes;
 use crate::edit::commit::CommitJob;
 use crate::error::LayoutError;
 use crate::file::journal::Commit;
 use crate::header::{Header, History};
-use crate::opening::{read_leaf, read_root};
 use crate::source::Source;
 use crate::terrain::Terrain;
 use std::sync::Arc;
@@ -92,45 +92,25 @@ impl EditSession {
             history: Some(History { commit_page, tip_page }),
             ..state.put_into(old)
         };
-        let (root, entries) = self.differing(&header)?;
-        let entries: Vec<(u64, Entry)> =
-            entries.into_iter().map(|(logical, entry)| (logical as u64, entry)).collect();
+        let job = CommitJob::turn(tail, header)?;
         // Everything that can fail comes before the header: once that is durable, memory follows without fail.
-        let replacement = self.editor.replacement(&entries, &header)?;
+        let checked = check_state(self.editor.terrain(), &self.directory, &job.next.page)?;
+        let places: Vec<(u64, Entry)> =
+            checked.differing.iter().map(|(logical, entry)| (*logical as u64, *entry)).collect();
+        let replacement = self.editor.replacement(&places, &job.next.header)?;
         let (terrain, original) = (Arc::clone(self.editor.terrain()), self.original.imagery);
         let turn = self.picture.turn(&terrain, &self.slots.header, original, state.imagery)?;
-        let job = CommitJob::turn(tail, header)?;
         if let Err(error) = job.run_on(&*self.disk) {
             self.attempted.note(&job.next.attempt);
             return Err(error);
         }
         let changes = self.editor.replace(replacement);
         self.picture.turn_to(turn);
-        entries.into_iter().for_each(|(logical, entry)| self.directory.entries[logical as usize] = entry);
-        self.directory.root = root;
+        self.directory = checked.directory;
         self.slots.flip(job.next.page, job.next.header);
         Ok(changes)
     }
-
-    /// The root of another state, and the entries in which its directory differs.
-    fn differing(&self, header: &Header) -> Result<Difference, LayoutError> {
-        let root = read_root(self.source(), header)?;
-        let mut differing = Vec::new();
-        let mut leaf = Vec::new();
-        for (i, here) in root.iter().enumerate().filter(|(i, here)| **here != self.directory.root[*i]) {
-            leaf.clear();
-            read_leaf(self.source(), header, i, *here, &mut leaf)?;
-            let first = i * crate::directory::ENTRIES_PER_LEAF;
-            let pairs = leaf.iter().zip(&self.directory.entries[first..]);
-            let others = pairs.enumerate().filter(|(_, (theirs, ours))| theirs != ours);
-            differing.extend(others.map(|(j, (theirs, _))| (first + j, *theirs)));
-        }
-        Ok((root, differing))
-    }
 }
-
-/// The root of another state, and the record pages whose entries differ.
-type Difference = (Vec<Entry>, Vec<(usize, Entry)>);
 
 /// All commits of a file, the first one first.
 fn history_of(source: &dyn Source, header: &Header) -> Result<Vec<HistoryEntry>, LayoutError> {

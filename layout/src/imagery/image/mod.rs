@@ -24,7 +24,7 @@ pub fn open(path: &Path) -> Result<Box<dyn ImageSource>, LayoutError> {
     if path.is_dir() {
         return Err(LayoutError::not_this_format(path, "this is a directory; name the images in it"));
     }
-    input::open(path, "cannot open the image")?
+    input::open(path, "cannot read the image")?
         .take(16)
         .read_to_end(&mut head)
         .map_err(|source| LayoutError::io(path, "cannot read the image", source))?;

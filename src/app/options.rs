@@ -1,0 +1,83 @@
+//! How a scene is made, what its pictures cost, and why there may be none: plain values.
+
+use super::drape::Served;
+use super::feed::PictureEngine;
+use terrasoar::refine::Culling;
+use terrasoar_layout::LayoutError;
+use terrasoar_render::{DrawStats, RenderError, Renderer, UploadStats};
+
+/// How a scene is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SceneOptions {
+    /// What makes the mesh.
+    pub engine: PictureEngine,
+    /// Where what lies out of view is left out.
+    pub culling: Culling,
+    /// Normal tiles given a frame.
+    pub tiles: TileService,
+    /// Device memory for the tiles of the image, in bytes.
+    pub imagery_bytes: u64,
+    /// Whether frames are timed on the device, where it can ([`Scene::gpu_time_ms`](super::scene::Scene::gpu_time_ms)).
+    pub timestamps: bool,
+}
+
+impl SceneOptions {
+    /// Whether frames must not wait.
+    pub(super) fn is_for_a_window(self) -> bool {
+        self.tiles != TileService::All
+    }
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self {
+            engine: PictureEngine::default(),
+            culling: Culling::default(),
+            tiles: TileService::default(),
+            imagery_bytes: Renderer::IMAGERY_BYTES,
+            timestamps: false,
+        }
+    }
+}
+
+/// How many of the normal tiles that a view lacks it is given before it is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum TileService {
+    /// All: the picture depends on the view alone.
+    #[default]
+    All,
+    /// So many a frame, the coarsest first; what is missing shows coarser shading for some frames.
+    AFrame(usize),
+}
+
+/// Why there is no scene or picture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum SceneError {
+    /// The terrain's source does not lend its bytes.
+    #[error("{0}: pictures need a mapped or in-memory terrain")]
+    NotInAddressSpace(String),
+    /// The terrain cannot be read.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// The renderer or its device failed. [`RenderError::DeviceLost`] is over with [`Scene::recover`](super::scene::Scene::recover).
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+/// What a picture cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Drawn {
+    /// Mesh sent to the device.
+    pub upload: UploadStats,
+    /// Draw calls.
+    pub draw: DrawStats,
+    /// Tiles given and their bytes.
+    pub tiles: [u64; 2],
+    /// Tiles that the view still lacks.
+    pub tiles_missing: u32,
+    /// Tiles of the image given.
+    pub image: Served,
+    /// Tiles of the image that the view still lacks.
+    pub image_missing: u32,
+}

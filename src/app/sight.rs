@@ -1,0 +1,45 @@
+//! Views and terrains as the renderer takes them.
+
+use std::f64::consts::FRAC_PI_2;
+use terrasoar::view::View;
+use terrasoar_layout::terrain::Terrain;
+use terrasoar_render::{FrameView, TerrainShape};
+
+/// Frames ahead of the eye that tiles of the image are asked for.
+const FRAMES_AHEAD: f64 = 24.0;
+
+/// Where a steady eye will be in some frames.
+pub(super) fn ahead(before: &View, now: &View) -> View {
+    let turned = |before: f64, now: f64| now + FRAMES_AHEAD * (now - before).sin();
+    View {
+        eye_m: now.eye_m + FRAMES_AHEAD * (now.eye_m - before.eye_m),
+        yaw_rad: turned(before.yaw_rad, now.yaw_rad),
+        pitch_rad: turned(before.pitch_rad, now.pitch_rad).clamp(-FRAC_PI_2, FRAC_PI_2),
+        ..*now
+    }
+}
+
+/// What the renderer needs to know of a terrain.
+pub(crate) fn shape(terrain: &Terrain) -> TerrainShape {
+    let grid = terrain.grid();
+    TerrainShape {
+        spacing_m: grid.spacing_m(),
+        samples: grid.samples(),
+        height_range_m: terrain.header().height_range_m,
+    }
+}
+
+/// A view as the renderer takes it.
+pub(crate) fn frame_view(view: &View) -> FrameView {
+    let [right, up, forward] = view.axes();
+    FrameView {
+        eye_m: view.eye_m,
+        right,
+        up,
+        forward,
+        vertical_fov_rad: view.vertical_fov_rad,
+        viewport_px: [view.viewport.width_px, view.viewport.height_px],
+        tolerance_px: view.tolerance_px,
+        vertical_exaggeration: view.vertical_exaggeration,
+    }
+}
