@@ -55,17 +55,17 @@ fn main() -> ExitCode {
         paint::TESTS,
         program::TESTS,
     ]
-        .concat()
-        .into_iter()
-        .map(|(name, test): Test| {
-            Trial::ignorable_test(name, move || match gpu {
-                None => Ok(Completion::ignored_with("no adapter")),
-                Some(gpu) if reads_depth(name) && !gpu.capabilities.depth_copies => {
-                    Ok(Completion::ignored_with("depth cannot be read on this device"))
-                }
-                Some(gpu) => test(gpu).map(|()| Completion::Completed).map_err(Failed::from),
-            })
-        });
+    .concat()
+    .into_iter()
+    .map(|(name, test): Test| {
+        Trial::ignorable_test(name, move || match gpu {
+            None => Ok(Completion::ignored_with("no adapter")),
+            Some(gpu) if reads_depth(name) && !gpu.capabilities.depth_copies => {
+                Ok(Completion::ignored_with("depth cannot be read on this device"))
+            }
+            Some(gpu) => test(gpu).map(|()| Completion::Completed).map_err(Failed::from),
+        })
+    });
     libtest_mimic::run(&arguments, trials.collect()).exit_code()
 }
 
