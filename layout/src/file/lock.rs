@@ -1,8 +1,8 @@
 //! One writer at a time: a lock on the terrain file itself, so that no other name of it, a link or another path, makes a second writer.
 //!
 //! Readers hold a shared lock on the whole file for as long as they have it open, and appending need not wait for them (FORMAT.md, section 7.4); so writers exclude each other on
-//! one byte far behind any file's end. **The lock belongs to the open file:** it ends with the process, however that ends, and leaves nothing behind. Nothing
-//! is made beside the file. Whoever replaces a file by a new one takes part: it asks for the same byte, shared with others who replace.
+//! one byte far behind any file's end. **The lock belongs to the open file:** it ends with the process, however that ends, and leaves nothing behind; in a process that goes on it is given back by name,
+//! for a program that is being started at that moment has copies of all open files for a while. Nothing is made beside the file. Whoever replaces a file by a new one takes part: it asks for the same byte, shared with others who replace.
 //!
 //! Linux and macOS lock the byte (open file description locks). On Windows a writer opens the file so that nobody else can open it for writing. On other systems, and on
 //! file systems without locks, nobody is kept out.
@@ -10,14 +10,25 @@
 use crate::error::LayoutError;
 use std::fs::File;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Times that a file may be replaced under its name while its lock is taken.
 const MOST_TRIES: u32 = 100;
 
-/// The right to write to a terrain file, and the file.
-#[derive(Debug)]
+/// The right to write to a terrain file, and the file. Whoever has a clone has the right.
+#[derive(Debug, Clone)]
 pub(crate) struct WriteLock {
-    file: File,
+    locked: Arc<Locked>,
+}
+
+/// A file whose lock is given back when it is dropped.
+#[derive(Debug)]
+struct Locked(File);
+
+impl Drop for Locked {
+    fn drop(&mut self) {
+        system::unlock(&self.0);
+    }
 }
 
 impl WriteLock {
@@ -36,27 +47,28 @@ impl WriteLock {
             if !system::lock(&file, system::Kind::Exclusive) {
                 return Err(taken(path));
             }
+            let locked = Locked(file);
             // Whoever had the lock may have put another file in its place between our opening and locking it.
-            if is_named(&file, path) {
-                return Ok(Self { file });
+            if is_named(&locked.0, path) {
+                return Ok(Self { locked: Arc::new(locked) });
             }
         }
         Err(taken(path))
     }
 
-    /// The file, open for reading and writing. The lock lasts as long as any clone of it.
+    /// The file, open for reading and writing.
     pub(crate) fn file(&self) -> &File {
-        &self.file
+        &self.locked.0
     }
 
     /// Whether `path` is another name of the file.
     pub(crate) fn is_of(&self, path: &Path) -> bool {
-        is_named(&self.file, path)
+        is_named(self.file(), path)
     }
 
     /// Refuses to replace a file that has other names (hard links), which would go on naming the old one.
     pub(crate) fn check_only_name(&self, path: &Path) -> Result<(), LayoutError> {
-        match names(&self.file) {
+        match names(self.file()) {
             0 | 1 => Ok(()),
             names => Err(LayoutError::Usage(format!(
                 "{}: the file has {names} names (hard links), and writing it anew would leave the others with the old contents; \
@@ -70,7 +82,7 @@ impl WriteLock {
 /// Keeps writers away from a file while it is replaced by another.
 #[derive(Debug)]
 pub(super) struct ReplaceLock {
-    _file: Option<File>,
+    _locked: Option<Locked>,
 }
 
 impl ReplaceLock {
@@ -78,12 +90,12 @@ impl ReplaceLock {
     pub(super) fn take(path: &Path) -> Result<Self, LayoutError> {
         let is_file = std::fs::symlink_metadata(path).is_ok_and(|meta| meta.is_file());
         let Some(file) = is_file.then(|| system::open_for_reading(path).ok()).flatten() else {
-            return Ok(Self { _file: None });
+            return Ok(Self { _locked: None });
         };
         if !system::lock(&file, system::Kind::Shared) {
             return Err(taken(path));
         }
-        Ok(Self { _file: Some(file) })
+        Ok(Self { _locked: Some(Locked(file)) })
     }
 }
 
@@ -162,28 +174,50 @@ mod system {
     }
 
     /// Whether the lock was to be had; it is where the file system has no locks.
-    #[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
     pub(super) fn lock(file: &File, kind: Kind) -> bool {
+        byte::set(file, kind)
+    }
+
+    pub(super) fn unlock(file: &File) {
+        byte::give_back(file);
+    }
+
+    #[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
+    mod byte {
+        use super::{File, Kind};
         use nix::errno::Errno;
         use nix::fcntl::{FcntlArg, fcntl};
         use nix::libc;
-        let l_type = match kind {
-            Kind::Exclusive => libc::F_WRLCK,
-            Kind::Shared => libc::F_RDLCK,
-        };
-        let byte = libc::flock {
-            l_type: l_type as libc::c_short,
-            l_whence: libc::SEEK_SET as libc::c_short,
-            l_start: libc::off_t::MAX - 1,
-            l_len: 1,
-            l_pid: 0,
-        };
-        !matches!(fcntl(file, FcntlArg::F_OFD_SETLK(&byte)), Err(Errno::EAGAIN | Errno::EACCES))
+
+        pub(super) fn set(file: &File, kind: Kind) -> bool {
+            let set = match kind {
+                Kind::Exclusive => call(file, libc::F_WRLCK as libc::c_short),
+                Kind::Shared => call(file, libc::F_RDLCK as libc::c_short),
+            };
+            !matches!(set, Err(Errno::EAGAIN | Errno::EACCES))
+        }
+
+        pub(super) fn give_back(file: &File) {
+            // It ends with the process in any case.
+            let _ = call(file, libc::F_UNLCK as libc::c_short);
+        }
+
+        fn call(file: &File, l_type: libc::c_short) -> nix::Result<i32> {
+            let l_whence = libc::SEEK_SET as libc::c_short;
+            let byte = libc::flock { l_type, l_whence, l_start: libc::off_t::MAX - 1, l_len: 1, l_pid: 0 };
+            fcntl(file, FcntlArg::F_OFD_SETLK(&byte))
+        }
     }
 
     #[cfg(not(any(target_os = "linux", target_os = "android", target_vendor = "apple")))]
-    pub(super) fn lock(_: &File, _: Kind) -> bool {
-        true
+    mod byte {
+        use super::{File, Kind};
+
+        pub(super) fn set(_: &File, _: Kind) -> bool {
+            true
+        }
+
+        pub(super) fn give_back(_: &File) {}
     }
 }
 
@@ -220,6 +254,8 @@ mod system {
     pub(super) fn lock(_: &File, _: Kind) -> bool {
         true
     }
+
+    pub(super) fn unlock(_: &File) {}
 }
 
 #[cfg(not(any(unix, windows)))]
@@ -249,6 +285,8 @@ mod system {
     pub(super) fn lock(_: &File, _: Kind) -> bool {
         true
     }
+
+    pub(super) fn unlock(_: &File) {}
 }
 
 #[cfg(test)]
@@ -267,11 +305,15 @@ mod tests {
         std::fs::write(&target, "x").unwrap();
         let first = WriteLock::take(&target).unwrap();
         is_told(&target);
-        let clone = first.file().try_clone().unwrap();
+        let clone = first.clone();
         drop(first);
         // A commit that is under way keeps the lock.
         is_told(&target);
+        // What another program has inherited keeps nothing.
+        let inherited = clone.file().try_clone().unwrap();
         drop(clone);
+        drop(WriteLock::take(&target).unwrap());
+        drop(inherited);
         drop(WriteLock::take(&target).unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }

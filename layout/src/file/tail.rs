@@ -5,6 +5,7 @@
 //!
 //! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers it, so that the next write goes behind what that header counts and takes the generation after its.
 
+use super::lock::WriteLock;
 use super::slots::Slots;
 use crate::bytes::{PAGE_BYTES, Page};
 use crate::disk::Disk;
@@ -51,7 +52,7 @@ pub(crate) struct Attempt {
 #[derive(Debug)]
 pub(crate) struct Tail {
     path: PathBuf,
-    file: File,
+    file: TailFile,
     /// Offset of the file's first byte: 0, or where an overlay begins.
     start: u64,
     /// First byte behind everything that a header leads to, of a page.
@@ -62,8 +63,15 @@ pub(crate) struct Tail {
     current: Box<Page>,
     /// Byte from the file's start at which the next header goes.
     header_offset: u64,
-    /// Whether others may have the file open: a file that has no name yet needs none of the care.
-    is_live: bool,
+}
+
+/// Whose end it is.
+#[derive(Debug)]
+enum TailFile {
+    /// A file that others may have open, and the right to write to it.
+    Live(WriteLock),
+    /// One that has no name yet, which needs none of the care.
+    New(File),
 }
 
 /// A header that is ready to be written.
@@ -75,13 +83,30 @@ pub(crate) struct NextHeader {
 }
 
 impl Tail {
-    /// The end of the file that was opened at `path`, whose first byte has the offset `start`.
+    /// The end of the file at `path` that `lock` is of, whose first byte has the offset `start`.
     ///
     /// # Errors
-    /// [`LayoutError::Usage`] when the generations have run out; the system's, which gives no second handle.
+    /// [`LayoutError::Usage`] when the generations have run out.
     pub(crate) fn of(
         path: &Path,
-        file: &File,
+        lock: &WriteLock,
+        start: u64,
+        slots: &Slots,
+        attempted: Attempted,
+    ) -> Result<Self, LayoutError> {
+        Self::new(path, TailFile::Live(lock.clone()), start, slots, attempted)
+    }
+
+    /// The end of a file that nobody else knows of, because it is not published yet.
+    pub(crate) fn of_new(path: &Path, file: &File, slots: &Slots) -> Result<Self, LayoutError> {
+        let file =
+            file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
+        Self::new(path, TailFile::New(file), 0, slots, Attempted::default())
+    }
+
+    fn new(
+        path: &Path,
+        file: TailFile,
         start: u64,
         slots: &Slots,
         attempted: Attempted,
@@ -93,8 +118,6 @@ impl Tail {
                 path.display()
             )));
         };
-        let file =
-            file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
         Ok(Self {
             path: path.to_owned(),
             file,
@@ -103,13 +126,14 @@ impl Tail {
             generation,
             current: slots.current.clone(),
             header_offset: slots.next_offset(),
-            is_live: true,
         })
     }
 
-    /// The end of a file that nobody else knows of, because it is not published yet.
-    pub(crate) fn of_new(path: &Path, file: &File, slots: &Slots) -> Result<Self, LayoutError> {
-        Ok(Self { is_live: false, ..Self::of(path, file, 0, slots, Attempted::default())? })
+    fn file(&self) -> &File {
+        match &self.file {
+            TailFile::Live(lock) => lock.file(),
+            TailFile::New(file) => file,
+        }
     }
 
     /// Where what is written first goes.
@@ -135,12 +159,18 @@ impl Tail {
     fn put(&self, disk: &dyn Disk, bytes: &[u8], place: u64) -> Result<(), LayoutError> {
         let when_full =
             "cannot append to the file, for which there is no room; make some on its disk, and try again";
-        disk.write_at(&self.file, bytes, place)
+        disk.write_at(self.file(), bytes, place)
             .map_err(|e| LayoutError::write(&self.path, "cannot append to the file", when_full, e))
     }
 
+    /// Brings the file to the disk, if anybody could miss it.
     fn sync(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
-        disk.sync(&self.file).map_err(|e| LayoutError::io(&self.path, "cannot bring the file to the disk", e))
+        match &self.file {
+            TailFile::New(_) => Ok(()),
+            TailFile::Live(lock) => disk
+                .sync(lock.file())
+                .map_err(|e| LayoutError::io(&self.path, "cannot bring the file to the disk", e)),
+        }
     }
 
     /// The header that follows, with this tail's generation.
@@ -165,24 +195,24 @@ impl Tail {
     /// # Errors
     /// [`LayoutError::Io`], or [`LayoutError::Usage`] if the file was replaced under its name. The file reads as before then, or as after if only the last sync failed.
     pub(crate) fn flip(&self, disk: &dyn Disk, next: &NextHeader) -> Result<(), LayoutError> {
-        if self.is_live {
-            self.sync(disk)?;
-            if !super::lock::is_named(&self.file, &self.path) {
-                return Err(LayoutError::Usage(format!(
-                    "{}: the file was replaced by another while it was written to; open it again, and do it again",
-                    self.path.display()
-                )));
-            }
+        self.sync(disk)?;
+        if let TailFile::Live(lock) = &self.file
+            && !lock.is_of(&self.path)
+        {
+            return Err(LayoutError::Usage(format!(
+                "{}: the file was replaced by another while it was written to; open it again, and do it again",
+                self.path.display()
+            )));
         }
         next.attempt.header_begun.store(true, Ordering::Release);
         self.put(disk, &next.page[..], self.header_offset)?;
-        if self.is_live { self.sync(disk) } else { Ok(()) }
+        self.sync(disk)
     }
 
     /// Gives back what was written, whose header was never begun. Failing here costs space only.
     pub(crate) fn give_up(&self, disk: &dyn Disk, next: Option<&NextHeader>, length: u64) {
         if next.is_none_or(|next| !next.attempt.header_begun.load(Ordering::Acquire)) {
-            let _ = disk.set_len(&self.file, length);
+            let _ = disk.set_len(self.file(), length);
         }
     }
 }

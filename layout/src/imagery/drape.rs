@@ -22,7 +22,6 @@ use crate::header::Header;
 use crate::remedy::Remedy;
 use crate::source::{PreadSource, Source};
 use crate::terrain::Terrain;
-use std::fs::File;
 use std::path::Path;
 
 /// How to drape.
@@ -87,12 +86,12 @@ pub fn drape_on(
         file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
     // One file, opened once: what is read is what is written to.
     let terrain = Terrain::from_source(Box::new(PreadSource::over(path, again)?))?;
-    append_all(disk, file, terrain.source(), images, options, progress)
+    append_all(disk, &lock, terrain.source(), images, options, progress)
 }
 
 fn append_all(
     disk: &dyn Disk,
-    file: &File,
+    lock: &WriteLock,
     source: &dyn Source,
     images: &[Box<dyn ImageSource>],
     options: &DrapeOptions,
@@ -120,7 +119,7 @@ fn append_all(
     }
     let old = slots.header.clone();
     let lineage = old.history.map(|_| Lineage::read(source, &old)).transpose()?;
-    let tail = Tail::of(path, file, 0, &slots, Attempted::default())?;
+    let tail = Tail::of(path, lock, 0, &slots, Attempted::default())?;
     let mut append = Append::begin(disk, tail, old, lineage, shape)?;
     progress.stage("draping", u64::from(shape.texels[0]) * u64::from(shape.texels[1]));
     let length = source.byte_count();

@@ -376,7 +376,7 @@ impl EditSession {
     }
 
     fn tail(&self) -> Result<Tail, LayoutError> {
-        Tail::of(&self.path, self.lock.file(), self.start, &self.slots, self.attempted)
+        Tail::of(&self.path, &self.lock, self.start, &self.slots, self.attempted)
     }
 }
 
