@@ -34,7 +34,8 @@ fn terrain_at(path: &Path) {
         (1, 0) => 4000.0,
         _ => rugged(3, x, y),
     });
-    build(&dem, path, &BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() }, &Silent).unwrap();
+    build(&dem, path, &BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() }, &Silent)
+        .unwrap();
 }
 
 fn craters(batch: u32) -> Vec<Edit> {
@@ -111,7 +112,10 @@ impl<F: Fetch> Flight<F> {
         soar.update(&view, &mut Unobserved);
         let mesh = triangles(&soar);
         assert!(mesh.len() > 500, "{}", mesh.len());
-        assert!(keys(&triangles(self.streamed.engine())) == keys(&mesh), "view {i}: not the mesh of the file");
+        assert!(
+            keys(&triangles(self.streamed.engine())) == keys(&mesh),
+            "view {i}: not the mesh of the file"
+        );
     }
 }
 

@@ -53,8 +53,7 @@ fn now(path: &Path, overlay: Option<&Path>) -> Vec<Box<Page>> {
 
 /// Asks for all pages and waits for them.
 fn load_all(loader: &Loader, count: usize, frame: u64) -> Vec<Box<Page>> {
-    let requests: Vec<PageRequest> =
-        (0..count as u64).map(|page| PageRequest { page, due: frame }).collect();
+    let requests: Vec<PageRequest> = (0..count as u64).map(|page| PageRequest { page, due: frame }).collect();
     loader.ask(frame, &requests);
     let mut pages: Vec<Option<Box<Page>>> = vec![None; count];
     while pages.iter().any(Option::is_none) {

@@ -71,7 +71,8 @@ impl PictureWatch {
         let Repainted { tiles, is_another } = session.take_repainted();
         let place = session.header().imagery;
         if is_another {
-            let picture = session.open_picture()?.map_or(Picture::Gone, |p| Picture::Another(PictureFile::of(p)));
+            let picture =
+                session.open_picture()?.map_or(Picture::Gone, |p| Picture::Another(PictureFile::of(p)));
             self.told = Some(place);
             let (tiles, painted, read) = (BTreeSet::new(), Vec::new(), Vec::new());
             return Ok(Some(Repaint { picture, tiles, painted, read }));

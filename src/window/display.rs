@@ -17,7 +17,9 @@ pub(super) fn refusal(error: &dyn Display) -> anyhow::Error {
 fn words(cause: &str, variable: impl Fn(&str) -> Option<OsString>) -> String {
     let set = |name: &str| variable(name).filter(|value| !value.is_empty());
     // In the order in which they are looked at.
-    let named = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"].into_iter().find_map(|name| Some((name, set(name)?)));
+    let named = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"]
+        .into_iter()
+        .find_map(|name| Some((name, set(name)?)));
     match named {
         None if cfg!(all(unix, not(target_os = "macos"))) => {
             format!(
@@ -63,16 +65,28 @@ mod tests {
     #[test]
     fn what_is_missing_is_named_and_what_to_do_instead() {
         let all = |set: &'static [(&'static str, &'static str)]| {
-            let value = move |name: &str| set.iter().find(|(n, _)| *n == name).map(|(_, v)| OsString::from(*v));
+            let value =
+                move |name: &str| set.iter().find(|(n, _)| *n == name).map(|(_, v)| OsString::from(*v));
             words("it does not answer", value)
         };
         for none in [&[][..], &[("DISPLAY", ""), ("WAYLAND_DISPLAY", "")]] {
             let words = all(none);
-            assert!(words.contains("there is no display") && words.contains("DISPLAY") && words.contains("WAYLAND_DISPLAY"));
-            assert!(words.contains("snapshot") && words.contains("movie") && !words.contains("it does not answer"));
+            assert!(
+                words.contains("there is no display")
+                    && words.contains("DISPLAY")
+                    && words.contains("WAYLAND_DISPLAY")
+            );
+            assert!(
+                words.contains("snapshot")
+                    && words.contains("movie")
+                    && !words.contains("it does not answer")
+            );
         }
         let words = all(&[("DISPLAY", ":77"), ("WAYLAND_DISPLAY", "")]);
-        assert!(words.contains("DISPLAY names, \":77\": it does not answer") && words.contains("snapshot"), "{words}");
+        assert!(
+            words.contains("DISPLAY names, \":77\": it does not answer") && words.contains("snapshot"),
+            "{words}"
+        );
         let words = all(&[("DISPLAY", ":77"), ("WAYLAND_DISPLAY", "wayland-9")]);
         assert!(words.contains("WAYLAND_DISPLAY names, \"wayland-9\""), "{words}");
     }

@@ -292,7 +292,11 @@ mod tests {
         assert!(settings.suit(&adapter(true)).unwrap().contains("pipe"));
         assert_eq!(settings.tolerance_px(), 4.0);
         assert_eq!((settings.suit(&adapter(true)), settings.tolerance_px()), (None, 4.0), "said once");
-        assert_eq!((settings.suit(&adapter(false)), settings.tolerance_px()), (None, 1.0), "another took over");
+        assert_eq!(
+            (settings.suit(&adapter(false)), settings.tolerance_px()),
+            (None, 1.0),
+            "another took over"
+        );
         assert!(settings.suit(&adapter(true)).is_some());
         settings.save(&path).unwrap();
         assert_eq!(

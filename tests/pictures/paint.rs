@@ -55,7 +55,13 @@ impl<'a> Window<'a> {
         let options = SceneOptions { tiles: TileService::AFrame(8), ..SceneOptions::default() };
         let scene = Scene::streamed(&terrain, 64 << 20, gpu, options).map_err(|e| e.to_string())?;
         let offscreen = Offscreen::new(&gpu.device, SIZE_PX).map_err(|e| e.to_string())?;
-        Ok(Self { gpu, scene, offscreen, look: Look { imagery: 1.0, ..Look::default() }, watch: PictureWatch::default() })
+        Ok(Self {
+            gpu,
+            scene,
+            offscreen,
+            look: Look { imagery: 1.0, ..Look::default() },
+            watch: PictureWatch::default(),
+        })
     }
 
     /// Goes on with another device.

@@ -188,8 +188,20 @@ fn report(_: &Gpu) -> Outcome {
 fn quiet(_: &Gpu) -> Outcome {
     let bench = Bench::with_flight();
     let snapshot = ["snapshot", "land.iqt", "-o", "a b.png", "--size", "64x48"];
-    let movie = ["movie", "land.iqt", "--flight", "land.flight", "-o", "film.gif", "--size", "64x48", "--every", "20"];
-    let compare = ["compare", "land.iqt", "--flight", "land.flight", "--engines", "soar,kinetic", "-o", "report"];
+    let movie = [
+        "movie",
+        "land.iqt",
+        "--flight",
+        "land.flight",
+        "-o",
+        "film.gif",
+        "--size",
+        "64x48",
+        "--every",
+        "20",
+    ];
+    let compare =
+        ["compare", "land.iqt", "--flight", "land.flight", "--engines", "soar,kinetic", "-o", "report"];
     for verb in [&snapshot[..], &movie, &compare] {
         for folder in [None, Some(""), Some("not/absolute"), Some("/no/such/folder")] {
             let mut command = bench.command(verb);

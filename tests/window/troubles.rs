@@ -52,7 +52,8 @@ pub fn no_display(display: &Display) -> Outcome {
         ensure(words.contains("snapshot") && words.contains("movie"), told)?;
         ensure(words.lines().count() == 1 && words.starts_with("error: "), told)?;
         // Neither places in source text nor names of a library's own types.
-        let is_debug_text = [".rs", "os error at", "registry", "Os(", "{ ", "winit"].iter().any(|w| words.contains(w));
+        let is_debug_text =
+            [".rs", "os error at", "registry", "Os(", "{ ", "winit"].iter().any(|w| words.contains(w));
         ensure(!is_debug_text, told)?;
         if set.is_empty() {
             ensure(words.contains("no display") && words.contains("WAYLAND_DISPLAY"), told)?;

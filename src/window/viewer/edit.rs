@@ -29,7 +29,8 @@ const MOST_IN_FLIGHT: u64 = 32;
 /// Edited pages that are not in the file, beyond which nothing more is edited: 128 MiB, some 30 million samples.
 const MOST_HELD: usize = 32_768;
 /// What is said then.
-const UNSAVED: &str = "128 MiB of edited ground are not on the disk yet, so this stroke ends here; go on when they are saved";
+const UNSAVED: &str =
+    "128 MiB of edited ground are not on the disk yet, so this stroke ends here; go on when they are saved";
 /// Points of the ring that shows where a tool works.
 const RING_POINTS: usize = 72;
 

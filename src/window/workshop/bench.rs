@@ -229,10 +229,10 @@ impl Bench {
         let mut pages = Vec::with_capacity(changes.pages.len());
         for page in &changes.pages {
             // One that is in the file need not be in memory.
-            let bytes = editor.edited_page(*page).map(|bytes| Box::new(*bytes)).map_or_else(
-                || editor.terrain().checked_page_at(*page, self.session.place_of(*page)),
-                Ok,
-            );
+            let bytes = editor
+                .edited_page(*page)
+                .map(|bytes| Box::new(*bytes))
+                .map_or_else(|| editor.terrain().checked_page_at(*page, self.session.place_of(*page)), Ok);
             match bytes {
                 Ok(bytes) => pages.push((*page, bytes)),
                 Err(error) => trouble = Some(error),

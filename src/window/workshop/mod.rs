@@ -209,8 +209,7 @@ impl Workshop {
             State::Open(worker) => worker.unsaved(),
             State::Closed | State::Broken(_) => 0,
         };
-        let words =
-            format!("{}: editing came to an unexpected end; {}", self.path.display(), lost(unsaved));
+        let words = format!("{}: editing came to an unexpected end; {}", self.path.display(), lost(unsaved));
         self.state = State::Broken(words.clone());
         words
     }

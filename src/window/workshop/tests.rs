@@ -292,7 +292,10 @@ fn a_disk_that_fails_once_or_is_full_is_told_and_nothing_is_lost_that_was_saved(
     let (news, closed) = workshop.close();
     assert_eq!(news.len(), 2, "{news:?}");
     let words = closed.unwrap_err();
-    assert!(words.contains("room") && words.contains("2 edits were not told as saved and may be gone"), "{words}");
+    assert!(
+        words.contains("room") && words.contains("2 edits were not told as saved and may be gone"),
+        "{words}"
+    );
     assert!(land.pages() == land.pages_after(&[crater(1)]));
     // The right to edit was given back.
     let mut workshop = land.workshop_on(Arc::new(SystemDisk));
@@ -419,8 +422,12 @@ fn undo_and_redo_come_after_everything_before_and_bring_pages_and_places() {
             News::Turned { back, seen } => {
                 names.push(if back { 'u' } else { 'r' });
                 let terrain = land.open();
-                let opened: Vec<(u64, Entry)> =
-                    seen.ground.pages.iter().map(|(page, _)| (*page, terrain.entries()[*page as usize])).collect();
+                let opened: Vec<(u64, Entry)> = seen
+                    .ground
+                    .pages
+                    .iter()
+                    .map(|(page, _)| (*page, terrain.entries()[*page as usize]))
+                    .collect();
                 assert_eq!(seen.ground.places, opened);
                 assert!(!opened.is_empty() && seen.trouble.is_none());
                 for (page, bytes) in &seen.ground.pages {
