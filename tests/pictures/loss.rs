@@ -60,6 +60,7 @@ fn format(window: &Window<'_>) -> Option<ImageryFormat> {
 
 fn less_and_more(gpu: &Gpu) -> Outcome {
     let Some([rich, poor]) = devices(gpu)? else { return Ok(()) };
+    let again = device(gpu, true)?;
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let path = land(&folder, Some(TileFormat::Bc1))?;
     let view = from_above();
@@ -74,7 +75,6 @@ fn less_and_more(gpu: &Gpu) -> Outcome {
     ensure(off <= DECODERS_DIFFER_BY, || format!("the picture is off by {off}"))?;
     let fresh = Window::open(&poor, &path)?.settled(&view)?;
     ensure(decoded == fresh, || "a scene made on that device shows another picture".into())?;
-    let again = device(gpu, true)?;
     window.move_to(&again)?;
     ensure(window.settled(&view)? == before, || "the first picture does not come back".into())?;
     ensure(format(&window) == Some(ImageryFormat::Bc1), || "blocks are sent again".into())

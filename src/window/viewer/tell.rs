@@ -63,13 +63,13 @@ impl Viewer {
         self.tell_state("raining", self.rain.is_some().to_string());
         self.tell_state("recording", self.recorder.is_some().to_string());
         self.tell_state("full-screen", self.window.fullscreen().is_some().to_string());
-        // What is ordered and not seen yet will make another picture.
-        if !moving && !self.unsettled && self.workshop.in_flight() == 0 {
+        if moving || self.unsettled {
+            self.said.retain(|(name, _)| *name != "at-rest");
+        } else if self.workshop.in_flight() == 0 {
+            // What is ordered and not seen yet may make another picture.
             let Camera { eye_m, yaw_deg, pitch_deg, .. } = self.rig.camera;
             let place = format!("{:.2} {:.2} {:.2} {yaw_deg:.3} {pitch_deg:.3}", eye_m.x, eye_m.y, eye_m.z);
             self.tell_state("at-rest", place);
-        } else {
-            self.said.retain(|(name, _)| *name != "at-rest");
         }
     }
 }
