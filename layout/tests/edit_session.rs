@@ -204,6 +204,39 @@ proptest! {
 }
 
 /// Whoever opened the file before goes on reading what was there.
+/// A batch that is refused halfway through leaves nothing: what is undone next is the batch before it, and there is nothing to commit.
+#[test]
+fn after_a_refused_batch_there_is_nothing_to_commit_and_undo_goes_on() {
+    let bench = Bench::new();
+    let mut session = EditSession::open(&bench.terrain()).unwrap();
+    let built = session_pages(&mut session);
+    session.apply(&[set(1)]).unwrap();
+    session.commit("one").unwrap();
+    let (one, header) = (session_pages(&mut session), session.header().clone());
+    let too_high = Edit::Set {
+        height_m: 1e6,
+        area: Area::Rect(SampleRect { west: 90, south: 80, east: 95, north: 85 }),
+    };
+    // Pages of the batch before and pages that nobody has written to.
+    assert!(matches!(
+        session.apply(&[set(1), set(2), set(5), too_high.clone()]),
+        Err(LayoutError::OutOfRange { .. })
+    ));
+    assert!(session.is_committed() && session.editor().uncommitted().is_empty());
+    assert!(session_pages(&mut session) == one);
+    assert_eq!(session.commit("nothing").unwrap().pages, 0);
+    assert_eq!(*session.header(), header);
+    assert!(session.undo().unwrap().is_some());
+    assert!(session_pages(&mut session) == built);
+    // What was applied before it stays to be committed, and no more than that.
+    session.apply(&[set(3)]).unwrap();
+    let (three, waiting) = (session_pages(&mut session), session.editor().uncommitted());
+    session.apply(&[set(2), set(4), too_high]).unwrap_err();
+    assert!(session_pages(&mut session) == three && session.editor().uncommitted() == waiting);
+    session.discard();
+    assert!(session_pages(&mut session) == built && session.is_committed());
+}
+
 #[test]
 fn readers_keep_what_they_opened() {
     let bench = Bench::new();

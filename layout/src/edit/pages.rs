@@ -52,6 +52,8 @@ pub(super) struct Pages<C: RecordCodec> {
     log: Vec<Overwritten<C::Raw>>,
     /// Pages written to since the last commit began, and what they held then.
     uncommitted: Vec<(u64, Box<Page>)>,
+    /// How many of them were written to by batches that stay; those behind are the batch's that is under way.
+    kept: usize,
     /// Pages in the commit that is under way, and what they held before.
     taken: Vec<(u64, Box<Page>)>,
     failure: Option<LayoutError>,
@@ -73,6 +75,7 @@ impl<C: RecordCodec> Pages<C> {
             most_clean: CLEAN_PAGES,
             log: Vec::new(),
             uncommitted: Vec::new(),
+            kept: 0,
             taken: Vec::new(),
             failure: None,
         }
@@ -209,6 +212,7 @@ impl<C: RecordCodec> Pages<C> {
     /// Ends a batch that is to stay.
     pub(super) fn keep(&mut self) {
         self.log.clear();
+        self.kept = self.uncommitted.len();
         if self.clean > self.most_clean {
             self.drop_clean();
         }
@@ -220,11 +224,18 @@ impl<C: RecordCodec> Pages<C> {
             let within = Self::within(slot);
             C::write(old, &mut self.page_of(slot)[within..within + C::BYTES]);
         }
+        // Pages that this batch alone wrote to are as they were: there is nothing to commit of them.
+        for (logical, _) in self.uncommitted.drain(self.kept..) {
+            let flags = &mut self.flags[logical as usize];
+            *flags &= !UNCOMMITTED;
+            self.clean += usize::from(*flags & TAKEN == 0);
+        }
     }
 
     /// Between batches: puts back what the pages held when the last commit began; returns what they held until now.
     pub(super) fn roll_back(&mut self) -> Vec<(u64, Box<Page>)> {
         let mut until_now = Vec::with_capacity(self.uncommitted.len());
+        self.kept = 0;
         for (logical, committed) in std::mem::take(&mut self.uncommitted) {
             let flags = &mut self.flags[logical as usize];
             *flags &= !UNCOMMITTED;
@@ -247,6 +258,7 @@ impl<C: RecordCodec> Pages<C> {
     pub(super) fn begin_commit(&mut self) {
         debug_assert!(self.taken.is_empty());
         self.taken = std::mem::take(&mut self.uncommitted);
+        self.kept = 0;
         for (logical, _) in &self.taken {
             let flags = &mut self.flags[*logical as usize];
             *flags = *flags & !UNCOMMITTED | TAKEN;
@@ -275,6 +287,7 @@ impl<C: RecordCodec> Pages<C> {
                 None => self.uncommitted.push((logical, before)),
             }
         }
+        self.kept = self.uncommitted.len();
     }
 
     /// Whether nothing was written to since the last commit, and none is under way.

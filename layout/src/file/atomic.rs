@@ -25,9 +25,9 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct AtomicFile {
     /// What it was asked for as, for messages.
-    name: PathBuf,
-    /// Where that leads.
     target: PathBuf,
+    /// Where that leads.
+    place: PathBuf,
     inner: Inner,
 }
 
@@ -82,11 +82,11 @@ impl AtomicFile {
     /// [`LayoutError::Io`] if its folder does not exist or cannot be written to; [`LayoutError::Usage`] if `target` is something other than a regular file: a folder, a device, a FIFO.
     pub fn create(target: &Path) -> Result<Self, LayoutError> {
         let failed = |e| LayoutError::io(target, "cannot create the file", e);
-        let (name, target) = (target.to_owned(), resolved(target).map_err(failed)?);
-        check_replaceable(&name, &target)?;
+        let (target, place) = (target.to_owned(), resolved(target).map_err(failed)?);
+        check_replaceable(&target, &place)?;
         #[cfg(target_os = "linux")]
-        if let Some(file) = nameless(folder_of(&target)) {
-            return Ok(Self { name, target, inner: Inner::Nameless(file) });
+        if let Some(file) = nameless(folder_of(&place)) {
+            return Ok(Self { target, place, inner: Inner::Nameless(file) });
         }
         let mut builder = tempfile::Builder::new();
         builder.prefix(".terrasoar-").suffix(".partial");
@@ -97,11 +97,11 @@ impl AtomicFile {
             builder.permissions(std::fs::Permissions::from_mode(NEW_FILE_MODE));
         }
         let (guard, file) = unfinished::make(|| {
-            let file = builder.tempfile_in(folder_of(&target))?;
+            let file = builder.tempfile_in(folder_of(&place))?;
             Ok((file.path().to_owned(), file))
         })
         .map_err(failed)?;
-        Ok(Self { name, target, inner: Inner::Named(guard, file) })
+        Ok(Self { target, place, inner: Inner::Named(guard, file) })
     }
 
     /// The file to write to.
@@ -115,7 +115,7 @@ impl AtomicFile {
 
     /// Name it will have, as it was asked for.
     pub fn target(&self) -> &Path {
-        &self.name
+        &self.target
     }
 
     /// Syncs what was written and gives the file its name, replacing what had it.
@@ -143,34 +143,34 @@ impl AtomicFile {
     }
 
     fn finish(self, disk: &dyn Disk, replaced: Replaced<'_>) -> Result<bool, LayoutError> {
-        let Self { name, target, inner } = self;
+        let Self { target, place, inner } = self;
         let failed = |e| {
             let when_full = "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
-            LayoutError::write(&name, "cannot write the file", when_full, e)
+            LayoutError::write(&target, "cannot write the file", when_full, e)
         };
         let file = match &inner {
             #[cfg(target_os = "linux")]
             Inner::Nameless(file) => file,
             Inner::Named(_, file) => file.as_file(),
         };
-        let old = std::fs::symlink_metadata(&target).ok().filter(Metadata::is_file);
+        let old = std::fs::symlink_metadata(&place).ok().filter(Metadata::is_file);
         if let (Some(old), Replaced::Any | Replaced::Held(_)) = (&old, replaced) {
             take_over(file, old).map_err(failed)?;
         }
         disk.sync(file).map_err(failed)?;
         let _lock = match replaced {
-            Replaced::Any => Some(ReplaceLock::take(&target)?),
-            Replaced::Held(lock) if !lock.is_of(&target) => return Err(replaced_meanwhile(&name)),
+            Replaced::Any => Some(ReplaceLock::take(&place)?),
+            Replaced::Held(lock) if !lock.is_of(&place) => return Err(replaced_meanwhile(&target)),
             Replaced::Held(_) | Replaced::None => None,
         };
         if !matches!(replaced, Replaced::None) {
-            check_replaceable(&name, &target)?;
+            check_replaceable(&target, &place)?;
         }
-        let is_named = give_name(disk, inner, &target, replaced).map_err(failed)?;
+        let is_named = give_name(disk, inner, &place, replaced).map_err(failed)?;
         if is_named {
-            disk.sync_folder(folder_of(&target)).map_err(|e| {
+            disk.sync_folder(folder_of(&place)).map_err(|e| {
                 LayoutError::io(
-                    &name,
+                    &target,
                     "the file is complete, but its name cannot be brought to the disk and may be lost at a power cut",
                     e,
                 )

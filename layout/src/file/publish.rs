@@ -59,7 +59,7 @@ mod tests {
         let last = header.root_page as usize;
         for (page, opens) in [(0, false), (2, false), (last, false), (last - 1, false), (3, true)] {
             let mut damaged = bytes.clone();
-            damaged[page * 4096 + 17] ^= 1;
+            damaged[page * 4096 + 5] ^= 1;
             let file = AtomicFile::create(&path).unwrap();
             SystemDisk.write_at(file.file(), &damaged, 0).unwrap();
             let done = publish_terrain(&SystemDisk, file, None);

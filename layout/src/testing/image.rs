@@ -96,7 +96,7 @@ impl<'b> Image<'b> {
     /// Offsets of the header slots that begin as one does.
     pub(super) fn headers(&self) -> Vec<usize> {
         let slots = [self.start, self.start + PAGE_BYTES];
-        let is_header = |at: &usize| self.get(*at, PAGE_BYTES).is_some_and(|page| has_magic(page));
+        let is_header = |at: &usize| self.get(*at, PAGE_BYTES).is_some_and(has_magic);
         slots.into_iter().filter(is_header).collect()
     }
 

@@ -15,8 +15,8 @@ use super::codec::{Failure, Unpacker};
 use super::convert::Void;
 use super::zstd_frame;
 use super::{parts, predictor, put_constant};
-use crate::disk::read_at;
 use crate::dem::{SampleSink, Window};
+use crate::disk::read_at;
 use crate::error::LayoutError;
 
 /// Memory that all workers together take, unless one takes more.

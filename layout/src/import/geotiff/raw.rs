@@ -14,8 +14,8 @@ use super::chunks::Chunks;
 use super::convert::Void;
 use super::listing::Places;
 use super::{put_constant, rows_at_once};
-use crate::disk::read_at;
 use crate::dem::{SampleSink, Window};
+use crate::disk::read_at;
 use crate::error::LayoutError;
 
 /// Bytes read at once, unless a row of the image has more.
