@@ -208,8 +208,10 @@ impl SampleSink for Spool<'_> {
             && window.row.checked_add(window.height).is_some_and(|end| end <= self.high)
             && samples.len() == window.width as usize * window.height as usize;
         if !inside {
+            let Window { col, row, width, height } = window;
             return Err(LayoutError::Usage(format!(
-                "a window {window:?} does not lie in the elevation model"
+                "{} samples for {width} x {height} of the elevation model, from column {col} and row {row} on, do not lie in it",
+                samples.len()
             )));
         }
         if samples.iter().all(|v| v.is_nan()) {

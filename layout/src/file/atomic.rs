@@ -6,12 +6,13 @@
 //!
 //! **What the name stood for stays.** A symbolic link goes on leading to the file, which is replaced where it really lies. The new file takes over the mode of the one it replaces, and its owner
 //! where the system allows that; a file that replaces none has the mode that the process gives new files. What is no regular file, such as a device, is not replaced. A terrain that somebody is
-//! writing to is not replaced either ([`lock`](super::lock)).
+//! writing to is not replaced either ([`lock`](super::lock)), nor one that was edited after the new file was begun ([`seen`](super::seen)).
 //!
 //! **A nameless file cannot replace another.** Where the target exists it gets a name of its own first, `.NAME.*.terrasoar-new`, and is renamed at once. A process killed between
 //! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away. What has a name before it is complete is on the list of [`unfinished`].
 
 use super::lock::{ReplaceLock, WriteLock};
+use super::seen::Seen;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::unfinished;
@@ -28,6 +29,8 @@ pub struct AtomicFile {
     target: PathBuf,
     /// Where that leads.
     place: PathBuf,
+    /// What was there when it was begun.
+    seen: Seen,
     inner: Inner,
 }
 
@@ -84,9 +87,10 @@ impl AtomicFile {
         let failed = |e| LayoutError::io(target, "cannot create the file", e);
         let (target, place) = (target.to_owned(), resolved(target).map_err(failed)?);
         check_replaceable(&target, &place)?;
+        let seen = Seen::at(&place);
         #[cfg(target_os = "linux")]
         if let Some(file) = nameless(folder_of(&place)) {
-            return Ok(Self { target, place, inner: Inner::Nameless(file) });
+            return Ok(Self { target, place, seen, inner: Inner::Nameless(file) });
         }
         let mut builder = tempfile::Builder::new();
         builder.prefix(".terrasoar-").suffix(".partial");
@@ -101,7 +105,7 @@ impl AtomicFile {
             Ok((file.path().to_owned(), file))
         })
         .map_err(failed)?;
-        Ok(Self { target, place, inner: Inner::Named(guard, file) })
+        Ok(Self { target, place, seen, inner: Inner::Named(guard, file) })
     }
 
     /// The file to write to.
@@ -143,7 +147,7 @@ impl AtomicFile {
     }
 
     fn finish(self, disk: &dyn Disk, replaced: Replaced<'_>) -> Result<bool, LayoutError> {
-        let Self { target, place, inner } = self;
+        let Self { target, place, seen, inner } = self;
         let failed = |e| {
             let when_full = "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
             LayoutError::write(&target, "cannot write the file", when_full, e)
@@ -163,6 +167,10 @@ impl AtomicFile {
             Replaced::Held(lock) if !lock.is_of(&place) => return Err(replaced_meanwhile(&target)),
             Replaced::Held(_) | Replaced::None => None,
         };
+        // With the lock held nobody commits any more.
+        if matches!(replaced, Replaced::Any) && !seen.is_still(&place) {
+            return Err(replaced_meanwhile(&target));
+        }
         if !matches!(replaced, Replaced::None) {
             check_replaceable(&target, &place)?;
         }
@@ -198,7 +206,7 @@ fn check_replaceable(name: &Path, target: &Path) -> Result<(), LayoutError> {
 
 fn replaced_meanwhile(name: &Path) -> LayoutError {
     LayoutError::Usage(format!(
-        "{}: the file was replaced by another meanwhile; nothing was written, do it again",
+        "{}: the file was changed or replaced by another meanwhile; nothing was written, do it again",
         name.display()
     ))
 }

@@ -6,6 +6,7 @@
 //! * `directory`: where pages lie, written behind them.
 //! * `journal`: what commits led to and what was before them.
 //! * `slots`: which of a file's two headers counts.
+//! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
 //! * `publish`: a terrain file that does not open is not published.
 
 pub mod atomic;
@@ -13,5 +14,6 @@ pub(crate) mod directory;
 pub(crate) mod journal;
 pub(crate) mod lock;
 pub(crate) mod publish;
+mod seen;
 pub(crate) mod slots;
 pub(crate) mod tail;

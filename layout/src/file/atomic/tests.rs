@@ -159,3 +159,36 @@ fn what_somebody_writes_to_is_not_replaced() {
     assert!(file.publish_new_on(&SystemDisk).unwrap());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }
+
+/// Edits that were told as durable while the new file was made are not lost, and neither is a terrain that came into being meanwhile.
+#[test]
+fn a_terrain_that_was_edited_meanwhile_is_not_replaced() {
+    use crate::build::{BuildOptions, Silent, build};
+    use crate::edit::{Edit, EditSession, SampleRect};
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("a.iqt");
+    let dem = crate::dem::MemoryDem::from_fn([9, 9], crate::dem::SampleType::I16, |x, y| f64::from(x + y));
+    let make = || build(&dem, &target, &BuildOptions::default(), &Silent).unwrap();
+    make();
+    let file = AtomicFile::create(&target).unwrap();
+    SystemDisk.write_at(file.file(), b"new", 0).unwrap();
+    let mut session = EditSession::open(&target).unwrap();
+    let rect = SampleRect { west: 1, south: 1, east: 3, north: 3 };
+    session.apply(&[Edit::set(rect, 7.0)]).unwrap();
+    session.commit("a dam").unwrap();
+    drop(session);
+    let edited = std::fs::read(&target).unwrap();
+    let error = file.publish().unwrap_err().to_string();
+    assert!(error.contains("changed or replaced by another meanwhile"), "{error}");
+    assert!(std::fs::read(&target).unwrap() == edited);
+
+    std::fs::remove_file(&target).unwrap();
+    let file = AtomicFile::create(&target).unwrap();
+    make();
+    let made = std::fs::read(&target).unwrap();
+    file.publish().unwrap_err();
+    assert!(std::fs::read(&target).unwrap() == made);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    // One that is as it was is replaced.
+    make();
+}
