@@ -19,12 +19,18 @@ use super::clocks::{CLOCKS, Clocks};
 use super::labels::{child_point, level_of};
 use super::nodes::{STATUS, UNREAD};
 use super::queue::{Entry, Queue};
+use std::collections::HashSet;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::slot_of;
 use terrasoar_layout::store::RecordStore;
 
 /// Vertices that the looks of one frame may test, two to five milliseconds; the rest is looked at in the next.
 const TESTS_A_FRAME: usize = 8000;
+/// Tests of one look after which it remembers what it has tested. A vertex has two parents, so that a look which goes down many levels would come by the finest ones as
+/// often as there are ways to them: few where errors shrink from level to level, as they do in sound files and near no void, and 2^32 elsewhere.
+const TESTS_UNREMEMBERED: usize = 64;
+/// Tests after which a look ends, whatever is left: records of nonsense may all be wanted at once.
+const TESTS_A_LOOK: usize = 8 * TESTS_A_FRAME;
 /// Share of the newest frame in a clock's pace.
 const RECENT: f32 = 0.2;
 /// A pace grows by no more than this a frame, lest one jump of the eye make everything urgent.
@@ -60,6 +66,8 @@ pub(super) struct Ahead {
     blocked: Vec<(u64, u32)>,
     /// Vertices whose children are to be sought, and in how many frames they may split.
     stack: Vec<(GridPoint, f32)>,
+    /// What a long look has met.
+    seen: HashSet<GridPoint>,
 }
 
 impl Ahead {
@@ -73,6 +81,7 @@ impl Ahead {
             looks: Vec::new(),
             blocked: Vec::new(),
             stack: Vec::new(),
+            seen: HashSet::new(),
         }
     }
 
@@ -86,6 +95,7 @@ impl Ahead {
             + self.looks.capacity() * size_of::<u32>()
             + self.blocked.capacity() * size_of::<(u64, u32)>()
             + self.stack.capacity() * size_of::<(GridPoint, f32)>()
+            + self.seen.capacity() * size_of::<GridPoint>()
     }
 
     /// Takes in what the clocks did in this frame.
@@ -180,8 +190,9 @@ impl<S: RecordStore> Kinetic<S> {
         let mut tests = 0;
         let mut away = None;
         ahead.stack.clear();
+        ahead.seen.clear();
         ahead.stack.push((leaf.point, first));
-        while let Some((point, in_frames)) = ahead.stack.pop() {
+        while let Some((point, in_frames)) = ahead.stack.pop().filter(|_| tests < TESTS_A_LOOK) {
             let level = level_of(point);
             if level == 0 {
                 continue;
@@ -200,6 +211,10 @@ impl<S: RecordStore> Kinetic<S> {
                     continue;
                 };
                 if level == 1 {
+                    continue;
+                }
+                // The first way to it says when it can be needed at the earliest, as every other does.
+                if tests > TESTS_UNREMEMBERED && !ahead.seen.insert(child) {
                     continue;
                 }
                 tests += 1;
