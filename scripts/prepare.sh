@@ -46,6 +46,14 @@ need_component() {
     rustup component add "$component" || fail "rustup cannot install $component; it needs the network once"
 }
 
+# need_cargo_tool NAME VERSION WHY: a subcommand of cargo, built from its source if it is not here.
+need_cargo_tool() {
+    cargo "${1#cargo-}" --version >/dev/null 2>&1 && return
+    say "building $1 $2 through cargo, once: $3"
+    CARGO_NET_OFFLINE=false cargo install --quiet --locked "$1" --version "$2" ||
+        fail "$1 cannot be installed; it needs the network once"
+}
+
 # Fetches what Cargo.lock names for this machine, if it is not here yet, and keeps cargo off the network from then on.
 fetch_dependencies() {
     local host

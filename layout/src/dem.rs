@@ -118,6 +118,11 @@ pub trait DemSource: Sync {
     /// What the data set says about itself.
     fn info(&self) -> &DemInfo;
 
+    /// Memory in bytes that [`stream`](DemSource::stream) takes beyond a megabyte or two a thread.
+    fn memory_bytes(&self) -> u64 {
+        0
+    }
+
     /// Pushes every sample exactly once into `sink`, decoding on the current rayon pool where the
     /// format allows it. Holds a few windows at a time, never the whole grid.
     ///

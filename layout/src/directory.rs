@@ -1,6 +1,13 @@
 //! The page directory: logical record page -> where it lies and its checksum (FORMAT.md, section 5).
 //!
 //! On disk it has two levels, so that an edit rewrites one leaf and the root and a mostly void terrain has a small one. In memory it is flat.
+//!
+//! Cost: 12 bytes a logical page, of which the system gives only what is not void: entries of absent leaves are zeros that nobody writes. Without that a file of 1.7 MB, a
+//! void square of 2^16 steps in the largest records, would ask for 340 MB; of a file of 20 KB, 1.6 MB are the most.
+
+mod uses;
+
+pub(crate) use uses::PageUses;
 
 use crate::bytes::{PAGE_BYTES, get_u32, put_u32};
 
@@ -8,7 +15,7 @@ use crate::bytes::{PAGE_BYTES, get_u32, put_u32};
 pub(crate) const ENTRY_BYTES: usize = 16;
 
 /// Where a page lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, bytemuck::Zeroable)]
 pub struct Entry {
     /// Page number in the file; 0 if absent.
     pub page: u32,
@@ -42,6 +49,11 @@ impl Entry {
     pub fn is_present(self) -> bool {
         self.page != 0
     }
+}
+
+/// The table of a terrain of so many logical pages, all of them absent. Memory is taken as entries are written.
+pub(crate) fn absent(logical_pages: usize) -> Vec<Entry> {
+    bytemuck::zeroed_vec(logical_pages)
 }
 
 /// Entries a leaf page.

@@ -9,15 +9,15 @@ use crate::record::RecordCodec;
 use crate::store::{RawOf, RecordShape, RecordStore};
 use crate::terrain::Records;
 
-/// The page is the file's.
-const FILES: u32 = u32::MAX;
+/// The page is the file's. Zero, so that pages that are never replaced take no memory.
+const FILES: u32 = 0;
 
 /// Records of a terrain, some of them others than the file's.
 #[derive(Debug, Clone)]
 pub struct EditedRecords<'a, C: RecordCodec> {
     records: Records<'a, C>,
     shape: RecordShape<C>,
-    /// Which own page each logical page is, or [`FILES`].
+    /// Which own page each logical page is, counted from 1, or [`FILES`].
     own: Vec<u32>,
     /// Own pages, one after the other.
     bytes: Vec<u8>,
@@ -45,10 +45,10 @@ impl<'a, C: RecordCodec> EditedRecords<'a, C> {
             )));
         };
         if *own == FILES {
-            *own = (self.bytes.len() / PAGE_BYTES) as u32;
+            *own = (self.bytes.len() / PAGE_BYTES) as u32 + 1;
             self.bytes.extend_from_slice(page);
         } else {
-            self.bytes[*own as usize * PAGE_BYTES..][..PAGE_BYTES].copy_from_slice(page);
+            self.bytes[(*own as usize - 1) * PAGE_BYTES..][..PAGE_BYTES].copy_from_slice(page);
         }
         Ok(())
     }
@@ -63,7 +63,7 @@ impl<'a, C: RecordCodec> EditedRecords<'a, C> {
     fn place(&self, slot: u64) -> Option<usize> {
         let own = *self.own.get((slot >> Self::PAGE_SHIFT) as usize)?;
         let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
-        (own != FILES).then_some(own as usize * PAGE_BYTES + within)
+        (own != FILES).then(|| (own as usize - 1) * PAGE_BYTES + within)
     }
 }
 

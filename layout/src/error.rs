@@ -1,8 +1,9 @@
 //! The one error type of this crate. Its variants tell apart what a caller would handle apart:
 //! not our format, damaged, unsupported, I/O, wrong usage. Every message says what, where, and
-//! what to do.
+//! what to do; how that is done in a program, by which flag or button, is the program's to add ([`Remedy`]).
 
 use crate::disk::is_full;
+use crate::remedy::Remedy;
 use std::path::{Path, PathBuf};
 
 /// Anything that can go wrong between a DEM and a terrain file, or in reading one.
@@ -18,6 +19,8 @@ pub enum LayoutError {
         action: &'static str,
         /// The system's reason.
         source: std::io::Error,
+        /// What would mend it, where that can be asked for.
+        remedy: Option<Remedy>,
     },
     /// The file is not of the format it was taken for.
     #[error("{}: {problem}", path.display())]
@@ -44,6 +47,8 @@ pub enum LayoutError {
         path: PathBuf,
         /// What it uses, and what to do instead.
         problem: String,
+        /// What would mend it, where that can be asked for.
+        remedy: Option<Remedy>,
     },
     /// An edit leads to heights, or to slopes, that the file's records cannot hold.
     #[error("{}: {problem}", path.display())]
@@ -58,12 +63,20 @@ pub enum LayoutError {
     /// The request cannot be met as asked: a budget too small, a size out of range.
     #[error("{0}")]
     Usage(String),
+    /// As [`LayoutError::Usage`], where one thing that can be asked for would mend it.
+    #[error("{problem}")]
+    Unmet {
+        /// What cannot be met, and what to do.
+        problem: String,
+        /// What would mend it.
+        remedy: Remedy,
+    },
 }
 
 impl LayoutError {
     /// An I/O error on `path` while attempting `action` ("cannot read the file").
     pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
-        Self::Io { path: path.to_owned(), action, source }
+        Self::Io { path: path.to_owned(), action, source, remedy: None }
     }
 
     /// A failed write to `path`: `action` as for [`LayoutError::io`], or `when_full`, which says what to do, where there was no room.
@@ -84,6 +97,30 @@ impl LayoutError {
 
     /// Something sound but not supported.
     pub fn unsupported(path: &Path, problem: impl Into<String>) -> Self {
-        Self::Unsupported { path: path.to_owned(), problem: problem.into() }
+        Self::Unsupported { path: path.to_owned(), problem: problem.into(), remedy: None }
+    }
+
+    /// The same error with what would mend it. Of no effect on errors that nothing asked for can mend: damage, another format, heights out of range.
+    pub fn mended_by(mut self, mends: Remedy) -> Self {
+        match &mut self {
+            Self::Io { remedy, .. } | Self::Unsupported { remedy, .. } => *remedy = Some(mends),
+            Self::Unmet { remedy, .. } => *remedy = mends,
+            Self::Usage(problem) => {
+                return Self::Unmet { problem: std::mem::take(problem), remedy: mends };
+            }
+            Self::NotThisFormat { .. } | Self::Damaged { .. } | Self::OutOfRange { .. } => {}
+        }
+        self
+    }
+
+    /// What would mend it, if that can be asked for.
+    pub fn remedy(&self) -> Option<Remedy> {
+        match self {
+            Self::Io { remedy, .. } | Self::Unsupported { remedy, .. } => *remedy,
+            Self::Unmet { remedy, .. } => Some(*remedy),
+            Self::NotThisFormat { .. } | Self::Damaged { .. } | Self::OutOfRange { .. } | Self::Usage(_) => {
+                None
+            }
+        }
     }
 }

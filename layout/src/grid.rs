@@ -9,6 +9,8 @@
 //! Invariant: [`Grid::new`] is the only way in, so `k` is 1..=16 and both sample counts fit the square.
 
 use crate::error::LayoutError;
+use crate::remedy::Remedy;
+use crate::words::number;
 
 /// Largest supported `k`: a square of 65,537 samples a side.
 pub const MAX_K: u32 = 16;
@@ -77,9 +79,11 @@ impl Grid {
         }
         if !spacing_m.iter().all(|s| (1e-3..=1e6).contains(s)) {
             return Err(LayoutError::Usage(format!(
-                "a sample spacing lies between 0.001 and 1,000,000 metres, not {} x {}; state it with --spacing",
-                spacing_m[0], spacing_m[1]
-            )));
+                "a sample spacing lies between 0.001 and 1,000,000 metres, not {} x {}; state the spacing in metres",
+                number(spacing_m[0]),
+                number(spacing_m[1])
+            ))
+            .mended_by(Remedy::Spacing));
         }
         let k = (longest - 1).next_power_of_two().trailing_zeros().max(1);
         Ok(Self { k, samples, spacing_m })
@@ -218,8 +222,11 @@ impl Grid {
         })
     }
 
-    /// The two ends of the edge that a vertex splits.
+    /// The two ends of the edge that a vertex splits. A corner splits none: it is both.
     pub fn edge_ends(&self, p: GridPoint) -> [GridPoint; 2] {
+        if self.is_corner(p) {
+            return [p; 2];
+        }
         let step = 1u32 << (self.level(p) / 2);
         let (x, y) = (p.x(), p.y());
         let x_odd = (x / step) & 1 == 1;

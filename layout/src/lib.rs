@@ -2,7 +2,6 @@
 //!
 //! The way data takes: [`import`] turns a DEM into a [`dem::DemSource`]; [`build`] computes what refinement needs and writes
 //! the file that FORMAT.md specifies; [`terrain`] opens it. This crate knows bytes and knows no camera.
-pub mod atomic_file;
 mod bound;
 pub mod build;
 pub mod bytes;
@@ -12,26 +11,32 @@ pub mod disk;
 pub mod edit;
 pub mod edited;
 pub mod error;
+pub mod file;
 pub mod grid;
 pub mod header;
 pub mod imagery;
 pub mod import;
-mod journal;
 pub mod loader;
-mod lock;
 pub mod octave;
 mod opening;
 pub mod order;
 pub mod pool;
 pub mod prefetch;
+pub mod printable;
 pub mod record;
 mod records;
-mod slots;
+pub mod remedy;
 pub mod source;
 pub mod store;
 pub mod synth;
 pub mod terrain;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+pub mod unfinished;
 pub mod unused;
 pub mod verify;
+mod words;
 
 pub use error::LayoutError;
+pub use file::atomic as atomic_file;
+pub use remedy::Remedy;

@@ -1,17 +1,33 @@
 //! What is checked when a terrain file is opened: header, directory, inert page (FORMAT.md, section 6). Record pages are checked when they are read.
 //!
-//! Invariant: every page number of the directory that is handed out lies inside the source as it was when it was opened. Cost: a read a leaf page.
+//! Invariant: every page number of the directory that is handed out lies inside the source as it was when it was opened, and no page has two uses. Cost: a read a leaf page.
 
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
-use crate::directory::{ENTRY_BYTES, Entry};
+use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, absent};
 use crate::error::LayoutError;
-use crate::header::{Header, INERT_PAGE, LEAF_ENTRIES};
+use crate::header::{Header, INERT_PAGE};
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
-use crate::source::Source;
+use crate::source::{PreadSource, Source};
 use std::path::Path;
 
 /// Reads and checks header and directory (FORMAT.md, section 6).
 pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>), LayoutError> {
+    let header = read_header(source)?;
+    let entries = check_structure(source, &header)?;
+    Ok((header, entries))
+}
+
+/// As [`read_structure`], of a file that others may append to at this moment.
+pub(crate) fn read_growing(file: &mut PreadSource) -> Result<(Header, Vec<Entry>), LayoutError> {
+    // The header first and then the length: what a header counts was in the file before the header was.
+    let header = read_header(file)?;
+    file.measure_again()?;
+    let entries = check_structure(file, &header)?;
+    Ok((header, entries))
+}
+
+/// The current header.
+fn read_header(source: &dyn Source) -> Result<Header, LayoutError> {
     let path = source.path();
     let length = source.byte_count();
     let page_bytes = PAGE_BYTES as u64;
@@ -32,13 +48,17 @@ pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>)
     }
     source.read_at(0, &mut slot_a[..])?;
     source.read_at(page_bytes, &mut slot_b[..])?;
-    let header = Header::current(path, &slot_a, &slot_b)?;
+    Header::current(path, &slot_a, &slot_b)
+}
+
+/// Whether all that a header leads to is there; the directory.
+fn check_structure(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
+    let length = source.byte_count();
     if length < header.file_bytes {
-        return Err(truncated(path, length, Some(header.file_bytes)));
+        return Err(truncated(source.path(), length, Some(header.file_bytes)));
     }
-    check_inert_page(source, &header)?;
-    let entries = read_directory(source, &header)?;
-    Ok((header, entries))
+    check_inert_page(source, header)?;
+    read_directory(source, header)
 }
 
 /// The directory's root: where the leaves lie.
@@ -52,22 +72,19 @@ pub(crate) fn read_root(source: &dyn Source, header: &Header) -> Result<Vec<Entr
     Ok((0..header.root_entries() as usize).map(|i| Entry::read(&root, i)).collect())
 }
 
-/// The entries of leaf `i`, which the root says lies at `here`.
+/// Fills `entries` with those of leaf `i`, which the root says lies at `here`; leaves them as they are if it is absent.
 pub(crate) fn read_leaf(
     source: &dyn Source,
     header: &Header,
     i: usize,
     here: Entry,
-    entries: &mut Vec<Entry>,
+    entries: &mut [Entry],
 ) -> Result<(), LayoutError> {
-    let page_bytes = PAGE_BYTES as u64;
-    let in_file = |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * page_bytes <= header.file_bytes;
-    let first = i * LEAF_ENTRIES as usize;
-    let in_leaf = (to_usize(header.record_pages())? - first).min(LEAF_ENTRIES as usize);
     if !here.is_present() {
-        entries.resize(entries.len() + in_leaf, Entry::default());
         return Ok(());
     }
+    let page_bytes = PAGE_BYTES as u64;
+    let in_file = |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * page_bytes <= header.file_bytes;
     if !in_file(here.page) {
         return Err(damaged(source, format!("directory leaf {i}"), "it lies outside the file"));
     }
@@ -76,29 +93,52 @@ pub(crate) fn read_leaf(
     if checksum(&leaf) != here.checksum {
         return Err(damaged(source, format!("directory leaf {i}"), "the checksum does not match"));
     }
-    for j in 0..in_leaf {
-        let entry = Entry::read(&leaf, j);
-        if entry.is_present() && !in_file(entry.page) {
-            let place = format!("directory entry of record page {}", first + j);
+    for (j, place) in entries.iter_mut().enumerate() {
+        *place = Entry::read(&leaf, j);
+        if place.is_present() && !in_file(place.page) {
+            let place = format!("directory entry of record page {}", i * ENTRIES_PER_LEAF + j);
             return Err(damaged(source, place, "the page lies outside the file"));
         }
-        entries.push(entry);
     }
     Ok(())
 }
 
+/// A directory as it is held in memory: the root, an entry a leaf, and all entries, one a logical page.
+pub(crate) type Tables = (Vec<Entry>, Vec<Entry>);
+
 /// The whole directory that `header` names, checked.
 pub(crate) fn read_directory(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
-    let mut entries = Vec::with_capacity(to_usize(header.record_pages())?);
-    for (i, here) in read_root(source, header)?.into_iter().enumerate() {
-        read_leaf(source, header, i, here, &mut entries)?;
+    read_directory_beside(source, header, None).map(|(_, entries)| entries)
+}
+
+/// As [`read_directory`], of a state beside one of the same file whose root and entries are `known`: leaves that both have are not read again.
+pub(crate) fn read_directory_beside(
+    source: &dyn Source,
+    header: &Header,
+    known: Option<(&[Entry], &[Entry])>,
+) -> Result<Tables, LayoutError> {
+    let root = read_root(source, header)?;
+    let mut uses = PageUses::new(source, header.file_bytes)?;
+    uses.take_root(source, header, &root)?;
+    let mut entries = absent(to_usize(header.record_pages())?);
+    let mut stored = 0;
+    for (i, (here, leaf)) in root.iter().zip(entries.chunks_mut(ENTRIES_PER_LEAF)).enumerate() {
+        let first = i * ENTRIES_PER_LEAF;
+        let same = known.filter(|(root, _)| here.is_present() && root.get(i) == Some(here));
+        match same.and_then(|(_, entries)| entries.get(first..first + leaf.len())) {
+            Some(known) => leaf.copy_from_slice(known),
+            None => read_leaf(source, header, i, *here, leaf)?,
+        }
+        if here.is_present() {
+            uses.take_entries(source, first, leaf)?;
+            stored += leaf.iter().filter(|entry| entry.is_present()).count() as u64;
+        }
     }
-    let stored = entries.iter().filter(|e| e.is_present()).count() as u64;
     if stored != header.stored_pages {
         let problem = "it holds another number of pages than the header says";
         return Err(damaged(source, "directory".into(), problem));
     }
-    Ok(entries)
+    Ok((root, entries))
 }
 
 fn damaged(source: &dyn Source, place: String, problem: &str) -> LayoutError {

@@ -52,7 +52,10 @@ impl<C: RecordCodec> PagePool<C> {
         let most = terrain.entries().len() + STAYING;
         let capacity = usize::try_from(cache_bytes / PAGE_BYTES as u64).unwrap_or(usize::MAX);
         let capacity = capacity.clamp(STAYING + LEAST_PAGES, most.max(STAYING + LEAST_PAGES));
-        let frames = terrain.entries().iter().map(|e| if e.is_present() { AWAY } else { 0 }).collect();
+        // Zeros that are never written take no memory: most of a void terrain.
+        let mut frames = vec![0; terrain.entries().len()];
+        let present = terrain.entries().iter().zip(&mut frames).filter(|(entry, _)| entry.is_present());
+        present.for_each(|(_, frame)| *frame = AWAY);
         let mut pool = Self {
             shape,
             // Zeroed lazily by the system: memory is taken as pages come.

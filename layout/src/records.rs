@@ -4,6 +4,7 @@
 
 use crate::bytes::PAGE_BYTES;
 use crate::grid::{Grid, GridPoint};
+use crate::header::INERT_PAGE;
 use crate::order::slot_of;
 use crate::prefetch::prefetch;
 use crate::record::{RecordCodec, Vertex};
@@ -41,6 +42,7 @@ impl Slices<'_> {
 #[derive(Debug, Clone)]
 pub struct Records<'a, C: RecordCodec> {
     bytes: Slices<'a>,
+    /// Counted from the inert page.
     pages: &'a [u32],
     shape: RecordShape<C>,
 }
@@ -91,7 +93,7 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     /// For a slot past the last page.
     #[inline(always)]
     pub fn raw(&self, slot: u64) -> C::Raw {
-        let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize;
+        let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize + INERT_PAGE as usize;
         let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
         self.bytes.record::<C>(page * PAGE_BYTES + within)
     }
@@ -101,7 +103,7 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     pub fn prefetch(&self, slot: u64) {
         if let Some(page) = self.pages.get((slot >> Self::PAGE_SHIFT) as usize) {
             let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
-            prefetch(self.bytes.first, *page as usize * PAGE_BYTES + within);
+            prefetch(self.bytes.first, (*page + INERT_PAGE) as usize * PAGE_BYTES + within);
         }
     }
 

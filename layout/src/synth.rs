@@ -17,9 +17,11 @@ mod detail;
 mod landscape;
 mod noise;
 mod output;
+mod recognise;
 mod tiff_header;
 
 pub use colour::{ColourOptions, write_colour};
+pub use recognise::is_synthetic;
 
 use std::path::Path;
 

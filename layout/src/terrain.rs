@@ -9,10 +9,10 @@ pub use crate::records::Records;
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::directory::Entry;
 use crate::error::LayoutError;
+use crate::file::journal::Commit;
 use crate::grid::{Grid, GridPoint};
 use crate::header::{Header, INERT_PAGE};
-use crate::journal::Commit;
-use crate::opening::{read_directory, read_structure};
+use crate::opening::{read_directory, read_growing, read_structure};
 use crate::order::slot_of;
 use crate::pool::PagePool;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
@@ -27,7 +27,7 @@ pub struct Terrain {
     source: Box<dyn Source>,
     header: Header,
     entries: Vec<Entry>,
-    /// Page number of each logical page, absent ones replaced by the inert page. Made when records are first asked for.
+    /// Page of each logical page, counted from the inert page, which absent ones read as. Made when records are first asked for.
     pages: OnceLock<Vec<u32>>,
 }
 
@@ -124,9 +124,15 @@ impl Terrain {
         Ok(Self::of(source, header, entries))
     }
 
+    /// Page of each logical page, counted from [`INERT_PAGE`].
     pub(crate) fn pages(&self) -> &[u32] {
-        let page = |entry: &Entry| if entry.is_present() { entry.page } else { INERT_PAGE };
-        self.pages.get_or_init(|| self.entries.iter().map(page).collect())
+        self.pages.get_or_init(|| {
+            // Zeros that are never written take no memory: most of a void terrain.
+            let mut pages = vec![0; self.entries.len()];
+            let present = self.entries.iter().zip(&mut pages).filter(|(entry, _)| entry.is_present());
+            present.for_each(|(entry, page)| *page = entry.page - INERT_PAGE);
+            pages
+        })
     }
 
     /// The file's name for messages.
@@ -300,15 +306,9 @@ impl Terrain {
 
 /// Opens and checks a file that others may append to at this moment.
 fn open_settled(path: &Path) -> Result<(PreadSource, Header, Vec<Entry>), LayoutError> {
-    loop {
-        let file = PreadSource::open(path)?;
-        match read_structure(&file) {
-            Ok((header, entries)) => return Ok((file, header, entries)),
-            // The header is newer than the length: whoever appends is quicker.
-            Err(LayoutError::Damaged { .. }) if file.has_grown() => {}
-            Err(error) => return Err(error),
-        }
-    }
+    let mut file = PreadSource::open(path)?;
+    let (header, entries) = read_growing(&mut file)?;
+    Ok((file, header, entries))
 }
 
 /// Positions a hair off a sample, from spacings that are not exact in binary, mean the sample.

@@ -1,16 +1,18 @@
 //! Whether a terrain file is sound: every page against its checksum, every page number used once, and what section 3 of FORMAT.md
 //! promises of the records.
 //!
-//! Opening checks header, directory and inert page; this checks the rest, in three passes. `structure` looks at page numbers,
-//! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children.
-//! Cost: each page is read some ten times, never more than a few hundred kilobytes a thread are held. Not covered, for nothing depends
-//! on them: the header slot that is not current, the bytes after the directory root's last entry, pages that no directory reaches. Of the states
-//! that an edited file can go back to, the journal is read and nothing else.
+//! Opening checks header, directory and inert page; this checks the rest, in passes. `structure` looks at what the directory says besides page numbers,
+//! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children, `imagery` reads the tiles. Of an edited file
+//! `journal` looks at all states that it can go back and forth to, by checksums and page numbers; how their records are nested is checked of the current one alone.
+//! Cost: each page is read some ten times, never more than a few hundred kilobytes a thread are held, and the directory. Not covered, for nothing depends
+//! on them: the header slot that is not current, the bytes after the directory root's last entry, pages that no state reaches.
 //!
 //! Invariant: a report without problems means that every promise refinement relies on holds for the bytes as they were read.
 
 mod imagery;
+mod journal;
 mod nesting;
+mod states;
 mod structure;
 
 use crate::bytes::{PAGE_BYTES, checksum};
@@ -104,7 +106,7 @@ pub fn verify_pages(terrain: &Terrain) -> u64 {
 /// # Errors
 /// Only if the file cannot be read; what is wrong in it is the report's business.
 pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<VerifyReport, LayoutError> {
-    let findings = structure::check(terrain)?;
+    let findings = structure::check(terrain);
     let present: Vec<u32> =
         (0u32..).zip(terrain.entries()).filter(|(_, e)| e.is_present()).map(|(page, _)| page).collect();
     let (damaged, wrong_sums) = checksums(terrain, &present, progress)?;
@@ -121,14 +123,9 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
         }
     };
     let (tiles, pictures) = imagery::check(terrain, progress)?;
-    let mut journal = Findings::default();
-    match crate::edit::history(terrain) {
-        Ok(_) => {}
-        Err(LayoutError::Damaged { place, problem, .. }) => journal.add(place, problem),
-        Err(other) => return Err(other),
-    }
+    let history = journal::check(terrain)?;
     let findings = findings.merge(wrong_sums).merge(records).merge(pictures);
-    let Findings { listed, count } = findings.merge(journal);
+    let Findings { listed, count } = findings.merge(history);
     Ok(VerifyReport {
         pages_checked: present.len() as u64,
         vertices_checked: vertices,

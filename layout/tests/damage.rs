@@ -262,22 +262,24 @@ fn records_that_break_their_promises_are_found_behind_right_checksums() {
 #[test]
 fn a_page_used_twice_and_a_lost_page_are_found() {
     let bytes = file(None);
-    let report = |change: &dyn Fn(&mut Forger)| {
+    let forged = |change: &dyn Fn(&mut Forger)| {
         let mut forged = Forger { bytes: bytes.clone() };
         change(&mut forged);
-        use_terrain(&open_bytes(forged.seal()).unwrap()).unwrap()
+        open_bytes(forged.seal())
     };
+    let report = |change: &dyn Fn(&mut Forger)| use_terrain(&forged(change).unwrap()).unwrap();
     let says = |report: &VerifyReport, words: &str| {
         assert!(report.problems.iter().any(|p| p.to_string().contains(words)), "{:?}", report.problems);
     };
     let leaf = Forger { bytes: bytes.clone() }.leaf();
     let stored = open_bytes(bytes.clone()).unwrap().header().stored_pages as u32;
     let first = u32_at(&bytes, leaf) as u32;
-    says(
-        &report(&|f| f.put(leaf + 16, first)),
-        &format!("file page {first} is also that of the record page 0"),
-    );
-    says(&report(&|f| f.put(leaf + 16, (leaf / PAGE) as u32)), "is also that of the record page 1");
+    // Record pages, the leaf itself, the root.
+    for page in [first, (leaf / PAGE) as u32, u32_at(&bytes, 0x078) as u32] {
+        let error = forged(&|f| f.put(leaf + 16, page)).unwrap_err().to_string();
+        let words = format!("record page 1: file page {page} has another use as well");
+        assert!(error.contains(&words), "{error}");
+    }
     says(&report(&|f| f.put(leaf + 8, 7)), "generation 7 wrote it");
     says(&report(&|f| f.put(leaf + 8, 0)), "generation 0 wrote it");
     // The last stored page disappears: its parents' records and the count of heights know.

@@ -44,7 +44,8 @@ impl Bench {
     fn rebuilt(&self) -> Terrain {
         // Edited pages in their old places, which nobody checks.
         let mut bytes = self.bytes.clone();
-        for (logical, page) in self.editor.edited_pages() {
+        for logical in self.editor.edited_pages() {
+            let page = self.editor.edited_page(logical).unwrap();
             let at = self.terrain().entries()[logical as usize].page as usize * 4096;
             bytes[at..at + 4096].copy_from_slice(page);
         }

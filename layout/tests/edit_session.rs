@@ -75,12 +75,8 @@ fn is_sound(terrain: &Terrain) -> bool {
 }
 
 fn session_pages(session: &mut EditSession) -> Vec<u8> {
-    let terrain = Arc::clone(session.editor().terrain());
-    let page = |i| match session.editor().edited_page(i) {
-        Some(page) => page.to_vec(),
-        None => terrain.checked_page(i).unwrap().to_vec(),
-    };
-    (0..terrain.header().record_pages()).flat_map(page).collect()
+    let pages = session.header().record_pages();
+    (0..pages).flat_map(|i| session.editor_mut().page(i).unwrap().to_vec()).collect()
 }
 
 /// Three batches, then one undone, one redone; the pages after each step.
@@ -121,7 +117,17 @@ fn whatever_fails_a_whole_number_of_batches_is_there() {
                 for failure in [Failure::Killed { quarters }, Failure::Full { quarters }, Failure::Once] {
                     let bench = Bench::new();
                     let disk = Arc::new(FailingDisk::new(at, failure));
-                    let mut session = bench.session(disk, is_overlay).unwrap();
+                    let mut session = match bench.session(disk, is_overlay) {
+                        Ok(session) => session,
+                        // Making the overlay failed: there is none, or one without edits.
+                        Err(error) => {
+                            assert!(is_overlay, "{error}");
+                            if bench.path("o.iqo").exists() {
+                                assert!(pages(&bench.open(true)) == states[0]);
+                            }
+                            continue;
+                        }
+                    };
                     let mut done = 0;
                     let ended = script(&mut session, |step, _| done = step + 1);
                     assert!(ended.is_err() || matches!(failure, Failure::Full { .. }), "{failure:?} at {at}");
@@ -198,6 +204,39 @@ proptest! {
 }
 
 /// Whoever opened the file before goes on reading what was there.
+/// A batch that is refused halfway through leaves nothing: what is undone next is the batch before it, and there is nothing to commit.
+#[test]
+fn after_a_refused_batch_there_is_nothing_to_commit_and_undo_goes_on() {
+    let bench = Bench::new();
+    let mut session = EditSession::open(&bench.terrain()).unwrap();
+    let built = session_pages(&mut session);
+    session.apply(&[set(1)]).unwrap();
+    session.commit("one").unwrap();
+    let (one, header) = (session_pages(&mut session), session.header().clone());
+    let too_high = Edit::Set {
+        height_m: 1e6,
+        area: Area::Rect(SampleRect { west: 90, south: 80, east: 95, north: 85 }),
+    };
+    // Pages of the batch before and pages that nobody has written to.
+    assert!(matches!(
+        session.apply(&[set(1), set(2), set(5), too_high.clone()]),
+        Err(LayoutError::OutOfRange { .. })
+    ));
+    assert!(session.is_committed() && session.editor().uncommitted().is_empty());
+    assert!(session_pages(&mut session) == one);
+    assert_eq!(session.commit("nothing").unwrap().pages, 0);
+    assert_eq!(*session.header(), header);
+    assert!(session.undo().unwrap().is_some());
+    assert!(session_pages(&mut session) == built);
+    // What was applied before it stays to be committed, and no more than that.
+    session.apply(&[set(3)]).unwrap();
+    let (three, waiting) = (session_pages(&mut session), session.editor().uncommitted());
+    session.apply(&[set(2), set(4), too_high]).unwrap_err();
+    assert!(session_pages(&mut session) == three && session.editor().uncommitted() == waiting);
+    session.discard();
+    assert!(session_pages(&mut session) == built && session.is_committed());
+}
+
 #[test]
 fn readers_keep_what_they_opened() {
     let bench = Bench::new();
@@ -236,7 +275,7 @@ fn restoring_goes_back_to_the_original() {
 fn compacting_drops_what_edits_replaced() {
     let bench = Bench::new();
     let out = bench.path("c.iqt");
-    compact(&SystemDisk, &Terrain::open(&bench.terrain()).unwrap(), &out, &Silent).unwrap();
+    compact(&SystemDisk, &bench.terrain(), None, &out, &Silent).unwrap();
     assert!(std::fs::read(&out).unwrap() == std::fs::read(bench.terrain()).unwrap());
     for is_overlay in [false, true] {
         let mut session = bench.session(Arc::new(SystemDisk), is_overlay).unwrap();
@@ -247,7 +286,8 @@ fn compacting_drops_what_edits_replaced() {
         let edited = session_pages(&mut session);
         drop(session);
         let there = bench.open(is_overlay);
-        compact(&SystemDisk, &there, &out, &Silent).unwrap();
+        let overlay = is_overlay.then(|| bench.path("o.iqo"));
+        compact(&SystemDisk, &bench.terrain(), overlay.as_deref(), &out, &Silent).unwrap();
         let compacted = Terrain::open(&out).unwrap();
         assert!(is_sound(&compacted) && pages(&compacted) == edited);
         assert!(compacted.header().file_bytes < there.header().file_bytes);
@@ -257,7 +297,7 @@ fn compacting_drops_what_edits_replaced() {
     // In its own place, while somebody reads it.
     let reader = Terrain::open(&bench.terrain()).unwrap();
     let before = pages(&reader);
-    compact(&SystemDisk, &Terrain::open(&bench.terrain()).unwrap(), &bench.terrain(), &Silent).unwrap();
+    compact(&SystemDisk, &bench.terrain(), None, &bench.terrain(), &Silent).unwrap();
     assert!(pages(&reader) == before && pages(&Terrain::open(&bench.terrain()).unwrap()) == before);
 }
 

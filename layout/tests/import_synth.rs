@@ -95,6 +95,6 @@ fn mistakes_are_explained() {
     assert!(fails(129, 0.0, "t.tif").contains("spacing"));
     assert!(fails(129, f64::NAN, "t.tif").contains("spacing"));
     assert!(fails(129, 20.0, "t.jpg").contains(".tif or .png"));
-    assert!(fails(129, 20.0, "no/such/folder/t.tif").contains("cannot write"));
+    assert!(fails(129, 20.0, "no/such/folder/t.tif").contains("cannot create"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

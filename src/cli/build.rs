@@ -1,6 +1,7 @@
 //! `terrasoar build`: a DEM in, a terrain file out.
 
-use super::output::{check_output, complain, grouped, print};
+use super::output::{complain, grouped, print};
+use super::outputs::{Force, Kind};
 use super::progress::{Progress, short};
 use super::{parse, terrain};
 use anyhow::{Context, Result};
@@ -36,6 +37,8 @@ pub(super) struct Args {
     /// Terrain file to write
     #[arg(short, long, value_name = "OUT.iqt")]
     output: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Metres between samples, one number or east,north, instead of what the DEM says
     #[arg(long, value_name = "M|MX,MY", value_parser = parse::spacing_m)]
     spacing: Option<[f64; 2]>,
@@ -97,7 +100,7 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let inputs: Vec<&Path> = args.inputs.iter().map(PathBuf::as_path).collect();
-    check_output(&args.output, &inputs)?;
+    args.force.file(&args.output, Kind::Terrain, &inputs)?;
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         pool = pool.num_threads(usize::from(threads));

@@ -1,8 +1,8 @@
 //! A cap on the memory of what is measured, page cache included, by a Linux control group.
 //!
 //! The program makes a group, caps it, and runs itself again; the copy is in the group while it measures and out of it while it counts, so that the cap is on what flying and
-//! reading take: memory stays charged where it was first touched. The first program outlives the copy, tells if the kernel ended it, and removes the group; groups
-//! that a killed program left behind go at the next cap. Version 1 has `memory.limit_in_bytes`, version 2 `memory.max`. Where neither can be had, the program
+//! reading take: memory stays charged where it was first touched. The first program outlives the copy, tells if the kernel ended it, and removes the group; should the
+//! first be killed, the copy ends too and removes it. What is left all the same goes at the next cap. Version 1 has `memory.limit_in_bytes`, version 2 `memory.max`. Where neither can be had, the program
 //! goes on without a cap and says why.
 
 use super::WrongUsage;
@@ -93,19 +93,42 @@ fn join(capped: &Path, mib: u64) -> Result<Standing> {
         note: None,
         groups: Some(Groups { capped: capped.into(), home }),
     };
+    #[cfg(unix)]
+    if let Some(Groups { capped, home }) = &standing.groups {
+        end_with_parent(capped.clone(), home.clone());
+    }
     Ok(standing.within(|| Ok(())).map(|()| standing).unwrap_or_else(|e| Standing::uncapped(format!("{e:#}"))))
+}
+
+/// Ends this copy soon after the program that made the group, should that be killed: nobody waits for the copy then, and nobody else would remove the group.
+#[cfg(unix)]
+fn end_with_parent(capped: PathBuf, home: PathBuf) {
+    let parent = std::os::unix::process::parent_id();
+    // Without a thread to watch, the next cap removes the group.
+    let _ = std::thread::Builder::new().name("parent".into()).spawn(move || {
+        while std::os::unix::process::parent_id() == parent {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+        // A group with a process in it cannot be removed.
+        if enter(&home).is_ok() {
+            // Removed when dropped.
+            drop(Group { path: capped });
+        }
+        std::process::exit(1);
+    });
 }
 
 /// Runs the program again with the same words and the group's name.
 fn run_in(group: &Group, mib: u64) -> Result<()> {
     let program = std::env::current_exe().context("cannot find this program to run it under a cap")?;
     let words: Vec<OsString> = std::env::args_os().skip(1).collect();
-    let status = Command::new(&program)
-        .args(words)
-        .arg(GROUP_FLAG)
-        .arg(&group.path)
-        .status()
-        .with_context(|| format!("{}: cannot run under a cap", program.display()))?;
+    let mut copy = Command::new(&program);
+    copy.args(words).arg(GROUP_FLAG).arg(&group.path);
+    #[cfg(unix)]
+    let ran = super::signals::run_copy(&mut copy, || group.remove());
+    #[cfg(not(unix))]
+    let ran = copy.status();
+    let status = ran.with_context(|| format!("{}: cannot run under a cap", program.display()))?;
     match status.code() {
         Some(0) => Ok(()),
         Some(code) => {

@@ -1,6 +1,7 @@
 //! `terrasoar compare`: engines on the same flight, side by side, and a report.
 
 use super::output::{columns, complain, grouped, print, print_json};
+use super::outputs::{Force, Kind};
 use super::progress::Progress;
 use super::replay::{QualityArgs, fly};
 use super::terrain::TerrainArgs;
@@ -9,7 +10,7 @@ use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
-use terrasoar::report::{ComparisonReport, FlightPicture, ReportTitle};
+use terrasoar::report::{ComparisonReport, FLIGHT_PICTURE, FlightPicture, ReportTitle};
 use terrasoar::stats::{Comparison, FrameStats};
 use terrasoar_layout::terrain::Terrain;
 
@@ -39,6 +40,8 @@ pub(super) struct Args {
     /// Folder for the report, made if missing
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Leave out the sweeps over tolerance and incoherence
     #[arg(long)]
     no_sweeps: bool,
@@ -62,9 +65,12 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     args.check()?;
-    if args.output.exists() && !args.output.is_dir() {
-        bail!("{}: the report needs a folder and this is a file; name another", args.output.display());
-    }
+    let engines: Vec<&str> = args.engines.iter().map(|engine| engine.name()).collect();
+    let files: Vec<_> = ComparisonReport::files(&engines)
+        .into_iter()
+        .map(|(name, file)| (name, Kind::Report(file)))
+        .collect();
+    args.force.folder(&args.output, &files, &args.terrain.inputs(&[&args.flight]))?;
     let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
     let quality = args.quality.quality();
@@ -103,11 +109,15 @@ pub(super) fn run(args: &Args) -> Result<()> {
         tolerance_sweep: &by_tolerance,
         incoherence_sweep: &by_incoherence,
         picture: match &picture {
-            Ok(caption) => FlightPicture::File { name: PICTURE, caption },
+            Ok((file, caption)) => FlightPicture::Png { file, caption },
             Err(why) => FlightPicture::Missing(why),
         },
     };
     let written = report.write(&args.output)?;
+    if picture.is_err() {
+        // An older report's picture shows another flight. It is one, or may be lost: that was looked at first.
+        let _ = std::fs::remove_file(args.output.join(FLIGHT_PICTURE));
+    }
     if args.json {
         print_json(&comparison)?;
     } else {
@@ -127,33 +137,17 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// The picture's name in the report's folder.
-const PICTURE: &str = "flight.png";
-
-/// Draws the flight's middle frame into the report's folder; gives a caption, or says why there is none. A report without a picture is a report.
+/// Draws the flight's middle frame; gives a PNG file and a caption, or says why there is none. A report without a picture is a report.
 #[cfg(feature = "view")]
-fn middle_frame(args: &Args, terrain: &Terrain, flight: &Flight) -> Result<String, String> {
+fn middle_frame(args: &Args, terrain: &Terrain, flight: &Flight) -> Result<(Vec<u8>, String), String> {
     let frame = flight.frames.len() / 2;
-    let draw = || -> Result<String> {
-        std::fs::create_dir_all(&args.output)?;
-        super::picture::write_frame(
-            terrain,
-            flight,
-            frame,
-            args.quality.quality(),
-            &args.output.join(PICTURE),
-        )
-    };
-    let drawn_by = draw().map_err(|error| {
-        // An older report's picture shows another flight.
-        let _ = std::fs::remove_file(args.output.join(PICTURE));
-        super::message(&error)
-    })?;
-    Ok(format!("Frame {frame} of {}, drawn by {drawn_by}.", flight.frames.len()))
+    let drawn = super::picture::draw_frame(terrain, flight, frame, args.quality.quality());
+    let (file, drawn_by) = drawn.map_err(|error| super::message(&error))?;
+    Ok((file, format!("Frame {frame} of {}, drawn by {drawn_by}.", flight.frames.len())))
 }
 
 #[cfg(not(feature = "view"))]
-fn middle_frame(_: &Args, _: &Terrain, _: &Flight) -> Result<String, String> {
+fn middle_frame(_: &Args, _: &Terrain, _: &Flight) -> Result<(Vec<u8>, String), String> {
     Err("this program was built without the feature view".into())
 }
 

@@ -1,7 +1,8 @@
 //! `terrasoar flight`: a recorded flight over a terrain, at a speed given or found.
 
 use super::ground::TerrainGround;
-use super::output::{check_stream, complain, decimal, print};
+use super::output::{complain, decimal, print};
+use super::outputs::{Force, Kind};
 use super::progress::Progress;
 use super::replay::QualityArgs;
 use super::terrain::TerrainArgs;
@@ -12,6 +13,7 @@ use terrasoar::flight::Flight;
 use terrasoar::flight::generate::{FlightKind, FlightPlan, generate};
 use terrasoar::flight::incoherence::{MAX_TRIALS, solve};
 use terrasoar::flyover::mean_incoherence_percent;
+use terrasoar::sink::is_stream;
 
 /// Make a recorded flight over a terrain.
 ///
@@ -35,6 +37,8 @@ pub(super) struct Args {
     /// Flight file to write
     #[arg(short, long, value_name = "F.flight")]
     output: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Frames to fly
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     frames: u64,
@@ -87,7 +91,7 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let plan = args.plan()?;
-    check_stream(&args.output, &args.terrain.inputs(&[]))?;
+    args.force.stream(&args.output, Kind::Flight, &args.terrain.inputs(&[]))?;
     let terrain = args.terrain.open()?;
     let ground = TerrainGround::new(&terrain);
     let (mut flight, told) = match args.pace.incoherence {
@@ -118,11 +122,11 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let told =
         format!("{}: {} flight of {} frames{told}", args.output.display(), args.kind.name(), args.frames);
     // A flight piped on to another program stays alone in the pipe.
-    if std::fs::symlink_metadata(&args.output).is_ok_and(|meta| meta.is_file()) {
-        return print(&told);
+    if is_stream(&args.output) {
+        complain(&told);
+        return Ok(());
     }
-    complain(&told);
-    Ok(())
+    print(&told)
 }
 
 /// Adds the terrain's name, if it is one that a note can hold.

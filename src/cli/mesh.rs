@@ -1,12 +1,13 @@
 //! `terrasoar mesh`: one frame's triangles as a file that other programs read.
 
 use super::mesh_file::{self, Format};
-use super::output::{check_output, grouped, print};
+use super::output::{grouped, print};
+use super::outputs::{Force, Kind};
 use super::parse;
 use super::replay::{QualityArgs, batches_of};
 use super::terrain::TerrainArgs;
 use anyhow::Result;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flyover::{EngineKind, frame_mesh};
 
@@ -36,15 +37,19 @@ pub(super) struct Args {
     #[arg(long, value_name = "E.edits")]
     edits: Option<PathBuf>,
     /// File to write: binary PLY or OBJ by its extension
-    #[arg(short, long, value_name = "OUT.(ply|obj)", value_parser = |text: &str| parse::with_extension(text, &["ply", "obj"]))]
+    #[arg(short, long, value_name = "OUT.(ply|obj)", value_parser = parse::with_extension(&["ply", "obj"]))]
     output: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Write PLY as text
     #[arg(long)]
     ascii: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    check_output(&args.output, &args.terrain.inputs(&[&args.flight]))?;
+    let inputs: Vec<&Path> =
+        [Some(&args.flight), args.edits.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    args.force.file(&args.output, Kind::Mesh, &args.terrain.inputs(&inputs))?;
     let is_obj = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
     let format = match (is_obj, args.ascii) {
         (true, _) => Format::Obj,

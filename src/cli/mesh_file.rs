@@ -1,5 +1,6 @@
 //! Meshes as PLY (text or little-endian binary, coordinates in double precision) and OBJ (text). Streamed; the file appears when complete.
 
+use super::outputs::MESH_NOTE;
 use anyhow::{Context, Result};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -28,7 +29,7 @@ pub(super) fn write(path: &Path, mesh: &FrameMesh, format: Format) -> Result<()>
 fn write_to(out: &mut impl Write, mesh: &FrameMesh, format: Format) -> io::Result<()> {
     match format {
         Format::Obj => {
-            writeln!(out, "# metres east, north and up of the terrain's south-west sample")?;
+            writeln!(out, "# {MESH_NOTE}")?;
             for [x, y, z] in &mesh.positions {
                 writeln!(out, "v {x} {y} {z}")?;
             }
@@ -68,7 +69,7 @@ fn ply_header(out: &mut impl Write, mesh: &FrameMesh, encoding: &str) -> io::Res
     write!(
         out,
         "ply\nformat {encoding} 1.0\n\
-         comment metres east, north and up of the terrain's south-west sample\n\
+         comment {MESH_NOTE}\n\
          element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
          element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         mesh.positions.len(),

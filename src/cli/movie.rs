@@ -1,7 +1,8 @@
 //! `terrasoar movie`: a flight as moving pictures.
 
 use super::movie_file::{MovieFile, MovieFormat};
-use super::output::{check_output, grouped, print, print_json};
+use super::output::{grouped, print, print_json};
+use super::outputs::{Force, Kind};
 use super::picture::PictureArgs;
 use super::progress::Progress;
 use super::terrain::TerrainArgs;
@@ -14,7 +15,7 @@ use terrasoar::flight::Flight;
 
 /// Draw a flight as a folder of PNG files, a GIF or an MP4.
 ///
-/// A name ending in .gif or .mp4 is a file, any other a folder, which must be new or empty. MP4 needs an installed ffmpeg. The engine flies every
+/// A name ending in .gif or .mp4 is a file, any other a folder, which must be new or empty; all of it appears when the last picture is drawn. MP4 needs an installed ffmpeg. The engine flies every
 /// frame; --every draws some of them. The same input gives the same PNG and GIF on the same driver.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -31,6 +32,8 @@ pub(super) struct Args {
     /// Movie to write: a folder, or a file by its extension
     #[arg(short, long, value_name = "DIR|OUT.(gif|mp4)")]
     output: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Draw every so manieth frame
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -51,7 +54,7 @@ fn rate(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Serialize)]
 struct Answer {
-    output: PathBuf,
+    output: String,
     size_px: [u32; 2],
     style: String,
     ramp: &'static str,
@@ -72,7 +75,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         .into());
     };
     if format != MovieFormat::Folder {
-        check_output(&args.output, &args.terrain.inputs(&[&args.flight]))?;
+        args.force.file(&args.output, Kind::Film, &args.terrain.inputs(&[&args.flight]))?;
     }
     let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
@@ -80,7 +83,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let mut studio = Studio::new(&terrain, picture.scene(), picture.size)?;
     let has_image = studio.has_image();
     let look = picture.look(has_image);
-    let mut movie = MovieFile::create(&args.output, format, picture.size, args.fps)?;
+    let mut movie = MovieFile::create(&args.output, format, picture.size, args.fps, args.force.is_given())?;
     let progress = Progress::new("frames");
     progress.begin("drawing", flight.frames.len() as u64);
     let (mut pictures, mut triangles) = (0_u32, 0_u64);
@@ -101,7 +104,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let triangles_mean = triangles as f64 / f64::from(pictures.max(1));
     if args.json {
         return print_json(&Answer {
-            output: args.output.clone(),
+            output: args.output.display().to_string(),
             size_px: [width, height],
             style: picture.style(has_image).to_owned(),
             ramp: look.ramp.name,

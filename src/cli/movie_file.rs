@@ -1,15 +1,18 @@
 //! Where the pictures of a movie go: a folder of PNG files, a GIF, or an MP4 that an installed ffmpeg encodes.
 //!
-//! Invariant: nothing half-written has a name. A folder's pictures appear one by one, each complete; a GIF or MP4 appears when its last picture is in.
-//! Cost: a picture at a time in memory.
+//! Invariant: nothing half-written has a name. A movie appears when its last picture is in, a folder of pictures too.
+//! Cost: a picture at a time in memory; a folder takes twice its room on the disk for a moment.
 
-use super::picture::write_png;
+use super::outputs::FILM_NOTE;
+use super::picture::png;
 use anyhow::{Context, Result, bail};
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
+use terrasoar::picture;
+use terrasoar::sink::FolderSink;
 use terrasoar::view::Viewport;
 use terrasoar_layout::atomic_file::AtomicFile;
 
@@ -27,10 +30,10 @@ pub(super) enum MovieFormat {
 impl MovieFormat {
     /// By the name's extension; what has none is a folder.
     pub(super) fn of(path: &Path) -> Option<Self> {
-        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        match path.extension() {
             None => Some(Self::Folder),
-            Some("gif") => Some(Self::Gif),
-            Some("mp4") => Some(Self::Mp4),
+            Some(own) if own.eq_ignore_ascii_case("gif") => Some(Self::Gif),
+            Some(own) if own.eq_ignore_ascii_case("mp4") => Some(Self::Mp4),
             Some(_) => path.is_dir().then_some(Self::Folder),
         }
     }
@@ -44,29 +47,34 @@ pub(super) struct MovieFile {
 }
 
 enum Sink {
-    Folder { next: usize },
+    Folder { pictures: FolderSink, next: usize },
     Gif { encoder: Box<gif::Encoder<BufWriter<File>>>, file: AtomicFile, delay_cs: u16 },
     Mp4 { ffmpeg: Ffmpeg, file: AtomicFile },
 }
 
 impl MovieFile {
-    /// Starts a movie of `fps` pictures a second.
-    pub(super) fn create(path: &Path, format: MovieFormat, size: Viewport, fps: f64) -> Result<Self> {
+    /// Starts a movie of `fps` pictures a second. A folder must be new or empty, unless the movie in it may be replaced.
+    pub(super) fn create(
+        path: &Path,
+        format: MovieFormat,
+        size: Viewport,
+        fps: f64,
+        may_replace: bool,
+    ) -> Result<Self> {
         let sink = match format {
             MovieFormat::Folder => {
-                std::fs::create_dir_all(path)
-                    .with_context(|| format!("{}: cannot make the folder", path.display()))?;
-                let taken = std::fs::read_dir(path)
-                    .with_context(|| format!("{}: cannot look into the folder", path.display()))?
-                    .next()
-                    .is_some();
-                if taken {
+                let taken = path.exists()
+                    && std::fs::read_dir(path)
+                        .with_context(|| format!("{}: cannot look into the folder", path.display()))?
+                        .next()
+                        .is_some();
+                if taken && !may_replace {
                     bail!(
-                        "{}: the folder is not empty, and pictures of another movie would mix with these; name a new one",
+                        "{}: the folder is not empty, and pictures of another movie would mix with these; name a new one, or replace the movie in it with --force",
                         path.display()
                     );
                 }
-                Sink::Folder { next: 0 }
+                Sink::Folder { pictures: FolderSink::create(path)?, next: 0 }
             }
             MovieFormat::Gif => {
                 let file = AtomicFile::create(path)?;
@@ -75,6 +83,8 @@ impl MovieFile {
                 let (width, height) = (side(size.width_px)?, side(size.height_px)?);
                 let mut encoder = Box::new(gif::Encoder::new(out, width, height, &[])?);
                 encoder.set_repeat(gif::Repeat::Infinite)?;
+                let note = gif::AnyExtension(gif::Extension::Comment as u8);
+                encoder.write_raw_extension(note, &[FILM_NOTE.as_bytes()])?;
                 // Viewers take delays under two hundredths of a second for a tenth.
                 let delay_cs = (100.0 / fps).round().clamp(2.0, 65_535.0) as u16;
                 Sink::Gif { encoder, file, delay_cs }
@@ -91,10 +101,11 @@ impl MovieFile {
     /// Adds a picture, three bytes a pixel.
     pub(super) fn add(&mut self, rgb: &[u8]) -> Result<()> {
         match &mut self.sink {
-            Sink::Folder { next } => {
-                let path = self.path.join(format!("frame-{next:05}.png"));
+            Sink::Folder { pictures, next } => {
+                let file = png(rgb, self.size)?;
+                pictures.add(&frame_name(*next), |out| out.write_all(&file))?;
                 *next += 1;
-                write_png(&path, rgb, self.size)
+                Ok(())
             }
             Sink::Gif { encoder, delay_cs, .. } => {
                 let (width, height) = (self.size.width_px as u16, self.size.height_px as u16);
@@ -111,7 +122,11 @@ impl MovieFile {
     /// Completes the movie and gives it its name.
     pub(super) fn finish(self) -> Result<()> {
         match self.sink {
-            Sink::Folder { .. } => Ok(()),
+            Sink::Folder { pictures, next } => {
+                pictures.publish()?;
+                remove_from(&self.path, next);
+                Ok(())
+            }
             Sink::Gif { encoder, file, .. } => {
                 // The trailer is written by giving up the encoder.
                 encoder.into_inner()?.flush()?;
@@ -122,6 +137,23 @@ impl MovieFile {
                 Ok(file.publish()?)
             }
         }
+    }
+}
+
+/// What a picture of a folder is called.
+fn frame_name(number: usize) -> String {
+    format!("frame-{number:05}.png")
+}
+
+/// Removes the pictures from a number on, which a longer movie left there. What is not a picture of ours stays.
+fn remove_from(folder: &Path, first: usize) {
+    let is_ours = |path: &Path| {
+        let mut start = [0; 100];
+        File::open(path).is_ok_and(|mut file| file.read_exact(&mut start).is_ok()) && picture::is_ours(&start)
+    };
+    for path in (first..).map(|number| folder.join(frame_name(number))).take_while(|path| is_ours(path)) {
+        // One that does not go shows after the last; nothing else depends on it.
+        let _ = std::fs::remove_file(path);
     }
 }
 
@@ -143,6 +175,7 @@ impl Ffmpeg {
             .args(["-s", &picture, "-r", &rate, "-i", "pipe:0", "-an"])
             // Players want even sides and halved colours.
             .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-crf", "18"])
+            .args(["-metadata", &format!("comment={FILM_NOTE}")])
             // In fragments, for what is written to a pipe cannot be gone back to.
             .args(["-movflags", "frag_keyframe+empty_moov+default_base_moof", "-f", "mp4", "pipe:1"])
             .stdin(Stdio::piped())

@@ -1,6 +1,6 @@
 //! Words of the command line that are more than a number: each parser says what it takes when it refuses.
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 use terrasoar::flight::generate::FlightKind;
 use terrasoar::flyover::EngineKind;
@@ -116,21 +116,33 @@ pub(super) fn synth_size(text: &str) -> Result<u32, String> {
     }
 }
 
-/// A path whose extension is one of `allowed`, in lower case.
-pub(super) fn with_extension(text: &str, allowed: &[&str]) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    if allowed.contains(&extension.as_str()) {
-        Ok(path)
-    } else {
-        Err(format!("the name must end in .{}", allowed.join(" or .")))
-    }
+/// A path whose extension is one of `allowed`, given in lower case. The rest of the name may be any that the system has.
+pub(super) fn with_extension(allowed: &'static [&'static str]) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| {
+        let ends_in = |wanted: &&str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(wanted));
+        if allowed.iter().any(ends_in) {
+            Ok(path)
+        } else {
+            Err(format!("the name must end in .{}", allowed.join(" or .")))
+        }
+    })
 }
 
 /// An engine by name.
 pub(super) fn engine() -> impl TypedValueParser<Value = EngineKind> {
     PossibleValuesParser::new(EngineKind::ALL.map(EngineKind::name))
         .try_map(|word| word.parse::<EngineKind>())
+}
+
+/// Frames a second; 0 for no pace.
+pub(super) fn pace(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| {
+        if v == 0.0 || (0.001..=1e6).contains(&v) {
+            Ok(v)
+        } else {
+            Err("it must be 0, or from 0.001 to 1000000".into())
+        }
+    })
 }
 
 /// A way of culling by name.
@@ -159,7 +171,6 @@ mod tests {
         assert!(range("3,2").is_err() && range("0,2").is_err() && range("1,2,3").is_err());
         assert_eq!(viewport("800x600").unwrap(), Viewport::default());
         assert_eq!(synth_size("1025").unwrap(), 1025);
-        assert!(with_extension("a.b/c.TIF", &["tif", "png"]).is_ok());
         for wrong in ["", "0", "-1", "nan", "inf", "1,2,3", "10,", "1e9"] {
             assert!(spacing_m(wrong).is_err(), "{wrong}");
         }
@@ -177,6 +188,23 @@ mod tests {
             assert!(synth_size(wrong).is_err(), "{wrong}");
         }
         assert!(percent("100.5").is_err() && tolerance_px("0").is_err() && not_negative("-1").is_err());
-        assert!(with_extension("a", &["ply"]).is_err());
+    }
+
+    #[test]
+    fn names_end_as_they_should_whatever_comes_before() {
+        let parser = with_extension(&["tif", "png"]);
+        let command = clap::Command::new("x");
+        let parsed = |name: &std::ffi::OsStr| parser.parse_ref(&command, None, name);
+        assert_eq!(parsed("a.b/c.TIF".as_ref()).unwrap(), PathBuf::from("a.b/c.TIF"));
+        for wrong in ["a", "a.ply", "tif", "a.tif.gz", "a.tif/b"] {
+            let message = parsed(wrong.as_ref()).unwrap_err().to_string();
+            assert!(message.contains("the name must end in .tif or .png"), "{message}");
+        }
+        #[cfg(unix)]
+        {
+            use std::os::unix::ffi::OsStrExt;
+            let name = std::ffi::OsStr::from_bytes(b"\xff\xfe.png");
+            assert_eq!(parsed(name).unwrap().as_os_str(), name);
+        }
     }
 }

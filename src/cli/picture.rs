@@ -4,18 +4,14 @@ use super::parse;
 use crate::app::feed::PictureEngine;
 use crate::app::scene::SceneOptions;
 use crate::app::studio::Studio;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::ArgAction;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use image::ExtendedColorType;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use std::io::{BufWriter, Write};
-use std::path::Path;
 use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::Quality;
+use terrasoar::picture::encode;
 use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
-use terrasoar_layout::atomic_file::AtomicFile;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
 use terrasoar_render::{Contours, LOOKS, Look, Sun};
@@ -152,34 +148,18 @@ pub(super) fn angles(text: &str) -> Result<[f64; 2], String> {
     Ok([parse::finite(first)?, parse::finite(second)?])
 }
 
-/// Three bytes a pixel as PNG.
-pub(super) fn write_png(path: &Path, rgb: &[u8], size: Viewport) -> Result<()> {
-    let file = AtomicFile::create(path)?;
-    let mut out = BufWriter::new(file.file());
-    let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Default, FilterType::Adaptive);
-    let encoded = image::ImageEncoder::write_image(
-        encoder,
-        rgb,
-        size.width_px,
-        size.height_px,
-        ExtendedColorType::Rgb8,
-    );
-    if let Err(error) = encoded {
-        bail!("{}: cannot write the picture: {error}", path.display());
-    }
-    out.flush()?;
-    drop(out);
-    Ok(file.publish()?)
+/// Three bytes a pixel as the bytes of a PNG file.
+pub(super) fn png(rgb: &[u8], size: Viewport) -> Result<Vec<u8>> {
+    encode(rgb, [size.width_px, size.height_px]).context("the picture is incomplete")
 }
 
-/// Draws a frame of a flight, flown to it, as PNG; gives the adapter's name.
-pub(super) fn write_frame(
+/// Draws a frame of a flight, flown to it; gives the bytes of a PNG file and the adapter's name.
+pub(super) fn draw_frame(
     terrain: &Terrain,
     flight: &Flight,
     frame: usize,
     quality: Quality,
-    path: &Path,
-) -> Result<String> {
+) -> Result<(Vec<u8>, String)> {
     let options = SceneOptions { culling: quality.culling, ..SceneOptions::default() };
     let mut studio = Studio::new(terrain, options, quality.viewport)?;
     let view = |frame: &FlightFrame| View {
@@ -192,6 +172,5 @@ pub(super) fn write_frame(
     }
     let look = Look { multisample: true, ..Look::default() };
     let rgb = studio.picture(&view(asked), &look)?;
-    write_png(path, &rgb, quality.viewport)?;
-    Ok(studio.capabilities().adapter.clone())
+    Ok((png(&rgb, quality.viewport)?, studio.capabilities().adapter.clone()))
 }

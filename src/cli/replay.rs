@@ -1,6 +1,7 @@
 //! `terrasoar replay`: a recorded flight through one engine.
 
-use super::output::{check_stream, columns, complain, grouped, print, print_json};
+use super::output::{columns, complain, grouped, print, print_json};
+use super::outputs::{Force, Kind};
 use super::progress::Progress;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
@@ -11,7 +12,7 @@ use terrasoar::edits::{Loader, Script, timed};
 use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::{EngineKind, Quality, TimedBatch, replay, replay_edited};
 use terrasoar::refine::Culling;
-use terrasoar::report::write_frames_csv;
+use terrasoar::report::{ReportFile, write_frames_csv};
 use terrasoar::stats::{FrameStats, ReplaySummary};
 use terrasoar::view::Viewport;
 use terrasoar_layout::terrain::Terrain;
@@ -46,6 +47,8 @@ pub(super) struct Args {
     /// Also write every frame's figures to this file
     #[arg(long, value_name = "CSV")]
     stats: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -98,7 +101,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if let Some(stats) = &args.stats {
         let others: Vec<_> =
             [Some(&args.flight), args.edits.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
-        check_stream(stats, &args.terrain.inputs(&others))?;
+        args.force.stream(stats, Kind::Report(ReportFile::Frames), &args.terrain.inputs(&others))?;
     }
     let terrain = Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;

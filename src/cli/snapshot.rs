@@ -1,18 +1,21 @@
 //! `terrasoar snapshot`: one picture.
 
-use super::output::{check_output, decimal, grouped, print, print_json};
-use super::picture::{PictureArgs, angles, write_png};
+use super::output::{decimal, grouped, print, print_json};
+use super::outputs::{Force, Kind};
+use super::picture::{PictureArgs, angles, png};
 use super::progress::Progress;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
 use crate::app::overview::{FOV_DEG, overview, towards_middle, view_from};
 use crate::app::studio::Studio;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use glam::DVec3;
 use serde::Serialize;
+use std::io::Write;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
 use terrasoar::flyover::ReplayError;
+use terrasoar::sink::FileSink;
 use terrasoar::view::View;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::Haze;
@@ -48,8 +51,10 @@ pub(super) struct Args {
     #[command(flatten)]
     picture: PictureArgs,
     /// Picture to write
-    #[arg(short, long, value_name = "OUT.png", value_parser = |text: &str| parse::with_extension(text, &["png"]))]
+    #[arg(short, long, value_name = "OUT.png", value_parser = parse::with_extension(&["png"]))]
     output: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -79,7 +84,7 @@ fn field_of_view(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Serialize)]
 struct Answer {
-    output: PathBuf,
+    output: String,
     size_px: [u32; 2],
     style: String,
     ramp: &'static str,
@@ -99,7 +104,7 @@ struct Answer {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let flight: Vec<_> = args.flight.as_deref().into_iter().collect();
-    check_output(&args.output, &args.terrain.inputs(&flight))?;
+    args.force.file(&args.output, Kind::Picture, &args.terrain.inputs(&flight))?;
     let terrain = args.terrain.open()?;
     let views = args.views(&terrain)?;
     let picture = &args.picture;
@@ -121,12 +126,16 @@ pub(super) fn run(args: &Args) -> Result<()> {
         studio.raise_walls(block_bottom_m(&terrain, picture.exaggeration));
     }
     let rgb = studio.picture(view, &look)?;
-    write_png(&args.output, &rgb, picture.size)?;
+    let mut file = FileSink::create(&args.output)?;
+    file.write_all(&png(&rgb, picture.size)?).with_context(|| {
+        format!("{}: cannot write the picture; check the free space", args.output.display())
+    })?;
+    file.publish()?;
     let [width, height] = [picture.size.width_px, picture.size.height_px];
     let adapter = studio.capabilities();
     if args.json {
         return print_json(&Answer {
-            output: args.output.clone(),
+            output: args.output.display().to_string(),
             size_px: [width, height],
             style: picture.style(has_image).to_owned(),
             ramp: look.ramp.name,

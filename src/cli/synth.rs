@@ -1,6 +1,7 @@
 //! `terrasoar synth`: fractal terrain, and pictures of terrain, for tests and figures.
 
-use super::output::{check_output, grouped, print};
+use super::output::{grouped, print};
+use super::outputs::{Force, Kind};
 use super::progress::Progress;
 use super::{WrongUsage, parse, terrain};
 use anyhow::Result;
@@ -38,8 +39,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "colour", value_parser = clap::value_parser!(u32).range(1..=64))]
     texels: u32,
     /// File to write: GeoTIFF or 16-bit PNG by its extension
-    #[arg(short, long, value_name = "OUT.(tif|png)", value_parser = |text: &str| parse::with_extension(text, &["tif", "tiff", "png"]))]
+    #[arg(short, long, value_name = "OUT.(tif|png)", value_parser = parse::with_extension(&["tif", "tiff", "png"]))]
     output: PathBuf,
+    #[command(flatten)]
+    force: Force,
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
@@ -47,7 +50,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if let Some(file) = &args.colour {
         return colour(args, file, seed);
     }
-    check_output(&args.output, &[])?;
+    args.force.file(&args.output, Kind::Synthetic, &[])?;
     let size = args.size.unwrap_or(1025);
     let options = SynthOptions { size, seed, spacing_m: args.spacing };
     let progress = Progress::new("rows");
@@ -59,12 +62,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
 }
 
 fn colour(args: &Args, file: &Path, seed: u64) -> Result<()> {
-    check_output(&args.output, &[file])?;
     if args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(
             WrongUsage("pictures are written as GeoTIFF; give the output the extension .tif".into()).into()
         );
     }
+    args.force.file(&args.output, Kind::Synthetic, &[file])?;
     let terrain = terrain::open(file)?;
     let options = ColourOptions { seed, texels_a_sample: args.texels };
     let progress = Progress::new("rows");

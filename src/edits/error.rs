@@ -24,6 +24,9 @@ pub enum ScriptError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The file cannot be what it was to be, whatever is in it.
+    #[error(transparent)]
+    Output(LayoutError),
     /// The first line is not a script's.
     #[error(
         "{}:1: not a script of edits: it starts with {found} instead of `terrasoar-edits {VERSION}`; name a script, or write that line first",
@@ -82,4 +85,14 @@ pub enum ScriptError {
         /// Why, and what to do.
         problem: String,
     },
+}
+
+impl ScriptError {
+    /// What went wrong where a script was to go.
+    pub(super) fn of_output(error: LayoutError) -> Self {
+        match error {
+            LayoutError::Io { path, source, .. } => Self::Write { path, source },
+            other => Self::Output(other),
+        }
+    }
 }

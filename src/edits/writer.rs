@@ -3,31 +3,20 @@
 use super::format::{MAGIC, MAX_EDITS, UNITS, VERSION, name_fault, push_moment, push_step};
 use super::reader::order_fault;
 use super::{Script, ScriptError};
+use crate::sink::FileSink;
 use std::io::Write;
 use std::path::Path;
 
 impl Script {
-    /// Writes the script to `path`: to a file beside it first, which then takes its place. A path that is not a regular file, such as a link or a
-    /// pipe, is written directly.
+    /// Writes the script to `path`: a file appears when it is complete, a stream such as a pipe is written to directly.
     ///
     /// # Errors
-    /// [`ScriptError::Write`], [`ScriptError::Unwritable`] or [`ScriptError::NoEdits`].
+    /// [`ScriptError::Write`], [`ScriptError::Output`], [`ScriptError::Unwritable`] or [`ScriptError::NoEdits`].
     pub fn write(&self, path: &Path) -> Result<(), ScriptError> {
         let text = self.to_text(path)?;
-        let failed = |source| ScriptError::Write { path: path.into(), source };
-        // A link is followed: /dev/stdout is one, and must not be replaced.
-        if std::fs::symlink_metadata(path).is_ok_and(|m| !m.is_file()) {
-            let mut file = std::fs::File::create(path).map_err(failed)?;
-            return file.write_all(text.as_bytes()).map_err(failed);
-        }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".edits-");
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file = builder.tempfile_in(folder).map_err(failed)?;
-        file.write_all(text.as_bytes()).map_err(failed)?;
-        file.persist(path).map(drop).map_err(|e| failed(e.error))
+        let mut sink = FileSink::create(path).map_err(ScriptError::of_output)?;
+        sink.write_all(text.as_bytes()).map_err(|source| ScriptError::Write { path: path.into(), source })?;
+        sink.publish().map_err(ScriptError::of_output)
     }
 
     /// The script as text; errors call it `path`.

@@ -2,6 +2,7 @@
 
 use super::format::{MAX_FRAMES, MAX_LINE_BYTES, MAX_NOTES, VERSION};
 use std::path::PathBuf;
+use terrasoar_layout::LayoutError;
 
 /// Why a flight cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -23,6 +24,9 @@ pub enum FlightError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The file cannot be what it was to be, whatever is in it.
+    #[error(transparent)]
+    Output(LayoutError),
     /// The first line is not a flight file's.
     #[error(
         "{}:1: not a flight file: it starts with {found} instead of `terrasoar-flight {VERSION}`; name a flight file, or generate one",
@@ -175,4 +179,14 @@ pub enum FlightError {
         /// Its value, shortened.
         value: String,
     },
+}
+
+impl FlightError {
+    /// What went wrong where a flight was to go.
+    pub(super) fn of_output(error: LayoutError) -> Self {
+        match error {
+            LayoutError::Io { path, source, .. } => Self::Write { path, source },
+            other => Self::Output(other),
+        }
+    }
 }

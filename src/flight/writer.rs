@@ -6,7 +6,8 @@ use super::format::{
     FIELDS, MAGIC, MAX_FRAMES, MAX_NOTES, UNITS, VERSION, excerpt, fault_in, note_line, push_frame, values,
 };
 use super::{Flight, FlightError, FlightFrame};
-use std::io::{BufWriter, Write};
+use crate::sink::FileSink;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Takes the frames of a flight one after the other.
@@ -21,27 +22,13 @@ pub struct FlightWriter<W> {
 }
 
 impl Flight {
-    /// Writes the flight to `path`: to a file beside it first, which then takes its place. A path that is not a
-    /// regular file, such as a link or a pipe, is written directly.
+    /// Writes the flight to `path`: a file appears when it is complete, a stream such as a pipe is written to directly.
     ///
     /// # Errors
-    /// [`FlightError::Write`], or why a note, a frame or their number does not fit the format.
+    /// [`FlightError::Write`], [`FlightError::Output`], or why a note, a frame or their number does not fit the format.
     pub fn write(&self, path: &Path) -> Result<(), FlightError> {
-        let failed = |source| FlightError::Write { path: path.into(), source };
-        // A link is followed: /dev/stdout is one, and must not be replaced.
-        if std::fs::symlink_metadata(path).is_ok_and(|m| !m.is_file()) {
-            let file = std::fs::File::create(path).map_err(failed)?;
-            return self.write_to(BufWriter::new(file), path).map(drop);
-        }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".flight-");
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let file = builder.tempfile_in(folder).map_err(failed)?;
-        let file =
-            self.write_to(BufWriter::new(file), path)?.into_inner().map_err(|e| failed(e.into_error()))?;
-        file.persist(path).map(drop).map_err(|e| failed(e.error))
+        let sink = FileSink::create(path).map_err(FlightError::of_output)?;
+        self.write_to(sink, path)?.publish().map_err(FlightError::of_output)
     }
 
     /// Writes the flight to `output`, which errors call `path`, flushes it and gives it back.

@@ -30,7 +30,7 @@ pub use crate::stream::Prefetch;
 use crate::flyover::EngineKind;
 use serde::Serialize;
 use std::path::PathBuf;
-use terrasoar_layout::LayoutError;
+use terrasoar_layout::{LayoutError, Remedy};
 
 /// Bytes a page.
 const PAGE_BYTES: u64 = terrasoar_layout::bytes::PAGE_BYTES as u64;
@@ -88,7 +88,7 @@ pub enum IoBenchError {
         reader: Reader,
     },
     /// The disk is too full for a scratch file.
-    #[error("{}: a scratch file of {:.1} GB {}; name a folder on another disk with --scratch, or fewer layouts", folder.display(), *bytes as f64 / 1e9, room(*free))]
+    #[error("{}: a scratch file of {:.1} GB {}; name a folder on another disk, or fewer layouts", folder.display(), *bytes as f64 / 1e9, room(*free))]
     NoRoom {
         /// The folder.
         folder: PathBuf,
@@ -116,6 +116,17 @@ pub enum IoBenchError {
         /// The system's reason.
         source: std::io::Error,
     },
+}
+
+impl IoBenchError {
+    /// What would mend it, if that can be asked for.
+    pub fn remedy(&self) -> Option<Remedy> {
+        match self {
+            Self::NoRoom { .. } => Some(Remedy::ScratchFolder),
+            Self::Layout(error) => error.remedy(),
+            _ => None,
+        }
+    }
 }
 
 fn room(free: Option<u64>) -> String {

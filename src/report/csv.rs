@@ -3,27 +3,24 @@
 //! Hashes are 16 hexadecimal digits; times have the shortest digits that read back the same.
 
 use super::ReportError;
+use crate::sink::FileSink;
 use crate::stats::FrameStats;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
-const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,update_ms,scan_us,test_us,apply_us,edited_records,edit_ms,mesh_hash";
+pub(super) const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,update_ms,scan_us,test_us,apply_us,edited_records,edit_ms,mesh_hash";
 
-/// Writes `frames` to the file at `path`, replacing it.
+/// Writes `frames` to `path`: a file appears when it is complete, a stream such as a pipe is written to directly.
 ///
 /// # Errors
-/// [`ReportError::Write`].
+/// [`ReportError::Write`] or [`ReportError::Output`].
 pub fn write_frames_csv(path: &Path, frames: &[FrameStats]) -> Result<(), ReportError> {
-    let write = || {
-        let mut file = BufWriter::new(File::create(path)?);
-        write_frames(&mut file, frames)?;
-        file.flush()
-    };
-    write().map_err(|source| ReportError::Write { path: path.into(), source })
+    let mut sink = FileSink::create(path).map_err(ReportError::of_output)?;
+    write_frames(&mut sink, frames).map_err(|source| ReportError::Write { path: path.into(), source })?;
+    sink.publish().map_err(ReportError::of_output)
 }
 
-fn write_frames(to: &mut impl Write, frames: &[FrameStats]) -> std::io::Result<()> {
+pub(super) fn write_frames(to: &mut dyn Write, frames: &[FrameStats]) -> std::io::Result<()> {
     writeln!(to, "{HEADER}")?;
     for f in frames {
         // Named one by one, so that a new field cannot be forgotten.

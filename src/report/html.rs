@@ -4,7 +4,7 @@
 //! All text that comes from outside is escaped.
 
 use super::number::{exact, grouped, rounded};
-use super::{ComparisonReport, FlightPicture, PlotFile, SweepPoint};
+use super::{ComparisonReport, FLIGHT_PICTURE, FlightPicture, PlotFile, SweepPoint};
 use std::fmt::Write as _;
 
 const STYLE: &str = "\
@@ -16,6 +16,11 @@ h1{font-size:1.7rem;margin:0 0 .2rem}h2{font-size:1.25rem;margin:2.2rem 0 .6rem}
 th,td{padding:.35rem .8rem;text-align:right;border-bottom:1px solid #ddd}th{font-weight:600;vertical-align:bottom}\
 th:first-child,td:first-child{text-align:left}thead th{border-bottom:2px solid #888}\
 figure{margin:1.2rem 0 2rem}figure svg,figure img{width:100%;height:auto;border:1px solid #e4e4e4}figcaption{color:#444}";
+
+/// How every page of ours starts.
+pub(super) const OPENING: &str = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n<title>";
+/// What stands below its heading.
+pub(super) const OF: &str = "<p class=\"of\">";
 
 /// The whole page.
 pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots: &[PlotFile]) -> String {
@@ -50,10 +55,8 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
 
 /// The page's start, up to what it is of; both texts escaped.
 pub(super) fn begin(out: &mut String, heading: &str, of: &str) {
-    push(out, format_args!("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"));
-    push(out, format_args!("<meta name=\"viewport\" content=\"width=device-width\">\n"));
-    push(out, format_args!("<title>{heading}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"));
-    push(out, format_args!("<h1>{heading}</h1>\n<p class=\"of\">{of}</p>\n"));
+    push(out, format_args!("{OPENING}{heading}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"));
+    push(out, format_args!("<h1>{heading}</h1>\n{OF}{of}</p>\n"));
 }
 
 /// The plots, or why there are none.
@@ -94,8 +97,8 @@ fn verdict(out: &mut String, report: &ComparisonReport<'_>) {
 fn picture(out: &mut String, picture: FlightPicture<'_>) {
     push(out, format_args!("<h2>Picture</h2>\n"));
     match picture {
-        FlightPicture::File { name, caption } => {
-            let (name, caption) = (escaped(name), escaped(caption));
+        FlightPicture::Png { caption, .. } => {
+            let (name, caption) = (FLIGHT_PICTURE, escaped(caption));
             push(
                 out,
                 format_args!("<figure>\n<a href=\"{name}\"><img src=\"{name}\" alt=\"{caption}\"></a>\n"),
@@ -188,14 +191,13 @@ pub(super) fn push(out: &mut String, text: std::fmt::Arguments<'_>) {
 /// `text` for use between tags and in quoted attributes.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in terrasoar_layout::printable::line(text).chars() {
         match c {
             '&' => out.push_str("&amp;"),
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
             '\'' => out.push_str("&#39;"),
-            c if c.is_control() => out.push(' '),
             c => out.push(c),
         }
     }
@@ -222,7 +224,7 @@ mod tests {
             runs: &runs,
             tolerance_sweep: &sweep,
             incoherence_sweep: &[],
-            picture: FlightPicture::File { name: "a\"><img>.png", caption: "<i>" },
+            picture: FlightPicture::Png { file: &[], caption: "<i>" },
         };
         let page = page(&report, &["a.csv".into(), "b.csv".into(), "c.csv".into()], &[]);
         assert!(

@@ -7,13 +7,13 @@
 //! | `plot-io-*.svg`, `plot-io-*.png` | the plots, with the feature `plots` |
 //! | `report.html` | tables and plots in one file that needs no other |
 
-use super::{PlotFile, ReportError, io_page, write_text};
+use super::{PlotFile, ReportError, io_page};
 use crate::iobench::{FrameIo, IoBench, Run, Timed, UpdateCost};
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use crate::sink::{FileSink, FolderSink};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-const HEADER: &str = "engine,layout,source,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes";
+pub(super) const HEADER: &str = "engine,layout,source,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes";
 
 /// All that goes into a report.
 #[derive(Debug, Clone, Copy)]
@@ -29,47 +29,45 @@ impl IoReport<'_> {
     /// is the page to open.
     ///
     /// # Errors
-    /// [`ReportError`], which names the file; files before it are then complete.
+    /// [`ReportError`], which names the file. A new directory is not there then; in one that was, the files before it are complete.
     pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
-        std::fs::create_dir_all(dir).map_err(|source| ReportError::Directory { path: dir.into(), source })?;
-        let mut written = vec![dir.join("frames.csv"), dir.join("summary.json")];
-        write_io_frames_csv(&written[0], self.runs)?;
+        let mut out = FolderSink::create(dir).map_err(|error| ReportError::of_folder(dir, error))?;
+        out.add("frames.csv", |to| write_io_frames(to, self.runs)).map_err(ReportError::of_output)?;
         let json = serde_json::to_string_pretty(self.bench)
-            .map_err(|source| ReportError::Json { path: written[1].clone(), source })?;
-        write_text(&written[1], &(json + "\n"))?;
-        let plots = self.write_plots(dir, &mut written)?;
-        let path = dir.join("report.html");
-        write_text(&path, &io_page::page(self.bench, &plots))?;
-        written.push(path);
-        Ok(written)
+            .map_err(|source| ReportError::Json { path: dir.join("summary.json"), source })?;
+        super::add_text(&mut out, "summary.json", &(json + "\n"))?;
+        let plots = self.add_plots(dir, &mut out)?;
+        super::add_text(&mut out, "report.html", &io_page::page(self.bench, &plots))?;
+        out.publish().map_err(|error| ReportError::of_folder(dir, error))
     }
 
     #[cfg(feature = "plots")]
-    fn write_plots(&self, dir: &Path, written: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
-        super::write_charts(super::io_figures::all(self), dir, written)
+    fn add_plots(&self, dir: &Path, out: &mut FolderSink) -> Result<Vec<PlotFile>, ReportError> {
+        super::add_charts(super::io_figures::all(self), dir, out)
     }
 
     #[cfg(not(feature = "plots"))]
-    fn write_plots(&self, _: &Path, _: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
+    fn add_plots(&self, _: &Path, _: &mut FolderSink) -> Result<Vec<PlotFile>, ReportError> {
         Ok(Vec::new())
     }
 }
 
-/// Writes every frame of `runs` to the file at `path`, replacing it. What was not measured or is not known is empty.
+/// Writes every frame of `runs` to `path`: a file appears when it is complete, a stream such as a pipe is written to directly. What was not measured or is not known is empty.
 ///
 /// # Errors
-/// [`ReportError::Write`].
+/// [`ReportError::Write`] or [`ReportError::Output`].
 pub fn write_io_frames_csv(path: &Path, runs: &[(Run, Option<Timed>)]) -> Result<(), ReportError> {
-    let write = || {
-        let mut file = BufWriter::new(File::create(path)?);
-        writeln!(file, "{HEADER}")?;
-        runs.iter().try_for_each(|(run, timed)| write_run(&mut file, run, timed.as_ref()))?;
-        file.flush()
-    };
-    write().map_err(|source| ReportError::Write { path: path.into(), source })
+    let mut sink = FileSink::create(path).map_err(ReportError::of_output)?;
+    write_io_frames(&mut sink, runs).map_err(|source| ReportError::Write { path: path.into(), source })?;
+    sink.publish().map_err(ReportError::of_output)
 }
 
-fn write_run(to: &mut impl Write, run: &Run, timed: Option<&Timed>) -> std::io::Result<()> {
+fn write_io_frames(to: &mut dyn Write, runs: &[(Run, Option<Timed>)]) -> std::io::Result<()> {
+    writeln!(to, "{HEADER}")?;
+    runs.iter().try_for_each(|(run, timed)| write_run(to, run, timed.as_ref()))
+}
+
+fn write_run(to: &mut dyn Write, run: &Run, timed: Option<&Timed>) -> std::io::Result<()> {
     let words = [run.reader.name(), run.layout.name(), run.reader.source(), run.preload.name()].join(",");
     for (i, f) in run.frames.iter().enumerate() {
         // Named one by one, so that a new field cannot be forgotten.

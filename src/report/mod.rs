@@ -7,14 +7,15 @@
 //! | `plot-*.svg`, `plot-*.png` | the plots, with the feature `plots` |
 //! | `report.html` | tables and plots in one file that needs no other |
 //!
-//! **Equal input gives equal bytes**: nothing here reads a clock, a locale or a system font. Files of the same
-//! name are replaced, others left alone; the page is written last.
+//! **Equal input gives equal bytes**: nothing here reads a clock, a locale or a system font. A new directory appears when all of it is there; in one that was there before, files of
+//! the same name are replaced, others left alone, and the page comes last.
 
 #[cfg(feature = "plots")]
 mod chart;
 mod csv;
 #[cfg(feature = "plots")]
 mod figures;
+mod files;
 mod html;
 mod io;
 #[cfg(feature = "plots")]
@@ -25,12 +26,15 @@ mod number;
 mod plot;
 
 pub use csv::write_frames_csv;
+pub use files::{FLIGHT_PICTURE, ReportFile, START_BYTES};
 pub use io::{IoReport, write_io_frames_csv};
 
+use crate::sink::FolderSink;
 use crate::stats::{Comparison, FrameStats};
 use crate::view::Viewport;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use terrasoar_layout::LayoutError;
 
 /// Why a report cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -52,7 +56,10 @@ pub enum ReportError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// A plot cannot be drawn or saved.
+    /// A file cannot be what it was to be, whatever is in it.
+    #[error(transparent)]
+    Output(LayoutError),
+    /// A plot cannot be drawn.
     #[error("cannot draw {}: {reason}; build without the feature `plots` for a report without them", path.display())]
     Draw {
         /// The plot's file.
@@ -68,6 +75,24 @@ pub enum ReportError {
         /// What the JSON library says.
         source: serde_json::Error,
     },
+}
+
+impl ReportError {
+    /// What went wrong where a file was to go.
+    fn of_output(error: LayoutError) -> Self {
+        match error {
+            LayoutError::Io { path, source, .. } => Self::Write { path, source },
+            other => Self::Output(other),
+        }
+    }
+
+    /// What went wrong where the directory `dir` or a file in it was to go.
+    fn of_folder(dir: &Path, error: LayoutError) -> Self {
+        match error {
+            LayoutError::Io { path, source, .. } if path == dir => Self::Directory { path, source },
+            other => Self::of_output(other),
+        }
+    }
 }
 
 /// What was compared, as it stands in the report's titles.
@@ -116,10 +141,10 @@ pub struct ComparisonReport<'a> {
 /// A picture of the flight.
 #[derive(Debug, Clone, Copy)]
 pub enum FlightPicture<'a> {
-    /// A file in the report's directory, written by the caller.
-    File {
-        /// Its name.
-        name: &'a str,
+    /// A picture, which becomes the file [`FLIGHT_PICTURE`].
+    Png {
+        /// The file's bytes.
+        file: &'a [u8],
         /// What it shows, in a sentence.
         caption: &'a str,
     },
@@ -154,26 +179,22 @@ impl ComparisonReport<'_> {
     /// is the page to open.
     ///
     /// # Errors
-    /// [`ReportError`], which names the file; files before it are then complete.
+    /// [`ReportError`], which names the file. A new directory is not there then; in one that was, the files before it are complete.
     pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
-        std::fs::create_dir_all(dir).map_err(|source| ReportError::Directory { path: dir.into(), source })?;
-        let mut written = Vec::new();
+        let mut out = FolderSink::create(dir).map_err(|error| ReportError::of_folder(dir, error))?;
         let names: Vec<&str> = self.runs.iter().map(|(engine, _)| engine.as_str()).collect();
         let frame_files: Vec<String> =
-            file_parts(&names).into_iter().map(|part| format!("frames-{part}.csv")).collect();
+            file_parts(&names).iter().map(|part| files::frames_name(part)).collect();
         for ((_, frames), name) in self.runs.iter().zip(&frame_files) {
-            let path = dir.join(name);
-            write_frames_csv(&path, frames)?;
-            written.push(path);
+            out.add(name, |to| csv::write_frames(to, frames)).map_err(ReportError::of_output)?;
         }
-        let path = dir.join("summary.json");
-        write_text(&path, &self.summary_json(&path)?)?;
-        written.push(path);
-        let plots = self.write_plots(dir, &mut written)?;
-        let path = dir.join("report.html");
-        write_text(&path, &html::page(self, &frame_files, &plots))?;
-        written.push(path);
-        Ok(written)
+        if let FlightPicture::Png { file, .. } = self.picture {
+            out.add(FLIGHT_PICTURE, |to| to.write_all(file)).map_err(ReportError::of_output)?;
+        }
+        add_text(&mut out, "summary.json", &self.summary_json(&dir.join("summary.json"))?)?;
+        let plots = self.add_plots(dir, &mut out)?;
+        add_text(&mut out, "report.html", &html::page(self, &frame_files, &plots))?;
+        out.publish().map_err(|error| ReportError::of_folder(dir, error))
     }
 
     fn summary_json(&self, path: &Path) -> Result<String, ReportError> {
@@ -193,42 +214,41 @@ impl ComparisonReport<'_> {
     }
 
     #[cfg(feature = "plots")]
-    fn write_plots(&self, dir: &Path, written: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
-        write_charts(figures::all(self), dir, written)
+    fn add_plots(&self, dir: &Path, out: &mut FolderSink) -> Result<Vec<PlotFile>, ReportError> {
+        add_charts(figures::all(self), dir, out)
     }
 
     #[cfg(not(feature = "plots"))]
-    fn write_plots(&self, _: &Path, _: &mut Vec<PathBuf>) -> Result<Vec<PlotFile>, ReportError> {
+    fn add_plots(&self, _: &Path, _: &mut FolderSink) -> Result<Vec<PlotFile>, ReportError> {
         Ok(Vec::new())
     }
 }
 
-/// Draws `charts` into the directory `dir`, each as SVG and as PNG.
+/// Adds `charts`, each as SVG and as PNG, to what goes into the directory `dir`.
 #[cfg(feature = "plots")]
-fn write_charts(
+fn add_charts(
     charts: Vec<chart::Chart>,
     dir: &Path,
-    written: &mut Vec<PathBuf>,
+    out: &mut FolderSink,
 ) -> Result<Vec<PlotFile>, ReportError> {
     let mut plots = Vec::new();
     for chart in charts {
         let (svg, png) = (format!("{}.svg", chart.stem), format!("{}.png", chart.stem));
-        let (svg_path, png_path) = (dir.join(&svg), dir.join(&png));
-        let drawn = |path: &Path| {
-            let path = path.to_path_buf();
+        let drawn = |name: &str| {
+            let path = dir.join(name);
             move |reason| ReportError::Draw { path, reason }
         };
-        let drawing = plot::svg(&chart).map_err(drawn(&svg_path))?;
-        write_text(&svg_path, &drawing)?;
-        plot::write_png(&chart, &png_path).map_err(drawn(&png_path))?;
-        written.extend([svg_path, png_path]);
+        let drawing = plot::svg(&chart).map_err(drawn(&svg))?;
+        add_text(out, &svg, &drawing)?;
+        let pixels = plot::png(&chart).map_err(drawn(&png))?;
+        out.add(&png, |to| to.write_all(&pixels)).map_err(ReportError::of_output)?;
         plots.push(PlotFile { caption: chart.caption, svg, png, drawing });
     }
     Ok(plots)
 }
 
-fn write_text(path: &Path, text: &str) -> Result<(), ReportError> {
-    std::fs::write(path, text).map_err(|source| ReportError::Write { path: path.into(), source })
+fn add_text(out: &mut FolderSink, name: &str, text: &str) -> Result<(), ReportError> {
+    out.add(name, |to| to.write_all(text.as_bytes())).map_err(ReportError::of_output)
 }
 
 /// Engine names as parts of file names: lower-case letters, digits, `-`, `_`; all different.
@@ -309,7 +329,7 @@ mod tests {
         }
     }
 
-    fn with_report<T>(frames: u64, check: impl FnOnce(&ComparisonReport<'_>) -> T) -> T {
+    pub(super) fn with_report<T>(frames: u64, check: impl FnOnce(&ComparisonReport<'_>) -> T) -> T {
         let (runs, title) = (made_up_runs(frames), title());
         check(&ComparisonReport {
             title: &title,

@@ -3,7 +3,10 @@
 //! **Nothing is replaced**: where a name is taken a number follows.
 
 use anyhow::{Context, Result};
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use terrasoar::picture::encode;
+use terrasoar::sink::FileSink;
 use terrasoar_render::{Offscreen, wgpu};
 
 /// A free name such as `alps-2026-03-01-142233.png` for what belongs to a terrain.
@@ -32,8 +35,10 @@ pub(crate) fn picture(
     for pixel in picture.read_rgba(device, queue)?.chunks_exact(4) {
         rgb.extend_from_slice(&pixel[..3]);
     }
-    let picture = image::RgbImage::from_raw(width, height, rgb).context("the picture is incomplete")?;
-    picture.save(path).with_context(|| format!("{}: the picture cannot be written", path.display()))
+    let file = encode(&rgb, [width, height]).context("the picture is incomplete")?;
+    let mut sink = FileSink::create(path)?;
+    sink.write_all(&file).with_context(|| format!("{}: the picture cannot be written", path.display()))?;
+    Ok(sink.publish()?)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use terrasoar::refine::Culling;
+use terrasoar::sink::FileSink;
 use terrasoar_render::ramps::Ramp;
 use terrasoar_render::{Capabilities, Contours, Haze, LOOKS, Look, Surface};
 
@@ -170,12 +171,11 @@ impl Settings {
     pub(crate) fn save(&self, path: &Path) -> Result<()> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let text = toml::to_string(self).context("settings do not fit TOML")?;
-        let write = || -> std::io::Result<()> {
+        let write = || -> Result<()> {
             std::fs::create_dir_all(folder)?;
-            let mut file = tempfile::NamedTempFile::new_in(folder)?;
+            let mut file = FileSink::create(path)?;
             file.write_all(text.as_bytes())?;
-            file.persist(path)?;
-            Ok(())
+            Ok(file.publish()?)
         };
         write().with_context(|| {
             format!("{}: the settings cannot be written; check the folder's permissions", path.display())

@@ -154,7 +154,7 @@ fn has_nameless_files(bench: &Bench) -> bool {
 fn a_killed_build_leaves_nothing_and_the_next_starts_afresh() {
     let bench = Bench::new();
     bench.good(&["synth", "--size", "2049", "--seed", "3", "-o", "land.tif"]);
-    let build = ["build", "land.tif", "-o", "x.iqt", "--memory", "48"];
+    let build = ["build", "land.tif", "-o", "x.iqt", "--memory", "48", "--force"];
     // The first of several is often the slowest.
     let once = |_| {
         let start = Instant::now();

@@ -114,18 +114,17 @@ fn a_killed_drape_leaves_the_terrain_as_it_was() {
     }
     assert!(kills > 0);
     bench.good(&["verify", "land.iqt"]);
-    // A killed writer's lock is taken over and removed.
+    // A killed writer's lock ended with it.
     assert_eq!(bench.names(), ["land.iqt", "land.tif", "photo.tif"]);
 }
 
 #[test]
 fn a_second_writer_is_told() {
     let bench = with_picture();
-    let lock = std::fs::File::create(bench.path("land.iqt.lock")).unwrap();
-    lock.lock().unwrap();
+    let writer = terrasoar_layout::edit::EditSession::open(&bench.path("land.iqt")).unwrap();
     let output = bench.run(&["drape", "land.iqt", "--image", "photo.tif"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("another program is writing"), "{}", text(&output.stderr));
-    drop(lock);
+    drop(writer);
     bench.good(&["drape", "land.iqt", "--image", "photo.tif"]);
 }

@@ -9,8 +9,7 @@ use terrasoar_layout::terrain::Terrain;
 fn a_second_writer_is_told() {
     let bench = with_script("set rect 10,10,20,20 to 100\n");
     bench.good(&["edit", "land.iqt", "--script", "a.edits"]);
-    let lock = std::fs::File::create(bench.path("land.iqt.lock")).unwrap();
-    lock.lock().unwrap();
+    let writer = terrasoar_layout::edit::EditSession::open(&bench.path("land.iqt")).unwrap();
     let before = read(&bench, "land.iqt");
     for args in [
         &["edit", "land.iqt", "--script", "a.edits"][..],
@@ -25,7 +24,7 @@ fn a_second_writer_is_told() {
     // Looking and an overlay need no lock of the terrain.
     bench.good(&["edit", "land.iqt", "--script", "a.edits", "--dry-run"]);
     bench.good(&["edit", "land.iqt", "--script", "a.edits", "--overlay", "o.iqo"]);
-    drop(lock);
+    drop(writer);
     bench.good(&["undo", "land.iqt"]);
 }
 
@@ -45,8 +44,19 @@ fn in_step(batches: u32) -> String {
     lines
 }
 
+/// A script of batches that each set all of [`RECTS`] to one height.
+pub fn batches_in_step(heights_m: impl IntoIterator<Item = f64>) -> String {
+    let batch = |height_m: f64| {
+        let edit = |[west, south, east, north]: [u32; 4]| {
+            format!("set rect {west},{south},{east},{north} to {height_m}\n")
+        };
+        RECTS.into_iter().map(edit).collect::<String>() + "\n"
+    };
+    heights_m.into_iter().map(batch).collect()
+}
+
 /// The one height of all rectangles.
-fn height_in_step(path: &Path) -> f64 {
+pub fn height_in_step(path: &Path) -> f64 {
     let terrain = Terrain::open(path).unwrap();
     let at = |x: u32, y: u32| terrain.height_m(f64::from(x) * 20.0, f64::from(y) * 20.0).unwrap().unwrap();
     let first = at(RECTS[0][0], RECTS[0][1]);
@@ -81,7 +91,7 @@ fn a_killed_edit_leaves_whole_batches() {
         commits = now;
     }
     assert!(commits > 20, "the kills came too early: {commits}");
-    // A killed writer's lock is taken over; what it left can be undone.
+    // A killed writer's lock ended with it; what it left can be undone.
     bench.good(&["undo", "land.iqt", "5"]);
     height_in_step(&bench.path("land.iqt"));
     bench.good(&["undo", "land.iqt", "100000"]);

@@ -1,11 +1,19 @@
 //! The real program in a temporary folder: what it prints, what it leaves, how it ends.
 
+#[cfg(target_os = "linux")]
+mod aliases;
 mod build;
 mod drape;
 mod edit;
 mod edit_processes;
 mod engines;
+mod harmless;
 mod iobench;
+#[cfg(unix)]
+mod killed;
+#[cfg(unix)]
+mod kills;
+mod outputs;
 mod pictures;
 mod support;
 mod usage;

@@ -7,6 +7,7 @@ use crate::dem::SampleType;
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::record::RecordKind;
+use crate::remedy::Remedy;
 
 /// Mebibyte.
 const MIB: u64 = 1 << 20;
@@ -30,9 +31,20 @@ impl MemoryPlan {
         sample_type: SampleType,
         options: &BuildOptions,
         threads: u64,
+        reading_bytes: u64,
     ) -> Result<Self, LayoutError> {
         let memory_mib = options.memory_mib;
-        let budget = memory_mib * MIB;
+        let budget = memory_mib.saturating_mul(MIB);
+        // While samples are read nothing is worked on yet, so this is beside the spool alone.
+        let reading = RESERVED_BYTES.saturating_add(reading_bytes);
+        if reading > budget {
+            let enough_mib = reading.div_ceil(MIB);
+            return Err(LayoutError::Usage(format!(
+                "{memory_mib} MiB are too few to read this elevation model, whose compression needs {} MiB at once; allow at least {enough_mib}",
+                reading_bytes.div_ceil(MIB)
+            ))
+            .mended_by(Remedy::Memory { enough_mib: Some(enough_mib) }));
+        }
         let [wide, high] = grid.samples().map(u64::from);
         let n = grid.side_steps();
         let single = sample_type.fits_f32();
@@ -60,16 +72,20 @@ impl MemoryPlan {
         let available = budget.saturating_sub(fixed);
         let tiles = || (0..=8).rev().map(|m| 1 << m).filter(|s| (smallest..=largest).contains(s));
         let largest_within = |bytes: u64| tiles().find(|s| work(*s) <= bytes);
-        if let Some(tile) = largest_within(available.saturating_sub(spool)).filter(|t| *t >= largest.min(128))
+        if let Some(tile) = largest_within(available.saturating_sub(spool))
+            .filter(|t| *t >= largest.min(128) && reading + spool <= budget)
         {
             return Ok(Self { tile, spool_bytes: spool });
         }
         match largest_within(available) {
             Some(tile) => Ok(Self { tile, spool_bytes: 0 }),
-            None => Err(LayoutError::Usage(format!(
-                "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; give at least --memory {}",
-                (fixed + tiles().map(work).min().unwrap_or(0)).div_ceil(MIB)
-            ))),
+            None => {
+                let enough_mib = (fixed + tiles().map(work).min().unwrap_or(0)).div_ceil(MIB);
+                Err(LayoutError::Usage(format!(
+                    "{memory_mib} MiB are too few for an elevation model of {wide} x {high} samples; allow at least {enough_mib}"
+                ))
+                .mended_by(Remedy::Memory { enough_mib: Some(enough_mib) }))
+            }
         }
     }
 }
@@ -80,7 +96,7 @@ mod tests {
 
     fn plan(side: u32, sample_type: SampleType, memory_mib: u64) -> Result<MemoryPlan, LayoutError> {
         let grid = Grid::new([side, side - 1], [1.0, 1.0]).unwrap();
-        MemoryPlan::new(&grid, sample_type, &BuildOptions { memory_mib, ..Default::default() }, 2)
+        MemoryPlan::new(&grid, sample_type, &BuildOptions { memory_mib, ..Default::default() }, 2, 0)
     }
 
     #[test]
@@ -94,11 +110,28 @@ mod tests {
     fn the_budget_that_a_refusal_names_is_the_least_that_is_enough() {
         for side in [4097, 16_385, 30_000, 65_537] {
             for sample_type in [SampleType::I16, SampleType::F32, SampleType::F64] {
-                let refusal = plan(side, sample_type, 24).unwrap_err().to_string();
-                let named: u64 = refusal.rsplit(' ').next().unwrap().parse().unwrap();
+                let refusal = plan(side, sample_type, 24).unwrap_err();
+                let Some(Remedy::Memory { enough_mib: Some(named) }) = refusal.remedy() else {
+                    panic!("{refusal}")
+                };
+                assert!(refusal.to_string().ends_with(&format!(" {named}")), "{refusal}");
                 assert!(plan(side, sample_type, named).is_ok(), "{refusal}");
                 assert!(plan(side, sample_type, named - 1).is_err(), "{refusal}");
             }
         }
+    }
+
+    #[test]
+    fn what_reading_takes_counts() {
+        let grid = Grid::new([2049; 2], [1.0; 2]).unwrap();
+        let with = |memory_mib, reading_mib| {
+            let options = BuildOptions { memory_mib, ..Default::default() };
+            MemoryPlan::new(&grid, SampleType::U16, &options, 2, reading_mib * MIB)
+        };
+        assert!(with(512, 10).unwrap().spool_bytes > 0);
+        assert_eq!(with(512, 480).unwrap().spool_bytes, 0);
+        let refusal = with(64, 128).unwrap_err();
+        assert_eq!(refusal.remedy(), Some(Remedy::Memory { enough_mib: Some(152) }), "{refusal}");
+        assert!(with(152, 128).is_ok());
     }
 }

@@ -20,15 +20,18 @@ mod spool;
 mod survey;
 mod writer;
 
-use crate::atomic_file::AtomicFile;
 use crate::bound::{FIRST_SCANNED, Rules};
 use crate::dem::DemSource;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::publish::publish_terrain;
 use crate::grid::Grid;
-use crate::header::{ErrorKind, Header};
+use crate::header::{ErrorKind, Header, SpacingOrigin};
 use crate::order::corners;
-use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, VertexClass};
+use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
+use crate::remedy::Remedy;
+use crate::words::{harmless, number};
 use band::{Band, Fills, RowReader};
 use levels::{LevelShape, Levels};
 use memory::{LARGEST_TILE, MemoryPlan};
@@ -43,6 +46,9 @@ use std::sync::atomic::AtomicU32;
 use std::sync::mpsc::SyncSender;
 use survey::HeightCode;
 use writer::{PageWriter, PlacedPages, page_queue, write_pages};
+
+/// Longest text in a header; it has room for 254 bytes.
+const MAX_TEXT_CHARS: usize = 254;
 
 /// What to build.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,12 +127,20 @@ pub fn build_on(
 ) -> Result<Header, LayoutError> {
     let info = dem.info();
     if !(options.z_scale.is_finite() && options.z_scale > 0.0) {
-        return Err(LayoutError::Usage(format!("--z-scale is a positive factor, not {}", options.z_scale)));
+        return Err(LayoutError::Usage(format!(
+            "the factor on heights is a positive number, not {}",
+            number(options.z_scale)
+        ))
+        .mended_by(Remedy::HeightFactor));
     }
     let (spacing_m, spacing_origin) = spacing::resolve(info, options.spacing_m)?;
     let grid = Grid::new([info.samples_wide, info.samples_high], spacing_m)?;
     let samples = u64::from(info.samples_wide) * u64::from(info.samples_high);
-    let memory = MemoryPlan::new(&grid, info.sample_type, options, rayon::current_num_threads() as u64)?;
+    let mut header = first_header(dem, grid, spacing_origin, options);
+    // What is wrong already need not be waited for.
+    header.check_numbers()?;
+    let threads = rayon::current_num_threads() as u64;
+    let memory = MemoryPlan::new(&grid, info.sample_type, options, threads, dem.memory_bytes())?;
     let file = AtomicFile::create(out)?;
     let advance = |n| progress.advance(n);
 
@@ -142,17 +156,47 @@ pub fn build_on(
     let code = HeightCode::choose(info, options.z_scale, &stats, options.record);
     let height_range_m = survey::check_heights(info, &code, &stats)?;
     let steepest_m = survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
-    let scale = survey::record_scale(&grid, &code, height_range_m, steepest_m);
-    let mut header = Header {
+    header.record_kind = code.kind;
+    header.scale = survey::record_scale(&grid, &code, height_range_m, steepest_m);
+    header.has_voids = stats.voids > 0;
+    header.heights_rounded = code.rounds;
+    header.height_range_m = height_range_m;
+    header.nodata_samples = stats.voids;
+
+    progress.stage("building", samples);
+    let work =
+        Work { spool: &spool, code, fills: None, tile: memory.tile, file: &file, disk, advance: &advance };
+    work.run_kind(&mut header)?;
+    progress.stage("syncing", 0);
+    drop(spool);
+    publish_terrain(disk, file, None)
+}
+
+/// What a header says before a sample is read. Of heights it says what is known: that those of whole numbers go in steps of at least the DEM's scale.
+fn first_header(
+    dem: &dyn DemSource,
+    grid: Grid,
+    spacing_origin: SpacingOrigin,
+    options: &BuildOptions,
+) -> Header {
+    let info = dem.info();
+    let is_whole = info.sample_type.is_integer();
+    let height_step_m = if is_whole { info.height_scale * options.z_scale } else { 1.0 };
+    Header {
         grid,
-        record_kind: code.kind,
-        scale,
+        record_kind: RecordKind::Compact,
+        scale: RecordScale {
+            height_base_m: 0.0,
+            height_step_m,
+            error_top_m: 1.0,
+            radius_steps_per_octave: 64,
+        },
         error_kind: options.error,
-        has_voids: stats.voids > 0,
-        heights_rounded: code.rounds,
+        has_voids: false,
+        heights_rounded: false,
         generation: 1,
-        height_range_m,
-        nodata_samples: stats.voids,
+        height_range_m: [0.0; 2],
+        nodata_samples: 0,
         stored_pages: 0,
         root_page: 0,
         root_checksum: 0,
@@ -163,19 +207,10 @@ pub fn build_on(
         epsg: info.georeference.epsg,
         crs_unit: info.georeference.unit,
         spacing_origin,
-        body_radius_m: info.georeference.body_radius_m,
-        crs_name: info.georeference.crs_name.clone(),
-        source: info.format.clone(),
-    };
-
-    progress.stage("building", samples);
-    let work =
-        Work { spool: &spool, code, fills: None, tile: memory.tile, file: &file, disk, advance: &advance };
-    work.run_kind(&mut header)?;
-    progress.stage("syncing", 0);
-    drop(spool);
-    file.publish_on(disk)?;
-    Ok(header)
+        body_radius_m: info.georeference.body_radius_m.filter(|radius| *radius != 0.0),
+        crs_name: harmless(&info.georeference.crs_name, MAX_TEXT_CHARS),
+        source: harmless(&info.format, MAX_TEXT_CHARS),
+    }
 }
 
 /// What the work on one file needs to know.
@@ -191,8 +226,9 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Works with the codec of the header's kind of records.
+    /// Works with the codec of the header's kind of records, after a look at whether the file will open.
     fn run_kind(&self, header: &mut Header) -> Result<(), LayoutError> {
+        header.check_numbers()?;
         let (grid, scale) = (header.grid, header.scale);
         match header.record_kind {
             RecordKind::Compact => self.run(Compact::new(&grid, &scale), header),

@@ -4,10 +4,11 @@
 
 use super::survey::HeightCode;
 use super::{BuildOptions, BuildProgress, MemoryPlan, Work, spool::Spool};
-use crate::atomic_file::AtomicFile;
 use crate::dem::{DemInfo, DemSource, Georeference, SampleSink, SampleType, Window};
 use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::publish::publish_terrain;
 use crate::grid::GridPoint;
 use crate::header::Header;
 use crate::record::{RecordCodec, RecordKind, RecordScale};
@@ -75,10 +76,9 @@ pub fn rebuild(
     progress: &dyn BuildProgress,
 ) -> Result<Header, LayoutError> {
     let file = AtomicFile::create(out)?;
-    let header = rebuild_into(disk, terrain, &file, room, memory_mib, progress)?;
+    rebuild_into(disk, terrain, &file, room, memory_mib, progress)?;
     progress.stage("syncing", 0);
-    file.publish_on(disk)?;
-    Ok(header)
+    publish_terrain(disk, file, None)
 }
 
 /// As [`rebuild`], into a file that is published by the caller.
@@ -125,7 +125,7 @@ fn rebuild_kind<C: RecordCodec>(
     };
     let samples = u64::from(wide) * u64::from(high);
     let options = BuildOptions { memory_mib, ..BuildOptions::default() };
-    let memory = MemoryPlan::new(&grid, info.sample_type, &options, rayon::current_num_threads() as u64)?;
+    let memory = MemoryPlan::new(&grid, info.sample_type, &options, rayon::current_num_threads() as u64, 0)?;
     let advance = |n| progress.advance(n);
     progress.stage("reading", samples);
     let spool = Spool::new(disk, &info, None, file.target(), memory.spool_bytes, &advance)?;

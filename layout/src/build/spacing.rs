@@ -3,6 +3,8 @@
 use crate::dem::{DemInfo, Georeference, HorizontalUnit};
 use crate::error::LayoutError;
 use crate::header::SpacingOrigin;
+use crate::remedy::Remedy;
+use crate::words::number;
 
 /// Equatorial radius of WGS 84, metres.
 const EARTH_RADIUS_M: f64 = 6_378_137.0;
@@ -35,9 +37,11 @@ pub(super) fn resolve(
             let latitude = map[3] + map[4] * col + map[5] * row;
             if latitude.is_nan() || latitude.abs() >= 89.9 {
                 return Err(LayoutError::Usage(format!(
-                    "the elevation model is in degrees and its centre lies at latitude {latitude}, where degrees have no \
-                     useful length; state the spacing in metres with --spacing, or reproject the model"
-                )));
+                    "the elevation model is in degrees and its centre lies at latitude {}, where degrees have no \
+                     useful length; state the spacing in metres, or reproject the model",
+                    number(latitude)
+                ))
+                .mended_by(Remedy::Spacing));
             }
             let [lon_m, lat_m] = degree_m(latitude, reference);
             let spacing = [(map[1] * lon_m).hypot(map[4] * lat_m), (map[2] * lon_m).hypot(map[5] * lat_m)];

@@ -7,8 +7,9 @@
 
 use crate::bound::range;
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
-use crate::disk::Disk;
+use crate::disk::{Disk, is_full};
 use crate::error::LayoutError;
+use crate::remedy::Remedy;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -195,8 +196,10 @@ impl<'a> Spool<'a> {
 
 fn failed(target: &Path, action: &'static str, e: std::io::Error) -> LayoutError {
     let when_full = "no room for the temporary file beside it, which takes 4 or 8 bytes a sample; make some on its disk, name an output on \
-                     another, or give more --memory, which may hold the samples instead";
-    LayoutError::write(target, action, when_full, e)
+                     another, or allow more memory, which may hold the samples instead";
+    let is_full = is_full(&e);
+    let error = LayoutError::write(target, action, when_full, e);
+    if is_full { error.mended_by(Remedy::Memory { enough_mib: None }) } else { error }
 }
 
 impl SampleSink for Spool<'_> {
@@ -205,8 +208,10 @@ impl SampleSink for Spool<'_> {
             && window.row.checked_add(window.height).is_some_and(|end| end <= self.high)
             && samples.len() == window.width as usize * window.height as usize;
         if !inside {
+            let Window { col, row, width, height } = window;
             return Err(LayoutError::Usage(format!(
-                "a window {window:?} does not lie in the elevation model"
+                "{} samples for {width} x {height} of the elevation model, from column {col} and row {row} on, do not lie in it",
+                samples.len()
             )));
         }
         if samples.iter().all(|v| v.is_nan()) {

@@ -6,6 +6,8 @@ use crate::dem::{DemInfo, SampleType};
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::record::{RecordKind, RecordScale};
+use crate::remedy::Remedy;
+use crate::words::number;
 use rayon::prelude::*;
 
 /// Largest height code of compact records.
@@ -85,15 +87,16 @@ pub(super) fn check_heights(
 ) -> Result<[f64; 2], LayoutError> {
     let range_m = stats.range.map(|raw| code.metres(code.code(raw)));
     if range_m.iter().any(|h| h.is_nan() || h.abs() > 1e9) || code.step_m.is_nan() || code.step_m <= 0.0 {
-        let [low, high] = stats.range;
-        let hint = if info.sample_type == SampleType::F32 || info.sample_type == SampleType::F64 {
-            "is a no-data value not declared? name it with --nodata"
+        let [low, high] = stats.range.map(number);
+        let (hint, remedy) = if info.sample_type == SampleType::F32 || info.sample_type == SampleType::F64 {
+            ("is a no-data value not declared? name it", Remedy::Nodata)
         } else {
-            "check --z-scale"
+            ("check the factor on heights", Remedy::HeightFactor)
         };
         return Err(LayoutError::Usage(format!(
             "the heights {low} to {high} (raw) are not heights in metres of up to a million kilometres; {hint}"
-        )));
+        ))
+        .mended_by(remedy));
     }
     Ok(range_m)
 }

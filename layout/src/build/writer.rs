@@ -7,11 +7,12 @@
 use super::gather::gather;
 use super::levels::{LevelShape, Levels};
 use super::plan::{LevelPlan, Plan};
-use crate::atomic_file::AtomicFile;
 use crate::bytes::{PAGE_BYTES, Page, checksum};
-use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use crate::directory::Entry;
 use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::directory::{put_all_leaves, root_bytes};
 use crate::grid::Grid;
 use crate::header::{Header, INERT_PAGE};
 use crate::opening::inert_page;
@@ -157,26 +158,19 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     /// Writes what remains, closes gaps, and gives `header` its places.
     pub(super) fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
         let end = self.close_gaps()?;
-        let mut root = vec![0; self.entries.len().div_ceil(ENTRIES_PER_LEAF) * ENTRY_BYTES];
-        let mut page = end;
-        for (i, entries) in self.entries.chunks(ENTRIES_PER_LEAF).enumerate() {
-            if entries.iter().any(|e| e.is_present()) {
-                let leaf = leaf_page(entries);
-                Entry { page, checksum: checksum(&leaf), generation: 1 }.write(&mut root, i);
-                self.disk
-                    .write_at(self.file.file(), &leaf, u64::from(page) * PAGE)
-                    .map_err(|e| failed(self.file, e))?;
-                page += 1;
-            }
-        }
+        let (root, page) = put_all_leaves(&self.entries, end, |page, leaf| {
+            self.disk
+                .write_at(self.file.file(), leaf, u64::from(page) * PAGE)
+                .map_err(|e| failed(self.file, e))
+        })?;
+        let root = root_bytes(&root);
         header.root_page = page;
-        header.root_checksum = checksum(&root);
+        header.root_checksum = root.checksum;
         header.stored_pages = self.entries.iter().filter(|e| e.is_present()).count() as u64;
-        root.resize(root.len().next_multiple_of(PAGE_BYTES), 0);
-        header.file_bytes = u64::from(page) * PAGE + root.len() as u64;
+        header.file_bytes = u64::from(page) * PAGE + root.bytes.len() as u64;
         header.generation = 1;
         let (file, disk) = (self.file.file(), self.disk);
-        disk.write_at(file, &root, u64::from(page) * PAGE)
+        disk.write_at(file, &root.bytes, u64::from(page) * PAGE)
             .and_then(|()| disk.write_at(file, &[0; PAGE_BYTES], PAGE))
             .and_then(|()| disk.write_at(file, &self.inert[..], u64::from(INERT_PAGE) * PAGE))
             .and_then(|()| disk.write_at(file, &header.to_page()[..], 0))

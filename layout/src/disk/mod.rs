@@ -1,17 +1,22 @@
-//! What a build asks of the disk: a handful of calls on open files, behind one trait, so that a disk that fails or fills can stand in for
+//! What writers ask of the disk: a handful of calls on open files and on names, behind one trait, so that a disk that fails, fills or forgets can stand in for
 //! the system's.
 //!
-//! Every byte of a terrain file and of the samples on their way to it passes through here. Invariant: an offset and a length say where; no file has a
-//! position that threads could quarrel over.
+//! Every byte of a terrain file and of the samples on their way to it passes through here, and every name that such a file gets. Invariant: an offset and a length say where; no file
+//! has a position that threads could quarrel over.
 
 #[cfg(any(test, feature = "testing"))]
-mod testing;
+mod failing;
+#[cfg(any(test, feature = "testing"))]
+mod forgetful;
 
 #[cfg(any(test, feature = "testing"))]
-pub use testing::{FailingDisk, Failure};
+pub use failing::{FailingDisk, Failure};
+#[cfg(any(test, feature = "testing"))]
+pub use forgetful::{ForgetfulDisk, PowerCut};
 
 use std::fs::File;
 use std::io::{ErrorKind, Result};
+use std::path::Path;
 
 /// Calls on files that are being written.
 pub trait Disk: Sync + std::fmt::Debug {
@@ -38,6 +43,24 @@ pub trait Disk: Sync + std::fmt::Debug {
     /// # Errors
     /// The system's.
     fn sync(&self, file: &File) -> Result<()>;
+
+    /// Gives a file that has no name yet the name `to`, which nothing may have.
+    ///
+    /// # Errors
+    /// The system's, which has no nameless files everywhere; [`ErrorKind::AlreadyExists`] where something has the name.
+    fn link(&self, file: &File, to: &Path) -> Result<()>;
+
+    /// Gives what is called `from` the name `to`, in place of whatever has it.
+    ///
+    /// # Errors
+    /// The system's.
+    fn rename(&self, from: &Path, to: &Path) -> Result<()>;
+
+    /// Returns when the names in a folder are on the disk: a new name is not before this.
+    ///
+    /// # Errors
+    /// The system's. Systems and file systems that do not know how to say so.
+    fn sync_folder(&self, folder: &Path) -> Result<()>;
 }
 
 /// The system's own.
@@ -69,6 +92,48 @@ impl Disk for SystemDisk {
 
     fn sync(&self, file: &File) -> Result<()> {
         file.sync_all()
+    }
+
+    fn link(&self, file: &File, to: &Path) -> Result<()> {
+        #[cfg(target_os = "linux")]
+        {
+            use rustix::fs::{AtFlags, CWD, linkat};
+            use std::os::fd::AsRawFd;
+            let from = format!("/proc/self/fd/{}", file.as_raw_fd());
+            Ok(linkat(CWD, from, CWD, to, AtFlags::SYMLINK_FOLLOW)?)
+        }
+        #[cfg(not(target_os = "linux"))]
+        {
+            let _ = (file, to);
+            Err(ErrorKind::Unsupported.into())
+        }
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> Result<()> {
+        std::fs::rename(from, to)
+    }
+
+    fn sync_folder(&self, folder: &Path) -> Result<()> {
+        #[cfg(unix)]
+        {
+            // A folder that may be written to and not be read cannot be opened, and some file systems sync no folders: there is no more to be had there.
+            let cannot = |e: &std::io::Error| {
+                matches!(
+                    e.kind(),
+                    ErrorKind::PermissionDenied | ErrorKind::InvalidInput | ErrorKind::Unsupported
+                )
+            };
+            match File::open(folder).and_then(|folder| folder.sync_all()) {
+                Err(error) if cannot(&error) => Ok(()),
+                done => done,
+            }
+        }
+        // Elsewhere folders are not files that could be synced.
+        #[cfg(not(unix))]
+        {
+            let _ = folder;
+            Ok(())
+        }
     }
 }
 

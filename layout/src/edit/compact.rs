@@ -1,17 +1,19 @@
 //! A terrain file written anew as a build would have left it: pages in order, imagery behind them, and nothing of what edits replaced.
 
-use super::commit::Directory;
-use crate::atomic_file::AtomicFile;
 use crate::build::BuildProgress;
-use crate::bytes::{PAGE_BYTES, checksum};
-use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use crate::bytes::{PAGE_BYTES, Page};
+use crate::directory::Entry;
 use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::directory::{page_at, put_all_leaves, root_bytes};
+use crate::file::lock::WriteLock;
+use crate::file::publish::publish_terrain;
+use crate::file::slots::Slots;
+use crate::file::tail::Tail;
 use crate::header::{Header, INERT_PAGE};
 use crate::imagery::{Append, Imagery, MadeTile};
-use crate::lock::WriteLock;
 use crate::opening::inert_page;
-use crate::slots::Slots;
 use crate::terrain::Terrain;
 use std::path::Path;
 
@@ -19,26 +21,74 @@ const PAGE: u64 = PAGE_BYTES as u64;
 /// Bytes written at a time.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// Writes `terrain`, as it is now, to `out`, which may be its own file: the same records and imagery, in order, without journal. `out` appears when it is complete. Returns
-/// its header.
+/// What became of a file that was written anew.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Compacted {
+    /// Header of the new file.
+    pub header: Header,
+    /// Bytes of the old one, with its overlay if it had one.
+    pub bytes_before: u64,
+    /// Commits that could be undone or redone in the old one; 0 if its journal cannot be read.
+    pub commits_before: u64,
+}
+
+/// Writes the terrain file `file` with the edits of `overlay`, if there is one, as it is now to `out`: the same records and imagery, in order, without journal. `out` may be `file` itself, by
+/// whatever name; nobody else writes to it from before it is read until it is replaced. `out` appears when it is complete.
 ///
 /// # Errors
-/// Damage and I/O of the terrain; I/O of `out`; [`LayoutError::Usage`] while another program writes to it.
+/// Damage and I/O of the terrain; I/O of `out`; [`LayoutError::Usage`] while another program writes to it, and if `out` is `file` and has other names (hard links), which would keep the old contents.
 pub fn compact(
     disk: &dyn Disk,
-    terrain: &Terrain,
+    file: &Path,
+    overlay: Option<&Path>,
     out: &Path,
     progress: &dyn BuildProgress,
+) -> Result<Compacted, LayoutError> {
+    // The lock comes first: what is committed before it is read, and nothing is committed after it.
+    let lock = lock_if_same(file, out)?;
+    let terrain = match overlay {
+        Some(overlay) => Terrain::open_with_overlay_unmapped(file, overlay)?,
+        None => Terrain::open_unmapped(file)?,
+    };
+    let bytes_before = terrain.source().byte_count();
+    // A file whose journal is damaged is written anew all the same.
+    let commits_before = super::history(&terrain).map_or(0, |commits| commits.len() as u64);
+    let header = rewrite(disk, &terrain, AtomicFile::create(out)?, lock.as_ref(), progress)?;
+    Ok(Compacted { header, bytes_before, commits_before })
+}
+
+/// The lock of `file` if it is to be replaced.
+fn lock_if_same(file: &Path, out: &Path) -> Result<Option<WriteLock>, LayoutError> {
+    if !same_file(file, out) {
+        return Ok(None);
+    }
+    let lock = WriteLock::take(out)?;
+    lock.check_only_name(out)?;
+    Ok(Some(lock))
+}
+
+/// Whether two names lead to one file.
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (std::fs::File::open(a), std::fs::metadata(b)) {
+        (Ok(file), Ok(meta)) if meta.is_file() => crate::file::lock::is_named(&file, b),
+        _ => false,
+    }
+}
+
+fn rewrite(
+    disk: &dyn Disk,
+    terrain: &Terrain,
+    file: AtomicFile,
+    over: Option<&WriteLock>,
+    progress: &dyn BuildProgress,
 ) -> Result<Header, LayoutError> {
-    let _lock = WriteLock::take(out)?;
-    let file = AtomicFile::create(out)?;
     progress.stage("compacting", terrain.header().stored_pages * terrain.header().records_per_page());
     let mut writer = Writer { disk, file: &file, chunk: Vec::with_capacity(CHUNK_BYTES), offset: 0 };
     let slots = write_terrain(&mut writer, terrain, progress)?;
-    let header = copy_imagery(disk, &file, slots, terrain)?;
+    copy_imagery(disk, &file, slots, terrain)?;
     progress.stage("syncing", 0);
-    file.publish_on(disk)?;
-    Ok(header)
+    publish_terrain(disk, file, over)
 }
 
 /// Writes on and on.
@@ -72,8 +122,7 @@ impl Writer<'_> {
 
     /// Page that is written next.
     fn page(&self) -> Result<u32, LayoutError> {
-        let page = (self.offset + self.chunk.len() as u64) / PAGE;
-        u32::try_from(page).map_err(|_| LayoutError::Usage("a terrain file has at most 16 TiB".into()))
+        page_at(self.file.target(), self.offset + self.chunk.len() as u64)
     }
 }
 
@@ -87,38 +136,26 @@ fn write_terrain(
     writer.put(&[0; 2 * PAGE_BYTES])?;
     debug_assert_eq!(writer.page()?, INERT_PAGE);
     writer.put(&inert_page(old.record_kind)[..])?;
-    let mut directory = Directory { entries: Vec::with_capacity(terrain.entries().len()), root: Vec::new() };
+    let mut entries = Vec::with_capacity(terrain.entries().len());
     for (logical, entry) in (0u64..).zip(terrain.entries()) {
         let mut entry = *entry;
         if entry.is_present() {
-            let page = terrain.checked_page(logical)?;
+            let page: Box<Page> = terrain.checked_page(logical)?;
             entry = Entry { page: writer.page()?, generation: 1, ..entry };
             writer.put(&page[..])?;
             progress.advance(old.records_per_page());
         }
-        directory.entries.push(entry);
+        entries.push(entry);
     }
-    for entries in directory.entries.chunks(ENTRIES_PER_LEAF) {
-        if entries.iter().any(|entry| entry.is_present()) {
-            let bytes = leaf_page(entries);
-            directory.root.push(Entry { page: writer.page()?, checksum: checksum(&bytes), generation: 1 });
-            writer.put(&bytes)?;
-        } else {
-            directory.root.push(Entry::default());
-        }
-    }
-    let mut root = vec![0; directory.root.len() * ENTRY_BYTES];
-    directory.root.iter().enumerate().for_each(|(i, entry)| entry.write(&mut root, i));
-    let root_page = writer.page()?;
-    let root_checksum = checksum(&root);
-    root.resize(root.len().next_multiple_of(PAGE_BYTES), 0);
-    writer.put(&root)?;
+    let (root, root_page) = put_all_leaves(&entries, writer.page()?, |_, bytes| writer.put(bytes))?;
+    let root = root_bytes(&root);
+    writer.put(&root.bytes)?;
     writer.flush()?;
     let header = Header {
         generation: 1,
         root_page,
-        root_checksum,
-        file_bytes: u64::from(root_page) * PAGE + root.len() as u64,
+        root_checksum: root.checksum,
+        file_bytes: u64::from(root_page) * PAGE + root.bytes.len() as u64,
         imagery: None,
         history: None,
         ..old.clone()
@@ -128,7 +165,7 @@ fn write_terrain(
     Ok(Slots { current: page, current_slot: 0, header })
 }
 
-/// Copies the imagery of `terrain`, if it has any, behind the file with these header slots; returns the file's header.
+/// Copies the imagery of `terrain`, if it has any, behind the file with these header slots, which is not published yet; returns the file's header.
 pub(super) fn copy_imagery(
     disk: &dyn Disk,
     file: &AtomicFile,
@@ -136,12 +173,14 @@ pub(super) fn copy_imagery(
     terrain: &Terrain,
 ) -> Result<Header, LayoutError> {
     let Some(imagery) = Imagery::open(terrain)? else { return Ok(slots.header) };
-    let mut append = Append::begin(file.target(), disk, file.file(), slots, imagery.shape())?;
+    let tail = Tail::of_new(file.target(), file.file(), &slots)?;
+    let length = slots.header.file_bytes;
+    let mut append = Append::begin(disk, tail, slots.header, None, imagery.shape())?;
     for id in imagery.shape().ids() {
         let mut bytes = Vec::new();
         if let Some(entry) = imagery.read_stored(terrain, id, &mut bytes)? {
             append.put(&MadeTile { id, entry, bytes })?;
         }
     }
-    append.commit(imagery.source(), || Ok(()))
+    append.commit(imagery.source(), length)
 }

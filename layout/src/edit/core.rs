@@ -8,6 +8,7 @@ use super::window::{HeightWindow, SampleRect};
 use super::{Changes, Edit};
 use crate::bound::Rules;
 use crate::bytes::{PAGE_BYTES, Page};
+use crate::directory::Entry;
 use crate::error::LayoutError;
 use crate::grid::GridPoint;
 use crate::header::Header;
@@ -34,6 +35,8 @@ pub(super) struct Core<C: RecordCodec> {
     header: Header,
     /// The header's range and error top as committed.
     committed: ([f64; 2], f64),
+    /// The same before the commit that is under way.
+    before_commit: Option<([f64; 2], f64)>,
     scratch: Scratch<C>,
     /// Height codes of the window being set, before and after; NaN for voids.
     codes: [Vec<f64>; 2],
@@ -46,6 +49,7 @@ impl<C: RecordCodec> Core<C> {
         Self {
             rules,
             committed: (header.height_range_m, header.scale.error_top_m),
+            before_commit: None,
             header,
             pages: Pages::new(terrain),
             original: None,
@@ -70,17 +74,49 @@ impl<C: RecordCodec> Core<C> {
         self.pages.edited(logical)
     }
 
-    pub(super) fn all_edited(&self) -> impl Iterator<Item = (u64, &Page)> {
+    pub(super) fn page(&mut self, logical: u64) -> Result<&Page, LayoutError> {
+        self.pages.page(logical)
+    }
+
+    pub(super) fn all_edited(&self) -> Vec<u64> {
         self.pages.all_edited()
+    }
+
+    pub(super) fn keep_at_most(&mut self, pages: usize) {
+        self.pages.keep_at_most(pages);
+        if let Some(original) = &mut self.original {
+            original.keep_at_most(pages);
+        }
+    }
+
+    pub(super) fn held_pages(&self) -> usize {
+        self.pages.held_pages()
+    }
+
+    pub(super) fn has_original(&self) -> bool {
+        self.original.is_some()
     }
 
     pub(super) fn uncommitted(&self) -> Vec<u64> {
         self.pages.uncommitted()
     }
 
-    pub(super) fn mark_committed(&mut self) {
+    pub(super) fn begin_commit(&mut self) {
+        self.before_commit = Some(self.committed);
         self.committed = (self.header.height_range_m, self.header.scale.error_top_m);
-        self.pages.mark_committed();
+        self.pages.begin_commit();
+    }
+
+    pub(super) fn end_commit(&mut self, places: &[(u64, Entry)]) {
+        self.before_commit = None;
+        self.pages.end_commit(places);
+    }
+
+    pub(super) fn fail_commit(&mut self) {
+        if let Some(before) = self.before_commit.take() {
+            self.committed = before;
+        }
+        self.pages.fail_commit();
     }
 
     pub(super) fn vertex(&mut self, p: GridPoint) -> Result<Vertex, LayoutError> {
@@ -358,26 +394,55 @@ impl<C: RecordCodec> Core<C> {
         Ok(())
     }
 
-    /// Puts other contents into pages and takes over the range of heights of `header`.
-    pub(super) fn replace_pages(
+    pub(super) fn replacement(
         &mut self,
-        pages: Vec<(u64, Box<Page>)>,
+        places: &[(u64, Entry)],
         header: &Header,
-    ) -> Result<Changes, LayoutError> {
+    ) -> Result<Replacement, LayoutError> {
         if !self.pages.is_committed() {
             return Err(LayoutError::Usage(
                 "edits that are not committed are in the way; commit them or take them back first".into(),
             ));
         }
-        let mut changes = Changes::default();
-        for (logical, page) in pages {
-            let old = self.pages.replace(logical, page)?;
-            self.note_differences(logical, &old, &mut changes);
+        let mut pages = Vec::with_capacity(places.len());
+        for (logical, entry) in places {
+            // What is there now is compared with it, and must not fail to come then.
+            let now = Box::new(*self.pages.page(*logical)?);
+            pages.push(NewPage {
+                logical: *logical,
+                entry: *entry,
+                now,
+                new: self.pages.read_at(*logical, *entry)?,
+            });
         }
-        self.set_range((header.height_range_m, header.scale.error_top_m));
-        self.committed = (header.height_range_m, header.scale.error_top_m);
-        Ok(self.end_replacing(changes))
+        Ok(Replacement { pages, range: (header.height_range_m, header.scale.error_top_m) })
     }
+
+    pub(super) fn replace(&mut self, replacement: Replacement) -> Changes {
+        let mut changes = Changes::default();
+        for NewPage { logical, entry, now, new } in replacement.pages {
+            self.pages.replace(logical, entry, new);
+            self.note_differences(logical, &now, &mut changes);
+        }
+        self.set_range(replacement.range);
+        self.committed = replacement.range;
+        self.end_replacing(changes)
+    }
+}
+
+/// Contents for pages that are in the file at other places, ready to be put in.
+#[derive(Debug)]
+pub(super) struct Replacement {
+    pages: Vec<NewPage>,
+    range: ([f64; 2], f64),
+}
+
+#[derive(Debug)]
+struct NewPage {
+    logical: u64,
+    entry: Entry,
+    now: Box<Page>,
+    new: Box<Page>,
 }
 
 /// Leaves of `values`, one for each sample of `rect`, those of `part`, which lies in it.

@@ -33,7 +33,7 @@ pub use area::Area;
 pub use brush::{Brush, BrushAction, Falloff};
 pub use check::MAX_EDIT_SAMPLES;
 pub use commit::CommitJob;
-pub use compact::compact;
+pub use compact::{Compacted, compact};
 pub use crater::Crater;
 pub use foresight::{Foresight, holds_heights};
 pub use operation::Edit;
@@ -44,8 +44,9 @@ pub use stamp::{Stamp, StampMode};
 pub use widen::widen;
 pub use window::{HeightWindow, SampleRect};
 
-use self::core::Core;
+use self::core::{Core, Replacement};
 use crate::bytes::Page;
+use crate::directory::Entry;
 use crate::error::LayoutError;
 use crate::grid::GridPoint;
 use crate::header::Header;
@@ -137,42 +138,72 @@ impl Editor {
         with_records!(&mut self.core, core => core.vertex(p))
     }
 
-    /// The page with its edits; `None` if it is the terrain's own.
+    /// The page with its edits, from the batch that changed it until the next one; `None` if it is the terrain's own, and perhaps if it was committed before: [`Editor::page`] reads that back.
     pub fn edited_page(&self, logical_page: u64) -> Option<&Page> {
         with_records!(&self.core, core => core.edited_page(logical_page))
     }
 
-    /// All pages that are, or once were, other than the terrain's, in no order.
-    pub fn edited_pages(&self) -> Box<dyn Iterator<Item = (u64, &Page)> + '_> {
-        with_records!(&self.core, core => Box::new(core.all_edited()))
+    /// Any page as it is now.
+    ///
+    /// # Errors
+    /// Damage and I/O; [`LayoutError::Usage`] for a page that the terrain has not.
+    pub fn page(&mut self, logical_page: u64) -> Result<&Page, LayoutError> {
+        with_records!(&mut self.core, core => core.page(logical_page))
     }
 
-    /// Logical pages edited since the last [`Editor::mark_committed`], ascending.
+    /// Logical pages that are, or once were, other than the terrain's, ascending.
+    pub fn edited_pages(&self) -> Vec<u64> {
+        with_records!(&self.core, core => core.all_edited())
+    }
+
+    /// Pages in memory: those that are not committed, and a bounded number of others.
+    pub fn held_pages(&self) -> usize {
+        with_records!(&self.core, core => core.held_pages())
+    }
+
+    /// Keeps at most so many pages in memory, after each batch, that can be read again from the file; default 16,384, which are 64 MiB.
+    pub fn keep_at_most(&mut self, pages: usize) {
+        with_records!(&mut self.core, core => core.keep_at_most(pages));
+    }
+
+    /// Logical pages edited since the last commit, ascending.
     pub fn uncommitted(&self) -> Vec<u64> {
         with_records!(&self.core, core => core.uncommitted())
     }
 
-    /// Everything so far counts as committed.
-    pub fn mark_committed(&mut self) {
-        with_records!(&mut self.core, core => core.mark_committed());
-    }
-
-    /// Takes back everything since the last [`Editor::mark_committed`].
+    /// Takes back everything since the last commit.
     pub fn roll_back(&mut self) -> Changes {
         with_records!(&mut self.core, core => core.roll_back())
     }
 
-    /// Puts other contents into pages, as undoing does, and takes over the range of heights of `header`, all of it committed. What changed is found by comparing
-    /// records.
-    ///
-    /// # Errors
-    /// [`LayoutError::Usage`] for pages that the terrain has not, and while edits are not committed; I/O.
-    pub fn replace_pages(
-        &mut self,
-        pages: Vec<(u64, Box<Page>)>,
-        header: &Header,
-    ) -> Result<Changes, LayoutError> {
-        with_records!(&mut self.core, core => core.replace_pages(pages, header))
+    /// All that is not committed is on its way into the file.
+    pub(super) fn begin_commit(&mut self) {
+        with_records!(&mut self.core, core => core.begin_commit());
+    }
+
+    /// It is in the file, each page at the place that its new entry says.
+    pub(super) fn end_commit(&mut self, places: &[(u64, Entry)]) {
+        with_records!(&mut self.core, core => core.end_commit(places));
+    }
+
+    /// It is not, and is uncommitted again.
+    pub(super) fn fail_commit(&mut self) {
+        with_records!(&mut self.core, core => core.fail_commit());
+    }
+
+    /// Whether [`Editor::set_original`] was called.
+    pub(super) fn has_original(&self) -> bool {
+        with_records!(&self.core, core => core.has_original())
+    }
+
+    /// Gets ready to put the contents into pages that the file has at other places, as undoing does, and to take over the range of heights of `header`. Nothing changes yet.
+    fn replacement(&mut self, places: &[(u64, Entry)], header: &Header) -> Result<Replacement, LayoutError> {
+        with_records!(&mut self.core, core => core.replacement(places, header))
+    }
+
+    /// Does that; it cannot fail. What changed is found by comparing records.
+    fn replace(&mut self, replacement: Replacement) -> Changes {
+        with_records!(&mut self.core, core => core.replace(replacement))
     }
 
     /// The terrain's header with the range of heights as edits have widened it.

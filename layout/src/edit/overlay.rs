@@ -4,10 +4,12 @@
 //! the state of the base that it belongs to, and is refused with any other.
 
 use crate::bytes::{PAGE_BYTES, Page, get_text, get_u32, get_u64, put_text, put_u32, put_u64};
+use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::slots::Slots;
 use crate::header::{Header, seal};
-use crate::opening::{read_directory, read_structure};
-use crate::slots::Slots;
+use crate::opening::{read_directory, read_growing};
 use crate::source::{LayeredSource, MapSource, PreadSource, Source, split_of};
 use crate::terrain::Terrain;
 use std::path::Path;
@@ -44,8 +46,31 @@ impl Base {
     }
 }
 
+/// Makes the overlay `overlay`, without edits, of the terrain file `base` with these header slots, if nothing has its name.
+///
+/// # Errors
+/// As [`AtomicFile`]'s.
+pub(super) fn create_overlay(
+    disk: &dyn Disk,
+    base: &Path,
+    slots: &Slots,
+    overlay: &Path,
+) -> Result<(), LayoutError> {
+    if overlay.exists() {
+        return Ok(());
+    }
+    let file = AtomicFile::create(overlay)?;
+    let name = base.file_name().unwrap_or_default().to_string_lossy();
+    let when_full =
+        "cannot write the overlay, for which there is no room; make some on its disk, or name one on another";
+    disk.write_at(file.file(), &empty_overlay(slots, &name), 0)
+        .map_err(|e| LayoutError::write(overlay, "cannot write the overlay", when_full, e))?;
+    // Another who made one meanwhile was as quick to be right.
+    file.publish_new_on(disk).map(drop)
+}
+
 /// The first pages of an overlay without edits over the base with these header slots.
-pub(super) fn empty_overlay(base: &Slots, base_name: &str) -> Vec<u8> {
+fn empty_overlay(base: &Slots, base_name: &str) -> Vec<u8> {
     let split = split_of(base.header.file_bytes);
     let header =
         Header { file_bytes: split + FIRST_PAGES * PAGE_BYTES as u64, history: None, ..base.header.clone() };
@@ -65,12 +90,15 @@ pub(super) fn empty_overlay(base: &Slots, base_name: &str) -> Vec<u8> {
 }
 
 /// The header slots of the overlay over `base`, and where in the two together it begins.
-pub(super) fn overlay_slots(base: &PreadSource, overlay: &dyn Source) -> Result<(Slots, u64), LayoutError> {
+pub(super) fn overlay_slots(
+    base: &PreadSource,
+    overlay: &mut PreadSource,
+) -> Result<(Slots, u64), LayoutError> {
     let base_slots = Slots::read(base, 0)?;
     if overlay.byte_count() < FIRST_PAGES * PAGE_BYTES as u64 {
         return Err(not_an_overlay(overlay.path()));
     }
-    let slots = Slots::read_as(overlay, 0, MAGIC).map_err(|error| match error {
+    let slots = Slots::read_as(&*overlay, 0, MAGIC).map_err(|error| match error {
         LayoutError::NotThisFormat { .. } => not_an_overlay(overlay.path()),
         other => other,
     })?;
@@ -85,6 +113,8 @@ pub(super) fn overlay_slots(base: &PreadSource, overlay: &dyn Source) -> Result<
             "name the terrain they were made over, as it was then (an edit or a picture of its own makes it another)"
         )));
     }
+    // The header first and then the length: what a header counts was in the file before the header was.
+    overlay.measure_again()?;
     let split = split_of(found.file_bytes);
     if split + overlay.byte_count() < slots.header.file_bytes {
         return Err(LayoutError::damaged(
@@ -99,31 +129,24 @@ pub(super) fn overlay_slots(base: &PreadSource, overlay: &dyn Source) -> Result<
 fn not_an_overlay(path: &Path) -> LayoutError {
     LayoutError::not_this_format(
         path,
-        "this is no overlay of edits (.iqo); `terrasoar edit FILE --overlay NEW` makes one",
+        "this is no overlay of edits (.iqo); name one, or a new file for one, when the terrain is edited",
     )
 }
 
 /// The base with its overlay as one terrain.
 pub(crate) fn open_layers(base: &Path, overlay: &Path, is_mapped: bool) -> Result<Terrain, LayoutError> {
-    loop {
-        let base_file = PreadSource::open(base)?;
-        // The base must be a sound terrain by itself.
-        let (base_header, _) = read_structure(&base_file)?;
-        let overlay_file = PreadSource::open(overlay)?;
-        let opened = overlay_slots(&base_file, &overlay_file);
-        let slots = match opened {
-            Ok((slots, _)) => slots,
-            Err(LayoutError::Damaged { .. }) if overlay_file.has_grown() => continue,
-            Err(error) => return Err(error),
-        };
-        let source: Box<dyn Source> = if is_mapped {
-            let layers = [Box::new(MapSource::map(base_file)?), Box::new(MapSource::map(overlay_file)?)];
-            let [base, overlay] = layers;
-            Box::new(LayeredSource::new(base, base_header.file_bytes, overlay))
-        } else {
-            Box::new(LayeredSource::new(Box::new(base_file), base_header.file_bytes, Box::new(overlay_file)))
-        };
-        let entries = read_directory(&*source, &slots.header)?;
-        return Ok(Terrain::of(source, slots.header, entries));
-    }
+    let mut base_file = PreadSource::open(base)?;
+    // The base must be a sound terrain by itself.
+    let (base_header, _) = read_growing(&mut base_file)?;
+    let mut overlay_file = PreadSource::open(overlay)?;
+    let (slots, _) = overlay_slots(&base_file, &mut overlay_file)?;
+    let source: Box<dyn Source> = if is_mapped {
+        let layers = [Box::new(MapSource::map(base_file)?), Box::new(MapSource::map(overlay_file)?)];
+        let [base, overlay] = layers;
+        Box::new(LayeredSource::new(base, base_header.file_bytes, overlay))
+    } else {
+        Box::new(LayeredSource::new(Box::new(base_file), base_header.file_bytes, Box::new(overlay_file)))
+    };
+    let entries = read_directory(&*source, &slots.header)?;
+    Ok(Terrain::of(source, slots.header, entries))
 }

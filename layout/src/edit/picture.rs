@@ -57,6 +57,13 @@ impl Picture {
         }
     }
 
+    /// The section that was asked for last was not written: all of it is to be painted again.
+    pub(super) fn failed(&mut self) {
+        if let Some(painter) = &mut self.painter {
+            painter.failed();
+        }
+    }
+
     /// Takes back what was painted since the last section.
     pub(super) fn roll_back(&mut self) {
         if let Some(painter) = &mut self.painter {

@@ -1,13 +1,14 @@
 //! A terrain file rewritten so that its records have room for other heights.
 
 use super::compact::copy_imagery;
-use crate::atomic_file::AtomicFile;
 use crate::build::{BuildProgress, HeightRoom, rebuild_into};
 use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::lock::WriteLock;
+use crate::file::publish::publish_terrain;
+use crate::file::slots::Slots;
 use crate::header::Header;
-use crate::lock::WriteLock;
-use crate::slots::Slots;
 use crate::terrain::Terrain;
 use std::path::Path;
 
@@ -16,7 +17,8 @@ use std::path::Path;
 /// the old file. Returns the new header.
 ///
 /// # Errors
-/// Damage and I/O; [`LayoutError::Usage`] while another program writes to it, and as [`rebuild`](crate::build::rebuild). The file is as before then.
+/// Damage and I/O; [`LayoutError::Usage`] while another program writes to it, for a file with other names (hard links), which would keep the old contents, and as
+/// [`rebuild`](crate::build::rebuild). The file is as before then.
 pub fn widen(
     disk: &dyn Disk,
     path: &Path,
@@ -24,13 +26,13 @@ pub fn widen(
     memory_mib: u64,
     progress: &dyn BuildProgress,
 ) -> Result<Header, LayoutError> {
-    let _lock = WriteLock::take(path)?;
+    let lock = WriteLock::take(path)?;
+    lock.check_only_name(path)?;
     let terrain = Terrain::open(path)?;
     let file = AtomicFile::create(path)?;
     let header = rebuild_into(disk, &terrain, &file, Some(room), memory_mib, progress)?;
     let slots = Slots { current: header.to_page(), current_slot: 0, header };
-    let header = copy_imagery(disk, &file, slots, &terrain)?;
+    copy_imagery(disk, &file, slots, &terrain)?;
     progress.stage("syncing", 0);
-    file.publish_on(disk)?;
-    Ok(header)
+    publish_terrain(disk, file, Some(&lock))
 }

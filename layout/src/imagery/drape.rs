@@ -14,13 +14,14 @@ use super::source::{ImageSource, RowReader};
 use crate::build::BuildProgress;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
+use crate::file::journal::Lineage;
+use crate::file::lock::WriteLock;
+use crate::file::slots::Slots;
+use crate::file::tail::{Attempted, Tail};
 use crate::header::Header;
-use crate::lock::{WriteLock, is_named};
-use crate::slots::Slots;
+use crate::remedy::Remedy;
 use crate::source::{PreadSource, Source};
 use crate::terrain::Terrain;
-use std::cell::Cell;
-use std::fs::File;
 use std::path::Path;
 
 /// How to drape.
@@ -69,46 +70,32 @@ pub fn drape(
 }
 
 /// As [`drape`], with all writing done by `disk`.
-fn drape_on(
+///
+/// # Errors
+/// As [`drape`].
+pub fn drape_on(
     disk: &dyn Disk,
     path: &Path,
     images: &[Box<dyn ImageSource>],
     options: &DrapeOptions,
     progress: &dyn BuildProgress,
 ) -> Result<Draped, LayoutError> {
-    let _lock = WriteLock::take(path)?;
-    let failed = |e| LayoutError::io(path, "cannot open the file for writing", e);
-    let file = File::options().read(true).write(true).open(path).map_err(failed)?;
+    let lock = WriteLock::take(path)?;
+    let file = lock.file();
+    let again =
+        file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
     // One file, opened once: what is read is what is written to.
-    let terrain =
-        Terrain::from_source(Box::new(PreadSource::over(path, file.try_clone().map_err(failed)?)?))?;
-    let header_begun = Cell::new(false);
-    let may_commit = || {
-        if !is_named(&file, path) {
-            return Err(LayoutError::Usage(format!(
-                "{}: the file was replaced by another while the image was draped; drape it again",
-                path.display()
-            )));
-        }
-        header_begun.set(true);
-        Ok(())
-    };
-    let done = append_all(disk, &file, terrain.source(), images, options, progress, may_commit);
-    if done.is_err() && !header_begun.get() {
-        // No header counts what was appended. Failing here costs space only.
-        let _ = disk.set_len(&file, terrain.source().byte_count());
-    }
-    done
+    let terrain = Terrain::from_source(Box::new(PreadSource::over(path, again)?))?;
+    append_all(disk, &lock, terrain.source(), images, options, progress)
 }
 
 fn append_all(
     disk: &dyn Disk,
-    file: &File,
+    lock: &WriteLock,
     source: &dyn Source,
     images: &[Box<dyn ImageSource>],
     options: &DrapeOptions,
     progress: &dyn BuildProgress,
-    may_commit: impl FnOnce() -> Result<(), LayoutError>,
 ) -> Result<Draped, LayoutError> {
     let images: Vec<&dyn ImageSource> = images.iter().map(|image| &**image).collect();
     check_format(options.format)?;
@@ -116,21 +103,45 @@ fn append_all(
     let slots = Slots::read(source, 0)?;
     let mosaic = Mosaic::new(&images, &slots.header, options.extent)?;
     let shape = mosaic.shape(options.format);
-    let needed = memory_bytes(&shape) + mosaic.memory_bytes();
-    if needed > options.memory_mib << 20 {
+    let needed = memory_bytes(&shape).saturating_add(mosaic.memory_bytes());
+    if needed.div_ceil(1 << 20) > options.memory_mib {
+        let needed_mib = needed.div_ceil(1 << 20);
         return Err(LayoutError::Usage(format!(
-            "{} x {} texels of {} take {} MiB of memory and {} are allowed: allow more with --memory, or give a tiled GeoTIFF: \
+            "{} x {} texels of {} take {} MiB of memory and {} are allowed: allow more, or give a tiled GeoTIFF: \
              gdal_translate -co TILED=YES -co BIGTIFF=IF_SAFER INPUT output.tif",
             shape.texels[0],
             shape.texels[1],
             mosaic.format(),
-            (needed >> 20) + 1,
+            needed_mib,
             options.memory_mib
-        )));
+        ))
+        .mended_by(Remedy::Memory { enough_mib: Some(needed_mib) }));
     }
-    let mut append = Append::begin(path, disk, file, slots, shape)?;
+    let old = slots.header.clone();
+    let lineage = old.history.map(|_| Lineage::read(source, &old)).transpose()?;
+    let tail = Tail::of(path, lock, 0, &slots, Attempted::default())?;
+    let mut append = Append::begin(disk, tail, old, lineage, shape)?;
     progress.stage("draping", u64::from(shape.texels[0]) * u64::from(shape.texels[1]));
-    let mut pyramid = Pyramid::new(shape);
+    let length = source.byte_count();
+    if let Err(error) = append_tiles(&mut append, &mosaic, &shape, images[0].path(), progress) {
+        append.give_up(length);
+        return Err(error);
+    }
+    let stored_tiles = append.stored_tiles();
+    progress.stage("writing to disk", 0);
+    let header = append.commit(&mosaic.format(), length)?;
+    Ok(Draped { header, shape, stored_tiles, place: mosaic.place() })
+}
+
+/// Rows of the images through the pyramid, and its tiles behind the file's end.
+fn append_tiles(
+    append: &mut Append<'_>,
+    mosaic: &Mosaic<'_>,
+    shape: &ImageryShape,
+    first: &Path,
+    progress: &dyn BuildProgress,
+) -> Result<(), LayoutError> {
+    let mut pyramid = Pyramid::new(*shape);
     let mut rows = mosaic.rows()?;
     let row_bytes = shape.texels[0] as usize * 4;
     let (mut arriving, mut arrived): (Vec<u8>, Vec<u8>) = (Vec::new(), Vec::new());
@@ -151,15 +162,9 @@ fn append_all(
         }
     }
     if append.stored_tiles() == 0 {
-        return Err(LayoutError::Usage(format!(
-            "{}: the image is transparent throughout",
-            images[0].path().display()
-        )));
+        return Err(LayoutError::Usage(format!("{}: the image is transparent throughout", first.display())));
     }
-    let stored_tiles = append.stored_tiles();
-    progress.stage("writing to disk", 0);
-    let header = append.commit(&mosaic.format(), may_commit)?;
-    Ok(Draped { header, shape, stored_tiles, place: mosaic.place() })
+    Ok(())
 }
 
 #[cfg(test)]

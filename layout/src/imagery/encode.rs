@@ -6,6 +6,7 @@
 
 use super::shape::TileFormat;
 use crate::error::LayoutError;
+use crate::remedy::Remedy;
 use texpresso::{Algorithm, COLOUR_WEIGHTS_UNIFORM, Format, Params};
 
 /// Alpha below which a texel of BC1 is transparent.
@@ -30,8 +31,10 @@ impl TileFormat {
 pub(super) fn check_format(format: TileFormat) -> Result<(), LayoutError> {
     if format == TileFormat::Bc7 && !ispc::IS_HERE {
         return Err(LayoutError::Usage(
-            "this build has no encoder for bc7; take --format bc1 or raw, or build terrasoar with the feature ispc".into(),
-        ));
+            "this build has no encoder for bc7; take bc1 or raw, or build terrasoar with the feature ispc"
+                .into(),
+        )
+        .mended_by(Remedy::TileFormat));
     }
     Ok(())
 }

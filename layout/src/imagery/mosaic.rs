@@ -8,9 +8,14 @@ use super::shape::{ImageryShape, MAX_TEXELS, TileFormat};
 use super::source::{ImageSource, RowReader};
 use crate::error::LayoutError;
 use crate::header::Header;
+use crate::remedy::Remedy;
+use crate::words::{harmless, number};
 
 /// How far off the common grid an image may lie, in texels.
 const GRID_TEXELS: f64 = 0.1;
+
+/// Longest name of a format.
+const MAX_FORMAT_CHARS: usize = 200;
 
 /// Images side by side.
 pub(super) struct Mosaic<'i> {
@@ -32,7 +37,7 @@ impl<'i> Mosaic<'i> {
         extent: Option<Extent>,
     ) -> Result<Self, LayoutError> {
         let Some(first) = images.first() else {
-            return Err(LayoutError::Usage("no image was named; name one with --image".into()));
+            return Err(LayoutError::Usage("no image was named; name one".into()).mended_by(Remedy::Image));
         };
         if images.len() > 1 && extent.is_some() {
             return Err(LayoutError::Usage(
@@ -82,8 +87,8 @@ impl<'i> Mosaic<'i> {
             return Err(LayoutError::Usage(format!(
                 "{}: {} x {} texels are more than {MAX_TEXELS} a side; drape a part, or coarser images",
                 first.path().display(),
-                texels[0],
-                texels[1]
+                number(texels[0]),
+                number(texels[1])
             )));
         }
         let parts = images
@@ -112,15 +117,16 @@ impl<'i> Mosaic<'i> {
 
     /// Format in words.
     pub(super) fn format(&self) -> String {
+        let format = |part: &Part<'_>| harmless(&part.image.info().format, MAX_FORMAT_CHARS);
         match &self.parts[..] {
-            [part] => part.image.info().format.clone(),
-            parts => format!("{} images: {}", parts.len(), parts[0].image.info().format),
+            [part] => format(part),
+            parts => format!("{} images: {}", parts.len(), format(&parts[0])),
         }
     }
 
     /// Memory that reading takes.
     pub(super) fn memory_bytes(&self) -> u64 {
-        self.parts.iter().map(|part| part.image.info().memory_bytes).sum()
+        self.parts.iter().fold(0, |sum: u64, part| sum.saturating_add(part.image.info().memory_bytes))
     }
 
     /// The rows of the picture.

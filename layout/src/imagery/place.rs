@@ -7,6 +7,8 @@ use super::section::is_place;
 use super::source::ImageSource;
 use crate::error::LayoutError;
 use crate::header::Header;
+use crate::remedy::Remedy;
+use crate::words::number;
 
 /// Largest turn and shear, as a share of a texel over the length of the image.
 const STRAIGHT_TEXELS: f64 = 0.25;
@@ -64,9 +66,10 @@ pub(super) fn place(
         (Some(Extent::Crs(_)), _, None) => {
             return Err(LayoutError::Usage(
                 "the terrain does not say where it lies, so an extent in its reference system means nothing; state it in \
-                 metres from the terrain's south-west sample: --extent W,S,E,N"
+                 metres from the terrain's south-west sample: west, south, east, north"
                     .into(),
-            ));
+            )
+            .mended_by(Remedy::Extent));
         }
         (None, Some(pixels), Some(map)) => {
             if let (Some(ours), Some(theirs)) = (header.epsg, georeference.epsg)
@@ -90,20 +93,32 @@ pub(super) fn place(
         return Err(LayoutError::Usage(format!(
             "{}: the image would lie at {west}, {south} m with texels of {} x {} m, which is out of range; check the extent",
             image.path().display(),
-            found.texel_m[0],
-            found.texel_m[1]
+            number(found.texel_m[0]),
+            number(found.texel_m[1]),
+            west = number(west),
+            south = number(south)
         )));
     }
     if west >= whole[2] || south >= whole[3] || east <= 0.0 || north <= 0.0 {
         return Err(LayoutError::Usage(format!(
-            "{}: the image lies from {west:.1}, {south:.1} to {east:.1}, {north:.1} m and the terrain from 0, 0 to {:.1}, {:.1}: they do \
-             not meet; check the reference systems, or state where the image lies with --extent",
+            "{}: the image lies from {}, {} to {}, {} m and the terrain from 0, 0 to {}, {}: they do \
+             not meet; check the reference systems, or state where the image lies",
             image.path().display(),
-            whole[2],
-            whole[3]
-        )));
+            tenths(west),
+            tenths(south),
+            tenths(east),
+            tenths(north),
+            tenths(whole[2]),
+            tenths(whole[3])
+        ))
+        .mended_by(Remedy::Extent));
     }
     Ok(found)
+}
+
+/// Metres to a tenth.
+fn tenths(metres: f64) -> String {
+    number((10.0 * metres).round() / 10.0)
 }
 
 fn over([west, south, east, north]: [f64; 4], texels: [f64; 2], origin: PlaceOrigin) -> Place {
@@ -128,9 +143,10 @@ fn referenced(
         LayoutError::unsupported(
             image.path(),
             format!(
-                "{what}; turn it north-up into the terrain's reference system with gdalwarp, or state where it lies with --extent"
+                "{what}; turn it north-up into the terrain's reference system with gdalwarp, or state where it lies"
             ),
         )
+        .mended_by(Remedy::Extent)
     };
     // Metres of a step in the reference system.
     let step = |x: f64, y: f64| {

@@ -6,8 +6,10 @@
 use super::section::{Section, TILE_ENTRY_BYTES, TileEntry, damaged};
 use super::shape::{ImageryShape, TILE_TEXELS, TileFormat, TileId};
 use crate::bytes::{PAGE_BYTES, checksum, to_usize};
+use crate::directory::PageUses;
 use crate::error::LayoutError;
 use crate::header::ImageryPlace;
+use crate::source::Source;
 use crate::terrain::Terrain;
 
 /// The imagery section of a terrain file.
@@ -50,6 +52,7 @@ impl Imagery {
                 return Err(damaged(path, place, "the tile has another length or lies outside the file"));
             }
         }
+        check_uses(source, place, &section, &entries, file_bytes)?;
         let present = entries.iter().filter(|entry| entry.is_present());
         let (tiles, bytes) = present.fold((0, 0), |(n, sum), entry| (n + 1, sum + u64::from(entry.bytes)));
         if (tiles, bytes) != (section.stored_tiles, section.tile_bytes) {
@@ -159,6 +162,16 @@ impl Imagery {
         self.section.shape.ids().zip(pairs).filter(|(_, (a, b))| a != b).map(|(id, _)| id).collect()
     }
 
+    /// First page, length in bytes and checksum of a tile that is stored.
+    pub(crate) fn stored_place(&self, id: TileId) -> Option<(u32, u32, u32)> {
+        self.entry(id).map(|entry| (entry.page, entry.bytes, entry.checksum))
+    }
+
+    /// Bytes of the directory of tiles.
+    pub(crate) fn directory_bytes(&self) -> u64 {
+        self.section.directory_bytes()
+    }
+
     /// First page of a tile in the file.
     pub(crate) fn first_page(&self, id: TileId) -> Option<u64> {
         self.entry(id).map(|entry| entry.page.into())
@@ -180,6 +193,29 @@ impl Imagery {
         let index = self.section.shape.index(id)?;
         self.entries.get(index as usize).copied().filter(|entry| entry.is_present())
     }
+}
+
+/// No page has two uses in one section: a small file would stand for a large picture.
+pub(super) fn check_uses(
+    source: &dyn Source,
+    place: ImageryPlace,
+    section: &Section,
+    entries: &[TileEntry],
+    file_bytes: u64,
+) -> Result<(), LayoutError> {
+    let page = PAGE_BYTES as u64;
+    let damaged = |place: String| move |problem: String| damaged(source.path(), place, &problem);
+    let mut uses = PageUses::new(source, file_bytes)?;
+    uses.take(place.offset / page, 1).map_err(damaged("imagery header".into()))?;
+    uses.take(section.directory_page.into(), section.directory_bytes().div_ceil(page))
+        .map_err(damaged("imagery directory".into()))?;
+    for (id, entry) in section.shape.ids().zip(entries).filter(|(_, entry)| entry.is_present()) {
+        let problem = uses.take(entry.page.into(), u64::from(entry.bytes).div_ceil(page)).err();
+        if let Some(problem) = problem {
+            return Err(damaged(format!("imagery directory entry of {}", tile_name(id)))(problem));
+        }
+    }
+    Ok(())
 }
 
 /// Name of a tile in messages.

@@ -22,13 +22,14 @@
 //! half a spacing inside, as GDAL reads and writes BT (VTP's own programs divide by samples - 1; a
 //! file of 1025 columns then differs by 0.1 %). A void is -32768 in every sample type. The `.prj`
 //! file beside a BT is not read; the header's zone and datum stand. The grid is read in blocks of 64
-//! columns and transposed; blocks in parallel, 2 MiB of samples a worker.
+//! columns and transposed; blocks in parallel, half a mebibyte of samples a worker.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::WINDOW_SAMPLES;
+use super::input;
 use super::parallel::each_task;
 use crate::dem::{DemInfo, DemSource, Georeference, HorizontalUnit, SampleSink, SampleType, Window};
 use crate::error::LayoutError;
@@ -51,7 +52,7 @@ impl BtDem {
     /// Reads and checks the header.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
         let cannot_read = |source| LayoutError::io(path, "cannot read the BT file", source);
-        let mut file = File::open(path).map_err(cannot_read)?;
+        let mut file = input::open(path, "cannot read the BT file")?;
         let file_bytes = file.metadata().map_err(cannot_read)?.len();
         let mut header = [0; HEADER_BYTES as usize];
         if file_bytes < HEADER_BYTES {
@@ -80,11 +81,7 @@ impl DemSource for BtDem {
         let (wide, high) = (self.info.samples_wide, self.info.samples_high);
         let blocks_down = u64::from(high.div_ceil(BLOCK_ROWS));
         let blocks = u64::from(wide.div_ceil(BLOCK_COLUMNS)) * blocks_down;
-        let open = || {
-            let file = File::open(&self.path);
-            file.map(|file| (file, Vec::new(), Vec::new()))
-                .map_err(|source| LayoutError::io(&self.path, "cannot open the BT file", source))
-        };
+        let open = || Ok((input::open(&self.path, "cannot open the BT file")?, Vec::new(), Vec::new()));
         each_task(blocks, usize::MAX, open, |(file, bytes, samples), block| {
             // Both products stay below the grid's sides, which are 31-bit.
             let col = (block / blocks_down) as u32 * BLOCK_COLUMNS;

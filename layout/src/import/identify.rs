@@ -3,11 +3,10 @@
 //! A table of signatures, of the formats read here and of the strangers people most often offer
 //! instead, so that a refusal can say what the file is and how to convert it. Cost: one read of 512 bytes.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::hgt;
+use super::{hgt, input};
 use crate::error::LayoutError;
 
 /// What `open` accepts, for messages.
@@ -44,12 +43,13 @@ pub(super) fn identify(path: &Path) -> Result<Format, LayoutError> {
             "this is a directory; name the elevation file in it, or for .hgt tiles all of them: DIRECTORY/*.hgt",
         ));
     }
-    if metadata.len() == 0 {
+    if metadata.is_file() && metadata.len() == 0 {
         return Err(LayoutError::not_this_format(path, "the file is empty; fetch or write it again"));
     }
     let mut head = Vec::with_capacity(512);
-    File::open(path)
-        .and_then(|file| file.take(512).read_to_end(&mut head))
+    input::open(path, "cannot open the elevation file")?
+        .take(512)
+        .read_to_end(&mut head)
         .map_err(|source| LayoutError::io(path, "cannot read the elevation file", source))?;
 
     if head.starts_with(b"\x89PNG\r\n\x1a\n") {

@@ -10,6 +10,8 @@ mod geotiff;
 mod guard;
 mod hgt;
 mod identify;
+pub(crate) mod input;
+pub(crate) mod jpeg_frame;
 mod parallel;
 mod png;
 pub(crate) mod png_stream;
@@ -22,11 +24,12 @@ use identify::Format;
 
 pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
+pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 
-/// Samples handed to a sink in one window, at most: 2 MiB of `f64`.
-const WINDOW_SAMPLES: u64 = 1 << 18;
+/// Samples handed to a sink in one window, at most, unless a row has more: half a mebibyte of `f64`.
+const WINDOW_SAMPLES: u64 = 1 << 16;
 
 /// Opens the elevation data in `paths`: one file, or several `.hgt` tiles as one mosaic.
 ///

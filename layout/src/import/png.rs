@@ -11,7 +11,7 @@ use ::png::{BitDepth, ColorType, Transformations};
 
 use super::WINDOW_SAMPLES;
 use super::guard::guard;
-use super::png_stream::{self, PngRows, decoding_error};
+use super::png_stream::{self, PngRows, Texts, decoding_error};
 use crate::dem::{DemInfo, DemSource, Georeference, HorizontalUnit, SampleSink, SampleType, Window};
 use crate::error::LayoutError;
 
@@ -31,7 +31,7 @@ pub(super) struct PngDem {
 impl PngDem {
     /// Reads the header and the text chunks before the image data.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
-        let reader = png_stream::open(path, Transformations::IDENTITY)?;
+        let reader = png_stream::open(path, Transformations::IDENTITY, Texts::Kept)?;
         let header = reader.info();
         let sample_type = match (header.color_type, header.bit_depth) {
             (ColorType::Grayscale, BitDepth::Sixteen) => SampleType::U16,
@@ -100,7 +100,7 @@ impl DemSource for PngDem {
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        let mut reader = png_stream::open(&self.path, Transformations::IDENTITY)?;
+        let mut reader = png_stream::open(&self.path, Transformations::IDENTITY, Texts::PassedOver)?;
         let width = u64::from(self.info.samples_wide);
         let header = reader.info();
         if (header.width, header.height) != (self.info.samples_wide, self.info.samples_high) {

@@ -39,6 +39,10 @@ impl Source for LayeredSource {
         self.split + self.overlay.byte_count()
     }
 
+    fn own_start(&self) -> u64 {
+        self.split
+    }
+
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
         if offset >= self.split {
             return self.overlay.read_at(offset - self.split, buffer);

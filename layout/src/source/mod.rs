@@ -57,6 +57,11 @@ pub trait Source: Send + Sync {
     /// Length in bytes when it was opened.
     fn byte_count(&self) -> u64;
 
+    /// Offset at which the header slots lie: 0, or where an overlay begins behind its base.
+    fn own_start(&self) -> u64 {
+        0
+    }
+
     /// Fills `buffer` with the bytes at `offset`.
     ///
     /// # Errors

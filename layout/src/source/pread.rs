@@ -1,7 +1,7 @@
 //! The terrain file read by positioned reads: no map, hence no SIGBUS when someone truncates the file.
 
 use super::Source;
-use crate::atomic_file::read_at;
+use crate::disk::read_at;
 use crate::error::LayoutError;
 use std::fs::File;
 use std::io::ErrorKind;
@@ -21,7 +21,8 @@ impl PreadSource {
     /// # Errors
     /// [`LayoutError::Io`] if it cannot be opened or someone is writing to it; [`LayoutError::NotThisFormat`] for what is not a regular file.
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
-        let file = File::open(path).map_err(|e| LayoutError::io(path, "cannot open the file", e))?;
+        let file =
+            open_without_waiting(path).map_err(|e| LayoutError::io(path, "cannot open the file", e))?;
         Self::over(path, file)
     }
 
@@ -51,10 +52,27 @@ impl PreadSource {
         &self.file
     }
 
-    /// Whether the file is longer now than when it was opened.
-    pub(crate) fn has_grown(&self) -> bool {
-        self.file.metadata().is_ok_and(|meta| meta.len() > self.byte_count)
+    /// Takes the file's length as it is now for that when it was opened.
+    pub(crate) fn measure_again(&mut self) -> Result<(), LayoutError> {
+        let meta = self
+            .file
+            .metadata()
+            .map_err(|e| LayoutError::io(&self.path, "cannot ask for the file's length", e))?;
+        self.byte_count = meta.len();
+        Ok(())
     }
+}
+
+/// Opens what may be a FIFO, too, whose other end nobody has: it is told apart by what it is, once it is open.
+fn open_without_waiting(path: &Path) -> std::io::Result<File> {
+    let mut options = File::options();
+    options.read(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        options.custom_flags(rustix::fs::OFlags::NONBLOCK.bits() as i32);
+    }
+    options.open(path)
 }
 
 impl Source for PreadSource {

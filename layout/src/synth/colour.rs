@@ -7,9 +7,9 @@
 
 use super::noise::{fractal, hash, signed_unit, smoothstep};
 use super::tiff_header;
-use crate::atomic_file::AtomicFile;
 use crate::disk::write_at;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
 use crate::grid::GridPoint;
 use crate::terrain::Terrain;
 use crate::with_records;
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// Texels a side of the tiles written.
-const TILE: u32 = 512;
+pub(super) const TILE: u32 = 512;
 /// Most texels a side.
 const MAX_TEXELS: u64 = 1 << 22;
 

@@ -1,29 +1,33 @@
-//! The file being written: GeoTIFF or PNG, row after row, under a temporary name until it is complete.
+//! The file being written: GeoTIFF or PNG, row after row, without a name until it is complete.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, StreamWriter};
-use tempfile::{Builder, NamedTempFile};
 
 use super::{HEIGHT_SCALE, tiff_header};
+use crate::atomic_file::AtomicFile;
 use crate::error::LayoutError;
 use crate::import::{PNG_HEIGHT_SCALE_KEY, PNG_SPACING_KEY};
+
+/// The words of a PNG, in their order.
+pub(super) const PNG_KEYS: [&str; 2] = [PNG_SPACING_KEY, PNG_HEIGHT_SCALE_KEY];
 
 const CANNOT_WRITE: &str = "cannot write the terrain";
 
 /// A file that takes rows of heights.
 pub(super) struct Output {
-    out: PathBuf,
-    temporary: NamedTempFile,
+    file: AtomicFile,
+    failure: Failure,
     encoder: Encoding,
     bytes: Vec<u8>,
 }
 
 enum Encoding {
-    Tiff(BufWriter<File>),
-    Png(Box<StreamWriter<'static, BufWriter<File>>>),
+    Tiff(BufWriter<Watched>),
+    Png(Box<StreamWriter<'static, BufWriter<Watched>>>),
 }
 
 impl Output {
@@ -41,18 +45,19 @@ impl Output {
             }
         };
         let failed = |source| LayoutError::io(out, CANNOT_WRITE, source);
-        let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let temporary =
-            builder().prefix(".terrasoar-").suffix(".part").tempfile_in(folder).map_err(failed)?;
-        let mut file = BufWriter::with_capacity(1 << 18, temporary.reopen().map_err(failed)?);
+        let atomic = AtomicFile::create(out)?;
+        let failure = Failure::default();
+        let watched =
+            Watched { file: atomic.file().try_clone().map_err(failed)?, failure: Arc::clone(&failure) };
+        let mut file = BufWriter::with_capacity(1 << 18, watched);
         let encoder = if png {
             let mut encoder = Encoder::new(file, size, size);
             encoder.set_color(ColorType::Grayscale);
             encoder.set_depth(BitDepth::Sixteen);
             encoder.set_compression(Compression::Fast);
             let writer = encoder
-                .add_text_chunk(PNG_SPACING_KEY.into(), spacing_m.to_string())
-                .and_then(|()| encoder.add_text_chunk(PNG_HEIGHT_SCALE_KEY.into(), HEIGHT_SCALE.to_string()))
+                .add_text_chunk(PNG_KEYS[0].into(), spacing_m.to_string())
+                .and_then(|()| encoder.add_text_chunk(PNG_KEYS[1].into(), HEIGHT_SCALE.to_string()))
                 .and_then(|()| encoder.write_header())
                 .and_then(|writer| writer.into_stream_writer_with_size(1 << 18));
             Encoding::Png(Box::new(writer.map_err(|error| failed(png_error(error)))?))
@@ -60,7 +65,7 @@ impl Output {
             file.write_all(&tiff_header::header(size, spacing_m)).map_err(failed)?;
             Encoding::Tiff(file)
         };
-        Ok(Self { out: out.to_owned(), temporary, encoder, bytes: Vec::new() })
+        Ok(Self { file: atomic, failure, encoder, bytes: Vec::new() })
     }
 
     /// Appends whole rows.
@@ -76,18 +81,56 @@ impl Output {
                 writer.write_all(&self.bytes)
             }
         };
-        written.map_err(|source| LayoutError::io(&self.out, CANNOT_WRITE, source))
+        written.map_err(|source| LayoutError::io(self.file.target(), CANNOT_WRITE, source))
     }
 
     /// Flushes everything to disk and gives the file its name.
     pub(super) fn finish(self) -> Result<(), LayoutError> {
-        let failed = |source| LayoutError::io(&self.out, CANNOT_WRITE, source);
+        let failed = |source| LayoutError::io(self.file.target(), CANNOT_WRITE, source);
         match self.encoder {
             Encoding::Tiff(mut file) => file.flush().map_err(failed)?,
             Encoding::Png(writer) => writer.finish().map_err(|error| failed(png_error(error)))?,
         }
-        self.temporary.as_file().sync_all().map_err(failed)?;
-        self.temporary.persist(&self.out).map(drop).map_err(|error| failed(error.error))
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take();
+        match failure {
+            Some(source) => Err(failed(source)),
+            None => self.file.publish(),
+        }
+    }
+}
+
+/// The first failure of a [`Watched`] file.
+type Failure = Arc<Mutex<Option<io::Error>>>;
+
+/// A file that remembers its first failure: the PNG encoder writes its last chunks while it is dropped, and has nobody to tell then.
+struct Watched {
+    file: File,
+    failure: Failure,
+}
+
+impl Watched {
+    fn heard<T>(&self, done: io::Result<T>) -> io::Result<T> {
+        if let Err(error) = &done {
+            let copy = error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error);
+            self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(copy);
+        }
+        done
+    }
+}
+
+impl Write for Watched {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let done = self.file.write(bytes);
+        // An interrupted call is made again.
+        if done.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::Interrupted) {
+            return done;
+        }
+        self.heard(done)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let done = self.file.flush();
+        self.heard(done)
     }
 }
 
@@ -96,16 +139,4 @@ fn png_error(error: EncodingError) -> std::io::Error {
         EncodingError::IoError(source) => source,
         other => std::io::Error::other(other),
     }
-}
-
-/// Temporary files are private by default; this one becomes an ordinary file.
-fn builder<'a, 'b>() -> Builder<'a, 'b> {
-    #[cfg_attr(not(unix), expect(unused_mut, reason = "permissions are set on Unix only"))]
-    let mut builder = Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder
 }

@@ -13,6 +13,11 @@ const DOUBLE: u16 = 12;
 const ASCII: u16 = 2;
 const LONG8: u16 = 16;
 
+/// What heights call their reference system.
+const CITATION: &str = "Terrasoar synthetic terrain, local metres|";
+/// What pictures call theirs.
+const COLOUR_CITATION: &str = "Terrasoar synthetic colour|";
+
 /// Bytes of a strip, about.
 const STRIP_BYTES: u64 = 1 << 17;
 /// Largest classic TIFF, with room for the header.
@@ -41,7 +46,6 @@ pub(super) fn header(size: u32, spacing_m: f64) -> Vec<u8> {
     tags.reals(33550, &[spacing_m, spacing_m, 0.0]);
     // The first sample is the north-west corner, `PixelIsPoint`; the south-west one is the origin.
     tags.reals(33922, &[0.0, 0.0, 0.0, 0.0, f64::from(size - 1) * spacing_m, 0.0]);
-    let citation = "Terrasoar synthetic terrain, local metres|";
     tags.numbers(
         34735,
         SHORT,
@@ -49,13 +53,13 @@ pub(super) fn header(size: u32, spacing_m: f64) -> Vec<u8> {
             [1, 1, 0, 5],
             [1024, 0, 1, 1],
             [1025, 0, 1, 2],
-            [1026, 34737, citation.len() as u64, 0],
+            [1026, 34737, CITATION.len() as u64, 0],
             [3072, 0, 1, 32767],
             [3076, 0, 1, 9001],
         ]
         .concat(),
     );
-    tags.text(34737, citation);
+    tags.text(34737, CITATION);
     tags.text(
         42112,
         &format!(
@@ -71,6 +75,38 @@ pub(super) fn header(size: u32, spacing_m: f64) -> Vec<u8> {
 /// The bytes before the first tile of an RGB picture of `texels` (east, north) in tiles of `side` texels: it covers the terrain of `terrain`, `fine`
 /// texels a sample, in the terrain's reference system, or in metres from its south-west sample.
 pub(super) fn colour_header(texels: [u32; 2], side: u32, terrain: &Header, fine: u32) -> Vec<u8> {
+    let [dx, dy] = terrain.grid.spacing_m();
+    let samples = terrain.sample_to_crs.unwrap_or([0.0, dx, 0.0, 0.0, 0.0, dy]);
+    // A texel east is a share of a sample east; a row south one of a sample south, from the north-west sample.
+    let north = f64::from(terrain.grid.samples()[1] - 1);
+    let [x, xe, xn, y, ye, yn] = samples;
+    let share = 1.0 / f64::from(fine);
+    let [east, south] = [[xe * share, ye * share], [-xn * share, -yn * share]];
+    let corner = [x + xn * north, y + yn * north];
+    let place = [
+        [east[0], south[0], 0.0, corner[0]],
+        [east[1], south[1], 0.0, corner[1]],
+        [0.0; 4],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    let degrees = terrain.crs_unit == HorizontalUnit::Degree;
+    let code = u64::from(terrain.epsg.filter(|code| *code <= 65535).unwrap_or(32767));
+    let unit = match terrain.crs_unit {
+        HorizontalUnit::Degree => [2054, 0, 1, 9102],
+        HorizontalUnit::Foot => [3076, 0, 1, 9002],
+        HorizontalUnit::UsSurveyFoot => [3076, 0, 1, 9003],
+        HorizontalUnit::Unknown | HorizontalUnit::Metre => [3076, 0, 1, 9001],
+    };
+    let [model, system] = if degrees { [2, 2048] } else { [1, 3072] };
+    let mut keys = vec![[1024, 0, 1, model], [1025, 0, 1, 1], [1026, 34737, COLOUR_CITATION.len() as u64, 0]];
+    keys.extend([[system, 0, 1, code], unit]);
+    keys.sort_unstable();
+    keys.insert(0, [1, 1, 0, keys.len() as u64]);
+    placed_colour_header(texels, side, &place.concat(), &keys.concat())
+}
+
+/// As [`colour_header`], of a picture that lies where these 16 numbers of a transformation and these keys of a reference system say.
+pub(super) fn placed_colour_header(texels: [u32; 2], side: u32, place: &[f64], keys: &[u64]) -> Vec<u8> {
     let tiles = texels.map(|texels| u64::from(texels.div_ceil(side)));
     let sizes = vec![u64::from(side).pow(2) * 3; (tiles[0] * tiles[1]) as usize];
     let big = sizes.iter().sum::<u64>() > CLASSIC_BYTES;
@@ -87,40 +123,9 @@ pub(super) fn colour_header(texels: [u32; 2], side: u32, terrain: &Header, fine:
     tags.numbers(323, LONG, &[u64::from(side)]);
     tags.numbers(325, if big { LONG8 } else { LONG }, &sizes);
     tags.numbers(339, SHORT, &[1, 1, 1]);
-    let [dx, dy] = terrain.grid.spacing_m();
-    let samples = terrain.sample_to_crs.unwrap_or([0.0, dx, 0.0, 0.0, 0.0, dy]);
-    // A texel east is a share of a sample east; a row south one of a sample south, from the north-west sample.
-    let north = f64::from(terrain.grid.samples()[1] - 1);
-    let [x, xe, xn, y, ye, yn] = samples;
-    let share = 1.0 / f64::from(fine);
-    let [east, south] = [[xe * share, ye * share], [-xn * share, -yn * share]];
-    let corner = [x + xn * north, y + yn * north];
-    tags.reals(
-        34264,
-        &[
-            [east[0], south[0], 0.0, corner[0]],
-            [east[1], south[1], 0.0, corner[1]],
-            [0.0; 4],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-        .concat(),
-    );
-    let degrees = terrain.crs_unit == HorizontalUnit::Degree;
-    let code = u64::from(terrain.epsg.filter(|code| *code <= 65535).unwrap_or(32767));
-    let unit = match terrain.crs_unit {
-        HorizontalUnit::Degree => [2054, 0, 1, 9102],
-        HorizontalUnit::Foot => [3076, 0, 1, 9002],
-        HorizontalUnit::UsSurveyFoot => [3076, 0, 1, 9003],
-        HorizontalUnit::Unknown | HorizontalUnit::Metre => [3076, 0, 1, 9001],
-    };
-    let citation = "Terrasoar synthetic colour|";
-    let [model, system] = if degrees { [2, 2048] } else { [1, 3072] };
-    let mut keys = vec![[1024, 0, 1, model], [1025, 0, 1, 1], [1026, 34737, citation.len() as u64, 0]];
-    keys.extend([[system, 0, 1, code], unit]);
-    keys.sort_unstable();
-    keys.insert(0, [1, 1, 0, keys.len() as u64]);
-    tags.numbers(34735, SHORT, &keys.concat());
-    tags.text(34737, citation);
+    tags.reals(34264, place);
+    tags.numbers(34735, SHORT, keys);
+    tags.text(34737, COLOUR_CITATION);
     tags.places(324, &sizes);
     tags.bytes()
 }

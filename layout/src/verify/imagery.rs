@@ -1,4 +1,4 @@
-//! The imagery: header and directory as opening checks them, every tile against its checksum, and no page used twice.
+//! The imagery: header and directory as opening checks them, every tile against its checksum, and no page that is a record page as well.
 //!
 //! Cost: every tile is read once, in parallel; a tile a thread is held.
 
@@ -37,7 +37,7 @@ pub(super) fn check(
         }
         Err(other) => return Err(other),
     };
-    let places = check_places(&imagery, &mut findings);
+    let places = places_of(&imagery);
     // Painted tiles lie between the pages of edits.
     for (page, entry) in terrain.entries().iter().enumerate().filter(|(_, entry)| entry.is_present()) {
         let number = u64::from(entry.page);
@@ -67,22 +67,13 @@ pub(super) fn check(
     Ok((ids.len() as u64, findings))
 }
 
-/// No two tiles share a page. Returns first page, pages and name of each tile, in the order of the file.
-fn check_places(imagery: &Imagery, findings: &mut Findings) -> Vec<(u64, u64, TileId)> {
+/// First page, pages and name of each tile, in the order of the file. Opening has checked that no two share a page.
+fn places_of(imagery: &Imagery) -> Vec<(u64, u64, TileId)> {
     let mut places: Vec<(u64, u64, TileId)> = imagery
         .shape()
         .ids()
         .filter_map(|id| imagery.first_page(id).map(|page| (page, imagery.stored_pages(id), id)))
         .collect();
     places.sort_unstable();
-    for pair in places.windows(2) {
-        let [(page, pages, id), (next, ..)] = [pair[0], pair[1]];
-        if page + pages > next {
-            findings.add(
-                format!("imagery {}", crate::imagery::tile_name(id)),
-                format!("file page {next} is also that of another tile"),
-            );
-        }
-    }
     places
 }

@@ -1,7 +1,8 @@
 //! `terrasoar compact`: a file without what edits left behind.
 
 use crate::cli::WrongUsage;
-use crate::cli::output::{check_output, grouped, print, print_json};
+use crate::cli::output::{grouped, print, print_json};
+use crate::cli::outputs::{Force, Kind};
 use crate::cli::progress::Progress;
 use crate::cli::terrain::TerrainArgs;
 use anyhow::Result;
@@ -9,11 +10,11 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use terrasoar_layout::disk::SystemDisk;
-use terrasoar_layout::edit::compact;
+use terrasoar_layout::edit::{Compacted, compact};
 
 /// Write a terrain file anew without what edits left behind.
 ///
-/// The ground and the imagery stay as they are, pages come in order again, and the history ends: what was edited can no longer be undone or redone. Without -o the file itself
+/// The ground and the imagery stay as they are, pages come in order again, and the history ends: what was edited can no longer be undone or redone, and it says so. Without -o the file itself
 /// is replaced, when the new one is complete; programs that have it open go on reading the old one. With --overlay, -o is the terrain with those edits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -29,6 +30,8 @@ pub(crate) struct Args {
     /// File to write instead of replacing the terrain file
     #[arg(short, long, value_name = "OUT.iqt")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -48,7 +51,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let start = Instant::now();
     let out = match (&args.output, &args.terrain.overlay) {
         (Some(out), _) => {
-            check_output(out, &args.terrain.inputs(&[]))?;
+            args.force.file(out, Kind::Terrain, &args.terrain.inputs(&[]))?;
             out
         }
         (None, None) => &args.terrain.file,
@@ -60,13 +63,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             .into());
         }
     };
-    let terrain = args.terrain.open_unmapped()?;
-    let bytes_before = terrain.source().byte_count();
     let progress = Progress::new("records");
-    let header = compact(&SystemDisk, &terrain, out, &progress)?;
+    let TerrainArgs { file, overlay } = &args.terrain;
+    let Compacted { header, bytes_before, commits_before, .. } =
+        compact(&SystemDisk, file, overlay.as_deref(), out, &progress)?;
     drop(progress);
     let answer = Answer {
-        file: terrain.path().display().to_string(),
+        file: overlay.as_ref().unwrap_or(file).display().to_string(),
         output: out.display().to_string(),
         bytes_before,
         bytes_after: header.file_bytes,
@@ -76,8 +79,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.json {
         return print_json(&answer);
     }
+    let ended = match commits_before {
+        commits if commits == 0 || args.output.is_some() => String::new(),
+        1 => "; the history ends: 1 commit of edits can no longer be undone".into(),
+        commits => {
+            format!("; the history ends: {} commits of edits can no longer be undone", grouped(commits))
+        }
+    };
     print(&format!(
-        "{}: {} bytes instead of {}, {} record pages, {:.1} s",
+        "{}: {} bytes instead of {}, {} record pages, {:.1} s{ended}",
         answer.output,
         grouped(answer.bytes_after),
         grouped(answer.bytes_before),

@@ -2,12 +2,14 @@
 
 use super::work::Target;
 use super::{HowArgs, TargetArgs, apply};
-use crate::cli::output::{check_stream, complain, decimal, grouped, print};
+use crate::cli::output::{complain, decimal, grouped, print};
+use crate::cli::outputs::{Force, Kind};
 use crate::cli::{WrongUsage, parse};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 use terrasoar::edits::rain::Rain;
 use terrasoar::edits::{Batch, MAX_EDITS, Script};
+use terrasoar::sink::is_stream;
 use terrasoar_layout::edit::{Crater, Edit};
 use terrasoar_layout::terrain::Terrain;
 
@@ -54,6 +56,8 @@ pub(crate) struct Args {
     #[arg(short, long, value_name = "E.edits", conflicts_with_all = ["dry_run", "json", "overlay"])]
     output: Option<PathBuf>,
     #[command(flatten)]
+    force: Force,
+    #[command(flatten)]
     how: HowArgs,
 }
 
@@ -71,7 +75,7 @@ struct What {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     if let Some(out) = &args.output {
-        check_stream(out, &[&args.target.file])?;
+        args.force.stream(out, Kind::Craters, &[&args.target.file])?;
     }
     let script = args.script()?;
     let Some(out) = &args.output else {
@@ -87,11 +91,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         if script.batches.len() == 1 { "" } else { "es" }
     );
     // A script piped on to another program stays alone in the pipe.
-    if std::fs::symlink_metadata(out).is_ok_and(|meta| meta.is_file()) {
-        return print(&told);
+    if is_stream(out) {
+        complain(&told);
+        return Ok(());
     }
-    complain(&told);
-    Ok(())
+    print(&told)
 }
 
 impl Args {

@@ -4,7 +4,8 @@ mod measure;
 mod table;
 
 use super::cap::{self, Asked, Standing};
-use super::output::{check_stream, print, print_json};
+use super::output::{print, print_json};
+use super::outputs::{Force, Kind};
 use super::progress::Progress;
 use super::replay::QualityArgs;
 use super::{WrongUsage, parse};
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
 use terrasoar::iobench::{IoBench, IoRun, LayoutKind, Prefetch, ReadBy, Reader, Run, Timed, kernel};
-use terrasoar::report::{IoReport, write_io_frames_csv};
+use terrasoar::report::{IoReport, ReportFile, write_io_frames_csv};
 use terrasoar::view::View;
 use terrasoar_layout::bytes::PAGE_BYTES;
 
@@ -55,7 +56,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "N", default_value = "128", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
     disk_pages: u64,
     /// Pace of flights over the pool, in frames a second; 0 for as fast as frames are made
-    #[arg(long, value_name = "N", default_value = "60", value_parser = parse::not_negative)]
+    #[arg(long, value_name = "N", default_value = "60", value_parser = parse::pace)]
     fps: f64,
     /// What reads pages into the pool: threads, or one with an io_uring
     #[arg(long, value_name = "HOW", default_value = ReadBy::default().name(), value_parser = read_by())]
@@ -80,6 +81,8 @@ pub(in crate::cli) struct Args {
     /// Folder for a report with tables and plots, made if missing
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -136,14 +139,14 @@ impl Args {
         {
             bail!("{}: --scratch needs a folder that is there", folder.display());
         }
-        if let Some(folder) = &self.output
-            && folder.exists()
-            && !folder.is_dir()
-        {
-            bail!("{}: the report needs a folder and this is a file; name another", folder.display());
+        let inputs = [self.file.as_path(), self.flight.as_path()];
+        if let Some(folder) = &self.output {
+            let files: Vec<_> =
+                IoReport::files().into_iter().map(|(name, file)| (name, Kind::Report(file))).collect();
+            self.force.folder(folder, &files, &inputs)?;
         }
         if let Some(csv) = &self.frames {
-            check_stream(csv, &[&self.file, &self.flight])?;
+            self.force.stream(csv, Kind::Report(ReportFile::IoFrames), &inputs)?;
         }
         Ok(())
     }

@@ -3,27 +3,29 @@
 //! [`EditSession::apply`] changes the ground at once, in memory; [`EditSession::commit`] makes all since the last one durable, as one batch. Undoing and redoing are commits of
 //! their own: a header that leads to a state that is in the file already. One session at a time has a file; readers need not stop.
 
+mod checked_state;
 mod past;
 
 pub use past::{HistoryEntry, history};
 
-use super::commit::{Attempted, CommitJob, Content, Directory, Place};
-use super::overlay::{empty_overlay, overlay_slots};
+use super::commit::{CommitJob, Content};
+use super::overlay::{create_overlay, overlay_slots};
 use super::picture::Picture;
 use super::{Changes, Edit, Editor, HeightWindow};
 use crate::bytes::PAGE_BYTES;
 use crate::directory::Entry;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
-use crate::header::{Header, History, ImageryPlace};
-use crate::journal::{Commit, State};
-use crate::lock::WriteLock;
-use crate::opening::{read_directory, read_root, read_structure};
-use crate::slots::Slots;
+use crate::file::directory::Directory;
+use crate::file::journal::{Lineage, State};
+use crate::file::lock::WriteLock;
+use crate::file::slots::Slots;
+use crate::file::tail::{Attempt, Attempted, Tail};
+use crate::header::{Header, ImageryPlace};
+use crate::opening::{read_directory, read_growing, read_root, read_structure};
+use crate::remedy::Remedy;
 use crate::source::{LayeredSource, PreadSource, Source};
 use crate::terrain::Terrain;
-use std::collections::BTreeSet;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -34,8 +36,35 @@ pub struct Committed {
     pub pages: u64,
     /// Bytes by which the file grew.
     pub bytes: u64,
-    /// The logical pages written, ascending, and where each lies now.
+    /// Each logical page that was written, and its entry in the directory now, ascending: where whoever reads the file finds it.
     pub places: Vec<(u64, Entry)>,
+}
+
+/// What a session is at.
+#[derive(Debug)]
+enum Phase {
+    /// Nothing is under way. What was applied since the last commit, this many edits, is in memory alone.
+    Idle {
+        /// Edits that the next commit will count.
+        edits: u64,
+    },
+    /// A commit was handed out to be written.
+    Committing {
+        /// Edits in it.
+        taken: u64,
+        /// Edits since.
+        edits: u64,
+        /// How far its header came. The job has the other clone: if that is gone without a word, the commit has failed.
+        attempt: Arc<Attempt>,
+    },
+}
+
+impl Phase {
+    fn edits_mut(&mut self) -> &mut u64 {
+        match self {
+            Self::Idle { edits } | Self::Committing { edits, .. } => edits,
+        }
+    }
 }
 
 /// The right to edit a terrain file, or an overlay of one, and its edits so far.
@@ -44,20 +73,16 @@ pub struct EditSession {
     editor: Editor,
     picture: Picture,
     path: PathBuf,
-    file: File,
+    /// The right to write, and the file.
+    lock: WriteLock,
     /// Offset of the file's first byte.
     start: u64,
     slots: Slots,
     directory: Directory,
     original: State,
-    /// Pages whose edits a commit took that has not succeeded.
-    unwritten: BTreeSet<u64>,
     attempted: Attempted,
-    edits: u64,
-    has_original: bool,
-    is_committing: bool,
+    phase: Phase,
     disk: Arc<dyn Disk + Send>,
-    _lock: WriteLock,
 }
 
 impl EditSession {
@@ -74,13 +99,12 @@ impl EditSession {
     /// # Errors
     /// As [`EditSession::open`].
     pub fn open_on(disk: Arc<dyn Disk + Send>, path: &Path) -> Result<Self, LayoutError> {
-        let lock = WriteLock::take(path)?;
-        let file = open_for_writing(path)?;
-        let source = Box::new(over(path, &file)?);
+        let lock = take_lock(path)?;
+        let source = Box::new(over(path, &lock)?);
         let (header, entries) = read_structure(&*source)?;
         let slots = Slots::read(&*source, 0)?;
         let terrain = Terrain::of(source, header, entries);
-        Self::new(disk, terrain, path, file, 0, slots, lock)
+        Self::new(disk, terrain, path, 0, slots, lock)
     }
 
     /// Opens the terrain file `base`, which is not written to, with edits in the file `overlay`, which is made if it does not exist.
@@ -91,7 +115,7 @@ impl EditSession {
         Self::open_overlay_on(Arc::new(SystemDisk), base, overlay)
     }
 
-    /// As [`EditSession::open_overlay`], with all writing but the overlay's beginning done by `disk`.
+    /// As [`EditSession::open_overlay`], with all writing done by `disk`.
     ///
     /// # Errors
     /// As [`EditSession::open_overlay`].
@@ -100,35 +124,25 @@ impl EditSession {
         base: &Path,
         overlay: &Path,
     ) -> Result<Self, LayoutError> {
-        let lock = WriteLock::take(overlay)?;
-        let base_file = PreadSource::open(base)?;
-        let (base_header, _) = read_structure(&base_file)?;
-        if !overlay.exists() {
-            let name = base.file_name().unwrap_or_default().to_string_lossy();
-            let new = crate::atomic_file::AtomicFile::create(overlay)?;
-            let bytes = empty_overlay(&Slots::read(&base_file, 0)?, &name);
-            SystemDisk
-                .write_at(new.file(), &bytes, 0)
-                .map_err(|e| LayoutError::io(overlay, "cannot write the overlay", e))?;
-            new.publish()?;
-        }
-        let file = open_for_writing(overlay)?;
-        let (slots, start) = overlay_slots(&base_file, &over(overlay, &file)?)?;
+        let mut base_file = PreadSource::open(base)?;
+        let (base_header, _) = read_growing(&mut base_file)?;
+        create_overlay(&*disk, base, &Slots::read(&base_file, 0)?, overlay)?;
+        let lock = take_lock(overlay)?;
+        let (slots, start) = overlay_slots(&base_file, &mut over(overlay, &lock)?)?;
         let source = Box::new(LayeredSource::new(
             Box::new(base_file),
             base_header.file_bytes,
-            Box::new(over(overlay, &file)?),
+            Box::new(over(overlay, &lock)?),
         ));
         let entries = read_directory(&*source, &slots.header)?;
         let terrain = Terrain::of(source, slots.header.clone(), entries);
-        Self::new(disk, terrain, overlay, file, start, slots, lock)
+        Self::new(disk, terrain, overlay, start, slots, lock)
     }
 
     fn new(
         disk: Arc<dyn Disk + Send>,
         terrain: Terrain,
         path: &Path,
-        file: File,
         start: u64,
         slots: Slots,
         lock: WriteLock,
@@ -136,26 +150,19 @@ impl EditSession {
         let header = terrain.header().clone();
         let directory =
             Directory { entries: terrain.entries().to_vec(), root: read_root(terrain.source(), &header)? };
-        let original = match header.history {
-            Some(history) => Commit::read(terrain.source(), &header, history.tip_page)?.original,
-            None => State::of(&header),
-        };
+        let original = Lineage::read(terrain.source(), &header)?.original;
         Ok(Self {
             editor: Editor::new(Arc::new(terrain)),
             picture: Picture::default(),
             path: path.to_owned(),
-            file,
+            lock,
             start,
             slots,
             directory,
             original,
-            unwritten: BTreeSet::new(),
             attempted: Attempted::default(),
-            edits: 0,
-            has_original: false,
-            is_committing: false,
+            phase: Phase::Idle { edits: 0 },
             disk,
-            _lock: lock,
         })
     }
 
@@ -199,7 +206,7 @@ impl EditSession {
     }
 
     pub(super) fn count_edits(&mut self, edits: usize) {
-        self.edits += edits as u64;
+        *self.phase.edits_mut() += edits as u64;
     }
 
     fn source(&self) -> &dyn Source {
@@ -211,17 +218,16 @@ impl EditSession {
     /// # Errors
     /// As [`Editor::apply`]; a damaged journal, if an edit restores what was there before.
     pub fn apply(&mut self, edits: &[Edit]) -> Result<Changes, LayoutError> {
-        if !self.has_original && self.slots.header.history.is_some() && edits.iter().any(Edit::needs_original)
-        {
+        let needs_original = !self.editor.has_original() && edits.iter().any(Edit::needs_original);
+        if needs_original && self.slots.header.history.is_some() {
             let header = Header { history: None, ..self.original.put_into(&self.slots.header) };
             let entries = read_directory(self.source(), &header)?;
             let original =
                 Terrain::of(Box::new(Borrowed(Arc::clone(self.editor.terrain()))), header, entries);
             self.editor.set_original(Arc::new(original));
-            self.has_original = true;
         }
         let changes = self.editor.apply(edits)?;
-        self.edits += edits.len() as u64;
+        self.count_edits(edits.len());
         Ok(changes)
     }
 
@@ -231,20 +237,23 @@ impl EditSession {
     /// As [`Editor::set_heights`].
     pub fn set_heights(&mut self, window: &HeightWindow) -> Result<Changes, LayoutError> {
         let changes = self.editor.set_heights(window)?;
-        self.edits += 1;
+        self.count_edits(1);
         Ok(changes)
     }
 
-    /// Takes back what was applied and painted since the last commit.
+    /// Takes back what was applied and painted since the last commit: the last one that succeeded, or the one that is under way.
     pub fn discard(&mut self) -> Changes {
-        self.edits = 0;
+        self.notice_lost_job();
+        *self.phase.edits_mut() = 0;
         self.picture.roll_back();
         self.editor.roll_back()
     }
 
     /// Whether everything applied so far is in the file.
     pub fn is_committed(&self) -> bool {
-        self.unwritten.is_empty() && self.editor.uncommitted().is_empty() && self.picture.is_committed()
+        matches!(self.phase, Phase::Idle { .. })
+            && self.editor.uncommitted().is_empty()
+            && self.picture.is_committed()
     }
 
     /// Makes everything since the last commit durable, as one batch that `label` describes. Nothing is written if nothing changed.
@@ -258,100 +267,140 @@ impl EditSession {
     }
 
     /// What [`EditSession::commit`] would write, to be written on another thread; `None` if there is nothing. Edits go on meanwhile;
-    /// [`EditSession::finish_commit`] is to be called with the outcome before the next commit.
+    /// [`EditSession::finish_commit`] is to be called with the outcome before the next commit. A job that is dropped instead, by a thread that panicked for example, counts as
+    /// one that failed: what it was to write is part of the next commit.
     ///
     /// # Errors
     /// [`LayoutError::Usage`] while another commit is under way, and for a file that would become too long.
     pub fn prepare_commit(&mut self, label: &str) -> Result<Option<CommitJob>, LayoutError> {
-        self.check_idle()?;
-        let mut pages = self.unwritten.clone();
-        pages.extend(self.editor.uncommitted());
-        let place = self.place()?;
-        let section = self.picture.section(place.end(&self.slots.header) / PAGE_BYTES as u64)?;
+        let edits = self.check_idle()?;
+        let tail = self.tail()?;
+        let section = self.picture.section(tail.begin() / PAGE_BYTES as u64)?;
+        let job = match self.job(tail, section, edits, label) {
+            Ok(Some(job)) => job,
+            other => {
+                self.picture.failed();
+                return other;
+            }
+        };
+        self.editor.begin_commit();
+        self.phase = Phase::Committing { taken: edits, edits: 0, attempt: job.attempt() };
+        Ok(Some(job))
+    }
+
+    fn job(
+        &self,
+        tail: Tail,
+        section: Option<crate::imagery::PaintedSection>,
+        edits: u64,
+        label: &str,
+    ) -> Result<Option<CommitJob>, LayoutError> {
+        let (old, pages) = (&self.slots.header, self.editor.uncommitted());
         if pages.is_empty() && section.is_none() {
             // What failed may be in force on the disk all the same; a header then says again where we are.
-            let old = &self.slots.header;
             if !self.attempted.is_after(old) {
                 return Ok(None);
             }
-            let header = Header { generation: place.next_generation(old)?, ..old.clone() };
-            self.is_committing = true;
-            return Ok(Some(CommitJob::turn(place, &self.slots, header)));
+            return CommitJob::turn(tail, old.clone()).map(Some);
         }
-        let sequence = match self.slots.header.history {
-            Some(History { commit_page, .. }) if commit_page > 0 => {
-                Commit::read(self.source(), &self.slots.header, commit_page)?.sequence.saturating_add(1)
-            }
-            _ => 1,
-        };
         let content = Content {
             pages: pages.iter().filter_map(|page| Some((*page, self.editor.edited_page(*page)?))).collect(),
             header: self.editor.header(),
             section,
-            edits: self.edits,
+            edits,
             label,
         };
-        let job = CommitJob::new(place, &self.slots, &self.directory, self.original, sequence, content)?;
-        self.editor.mark_committed();
-        self.unwritten = pages;
-        self.is_committing = true;
-        Ok(Some(job))
+        let lineage = Lineage::read(self.source(), old)?;
+        CommitJob::new(tail, old, &self.directory, &lineage, content).map(Some)
     }
 
     /// Takes notice of what became of a commit.
     ///
     /// # Errors
-    /// That of the commit; what it was to write is part of the next one.
+    /// That of the commit; what it was to write is part of the next one. [`LayoutError::Usage`] for a job that is not the one under way.
     pub fn finish_commit(
         &mut self,
         job: CommitJob,
         outcome: Result<(), LayoutError>,
     ) -> Result<Committed, LayoutError> {
-        self.is_committing = false;
-        self.attempted.note(&job);
-        outcome?;
-        let places = job.entries.iter().map(|(logical, entry)| (*logical as u64, *entry)).collect();
+        let edits = match &self.phase {
+            Phase::Committing { edits, attempt, .. } if Arc::ptr_eq(attempt, &job.next.attempt) => *edits,
+            _ => {
+                return Err(LayoutError::Usage(format!(
+                    "{}: this commit is not the one that is under way",
+                    self.path.display()
+                )));
+            }
+        };
+        if let Err(error) = outcome {
+            drop(job);
+            self.notice_lost_job();
+            return Err(error);
+        }
+        let places: Vec<(u64, Entry)> =
+            job.entries.iter().map(|(logical, entry)| (*logical as u64, *entry)).collect();
         let committed = Committed { pages: job.pages(), bytes: job.bytes(), places };
         job.entries.iter().for_each(|(logical, entry)| self.directory.entries[*logical] = *entry);
         job.leaves.iter().for_each(|(leaf, entry)| self.directory.root[*leaf] = *entry);
-        self.slots.flip(job.header_page, job.header);
+        self.slots.flip(job.next.page, job.next.header);
         if let Some(section) = job.section {
             self.picture.committed(section);
         }
-        self.unwritten.clear();
-        self.edits = 0;
+        self.editor.end_commit(&committed.places);
+        self.phase = Phase::Idle { edits };
         Ok(committed)
     }
 
-    fn check_idle(&self) -> Result<(), LayoutError> {
-        if self.is_committing {
-            return Err(LayoutError::Usage(format!(
-                "{}: a commit is under way; wait for it",
-                self.path.display()
-            )));
+    /// If the commit under way has nobody left to write it, it has failed: all that it took is to be committed again.
+    fn notice_lost_job(&mut self) {
+        let Phase::Committing { taken, edits, attempt } = &self.phase else { return };
+        if Arc::strong_count(attempt) > 1 {
+            return;
         }
-        Ok(())
+        self.attempted.note(attempt);
+        self.phase = Phase::Idle { edits: taken + edits };
+        self.picture.failed();
+        self.editor.fail_commit();
     }
 
-    fn place(&self) -> Result<Place, LayoutError> {
-        let file = self
-            .file
-            .try_clone()
-            .map_err(|e| LayoutError::io(&self.path, "cannot open the file a second time", e))?;
-        Ok(Place { path: self.path.clone(), file, start: self.start, attempted: self.attempted })
+    /// Edits that are to be committed, if no commit is under way.
+    fn check_idle(&mut self) -> Result<u64, LayoutError> {
+        self.notice_lost_job();
+        match self.phase {
+            Phase::Idle { edits } => Ok(edits),
+            Phase::Committing { .. } => Err(LayoutError::Usage(format!(
+                "{}: a commit is under way; wait for it",
+                self.path.display()
+            ))),
+        }
+    }
+
+    fn tail(&self) -> Result<Tail, LayoutError> {
+        Tail::of(&self.path, &self.lock, self.start, &self.slots, self.attempted)
     }
 }
 
-fn open_for_writing(path: &Path) -> Result<File, LayoutError> {
-    File::options().read(true).write(true).open(path).map_err(|e| {
-        LayoutError::io(path, "cannot open the file for writing; --overlay keeps edits apart from it", e)
+/// The right to edit a file.
+fn take_lock(path: &Path) -> Result<WriteLock, LayoutError> {
+    WriteLock::take(path).map_err(|error| match error {
+        LayoutError::Io { path, source, .. } if source.kind() != std::io::ErrorKind::NotFound => {
+            LayoutError::io(
+                &path,
+                "cannot open the file for writing; edits can be kept apart from it in an overlay",
+                source,
+            )
+            .mended_by(Remedy::Overlay)
+        }
+        other => other,
     })
 }
 
 /// Reads of the very file that is written to.
-fn over(path: &Path, file: &File) -> Result<PreadSource, LayoutError> {
-    let file =
-        file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
+fn over(path: &Path, lock: &WriteLock) -> Result<PreadSource, LayoutError> {
+    let file = lock
+        .file()
+        .try_clone()
+        .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
     PreadSource::over(path, file)
 }
 
@@ -365,6 +414,10 @@ impl Source for Borrowed {
 
     fn byte_count(&self) -> u64 {
         self.0.source().byte_count()
+    }
+
+    fn own_start(&self) -> u64 {
+        self.0.source().own_start()
     }
 
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {

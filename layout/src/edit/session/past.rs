@@ -1,14 +1,13 @@
 //! Back and forth through a file's history: a header that names a state which is in the file already.
 
 use super::EditSession;
-use crate::bytes::{PAGE_BYTES, Page, checksum};
+use super::checked_state::check_state;
 use crate::directory::Entry;
 use crate::edit::Changes;
 use crate::edit::commit::CommitJob;
 use crate::error::LayoutError;
+use crate::file::journal::Commit;
 use crate::header::{Header, History};
-use crate::journal::Commit;
-use crate::opening::{inert_page, read_leaf, read_root};
 use crate::source::Source;
 use crate::terrain::Terrain;
 use std::sync::Arc;
@@ -30,8 +29,9 @@ impl EditSession {
     /// Goes back to the state before the last commit, durably; `None` if there is none to go back to.
     ///
     /// # Errors
-    /// [`LayoutError::Usage`] while edits are not committed; damage and I/O of what the file holds of that state. The file reads as before then.
+    /// [`LayoutError::Usage`] while edits are not committed or a commit is under way; damage and I/O of what the file holds of that state. The file reads as before then.
     pub fn undo(&mut self) -> Result<Option<Changes>, LayoutError> {
+        self.check_idle()?;
         let Some(History { commit_page, tip_page }) = self.slots.header.history else { return Ok(None) };
         if commit_page == 0 {
             return Ok(None);
@@ -45,6 +45,7 @@ impl EditSession {
     /// # Errors
     /// As [`EditSession::undo`].
     pub fn redo(&mut self) -> Result<Option<Changes>, LayoutError> {
+        self.check_idle()?;
         let Some(History { commit_page, tip_page }) = self.slots.header.history else { return Ok(None) };
         let mut at = tip_page;
         while at != commit_page {
@@ -74,7 +75,6 @@ impl EditSession {
 
     /// Brings the file, and the ground in memory, to the state of a journal page; 0 is how it was built.
     fn turn_to(&mut self, commit_page: u32, tip_page: u32) -> Result<Changes, LayoutError> {
-        self.check_idle()?;
         if !self.is_committed() {
             return Err(LayoutError::Usage(format!(
                 "{}: there are edits that are not committed; commit them or take them back first",
@@ -86,64 +86,31 @@ impl EditSession {
             0 => self.original,
             page => Commit::read(self.source(), old, page)?.state,
         };
-        let place = self.place()?;
-        let generation = place.next_generation(old)?;
-        let header =
-            Header { generation, history: Some(History { commit_page, tip_page }), ..state.put_into(old) };
-        let (root, entries) = self.differing(&header)?;
-        let mut pages = Vec::with_capacity(entries.len());
-        for (logical, entry) in &entries {
-            pages.push((*logical as u64, self.read_page(*logical, *entry)?));
-        }
+        let tail = self.tail()?;
+        let header = Header {
+            generation: tail.generation(),
+            history: Some(History { commit_page, tip_page }),
+            ..state.put_into(old)
+        };
+        let job = CommitJob::turn(tail, header)?;
+        // Everything that can fail comes before the header: once that is durable, memory follows without fail.
+        let checked = check_state(self.editor.terrain(), &self.directory, &job.next.page)?;
+        let places: Vec<(u64, Entry)> =
+            checked.differing.iter().map(|(logical, entry)| (*logical as u64, *entry)).collect();
+        let replacement = self.editor.replacement(&places, &job.next.header)?;
         let (terrain, original) = (Arc::clone(self.editor.terrain()), self.original.imagery);
         let turn = self.picture.turn(&terrain, &self.slots.header, original, state.imagery)?;
-        let job = CommitJob::turn(place, &self.slots, header);
-        let done = job.run_on(&*self.disk);
-        self.attempted.note(&job);
-        done?;
-        let changes = self.editor.replace_pages(pages, &job.header)?;
+        if let Err(error) = job.run_on(&*self.disk) {
+            self.attempted.note(&job.next.attempt);
+            return Err(error);
+        }
+        let changes = self.editor.replace(replacement);
         self.picture.turn_to(turn);
-        entries.into_iter().for_each(|(logical, entry)| self.directory.entries[logical] = entry);
-        self.directory.root = root;
-        self.slots.flip(job.header_page, job.header);
+        self.directory = checked.directory;
+        self.slots.flip(job.next.page, job.next.header);
         Ok(changes)
     }
-
-    /// The root of another state, and the entries in which its directory differs.
-    fn differing(&self, header: &Header) -> Result<Difference, LayoutError> {
-        let root = read_root(self.source(), header)?;
-        let mut differing = Vec::new();
-        let mut leaf = Vec::new();
-        for (i, here) in root.iter().enumerate().filter(|(i, here)| **here != self.directory.root[*i]) {
-            leaf.clear();
-            read_leaf(self.source(), header, i, *here, &mut leaf)?;
-            let first = i * crate::directory::ENTRIES_PER_LEAF;
-            let pairs = leaf.iter().zip(&self.directory.entries[first..]);
-            let others = pairs.enumerate().filter(|(_, (theirs, ours))| theirs != ours);
-            differing.extend(others.map(|(j, (theirs, _))| (first + j, *theirs)));
-        }
-        Ok((root, differing))
-    }
-
-    fn read_page(&self, logical: usize, entry: Entry) -> Result<Box<Page>, LayoutError> {
-        if !entry.is_present() {
-            return Ok(inert_page(self.slots.header.record_kind));
-        }
-        let mut page = Box::new([0; PAGE_BYTES]);
-        self.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, &mut page[..])?;
-        if checksum(&page[..]) == entry.checksum {
-            return Ok(page);
-        }
-        Err(LayoutError::damaged(
-            &self.path,
-            format!("record page {logical} (file page {})", entry.page),
-            "the checksum does not match; what was there before cannot be brought back",
-        ))
-    }
 }
-
-/// The root of another state, and the record pages whose entries differ.
-type Difference = (Vec<Entry>, Vec<(usize, Entry)>);
 
 /// All commits of a file, the first one first.
 fn history_of(source: &dyn Source, header: &Header) -> Result<Vec<HistoryEntry>, LayoutError> {

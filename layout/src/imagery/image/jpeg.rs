@@ -1,14 +1,14 @@
 //! Pictures as JPEG, baseline and progressive, decoded by jpeg-decoder.
 //!
-//! No Rust decoder gives a JPEG row by row, so its texels are held as a whole while it is read: 3 bytes a texel, twice that for the coefficients of a
-//! progressive one. That counts against the memory budget; larger pictures go through a tiled GeoTIFF.
+//! No Rust decoder gives a JPEG row by row, so its texels are held as a whole while it is read, and more while it is decoded ([`JpegFrame::memory_bytes`]): 4.5 bytes a
+//! texel of the usual kind, 7.5 of a progressive one. That counts against the memory budget; larger pictures go through a tiled GeoTIFF.
 
 use super::super::source::{ImageInfo, ImageSource, RowReader};
 use super::png::spread;
 use super::world;
 use crate::error::LayoutError;
-use crate::import::guard;
-use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat};
+use crate::import::{guard, input, jpeg_frame::JpegFrame};
+use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat, UnsupportedFeature};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,10 @@ pub(super) struct JpegImage {
 impl JpegImage {
     /// Reads the header.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
-        let mut decoder = decoder(path)?;
+        let frame = JpegFrame::read(reader(path)?)
+            .map_err(|source| LayoutError::io(path, "cannot read the JPEG file", source))?;
+        frame.check().map_err(|problem| LayoutError::unsupported(path, problem))?;
+        let mut decoder = Decoder::new(reader(path)?);
         guard(path, || "header".into(), || decoder.read_info().map_err(|e| decoding_error(path, e)))?;
         let Some(header) = decoder.info() else {
             return Err(LayoutError::damaged(path, "header", "it says no size; fetch the file again"));
@@ -35,18 +38,16 @@ impl JpegImage {
             return Err(LayoutError::damaged(path, "header", "it has no texels; fetch the file again"));
         }
         let progressive = header.coding_process == CodingProcess::DctProgressive;
-        // Coefficients of a progressive file are 16-bit and kept for all of it.
-        let held = if progressive { 3 * channels } else { channels };
         let info = ImageInfo {
             texels,
-            georeference: world::georeference(path, &["jgw", "jpgw", "jpegw", "wld"]),
+            georeference: world::georeference(path, &["jgw", "jpgw", "jpegw", "wld"])?,
             format: format!(
                 "{}{} JPEG",
                 if progressive { "progressive " } else { "" },
                 if channels == 1 { "grey" } else { "RGB" }
             ),
             notes: Vec::new(),
-            memory_bytes: u64::from(texels[0]) * u64::from(texels[1]) * held as u64,
+            memory_bytes: frame.memory_bytes(),
         };
         Ok(Self { path: path.to_owned(), info, channels })
     }
@@ -62,7 +63,7 @@ impl ImageSource for JpegImage {
     }
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
-        let mut decoder = decoder(&self.path)?;
+        let mut decoder = Decoder::new(reader(&self.path)?);
         let texels = guard(
             &self.path,
             || "image data".into(),
@@ -95,10 +96,8 @@ impl RowReader for Rows {
     }
 }
 
-fn decoder(path: &Path) -> Result<Decoder<BufReader<File>>, LayoutError> {
-    let file =
-        File::open(path).map_err(|source| LayoutError::io(path, "cannot open the JPEG file", source))?;
-    Ok(Decoder::new(BufReader::with_capacity(1 << 18, file)))
+fn reader(path: &Path) -> Result<BufReader<File>, LayoutError> {
+    Ok(BufReader::with_capacity(1 << 18, input::open(path, "cannot open the JPEG file")?))
 }
 
 fn channels(path: &Path, format: PixelFormat) -> Result<usize, LayoutError> {
@@ -125,9 +124,25 @@ fn decoding_error(path: &Path, error: Error) -> LayoutError {
         Error::Unsupported(feature) => LayoutError::unsupported(
             path,
             format!(
-                "the JPEG uses {feature:?}, which is not read; convert it: gdal_translate -co TILED=YES INPUT output.tif"
+                "the JPEG {}, which is not read; convert it: gdal_translate -co TILED=YES INPUT output.tif",
+                words_for(&feature)
             ),
         ),
-        error => LayoutError::damaged(path, "image data", format!("{error}; fetch the file again")),
+        Error::Io(_) => LayoutError::damaged(path, "image data", "the file is cut short; fetch it again"),
+        _ => LayoutError::damaged(path, "image data", "its JPEG stream is damaged; fetch the file again"),
+    }
+}
+
+fn words_for(feature: &UnsupportedFeature) -> String {
+    match feature {
+        UnsupportedFeature::Hierarchical => "is hierarchical".into(),
+        UnsupportedFeature::ArithmeticEntropyCoding => "is packed by arithmetic coding".into(),
+        UnsupportedFeature::SamplePrecision(bits) => format!("has {bits} bits a channel"),
+        UnsupportedFeature::ComponentCount(count) => format!("has {count} channels"),
+        UnsupportedFeature::DNL => "says its height behind its picture".into(),
+        UnsupportedFeature::SubsamplingRatio | UnsupportedFeature::NonIntegerSubsamplingRatio => {
+            "samples its channels in an unusual ratio".into()
+        }
+        _ => "is of an unusual kind".into(),
     }
 }

@@ -9,8 +9,7 @@ mod world;
 
 use super::source::ImageSource;
 use crate::error::LayoutError;
-use crate::import::{TiffImage, is_tiff};
-use std::fs::File;
+use crate::import::{TiffImage, input, is_tiff};
 use std::io::Read;
 use std::path::Path;
 
@@ -21,12 +20,14 @@ use std::path::Path;
 /// [`LayoutError::Io`] for a file that is missing or cannot be read; [`LayoutError::NotThisFormat`] for none of these formats;
 /// [`LayoutError::Unsupported`] and [`LayoutError::Damaged`] from the reader.
 pub fn open(path: &Path) -> Result<Box<dyn ImageSource>, LayoutError> {
-    let cannot_read = |source| LayoutError::io(path, "cannot read the image", source);
     let mut head = Vec::with_capacity(16);
     if path.is_dir() {
         return Err(LayoutError::not_this_format(path, "this is a directory; name the images in it"));
     }
-    File::open(path).and_then(|file| file.take(16).read_to_end(&mut head)).map_err(cannot_read)?;
+    input::open(path, "cannot read the image")?
+        .take(16)
+        .read_to_end(&mut head)
+        .map_err(|source| LayoutError::io(path, "cannot read the image", source))?;
     Ok(if head.starts_with(b"\x89PNG\r\n\x1a\n") {
         Box::new(png::PngImage::open(path)?)
     } else if head.starts_with(b"\xff\xd8\xff") {

@@ -7,7 +7,7 @@ use super::super::source::{ImageInfo, ImageSource, RowReader};
 use super::world;
 use crate::error::LayoutError;
 use crate::import::guard;
-use crate::import::png_stream::{self, PngRows, decoding_error};
+use crate::import::png_stream::{self, PngRows, Texts, decoding_error};
 use ::png::{BitDepth, ColorType, Transformations};
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ pub(super) struct PngImage {
 impl PngImage {
     /// Reads the header.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
-        let reader = png_stream::open(path, AS_COLOURS)?;
+        let reader = png_stream::open(path, AS_COLOURS, Texts::PassedOver)?;
         let header = reader.info();
         if header.interlaced {
             return Err(LayoutError::unsupported(
@@ -46,14 +46,14 @@ impl PngImage {
         }
         let info = ImageInfo {
             texels: [header.width, header.height],
-            georeference: world::georeference(path, &["pgw", "pngw", "wld"]),
+            georeference: world::georeference(path, &["pgw", "pngw", "wld"])?,
             format: format!(
                 "{}-bit {color} PNG{}",
                 header.bit_depth as u8,
                 if has_alpha { " with alpha" } else { "" }
             ),
             notes,
-            memory_bytes: u64::from(header.width) * 16,
+            memory_bytes: png_stream::memory_bytes(header),
         };
         Ok(Self { path: path.to_owned(), info })
     }
@@ -69,7 +69,7 @@ impl ImageSource for PngImage {
     }
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
-        let reader = png_stream::open(&self.path, AS_COLOURS)?;
+        let reader = png_stream::open(&self.path, AS_COLOURS, Texts::PassedOver)?;
         let header = reader.info();
         if [header.width, header.height] != self.info.texels {
             return Err(LayoutError::damaged(

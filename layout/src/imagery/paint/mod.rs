@@ -261,7 +261,17 @@ impl Painter {
         self.cache.mark_written();
     }
 
-    /// Takes back all paint since the last [`Painter::section`], or since the painter was opened.
+    /// Takes notice that a section was not written: what it held counts as painted since the one before.
+    pub fn failed(&mut self) {
+        for id in std::mem::take(&mut self.unwritten).into_keys() {
+            if let Some(tile) = self.cache.get_mut(id) {
+                tile.is_unwritten = false;
+                tile.is_painted = true;
+            }
+        }
+    }
+
+    /// Takes back all paint since the last [`Painter::section`] that has not failed, or since the painter was opened.
     pub fn roll_back(&mut self) -> PaintChanges {
         let tiles = self.cache.those(|tile| tile.is_painted);
         for id in &tiles {

@@ -3,6 +3,7 @@
 //! Cost: each painted tile is decoded once for its mean colour and checked off once, in parallel; one copy of all bytes.
 
 use super::super::Imagery;
+use super::super::reader::check_uses;
 use super::super::section::{Section, TILE_ENTRY_BYTES, TileEntry};
 use super::super::shape::TileId;
 use super::Painter;
@@ -79,6 +80,8 @@ impl PaintedSection {
         bytes[..PAGE_BYTES].copy_from_slice(&section.to_page()[..]);
         bytes[PAGE_BYTES..PAGE_BYTES + directory.len()].copy_from_slice(&directory);
         let place = ImageryPlace { offset: u64::from(first_page) * PAGE, bytes: bytes.len() as u64 };
+        // Tiles of two states of a file of nonsense may lie over one another.
+        check_uses(painter.files.terrain.source(), place, &section, &entries, place.end())?;
         Ok(Some(Self { place, bytes, imagery: Imagery::of(section, entries) }))
     }
 }

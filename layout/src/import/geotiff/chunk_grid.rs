@@ -1,17 +1,18 @@
 //! Where the strips or tiles of an image lie, whatever they hold: heights ([`super::chunks`]) or colours ([`super::colour_table`]).
 //!
 //! Chunk `i` covers a rectangle of `chunk_width * chunk_height` samples, `across` of them side by side.
-//! Tiles at the right and lower edge are stored whole, strips at the lower edge only as far as the image.
+//! Tiles at the right and lower edge are stored whole, strips at the lower edge only as far as the image. Nothing is held but the shape: places stay in the file
+//! ([`super::listing`]).
 
+use super::listing::{Listing, Places};
 use super::tags::{self, Directory, TiffFile};
 use crate::dem::Window;
 use crate::error::LayoutError;
-
-/// Largest unpacked chunk: the codecs need it in memory at once.
-pub(super) const MAX_CHUNK_BYTES: u64 = 512 << 20;
+use std::fs::File;
+use std::path::Path;
 
 /// The chunks of an image.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct ChunkGrid {
     pub(super) width: u32,
     pub(super) height: u32,
@@ -19,8 +20,18 @@ pub(super) struct ChunkGrid {
     pub(super) chunk_height: u32,
     pub(super) tiled: bool,
     pub(super) across: u32,
-    /// Offset and packed length of each; 0 where the file left it out.
-    pub(super) places: Vec<(u64, u64)>,
+    listing: Listing,
+    /// Chunks that one in the file was cut into, one below the other.
+    cuts: u32,
+    /// Bytes of a row of a chunk that was cut.
+    row_bytes: u64,
+}
+
+/// What a look at all places found.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Stored {
+    /// Packed length of the longest chunk.
+    pub(super) longest: u64,
 }
 
 impl ChunkGrid {
@@ -50,27 +61,95 @@ impl ChunkGrid {
         } else {
             (tags::STRIP_OFFSETS, tags::STRIP_BYTE_COUNTS)
         };
-        let offsets = file.numbers(directory, offsets)?.unwrap_or_default();
-        let counts = file.numbers(directory, counts)?.unwrap_or_default();
-        if offsets.len() as u64 != wanted || counts.len() as u64 != wanted {
+        let listed = [file.count(directory, offsets), file.count(directory, counts)];
+        let columns = (file.column(directory, offsets)?, file.column(directory, counts)?);
+        let listing = match columns {
+            (Some(offsets), Some(counts)) => Listing::new(offsets, counts).filter(|l| l.count() == wanted),
+            _ => None,
+        };
+        let Some(listing) = listing else {
             return Err(file.damaged(format!(
                 "{wanted} chunks make up the image, but {} places and {} lengths are listed; fetch the file again",
-                offsets.len(),
-                counts.len()
+                listed[0], listed[1]
+            )));
+        };
+        Ok(Self { width, height, chunk_width, chunk_height, tiled, across, listing, cuts: 1, row_bytes: 0 })
+    }
+
+    /// Cuts chunks that are not compressed, of `row_bytes` a row, into such of `rows` rows, which their height is a multiple of unless there is but one
+    /// row of them.
+    pub(super) fn cut(&mut self, rows: u32, row_bytes: u64) {
+        self.cuts = self.chunk_height.div_ceil(rows);
+        self.row_bytes = row_bytes;
+        self.chunk_height = rows;
+    }
+
+    /// Number of chunks, cut ones counted apart.
+    pub(super) fn count(&self) -> u64 {
+        u64::from(self.across) * u64::from(self.height.div_ceil(self.chunk_height))
+    }
+
+    /// What reads places of chunks from `file`.
+    pub(super) fn places<'f>(&self, path: &'f Path, file: &'f File) -> Places<'f> {
+        Places::new(path, file, self.listing)
+    }
+
+    /// Offset and packed length of a chunk; `None` if the file left it out. The length of one that is not compressed means nothing.
+    pub(super) fn place(
+        &self,
+        chunk: u64,
+        places: &mut Places<'_>,
+    ) -> Result<Option<(u64, u64)>, LayoutError> {
+        if self.cuts == 1 {
+            return places.get(chunk);
+        }
+        let [across, cuts] = [self.across, self.cuts].map(u64::from);
+        let (row, col) = (chunk / across, chunk % across);
+        let skipped = row % cuts * u64::from(self.chunk_height) * self.row_bytes;
+        Ok(places.get(row / cuts * across + col)?.map(|(at, length)| (at.saturating_add(skipped), length)))
+    }
+
+    /// Looks at the place of every chunk, before they are cut: that it lies in the file, that all of them are no longer than the file and what they unpack to allow, and that
+    /// there is one at all. `unpacked` gives the bytes that a chunk's samples take, `each` hears number, offset and packed length.
+    pub(super) fn check_places(
+        &self,
+        file: &TiffFile,
+        is_raw: bool,
+        unpacked: impl Fn(u64) -> u64,
+        mut each: impl FnMut(u64, u64, u64) -> Result<(), LayoutError>,
+    ) -> Result<Stored, LayoutError> {
+        let mut places = self.places(file.path(), file.file());
+        let mut stored = Stored::default();
+        let (mut packed_bytes, mut unpacked_bytes) = (0u64, 0u64);
+        for chunk in 0..self.count() {
+            let Some((at, packed)) = places.get(chunk)? else { continue };
+            let samples = unpacked(chunk);
+            let length = if is_raw { samples } else { packed };
+            self.check_end(file, chunk, at, length)?;
+            each(chunk, at, packed)?;
+            stored.longest = stored.longest.max(length);
+            packed_bytes = packed_bytes.saturating_add(length);
+            unpacked_bytes = unpacked_bytes.saturating_add(samples);
+        }
+        if stored.longest == 0 {
+            return Err(LayoutError::unsupported(
+                file.path(),
+                format!(
+                    "it holds no samples: of the {} {} that it declares none is stored; fetch or write it again",
+                    self.count(),
+                    self.kind()
+                ),
+            ));
+        }
+        // Equal chunks may be stored once; but then they are short. All of them long and in one place would make a small file endless.
+        if packed_bytes > file.bytes().max(unpacked_bytes.saturating_mul(2)) {
+            return Err(file.damaged(format!(
+                "its {} lie over each other: {packed_bytes} bytes of them in a file of {}; fetch or write the file again",
+                self.kind(),
+                file.bytes()
             )));
         }
-        let places = offsets.into_iter().zip(counts).collect();
-        Ok(Self { width, height, chunk_width, chunk_height, tiled, across, places })
-    }
-
-    /// Number of chunks.
-    pub(super) fn count(&self) -> u64 {
-        self.places.len() as u64
-    }
-
-    /// Offset and packed length of a chunk; `None` if the file left it out.
-    pub(super) fn place(&self, chunk: u64) -> Option<(u64, u64)> {
-        self.places.get(chunk as usize).copied().filter(|(at, bytes)| *at != 0 && *bytes != 0)
+        Ok(stored)
     }
 
     /// The part of the image a chunk covers.
@@ -91,33 +170,8 @@ impl ChunkGrid {
         format!("{} {chunk} of {}", if self.tiled { "tile" } else { "strip" }, self.count())
     }
 
-    /// Refuses chunks of `bytes` unpacked if that is too much.
-    pub(super) fn check_size(&self, file: &TiffFile, bytes: u64) -> Result<(), LayoutError> {
-        if bytes <= MAX_CHUNK_BYTES {
-            return Ok(());
-        }
-        Err(LayoutError::unsupported(
-            file.path(),
-            format!(
-                "its {} of {} x {} would take {} MiB each in memory, more than the {} MiB allowed; write it again in tiles: \
-                 gdal_translate -co TILED=YES -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER INPUT output.tif",
-                self.kind(),
-                self.chunk_width,
-                self.chunk_height,
-                bytes >> 20,
-                MAX_CHUNK_BYTES >> 20
-            ),
-        ))
-    }
-
     /// Refuses a chunk that lies at `at` and does not end in the file.
-    pub(super) fn check_end(
-        &self,
-        file: &TiffFile,
-        chunk: u64,
-        at: u64,
-        bytes: u64,
-    ) -> Result<(), LayoutError> {
+    fn check_end(&self, file: &TiffFile, chunk: u64, at: u64, bytes: u64) -> Result<(), LayoutError> {
         if at.checked_add(bytes).is_some_and(|end| end <= file.bytes()) {
             return Ok(());
         }

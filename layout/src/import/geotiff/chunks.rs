@@ -2,9 +2,12 @@
 //! read here.
 
 use super::chunk_grid::{ChunkGrid, side};
+use super::packed::{LARGEST_WHOLE, Span};
 use super::tags::{self, Directory, TiffFile};
+use super::zstd_frame;
 use crate::dem::SampleType;
 use crate::error::LayoutError;
+use std::io::Read;
 
 /// How chunks are packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +61,12 @@ pub(super) struct Chunks {
     pub(super) big_endian: bool,
     pub(super) compression: Compression,
     pub(super) predictor: Predictor,
+    /// Largest window that long chunks of ZSTD ask for.
+    pub(super) largest_window: u64,
 }
+
+/// Longest row of a chunk: what is unpacked at once at least.
+const MAX_ROW_BYTES: u64 = 64 << 20;
 
 impl Chunks {
     /// Reads and checks the table of the image `directory`.
@@ -101,30 +109,64 @@ impl Chunks {
             }
         };
         let grid = ChunkGrid::read(file, directory, [width, height])?;
-        let this = Self { grid, sample_type, big_endian: file.is_big_endian(), compression, predictor };
+        let mut this = Self {
+            grid,
+            sample_type,
+            big_endian: file.is_big_endian(),
+            compression,
+            predictor,
+            largest_window: 0,
+        };
         this.check_places(file)?;
         Ok(this)
     }
 
     /// Every chunk lies in the file, and is long enough for what it is to become.
-    fn check_places(&self, file: &TiffFile) -> Result<(), LayoutError> {
-        if !self.is_raw() {
-            self.grid.check_size(file, self.decoded_bytes())?;
+    fn check_places(&mut self, file: &TiffFile) -> Result<(), LayoutError> {
+        if !self.is_raw() && self.stride() > MAX_ROW_BYTES {
+            return Err(LayoutError::unsupported(
+                file.path(),
+                format!(
+                    "a row of its {} of {} samples takes {} MiB, more than the {} MiB allowed; write it again in other tiles: \
+                     gdal_translate -co TILED=YES -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER INPUT output.tif",
+                    self.grid.kind(),
+                    self.grid.chunk_width,
+                    self.stride() >> 20,
+                    MAX_ROW_BYTES >> 20
+                ),
+            ));
         }
-        for chunk in 0..self.grid.count() {
-            let Some((at, packed)) = self.grid.place(chunk) else { continue };
-            let needed = if self.is_raw() { self.stored_bytes(chunk) } else { packed };
-            self.grid.check_end(file, chunk, at, needed)?;
-            if !self.is_raw()
-                && packed.saturating_mul(self.compression.greatest_ratio()) < self.stored_bytes(chunk)
-            {
-                return Err(LayoutError::damaged(
+        // Of long chunks there are few, so a look into each costs little.
+        let asks_for_window = self.compression == Compression::Zstd && self.decoded_bytes() > LARGEST_WHOLE;
+        let mut largest_window = LARGEST_WHOLE;
+        self.grid.check_places(
+            file,
+            self.is_raw(),
+            |chunk| self.stored_bytes(chunk),
+            |chunk, at, packed| {
+                if asks_for_window {
+                    let mut head = [0; zstd_frame::HEAD_BYTES];
+                    let mut span = Span { file: file.file(), at, left: packed };
+                    let read = span.read(&mut head);
+                    let length = read.map_err(|source| {
+                        LayoutError::io(file.path(), "cannot read the TIFF file", source)
+                    })?;
+                    largest_window = largest_window.max(zstd_frame::window(&head[..length]).unwrap_or(0));
+                }
+                if self.is_raw()
+                    || packed.saturating_mul(self.compression.greatest_ratio()) >= self.stored_bytes(chunk)
+                {
+                    return Ok(());
+                }
+                Err(LayoutError::damaged(
                     file.path(),
                     self.grid.name(chunk),
                     format!("its {packed} bytes cannot hold the samples declared; fetch the file again"),
-                ));
-            }
-        }
+                ))
+            },
+        )?;
+        // The codec itself goes no further.
+        self.largest_window = largest_window.min(128 << 20);
         Ok(())
     }
 
@@ -141,6 +183,11 @@ impl Chunks {
             SampleType::U32 | SampleType::I32 | SampleType::F32 => 4,
             SampleType::F64 => 8,
         }
+    }
+
+    /// Bytes of a row of a chunk.
+    pub(super) fn stride(&self) -> u64 {
+        u64::from(self.grid.chunk_width) * self.sample_bytes()
     }
 
     /// Bytes of a whole chunk when unpacked.

@@ -1,140 +1,273 @@
-//! Unpacks a chunk: LZW, DEFLATE, ZSTD and PackBits, from bytes in memory to bytes in memory.
+//! Unpacks a chunk: LZW, DEFLATE, ZSTD and PackBits, a few rows at a time.
 //!
 //! A chunk must yield at least the bytes asked for; what it holds beyond them (rows below the image, a
-//! missing end code) does not matter, as writers differ in both. The `tiff` crate (0.11.3) is not used: it
+//! missing end code) does not matter, as writers differ in both. An [`Unpacker`] reads and writes piece by piece, so that what is held does not depend on how long a
+//! chunk is or becomes: the codec's own state, of ZSTD a window ([`super::zstd_frame`]). The `tiff` crate (0.11.3) is not used: it
 //! refuses sound LZW tiles at the right edge ("no lzw end code found" in `int16-tiles-lzw-p2.tif` of the
 //! fixtures), and inverts "white is zero" heights. Cost: the codec's.
 
-use std::io::Read;
+use std::io::BufRead;
 
 use flate2::{Decompress, FlushDecompress, Status};
 use weezl::{BitOrder, LzwStatus};
+use zstd::stream::raw::{DParameter, InBuffer, Operation, OutBuffer};
 
 use super::chunks::Compression;
+use super::zstd_frame;
 
-/// Fills `unpacked` from `packed`; an error says what is wrong with the bytes.
-pub(super) fn unpack(compression: Compression, packed: &[u8], unpacked: &mut [u8]) -> Result<(), String> {
-    let wanted = unpacked.len();
-    let got = match compression {
-        Compression::None => copy(packed, unpacked),
-        Compression::Deflate => inflate(packed, unpacked)?,
-        Compression::Lzw => lzw(packed, unpacked)?,
-        Compression::Zstd => zstd(packed, unpacked)?,
-        Compression::PackBits => pack_bits(packed, unpacked),
-    };
-    if got < wanted {
-        return Err(format!("it unpacks to {got} bytes where {wanted} are needed"));
-    }
-    Ok(())
+/// Why a chunk does not unpack.
+#[derive(Debug)]
+pub(super) enum Failure {
+    /// The packed bytes cannot be read.
+    Io(std::io::Error),
+    /// They are wrong, as the words say.
+    Damaged(String),
 }
 
-fn copy(packed: &[u8], unpacked: &mut [u8]) -> usize {
-    let length = packed.len().min(unpacked.len());
-    unpacked[..length].copy_from_slice(&packed[..length]);
-    length
-}
-
-fn inflate(packed: &[u8], unpacked: &mut [u8]) -> Result<usize, String> {
-    let mut decoder = Decompress::new(true);
-    loop {
-        // Neither total exceeds its slice's length.
-        let (read, written) = (decoder.total_in() as usize, decoder.total_out() as usize);
-        if written == unpacked.len() {
-            return Ok(written);
-        }
-        let status = decoder
-            .decompress(&packed[read..], &mut unpacked[written..], FlushDecompress::None)
-            .map_err(|error| format!("its DEFLATE stream is damaged ({error})"))?;
-        let moved = decoder.total_in() as usize > read || decoder.total_out() as usize > written;
-        if status == Status::StreamEnd || !moved {
-            return Ok(decoder.total_out() as usize);
-        }
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        Self::Io(error)
     }
 }
 
-fn lzw(packed: &[u8], unpacked: &mut [u8]) -> Result<usize, String> {
-    let mut decoder = weezl::decode::Configuration::with_tiff_size_switch(BitOrder::Msb, 8)
-        .with_yield_on_full_buffer(true)
-        .build();
-    let (mut read, mut written) = (0, 0);
-    while written < unpacked.len() {
-        let step = decoder.decode_bytes(&packed[read..], &mut unpacked[written..]);
-        read += step.consumed_in;
-        written += step.consumed_out;
-        match step.status {
-            Ok(LzwStatus::Ok) => {}
-            Ok(LzwStatus::Done | LzwStatus::NoProgress) => break,
-            Err(_) => return Err("its LZW stream is damaged".into()),
-        }
-    }
-    Ok(written)
+fn damaged(words: &str) -> Failure {
+    Failure::Damaged(words.to_owned())
 }
 
-fn zstd(packed: &[u8], unpacked: &mut [u8]) -> Result<usize, String> {
-    let damaged = |error: std::io::Error| format!("its ZSTD stream is damaged ({error})");
-    let mut decoder = zstd::stream::read::Decoder::with_buffer(packed).map_err(damaged)?;
-    let mut written = 0;
-    while written < unpacked.len() {
-        match decoder.read(&mut unpacked[written..]) {
-            Ok(0) => break,
-            Ok(count) => written += count,
-            Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => break,
-            Err(error) => return Err(damaged(error)),
-        }
-    }
-    Ok(written)
+/// A chunk on its way from `input`, which ends where the chunk does.
+pub(super) struct Unpacker<R> {
+    input: R,
+    state: State,
 }
 
-/// Runs of a count byte: 0..127 so many and one literal bytes, -1..-127 one byte so many times and one.
-fn pack_bits(packed: &[u8], unpacked: &mut [u8]) -> usize {
-    let (mut read, mut written) = (0, 0);
-    while written < unpacked.len() {
-        let Some(count) = packed.get(read) else { break };
-        let count = *count as i8;
-        read += 1;
-        let room = unpacked.len() - written;
-        if count >= 0 {
-            let rest = &packed[read..];
-            let length = (count as usize + 1).min(room).min(rest.len());
-            unpacked[written..written + length].copy_from_slice(&rest[..length]);
-            read += length;
-            written += length;
-            if length == 0 {
-                break;
+enum State {
+    Copy,
+    Deflate(Box<Decompress>),
+    Lzw(Box<weezl::decode::Decoder>),
+    Zstd(Box<zstd::stream::raw::Decoder<'static>>),
+    PackBits(Run),
+}
+
+/// Where a stream of PackBits stands.
+#[derive(Debug, Clone, Copy)]
+enum Run {
+    /// A count comes next.
+    Count,
+    /// So many bytes follow as they are.
+    Bytes(usize),
+    /// The byte that is repeated so many times comes next.
+    Byte(usize),
+    /// A byte is repeated so many times more.
+    Repeated(u8, usize),
+}
+
+impl<R: BufRead> Unpacker<R> {
+    /// Begins a chunk; a stream of ZSTD that needs a window of more than `window` bytes is refused as damaged.
+    pub(super) fn new(compression: Compression, input: R, window: u64) -> Result<Self, Failure> {
+        let state = match compression {
+            Compression::None => State::Copy,
+            Compression::Deflate => State::Deflate(Box::new(Decompress::new(true))),
+            Compression::Lzw => State::Lzw(Box::new(
+                weezl::decode::Configuration::with_tiff_size_switch(BitOrder::Msb, 8)
+                    .with_yield_on_full_buffer(true)
+                    .build(),
+            )),
+            Compression::Zstd => {
+                let mut decoder = zstd::stream::raw::Decoder::new()?;
+                decoder.set_parameter(DParameter::WindowLogMax(window.max(1).ilog2().clamp(10, 27)))?;
+                State::Zstd(Box::new(decoder))
             }
-        } else if count != i8::MIN {
-            let Some(byte) = packed.get(read) else { break };
-            let length = (1 + usize::from(count.unsigned_abs())).min(room);
-            unpacked[written..written + length].fill(*byte);
-            read += 1;
-            written += length;
+            Compression::PackBits => State::PackBits(Run::Count),
+        };
+        Ok(Self { input, state })
+    }
+
+    /// Fills `unpacked` with the next bytes, all of it.
+    pub(super) fn fill(&mut self, unpacked: &mut [u8]) -> Result<(), Failure> {
+        let mut written = 0;
+        while written < unpacked.len() {
+            let (read, wrote, ended) = self.step(&mut unpacked[written..])?;
+            self.input.consume(read);
+            written += wrote;
+            if wrote == 0 && (ended || read == 0) {
+                return Err(Failure::Damaged(format!(
+                    "it ends {} bytes too early",
+                    unpacked.len() - written
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// One step of the codec: bytes read and written, and whether the stream has ended.
+    fn step(&mut self, unpacked: &mut [u8]) -> Result<(usize, usize, bool), Failure> {
+        let packed = self.input.fill_buf()?;
+        match &mut self.state {
+            State::Copy => {
+                let count = packed.len().min(unpacked.len());
+                unpacked[..count].copy_from_slice(&packed[..count]);
+                Ok((count, count, false))
+            }
+            State::Deflate(decoder) => {
+                let (read, written) = (decoder.total_in(), decoder.total_out());
+                let status = decoder
+                    .decompress(packed, unpacked, FlushDecompress::None)
+                    .map_err(|_| damaged("its DEFLATE stream is damaged"))?;
+                // Neither grows by more than a slice's length.
+                let (read, written) =
+                    ((decoder.total_in() - read) as usize, (decoder.total_out() - written) as usize);
+                Ok((read, written, status == Status::StreamEnd))
+            }
+            State::Lzw(decoder) => {
+                let step = decoder.decode_bytes(packed, unpacked);
+                match step.status {
+                    Ok(status) => {
+                        Ok((step.consumed_in, step.consumed_out, matches!(status, LzwStatus::Done)))
+                    }
+                    Err(_) => Err(damaged("its LZW stream is damaged")),
+                }
+            }
+            State::Zstd(decoder) => {
+                let (mut input, mut output) = (InBuffer::around(packed), OutBuffer::around(unpacked));
+                // At a frame's end the next one begins.
+                decoder.run(&mut input, &mut output).map_err(|_| damaged("its ZSTD stream is damaged"))?;
+                Ok((input.pos(), output.pos(), false))
+            }
+            State::PackBits(run) => {
+                let (read, written) = pack_bits(run, packed, unpacked);
+                Ok((read, written, false))
+            }
         }
     }
-    written
+}
+
+/// Fills `unpacked` with the first bytes of a chunk that is in memory and unpacks to `whole` bytes.
+pub(super) fn unpack(
+    compression: Compression,
+    packed: &[u8],
+    unpacked: &mut [u8],
+    whole: usize,
+) -> Result<(), Failure> {
+    let window = (whole as u64).next_power_of_two().max(1 << 17);
+    if compression == Compression::Zstd && zstd_frame::window(packed).is_some_and(|asked| asked > window) {
+        let mut all = vec![0; whole.max(unpacked.len())];
+        zstd_frame::unpack_whole(packed, &mut all).map_err(Failure::Damaged)?;
+        unpacked.copy_from_slice(&all[..unpacked.len()]);
+        return Ok(());
+    }
+    Unpacker::new(compression, packed, window)?.fill(unpacked)
+}
+
+/// Runs of a count byte: 0..127 so many and one literal bytes, -1..-127 one byte so many times and one. Gives the bytes read and written.
+fn pack_bits(run: &mut Run, packed: &[u8], unpacked: &mut [u8]) -> (usize, usize) {
+    let (mut read, mut written) = (0, 0);
+    while written < unpacked.len() {
+        let room = unpacked.len() - written;
+        if let Run::Repeated(byte, left) = *run {
+            let length = left.min(room);
+            unpacked[written..written + length].fill(byte);
+            written += length;
+            *run = if left > length { Run::Repeated(byte, left - length) } else { Run::Count };
+            continue;
+        }
+        let rest = &packed[read..];
+        let Some(first) = rest.first() else { break };
+        match *run {
+            Run::Count => {
+                let count = *first as i8;
+                *run = match count {
+                    0.. => Run::Bytes(count as usize + 1),
+                    i8::MIN => Run::Count,
+                    _ => Run::Byte(1 + usize::from(count.unsigned_abs())),
+                };
+                read += 1;
+            }
+            Run::Bytes(left) => {
+                let length = left.min(room).min(rest.len());
+                unpacked[written..written + length].copy_from_slice(&rest[..length]);
+                read += length;
+                written += length;
+                *run = if left > length { Run::Bytes(left - length) } else { Run::Count };
+            }
+            Run::Byte(times) => {
+                *run = Run::Repeated(*first, times);
+                read += 1;
+            }
+            Run::Repeated(..) => {}
+        }
+    }
+    (read, written)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Unpacks pieces of `piece` bytes from input that comes in such pieces too.
+    fn unpack(
+        compression: Compression,
+        packed: &[u8],
+        unpacked: &mut [u8],
+        piece: usize,
+    ) -> Result<(), Failure> {
+        let mut unpacker =
+            Unpacker::new(compression, std::io::BufReader::with_capacity(piece, packed), 1 << 23)?;
+        unpacked.chunks_mut(piece).try_for_each(|part| unpacker.fill(part))
+    }
+
     #[test]
     fn pack_bits_of_the_specification() {
         // The example of Apple's technical note 1023.
         let packed =
             [0xfe, 0xaa, 0x02, 0x80, 0x00, 0x2a, 0xfd, 0xaa, 0x03, 0x80, 0x00, 0x2a, 0x22, 0xf7, 0xaa];
-        let mut unpacked = [0; 24];
-        unpack(Compression::PackBits, &packed, &mut unpacked).unwrap();
-        assert_eq!(unpacked[..10], [0xaa, 0xaa, 0xaa, 0x80, 0, 0x2a, 0xaa, 0xaa, 0xaa, 0xaa]);
-        assert_eq!(unpacked[14..], [0xaa; 10]);
-        let error = unpack(Compression::PackBits, &packed[..9], &mut unpacked).unwrap_err();
-        assert!(error.contains("10 bytes where 24"), "{error}");
+        for piece in 1..20 {
+            let mut unpacked = [0; 24];
+            unpack(Compression::PackBits, &packed, &mut unpacked, piece).unwrap();
+            assert_eq!(unpacked[..10], [0xaa, 0xaa, 0xaa, 0x80, 0, 0x2a, 0xaa, 0xaa, 0xaa, 0xaa]);
+            assert_eq!(unpacked[14..], [0xaa; 10]);
+            let error = unpack(Compression::PackBits, &packed[..9], &mut unpacked, 24).unwrap_err();
+            assert!(
+                matches!(&error, Failure::Damaged(words) if words.contains("14 bytes too early")),
+                "{error:?}"
+            );
+        }
     }
 
     #[test]
     fn streams_cut_short_say_so() {
         for compression in [Compression::Deflate, Compression::Lzw, Compression::Zstd, Compression::None] {
             for packed in [&[][..], &[0x78], &[0x28, 0xb5, 0x2f, 0xfd]] {
-                assert!(unpack(compression, packed, &mut [0; 100]).is_err(), "{compression:?} {packed:?}");
+                for piece in [1, 7, 100] {
+                    let failure = unpack(compression, packed, &mut [0; 100], piece).unwrap_err();
+                    assert!(matches!(failure, Failure::Damaged(_)), "{compression:?} {packed:?} {failure:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_make_the_whole() {
+        let whole: Vec<u8> = (0..50_000u32).map(|i| (i / 7 * (i / 400)) as u8).collect();
+        let deflated = {
+            let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+            std::io::Write::write_all(&mut encoder, &whole).unwrap();
+            encoder.finish().unwrap()
+        };
+        let lzw = weezl::encode::Encoder::with_tiff_size_switch(BitOrder::Msb, 8).encode(&whole).unwrap();
+        let zstd = zstd::encode_all(&whole[..], 3).unwrap();
+        for (compression, packed) in
+            [(Compression::Deflate, deflated), (Compression::Lzw, lzw), (Compression::Zstd, zstd)]
+        {
+            for piece in [1, 333, 4096, 1 << 20] {
+                let mut unpacked = vec![0; whole.len()];
+                unpack(compression, &packed, &mut unpacked, piece).unwrap();
+                assert!(unpacked == whole, "{compression:?} {piece}");
+                // One byte more than there is.
+                unpacked.push(0);
+                assert!(
+                    unpack(compression, &packed, &mut unpacked, piece).is_err(),
+                    "{compression:?} {piece}"
+                );
             }
         }
     }

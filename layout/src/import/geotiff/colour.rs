@@ -8,10 +8,11 @@
 
 use super::colour_table::{Packing, Paint, Table};
 use super::{codec, geokeys, predictor, tags};
-use crate::atomic_file::read_at;
+use crate::disk::read_at;
 use crate::error::LayoutError;
 use crate::imagery::{ImageInfo, ImageSource, RowReader};
 use crate::import::guard::guard;
+use crate::import::{input, jpeg_frame::JpegFrame};
 use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 use rayon::prelude::*;
 use std::fs::File;
@@ -20,6 +21,8 @@ use std::path::{Path, PathBuf};
 
 /// Rows of strips unpacked at once, about.
 const GROUP_ROWS: u32 = 64;
+/// What is known of a chunk at hand: its place, where its texels are, and what an allocation costs.
+const CHUNK_BYTES: u64 = 96;
 
 /// A TIFF picture.
 #[derive(Debug)]
@@ -36,17 +39,25 @@ impl TiffImage {
         let directory = file.first_full_image()?;
         let table = Table::read(&mut file, &directory)?;
         let (georeference, _) = geokeys::read(&mut file, &directory)?;
-        let rows = u64::from(table.grid.chunk_height) * u64::from(group_chunks(&table));
         let info = ImageInfo {
             texels: [table.grid.width, table.grid.height],
             georeference,
             format: format!("{}{}", if file.is_big() { "BigTIFF" } else { "TIFF" }, table.describe()),
             notes: table.notes.clone(),
-            memory_bytes: u64::from(table.grid.width.max(table.grid.chunk_width)) * rows * 4
-                + rayon::current_num_threads() as u64 * 2 * table.chunk_bytes(),
+            memory_bytes: memory_bytes(&table),
         };
         Ok(Self { path: path.to_owned(), info, table })
     }
+}
+
+/// Memory for the chunks at hand, what is known of each, and the work on as many as there are threads.
+fn memory_bytes(table: &Table) -> u64 {
+    let chunks = u64::from(group_chunks(table)) * u64::from(table.grid.across);
+    let texels = u64::from(table.grid.chunk_width) * u64::from(table.grid.chunk_height);
+    let threads = (rayon::current_num_threads() as u64).min(chunks);
+    chunks
+        .saturating_mul(texels.saturating_mul(4).saturating_add(CHUNK_BYTES))
+        .saturating_add(table.worker_bytes().saturating_mul(threads))
 }
 
 /// Rows of chunks unpacked at once.
@@ -64,8 +75,7 @@ impl ImageSource for TiffImage {
     }
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
-        let file = File::open(&self.path)
-            .map_err(|e| LayoutError::io(&self.path, "cannot open the TIFF file", e))?;
+        let file = input::open(&self.path, "cannot open the TIFF file")?;
         Ok(Box::new(Rows { image: self, file, y: 0, first_chunk: 0, chunks: Vec::new() }))
     }
 }
@@ -108,10 +118,17 @@ impl Rows<'_> {
         self.chunks.resize((end - first) as usize, Vec::new());
         let image = self.image;
         let file = &self.file;
+        let mut places = table.grid.places(&image.path, file);
+        let places: Vec<Option<(u64, u64)>> = (first..end)
+            .map(|chunk| table.place(u64::from(chunk), &mut places))
+            .collect::<Result<_, LayoutError>>()?;
         self.chunks
             .par_iter_mut()
             .zip(first..end)
-            .map_init(Scratch::default, |scratch, (texels, chunk)| image.unpack(file, chunk, scratch, texels))
+            .zip(places)
+            .map_init(Scratch::default, |scratch, ((texels, chunk), place)| {
+                image.unpack(file, (chunk, place), scratch, texels)
+            })
             .collect::<Result<(), LayoutError>>()?;
         self.first_chunk = first;
         Ok(())
@@ -125,11 +142,11 @@ struct Scratch {
 }
 
 impl TiffImage {
-    /// One chunk as RGBA.
+    /// One chunk as RGBA, from its place.
     fn unpack(
         &self,
         file: &File,
-        chunk: u32,
+        (chunk, place): (u32, Option<(u64, u64)>),
         scratch: &mut Scratch,
         texels: &mut Vec<u8>,
     ) -> Result<(), LayoutError> {
@@ -137,7 +154,7 @@ impl TiffImage {
         let rows = table.grid.window(u64::from(chunk)).height;
         let count = table.grid.chunk_width as usize * rows as usize;
         texels.resize(count * 4, 0);
-        let Some((at, length)) = table.grid.place(u64::from(chunk)) else {
+        let Some((at, length)) = place else {
             texels.fill(0);
             return Ok(());
         };
@@ -151,7 +168,7 @@ impl TiffImage {
             ),
             _ => LayoutError::io(&self.path, "cannot read the TIFF file", e),
         })?;
-        let failed = |problem: String| {
+        let damaged = |problem: String| {
             LayoutError::damaged(
                 &self.path,
                 table.grid.name(u64::from(chunk)),
@@ -164,14 +181,22 @@ impl TiffImage {
             || match &table.packing {
                 Packing::Jpeg { tables } => {
                     let image = join_tables(tables, &scratch.packed);
-                    let (bytes, channels) = self.decode_jpeg(&image, rows).map_err(failed)?;
+                    let (bytes, channels) = self.decode_jpeg(&image, rows).map_err(damaged)?;
                     table.paint_chunk(&bytes, channels, texels);
                     Ok(())
                 }
                 Packing::Bytes(compression) => {
                     let pixel = table.bands as usize * table.sample_bytes as usize;
                     scratch.bytes.resize(count * pixel, 0);
-                    codec::unpack(*compression, &scratch.packed, &mut scratch.bytes).map_err(failed)?;
+                    let whole = table.grid.chunk_width as usize * table.grid.chunk_height as usize * pixel;
+                    codec::unpack(*compression, &scratch.packed, &mut scratch.bytes, whole).map_err(
+                        |failure| match failure {
+                            codec::Failure::Damaged(problem) => damaged(problem),
+                            codec::Failure::Io(source) => {
+                                LayoutError::io(&self.path, "cannot read the TIFF file", source)
+                            }
+                        },
+                    )?;
                     if table.differences {
                         let stride = table.grid.chunk_width as usize * pixel;
                         predictor::horizontal_bands(
@@ -190,7 +215,13 @@ impl TiffImage {
     }
 
     fn decode_jpeg(&self, image: &[u8], rows: u32) -> Result<(Vec<u8>, usize), String> {
-        let damaged = |e: jpeg_decoder::Error| format!("its JPEG stream is damaged ({e})");
+        let damaged = |_| "its JPEG stream is damaged".to_owned();
+        // Reading from memory does not fail.
+        let frame = JpegFrame::read(image).map_err(|_| "its JPEG stream is damaged".to_owned())?;
+        frame.check()?;
+        if frame.memory_bytes() > self.table.jpeg_bytes() {
+            return Err("its JPEG stream is of another size or sampling than its tiles".into());
+        }
         let mut decoder = Decoder::new(image);
         decoder.read_info().map_err(damaged)?;
         let Some(info) = decoder.info() else { return Err("its JPEG stream has no size".into()) };

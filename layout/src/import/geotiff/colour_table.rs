@@ -5,11 +5,19 @@
 
 use super::chunk_grid::{ChunkGrid, side};
 use super::chunks::{Compression, compression_of};
+use super::listing::Places;
 use super::tags::{self, Directory, TiffFile};
 use crate::error::LayoutError;
 
 /// Rows that uncompressed chunks are cut to where that comes out even.
 const CUT_ROWS: u32 = 64;
+
+/// Bands of a picture, at most.
+const MAX_BANDS: u64 = 64;
+/// Colours of a palette, at most.
+const MAX_COLOURS: u64 = 65_536;
+/// Bytes of the tables that JPEG chunks share, at most; they are some hundreds.
+const MAX_TABLE_BYTES: u64 = 1 << 16;
 
 /// What unpacks a chunk.
 #[derive(Debug)]
@@ -52,6 +60,8 @@ pub(super) struct Table {
     pub(super) differences: bool,
     /// Height of the chunks in the file, before they were cut.
     declared_height: u32,
+    /// Length of the longest chunk in the file.
+    longest: u64,
     /// What is lost in reading it.
     pub(super) notes: Vec<String>,
 }
@@ -69,7 +79,7 @@ impl Table {
         let mut notes = Vec::new();
         let sample_bytes = sample_bytes(file, directory, &mut notes)?;
         let colours = if matches!(paint, Paint::Rgb | Paint::YCbCr) { 3 } else { 1 };
-        let extra = file.numbers(directory, tags::EXTRA_SAMPLES)?.unwrap_or_default();
+        let extra = file.numbers(directory, tags::EXTRA_SAMPLES, MAX_BANDS)?.unwrap_or_default();
         let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2)).map(|at| colours + at);
         let alpha = alpha.filter(|at| (*at as u64) < bands);
         let unused = bands - colours as u64 - u64::from(alpha.is_some());
@@ -92,7 +102,8 @@ impl Table {
                      -co COMPRESS=DEFLATE INPUT output.tif",
                 ));
             }
-            Packing::Jpeg { tables: file.bytes_of(directory, tags::JPEG_TABLES)?.unwrap_or_default() }
+            let tables = file.bytes_of(directory, tags::JPEG_TABLES, MAX_TABLE_BYTES)?;
+            Packing::Jpeg { tables: tables.unwrap_or_default() }
         } else {
             Packing::Bytes(compression_of(file, directory)?)
         };
@@ -103,13 +114,15 @@ impl Table {
                 "predictor {predictor} does not go with its samples; write the file again"
             )));
         }
-        let void = file.text(directory, tags::GDAL_NODATA)?.and_then(|text| text.trim().parse::<f64>().ok());
+        let void = file.text(directory, tags::GDAL_NODATA, super::MAX_NODATA_BYTES)?;
+        let void = void.and_then(|text| text.trim().parse::<f64>().ok());
         let grid = ChunkGrid::read(file, directory, [width, height])?;
         if grid.count() > u64::from(u32::MAX) {
             return Err(file.damaged("it has more chunks than a picture can have; fetch the file again"));
         }
         let mut table = Self {
             declared_height: grid.chunk_height,
+            longest: 0,
             grid,
             bands,
             sample_bytes,
@@ -121,63 +134,88 @@ impl Table {
             differences: predictor == 2 && !is_raw,
             notes,
         };
+        table.longest = table.check(file)?;
         if is_raw {
-            table.cut(file.bytes());
+            table.cut();
         }
-        table.check(file)?;
         Ok(table)
     }
 
     /// Cuts uncompressed chunks into lower ones.
-    fn cut(&mut self, file_bytes: u64) {
-        let grid = &mut self.grid;
-        let one_strip = grid.chunk_height >= grid.height;
-        if grid.chunk_height <= CUT_ROWS || !(one_strip || grid.chunk_height.is_multiple_of(CUT_ROWS)) {
-            return;
+    fn cut(&mut self) {
+        let one_strip = self.grid.chunk_height >= self.grid.height;
+        let is_even = one_strip || self.grid.chunk_height.is_multiple_of(CUT_ROWS);
+        if self.grid.chunk_height > CUT_ROWS && is_even {
+            self.grid.cut(CUT_ROWS, u64::from(self.grid.chunk_width) * self.pixel_bytes());
         }
-        let row_bytes = u64::from(grid.chunk_width) * self.bands * self.sample_bytes;
-        // A file that is too short for its chunks gets no table of more; the check says so.
-        if row_bytes.saturating_mul(u64::from(grid.chunk_height)) > file_bytes {
-            return;
-        }
-        let cuts = grid.chunk_height.div_ceil(CUT_ROWS);
-        let mut places = Vec::new();
-        for chunk_row in grid.places.chunks(grid.across as usize) {
-            for cut in 0..u64::from(cuts) {
-                let skipped = cut * u64::from(CUT_ROWS) * row_bytes;
-                let rest = |&(at, bytes): &(u64, u64)| match bytes {
-                    0 => (0, 0),
-                    _ => (at.saturating_add(skipped), bytes.saturating_sub(skipped)),
-                };
-                places.extend(chunk_row.iter().map(rest));
-            }
-        }
-        grid.chunk_height = CUT_ROWS;
-        places.truncate(grid.across as usize * grid.height.div_ceil(CUT_ROWS) as usize);
-        grid.places = places;
     }
 
-    /// Every chunk lies in the file, and is no larger than it may be.
-    fn check(&mut self, file: &TiffFile) -> Result<(), LayoutError> {
-        self.grid.check_size(file, self.chunk_bytes())?;
-        let is_raw = matches!(self.packing, Packing::Bytes(Compression::None));
-        let pixel = self.bands * self.sample_bytes;
-        for chunk in 0..self.grid.count() {
-            let Some((at, packed)) = self.grid.place(chunk) else { continue };
-            let rows = self.grid.window(chunk).height;
-            let needed = u64::from(self.grid.chunk_width) * u64::from(rows) * pixel;
-            self.grid.check_end(file, chunk, at, if is_raw { needed } else { packed })?;
-            if is_raw {
-                self.grid.places[chunk as usize].1 = needed;
-            } else if packed > 2 * self.chunk_bytes() + (1 << 20) {
-                return Err(LayoutError::damaged(
+    /// Bytes of a texel's samples.
+    fn pixel_bytes(&self) -> u64 {
+        self.bands * self.sample_bytes
+    }
+
+    /// Whether the chunks are not compressed.
+    fn is_raw(&self) -> bool {
+        matches!(self.packing, Packing::Bytes(Compression::None))
+    }
+
+    /// Bytes that the samples of a chunk take that lie in the image's rows.
+    pub(super) fn stored_bytes(&self, chunk: u64) -> u64 {
+        let texels = u64::from(self.grid.chunk_width) * u64::from(self.grid.window(chunk).height);
+        texels.saturating_mul(self.pixel_bytes())
+    }
+
+    /// Offset and length of a chunk; `None` if the file left it out.
+    pub(super) fn place(
+        &self,
+        chunk: u64,
+        places: &mut Places<'_>,
+    ) -> Result<Option<(u64, u64)>, LayoutError> {
+        let place = self.grid.place(chunk, places)?;
+        Ok(place.map(|(at, length)| (at, if self.is_raw() { self.stored_bytes(chunk) } else { length })))
+    }
+
+    /// Every chunk lies in the file, and is no longer than it may be. Gives the length of the longest.
+    fn check(&self, file: &TiffFile) -> Result<u64, LayoutError> {
+        let is_raw = self.is_raw();
+        let longest_allowed = self.chunk_bytes().saturating_mul(2).saturating_add(1 << 20);
+        let stored = self.grid.check_places(
+            file,
+            is_raw,
+            |chunk| self.stored_bytes(chunk),
+            |chunk, _, packed| {
+                if is_raw || packed <= longest_allowed {
+                    return Ok(());
+                }
+                Err(LayoutError::damaged(
                     file.path(),
                     self.grid.name(chunk),
                     "it is much longer packed than unpacked; fetch the file again",
-                ));
-            }
-        }
-        Ok(())
+                ))
+            },
+        )?;
+        Ok(stored.longest)
+    }
+
+    /// Memory that unpacking one chunk takes, beside its texels.
+    pub(super) fn worker_bytes(&self) -> u64 {
+        let texels = u64::from(self.grid.chunk_width) * u64::from(self.grid.chunk_height);
+        let samples = texels.saturating_mul(self.pixel_bytes());
+        // Strips are no higher than the image, cut ones lower than the longest.
+        let packed = if self.is_raw() { samples.min(self.longest) } else { self.longest };
+        let codec = match &self.packing {
+            Packing::Jpeg { .. } => self.jpeg_bytes().saturating_add(packed),
+            Packing::Bytes(Compression::Zstd) => samples.saturating_mul(2),
+            Packing::Bytes(_) => 0,
+        };
+        packed.saturating_add(samples).saturating_add(codec).saturating_add(1 << 18)
+    }
+
+    /// Memory that unpacking a chunk of JPEG may take.
+    pub(super) fn jpeg_bytes(&self) -> u64 {
+        let padded = [self.grid.chunk_width, self.grid.chunk_height].map(|side| u64::from(side) + 64);
+        padded[0].saturating_mul(padded[1]).saturating_mul(5 * self.bands)
     }
 
     /// Bytes of a whole chunk when unpacked, as RGBA if that is more.
@@ -259,7 +297,7 @@ fn unsupported(file: &TiffFile, problem: &str) -> LayoutError {
 fn paint(file: &mut TiffFile, directory: &Directory, bands: u64, jpeg: bool) -> Result<Paint, LayoutError> {
     let photometric = file.number(directory, tags::PHOTOMETRIC)?.unwrap_or(if bands < 3 { 1 } else { 2 });
     let what = match (photometric, bands) {
-        (_, 0 | 65..) => {
+        (_, bands) if !(1..=MAX_BANDS).contains(&bands) => {
             return Err(file.damaged(format!("{bands} bands are declared; fetch the file again")));
         }
         (0, _) => return Ok(Paint::InverseGrey),
@@ -267,11 +305,14 @@ fn paint(file: &mut TiffFile, directory: &Directory, bands: u64, jpeg: bool) -> 
         (2, 3..) => return Ok(Paint::Rgb),
         (6, 3) if jpeg => return Ok(Paint::YCbCr),
         (3, _) => {
-            let colours = file.numbers(directory, tags::COLOR_MAP)?.unwrap_or_default();
-            let count = colours.len() / 3;
-            if count == 0 || count > 65536 {
-                return Err(file.damaged("the palette is missing; fetch or write the file again"));
+            let listed = file.count(directory, tags::COLOR_MAP);
+            if !(3..=3 * MAX_COLOURS).contains(&listed) {
+                return Err(file.damaged(format!(
+                    "{listed} numbers make no palette of up to {MAX_COLOURS} colours; fetch or write the file again"
+                )));
             }
+            let colours = file.numbers(directory, tags::COLOR_MAP, listed)?.unwrap_or_default();
+            let count = colours.len() / 3;
             let colour = |i: usize| [0, 1, 2].map(|channel| (colours[channel * count + i] >> 8) as u8);
             return Ok(Paint::Palette((0..count).map(colour).collect()));
         }
@@ -294,7 +335,7 @@ fn sample_bytes(
     directory: &Directory,
     notes: &mut Vec<String>,
 ) -> Result<u64, LayoutError> {
-    let bits = file.numbers(directory, tags::BITS_PER_SAMPLE)?.unwrap_or_else(|| vec![1]);
+    let bits = file.numbers(directory, tags::BITS_PER_SAMPLE, MAX_BANDS)?.unwrap_or_else(|| vec![1]);
     let format = file.number(directory, tags::SAMPLE_FORMAT)?.unwrap_or(1);
     match (format, bits.first()) {
         (1, Some(8)) if bits.iter().all(|b| *b == 8) => Ok(1),

@@ -9,6 +9,7 @@ use std::path::Path;
 
 use crate::dem::SampleType;
 use crate::error::LayoutError;
+use crate::words::harmless;
 
 /// Beyond this, a real void value is meant as the type's extreme.
 const EXTREME: f64 = 3.39e38;
@@ -37,12 +38,12 @@ impl Void {
             return Ok(Self { value: None, declared: true });
         }
         let Ok(value) = text.parse::<f64>() else {
-            let shown: String = text.chars().take(40).collect();
+            let shown = harmless(text, 40);
             return Err(LayoutError::damaged(
                 path,
                 "tag GDAL_NODATA",
                 format!(
-                    "the void value {shown:?} is no number; set it again: gdal_edit.py -a_nodata -9999 FILE"
+                    "the void value \"{shown}\" is no number; set it again: gdal_edit.py -a_nodata -9999 FILE"
                 ),
             ));
         };

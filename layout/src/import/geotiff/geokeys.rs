@@ -8,6 +8,7 @@
 use super::tags::{self, Directory, TiffFile};
 use crate::dem::{Georeference, HorizontalUnit};
 use crate::error::LayoutError;
+use crate::words::harmless;
 
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
@@ -23,6 +24,11 @@ const VERTICAL_UNITS: u16 = 4099;
 
 /// Semi-major axes of the Earth's ellipsoids in use, with room to spare.
 const EARTH_RADII_M: std::ops::RangeInclusive<f64> = 6_370_000.0..=6_385_000.0;
+
+/// Keys looked at, and the directory's head; there are not a hundred in the standard.
+const MAX_KEYS: u64 = 1024;
+/// Keys count values and characters in 16 bits.
+const MAX_PLACE: u64 = 1 << 16;
 
 /// Longest name kept.
 const MAX_NAME_CHARS: usize = 200;
@@ -87,9 +93,9 @@ fn transform(
     directory: &Directory,
     point: bool,
 ) -> Result<Option<[f64; 6]>, LayoutError> {
-    let matrix = file.reals(directory, tags::MODEL_TRANSFORMATION)?;
-    let scale = file.reals(directory, tags::MODEL_PIXEL_SCALE)?;
-    let tie = file.reals(directory, tags::MODEL_TIEPOINT)?;
+    let matrix = file.reals(directory, tags::MODEL_TRANSFORMATION, 16)?;
+    let scale = file.reals(directory, tags::MODEL_PIXEL_SCALE, 3)?;
+    let tie = file.reals(directory, tags::MODEL_TIEPOINT, 6)?;
     let raster = match (matrix.as_deref(), scale.as_deref(), tie.as_deref()) {
         (_, Some(&[across, down, ..]), Some(&[col, row, _, x, y, _, ..])) => {
             [x - col * across, across, 0.0, y + row * down.abs(), 0.0, -down.abs()]
@@ -115,9 +121,9 @@ struct Keys {
 impl Keys {
     fn read(file: &mut TiffFile, directory: &Directory) -> Result<Self, LayoutError> {
         Ok(Self {
-            directory: file.numbers(directory, tags::GEO_KEY_DIRECTORY)?.unwrap_or_default(),
-            reals: file.reals(directory, tags::GEO_DOUBLE_PARAMS)?.unwrap_or_default(),
-            texts: file.text(directory, tags::GEO_ASCII_PARAMS)?.unwrap_or_default(),
+            directory: file.numbers(directory, tags::GEO_KEY_DIRECTORY, 4 * MAX_KEYS)?.unwrap_or_default(),
+            reals: file.reals(directory, tags::GEO_DOUBLE_PARAMS, MAX_PLACE)?.unwrap_or_default(),
+            texts: file.text(directory, tags::GEO_ASCII_PARAMS, MAX_PLACE)?.unwrap_or_default(),
         })
     }
 
@@ -152,7 +158,7 @@ impl Keys {
         let bytes = self.texts.as_bytes().get(at..at.checked_add(count)?.min(self.texts.len()))?;
         let text = String::from_utf8_lossy(bytes);
         let text = text.trim_end_matches(['|', '\0']).trim();
-        let shown: String = text.chars().filter(|c| !c.is_control()).take(MAX_NAME_CHARS).collect();
+        let shown = harmless(text, MAX_NAME_CHARS);
         (!shown.is_empty()).then_some(shown)
     }
 }

@@ -2,10 +2,9 @@
 //!
 //! [`tags`] reads the directory and holds every declared size against the file, [`chunks`] makes the
 //! table of chunks of it, [`geokeys`] and [`metadata`] say where the grid lies and what a unit is.
-//! Uncompressed chunks are read piecewise by [`raw`], however large; compressed ones are unpacked whole by
+//! Chunks are read piecewise, however large: uncompressed ones by [`raw`], compressed ones by
 //! [`packed`] with [`codec`] and [`predictor`]. [`convert`] turns bytes into samples. Of a file with
-//! several images the first full-resolution one is read. Memory: 16 bytes a chunk, and an unpacked
-//! chunk a worker.
+//! several images the first full-resolution one is read. Memory: some rows a worker, whatever the file declares.
 //!
 //! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
 //! are not inverted for "white is zero" files. Masks in images of their own are not applied.
@@ -17,11 +16,13 @@ mod colour;
 mod colour_table;
 mod convert;
 mod geokeys;
+mod listing;
 mod metadata;
 mod packed;
 mod predictor;
 mod raw;
 mod tags;
+mod zstd_frame;
 
 use std::path::{Path, PathBuf};
 
@@ -33,6 +34,11 @@ use convert::Void;
 use tags::TiffFile;
 
 use super::WINDOW_SAMPLES;
+
+/// Longest text of the void value: a number.
+const MAX_NODATA_BYTES: u64 = 256;
+/// Longest metadata; those of a DEM are a few KiB.
+const MAX_METADATA_BYTES: u64 = 4 << 20;
 
 /// A GeoTIFF with one band of heights.
 #[derive(Debug)]
@@ -49,10 +55,10 @@ impl TiffDem {
         let mut file = TiffFile::open(path)?;
         let directory = file.first_full_image()?;
         let chunks = Chunks::read(&mut file, &directory)?;
-        let nodata = file.text(&directory, tags::GDAL_NODATA)?;
+        let nodata = file.text(&directory, tags::GDAL_NODATA, MAX_NODATA_BYTES)?;
         let void = Void::parse(path, nodata.as_deref(), chunks.sample_type)?;
         let (georeference, vertical_unit_m) = geokeys::read(&mut file, &directory)?;
-        let bands = file.text(&directory, tags::GDAL_METADATA)?.unwrap_or_default();
+        let bands = file.text(&directory, tags::GDAL_METADATA, MAX_METADATA_BYTES)?.unwrap_or_default();
         let heights = metadata::heights(&bands);
         let unit_m = heights.unit_m.unwrap_or(vertical_unit_m);
         let info = DemInfo {
@@ -79,6 +85,10 @@ impl DemSource for TiffDem {
         &self.info
     }
 
+    fn memory_bytes(&self) -> u64 {
+        self.chunks.memory_bytes()
+    }
+
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
         if self.chunks.is_raw() {
             raw::stream(&self.path, &self.chunks, &self.void, sink)
@@ -91,7 +101,7 @@ impl DemSource for TiffDem {
 /// Pushes `window` full of one value, a few rows at a time.
 fn put_constant(sink: &dyn SampleSink, window: Window, value: f64) -> Result<(), LayoutError> {
     let rows = rows_at_once(window.width).min(window.height);
-    // At most a window's worth, or one row.
+    // At most a window's worth, or one row, of which a build has no longer ones than 65,537.
     let samples = vec![value; window.width as usize * rows as usize];
     for part in parts(window, rows) {
         sink.put(part, &samples[..part.width as usize * part.height as usize])?;

@@ -1,14 +1,17 @@
 //! The tag directories of a TIFF or BigTIFF file.
 //!
 //! A directory is a list of (tag, type, count, value or place of the values). Every place and count is
-//! held against the length of the file when the directory is read, so whoever reads values later
-//! allocates no more than the file has. Cost: one small read a directory, one read a value.
+//! held against the length of the file when the directory is read. That says little of memory, for a file may be long and empty, and tags may
+//! share their values: so whoever reads values says how many of them mean anything, and no more are read. The one list that grows with the image,
+//! that of its chunks, stays in the file ([`super::listing`]). Cost: one small read a directory, one read a value.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use super::super::input;
+use super::listing::Column;
 use crate::error::LayoutError;
 
 pub(super) const NEW_SUBFILE_TYPE: u16 = 254;
@@ -40,10 +43,42 @@ pub(super) const GEO_ASCII_PARAMS: u16 = 34737;
 pub(super) const GDAL_METADATA: u16 = 42112;
 pub(super) const GDAL_NODATA: u16 = 42113;
 
+/// The tags that mean something here; what others hold is never looked at.
+const KNOWN: [u16; 28] = [
+    NEW_SUBFILE_TYPE,
+    IMAGE_WIDTH,
+    IMAGE_LENGTH,
+    BITS_PER_SAMPLE,
+    COMPRESSION,
+    PHOTOMETRIC,
+    STRIP_OFFSETS,
+    SAMPLES_PER_PIXEL,
+    ROWS_PER_STRIP,
+    STRIP_BYTE_COUNTS,
+    PLANAR_CONFIGURATION,
+    PREDICTOR,
+    COLOR_MAP,
+    TILE_WIDTH,
+    TILE_LENGTH,
+    TILE_OFFSETS,
+    TILE_BYTE_COUNTS,
+    EXTRA_SAMPLES,
+    SAMPLE_FORMAT,
+    JPEG_TABLES,
+    MODEL_PIXEL_SCALE,
+    MODEL_TIEPOINT,
+    MODEL_TRANSFORMATION,
+    GEO_KEY_DIRECTORY,
+    GEO_DOUBLE_PARAMS,
+    GEO_ASCII_PARAMS,
+    GDAL_METADATA,
+    GDAL_NODATA,
+];
+
 /// Directories looked at, at most: a full pyramid has a few dozen.
 const MAX_DIRECTORIES: usize = 1024;
-/// Longest text tag read; metadata of a DEM is a few KiB.
-const MAX_TEXT_BYTES: u64 = 16 << 20;
+/// Tags of all directories together, at most: a directory has some twenty.
+const MAX_TAGS: u64 = 1 << 18;
 
 /// An open TIFF file.
 #[derive(Debug)]
@@ -82,7 +117,7 @@ impl TiffFile {
     /// Opens the file and reads its header.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
         let cannot_read = |source| LayoutError::io(path, "cannot read the TIFF file", source);
-        let file = File::open(path).map_err(cannot_read)?;
+        let file = input::open(path, "cannot open the TIFF file")?;
         let bytes = file.metadata().map_err(cannot_read)?.len();
         let mut this = Self {
             path: path.to_owned(),
@@ -99,6 +134,10 @@ impl TiffFile {
 
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    pub(super) fn file(&self) -> &File {
+        self.file.get_ref()
     }
 
     /// Length of the file.
@@ -133,11 +172,12 @@ impl TiffFile {
             u64::from(self.u32(&head[4..]))
         };
         let mut seen = HashSet::new();
+        let mut tags_left = MAX_TAGS;
         for _ in 0..MAX_DIRECTORIES {
             if at == 0 || !seen.insert(at) {
                 break;
             }
-            let (directory, next) = self.directory(at)?;
+            let (directory, next) = self.directory(at, &mut tags_left)?;
             let kind = self.number(&directory, NEW_SUBFILE_TYPE)?.unwrap_or(0);
             if kind & 0b101 == 0 {
                 return Ok(directory);
@@ -147,8 +187,8 @@ impl TiffFile {
         Err(self.damaged("the file has no full-resolution image; write it again with gdal_translate"))
     }
 
-    /// Reads the directory at `at`; also gives the place of the next.
-    fn directory(&mut self, at: u64) -> Result<(Directory, u64), LayoutError> {
+    /// Reads the directory at `at`, which may have `tags_left` tags; also gives the place of the next.
+    fn directory(&mut self, at: u64, tags_left: &mut u64) -> Result<(Directory, u64), LayoutError> {
         let (count_bytes, entry_bytes, next_bytes, inline) =
             if self.big { (8, 20, 8, 8) } else { (2, 12, 4, 4) };
         let count = self.read_at(at, count_bytes, "tag directory")?;
@@ -156,6 +196,11 @@ impl TiffFile {
         if count > u64::from(u16::MAX) {
             return Err(self.damaged(format!("it claims {count} tags; fetch the file again")));
         }
+        *tags_left = tags_left.checked_sub(count).ok_or_else(|| {
+            self.damaged(format!(
+                "its directories have more than {MAX_TAGS} tags; write the file again with gdal_translate"
+            ))
+        })?;
         let table = self.read_at(at + count_bytes, count * entry_bytes + next_bytes, "tag directory")?;
         let (table, next) = table.split_at((count * entry_bytes) as usize);
         let mut entries = BTreeMap::new();
@@ -177,67 +222,93 @@ impl TiffFile {
                     "the {count} values of tag {tag} lie beyond the end of the file; it is cut short: fetch it again"
                 )));
             }
-            entries.entry(tag).or_insert(entry);
+            if KNOWN.contains(&tag) {
+                entries.entry(tag).or_insert(entry);
+            }
         }
         let next = if self.big { self.u64(next) } else { u64::from(self.u32(next)) };
         Ok((Directory { entries }, next))
     }
 
-    /// The bytes of a tag's values in file order, and their type.
-    fn values(&mut self, directory: &Directory, tag: u16) -> Result<Option<(u16, Vec<u8>)>, LayoutError> {
+    /// Number of a tag's values; 0 without the tag.
+    pub(super) fn count(&self, directory: &Directory, tag: u16) -> u64 {
+        directory.entries.get(&tag).map_or(0, |entry| entry.count)
+    }
+
+    /// The bytes of a tag's first values, `most` of them at most, in file order, and their type.
+    fn values(
+        &mut self,
+        directory: &Directory,
+        tag: u16,
+        most: u64,
+    ) -> Result<Option<(u16, Vec<u8>)>, LayoutError> {
         let Some(entry) = directory.entries.get(&tag).copied() else {
             return Ok(None);
         };
-        // The product was checked when the directory was read.
-        let bytes = type_bytes(entry.kind) * entry.count;
-        let inline = if self.big { 8 } else { 4 };
-        let values = if bytes <= inline {
-            entry.value[..bytes as usize].to_vec()
+        // The larger product was checked when the directory was read.
+        let wanted = type_bytes(entry.kind) * entry.count.min(most);
+        let values = if self.is_inline(&entry) {
+            entry.value[..wanted as usize].to_vec()
         } else {
-            self.read_at(self.place(&entry), bytes, "tag values")?
+            self.read_at(self.place(&entry), wanted, "tag values")?
         };
         Ok(Some((entry.kind, values)))
     }
 
-    /// A tag's values as unsigned integers.
+    /// A tag's first values as unsigned integers, `most` of them at most.
     pub(super) fn numbers(
         &mut self,
         directory: &Directory,
         tag: u16,
+        most: u64,
     ) -> Result<Option<Vec<u64>>, LayoutError> {
-        let Some((kind, bytes)) = self.values(directory, tag)? else {
+        let Some((kind, bytes)) = self.values(directory, tag, most)? else {
             return Ok(None);
         };
-        Ok(Some(match kind {
-            1 | 7 => bytes.iter().map(|byte| u64::from(*byte)).collect(),
-            3 => bytes.chunks_exact(2).map(|value| u64::from(self.u16(value))).collect(),
-            4 | 13 => bytes.chunks_exact(4).map(|value| u64::from(self.u32(value))).collect(),
-            16 | 18 => bytes.chunks_exact(8).map(|value| self.u64(value)).collect(),
-            _ => {
-                return Err(
-                    self.damaged(format!("tag {tag} has values of type {kind}, which are no whole numbers"))
-                );
-            }
+        let size = self.whole_number_bytes(tag, kind)?;
+        Ok(Some(bytes.chunks_exact(size).map(|value| self.whole_number(value)).collect()))
+    }
+
+    /// Where a tag's values are, for whoever reads them piece by piece.
+    pub(super) fn column(&self, directory: &Directory, tag: u16) -> Result<Option<Column>, LayoutError> {
+        let Some(entry) = directory.entries.get(&tag) else {
+            return Ok(None);
+        };
+        Ok(Some(Column {
+            count: entry.count,
+            value_bytes: self.whole_number_bytes(tag, entry.kind)?,
+            big_endian: self.big_endian,
+            inline: self.is_inline(entry).then_some(entry.value),
+            at: self.place(entry),
         }))
     }
 
-    /// A tag's values as they are in the file.
+    /// A tag's values as they are in the file, `most` bytes of them at most.
     pub(super) fn bytes_of(
         &mut self,
         directory: &Directory,
         tag: u16,
+        most: u64,
     ) -> Result<Option<Vec<u8>>, LayoutError> {
-        Ok(self.values(directory, tag)?.map(|(_, bytes)| bytes))
+        if self.count(directory, tag) > most {
+            return Err(self.damaged(format!("tag {tag} has more than {most} bytes; write the file again")));
+        }
+        Ok(self.values(directory, tag, most)?.map(|(_, bytes)| bytes))
     }
 
     /// A tag's first value as an unsigned integer.
     pub(super) fn number(&mut self, directory: &Directory, tag: u16) -> Result<Option<u64>, LayoutError> {
-        Ok(self.numbers(directory, tag)?.and_then(|values| values.first().copied()))
+        Ok(self.numbers(directory, tag, 1)?.and_then(|values| values.first().copied()))
     }
 
-    /// A tag's values as floating-point numbers.
-    pub(super) fn reals(&mut self, directory: &Directory, tag: u16) -> Result<Option<Vec<f64>>, LayoutError> {
-        let Some((kind, bytes)) = self.values(directory, tag)? else {
+    /// A tag's first values as floating-point numbers, `most` of them at most.
+    pub(super) fn reals(
+        &mut self,
+        directory: &Directory,
+        tag: u16,
+        most: u64,
+    ) -> Result<Option<Vec<f64>>, LayoutError> {
+        let Some((kind, bytes)) = self.values(directory, tag, most)? else {
             return Ok(None);
         };
         Ok(Some(match kind {
@@ -251,21 +322,25 @@ impl TiffFile {
         }))
     }
 
-    /// A tag's text up to its first NUL.
-    pub(super) fn text(&mut self, directory: &Directory, tag: u16) -> Result<Option<String>, LayoutError> {
-        if directory.entries.get(&tag).is_some_and(|entry| entry.count > MAX_TEXT_BYTES) {
-            return Err(
-                self.damaged(format!("tag {tag} is a text of more than {} MiB", MAX_TEXT_BYTES >> 20))
-            );
-        }
-        let Some((kind, mut bytes)) = self.values(directory, tag)? else {
+    /// A tag's text up to its first NUL; one of more than `most` bytes is refused.
+    pub(super) fn text(
+        &mut self,
+        directory: &Directory,
+        tag: u16,
+        most: u64,
+    ) -> Result<Option<String>, LayoutError> {
+        let Some(mut bytes) = self.bytes_of(directory, tag, most)? else {
             return Ok(None);
         };
+        let kind = directory.entries.get(&tag).map_or(0, |entry| entry.kind);
         if !matches!(kind, 1 | 2 | 7) {
             return Err(self.damaged(format!("tag {tag} has values of type {kind}, which are no text")));
         }
         bytes.truncate(bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len()));
-        Ok(Some(String::from_utf8_lossy(&bytes).into_owned()))
+        // Nearly always what is there is text, and no copy is made.
+        Ok(Some(
+            String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned()),
+        ))
     }
 
     /// Reads `count` bytes at `at`, after checking that the file has them.
@@ -296,24 +371,50 @@ impl TiffFile {
         Ok(bytes)
     }
 
+    /// Whether the values stand in the directory itself.
+    fn is_inline(&self, entry: &Entry) -> bool {
+        // The product was checked when the directory was read.
+        type_bytes(entry.kind) * entry.count <= if self.big { 8 } else { 4 }
+    }
+
+    /// Bytes of a whole number of the type `kind`.
+    fn whole_number_bytes(&self, tag: u16, kind: u16) -> Result<usize, LayoutError> {
+        match kind {
+            1 | 7 => Ok(1),
+            3 => Ok(2),
+            4 | 13 => Ok(4),
+            16 | 18 => Ok(8),
+            _ => {
+                Err(self.damaged(format!("tag {tag} has values of type {kind}, which are no whole numbers")))
+            }
+        }
+    }
+
+    fn whole_number(&self, bytes: &[u8]) -> u64 {
+        whole_number(bytes, self.big_endian)
+    }
+
     fn place(&self, entry: &Entry) -> u64 {
         if self.big { self.u64(&entry.value) } else { u64::from(self.u32(&entry.value)) }
     }
 
     fn u16(&self, bytes: &[u8]) -> u16 {
-        let bytes = [bytes[0], bytes[1]];
-        if self.big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) }
+        whole_number(&bytes[..2], self.big_endian) as u16
     }
 
     fn u32(&self, bytes: &[u8]) -> u32 {
-        let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
-        if self.big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) }
+        whole_number(&bytes[..4], self.big_endian) as u32
     }
 
     fn u64(&self, bytes: &[u8]) -> u64 {
-        let bytes = std::array::from_fn(|i| bytes[i]);
-        if self.big_endian { u64::from_be_bytes(bytes) } else { u64::from_le_bytes(bytes) }
+        whole_number(&bytes[..8], self.big_endian)
     }
+}
+
+/// The unsigned number in at most 8 bytes.
+pub(super) fn whole_number(bytes: &[u8], big_endian: bool) -> u64 {
+    let add = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
+    if big_endian { bytes.iter().fold(0, add) } else { bytes.iter().rev().fold(0, add) }
 }
 
 /// Bytes of one value of a TIFF type; unknown types count as bytes, their tags are not read.

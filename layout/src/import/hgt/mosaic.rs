@@ -9,11 +9,11 @@
 //! of rows a worker.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
 use super::super::WINDOW_SAMPLES;
+use super::super::input;
 use super::super::parallel::each_task;
 use super::{name, side_of};
 use crate::dem::{SampleSink, Window};
@@ -205,10 +205,10 @@ impl Mosaic {
         };
         let row_bytes = self.side as usize * 2;
         let mut bytes = vec![0; row_bytes * rows as usize];
-        let read = File::open(path).and_then(|mut file| {
-            file.seek(SeekFrom::Start(u64::from(first) * row_bytes as u64))?;
-            file.read_exact(&mut bytes)
-        });
+        let mut file = input::open(path, "cannot open the .hgt tile")?;
+        let read = file
+            .seek(SeekFrom::Start(u64::from(first) * row_bytes as u64))
+            .and_then(|_| file.read_exact(&mut bytes));
         read.map_err(|source| match source.kind() {
             ErrorKind::UnexpectedEof => LayoutError::damaged(
                 path,

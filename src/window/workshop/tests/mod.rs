@@ -62,6 +62,21 @@ impl Disk for TestDisk {
         self.call();
         SystemDisk.sync(file)
     }
+
+    fn link(&self, file: &File, to: &Path) -> io::Result<()> {
+        self.call();
+        SystemDisk.link(file, to)
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.call();
+        SystemDisk.rename(from, to)
+    }
+
+    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+        self.call();
+        SystemDisk.sync_folder(folder)
+    }
 }
 
 /// A terrain of some 60 pages with room for other heights.

@@ -7,7 +7,7 @@ use crate::bytes::{
     put_u32, put_u64,
 };
 use crate::error::LayoutError;
-use crate::header::{Header, ImageryPlace, seal};
+use crate::header::{Header, History, ImageryPlace, seal};
 use crate::source::Source;
 use std::path::Path;
 
@@ -75,6 +75,42 @@ impl State {
                 [offset, bytes] => Some(ImageryPlace { offset, bytes }),
             },
         }
+    }
+}
+
+/// What the next commit of a file follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lineage {
+    /// Journal page of the commit that the file is at; 0 if it is as it was built.
+    parent: u32,
+    /// Of the commit after it.
+    sequence: u32,
+    /// The state before all commits.
+    pub(crate) original: State,
+}
+
+impl Lineage {
+    /// Of the file that `header` is the current one of.
+    ///
+    /// # Errors
+    /// As [`Commit::read`].
+    pub(crate) fn read(source: &dyn Source, header: &Header) -> Result<Self, LayoutError> {
+        let Some(History { commit_page, tip_page }) = header.history else {
+            return Ok(Self { parent: 0, sequence: 1, original: State::of(header) });
+        };
+        let tip = Commit::read(source, header, tip_page)?;
+        let sequence = match commit_page {
+            0 => 0,
+            page if page == tip_page => tip.sequence,
+            page => Commit::read(source, header, page)?.sequence,
+        };
+        Ok(Self { parent: commit_page, sequence: sequence.saturating_add(1), original: tip.original })
+    }
+
+    /// The commit that follows and leads to `state`.
+    pub(crate) fn commit(&self, state: State, edits: u64, label: &str) -> Commit {
+        let Self { parent, sequence, original } = *self;
+        Commit { parent, sequence, edits, state, original, label: label.to_owned() }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::{Disk, SystemDisk};
 use std::fs::File;
 use std::io::{Error, ErrorKind, Result};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How a [`FailingDisk`] fails. Of a write that fails some quarters of the bytes may still arrive.
@@ -87,5 +88,17 @@ impl Disk for FailingDisk {
 
     fn sync(&self, file: &File) -> Result<()> {
         self.error(true).map_or_else(|| SystemDisk.sync(file), Err)
+    }
+
+    fn link(&self, file: &File, to: &Path) -> Result<()> {
+        self.error(true).map_or_else(|| SystemDisk.link(file, to), Err)
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> Result<()> {
+        self.error(true).map_or_else(|| SystemDisk.rename(from, to), Err)
+    }
+
+    fn sync_folder(&self, folder: &Path) -> Result<()> {
+        self.error(true).map_or_else(|| SystemDisk.sync_folder(folder), Err)
     }
 }

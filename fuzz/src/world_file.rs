@@ -1,0 +1,25 @@
+//! A world file beside a picture that is sound.
+
+use crate::image::reads_and_drapes;
+use crate::seeds::{self, Inputs};
+use crate::words::told;
+use terrasoar_layout::imagery::open_image;
+
+/// The picture.
+const PICTURE: &[u8] = include_bytes!("../../layout/tests/image_fixtures/rgba.png");
+
+pub(crate) fn seeds() -> Inputs {
+    seeds::world_files()
+}
+
+pub(crate) fn body(data: &[u8]) {
+    let folder = crate::scratch::folder();
+    let path = folder.path().join("picture.png");
+    seeds::write(&path, PICTURE);
+    seeds::write(&folder.path().join("picture.pgw"), data);
+    let image = told(open_image(&path))
+        .unwrap_or_else(|| panic!("a world file keeps a sound picture from being opened"));
+    let map = image.info().georeference.pixel_to_crs;
+    assert!(map.is_none_or(|map| map.iter().all(|number| number.is_finite())), "{map:?}");
+    reads_and_drapes(image, folder.path());
+}

@@ -1,0 +1,52 @@
+//! A state that the file is to go to, checked as opening checks it, before any header names it.
+//!
+//! Undoing and redoing write a header alone, so nothing but this stands between a journal of nonsense and a file that does not open. Cost: what opening the file costs, less the
+//! leaves that the state has in common with the one that is known.
+
+use crate::bytes::{Page, get_u64};
+use crate::directory::Entry;
+use crate::error::LayoutError;
+use crate::file::directory::Directory;
+use crate::header::Header;
+use crate::imagery::Imagery;
+use crate::opening::read_directory_beside;
+use crate::terrain::Terrain;
+
+/// A state that opens.
+pub(super) struct CheckedState {
+    /// Its directory.
+    pub(super) directory: Directory,
+    /// Logical pages whose entries are others than those known, and their entries.
+    pub(super) differing: Vec<(usize, Entry)>,
+}
+
+/// Checks the state that the header page `page` names, in the file of `terrain`, whose directory is now `known`: the header itself, the whole directory, the imagery.
+///
+/// # Errors
+/// What opening the file in that state would say.
+pub(super) fn check_state(
+    terrain: &Terrain,
+    known: &Directory,
+    page: &Page,
+) -> Result<CheckedState, LayoutError> {
+    read_state(terrain, known, page).map_err(|error| match error {
+        LayoutError::Damaged { path, place, problem } => {
+            let place = format!("the state that this would lead to, {place}");
+            LayoutError::Damaged { path, place, problem: format!("{problem}. Nothing was changed") }
+        }
+        other => other,
+    })
+}
+
+fn read_state(terrain: &Terrain, known: &Directory, page: &Page) -> Result<CheckedState, LayoutError> {
+    let magic = get_u64(page, 0).to_le_bytes();
+    let header = Header::parse_as(terrain.path(), page, magic)?;
+    let (root, entries) =
+        read_directory_beside(terrain.source(), &header, Some((&known.root, &known.entries)))?;
+    if let Some(place) = header.imagery {
+        Imagery::open_at(terrain, place, header.file_bytes)?;
+    }
+    let pairs = entries.iter().zip(&known.entries).enumerate();
+    let differing = pairs.filter(|(_, (theirs, ours))| theirs != ours).map(|(i, (theirs, _))| (i, *theirs));
+    Ok(CheckedState { differing: differing.collect(), directory: Directory { entries, root } })
+}

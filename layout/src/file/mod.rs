@@ -1,0 +1,19 @@
+//! The one way to the disk: how terrain files come to be, grow and are replaced, so that nothing told as durable is lost and nothing of others is harmed.
+//!
+//! * [`atomic`]: a new file appears under its name only when it is complete, keeps what the name stood for (a link, a mode, an owner), and its name is on the disk too.
+//! * [`lock`]: one writer at a time, by a lock on the file itself, whatever name it is reached by.
+//! * `tail`: a file grows behind its end, and one write of a header makes that count. Edits, undo, pictures and overlays all go through it.
+//! * `directory`: where pages lie, written behind them.
+//! * `journal`: what commits led to and what was before them.
+//! * `slots`: which of a file's two headers counts.
+//! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
+//! * `publish`: a terrain file that does not open is not published.
+
+pub mod atomic;
+pub(crate) mod directory;
+pub(crate) mod journal;
+pub(crate) mod lock;
+pub(crate) mod publish;
+mod seen;
+pub(crate) mod slots;
+pub(crate) mod tail;

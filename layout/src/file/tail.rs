@@ -1,0 +1,218 @@
+//! The end of a file that grows while others read it: what is written behind everything that a header leads to, and the header that makes it count (FORMAT.md, sections 7.1 and 8.5).
+//!
+//! The order is always the same: the new bytes, a sync, a look whether the file still has its name, the header slot that is not current, a sync. Nothing that a header
+//! leads or led to is written over. Killed or cut off anywhere, the file holds what it held before or all of the new.
+//!
+//! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers it, so that the next write goes behind what that header counts and takes the generation after its.
+
+use super::lock::WriteLock;
+use super::slots::Slots;
+use crate::bytes::{PAGE_BYTES, Page};
+use crate::disk::Disk;
+use crate::error::LayoutError;
+use crate::header::Header;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+const PAGE: u64 = PAGE_BYTES as u64;
+
+/// What headers that failed may have made of the file all the same.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Attempted {
+    generation: u32,
+    file_bytes: u64,
+}
+
+impl Attempted {
+    /// Whether a header newer than this one may be on the disk.
+    pub(crate) fn is_after(&self, header: &Header) -> bool {
+        self.generation > header.generation
+    }
+
+    /// Takes an attempt into account that did not succeed.
+    pub(crate) fn note(&mut self, attempt: &Attempt) {
+        if attempt.header_begun.load(Ordering::Acquire) {
+            self.generation = self.generation.max(attempt.generation);
+            self.file_bytes = self.file_bytes.max(attempt.file_bytes);
+        }
+    }
+}
+
+/// How far a header came. Whoever ordered the write keeps a clone, to know what may be on the disk if nobody comes back.
+#[derive(Debug)]
+pub(crate) struct Attempt {
+    generation: u32,
+    file_bytes: u64,
+    header_begun: AtomicBool,
+}
+
+/// Where a file is written to.
+#[derive(Debug)]
+pub(crate) struct Tail {
+    path: PathBuf,
+    file: TailFile,
+    /// Offset of the file's first byte: 0, or where an overlay begins.
+    start: u64,
+    /// First byte behind everything that a header leads to, of a page.
+    begin: u64,
+    /// The generation after all that were tried.
+    generation: u32,
+    /// The current header as it stands in the file.
+    current: Box<Page>,
+    /// Byte from the file's start at which the next header goes.
+    header_offset: u64,
+}
+
+/// Whose end it is.
+#[derive(Debug)]
+enum TailFile {
+    /// A file that others may have open, and the right to write to it.
+    Live(WriteLock),
+    /// One that has no name yet, which needs none of the care.
+    New(File),
+}
+
+/// A header that is ready to be written.
+#[derive(Debug)]
+pub(crate) struct NextHeader {
+    pub(crate) page: Box<Page>,
+    pub(crate) header: Header,
+    pub(crate) attempt: Arc<Attempt>,
+}
+
+impl Tail {
+    /// The end of the file at `path` that `lock` is of, whose first byte has the offset `start`.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] when the generations have run out.
+    pub(crate) fn of(
+        path: &Path,
+        lock: &WriteLock,
+        start: u64,
+        slots: &Slots,
+        attempted: Attempted,
+    ) -> Result<Self, LayoutError> {
+        Self::new(path, TailFile::Live(lock.clone()), start, slots, attempted)
+    }
+
+    /// The end of a file that nobody else knows of, because it is not published yet.
+    pub(crate) fn of_new(path: &Path, file: &File, slots: &Slots) -> Result<Self, LayoutError> {
+        let file =
+            file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
+        Self::new(path, TailFile::New(file), 0, slots, Attempted::default())
+    }
+
+    fn new(
+        path: &Path,
+        file: TailFile,
+        start: u64,
+        slots: &Slots,
+        attempted: Attempted,
+    ) -> Result<Self, LayoutError> {
+        let old = &slots.header;
+        let Some(generation) = old.generation.max(attempted.generation).checked_add(1) else {
+            return Err(LayoutError::Usage(format!(
+                "{}: it was written to four thousand million times, which is the most it can count; written anew (compacted) it begins to count again",
+                path.display()
+            )));
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            start,
+            begin: old.file_bytes.max(attempted.file_bytes).next_multiple_of(PAGE),
+            generation,
+            current: slots.current.clone(),
+            header_offset: slots.next_offset(),
+        })
+    }
+
+    fn file(&self) -> &File {
+        match &self.file {
+            TailFile::Live(lock) => lock.file(),
+            TailFile::New(file) => file,
+        }
+    }
+
+    /// Where what is written first goes.
+    pub(crate) fn begin(&self) -> u64 {
+        self.begin
+    }
+
+    /// Generation of the next header.
+    pub(crate) fn generation(&self) -> u32 {
+        self.generation
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes `bytes` at `offset`, which lies behind everything that counts.
+    pub(crate) fn write(&self, disk: &dyn Disk, bytes: &[u8], offset: u64) -> Result<(), LayoutError> {
+        debug_assert!(offset >= self.begin);
+        self.put(disk, bytes, offset - self.start)
+    }
+
+    fn put(&self, disk: &dyn Disk, bytes: &[u8], place: u64) -> Result<(), LayoutError> {
+        let when_full =
+            "cannot append to the file, for which there is no room; make some on its disk, and try again";
+        disk.write_at(self.file(), bytes, place)
+            .map_err(|e| LayoutError::write(&self.path, "cannot append to the file", when_full, e))
+    }
+
+    /// Brings the file to the disk, if anybody could miss it.
+    fn sync(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
+        match &self.file {
+            TailFile::New(_) => Ok(()),
+            TailFile::Live(lock) => disk
+                .sync(lock.file())
+                .map_err(|e| LayoutError::io(&self.path, "cannot bring the file to the disk", e)),
+        }
+    }
+
+    /// The header that follows, with this tail's generation.
+    ///
+    /// # Errors
+    /// [`LayoutError::Damaged`] for one that no reader would accept: it must not be written.
+    pub(crate) fn next_header(&self, header: Header) -> Result<NextHeader, LayoutError> {
+        let header = Header { generation: self.generation, ..header };
+        let page = header.amended(&self.current);
+        let magic = std::array::from_fn(|i| self.current[i]);
+        Header::parse_as(&self.path, &page, magic)?;
+        let attempt = Attempt {
+            generation: header.generation,
+            file_bytes: header.file_bytes,
+            header_begun: AtomicBool::new(false),
+        };
+        Ok(NextHeader { page, header, attempt: Arc::new(attempt) })
+    }
+
+    /// Brings what was written to the disk, then the header that leads to it.
+    ///
+    /// # Errors
+    /// [`LayoutError::Io`], or [`LayoutError::Usage`] if the file was replaced under its name. The file reads as before then, or as after if only the last sync failed.
+    pub(crate) fn flip(&self, disk: &dyn Disk, next: &NextHeader) -> Result<(), LayoutError> {
+        self.sync(disk)?;
+        if let TailFile::Live(lock) = &self.file
+            && !lock.is_of(&self.path)
+        {
+            return Err(LayoutError::Usage(format!(
+                "{}: the file was replaced by another while it was written to; open it again, and do it again",
+                self.path.display()
+            )));
+        }
+        next.attempt.header_begun.store(true, Ordering::Release);
+        self.put(disk, &next.page[..], self.header_offset)?;
+        self.sync(disk)
+    }
+
+    /// Gives back what was written, whose header was never begun. Failing here costs space only.
+    pub(crate) fn give_up(&self, disk: &dyn Disk, next: Option<&NextHeader>, length: u64) {
+        if next.is_none_or(|next| !next.attempt.header_begun.load(Ordering::Acquire)) {
+            let _ = disk.set_len(self.file(), length);
+        }
+    }
+}

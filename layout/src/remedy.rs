@@ -1,0 +1,31 @@
+//! What a caller can ask for to mend a refusal, as a value.
+//!
+//! A library does not know by which flag or button a program asks for more memory or another spacing. Its messages say what to change in words, and
+//! the error carries the same as a [`Remedy`], which a program turns into its own way of asking. Cost: none.
+
+/// Something that can be asked for and would mend a refusal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Remedy {
+    /// The distance between samples, stated: [`BuildOptions::spacing_m`](crate::build::BuildOptions::spacing_m).
+    Spacing,
+    /// The raw value that means "no data": [`BuildOptions::nodata`](crate::build::BuildOptions::nodata).
+    Nodata,
+    /// Another factor on heights: [`BuildOptions::z_scale`](crate::build::BuildOptions::z_scale).
+    HeightFactor,
+    /// More memory, in `memory_mib` of the options.
+    Memory {
+        /// Mebibytes that are enough, where known.
+        enough_mib: Option<u64>,
+    },
+    /// An image to drape.
+    Image,
+    /// The place of an image, stated: [`DrapeOptions::extent`](crate::imagery::DrapeOptions::extent).
+    Extent,
+    /// Another format of tiles: [`DrapeOptions::format`](crate::imagery::DrapeOptions::format).
+    TileFormat,
+    /// Edits kept in a file of their own, an overlay.
+    Overlay,
+    /// Another folder for scratch files.
+    ScratchFolder,
+}

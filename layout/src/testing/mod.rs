@@ -1,0 +1,25 @@
+//! Terrain files with nonsense in them and right checksums, for tests and fuzzing: what a hostile or faulty writer could make.
+//!
+//! | part | what |
+//! |---|---|
+//! | [`reseal`], [`reseal_overlay`] | makes every checksum right, bottom up |
+//! | [`Mutation`] | one change of a part that matters, told by eight bytes |
+//! | [`Sealed`] | a terrain file, and perhaps an overlay over it, mutated and sealed by a recipe of mutations |
+//! | [`seeds`] | small sound files to begin with |
+//! | [`exercise`] | everything that this crate does with a file |
+//!
+//! Invariant: mutating and sealing never panic or take long, whatever the bytes; equal recipes give equal files. Cost: a few checksums of the file.
+
+mod exercise;
+mod image;
+mod mutation;
+mod parts;
+mod seal;
+mod sealed;
+mod seeds;
+
+pub use exercise::exercise;
+pub use mutation::Mutation;
+pub use seal::{Counts, reseal, reseal_overlay};
+pub use sealed::Sealed;
+pub use seeds::{Seed, seeds};

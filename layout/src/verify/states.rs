@@ -1,0 +1,269 @@
+//! Older and newer states of an edited file, down to the pages that they alone lead to.
+//!
+//! States share most of what they are made of, so each is looked at by what differs from the one looked at before: leaves are read where the root names another, record pages
+//! and tiles once, however many states have them. What writers make lies nowhere over anything else, so that all of it together is no longer than the file; more is
+//! refused, lest a small file keep a reader busy for long. Cost: a read of what the file holds besides its current state, 24 bytes a record page or tile read, and what
+//! opening takes.
+
+use super::Findings;
+use crate::bytes::{PAGE_BYTES, checksum, to_usize};
+use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses};
+use crate::error::LayoutError;
+use crate::file::journal::State;
+use crate::header::Header;
+use crate::imagery::Imagery;
+use crate::opening::{read_leaf, read_root};
+use crate::terrain::Terrain;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+
+const PAGE: u64 = PAGE_BYTES as u64;
+/// States with problems after which the rest is not looked at.
+const MOST_BAD_STATES: usize = 20;
+
+/// Bytes of the file, and what a state says of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Wanted {
+    page: u32,
+    bytes: u32,
+    checksum: u32,
+    is_tile: bool,
+    /// Logical page, or place in the directory of tiles.
+    index: u32,
+    /// Place in [`States::names`].
+    state: u32,
+}
+
+impl Wanted {
+    /// What makes two of them one read.
+    fn what(&self) -> (u32, u32, u32) {
+        (self.page, self.bytes, self.checksum)
+    }
+}
+
+/// States, one after the other.
+pub(super) struct States<'t> {
+    terrain: &'t Terrain,
+    names: Vec<String>,
+    /// The sound state looked at last: its header, root, entries, and the pages that these take.
+    header: Header,
+    root: Vec<Entry>,
+    entries: Vec<Entry>,
+    uses: PageUses,
+    journal: Vec<u32>,
+    /// Roots and imagery seen.
+    roots: BTreeSet<(u32, u32, u64)>,
+    sections: BTreeSet<(u64, u64)>,
+    wanted: Vec<Wanted>,
+    /// Bytes of directories that may still be read.
+    left: u64,
+    bad: usize,
+}
+
+impl<'t> States<'t> {
+    /// Begins with the state that the terrain is in, which opening has checked.
+    pub(super) fn of(terrain: &'t Terrain) -> Result<Self, LayoutError> {
+        let (source, header) = (terrain.source(), terrain.header());
+        let state = State::of(header);
+        let mut states = Self {
+            terrain,
+            names: Vec::new(),
+            header: header.clone(),
+            root: read_root(source, header)?,
+            entries: terrain.entries().to_vec(),
+            uses: PageUses::new(source, header.file_bytes)?,
+            journal: Vec::new(),
+            roots: BTreeSet::from([root_of(&state)]),
+            sections: header.imagery.iter().map(|place| (place.offset, place.bytes)).collect(),
+            wanted: Vec::new(),
+            left: source.byte_count(),
+            bad: 0,
+        };
+        states.take_all()?;
+        Ok(states)
+    }
+
+    /// No state may use the journal page `page` for anything else.
+    pub(super) fn take_journal(&mut self, page: u32, findings: &mut Findings) {
+        match self.uses.take(page.into(), 1) {
+            Ok(()) => self.journal.push(page),
+            Err(problem) => findings.add(format!("journal (file page {page})"), problem),
+        }
+    }
+
+    /// Takes all pages of the state held, from none.
+    fn take_all(&mut self) -> Result<(), LayoutError> {
+        let source = self.terrain.source();
+        self.uses = PageUses::new(source, self.terrain.header().file_bytes)?;
+        self.uses.take_root(source, &self.header, &self.root)?;
+        for (i, _) in self.root.iter().enumerate().filter(|(_, leaf)| leaf.is_present()) {
+            self.uses.take_entries(source, i * ENTRIES_PER_LEAF, leaf_of(&self.entries, i))?;
+        }
+        // They were free before.
+        self.journal.iter().for_each(|page| _ = self.uses.take((*page).into(), 1));
+        Ok(())
+    }
+
+    /// Checks what `state` has that none had before it; `name` says in messages which it is.
+    pub(super) fn look_at(
+        &mut self,
+        name: String,
+        state: &State,
+        findings: &mut Findings,
+    ) -> Result<(), LayoutError> {
+        if self.bad >= MOST_BAD_STATES {
+            return Ok(());
+        }
+        let header = state.put_into(self.terrain.header());
+        self.names.push(name);
+        let found = [
+            if self.roots.insert(root_of(state)) { self.directory(&header) } else { Ok(()) },
+            self.imagery(&header),
+        ];
+        for error in found.into_iter().filter_map(Result::err) {
+            let LayoutError::Damaged { place, problem, .. } = error else { return Err(error) };
+            findings.add(format!("{place} {}", self.name(self.names.len() - 1)), problem);
+            self.bad += 1;
+        }
+        Ok(())
+    }
+
+    fn name(&self, state: usize) -> &str {
+        self.names.get(state).map_or("", String::as_str)
+    }
+
+    /// Takes `bytes` off those that may be read of directories.
+    fn spend(&mut self, bytes: u64, place: &str) -> Result<(), LayoutError> {
+        let left = self.left.checked_sub(bytes);
+        self.left = left.unwrap_or(0);
+        left.map(|_| ()).ok_or_else(|| {
+            let problem =
+                "with those of other states it is longer than the file, so they lie over one another";
+            LayoutError::damaged(self.terrain.path(), place, problem)
+        })
+    }
+
+    /// Goes from the directory held to that of `header`.
+    fn directory(&mut self, header: &Header) -> Result<(), LayoutError> {
+        let source = self.terrain.source();
+        self.spend(header.root_entries() * ENTRY_BYTES as u64, "directory root")?;
+        let root = read_root(source, header)?;
+        let differing: Vec<usize> = (0..root.len()).filter(|i| root[*i] != self.root[*i]).collect();
+        let mut leaves = Vec::new();
+        for i in differing {
+            let mut leaf = vec![Entry::default(); leaf_of(&self.entries, i).len()];
+            if root[i].is_present() {
+                self.spend(PAGE, &format!("directory leaf {i}"))?;
+                read_leaf(source, header, i, root[i], &mut leaf)?;
+            }
+            leaves.push((i, leaf));
+        }
+        let taken = self.exchange(header, &root, &leaves);
+        if taken.is_err() {
+            self.take_all()?;
+            return taken;
+        }
+        let state = (self.names.len() - 1) as u32;
+        for (i, leaf) in leaves {
+            let first = i * ENTRIES_PER_LEAF;
+            for ((logical, ours), theirs) in (first..).zip(&mut self.entries[first..]).zip(leaf) {
+                if *ours != theirs && theirs.is_present() {
+                    let Entry { page, checksum, .. } = theirs;
+                    let (bytes, index) = (PAGE_BYTES as u32, logical as u32);
+                    self.wanted.push(Wanted { page, bytes, checksum, is_tile: false, index, state });
+                }
+                *ours = theirs;
+            }
+        }
+        self.root = root;
+        self.header = header.clone();
+        Ok(())
+    }
+
+    /// Gives back the pages of root and leaves that are not the new state's, and takes those that are.
+    fn exchange(
+        &mut self,
+        header: &Header,
+        root: &[Entry],
+        leaves: &[(usize, Vec<Entry>)],
+    ) -> Result<(), LayoutError> {
+        let source = self.terrain.source();
+        self.uses.give_back_root(&self.header, &self.root);
+        let mut stored = self.header.stored_pages;
+        for (i, _) in leaves {
+            let ours = leaf_of(&self.entries, *i);
+            self.uses.give_back_entries(ours);
+            stored -= present(ours);
+        }
+        self.uses.take_root(source, header, root)?;
+        for (i, leaf) in leaves {
+            self.uses.take_entries(source, i * ENTRIES_PER_LEAF, leaf)?;
+            stored += present(leaf);
+        }
+        if stored != header.stored_pages {
+            let problem = "it holds another number of pages than the state says";
+            return Err(LayoutError::damaged(source.path(), "directory", problem));
+        }
+        Ok(())
+    }
+
+    /// The imagery of `header`, if no state before had it.
+    fn imagery(&mut self, header: &Header) -> Result<(), LayoutError> {
+        let Some(place) = header.imagery else { return Ok(()) };
+        if !self.sections.insert((place.offset, place.bytes)) {
+            return Ok(());
+        }
+        let imagery = Imagery::open_at(self.terrain, place, header.file_bytes)?;
+        self.spend(imagery.directory_bytes() + PAGE, "imagery directory")?;
+        let state = (self.names.len() - 1) as u32;
+        for (index, id) in (0u32..).zip(imagery.shape().ids()) {
+            if let Some((page, bytes, checksum)) = imagery.stored_place(id) {
+                self.wanted.push(Wanted { page, bytes, checksum, is_tile: true, index, state });
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads each page and tile that was noted, once, and holds it against its checksum.
+    pub(super) fn read_pages(mut self, findings: &mut Findings) -> Result<(), LayoutError> {
+        self.wanted.sort_unstable();
+        self.wanted.dedup_by_key(|wanted| wanted.what());
+        let sum: u64 = self.wanted.iter().map(|wanted| u64::from(wanted.bytes)).sum();
+        if sum > self.terrain.source().byte_count() {
+            let problem =
+                "what its states lead to is longer than the file, so pages of some lie over those of others";
+            findings.add("journal".into(), problem);
+            return Ok(());
+        }
+        let source = self.terrain.source();
+        let is_wrong = |bytes: &mut Vec<u8>, wanted: &Wanted| -> Result<bool, LayoutError> {
+            bytes.resize(to_usize(wanted.bytes.into())?, 0);
+            source.read_at(u64::from(wanted.page) * PAGE, bytes)?;
+            Ok(checksum(bytes) != wanted.checksum)
+        };
+        let wrong: Vec<bool> =
+            self.wanted.par_iter().map_init(Vec::new, is_wrong).collect::<Result<_, LayoutError>>()?;
+        for (wanted, _) in self.wanted.iter().zip(wrong).filter(|(_, is_wrong)| *is_wrong) {
+            let what = if wanted.is_tile { "tile in place" } else { "record page" };
+            let name = self.name(wanted.state as usize);
+            let place = format!("{what} {} (file page {}) {name}", wanted.index, wanted.page);
+            findings.add(place, "the checksum does not match");
+        }
+        Ok(())
+    }
+}
+
+/// What tells one root from another.
+fn root_of(state: &State) -> (u32, u32, u64) {
+    (state.root_page, state.root_checksum, state.stored_pages)
+}
+
+/// The entries of a leaf.
+fn leaf_of(entries: &[Entry], i: usize) -> &[Entry] {
+    let first = i * ENTRIES_PER_LEAF;
+    &entries[first..(first + ENTRIES_PER_LEAF).min(entries.len())]
+}
+
+fn present(entries: &[Entry]) -> u64 {
+    entries.iter().filter(|entry| entry.is_present()).count() as u64
+}

@@ -1,0 +1,44 @@
+//! Numbers and texts of files as messages and headers can bear them.
+//!
+//! A file may hold any number and any text. A number of three hundred digits says less than its power of ten; a text may move a terminal's cursor,
+//! ring its bell or turn what follows from right to left. Cost: one pass over what is shown.
+
+/// A number as people read it: with its power of ten where it would be long.
+pub(crate) fn number(value: f64) -> String {
+    let size = value.abs();
+    if value.is_finite() && size != 0.0 && !(1e-5..1e15).contains(&size) {
+        format!("{value:e}")
+    } else {
+        format!("{value}")
+    }
+}
+
+/// At most `most` characters of `text`, without those that do something rather than show something.
+pub(crate) fn harmless(text: &str, most: usize) -> String {
+    text.chars().filter(|c| !acts(*c)).take(most).collect()
+}
+
+/// Controls, ends of lines and paragraphs, marks and turns of direction, marks of byte order, characters without width.
+fn acts(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}')
+        || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_numbers_are_shown_with_their_power_of_ten() {
+        assert_eq!([0.0, -9999.5, 1e6, 0.001].map(number), ["0", "-9999.5", "1000000", "0.001"]);
+        assert_eq!([1e308, -2.5e-300].map(number), ["1e308", "-2.5e-300"]);
+        assert_eq!([f64::NAN, f64::INFINITY].map(number), ["NaN", "inf"]);
+    }
+
+    #[test]
+    fn characters_that_act_are_left_out() {
+        assert_eq!(harmless("\u{1b}[31mWGS\u{7} 84\r\n\u{202e}\u{9b}2J", 99), "[31mWGS 842J");
+        assert_eq!(harmless("Zürich / 東京", 6), "Zürich");
+    }
+}
