@@ -155,6 +155,17 @@ mod tests {
     }
 
     #[test]
+    fn a_build_takes_none_of_the_threads_that_frames_have() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join("puget.png");
+        std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/puget_sound_1025.png"), &input)
+            .unwrap();
+        threads::while_frames_have_all_threads(|| {
+            assert_eq!(run(&input).unwrap().path, folder.path().join("puget.iqt"));
+        });
+    }
+
+    #[test]
     fn what_is_no_dem_comes_back_as_words() {
         let folder = tempfile::tempdir().unwrap();
         let input = folder.path().join("shopping.txt");

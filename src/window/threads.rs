@@ -17,6 +17,27 @@ pub(crate) fn pool(name: &'static str, most: usize) -> io::Result<ThreadPool> {
         .map_err(io::Error::other)
 }
 
+/// Does `work` while every thread that frames share their work out to is kept busy.
+#[cfg(test)]
+pub(crate) fn while_frames_have_all_threads(work: impl FnOnce()) {
+    use std::sync::{Arc, Barrier};
+    let threads = rayon::current_num_threads();
+    let [begun, over] = [(); 2].map(|()| Arc::new(Barrier::new(threads + 1)));
+    for _ in 0..threads {
+        let (begun, over) = (Arc::clone(&begun), Arc::clone(&over));
+        rayon::spawn(move || {
+            begun.wait();
+            over.wait();
+        });
+    }
+    begun.wait();
+    let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
+    over.wait();
+    if let Err(panic) = done {
+        std::panic::resume_unwind(panic);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -14,6 +14,7 @@ pub const TESTS: &[Test] = &[
     ("engines::streamed_looks_as_mapped", streamed_looks_as_mapped),
     ("engines::unseen_updates_are_made_up_for", unseen_updates),
     ("engines::a_new_device_shows_the_same", new_device),
+    ("engines::another_way_of_culling_shows_the_same", other_culling),
 ];
 
 const SIZE_PX: [u32; 2] = [360, 240];
@@ -106,4 +107,23 @@ fn new_device(gpu: &Gpu) -> Outcome {
     let after = rig.shoot(&frame(4), &look);
     let mut fresh = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
     same(&after, &fresh.shoot(&frame(4), &look), || "the frame after".into())
+}
+
+/// The way of culling changes in flight, over the pages that are there.
+fn other_culling(gpu: &Gpu) -> Outcome {
+    let mut streamed = Rig::streamed(gpu, SceneOptions::default(), SIZE_PX, 3 << 20);
+    let mut fresh = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    let look = Look::default();
+    for (i, culling) in (0..).zip([Culling::Clusters, Culling::Vertices, Culling::Clusters]) {
+        streamed.shoot_settled(&frame(i), &look);
+        let changed = streamed.scene.set_culling(culling, gpu).map_err(|e| e.to_string())?;
+        ensure(changed, || "a window's scene can".into())?;
+        let [a, b] = [streamed.shoot_settled(&frame(i), &look), fresh.shoot(&frame(i), &look)];
+        same(&a, &b, || format!("the same frame, {culling:?}"))?;
+        let [a, b] = [streamed.shoot_settled(&frame(i + 5), &look), fresh.shoot(&frame(i + 5), &look)];
+        same(&a, &b, || format!("another frame, {culling:?}"))?;
+    }
+    ensure(!fresh.scene.set_culling(Culling::Clusters, gpu).map_err(|e| e.to_string())?, || {
+        "others cannot".into()
+    })
 }
