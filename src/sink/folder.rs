@@ -5,7 +5,7 @@
 //! copied out can leave that hidden folder. Files of other names are left alone. Cost: everything is written twice, and takes twice the room for a moment.
 
 use super::file::FileSink;
-use std::fs::{File, Permissions};
+use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use terrasoar_layout::LayoutError;
@@ -120,7 +120,7 @@ fn hidden_in(parent: &Path, folder: &Path) -> io::Result<tempfile::TempDir> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(".terrasoar-new");
     #[cfg(unix)]
-    builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o777));
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
     builder.tempdir_in(parent)
 }
 

@@ -24,9 +24,10 @@ pub(in crate::cli) enum Kind {
     /// Triangles.
     Mesh,
     /// A picture.
+    #[cfg_attr(not(feature = "view"), allow(dead_code, reason = "pictures need the feature"))]
     Picture,
     /// A film.
-    #[cfg_attr(not(feature = "view"), expect(dead_code, reason = "films are drawn"))]
+    #[cfg_attr(not(feature = "view"), allow(dead_code, reason = "films need the feature"))]
     Film,
     /// A part of a report.
     Report(ReportFile),

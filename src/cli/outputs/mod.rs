@@ -68,6 +68,7 @@ impl Force {
     }
 
     /// Whether everything may be replaced.
+    #[cfg(feature = "view")]
     pub(super) fn is_given(self) -> bool {
         self.force
     }
