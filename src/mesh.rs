@@ -57,16 +57,24 @@ pub fn with_apex_first([p, q, r]: Triangle) -> Triangle {
     }
 }
 
-/// The triangle that a bin-tree triangle is a half of; `None` for the four that have the square's centre for apex.
+/// The triangle that a bin-tree triangle is a half of; `None` for the four that have the square's centre for apex, and for what is no bin-tree triangle, as strips have them over
+/// records that are not nested.
 pub fn parent(grid: &Grid, [apex, b, d]: Triangle) -> Option<Triangle> {
     let n = grid.side_steps();
-    if apex == GridPoint::new(n / 2, n / 2) {
+    if apex == GridPoint::new(n / 2, n / 2) || grid.is_corner(apex) || !is_right_isosceles([apex, b, d]) {
         return None;
     }
     // The apex is the middle of the parent's longest edge, one of whose ends is a corner here; the other corner is the parent's apex.
     let ends = grid.edge_ends(apex);
     let other = |end: GridPoint| if ends[0] == end { ends[1] } else { ends[0] };
-    Some(if ends.contains(&b) { [d, other(b), b] } else { [b, d, other(d)] })
+    if ends.contains(&b) { Some([d, other(b), b]) } else { ends.contains(&d).then(|| [b, d, other(d)]) }
+}
+
+/// Whether the legs from the apex, which comes first, are as long as each other and at a right angle, in grid steps.
+fn is_right_isosceles([apex, b, d]: Triangle) -> bool {
+    let leg = |p: GridPoint| [i64::from(p.x()) - i64::from(apex.x()), i64::from(p.y()) - i64::from(apex.y())];
+    let ([bx, by], [dx, dy]) = (leg(b), leg(d));
+    bx * dx + by * dy == 0 && bx * bx + by * by == dx * dx + dy * dy
 }
 
 /// Twice the signed area in grid steps, padding not folded; positive if counter-clockwise.
@@ -90,8 +98,8 @@ pub fn is_drawn(records: &impl RecordStore, triangle: Triangle) -> bool {
         return true;
     }
     let [_, b, d] = with_apex_first(triangle);
-    // The longest edge of the smallest triangles is a cell's diagonal: its midpoint is no grid point.
-    if (b.x() + d.x()) & 1 == 1 {
+    // The longest edge of the smallest triangles is a cell's diagonal: its midpoint is no grid point. Nor is that of many triangles which are none of a bin tree.
+    if (b.x() + d.x()) & 1 == 1 || (b.y() + d.y()) & 1 == 1 {
         triangle.iter().all(|p| !records.vertex_at(*p).class.is_void())
     } else {
         records.vertex_at(b.midpoint(d)).class.is_plain()
@@ -132,6 +140,33 @@ mod tests {
             steps += 1;
         }
         assert_eq!(steps, 7);
+    }
+
+    /// What strips over records of nonsense are made of.
+    #[test]
+    fn no_triangle_of_whatever_corners_is_too_much() {
+        let terrain = crate::iobench::tests::square_terrain(3);
+        let records = terrain.records().unwrap();
+        terrasoar_layout::with_records!(records, records => {
+            let grid = *terrain.grid();
+            let points: Vec<GridPoint> = (0..9).flat_map(|y| (0..9).map(move |x| GridPoint::new(x, y))).collect();
+            for (i, a) in points.iter().enumerate() {
+                for (j, b) in points.iter().enumerate().filter(|(j, _)| (i + j) % 3 == 0) {
+                    for (_, d) in points.iter().enumerate().filter(|(k, _)| (i + j + k) % 4 == 1) {
+                        let triangle = [*a, *b, *d];
+                        let _ = (is_drawn(&records, triangle), TriangleKey::of(triangle));
+                        let mut above = parent(&grid, with_apex_first(triangle));
+                        let mut steps = 0;
+                        while let Some(triangle) = above {
+                            assert_eq!(with_apex_first(triangle), triangle);
+                            above = parent(&grid, triangle);
+                            steps += 1;
+                        }
+                        assert!(steps <= 6, "{triangle:?}");
+                    }
+                }
+            }
+        });
     }
 
     #[test]

@@ -222,8 +222,11 @@ impl Grid {
         })
     }
 
-    /// The two ends of the edge that a vertex splits.
+    /// The two ends of the edge that a vertex splits. A corner splits none: it is both.
     pub fn edge_ends(&self, p: GridPoint) -> [GridPoint; 2] {
+        if self.is_corner(p) {
+            return [p; 2];
+        }
         let step = 1u32 << (self.level(p) / 2);
         let (x, y) = (p.x(), p.y());
         let x_odd = (x / step) & 1 == 1;

@@ -22,6 +22,7 @@ mod opening;
 pub mod order;
 pub mod pool;
 pub mod prefetch;
+pub mod printable;
 pub mod record;
 mod records;
 pub mod remedy;

@@ -10,7 +10,7 @@ pub enum RenderError {
          (Debian and Ubuntu: apt install mesa-vulkan-drivers libvulkan1; Fedora: dnf install mesa-vulkan-drivers)"
     )]
     NoAdapter {
-        /// What the driver layer said.
+        /// Why, in words.
         detail: String,
     },
     /// The adapter gave no device.
@@ -18,20 +18,20 @@ pub enum RenderError {
     NoDevice {
         /// The adapter's name.
         adapter: String,
-        /// What the driver layer said.
+        /// Why, in words.
         detail: String,
     },
     /// The device went away: driver reset, unplugged, put to sleep. Make a new one, a new renderer on it, and apply
     /// one patch with everything.
     #[error("the graphics device was lost ({reason}); a new device and renderer are needed")]
     DeviceLost {
-        /// What the driver layer said.
+        /// Why, in words.
         reason: String,
     },
     /// The driver layer refused a command; the picture may be incomplete.
     #[error("graphics error: {message}")]
     Device {
-        /// What the driver layer said.
+        /// Why, in words.
         message: String,
     },
     /// More than the device can hold. A larger tolerance makes a smaller mesh.

@@ -7,6 +7,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{RenderError, Result};
+use crate::words;
 
 /// What the adapter can do, as far as this crate cares.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,12 +61,12 @@ impl DeviceWatch {
     pub fn install(device: &wgpu::Device) -> Self {
         let watch = Self::default();
         let seen = watch.clone();
-        device.set_device_lost_callback(move |reason, message| {
-            seen.note(RenderError::DeviceLost { reason: format!("{reason:?}: {message}") });
+        device.set_device_lost_callback(move |reason, _| {
+            seen.note(RenderError::DeviceLost { reason: words::of_loss(reason).into() });
         });
         let seen = watch.clone();
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            seen.note(RenderError::Device { message: error.to_string() });
+            seen.note(RenderError::Device { message: words::of_error(&error) });
         }));
         watch
     }
@@ -122,21 +123,20 @@ impl Gpu {
             Some(backends) => vec![backends],
             None => vec![wgpu::Backends::PRIMARY, wgpu::Backends::SECONDARY],
         };
-        let mut detail = String::new();
+        let mut asked = wgpu::Backends::empty();
         for backends in choices {
+            asked |= backends & wgpu::Instance::enabled_backend_features();
             let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
             descriptor.backends = backends;
             let options = wgpu::RequestAdapterOptions {
                 power_preference: wgpu::PowerPreference::HighPerformance,
                 ..Default::default()
             };
-            match wgpu::Instance::new(descriptor).request_adapter(&options).await {
-                Ok(adapter) => return Self::on(adapter).await,
-                Err(error) if detail.is_empty() => detail = error.to_string(),
-                Err(_) => {}
+            if let Ok(adapter) = wgpu::Instance::new(descriptor).request_adapter(&options).await {
+                return Self::on(adapter).await;
             }
         }
-        Err(RenderError::NoAdapter { detail })
+        Err(RenderError::NoAdapter { detail: format!("{} was asked for", words::of_backends(asked)) })
     }
 
     /// [`Gpu::headless`], waiting for it.
@@ -168,7 +168,7 @@ impl Gpu {
             .await
             .map_err(|e| RenderError::NoDevice {
                 adapter: capabilities.adapter.clone(),
-                detail: e.to_string(),
+                detail: words::last_cause(&e.to_string()),
             })?;
         let watch = DeviceWatch::install(&device);
         Ok(Self { adapter, device, queue, capabilities, watch })

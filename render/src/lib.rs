@@ -87,6 +87,7 @@ mod tiles;
 mod timing;
 mod uniforms;
 mod view;
+mod words;
 
 pub use error::{RenderError, Result};
 pub use frame::{DrawStats, Frame, RendererOptions, Target};

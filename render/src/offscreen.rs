@@ -3,6 +3,7 @@
 use crate::error::{RenderError, Result};
 use crate::frame::Target;
 use crate::renderer::Renderer;
+use crate::words;
 
 /// A picture on the device, 8-bit sRGB with alpha.
 #[derive(Debug)]
@@ -117,7 +118,7 @@ fn read_back(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture
         // The receiver lives until the poll below has returned.
         let _ = sender.send(result);
     });
-    let refused = |message: String| RenderError::Device { message };
+    let refused = |message: String| RenderError::Device { message: words::last_cause(&message) };
     device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| refused(e.to_string()))?;
     receiver
         .try_recv()

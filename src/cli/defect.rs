@@ -7,6 +7,7 @@ use super::output::complain;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook};
 use std::process::ExitCode;
 use std::sync::Once;
+use terrasoar_layout::import::is_guarded;
 
 /// Does `work`; a panic in it ends in a line on standard error and exit code 1.
 pub(super) fn guarded(work: impl FnOnce() -> ExitCode) -> ExitCode {
@@ -16,9 +17,12 @@ pub(super) fn guarded(work: impl FnOnce() -> ExitCode) -> ExitCode {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or(ExitCode::FAILURE)
 }
 
-/// Says it once, however many threads are hit.
+/// Says it once, however many threads are hit; nothing where a decoder gives up on a damaged file, for that is told as damage.
 fn tell(usual: &(dyn Fn(&PanicHookInfo<'_>) + Sync + Send), info: &PanicHookInfo<'_>) {
     static TOLD: Once = Once::new();
+    if is_guarded() {
+        return;
+    }
     if std::env::var_os("RUST_BACKTRACE").is_some_and(|value| !value.is_empty() && value != "0") {
         usual(info);
     }

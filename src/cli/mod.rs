@@ -29,6 +29,8 @@ mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
 mod progress;
+#[cfg(feature = "view")]
+mod quiet;
 mod remedy;
 mod replay;
 #[cfg(unix)]
@@ -46,8 +48,10 @@ mod view;
 use pictureless::{movie, snapshot, view};
 
 use clap::{Parser, Subcommand};
+use std::borrow::Cow;
 use std::fmt;
 use std::process::ExitCode;
+use terrasoar_layout::printable;
 
 /// Fly over terrain far larger than memory.
 ///
@@ -111,6 +115,32 @@ impl fmt::Display for WrongUsage {
 
 impl std::error::Error for WrongUsage {}
 
+/// An error that is told in several lines, each of which may hold text from a file.
+#[derive(Debug)]
+struct Lines(Vec<String>);
+
+impl fmt::Display for Lines {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, line) in self.0.iter().enumerate() {
+            let end = if i == 0 { "" } else { "\n" };
+            write!(f, "{end}{}", printable::line(line))?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Lines {}
+
+/// Ends the program with what is wrong with the command line, or with help.
+fn refuse(error: &clap::Error) -> ! {
+    if std::env::args_os().all(|arg| matches!(printable::line(&arg.to_string_lossy()), Cow::Borrowed(_))) {
+        error.exit();
+    }
+    // The terminal would obey what was typed: it is told without colours, and spelt out.
+    output::complain_lines(error.render().to_string().trim_end());
+    std::process::exit(error.exit_code())
+}
+
 /// The whole program.
 pub(crate) fn run() -> ExitCode {
     #[cfg(unix)]
@@ -119,7 +149,12 @@ pub(crate) fn run() -> ExitCode {
 }
 
 fn carry_out() -> ExitCode {
-    let done = match Typed::parse().verb {
+    let verb = Typed::try_parse().unwrap_or_else(|error| refuse(&error)).verb;
+    #[cfg(feature = "view")]
+    if matches!(verb, Verb::Compare(_) | Verb::Snapshot(_) | Verb::Movie(_) | Verb::View(_)) {
+        quiet::begin();
+    }
+    let done = match verb {
         Verb::Build(args) => build::run(&args),
         Verb::Drape(args) => drape::run(&args),
         Verb::Edit(args) => edit::run(&args),
@@ -145,16 +180,20 @@ fn carry_out() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            output::complain(&format!("error: {}", remedy::spoken(&error)));
+            output::complain_lines(&format!("error: {}", remedy::spoken(&error)));
             ExitCode::from(if error.is::<WrongUsage>() { 2 } else { 1 })
         }
     }
 }
 
-/// The chain of causes in one line; causes that their effect already spells out are not repeated.
+/// The chain of causes in one line, unless one of them is of several; causes that their effect already spells out are not repeated.
 fn message(error: &anyhow::Error) -> String {
     let mut text = String::new();
-    for cause in error.chain().map(ToString::to_string) {
+    let shown = |cause: &(dyn std::error::Error + 'static)| {
+        let told = cause.to_string();
+        if cause.is::<Lines>() { told } else { printable::line(&told).into_owned() }
+    };
+    for cause in error.chain().map(shown) {
         if text.is_empty() {
             text = cause;
         } else if !text.contains(&cause) {

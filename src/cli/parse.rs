@@ -134,6 +134,17 @@ pub(super) fn engine() -> impl TypedValueParser<Value = EngineKind> {
         .try_map(|word| word.parse::<EngineKind>())
 }
 
+/// Frames a second; 0 for no pace.
+pub(super) fn pace(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| {
+        if v == 0.0 || (0.001..=1e6).contains(&v) {
+            Ok(v)
+        } else {
+            Err("it must be 0, or from 0.001 to 1000000".into())
+        }
+    })
+}
+
 /// A way of culling by name.
 pub(super) fn culling() -> impl TypedValueParser<Value = Culling> {
     PossibleValuesParser::new(Culling::ALL.map(Culling::name))

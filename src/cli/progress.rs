@@ -22,7 +22,7 @@ impl Progress {
         let unit = self.unit;
         let template =
             if total > 0 { "{stage:24} [{bar:30}] {percent:>3}%  {rate}  {left}" } else { "{stage:24}" };
-        let stage: String = stage.into();
+        let stage = terrasoar_layout::printable::line(&stage.into()).into_owned();
         // A template that indicatif cannot read would show as its default bar.
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let style = style

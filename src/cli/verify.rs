@@ -1,15 +1,16 @@
 //! `terrasoar verify`: whether every page of a terrain file is what was written.
 
-use super::output::{grouped, print};
+use super::Lines;
+use super::output::{grouped, print_line};
 use super::progress::Progress;
 use super::terrain::TerrainArgs;
-use anyhow::{Result, bail};
+use anyhow::Result;
 use terrasoar_layout::verify::{verify, verify_pages};
 
 /// Check every page of a terrain file.
 ///
-/// Header, directory, checksums, page numbers, that errors and radii are nested the way refinement relies on, and every tile of imagery. Names
-/// the pages that are wrong. Exit code 0: sound; 1: not.
+/// Header, directory, checksums, page numbers, that errors and radii are nested the way refinement relies on, and every tile of imagery; of a file that was edited also its
+/// history, and the checksums and page numbers of every state that undo and redo lead to. Names the pages that are wrong. Exit code 0: sound; 1: not.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Example:
@@ -31,23 +32,23 @@ pub(super) fn run(args: &Args) -> Result<()> {
             0 => String::new(),
             tiles => format!(", {} tiles of imagery match theirs", grouped(tiles)),
         };
-        return print(&format!(
+        return print_line(&format!(
             "{}: sound: {} record pages match their checksums, {} vertices are nested{tiles}",
             terrain.path().display(),
             grouped(report.pages_checked),
             grouped(report.vertices_checked)
         ));
     }
-    let mut lines: Vec<String> = report.problems.iter().map(|p| format!("  {p}")).collect();
+    let mut lines = vec![format!(
+        "{}: not sound, {} problem{}; restore a copy of the file or build it again",
+        terrain.path().display(),
+        grouped(report.problem_count),
+        if report.problem_count == 1 { "" } else { "s" },
+    )];
+    lines.extend(report.problems.iter().map(|problem| format!("  {problem}")));
     let more = report.problem_count - report.problems.len() as u64;
     if more > 0 {
         lines.push(format!("  and {} more", grouped(more)));
     }
-    bail!(
-        "{}: not sound, {} problem{}; restore a copy of the file or build it again\n{}",
-        terrain.path().display(),
-        grouped(report.problem_count),
-        if report.problem_count == 1 { "" } else { "s" },
-        lines.join("\n")
-    )
+    Err(Lines(lines).into())
 }

@@ -91,6 +91,15 @@ pub enum ReplayError {
     /// The terrain cannot be read, or not be edited as asked.
     #[error(transparent)]
     Terrain(#[from] LayoutError),
+    /// Brute force would take minutes a frame, however little of the square is no void.
+    #[error(
+        "the engine naive tests every vertex of a square of up to {} steps a side, this one has {steps}; use another engine",
+        crate::refine::naive::MOST_STEPS
+    )]
+    TooLargeForNaive {
+        /// Steps a side.
+        steps: u32,
+    },
     /// The frame asked for is not in the flight.
     #[error("the flight has frames 0 to {last}, not {asked}")]
     NoSuchFrame {
@@ -129,7 +138,12 @@ impl Default for Quality {
 }
 
 impl Quality {
-    fn check(self) -> Result<Self, ReplayError> {
+    /// Checks it, and that `kind` can fly over `terrain` at all.
+    fn check(self, terrain: &Terrain, kind: EngineKind) -> Result<Self, ReplayError> {
+        let steps = terrain.grid().side_steps();
+        if kind == EngineKind::Naive && steps > crate::refine::naive::MOST_STEPS {
+            return Err(ReplayError::TooLargeForNaive { steps });
+        }
         if !(0.01..=10_000.0).contains(&self.tolerance_px) {
             return Err(ReplayError::Tolerance(self.tolerance_px));
         }
@@ -185,7 +199,7 @@ pub fn replay(
     kind: EngineKind,
     done: &mut dyn FnMut(u64),
 ) -> Result<Vec<FrameStats>, ReplayError> {
-    let quality = quality.check()?;
+    let quality = quality.check(terrain, kind)?;
     with_records!(records_of(terrain)?, records => {
         let times = with_engine!(kind, records.clone(), quality, engine => time_updates(engine, &mut Still, frames, quality, done))?;
         let stats = with_engine!(kind, records.clone(), quality, engine => count_frames(engine, &mut Still, &records, frames, quality, done))?;
@@ -219,7 +233,7 @@ pub fn replay_edited(
     batches: &[TimedBatch],
     done: &mut dyn FnMut(u64),
 ) -> Result<Vec<FrameStats>, ReplayError> {
-    let quality = quality.check()?;
+    let quality = quality.check(terrain, kind)?;
     with_records!(records_of(terrain)?, records => {
         let store = || EditedRecords::new(records.clone());
         let mut ground = Changing::new(terrain, batches)?;
@@ -253,7 +267,7 @@ pub fn mean_incoherence_percent(
     pairs: &[(FlightFrame, FlightFrame)],
     quality: Quality,
 ) -> Result<f64, ReplayError> {
-    let quality = quality.check()?;
+    let quality = quality.check(terrain, EngineKind::Soar)?;
     with_records!(records_of(terrain)?, records => {
         let mut engine = Soar::new(records.clone(), quality.culling);
         let mut sets = |frame: &FlightFrame| {
@@ -281,7 +295,7 @@ pub fn frame_mesh(
     kind: EngineKind,
     batches: &[TimedBatch],
 ) -> Result<FrameMesh, ReplayError> {
-    let quality = quality.check()?;
+    let quality = quality.check(terrain, kind)?;
     let Some(flown) = frames.get(..=frame) else {
         return Err(ReplayError::NoSuchFrame { asked: frame, last: frames.len().saturating_sub(1) });
     };

@@ -12,6 +12,9 @@ use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::order::{corners, slot_of};
 use terrasoar_layout::store::RecordStore;
 
+/// Steps a side of the largest square that replays use it for: half a second a frame.
+pub const MOST_STEPS: u32 = 1 << 12;
+
 /// Brute-force refinement.
 #[derive(Debug)]
 pub struct Naive<S: RecordStore> {

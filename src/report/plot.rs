@@ -163,7 +163,7 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
 
     /// `text`, shortened to fit into `room` units.
     fn fitted(&self, text: &str, em: f64, room: f64) -> Result<String, String> {
-        let clean: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(400).collect();
+        let clean: String = terrasoar_layout::printable::line(text).chars().take(400).collect();
         let mut short = clean;
         let mut whole = true;
         loop {

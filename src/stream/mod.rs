@@ -298,15 +298,22 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
     /// of the updates on the way are lost, the whole mesh is to be asked for. Returns the number of updates.
     pub fn fill<P: Probe>(&mut self, view: &View, longest: Duration, probe: &mut P) -> u64 {
         let (start, begun) = (self.now, Instant::now());
+        let mut least_late = u64::MAX;
         loop {
             let frame = self.update(view, probe);
             if frame.work.late == 0 || begun.elapsed() >= longest {
                 return self.now - start;
             }
+            let got_on = frame.work.late < least_late || frame.work.slots_written > 0;
+            least_late = least_late.min(frame.work.late);
             if frame.outstanding > 0 {
                 self.fetch.wait();
-            } else if frame.work.unread > 0 && frame.pages_come == 0 && !self.fetch.has_arrivals() {
-                // What is left cannot be read; waiting until it is tried again would keep us here for ever.
+            } else if frame.pages_come == 0
+                && (frame.work.unread > 0 || !got_on)
+                && !self.fetch.has_arrivals()
+            {
+                // What is left cannot be read, or stays as it is: records that are not nested want vertices whose parents are not wanted. Waiting would keep us here
+                // for ever.
                 return self.now - start;
             }
         }

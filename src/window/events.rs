@@ -3,9 +3,10 @@
 //! The event loop sleeps while nothing moves. An error before the first picture ends the program; later ones are the viewer's to tell.
 
 use super::Plan;
+use super::display::plain;
 use super::settings::Settings;
 use super::viewer::{Next, Viewer};
-use anyhow::{Context, Result};
+use anyhow::{Result, anyhow};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -36,7 +37,9 @@ pub(super) fn run(
         viewer: None,
         failure: None,
     };
-    event_loop.run_app(&mut session).context("the window's events failed")?;
+    event_loop
+        .run_app(&mut session)
+        .map_err(|e| anyhow!("the window's events came to an end: {}", plain(&e)))?;
     session.failure.map_or(Ok(()), Err)
 }
 
@@ -73,7 +76,9 @@ impl Session {
             .with_title("Terrasoar")
             .with_inner_size(size)
             .with_min_inner_size(LogicalSize::new(320, 240));
-        let window = event_loop.create_window(attributes).context("no window can be opened")?;
+        let window = event_loop
+            .create_window(attributes)
+            .map_err(|e| anyhow!("no window can be opened: {}", plain(&e)))?;
         let display = event_loop.owned_display_handle();
         let mut viewer =
             Viewer::new(Arc::new(window), display, self.proxy.clone(), plan, settings, terrain, flight)?;
@@ -89,7 +94,7 @@ impl Session {
             let closed = viewer.close_workshop();
             self.failure = viewer.failure.take();
             if let Err(words) = closed {
-                self.failure.get_or_insert(anyhow::anyhow!("the last edits could not be saved: {words}"));
+                self.failure.get_or_insert(anyhow!("the last edits could not be saved: {words}"));
             }
             if let Some(path) = &self.settings_path
                 && let Err(error) = viewer.settings_to_keep().save(path)

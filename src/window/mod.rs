@@ -5,6 +5,7 @@
 //! moves or was touched; else nothing is. **Whatever fails while the window is open is said in it.**
 
 mod camera;
+mod display;
 mod events;
 mod flights;
 mod ground;
@@ -24,7 +25,7 @@ mod tool;
 mod viewer;
 mod workshop;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
 use terrasoar_layout::terrain::Terrain;
@@ -72,9 +73,7 @@ pub(crate) fn run(plan: Plan) -> Result<()> {
         None => Terrain::open_unmapped(&plan.file)?,
     };
     let flight = plan.flight.as_deref().map(Flight::read).transpose()?;
-    let event_loop = winit::event_loop::EventLoop::with_user_event().build().context(
-        "no window can be opened: there is no display. Run it on a desktop, or with DISPLAY or WAYLAND_DISPLAY set \
-         (ssh -X does); all other verbs need none",
-    )?;
+    let event_loop =
+        winit::event_loop::EventLoop::with_user_event().build().map_err(|e| display::refusal(&e))?;
     events::run(event_loop, plan, terrain, flight)
 }

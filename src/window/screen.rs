@@ -1,7 +1,7 @@
 //! The window's surface and the device that draws on it, through resizes and losses.
 //!
 //! A surface that is out of date or lost is made anew at once; while there is nothing to draw on, no frame is drawn. A lost device is told by
-//! [`Screen::check`], and [`Screen::renew`] makes another; what lay on the old one is then for its owners to send again.
+//! the device's watch, and [`Screen::renew`] makes another; what lay on the old one is then for its owners to send again.
 
 use anyhow::{Context, Result, anyhow};
 use std::sync::Arc;
@@ -67,6 +67,9 @@ impl Screen {
         config.present_mode = wgpu::PresentMode::AutoVsync;
         config.desired_maximum_frame_latency = 2;
         let gpu = pollster::block_on(Gpu::on(adapter))?;
+        // One that takes over from another may draw smaller pictures only.
+        let most = gpu.device.limits().max_texture_dimension_2d;
+        (config.width, config.height) = (config.width.min(most), config.height.min(most));
         surface.configure(&gpu.device, &config);
         Ok(Self { window: Arc::clone(window), display: display.clone(), instance, surface, config, gpu })
     }

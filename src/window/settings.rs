@@ -89,11 +89,12 @@ impl Settings {
 
     /// Suits what is not set to an adapter; says what that means where it is worth saying.
     pub(crate) fn suit(&mut self, adapter: &Capabilities) -> Option<String> {
-        if !adapter.software {
-            return None;
-        }
-        self.suited_tolerance_px = SOFTWARE_TOLERANCE_PX;
-        self.tolerance_px.is_none().then(|| {
+        let before = self.suited_tolerance_px;
+        self.suited_tolerance_px =
+            if adapter.software { SOFTWARE_TOLERANCE_PX } else { Self::default().suited_tolerance_px };
+        // It is said once, not by every device of a kind.
+        let is_news = adapter.software && before != self.suited_tolerance_px;
+        (is_news && self.tolerance_px.is_none()).then(|| {
             format!(
                 "Drawn in software ({}), so the tolerance is {SOFTWARE_TOLERANCE_PX} px instead of 1 until you set it.",
                 adapter.adapter
@@ -290,6 +291,13 @@ mod tests {
         assert_eq!((settings.suit(&adapter(false)), settings.tolerance_px()), (None, 1.0));
         assert!(settings.suit(&adapter(true)).unwrap().contains("pipe"));
         assert_eq!(settings.tolerance_px(), 4.0);
+        assert_eq!((settings.suit(&adapter(true)), settings.tolerance_px()), (None, 4.0), "said once");
+        assert_eq!(
+            (settings.suit(&adapter(false)), settings.tolerance_px()),
+            (None, 1.0),
+            "another took over"
+        );
+        assert!(settings.suit(&adapter(true)).is_some());
         settings.save(&path).unwrap();
         assert_eq!(
             Settings::load(&path).0.tolerance_px(),

@@ -280,7 +280,8 @@ impl Viewer {
 
     fn name_terrain(&mut self) {
         let path = self.stage.path();
-        self.terrain_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        self.terrain_name = terrasoar_layout::printable::line(&name).into_owned();
         self.window.set_title(&format!("{} - Terrasoar", self.terrain_name));
     }
 }

@@ -118,8 +118,8 @@ fn a_killed_flight_or_script_leaves_what_was_there() {
     let flight =
         ["flight", "orbit", "land.iqt", "--frames", "50000", "--speed", "5", "-o", "a.flight", "--force"];
     let script = ["crater", "land.iqt", "--rain", "50000", "--seed", "1", "-o", "a.edits", "--force"];
-    for (args, out) in [(flight, "a.flight"), (script, "a.edits")] {
-        check(&bench, &args, true, &|bench| fs::write(bench.path(out), "what was there").unwrap());
+    for (args, out) in [(&flight[..], "a.flight"), (&script, "a.edits")] {
+        check(&bench, args, true, &|bench| fs::write(bench.path(out), "what was there").unwrap());
     }
 }
 

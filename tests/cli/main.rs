@@ -7,6 +7,7 @@ mod drape;
 mod edit;
 mod edit_processes;
 mod engines;
+mod harmless;
 mod iobench;
 #[cfg(unix)]
 mod killed;

@@ -7,6 +7,12 @@ mod app;
 mod cracks;
 mod depth;
 mod engines;
+#[cfg(unix)]
+#[path = "../cli/killed.rs"]
+#[allow(dead_code, reason = "shared with the tests of the other verbs")]
+mod killed;
+mod loss;
+mod outputs;
 mod paint;
 mod program;
 mod rig;
@@ -40,18 +46,26 @@ fn main() -> ExitCode {
         }
     };
     let reads_depth = |name: &str| ["cracks::", "depth::"].iter().any(|part| name.starts_with(part));
-    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, paint::TESTS, program::TESTS]
-        .concat()
-        .into_iter()
-        .map(|(name, test): Test| {
-            Trial::ignorable_test(name, move || match gpu {
-                None => Ok(Completion::ignored_with("no adapter")),
-                Some(gpu) if reads_depth(name) && !gpu.capabilities.depth_copies => {
-                    Ok(Completion::ignored_with("depth cannot be read on this device"))
-                }
-                Some(gpu) => test(gpu).map(|()| Completion::Completed).map_err(Failed::from),
-            })
-        });
+    let trials = [
+        cracks::TESTS,
+        depth::TESTS,
+        engines::TESTS,
+        loss::TESTS,
+        outputs::TESTS,
+        paint::TESTS,
+        program::TESTS,
+    ]
+    .concat()
+    .into_iter()
+    .map(|(name, test): Test| {
+        Trial::ignorable_test(name, move || match gpu {
+            None => Ok(Completion::ignored_with("no adapter")),
+            Some(gpu) if reads_depth(name) && !gpu.capabilities.depth_copies => {
+                Ok(Completion::ignored_with("depth cannot be read on this device"))
+            }
+            Some(gpu) => test(gpu).map(|()| Completion::Completed).map_err(Failed::from),
+        })
+    });
     libtest_mimic::run(&arguments, trials.collect()).exit_code()
 }
 

@@ -20,10 +20,10 @@ pub const TESTS: &[Test] = &[
     ("paint::craters_scorch_only_pictures_that_can_be_painted", scorches),
 ];
 
-const SIZE_PX: [u32; 2] = [320, 240];
+pub const SIZE_PX: [u32; 2] = [320, 240];
 
 /// Level ground of 4 km, with a picture of 2 m a texel, or none.
-fn land(folder: &tempfile::TempDir, format: Option<TileFormat>) -> Result<std::path::PathBuf, String> {
+pub fn land(folder: &tempfile::TempDir, format: Option<TileFormat>) -> Result<std::path::PathBuf, String> {
     let path = folder.path().join("land.iqt");
     let dem = MemoryDem::from_fn([257, 257], SampleType::I16, |x, y| f64::from(x * y % 3));
     let options = BuildOptions { spacing_m: Some([16.0; 2]), ..BuildOptions::default() };
@@ -41,16 +41,16 @@ fn land(folder: &tempfile::TempDir, format: Option<TileFormat>) -> Result<std::p
 }
 
 /// A window's scene, and a picture to draw to.
-struct Window<'a> {
+pub struct Window<'a> {
     gpu: &'a Gpu,
-    scene: Scene<'a>,
+    pub scene: Scene<'a>,
     offscreen: Offscreen,
     look: Look,
     watch: PictureWatch,
 }
 
 impl<'a> Window<'a> {
-    fn open(gpu: &'a Gpu, path: &std::path::Path) -> Result<Self, String> {
+    pub fn open(gpu: &'a Gpu, path: &std::path::Path) -> Result<Self, String> {
         let terrain = Arc::new(Terrain::open_unmapped(path).map_err(|e| e.to_string())?);
         let options = SceneOptions { tiles: TileService::AFrame(8), ..SceneOptions::default() };
         let scene = Scene::streamed(&terrain, 64 << 20, gpu, options).map_err(|e| e.to_string())?;
@@ -64,15 +64,22 @@ impl<'a> Window<'a> {
         })
     }
 
+    /// Goes on with another device.
+    pub fn move_to(&mut self, gpu: &'a Gpu) -> Outcome {
+        self.gpu = gpu;
+        self.offscreen = Offscreen::new(&gpu.device, SIZE_PX).map_err(|e| e.to_string())?;
+        self.scene.recover(gpu).map_err(|e| e.to_string())
+    }
+
     /// Has the scene follow what became of the picture.
-    fn repainted(&mut self, session: &mut EditSession) -> Outcome {
+    pub fn repainted(&mut self, session: &mut EditSession) -> Outcome {
         match self.watch.look(session).map_err(|e| e.to_string())? {
             Some(repaint) => self.scene.repainted(repaint).map_err(|e| e.to_string()),
             None => Ok(()),
         }
     }
 
-    fn frame(&mut self, view: &View) -> Vec<u8> {
+    pub fn frame(&mut self, view: &View) -> Vec<u8> {
         self.scene.update(view);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.scene.draw(&mut encoder, self.offscreen.target(), view, &self.look, None).unwrap();
@@ -80,7 +87,7 @@ impl<'a> Window<'a> {
         self.offscreen.read_rgba(&self.gpu.device, &self.gpu.queue).unwrap()
     }
 
-    fn settled(&mut self, view: &View) -> Result<Vec<u8>, String> {
+    pub fn settled(&mut self, view: &View) -> Result<Vec<u8>, String> {
         let begun = Instant::now();
         loop {
             let picture = self.frame(view);
@@ -95,11 +102,11 @@ impl<'a> Window<'a> {
     }
 }
 
-fn from_above() -> View {
+pub fn from_above() -> View {
     view([2.0, 2.0, 1.2], [0.0, -90.0, 0.0], 50.0, SIZE_PX)
 }
 
-fn burn(centre_m: [f64; 2], radius_m: f64) -> Paint {
+pub fn burn(centre_m: [f64; 2], radius_m: f64) -> Paint {
     Paint::Scorch(Scorch { centre_m, radius_m, direction_deg: 20.0, strength: 0.9 })
 }
 

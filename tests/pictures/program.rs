@@ -11,6 +11,7 @@ pub const TESTS: &[Test] = &[
     ("program::movies_repeat_and_leave_nothing_else", movies),
     ("program::a_film_needs_ffmpeg", film),
     ("program::compare_has_a_picture", report),
+    ("program::nothing_is_said_on_standard_error", quiet),
 ];
 
 /// Width and height of a PNG file.
@@ -181,4 +182,41 @@ fn report(_: &Gpu) -> Outcome {
     ensure(png_size(&read(&bench, "r/flight.png")) == Some([160, 120]), || "no picture".into())?;
     let page = text(&read(&bench, "r/report.html"));
     ensure(page.contains("<img src=\"flight.png\"") && page.contains("Frame 20 of 40"), || page)
+}
+
+/// Whatever the variable is that drivers complain about.
+fn quiet(_: &Gpu) -> Outcome {
+    let bench = Bench::with_flight();
+    let snapshot = ["snapshot", "land.iqt", "-o", "a b.png", "--size", "64x48"];
+    let movie = [
+        "movie",
+        "land.iqt",
+        "--flight",
+        "land.flight",
+        "-o",
+        "film.gif",
+        "--size",
+        "64x48",
+        "--every",
+        "20",
+    ];
+    let compare =
+        ["compare", "land.iqt", "--flight", "land.flight", "--engines", "soar,kinetic", "-o", "report"];
+    for verb in [&snapshot[..], &movie, &compare] {
+        for folder in [None, Some(""), Some("not/absolute"), Some("/no/such/folder")] {
+            let mut command = bench.command(verb);
+            if let Some(folder) = folder {
+                command.env("XDG_RUNTIME_DIR", folder);
+            }
+            let output = command.output().map_err(|e| e.to_string())?;
+            let words = text(&output.stderr);
+            ensure(output.status.success() && words.is_empty(), || format!("{verb:?} {folder:?}: {words}"))?;
+            ensure(!output.stdout.is_empty(), || "it says what it did".into())?;
+        }
+    }
+    ensure(bench.path("a b.png").exists(), || "words with spaces stay one".into())?;
+    // What goes wrong is said once, with its exit code.
+    bench.bad(1, &["snapshot", "none.iqt", "-o", "b.png"]);
+    bench.bad(2, &["movie", "land.iqt", "--flight", "land.flight", "-o", "film.doc"]);
+    Ok(())
 }

@@ -61,6 +61,7 @@ impl Display {
             .current_dir(self.folder.path())
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")
+            .env_remove("XDG_RUNTIME_DIR")
             .env("HOME", self.folder.path())
             .env("XDG_CONFIG_HOME", self.folder.path().join("config"))
             .stdin(Stdio::null());

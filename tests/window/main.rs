@@ -30,6 +30,7 @@ const TESTS: &[(&str, Test)] = &[
     ("lost_device", troubles::lost_device),
     ("no_adapter", troubles::no_adapter),
     ("no_display", troubles::no_display),
+    ("nothing_on_standard_error", troubles::nothing_on_standard_error),
 ];
 
 fn main() -> ExitCode {

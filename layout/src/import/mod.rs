@@ -24,6 +24,7 @@ use identify::Format;
 
 pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
+pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 

@@ -58,10 +58,17 @@ impl Scale {
         Self { height_base_m: scale.height_base_m, height_step_m: scale.height_step_m, edge_m }
     }
 
+    /// A height that is no number, or too large for one once it is scaled, reads as the base height.
+    #[inline(always)]
+    fn height_m(&self, value: f64) -> f64 {
+        let height_m = self.height_base_m + value * self.height_step_m;
+        if height_m.is_finite() { height_m } else { self.height_base_m }
+    }
+
     #[inline(always)]
     fn vertex(&self, value: f64, error: f32, radius: f32, inert: bool) -> Vertex {
         Vertex {
-            height_m: self.height_base_m + finite(value) * self.height_step_m,
+            height_m: self.height_m(value),
             error_m: magnitude(error),
             radius_m: magnitude(radius),
             class: signed_class(error, radius, inert),

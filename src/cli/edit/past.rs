@@ -1,7 +1,7 @@
 //! `terrasoar undo`, `redo` and `history`: batches taken back, done again and listed.
 
 use super::TargetArgs;
-use crate::cli::output::{columns, grouped, print, print_json};
+use crate::cli::output::{columns, grouped, print, print_json, print_line};
 use crate::cli::terrain::TerrainArgs;
 use anyhow::{Result, bail};
 use serde::Serialize;
@@ -158,7 +158,7 @@ impl TurnArgs {
             0 => "as it was built".to_owned(),
             commit => format!("as after commit {commit}"),
         };
-        print(&format!(
+        print_line(&format!(
             "{}: {participle}: {}; {} records changed, the terrain is {state}",
             told.file,
             told.labels.join(", "),
@@ -189,7 +189,7 @@ pub(crate) fn list(args: &HistoryArgs) -> Result<()> {
         return print_json(&past);
     }
     if past.commits.is_empty() {
-        return print(&format!("{}: no edits", past.file));
+        return print_line(&format!("{}: no edits", past.file));
     }
     let head = ["commit", "edits", "", "what"].map(String::from).to_vec();
     let rows = past.commits.iter().map(|commit| {

@@ -56,7 +56,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "N", default_value = "128", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
     disk_pages: u64,
     /// Pace of flights over the pool, in frames a second; 0 for as fast as frames are made
-    #[arg(long, value_name = "N", default_value = "60", value_parser = parse::not_negative)]
+    #[arg(long, value_name = "N", default_value = "60", value_parser = parse::pace)]
     fps: f64,
     /// What reads pages into the pool: threads, or one with an io_uring
     #[arg(long, value_name = "HOW", default_value = ReadBy::default().name(), value_parser = read_by())]

@@ -26,7 +26,7 @@ pub(super) fn path(stage: &Stage, plan: &FlightPlan, ground: &dyn Ground) -> imp
         let way = speed * i as f64;
         let [east, north, profile] = track.at(way);
         // Never below a quarter of the clearance, however sharp a peak stands between two entries.
-        let least = ground.height_m(east, north).unwrap_or(profile) + 0.25 * clearance;
+        let least = known_height(ground, east, north).unwrap_or(profile) + 0.25 * clearance;
         let reach = clearance.clamp(track.spacing_m, 0.01 * track.length_m.max(100.0 * track.spacing_m));
         let [behind, ahead] = [track.at(way - reach), track.at(way + reach)];
         let [de, dn, du] = [0, 1, 2].map(|axis| ahead[axis] - behind[axis]);
@@ -89,10 +89,14 @@ impl Track {
     }
 }
 
+/// Height of the ground, if it has one that a flight can be made over.
+fn known_height(ground: &dyn Ground, east_m: f64, north_m: f64) -> Option<f64> {
+    ground.height_m(east_m, north_m).filter(|height| height.abs() <= 1e8)
+}
+
 /// Ground heights; where there is none, the last known one along the path, or `otherwise` if there is none at all.
 fn known_heights(places: &[[f64; 2]], ground: &dyn Ground, otherwise: f64) -> Vec<f64> {
-    let found: Vec<Option<f64>> =
-        places.iter().map(|[e, n]| ground.height_m(*e, *n).filter(|h| h.abs() <= 1e8)).collect();
+    let found: Vec<Option<f64>> = places.iter().map(|[e, n]| known_height(ground, *e, *n)).collect();
     // The path is closed: what stands before its start is its end.
     let mut last = found.iter().rev().flatten().next().copied().unwrap_or(otherwise);
     found

@@ -6,6 +6,7 @@ use super::{Facts, Wish};
 use crate::window::overlay::PANEL;
 use egui::{Align2, Area, Color32, Context, Frame, Id, Margin, ProgressBar, Rect, Stroke, vec2};
 use std::time::{Duration, Instant};
+use terrasoar_layout::printable;
 
 /// How long news is shown.
 const SHOWN: Duration = Duration::from_secs(8);
@@ -22,13 +23,18 @@ pub(crate) struct Note {
 impl Note {
     /// Something that went well.
     pub(crate) fn news(text: impl Into<String>) -> Self {
-        Self { text: text.into(), until: Some(Instant::now() + SHOWN) }
+        Self { text: shown(text.into()), until: Some(Instant::now() + SHOWN) }
     }
 
     /// Something that went wrong.
     pub(crate) fn trouble(text: impl Into<String>) -> Self {
-        Self { text: text.into(), until: None }
+        Self { text: shown(text.into()), until: None }
     }
+}
+
+/// What files and names say, harmlessly.
+fn shown(text: String) -> String {
+    printable::lines(&text).into_owned()
 }
 
 /// Everything in the upper right corner of `room`.

@@ -117,6 +117,9 @@ impl Viewer {
         match recovered {
             Ok(()) => {
                 self.news("The graphics device was lost; another was taken.");
+                if let Some(words) = self.settings.suit(&self.screen.gpu.capabilities) {
+                    self.news(words);
+                }
                 self.tell("recovered");
             }
             Err(error) => {

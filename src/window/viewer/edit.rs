@@ -65,11 +65,17 @@ impl Viewer {
         true
     }
 
-    /// Goes on with a stroke to where the cursor is.
+    /// Goes on with a stroke to where the cursor is. A hand that is ahead of the ground is caught up with.
     pub(super) fn go_on_with_stroke(&mut self) {
+        if !self.is_behind() {
+            self.lengthen_stroke();
+        }
+    }
+
+    fn lengthen_stroke(&mut self) {
         let (Some(mut stroke), Some(hit)) = (self.stroke, self.under) else { return };
-        // Craters are shot one by one. A hand that is ahead of the ground is caught up with.
-        if self.tools.tool == Tool::Crater || self.is_behind() {
+        // Craters are shot one by one.
+        if self.tools.tool == Tool::Crater {
             return;
         }
         let places = stroke.go_on(hit.at_m.truncate(), self.tools.radius_m, EDITS_A_FRAME);
@@ -85,7 +91,7 @@ impl Viewer {
         if self.stroke.is_some() {
             // The hand may have moved since the last frame.
             self.under = self.pick(self.hand.pointer);
-            self.go_on_with_stroke();
+            self.lengthen_stroke();
             self.end_work();
         }
     }
@@ -282,6 +288,7 @@ impl Viewer {
         let edits: Vec<Edit> = craters.craters().filter(|_| is_over_ground).map(Edit::Crater).collect();
         rain.fallen += CRATERS_A_FRAME;
         if !self.apply(edits) {
+            self.workshop.commit(RAIN);
             return;
         }
         if rain.since.elapsed() >= RAIN_COMMITS {

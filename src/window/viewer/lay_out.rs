@@ -15,7 +15,14 @@ impl Viewer {
         let extent_m = self.stage.ground().extent_m();
         let job = self.job.as_ref().map(|job| {
             let (stage, part) = job.progress();
-            (job.input.file_name().unwrap_or_default().to_string_lossy().into_owned(), stage, part)
+            (
+                terrasoar_layout::printable::line(
+                    &job.input.file_name().unwrap_or_default().to_string_lossy(),
+                )
+                .into_owned(),
+                stage,
+                part,
+            )
         });
         let facts = Facts {
             terrain: &self.terrain_name,

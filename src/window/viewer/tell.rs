@@ -29,6 +29,7 @@ impl Viewer {
     pub(super) fn tell(&self, line: &str) {
         if self.plan.narrate {
             let mut out = std::io::stdout().lock();
+            let line = terrasoar_layout::printable::line(line);
             let _ = writeln!(out, "{line}").and_then(|()| out.flush());
         }
     }

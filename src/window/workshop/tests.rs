@@ -60,6 +60,21 @@ impl Disk for TestDisk {
         self.call();
         SystemDisk.sync(file)
     }
+
+    fn link(&self, file: &File, to: &std::path::Path) -> io::Result<()> {
+        self.call();
+        SystemDisk.link(file, to)
+    }
+
+    fn rename(&self, from: &std::path::Path, to: &std::path::Path) -> io::Result<()> {
+        self.call();
+        SystemDisk.rename(from, to)
+    }
+
+    fn sync_folder(&self, folder: &std::path::Path) -> io::Result<()> {
+        self.call();
+        SystemDisk.sync_folder(folder)
+    }
 }
 
 /// A terrain of some 60 pages with room for other heights.

@@ -21,11 +21,24 @@ pub(super) struct CheckedState {
 }
 
 /// Checks the state that the header page `page` names, in the file of `terrain`, whose directory is now `known`: the header itself, the whole directory, the imagery.
+///
+/// # Errors
+/// What opening the file in that state would say.
 pub(super) fn check_state(
     terrain: &Terrain,
     known: &Directory,
     page: &Page,
 ) -> Result<CheckedState, LayoutError> {
+    read_state(terrain, known, page).map_err(|error| match error {
+        LayoutError::Damaged { path, place, problem } => {
+            let place = format!("the state that this would lead to, {place}");
+            LayoutError::Damaged { path, place, problem: format!("{problem}. Nothing was changed") }
+        }
+        other => other,
+    })
+}
+
+fn read_state(terrain: &Terrain, known: &Directory, page: &Page) -> Result<CheckedState, LayoutError> {
     let magic = get_u64(page, 0).to_le_bytes();
     let header = Header::parse_as(terrain.path(), page, magic)?;
     let (root, entries) =

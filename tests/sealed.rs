@@ -1,0 +1,97 @@
+//! Files whose checksums are right and whose contents are nonsense, flown over by every engine: no panic, no waiting, no more triangles than records.
+
+mod common;
+
+use common::exercise::fly;
+use common::frame;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use terrasoar::refine::{Culling, Unobserved};
+use terrasoar::stream::{Prefetch, Streamed, Threads};
+use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::loader::Loader;
+use terrasoar_layout::source::MemorySource;
+use terrasoar_layout::terrain::{ByKind, Terrain};
+use terrasoar_layout::testing::{Counts, reseal, seeds};
+
+/// Longest that all uses of one small file may take.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Numbers that repeat for a seed.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+        let x = self.0 ^ self.0 >> 29;
+        x.wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 16
+    }
+}
+
+#[test]
+fn whatever_a_sealed_file_says_it_is_flown_over() {
+    let rounds = std::env::var("TERRASOAR_ROUNDS").ok().and_then(|n| n.parse().ok()).unwrap_or(12);
+    let folder = tempfile::tempdir().unwrap();
+    for (i, seed) in seeds().into_iter().enumerate().filter(|(_, seed)| seed.files.overlay.is_none()) {
+        let mut random = Random(100 + i as u64);
+        for _ in 0..rounds {
+            let count = 1 + random.next() as usize % 4;
+            let mut recipe = vec![0];
+            (0..count).for_each(|_| recipe.extend(random.next().to_le_bytes()));
+            // Records, most of all, and fields of the header.
+            for how in recipe[1..].iter_mut().step_by(8) {
+                *how = [0, 2, 8, 8, 11, 11, 13, 14][usize::from(*how) % 8];
+            }
+            let mut files = seed.files.clone();
+            files.mutate(&recipe);
+            let (path, _) = files.write(folder.path()).unwrap();
+            let begun = Instant::now();
+            let flown = std::panic::catch_unwind(|| fly(&path));
+            assert!(flown.is_ok(), "{} with {recipe:?}", seed.name);
+            assert!(begun.elapsed() < PATIENCE, "{} with {recipe:?}", seed.name);
+        }
+    }
+}
+
+/// A terrain each of whose vertices is wanted always or never, whatever its parents are.
+fn without_nesting() -> Vec<u8> {
+    let terrain = common::rugged_terrain([129, 100], 3, false);
+    let mut bytes = vec![0; terrain.source().byte_count() as usize];
+    terrain.source().read_at(0, &mut bytes).unwrap();
+    let mut random = Random(7);
+    for entry in terrain.entries().iter().filter(|entry| entry.is_present()) {
+        let page = &mut bytes[entry.page as usize * PAGE_BYTES..][..PAGE_BYTES];
+        for record in page.chunks_exact_mut(4) {
+            // An endless error, or none.
+            record[2..].copy_from_slice(if random.next().is_multiple_of(2) { &[251, 0] } else { &[0, 0] });
+        }
+    }
+    reseal(&mut bytes, Counts::Keep);
+    bytes
+}
+
+#[test]
+fn filling_a_pool_ends_where_wanted_vertices_have_parents_that_are_not() {
+    let source = MemorySource::new("unnested", without_nesting());
+    let terrain = Arc::new(Terrain::from_source(Box::new(source)).unwrap());
+    let frame = frame(&terrain, [0.5, 0.4], 1200.0, 40.0, -30.0);
+    let view = frame.view(terrasoar::view::Viewport::default(), 1.0);
+    for prefetch in Prefetch::ALL {
+        let ByKind::Compact(pool) = terrain.pool(1 << 24).unwrap() else { panic!("compact records") };
+        let loader = Threads::from(Loader::start(Arc::clone(&terrain), 2).unwrap());
+        let mut streamed = Streamed::new(pool, loader, Culling::Vertices, prefetch);
+        let begun = Instant::now();
+        streamed.fill(&view, Duration::from_secs(60), &mut Unobserved);
+        assert!(begun.elapsed() < Duration::from_secs(20), "{prefetch:?}: {:?}", begun.elapsed());
+        let work = streamed.update(&view, &mut Unobserved).work;
+        assert!(work.late > 0 && work.unread == 0, "the file is not what it is to be: {work:?}");
+    }
+}
+
+#[test]
+fn every_engine_flies_over_records_that_are_not_nested() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.iqt");
+    std::fs::write(&path, without_nesting()).unwrap();
+    fly(&path);
+}
