@@ -52,7 +52,9 @@ pub(crate) fn flies(terrain: &Arc<Terrain>, frames: &[FlightFrame], is_sound: bo
         refines(terrain, &views, culling, is_sound);
     }
     streams(terrain, &views);
-    counts(terrain, &views);
+    if terrain.grid().k() <= MOST_K {
+        counts(terrain, &views);
+    }
 }
 
 fn keys(engine: &impl Engine) -> HashSet<TriangleKey> {
