@@ -5,8 +5,11 @@ mod drape;
 mod edit;
 mod edit_processes;
 mod engines;
+mod hostile_imports;
 mod iobench;
 mod pictures;
 mod support;
+#[path = "../../layout/tests/import_support/tiff.rs"]
+mod tiff;
 mod usage;
 mod verbs;
