@@ -111,6 +111,16 @@ pub trait SampleSink: Sync {
     /// # Errors
     /// Whatever keeps the sink from storing them, such as a full disk; the source stops and passes it on.
     fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError>;
+
+    /// As [`put`](SampleSink::put) of voids alone, of a window of any size.
+    ///
+    /// # Errors
+    /// As [`put`](SampleSink::put).
+    fn put_void(&self, window: Window) -> Result<(), LayoutError> {
+        let row = vec![f64::NAN; window.width as usize];
+        (window.row..window.row + window.height)
+            .try_for_each(|row_number| self.put(Window { row: row_number, height: 1, ..window }, &row))
+    }
 }
 
 /// An elevation data set that can be read window by window.

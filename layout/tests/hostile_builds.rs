@@ -1,10 +1,13 @@
 //! Elevation data of which no terrain can come: words before anything is published, at best before anything is read; and inputs that are no files.
 
+#[path = "import_support/packing.rs"]
+mod packing;
 #[path = "import_support/peak.rs"]
 mod peak;
 #[path = "import_support/tiff.rs"]
 mod tiff;
 
+use packing::packed;
 use peak::{alone, peak};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -13,7 +16,7 @@ use terrasoar_layout::dem::{DemInfo, DemSource, MemoryDem, SampleSink, SampleTyp
 use terrasoar_layout::record::RecordKind;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::{LayoutError, Remedy, import};
-use tiff::{DATA_AT, DEFLATE, RAW, Tag, ZSTD, heights, one_strip, packed, reals, shorts, text, tiff};
+use tiff::{DATA_AT, DEFLATE, RAW, Tag, ZSTD, heights, one_strip, reals, shorts, text, tiff};
 
 /// Counts the samples that were read.
 #[derive(Default)]
@@ -72,7 +75,7 @@ fn numbers_that_no_header_holds_are_refused_before_a_sample_is_read() {
     let stated = BuildOptions { spacing_m: Some([10.0; 2]), ..BuildOptions::default() };
     let scaled = BuildOptions { z_scale: 1e13, ..stated.clone() };
     for (other, options, words) in [
-        (body(1e13), &stated, "radius of 10000000000000 m"),
+        (body(1e13), &stated, "radius of 1e13 m"),
         (body(f64::MAX), &stated, "e308 m"),
         (vec![reals(33550, &[1e308, 1e308, 0.0])], &stated, "coordinates beyond all numbers"),
         (

@@ -1,12 +1,15 @@
 //! Elevation files made to exhaust memory, time or the program's good manners: words, or the heights, in proportion to the file.
 
 mod import_support;
+#[path = "import_support/packing.rs"]
+mod packing;
 #[path = "import_support/peak.rs"]
 mod peak;
 #[path = "import_support/tiff.rs"]
 mod tiff;
 
 use import_support::Random;
+use packing::packed;
 use peak::{alone, peak};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,8 +19,8 @@ use terrasoar_layout::LayoutError;
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::import;
 use tiff::{
-    DATA_AT, DEFLATE, LZW, PACK_BITS, RAW, Tag, ZSTD, claimed, heights, longs, one_strip, packed, reals,
-    shorts, text, tiff,
+    DATA_AT, DEFLATE, LZW, PACK_BITS, RAW, Tag, ZSTD, claimed, heights, longs, one_strip, reals, shorts,
+    text, tiff,
 };
 
 const MIB: usize = 1 << 20;
@@ -50,6 +53,13 @@ impl SampleSink for Sum {
         self.sum.fetch_add(sum as u64, Ordering::Relaxed);
         Ok(())
     }
+
+    fn put_void(&self, window: Window) -> Result<(), LayoutError> {
+        let count = u64::from(window.width) * u64::from(window.height);
+        self.samples.fetch_add(count, Ordering::Relaxed);
+        self.voids.fetch_add(count, Ordering::Relaxed);
+        Ok(())
+    }
 }
 
 /// Reads a whole file: number of samples, voids and sum, and the memory it took.
@@ -67,7 +77,7 @@ fn refusal(path: &Path) -> String {
     let (done, bytes) = read(path);
     let said = done.expect_err("it was read").to_string();
     assert!(bytes < 16 * MIB, "{bytes} bytes: {said}");
-    assert!(start.elapsed() < Duration::from_secs(20), "{:?}: {said}", start.elapsed());
+    assert!(start.elapsed() < Duration::from_secs(60), "{:?}: {said}", start.elapsed());
     assert!(said.len() < 600 && !said.contains(|c: char| c.is_control()), "{said:?}");
     said
 }
@@ -127,7 +137,7 @@ fn tables_of_chunks_stay_in_the_file() {
     ];
     let (_folder, path) = file("a.tif", &with_tags(true, tags), 4096 + 4 * chunks);
     let said = refusal(&path);
-    assert!(said.contains("121000000 tiles") && said.contains("none is stored"), "{said}");
+    assert!(said.contains("121000000 samples") && said.contains("none is stored"), "{said}");
 }
 
 #[test]
@@ -225,19 +235,44 @@ fn large_windows_of_small_chunks_take_no_memory() {
     assert!(told > 100 << 20 && taken as u64 <= told + (16 << 20), "{told} told, {taken} taken");
 }
 
+/// Hours as heights of zero, and next to nothing as voids.
 #[test]
-fn a_file_that_stores_no_chunk_is_refused_at_once() {
+fn a_large_file_that_stores_no_chunk_is_refused_at_once() {
     let _alone = alone();
     let side = 65_537;
     for compression in [RAW, DEFLATE, ZSTD] {
-        for other in [vec![], vec![text(42113, "-9999")], vec![longs(322, &[65_552]), longs(323, &[65_552])]]
-        {
+        for other in [vec![], vec![longs(322, &[65_552]), longs(323, &[65_552])]] {
             let mut tags = heights([side; 2], compression, side, &[0], &[0]);
             tags.extend([longs(324, &[0]), longs(325, &[0])]);
             tags.extend(other);
+            let (_folder, path) = file("a.tif", &tiff(false, tags.clone(), &[]), 0);
+            let said = refusal(&path);
+            assert!(said.contains("none is stored") && said.contains("-a_nodata"), "{said}");
+            tags.push(text(42113, "-9999"));
             let (_folder, path) = file("a.tif", &tiff(false, tags, &[]), 0);
-            assert!(refusal(&path).contains("none is stored"));
+            let samples = u64::from(side) * u64::from(side);
+            assert_eq!(read(&path).0.unwrap(), [samples, samples, 0]);
         }
+    }
+}
+
+/// One row of 65,537: the rest costs hours as heights of zero, and next to nothing as voids.
+#[test]
+fn a_large_file_that_is_hardly_there_says_whether_the_rest_is_void() {
+    let _alone = alone();
+    let side = 65_537u32;
+    for compression in [RAW, ZSTD] {
+        let row = packed(compression, &[3, 0].repeat(side as usize));
+        let mut tags = heights([side; 2], compression, side - 1, &[0, DATA_AT], &[0, row.len() as u32]);
+        let (_folder, path) = file("a.tif", &tiff(false, tags.clone(), &row), 0);
+        let said = refusal(&path);
+        assert!(said.contains("4295098369 samples") && said.contains("only 65537 are stored"), "{said}");
+        tags.push(text(42113, "-9999"));
+        let (_folder, path) = file("a.tif", &tiff(false, tags, &row), 0);
+        let start = Instant::now();
+        let [rows, cols] = [u64::from(side); 2];
+        assert_eq!(read(&path).0.unwrap(), [rows * cols, (rows - 1) * cols, 3 * cols]);
+        assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
     }
 }
 

@@ -1,12 +1,15 @@
 //! Pictures made to exhaust memory or time, and world files that are none: words before the terrain file is touched.
 
 mod common;
+#[path = "import_support/packing.rs"]
+mod packing;
 #[path = "import_support/peak.rs"]
 mod peak;
 #[path = "import_support/tiff.rs"]
 mod tiff;
 
 use common::drape::land;
+use packing::packed;
 use peak::{alone, peak};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -14,7 +17,7 @@ use tempfile::TempDir;
 use terrasoar_layout::build::Silent;
 use terrasoar_layout::imagery::{DrapeOptions, Draped, drape, open_image};
 use terrasoar_layout::{LayoutError, Remedy};
-use tiff::{DATA_AT, DEFLATE, JPEG, LZW, PACK_BITS, RAW, Tag, ZSTD, claimed, longs, packed, shorts, tiff};
+use tiff::{DATA_AT, DEFLATE, JPEG, LZW, PACK_BITS, RAW, Tag, ZSTD, claimed, longs, shorts, tiff};
 
 const MIB: usize = 1 << 20;
 
@@ -58,7 +61,7 @@ impl Bench {
         let (done, bytes) = self.drape(image, 64);
         let error = done.expect_err("it was draped");
         assert!(bytes < 24 * MIB, "{bytes} bytes: {error}");
-        assert!(start.elapsed() < Duration::from_secs(20), "{:?}: {error}", start.elapsed());
+        assert!(start.elapsed() < Duration::from_secs(60), "{:?}: {error}", start.elapsed());
         assert!(std::fs::read(self.path("a.iqt")).unwrap() == self.before, "{error}");
         error
     }
@@ -198,6 +201,23 @@ fn tables_and_tiles_of_pictures_take_no_memory_before_it_is_allowed() {
     let (done, bytes) = bench.drape(&path, 128);
     done.unwrap();
     assert!(bytes < 136 * MIB, "{bytes} bytes");
+}
+
+#[test]
+fn a_large_picture_that_is_hardly_there_is_refused() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let tiles = 4u32 << 20 >> 6;
+    let row = [9u8; 3 * 64 * 64];
+    let mut places = vec![(0, 0); tiles as usize];
+    places[7] = (DATA_AT, row.len() as u32);
+    let tags = picture([64, 4 << 20], RAW, [64, 64], &places);
+    let said = bench.refusal(&bench.write("a.tif", &tiff(false, tags, &row))).to_string();
+    assert!(said.contains("only 4096 are stored") && said.contains("-projwin"), "{said}");
+    // A thousandth of it is enough.
+    places[..70].fill((DATA_AT, row.len() as u32));
+    let tags = picture([64, 4 << 20], RAW, [64, 64], &places);
+    assert!(open_image(&bench.write("a.tif", &tiff(false, tags, &row))).is_ok());
 }
 
 #[test]

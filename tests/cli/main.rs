@@ -8,6 +8,7 @@ mod edit;
 mod edit_processes;
 mod engines;
 mod harmless;
+mod hostile_imports;
 mod iobench;
 #[cfg(unix)]
 mod killed;
@@ -16,5 +17,7 @@ mod kills;
 mod outputs;
 mod pictures;
 mod support;
+#[path = "../../layout/tests/import_support/tiff.rs"]
+mod tiff;
 mod usage;
 mod verbs;

@@ -202,21 +202,39 @@ fn failed(target: &Path, action: &'static str, e: std::io::Error) -> LayoutError
     if is_full { error.mended_by(Remedy::Memory { enough_mib: None }) } else { error }
 }
 
+impl Spool<'_> {
+    /// Whether the window lies in the elevation model.
+    fn check(&self, window: Window) -> Result<(), LayoutError> {
+        let is_inside = window.col.checked_add(window.width).is_some_and(|end| end <= self.wide)
+            && window.row.checked_add(window.height).is_some_and(|end| end <= self.high);
+        if is_inside {
+            return Ok(());
+        }
+        Err(LayoutError::Usage(format!(
+            "a window of {} x {} samples at column {}, row {} does not lie in the elevation model",
+            window.width, window.height, window.col, window.row
+        )))
+    }
+
+    fn count_voids(&self, voids: u64) {
+        self.stats.lock().unwrap_or_else(PoisonError::into_inner).voids += voids;
+        (self.advance)(voids);
+    }
+}
+
 impl SampleSink for Spool<'_> {
     fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
-        let inside = window.col.checked_add(window.width).is_some_and(|end| end <= self.wide)
-            && window.row.checked_add(window.height).is_some_and(|end| end <= self.high)
-            && samples.len() == window.width as usize * window.height as usize;
-        if !inside {
-            let Window { col, row, width, height } = window;
+        self.check(window)?;
+        if samples.len() != window.width as usize * window.height as usize {
             return Err(LayoutError::Usage(format!(
-                "{} samples for {width} x {height} of the elevation model, from column {col} and row {row} on, do not lie in it",
+                "a window of {} x {} samples came with {}",
+                window.width,
+                window.height,
                 samples.len()
             )));
         }
         if samples.iter().all(|v| v.is_nan()) {
-            self.stats.lock().unwrap_or_else(PoisonError::into_inner).voids += samples.len() as u64;
-            (self.advance)(samples.len() as u64);
+            self.count_voids(samples.len() as u64);
             return Ok(());
         }
         let cleaned;
@@ -252,6 +270,13 @@ impl SampleSink for Spool<'_> {
         }
         self.stats.lock().unwrap_or_else(PoisonError::into_inner).merge(&stats);
         (self.advance)(samples.len() as u64);
+        Ok(())
+    }
+
+    /// Nothing is written: a void's bytes are zero.
+    fn put_void(&self, window: Window) -> Result<(), LayoutError> {
+        self.check(window)?;
+        self.count_voids(u64::from(window.width) * u64::from(window.height));
         Ok(())
     }
 }

@@ -11,6 +11,11 @@ use crate::error::LayoutError;
 use std::fs::File;
 use std::path::Path;
 
+/// Samples from which on an image is large.
+const LARGE_SAMPLES: u64 = 1 << 26;
+/// Of how many samples of a large image one is stored at least.
+const SPARSEST: u64 = 1024;
+
 /// The chunks of an image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ChunkGrid {
@@ -32,6 +37,8 @@ pub(super) struct ChunkGrid {
 pub(super) struct Stored {
     /// Packed length of the longest chunk.
     pub(super) longest: u64,
+    /// Samples of the image that lie in a chunk.
+    pub(super) samples: u64,
 }
 
 impl ChunkGrid {
@@ -109,8 +116,8 @@ impl ChunkGrid {
         Ok(places.get(row / cuts * across + col)?.map(|(at, length)| (at.saturating_add(skipped), length)))
     }
 
-    /// Looks at the place of every chunk, before they are cut: that it lies in the file, that all of them are no longer than the file and what they unpack to allow, and that
-    /// there is one at all. `unpacked` gives the bytes that a chunk's samples take, `each` hears number, offset and packed length.
+    /// Looks at the place of every chunk, before they are cut: that it lies in the file, and that all of them together are no longer than the file and what they unpack to
+    /// allow. `unpacked` gives the bytes that a chunk's samples take, `each` hears number, offset and packed length.
     pub(super) fn check_places(
         &self,
         file: &TiffFile,
@@ -121,25 +128,18 @@ impl ChunkGrid {
         let mut places = self.places(file.path(), file.file());
         let mut stored = Stored::default();
         let (mut packed_bytes, mut unpacked_bytes) = (0u64, 0u64);
-        for chunk in 0..self.count() {
-            let Some((at, packed)) = places.get(chunk)? else { continue };
+        let mut next = 0;
+        while let Some((chunk, at, packed)) = places.next(next)? {
+            next = chunk + 1;
             let samples = unpacked(chunk);
             let length = if is_raw { samples } else { packed };
             self.check_end(file, chunk, at, length)?;
             each(chunk, at, packed)?;
             stored.longest = stored.longest.max(length);
+            let Window { width, height, .. } = self.window(chunk);
+            stored.samples += u64::from(width) * u64::from(height);
             packed_bytes = packed_bytes.saturating_add(length);
             unpacked_bytes = unpacked_bytes.saturating_add(samples);
-        }
-        if stored.longest == 0 {
-            return Err(LayoutError::unsupported(
-                file.path(),
-                format!(
-                    "it holds no samples: of the {} {} that it declares none is stored; fetch or write it again",
-                    self.count(),
-                    self.kind()
-                ),
-            ));
         }
         // Equal chunks may be stored once; but then they are short. All of them long and in one place would make a small file endless.
         if packed_bytes > file.bytes().max(unpacked_bytes.saturating_mul(2)) {
@@ -150,6 +150,17 @@ impl ChunkGrid {
             )));
         }
         Ok(stored)
+    }
+
+    /// Refuses an image that is large and hardly there, with what to do: a file of some hundred bytes would ask for hours and gigabytes.
+    pub(super) fn check_sparse(&self, file: &TiffFile, stored: u64, advice: &str) -> Result<(), LayoutError> {
+        let samples = u64::from(self.width) * u64::from(self.height);
+        if samples < LARGE_SAMPLES || stored >= samples / SPARSEST {
+            return Ok(());
+        }
+        let there = if stored == 0 { "none is".into() } else { format!("only {stored} are") };
+        let problem = format!("of the {samples} samples that it declares {there} stored; {advice}");
+        Err(LayoutError::unsupported(file.path(), problem))
     }
 
     /// The part of the image a chunk covers.

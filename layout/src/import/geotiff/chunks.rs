@@ -63,6 +63,8 @@ pub(super) struct Chunks {
     pub(super) predictor: Predictor,
     /// Largest window that long chunks of ZSTD ask for.
     pub(super) largest_window: u64,
+    /// Samples that lie in chunks that the file did not leave out.
+    pub(super) stored_samples: u64,
 }
 
 /// Longest row of a chunk: what is unpacked at once at least.
@@ -116,6 +118,7 @@ impl Chunks {
             compression,
             predictor,
             largest_window: 0,
+            stored_samples: 0,
         };
         this.check_places(file)?;
         Ok(this)
@@ -139,7 +142,7 @@ impl Chunks {
         // Of long chunks there are few, so a look into each costs little.
         let asks_for_window = self.compression == Compression::Zstd && self.decoded_bytes() > LARGEST_WHOLE;
         let mut largest_window = LARGEST_WHOLE;
-        self.grid.check_places(
+        let stored = self.grid.check_places(
             file,
             self.is_raw(),
             |chunk| self.stored_bytes(chunk),
@@ -165,6 +168,7 @@ impl Chunks {
                 ))
             },
         )?;
+        self.stored_samples = stored.samples;
         // The codec itself goes no further.
         self.largest_window = largest_window.min(128 << 20);
         Ok(())
@@ -197,7 +201,7 @@ impl Chunks {
     }
 
     /// Bytes that must be unpacked for the samples of a chunk that lie in the image.
-    fn stored_bytes(&self, chunk: u64) -> u64 {
+    pub(super) fn stored_bytes(&self, chunk: u64) -> u64 {
         let rows = u64::from(self.grid.window(chunk).height);
         (u64::from(self.grid.chunk_width) * rows).saturating_mul(self.sample_bytes())
     }

@@ -151,7 +151,7 @@ pub(super) fn unpack(
     let window = (whole as u64).next_power_of_two().max(1 << 17);
     if compression == Compression::Zstd && zstd_frame::window(packed).is_some_and(|asked| asked > window) {
         let mut all = vec![0; whole.max(unpacked.len())];
-        zstd_frame::unpack_whole(packed, &mut all).map_err(Failure::Damaged)?;
+        zstd_frame::unpack_whole(packed, &mut all, unpacked.len()).map_err(Failure::Damaged)?;
         unpacked.copy_from_slice(&all[..unpacked.len()]);
         return Ok(());
     }

@@ -195,6 +195,8 @@ impl Table {
                 ))
             },
         )?;
+        let advice = "cut out what is there: gdal_translate -projwin WEST NORTH EAST SOUTH INPUT output.tif";
+        self.grid.check_sparse(file, stored.samples, advice)?;
         Ok(stored.longest)
     }
 

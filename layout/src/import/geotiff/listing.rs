@@ -93,6 +93,24 @@ impl<'f> Places<'f> {
         Ok(place.filter(|(offset, length)| *offset != 0 && *length != 0))
     }
 
+    /// The first chunk from `chunk` on that the file has, with its offset and packed length.
+    pub(super) fn next(&mut self, mut chunk: u64) -> Result<Option<(u64, u64, u64)>, LayoutError> {
+        while chunk < self.listing.count() {
+            // Brings it to hand.
+            self.get(chunk)?;
+            let at = (chunk - self.first) as usize;
+            let mut rest = self.offsets[at..].iter().zip(&self.lengths[at..]);
+            match rest.position(|(offset, length)| *offset != 0 && *length != 0) {
+                Some(skipped) => {
+                    let at = at + skipped;
+                    return Ok(Some((self.first + at as u64, self.offsets[at], self.lengths[at])));
+                }
+                None => chunk = self.first + self.offsets.len() as u64,
+            }
+        }
+        Ok(None)
+    }
+
     /// Brings the block of `chunk` to hand.
     fn turn_to(&mut self, chunk: u64) -> Result<(), LayoutError> {
         self.first = chunk / BLOCK * BLOCK;
@@ -138,6 +156,12 @@ mod tests {
             assert_eq!(places.get(chunk).unwrap(), (length != 0).then_some((100 + chunk, length)), "{chunk}");
         }
         assert_eq!(places.get(count).unwrap(), None);
+        let mut next = 0;
+        while let Some((chunk, offset, length)) = places.next(next).unwrap() {
+            assert_eq!((chunk, offset, length), (next + u64::from(next % 7 == 0), 100 + chunk, chunk % 7));
+            next = chunk + 1;
+        }
+        assert!(next + 7 > count, "{next} of {count}");
         file.set_len(100).unwrap();
         let mut places = Places::new(Path::new("t.tif"), &file, listing);
         assert!(places.get(BLOCK).unwrap_err().to_string().contains("cut short"));

@@ -57,6 +57,11 @@ impl TiffDem {
         let chunks = Chunks::read(&mut file, &directory)?;
         let nodata = file.text(&directory, tags::GDAL_NODATA, MAX_NODATA_BYTES)?;
         let void = Void::parse(path, nodata.as_deref(), chunks.sample_type)?;
+        if !void.absent().is_nan() {
+            let advice = "the others would all be heights of 0, for it declares no void value; if they are voids, say so: \
+                          gdal_edit.py -a_nodata -9999 FILE";
+            chunks.grid.check_sparse(&file, chunks.stored_samples, advice)?;
+        }
         let (georeference, vertical_unit_m) = geokeys::read(&mut file, &directory)?;
         let bands = file.text(&directory, tags::GDAL_METADATA, MAX_METADATA_BYTES)?.unwrap_or_default();
         let heights = metadata::heights(&bands);
@@ -101,6 +106,9 @@ impl DemSource for TiffDem {
 /// Pushes `window` full of one value, a few rows at a time.
 fn put_constant(sink: &dyn SampleSink, window: Window, value: f64) -> Result<(), LayoutError> {
     let rows = rows_at_once(window.width).min(window.height);
+    if value.is_nan() {
+        return sink.put_void(window);
+    }
     // At most a window's worth, or one row, of which a build has no longer ones than 65,537.
     let samples = vec![value; window.width as usize * rows as usize];
     for part in parts(window, rows) {

@@ -126,7 +126,7 @@ impl Worker<'_> {
         let is_whole =
             chunks.compression == Compression::Zstd && self.whole_is_needed(span).map_err(failed)?;
         if is_whole {
-            guarded(&mut || unpack_whole(&mut span, chunks, &mut self.whole))?;
+            guarded(&mut || unpack_whole(&mut span, chunks, chunk, &mut self.whole))?;
         }
         let (compression, packed): (_, Box<dyn BufRead + '_>) = if is_whole {
             (Compression::None, Box::new(&self.whole[..]))
@@ -178,7 +178,12 @@ impl Chunks {
 }
 
 /// Unpacks a chunk of ZSTD into `whole`.
-fn unpack_whole(span: &mut Span<'_>, chunks: &Chunks, whole: &mut Vec<u8>) -> Result<(), Failure> {
+fn unpack_whole(
+    span: &mut Span<'_>,
+    chunks: &Chunks,
+    chunk: u64,
+    whole: &mut Vec<u8>,
+) -> Result<(), Failure> {
     let unpacked = chunks.decoded_bytes();
     // Nothing that is worth packing becomes longer by it.
     if span.left > 2 * unpacked {
@@ -187,7 +192,7 @@ fn unpack_whole(span: &mut Span<'_>, chunks: &Chunks, whole: &mut Vec<u8>) -> Re
     let mut packed = vec![0; span.left as usize];
     span.read_exact(&mut packed)?;
     whole.resize(unpacked as usize, 0);
-    zstd_frame::unpack_whole(&packed, whole).map_err(Failure::Damaged)
+    zstd_frame::unpack_whole(&packed, whole, chunks.stored_bytes(chunk) as usize).map_err(Failure::Damaged)
 }
 
 /// Rows of a chunk that are unpacked at once, at least 1.

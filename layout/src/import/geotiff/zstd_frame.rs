@@ -35,13 +35,12 @@ pub(super) fn window(head: &[u8]) -> Option<u64> {
     Some(window.min(content))
 }
 
-/// Fills `unpacked` from the first frame of `packed`, without a window.
-pub(super) fn unpack_whole(packed: &[u8], unpacked: &mut [u8]) -> Result<(), String> {
+/// Unpacks the first frame of `packed` without a window, into `unpacked`, which has room for all of it and needs `wanted` bytes.
+pub(super) fn unpack_whole(packed: &[u8], unpacked: &mut [u8], wanted: usize) -> Result<(), String> {
     let damaged = || "its ZSTD stream is damaged".to_owned();
     // Writers may leave something behind the frame.
     let length = zstd::zstd_safe::find_frame_compressed_size(packed).map_err(|_| damaged())?;
     let frame = packed.get(..length).ok_or_else(damaged)?;
-    let wanted = unpacked.len();
     let got = zstd::bulk::Decompressor::new()
         .and_then(|mut decoder| decoder.decompress_to_buffer(frame, unpacked))
         .map_err(|_| damaged())?;
@@ -81,10 +80,12 @@ mod tests {
         let mut packed = streamed(22, &bytes);
         packed.extend_from_slice(b"left behind");
         let mut unpacked = vec![0; bytes.len()];
-        unpack_whole(&packed, &mut unpacked).unwrap();
+        unpack_whole(&packed, &mut unpacked, bytes.len()).unwrap();
         assert_eq!(unpacked, bytes);
-        unpacked.push(0);
-        assert!(unpack_whole(&packed, &mut unpacked).unwrap_err().contains("1 bytes too early"));
-        assert!(unpack_whole(&packed[..packed.len() / 2], &mut unpacked).is_err());
+        // The last strip of an image is shorter than the others.
+        unpacked.resize(50_000, 0);
+        unpack_whole(&packed, &mut unpacked, bytes.len()).unwrap();
+        assert!(unpack_whole(&packed, &mut unpacked, 30_001).unwrap_err().contains("1 bytes too early"));
+        assert!(unpack_whole(&packed[..packed.len() / 2], &mut unpacked, 1).is_err());
     }
 }

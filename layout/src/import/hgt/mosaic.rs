@@ -150,13 +150,22 @@ impl Mosaic {
                     width,
                     height: rows,
                 };
-                sink.put(window, &self.band((down, across), first, rows, width)?)
+                match self.band((down, across), first, rows, width)? {
+                    Some(samples) => sink.put(window, &samples),
+                    None => sink.put_void(window),
+                }
             },
         )
     }
 
-    /// The samples of a cell's rows `first..first + rows` and its first `width` columns.
-    fn band(&self, cell: (u32, u32), first: u32, rows: u32, width: u32) -> Result<Vec<f64>, LayoutError> {
+    /// The samples of a cell's rows `first..first + rows` and its first `width` columns; `None` if all are void.
+    fn band(
+        &self,
+        cell: (u32, u32),
+        first: u32,
+        rows: u32,
+        width: u32,
+    ) -> Result<Option<Vec<f64>>, LayoutError> {
         let (down, across) = cell;
         let side = self.side as usize;
         let width = width as usize;
@@ -185,8 +194,11 @@ impl Mosaic {
         {
             heights[0] = corner[side - 1];
         }
+        if heights.iter().all(|height| *height == VOID) {
+            return Ok(None);
+        }
         let to_sample = |height: i16| if height == VOID { f64::NAN } else { f64::from(height) };
-        Ok(heights.into_iter().map(to_sample).collect())
+        Ok(Some(heights.into_iter().map(to_sample).collect()))
     }
 
     /// Whole rows of the tile in a cell, or `None` where there is no tile.
