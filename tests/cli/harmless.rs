@@ -87,18 +87,9 @@ fn labels_of_a_history_are_spelt_out() {
 #[test]
 fn overlays_flights_and_scripts_are_spelt_out() {
     let bench = Bench::with_flight();
-    bench.good(&[
-        "crater",
-        "land.iqt",
-        "--at",
-        "900,900",
-        "--radius",
-        "60",
-        "--depth",
-        "9",
-        "--overlay",
-        "o.iqo",
-    ]);
+    fs::write(bench.path("o.edits"), "terrasoar-edits 1\nunits metres degrees\nset rect 3,3,9,9 to 50\n")
+        .unwrap();
+    bench.good(&["edit", "land.iqt", "--script", "o.edits", "--overlay", "o.iqo"]);
     let mut overlay = fs::read(bench.path("o.iqo")).unwrap();
     for slot in [0, 4096] {
         overlay[slot + 0x400..slot + 0x402].copy_from_slice(&(HOSTILE.len() as u16).to_le_bytes());
@@ -183,7 +174,7 @@ fn outputs_need_no_names_that_are_text() {
     assert!(serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["path"].is_string());
     // Without anything to draw with the verb fails, and not for the name.
     for json in [&[][..], &["--json"]] {
-        let out = name("png");
+        let out = name("picture.png");
         let args = ["snapshot", "land.iqt", "--size", "64x48"];
         let output = bench.command(&[&args[..], json].concat()).arg("-o").arg(&out).output().unwrap();
         let told = text(&output.stderr);

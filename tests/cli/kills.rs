@@ -22,18 +22,24 @@ const KILLS_A_FILE: u64 = 20;
 /// Longest that a program is left running, in milliseconds.
 const LONGEST_MS: u64 = 90;
 
-/// A file's past: what it was before, what was done, what was undone (the last one first to be done again). Each is a height of all rectangles.
-#[derive(Debug, Clone, PartialEq)]
-struct Past {
-    built_m: f64,
-    done_m: Vec<f64>,
-    undone_m: Vec<f64>,
+/// What is seen of a file: the height of all rectangles, and whether there is a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Seen {
+    height_m: f64,
     has_picture: bool,
 }
 
+/// A file's past: what it was before, what was done, what was undone (the last one first to be done again).
+#[derive(Debug, Clone, PartialEq)]
+struct Past {
+    built: Seen,
+    done: Vec<Seen>,
+    undone: Vec<Seen>,
+}
+
 impl Past {
-    fn height_m(&self) -> f64 {
-        self.done_m.last().copied().unwrap_or(self.built_m)
+    fn now(&self) -> Seen {
+        self.done.last().copied().unwrap_or(self.built)
     }
 
     /// Whether the file at `path` has this past.
@@ -42,25 +48,20 @@ impl Past {
         let entries = history(&terrain).unwrap();
         let done = entries.iter().position(|entry| entry.is_current).map_or(0, |at| at + 1);
         let has_picture = Imagery::open(&terrain).unwrap().is_some();
-        let is_height = (height_in_step(path) - self.height_m()).abs() < 0.051;
+        let is_height = (height_in_step(path) - self.now().height_m).abs() < 0.051;
         (done, entries.len() - done, has_picture)
-            == (self.done_m.len(), self.undone_m.len(), self.has_picture)
+            == (self.done.len(), self.undone.len(), self.now().has_picture)
             && is_height
     }
 
     /// As another file made of this one has it.
     fn rewritten(&self) -> Self {
-        Self {
-            built_m: self.height_m(),
-            done_m: Vec::new(),
-            undone_m: Vec::new(),
-            has_picture: self.has_picture,
-        }
+        Self { built: self.now(), done: Vec::new(), undone: Vec::new() }
     }
 
-    fn with(&self, height_m: f64) -> Self {
-        let done_m = self.done_m.iter().copied().chain([height_m]).collect();
-        Self { done_m, undone_m: Vec::new(), ..*self }
+    fn with(&self, seen: Seen) -> Self {
+        let done = self.done.iter().copied().chain([seen]).collect();
+        Self { done, undone: Vec::new(), ..*self }
     }
 }
 
@@ -89,31 +90,32 @@ impl Deed {
                     states.push(before.rewritten());
                 }
                 for height_m in heights_m {
-                    states.push(last(&states).with(*height_m));
+                    let past = last(&states);
+                    states.push(past.with(Seen { height_m: *height_m, ..past.now() }));
                 }
             }
             Self::Undo(count) => {
                 for _ in 0..*count {
                     let mut past = last(&states);
-                    let Some(height_m) = past.done_m.pop() else { break };
-                    past.undone_m.push(height_m);
+                    let Some(seen) = past.done.pop() else { break };
+                    past.undone.push(seen);
                     states.push(past);
                 }
             }
             Self::Redo(count) => {
                 for _ in 0..*count {
                     let mut past = last(&states);
-                    let Some(height_m) = past.undone_m.pop() else { break };
-                    past.done_m.push(height_m);
+                    let Some(seen) = past.undone.pop() else { break };
+                    past.done.push(seen);
                     states.push(past);
                 }
             }
             Self::Compact => states.push(before.rewritten()),
             // A picture over a file with a past is a step of it.
-            Self::Drape if before.done_m.is_empty() && before.undone_m.is_empty() => {
-                states.push(Past { has_picture: true, ..before.clone() });
+            Self::Drape if before.done.is_empty() && before.undone.is_empty() => {
+                states.push(Past { built: Seen { has_picture: true, ..before.built }, ..before.clone() });
             }
-            Self::Drape => states.push(Past { has_picture: true, ..before.with(before.height_m()) }),
+            Self::Drape => states.push(before.with(Seen { has_picture: true, ..before.now() })),
         }
         (states.len() > 1 || matches!(self, Self::Edit { .. })).then_some(states)
     }
@@ -195,7 +197,8 @@ fn whatever_is_killed_whole_steps_are_there_and_none_that_was_told_is_lost() {
 /// Deeds over one file until so many were killed.
 fn kills_over_one_file(bench: &Bench, random: &mut Random, kills: u64) -> u64 {
     let land = bench.path("land.iqt");
-    let mut past = Past { built_m: 20.0, done_m: Vec::new(), undone_m: Vec::new(), has_picture: false };
+    let mut past =
+        Past { built: Seen { height_m: 20.0, has_picture: false }, done: Vec::new(), undone: Vec::new() };
     let (mut killed, mut number, mut has_widened) = (0, 0, false);
     while killed < kills {
         number += 1;
