@@ -91,6 +91,10 @@ impl Deed {
                 }
                 for height_m in heights_m {
                     let past = last(&states);
+                    if past.now().height_m == *height_m {
+                        // Nothing changes, and nothing is committed.
+                        continue;
+                    }
                     states.push(past.with(Seen { height_m: *height_m, ..past.now() }));
                 }
             }
