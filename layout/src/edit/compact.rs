@@ -4,7 +4,7 @@ use super::commit::Directory;
 use crate::atomic_file::AtomicFile;
 use crate::build::BuildProgress;
 use crate::bytes::{PAGE_BYTES, checksum};
-use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, absent, leaf_page};
 use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::header::{Header, INERT_PAGE};
@@ -87,16 +87,13 @@ fn write_terrain(
     writer.put(&[0; 2 * PAGE_BYTES])?;
     debug_assert_eq!(writer.page()?, INERT_PAGE);
     writer.put(&inert_page(old.record_kind)[..])?;
-    let mut directory = Directory { entries: Vec::with_capacity(terrain.entries().len()), root: Vec::new() };
-    for (logical, entry) in (0u64..).zip(terrain.entries()) {
-        let mut entry = *entry;
-        if entry.is_present() {
-            let page = terrain.checked_page(logical)?;
-            entry = Entry { page: writer.page()?, generation: 1, ..entry };
-            writer.put(&page[..])?;
-            progress.advance(old.records_per_page());
-        }
-        directory.entries.push(entry);
+    let mut directory = Directory { entries: absent(terrain.entries().len()), root: Vec::new() };
+    let pages = (0u64..).zip(terrain.entries()).zip(&mut directory.entries);
+    for ((logical, entry), place) in pages.filter(|((_, entry), _)| entry.is_present()) {
+        let page = terrain.checked_page(logical)?;
+        *place = Entry { page: writer.page()?, generation: 1, ..*entry };
+        writer.put(&page[..])?;
+        progress.advance(old.records_per_page());
     }
     for entries in directory.entries.chunks(ENTRIES_PER_LEAF) {
         if entries.iter().any(|entry| entry.is_present()) {

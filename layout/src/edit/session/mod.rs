@@ -13,6 +13,7 @@ use super::overlay::{empty_overlay, overlay_slots};
 use super::picture::Picture;
 use super::{Changes, Edit, Editor, HeightWindow};
 use crate::bytes::PAGE_BYTES;
+use crate::directory::copy_of;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::header::{Header, History, ImageryPlace};
@@ -133,7 +134,7 @@ impl EditSession {
     ) -> Result<Self, LayoutError> {
         let header = terrain.header().clone();
         let directory =
-            Directory { entries: terrain.entries().to_vec(), root: read_root(terrain.source(), &header)? };
+            Directory { entries: copy_of(terrain.entries()), root: read_root(terrain.source(), &header)? };
         let original = match header.history {
             Some(history) => Commit::read(terrain.source(), &header, history.tip_page)?.original,
             None => State::of(&header),
