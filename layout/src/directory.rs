@@ -56,6 +56,14 @@ pub(crate) fn absent(logical_pages: usize) -> Vec<Entry> {
     bytemuck::zeroed_vec(logical_pages)
 }
 
+/// A copy that takes memory for what is present alone, as the table itself does.
+pub(crate) fn copy_of(entries: &[Entry]) -> Vec<Entry> {
+    let mut copy = absent(entries.len());
+    let present = copy.iter_mut().zip(entries).filter(|(_, entry)| **entry != Entry::default());
+    present.for_each(|(place, entry)| *place = *entry);
+    copy
+}
+
 /// Entries a leaf page.
 pub(crate) const ENTRIES_PER_LEAF: usize = PAGE_BYTES / ENTRY_BYTES;
 

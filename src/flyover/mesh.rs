@@ -14,15 +14,18 @@ pub struct FrameMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// The mesh of an engine over `records`.
-pub(super) fn collect_mesh(engine: &impl Engine, records: &impl RecordStore) -> FrameMesh {
+/// The mesh of an engine over its records.
+pub(super) fn collect_mesh<E: Engine>(mut engine: E) -> FrameMesh {
+    let mut triangles: Vec<Triangle> = Vec::new();
+    engine.for_each_triangle(&mut |triangle| triangles.push(triangle));
+    mesh_of(&triangles, engine.store_mut())
+}
+
+fn mesh_of(triangles: &[Triangle], records: &impl RecordStore) -> FrameMesh {
     let mut mesh = FrameMesh::default();
     let mut indices: HashMap<u64, u32> = HashMap::new();
     let grid = *records.grid();
-    engine.for_each_triangle(&mut |t: Triangle| {
-        if !is_drawn(records, t) {
-            return;
-        }
+    for t in triangles.iter().filter(|t| is_drawn(records, **t)) {
         mesh.triangles.push(t.map(|p| {
             // Folded points coincide; they become one vertex.
             *indices.entry(grid.fold(p).packed()).or_insert_with(|| {
@@ -31,6 +34,6 @@ pub(super) fn collect_mesh(engine: &impl Engine, records: &impl RecordStore) -> 
                 mesh.positions.len() as u32 - 1
             })
         }));
-    });
+    }
     mesh
 }

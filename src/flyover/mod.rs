@@ -306,7 +306,6 @@ pub fn frame_mesh(
             ground.edit_and_tell(i, &mut engine)?;
             engine.update(&quality.view(frame), &mut Unobserved);
         }
-        let records = engine.store_mut().clone();
-        Ok(collect_mesh(&engine, &records))
+        Ok(collect_mesh(engine))
     }))
 }

@@ -1,8 +1,8 @@
 //! A terrain file written anew as a build would have left it: pages in order, imagery behind them, and nothing of what edits replaced.
 
 use crate::build::BuildProgress;
-use crate::bytes::{PAGE_BYTES, Page};
-use crate::directory::Entry;
+use crate::bytes::PAGE_BYTES;
+use crate::directory::{Entry, absent};
 use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
@@ -136,16 +136,13 @@ fn write_terrain(
     writer.put(&[0; 2 * PAGE_BYTES])?;
     debug_assert_eq!(writer.page()?, INERT_PAGE);
     writer.put(&inert_page(old.record_kind)[..])?;
-    let mut entries = Vec::with_capacity(terrain.entries().len());
-    for (logical, entry) in (0u64..).zip(terrain.entries()) {
-        let mut entry = *entry;
-        if entry.is_present() {
-            let page: Box<Page> = terrain.checked_page(logical)?;
-            entry = Entry { page: writer.page()?, generation: 1, ..entry };
-            writer.put(&page[..])?;
-            progress.advance(old.records_per_page());
-        }
-        entries.push(entry);
+    let mut entries = absent(terrain.entries().len());
+    let pages = (0u64..).zip(terrain.entries()).zip(&mut entries);
+    for ((logical, entry), place) in pages.filter(|((_, entry), _)| entry.is_present()) {
+        let page = terrain.checked_page(logical)?;
+        *place = Entry { page: writer.page()?, generation: 1, ..*entry };
+        writer.put(&page[..])?;
+        progress.advance(old.records_per_page());
     }
     let (root, root_page) = put_all_leaves(&entries, writer.page()?, |_, bytes| writer.put(bytes))?;
     let root = root_bytes(&root);

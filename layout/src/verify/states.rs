@@ -7,7 +7,7 @@
 
 use super::Findings;
 use crate::bytes::{PAGE_BYTES, checksum, to_usize};
-use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses};
+use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, copy_of};
 use crate::error::LayoutError;
 use crate::file::journal::State;
 use crate::header::Header;
@@ -70,7 +70,7 @@ impl<'t> States<'t> {
             names: Vec::new(),
             header: header.clone(),
             root: read_root(source, header)?,
-            entries: terrain.entries().to_vec(),
+            entries: copy_of(terrain.entries()),
             uses: PageUses::new(source, header.file_bytes)?,
             journal: Vec::new(),
             roots: BTreeSet::from([root_of(&state)]),

@@ -13,7 +13,7 @@ use super::overlay::{create_overlay, overlay_slots};
 use super::picture::Picture;
 use super::{Changes, Edit, Editor, HeightWindow};
 use crate::bytes::PAGE_BYTES;
-use crate::directory::Entry;
+use crate::directory::{Entry, copy_of};
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::file::directory::Directory;
@@ -149,7 +149,7 @@ impl EditSession {
     ) -> Result<Self, LayoutError> {
         let header = terrain.header().clone();
         let directory =
-            Directory { entries: terrain.entries().to_vec(), root: read_root(terrain.source(), &header)? };
+            Directory { entries: copy_of(terrain.entries()), root: read_root(terrain.source(), &header)? };
         let original = Lineage::read(terrain.source(), &header)?.original;
         Ok(Self {
             editor: Editor::new(Arc::new(terrain)),
