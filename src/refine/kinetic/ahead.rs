@@ -181,7 +181,9 @@ impl<S: RecordStore> Kinetic<S> {
         let mut away = None;
         ahead.stack.clear();
         ahead.stack.push((leaf.point, first));
-        while let Some((point, in_frames)) = ahead.stack.pop() {
+        // A vertex is met from each of its parents, and records that are not nested can make all of them due at once: what is met then has no end. What is given up here
+        // is foresight; its pages are asked for when the mesh lacks them.
+        while let Some((point, in_frames)) = ahead.stack.pop().filter(|_| tests < TESTS_A_FRAME) {
             let level = level_of(point);
             if level == 0 {
                 continue;
