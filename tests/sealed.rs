@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 use terrasoar::refine::{Culling, Unobserved};
 use terrasoar::stream::{Prefetch, Streamed, Threads};
 use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::loader::Loader;
+use terrasoar_layout::order::slot_of;
 use terrasoar_layout::source::MemorySource;
 use terrasoar_layout::terrain::{ByKind, Terrain};
 use terrasoar_layout::testing::{Counts, reseal, seeds};
@@ -85,6 +87,43 @@ fn filling_a_pool_ends_where_wanted_vertices_have_parents_that_are_not() {
         assert!(begun.elapsed() < Duration::from_secs(20), "{prefetch:?}: {:?}", begun.elapsed());
         let work = streamed.update(&view, &mut Unobserved).work;
         assert!(work.late > 0 && work.unread == 0, "the file is not what it is to be: {work:?}");
+    }
+}
+
+/// Large forms that are wanted sooner or later as the eye comes near, and everything below them at once: each vertex is due from each of its parents.
+fn due_all_at_once() -> Vec<u8> {
+    let terrain = common::rugged_terrain([513, 513], 4, false);
+    let mut bytes = vec![0; terrain.source().byte_count() as usize];
+    terrain.source().read_at(0, &mut bytes).unwrap();
+    let grid = *terrain.grid();
+    let mut random = Random(9);
+    for (x, y) in (0..=512).flat_map(|x| (0..=512).map(move |y| (x, y))) {
+        let point = GridPoint::new(x, y);
+        if grid.is_corner(point) {
+            continue;
+        }
+        let slot = slot_of(grid.k(), point) as usize;
+        let page = terrain.entries()[slot * 4 / PAGE_BYTES].page as usize;
+        let error = if grid.level(point) > 13 { 1 + (random.next() % 247) as u8 } else { 251 };
+        bytes[page * PAGE_BYTES + slot * 4 % PAGE_BYTES + 2] = error;
+    }
+    reseal(&mut bytes, Counts::Keep);
+    bytes
+}
+
+#[test]
+fn looking_ahead_ends_where_everything_is_due_at_once() {
+    let source = MemorySource::new("due", due_all_at_once());
+    let terrain = Arc::new(Terrain::from_source(Box::new(source)).unwrap());
+    let ByKind::Compact(pool) = terrain.pool(1 << 24).unwrap() else { panic!("compact records") };
+    let loader = Threads::from(Loader::start(Arc::clone(&terrain), 2).unwrap());
+    let mut streamed = Streamed::new(pool, loader, Culling::Vertices, Prefetch::Deadline);
+    let begun = Instant::now();
+    for i in 0..150 {
+        let up_m = 4e6 * 0.95_f64.powi(i);
+        let frame = frame(&terrain, [0.5, 0.4], up_m, 40.0, -60.0);
+        streamed.update(&frame.view(terrasoar::view::Viewport::default(), 1.0), &mut Unobserved);
+        assert!(begun.elapsed() < PATIENCE, "frame {i}: {:?}", begun.elapsed());
     }
 }
 
