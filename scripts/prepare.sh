@@ -46,11 +46,11 @@ need_component() {
     rustup component add "$component" || fail "rustup cannot install $component; it needs the network once"
 }
 
-# need_cargo_tool NAME VERSION WHY: a subcommand of cargo, built from its source if it is not here.
+# need_cargo_tool NAME VERSION WHY [OPTION...]: a subcommand of cargo, built from its source if it is not here.
 need_cargo_tool() {
     cargo "${1#cargo-}" --version >/dev/null 2>&1 && return
     say "building $1 $2 through cargo, once: $3"
-    CARGO_NET_OFFLINE=false cargo install --quiet --locked "$1" --version "$2" ||
+    CARGO_NET_OFFLINE=false cargo install --quiet --locked "$1" --version "$2" "${@:4}" ||
         fail "$1 cannot be installed; it needs the network once"
 }
 

@@ -28,6 +28,23 @@ pub fn make<T>(make: impl FnOnce() -> io::Result<(PathBuf, T)>) -> io::Result<(G
     Ok((Guard(path), made))
 }
 
+impl Guard {
+    /// Gives what was made its own name by `give`, and takes it off the list, both at once: a signal comes before, and takes all of it away, or after. In between it could take away a part.
+    ///
+    /// # Errors
+    /// Those of `give`.
+    pub fn finish<T>(mut self, give: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
+        let mut list = LIST.lock().unwrap_or_else(PoisonError::into_inner);
+        let given = give()?;
+        let path = std::mem::take(&mut self.0);
+        if let Some(at) = list.iter().position(|listed| *listed == path) {
+            list.swap_remove(at);
+        }
+        drop(list);
+        Ok(given)
+    }
+}
+
 impl Drop for Guard {
     fn drop(&mut self) {
         let mut list = LIST.lock().unwrap_or_else(PoisonError::into_inner);

@@ -89,9 +89,15 @@ fn every_call_of_the_disk_may_fail() {
                     let said = error.to_string();
                     assert!(matches!(error, LayoutError::Io { .. }), "{}: {said}", what());
                     assert!(said.contains(&target.display().to_string()), "{}: {said}", what());
-                    let remedy = if failure == Failure::Once { "injected failure" } else { "room" };
-                    assert!(said.contains(remedy), "{}: {said}", what());
-                    folder.is_left(&[], &what);
+                    if said.contains("the file is complete") {
+                        // The last step alone failed, which brings the name to the disk.
+                        assert!(verify(&Terrain::open(&target).unwrap(), &|_| {}).unwrap().is_sound());
+                        std::fs::remove_file(&target).unwrap();
+                    } else {
+                        let remedy = if failure == Failure::Once { "injected failure" } else { "room" };
+                        assert!(said.contains(remedy), "{}: {said}", what());
+                        folder.is_left(&[], &what);
+                    }
                     failures += 1;
                 }
                 n += 1;
@@ -157,7 +163,7 @@ fn a_name_that_is_taken_or_gone_when_the_file_is_complete_is_an_error() {
     let take = || std::fs::create_dir(folder.target()).unwrap();
     let dem = dem();
     let error = build(&Meddling::new(&dem, 9, &take), &folder.target(), &options(512), &Silent).unwrap_err();
-    assert!(error.to_string().contains("t.iqt: cannot write the file"), "{error}");
+    assert!(error.to_string().contains("t.iqt: the output is a folder"), "{error}");
     folder.is_left(&["t.iqt"], &|| "a folder took the name".into());
     let inner = folder.folder.path().join("inner");
     std::fs::create_dir(&inner).unwrap();

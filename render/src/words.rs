@@ -44,8 +44,8 @@ pub(crate) fn of_backends(backends: wgpu::Backends) -> String {
 
 /// The last line of a chain of causes that says something.
 pub(crate) fn last_cause(text: &str) -> String {
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    lines.last().unwrap_or("it does not say why").trim_end_matches('.').into()
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.next_back().unwrap_or("it does not say why").trim_end_matches('.').into()
 }
 
 #[cfg(test)]

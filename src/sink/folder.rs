@@ -87,7 +87,7 @@ fn publish_new(folder: &Path, spool: &mut File, files: &[(String, u64)]) -> Resu
     let top = folder.ancestors().take_while(|above| !above.as_os_str().is_empty() && !above.exists()).last();
     let top = top.unwrap_or(folder);
     let parent = top.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let (_guard, hidden) = unfinished::make(|| {
+    let (guard, hidden) = unfinished::make(|| {
         let hidden = hidden_in(parent, top)?;
         Ok((hidden.path().to_owned(), hidden))
     })
@@ -106,7 +106,7 @@ fn publish_new(folder: &Path, spool: &mut File, files: &[(String, u64)]) -> Resu
     for synced in filled.ancestors().take_while(|above| above.starts_with(hidden.path())) {
         sync_folder(synced).map_err(failed)?;
     }
-    std::fs::rename(hidden.path(), top).map_err(failed)?;
+    guard.finish(|| std::fs::rename(hidden.path(), top)).map_err(failed)?;
     // What had this name has another now.
     let _ = hidden.keep();
     sync_folder(parent).map_err(failed)

@@ -193,7 +193,8 @@ fn whatever_is_killed_whole_steps_are_there_and_none_that_was_told_is_lost() {
     });
     println!("{kills} kills, {} looks", looks.load(Ordering::Relaxed));
     assert!(looks.load(Ordering::Relaxed) > kills);
-    bench.good(&["undo", "land.iqt", "100000"]);
+    // There may be nothing left to undo.
+    bench.run(&["undo", "land.iqt", "100000"]);
     bench.good(&["compact", "land.iqt"]);
     assert_eq!(bench.names(), ["begin.iqt", "deed.edits", "land.iqt", "land.tif", "photo.tif"]);
 }

@@ -1,5 +1,9 @@
 //! An editor for one kind of records: heights in, records out, whole or not at all.
 
+mod replace;
+
+pub(super) use replace::Replacement;
+
 use super::ground::NewCodes;
 use super::near::MARGIN;
 use super::pages::{Overwritten, Pages};
@@ -393,56 +397,6 @@ impl<C: RecordCodec> Core<C> {
         self.header.height_range_m = range_m;
         Ok(())
     }
-
-    pub(super) fn replacement(
-        &mut self,
-        places: &[(u64, Entry)],
-        header: &Header,
-    ) -> Result<Replacement, LayoutError> {
-        if !self.pages.is_committed() {
-            return Err(LayoutError::Usage(
-                "edits that are not committed are in the way; commit them or take them back first".into(),
-            ));
-        }
-        let mut pages = Vec::with_capacity(places.len());
-        for (logical, entry) in places {
-            // What is there now is compared with it, and must not fail to come then.
-            let now = Box::new(*self.pages.page(*logical)?);
-            pages.push(NewPage {
-                logical: *logical,
-                entry: *entry,
-                now,
-                new: self.pages.read_at(*logical, *entry)?,
-            });
-        }
-        Ok(Replacement { pages, range: (header.height_range_m, header.scale.error_top_m) })
-    }
-
-    pub(super) fn replace(&mut self, replacement: Replacement) -> Changes {
-        let mut changes = Changes::default();
-        for NewPage { logical, entry, now, new } in replacement.pages {
-            self.pages.replace(logical, entry, new);
-            self.note_differences(logical, &now, &mut changes);
-        }
-        self.set_range(replacement.range);
-        self.committed = replacement.range;
-        self.end_replacing(changes)
-    }
-}
-
-/// Contents for pages that are in the file at other places, ready to be put in.
-#[derive(Debug)]
-pub(super) struct Replacement {
-    pages: Vec<NewPage>,
-    range: ([f64; 2], f64),
-}
-
-#[derive(Debug)]
-struct NewPage {
-    logical: u64,
-    entry: Entry,
-    now: Box<Page>,
-    new: Box<Page>,
 }
 
 /// Leaves of `values`, one for each sample of `rect`, those of `part`, which lies in it.

@@ -6,7 +6,7 @@
 //!
 //! **What the name stood for stays.** A symbolic link goes on leading to the file, which is replaced where it really lies. The new file takes over the mode of the one it replaces, and its owner
 //! where the system allows that; a file that replaces none has the mode that the process gives new files. What is no regular file, such as a device, is not replaced. A terrain that somebody is
-//! writing to is not replaced either ([`lock`](super::lock)), nor one that was edited after the new file was begun ([`seen`](super::seen)).
+//! writing to is not replaced either (`lock`), nor one that was edited after the new file was begun (`seen`).
 //!
 //! **A nameless file cannot replace another.** Where the target exists it gets a name of its own first, `.NAME.*.terrasoar-new`, and is renamed at once. A process killed between
 //! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away. What has a name before it is complete is on the list of [`unfinished`].

@@ -1,7 +1,7 @@
 //! The one way to the disk: how terrain files come to be, grow and are replaced, so that nothing told as durable is lost and nothing of others is harmed.
 //!
 //! * [`atomic`]: a new file appears under its name only when it is complete, keeps what the name stood for (a link, a mode, an owner), and its name is on the disk too.
-//! * [`lock`]: one writer at a time, by a lock on the file itself, whatever name it is reached by.
+//! * `lock`: one writer at a time, by a lock on the file itself, whatever name it is reached by.
 //! * `tail`: a file grows behind its end, and one write of a header makes that count. Edits, undo, pictures and overlays all go through it.
 //! * `directory`: where pages lie, written behind them.
 //! * `journal`: what commits led to and what was before them.
