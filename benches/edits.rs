@@ -11,15 +11,12 @@
 
 #[path = "support/craters.rs"]
 mod craters;
-#[path = "support/ground.rs"]
-mod ground;
 
 use craters::{Dice, Failure, crater, with_room};
-use ground::OverTerrain;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
-use terrasoar::flight::generate::{FlightKind, FlightPlan, generate};
+use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround, generate};
 use terrasoar::refine::ground::GroundChange;
 use terrasoar::refine::kinetic::Kinetic;
 use terrasoar::refine::{Culling, Engine, Unobserved};
@@ -116,7 +113,7 @@ fn bomb<C: RecordCodec>(
 ) -> Result<String, Failure> {
     let plan =
         FlightPlan::new(FlightKind::Straight, (WARM + 2 * frames) as u64, terrain.grid().spacing_m()[0]);
-    let flown = generate(&OverTerrain(terrain), &plan)?.frames;
+    let flown = generate(&TerrainGround::new(terrain), &plan)?.frames;
     let mut editor = Editor::new(Arc::clone(terrain));
     let mut engine = Kinetic::new(EditedRecords::new(records.clone()), culling);
     let mut dice = Dice(11);

@@ -7,14 +7,10 @@
 //!
 //! Prints Markdown tables. Keep runs under benches/runs/.
 
-#[path = "support/ground.rs"]
-mod ground;
-
-use ground::OverTerrain;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
-use terrasoar::flight::generate::{FlightKind, FlightPlan};
+use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround};
 use terrasoar::flight::{FlightFrame, incoherence};
 use terrasoar::flyover::{EngineKind, Quality, mean_incoherence_percent, replay};
 use terrasoar::stats::Comparison;
@@ -108,7 +104,7 @@ fn flight(
     tolerance_px: f64,
 ) -> Result<(Vec<FlightFrame>, f64), Failure> {
     let plan = FlightPlan::new(kind, frames, 1.0);
-    let solution = incoherence::solve(&OverTerrain(terrain), &plan, percent, |pairs| {
+    let solution = incoherence::solve(&TerrainGround::new(terrain), &plan, percent, |pairs| {
         mean_incoherence_percent(terrain, pairs, quality(tolerance_px))
     })?;
     Ok((solution.flight.frames, solution.best.speed_m_per_frame))

@@ -9,15 +9,12 @@
 //! All engines fly the same frames in the same process, one after the other, three times over; a frame's time is the least of its three, and figures are
 //! medians over the last two thirds of the frames. One thread. Prints Markdown. Keep runs under benches/runs/.
 
-#[path = "support/ground.rs"]
-mod ground;
 #[path = "support/scan.rs"]
 mod scan;
 
-use ground::OverTerrain;
 use std::path::PathBuf;
 use std::time::Instant;
-use terrasoar::flight::generate::{FlightKind, FlightPlan, generate};
+use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround, generate};
 use terrasoar::flight::{FlightFrame, incoherence};
 use terrasoar::flyover::{Quality, mean_incoherence_percent};
 use terrasoar::refine::kinetic::Kinetic;
@@ -91,7 +88,7 @@ fn straight(
 ) -> Result<(Vec<FlightFrame>, f64), Failure> {
     let quality = Quality { tolerance_px, ..Default::default() };
     let plan = FlightPlan::new(FlightKind::Straight, frames, 1.0);
-    let solution = incoherence::solve(&OverTerrain(terrain), &plan, percent, |pairs| {
+    let solution = incoherence::solve(&TerrainGround::new(terrain), &plan, percent, |pairs| {
         mean_incoherence_percent(terrain, pairs, quality)
     })?;
     Ok((solution.flight.frames, solution.best.speed_m_per_frame))
@@ -104,7 +101,7 @@ fn plain(terrain: &Terrain, frames: u64, speed_m: f64, rate_deg: f64) -> Result<
     if rate_deg != 0.0 {
         plan.turn_rate_deg_per_frame = rate_deg;
     }
-    Ok(generate(&OverTerrain(terrain), &plan)?.frames)
+    Ok(generate(&TerrainGround::new(terrain), &plan)?.frames)
 }
 
 fn views(frames: &[FlightFrame], tolerance_px: f64) -> Vec<View> {

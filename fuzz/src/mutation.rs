@@ -1,22 +1,6 @@
 //! Mutations that repeat: what tests do to seeds where no fuzzer is.
 
-/// Numbers that repeat for a seed.
-#[derive(Debug, Clone)]
-pub struct Random(u64);
-
-impl Random {
-    /// Begins with a seed.
-    pub fn new(seed: u64) -> Self {
-        Self(seed ^ 0x9e37_79b9_7f4a_7c15)
-    }
-
-    /// The next number, below `end`; 0 if that is 0.
-    pub fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let mixed = (self.0 ^ (self.0 >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
-        ((mixed ^ (mixed >> 29)) % end.max(1) as u64) as usize
-    }
-}
+use terrasoar_layout::testing::Random;
 
 const WORDS: &[&str] = &[
     "0",
@@ -77,8 +61,8 @@ const NUMBERS: &[u64] = &[
 pub fn mutate(seed: &[u8], number: u64, is_text: bool) -> Vec<u8> {
     let mut random = Random::new(number);
     let mut bytes = seed.to_vec();
-    for _ in 0..=random.below(3) {
-        if is_text && random.below(2) == 0 {
+    for _ in 0..=random.index(3) {
+        if is_text && random.index(2) == 0 {
             change_text(&mut bytes, &mut random);
         } else {
             change_bytes(&mut bytes, &mut random);
@@ -91,43 +75,43 @@ pub fn mutate(seed: &[u8], number: u64, is_text: bool) -> Vec<u8> {
 fn change_text(bytes: &mut Vec<u8>, random: &mut Random) {
     let starts = bytes.iter().enumerate().filter(|(_, byte)| byte.is_ascii_whitespace()).map(|(i, _)| i + 1);
     let starts: Vec<usize> = std::iter::once(0).chain(starts).collect();
-    let start = starts[random.below(starts.len())];
+    let start = starts[random.index(starts.len())];
     let length = bytes[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(bytes.len() - start);
-    let word = WORDS[random.below(WORDS.len())];
+    let word = WORDS[random.index(WORDS.len())];
     bytes.splice(start..start + length, word.bytes());
 }
 
 fn change_bytes(bytes: &mut Vec<u8>, random: &mut Random) {
     if bytes.is_empty() {
-        return bytes.push(random.below(256) as u8);
+        return bytes.push(random.index(256) as u8);
     }
     // Headers and directories are at either end.
-    let near = random.below(400.min(bytes.len()));
-    let at = match random.below(4) {
-        0 => random.below(bytes.len()),
+    let near = random.index(400.min(bytes.len()));
+    let at = match random.index(4) {
+        0 => random.index(bytes.len()),
         1 => bytes.len() - 1 - near,
         _ => near,
     };
-    match random.below(8) {
-        0 => bytes[at] ^= 1 << random.below(8),
-        1 => bytes[at] = random.below(256) as u8,
+    match random.index(8) {
+        0 => bytes[at] ^= 1 << random.index(8),
+        1 => bytes[at] = random.index(256) as u8,
         2..=4 => {
-            let number = NUMBERS[random.below(NUMBERS.len())];
-            let width = [1, 2, 4, 8][random.below(4)].min(bytes.len() - at);
-            let big = random.below(2) == 0;
+            let number = NUMBERS[random.index(NUMBERS.len())];
+            let width = [1, 2, 4, 8][random.index(4)].min(bytes.len() - at);
+            let big = random.index(2) == 0;
             let raw = if big { number.to_be_bytes() } else { number.to_le_bytes() };
             let from = if big { 8 - width } else { 0 };
             bytes[at..at + width].copy_from_slice(&raw[from..from + width]);
         }
         5 => bytes.truncate(at),
         6 => {
-            let end = (at + random.below(64)).min(bytes.len());
+            let end = (at + random.index(64)).min(bytes.len());
             let piece = bytes[at..end].to_vec();
-            let to = random.below(bytes.len());
+            let to = random.index(bytes.len());
             bytes.splice(to..to, piece);
         }
         _ => {
-            let end = (at + random.below(16)).min(bytes.len());
+            let end = (at + random.index(16)).min(bytes.len());
             bytes.drain(at..end);
         }
     }

@@ -3,6 +3,8 @@
 //! A file may hold any number and any text. A number of three hundred digits says less than its power of ten; a text may move a terminal's cursor,
 //! ring its bell or turn what follows from right to left. Cost: one pass over what is shown.
 
+use crate::printable::is_harmless;
+
 /// A number as people read it: with its power of ten where it would be long.
 pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
@@ -15,14 +17,7 @@ pub(crate) fn number(value: f64) -> String {
 
 /// At most `most` characters of `text`, without those that do something rather than show something.
 pub(crate) fn harmless(text: &str, most: usize) -> String {
-    text.chars().filter(|c| !acts(*c)).take(most).collect()
-}
-
-/// Controls, ends of lines and paragraphs, marks and turns of direction, marks of byte order, characters without width.
-fn acts(c: char) -> bool {
-    c.is_control()
-        || matches!(c, '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}')
-        || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+    text.chars().filter(|c| is_harmless(*c)).take(most).collect()
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 mod common;
 
 use common::MemoryDem;
-use std::path::{Path, PathBuf};
+use common::edits::{Bench, pages, session_pages, set};
+use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, HeightRoom, Silent, build};
@@ -15,53 +16,19 @@ use terrasoar_layout::imagery::{DrapeOptions, MemoryImage, Paint, Scorch};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
-struct Bench {
-    folder: tempfile::TempDir,
-}
-
-impl Bench {
-    fn new() -> Self {
-        let bench = Self { folder: tempfile::tempdir().unwrap() };
-        let dem = MemoryDem::from_fn([150, 120], SampleType::I16, |x, y| {
-            f64::from((x * 7 + y * 13) % 100 + x / 3 + y / 2)
-        });
-        let options = BuildOptions { spacing_m: Some([10.0; 2]), ..BuildOptions::default() };
-        build(&dem, &bench.path("t.iqt"), &options, &Silent).unwrap();
-        bench
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(self.folder.path()).unwrap();
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-}
-
-fn set(i: u32) -> Edit {
-    let (west, south) = (i * 37 % 120, i * 53 % 100);
-    let rect = SampleRect { west, south, east: west + 12, north: south + 9 };
-    Edit::Set { area: Area::Rect(rect), height_m: f64::from(20 + i % 60) }
+/// What is in the folder of a bench.
+fn names(bench: &Bench) -> Vec<String> {
+    let entries = std::fs::read_dir(bench.folder.path()).unwrap();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
 }
 
 fn commit(path: &Path, i: u32) {
     let mut session = EditSession::open(path).unwrap();
     session.apply(&[set(i)]).unwrap();
     session.commit("set").unwrap();
-}
-
-fn pages(terrain: &Terrain) -> Vec<u8> {
-    (0..terrain.header().record_pages()).flat_map(|i| terrain.checked_page(i).unwrap().to_vec()).collect()
-}
-
-fn session_pages(session: &mut EditSession) -> Vec<u8> {
-    let pages = session.header().record_pages();
-    (0..pages).flat_map(|i| session.editor_mut().page(i).unwrap().to_vec()).collect()
 }
 
 fn draped(path: &Path) {
@@ -329,7 +296,7 @@ mod names {
             last = now;
             assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
             assert_eq!(std::fs::metadata(&real).unwrap().mode() & 0o777, 0o600, "step {step}");
-            assert_eq!(bench.names(), ["far", "link.iqt"]);
+            assert_eq!(names(&bench), ["far", "link.iqt"]);
             assert_eq!(std::fs::read_dir(bench.path("far")).unwrap().count(), 1);
             assert!(verify(&Terrain::open(&link).unwrap(), &|_| {}).unwrap().is_sound());
         }
@@ -390,6 +357,6 @@ mod names {
         for name in ["t.iqt.lock", "Cargo.lock", "o.iqo.lock"] {
             assert_eq!(std::fs::read_to_string(bench.path(name)).unwrap(), "mine");
         }
-        assert_eq!(bench.names(), ["Cargo", "Cargo.lock", "o.iqo", "o.iqo.lock", "t.iqt", "t.iqt.lock"]);
+        assert_eq!(names(&bench), ["Cargo", "Cargo.lock", "o.iqo", "o.iqo.lock", "t.iqt", "t.iqt.lock"]);
     }
 }

@@ -2,44 +2,27 @@
 
 mod common;
 
-use common::MemoryDem;
+use common::edits::{Bench, pages, session_pages, set};
 use proptest::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, HeightRoom, Silent, build};
-use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::build::{HeightRoom, Silent};
 use terrasoar_layout::disk::{Disk, FailingDisk, Failure, SystemDisk};
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, history, widen};
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
-/// A folder with a terrain in it.
-struct Bench {
-    folder: tempfile::TempDir,
+/// What a test edits: a terrain, or an overlay of it.
+trait Target {
+    /// Where edits go: the terrain itself or an overlay of it.
+    fn session(&self, disk: Arc<dyn Disk + Send>, is_overlay: bool) -> Result<EditSession, LayoutError>;
+
+    fn open(&self, is_overlay: bool) -> Terrain;
 }
 
-impl Bench {
-    fn new() -> Self {
-        let bench = Self { folder: tempfile::tempdir().unwrap() };
-        let dem = MemoryDem::from_fn([150, 120], SampleType::I16, |x, y| {
-            f64::from((x * 7 + y * 13) % 100 + x / 3 + y / 2)
-        });
-        let options = BuildOptions { spacing_m: Some([10.0; 2]), ..BuildOptions::default() };
-        build(&dem, &bench.terrain(), &options, &Silent).unwrap();
-        bench
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn terrain(&self) -> PathBuf {
-        self.path("t.iqt")
-    }
-
-    /// Where edits go: the terrain itself or an overlay of it.
+impl Target for Bench {
     fn session(&self, disk: Arc<dyn Disk + Send>, is_overlay: bool) -> Result<EditSession, LayoutError> {
         if is_overlay {
             EditSession::open_overlay_on(disk, &self.terrain(), &self.path("o.iqo"))
@@ -57,26 +40,10 @@ impl Bench {
     }
 }
 
-fn set(i: u32) -> Edit {
-    let (west, south) = (i * 37 % 120, i * 53 % 100);
-    let rect = SampleRect { west, south, east: west + 12, north: south + 9 };
-    Edit::Set { area: Area::Rect(rect), height_m: f64::from(20 + i % 60) }
-}
-
-/// All record pages.
-fn pages(terrain: &Terrain) -> Vec<u8> {
-    (0..terrain.header().record_pages()).flat_map(|i| terrain.checked_page(i).unwrap().to_vec()).collect()
-}
-
 fn is_sound(terrain: &Terrain) -> bool {
     let report = verify(terrain, &|_| {}).unwrap();
     assert!(report.is_sound(), "{:?}", report.problems);
     true
-}
-
-fn session_pages(session: &mut EditSession) -> Vec<u8> {
-    let pages = session.header().record_pages();
-    (0..pages).flat_map(|i| session.editor_mut().page(i).unwrap().to_vec()).collect()
 }
 
 /// Three batches, then one undone, one redone; the pages after each step.

@@ -5,25 +5,14 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::imagery::Imagery;
-use terrasoar_layout::testing::{Counts, Mutation, Sealed, Seed, exercise, reseal, seeds};
+use terrasoar_layout::testing::{Counts, Mutation, Random, Sealed, Seed, exercise, reseal, seeds};
 
-/// Numbers that repeat for a seed.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
-        let x = self.0 ^ self.0 >> 29;
-        x.wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 16
-    }
-
-    /// A recipe of one to four mutations; three in four settle the counts.
-    fn recipe(&mut self) -> Vec<u8> {
-        let count = 1 + self.next() as usize % 4;
-        let mut recipe = vec![u8::from(self.next().is_multiple_of(4))];
-        (0..count).for_each(|_| recipe.extend(self.next().to_le_bytes()));
-        recipe
-    }
+/// A recipe of one to four mutations; three in four settle the counts.
+fn recipe(random: &mut Random) -> Vec<u8> {
+    let count = 1 + random.index(4);
+    let mut recipe = vec![u8::from(random.below(4) == 0)];
+    (0..count).for_each(|_| recipe.extend(random.bits().to_le_bytes()));
+    recipe
 }
 
 /// A folder that lies in memory, if the system has such: nothing here is about what becomes of files.
@@ -53,9 +42,9 @@ fn whatever_a_sealed_file_says_it_is_used_or_refused() {
     let mut opened = 0;
     for (i, seed) in seeds().into_iter().enumerate() {
         assert!(exercise(&seed.files, folder.path()), "{}", seed.name);
-        let mut random = Random(i as u64);
+        let mut random = Random::new(i as u64);
         for _ in 0..rounds {
-            let recipe = random.recipe();
+            let recipe = recipe(&mut random);
             let mut files = seed.files.clone();
             files.mutate(&recipe);
             let tried = std::panic::catch_unwind(|| try_out(seed.name, &recipe, &files, folder.path()));

@@ -1,6 +1,5 @@
 //! `terrasoar flight`: a recorded flight over a terrain, at a speed given or found.
 
-use super::ground::TerrainGround;
 use super::output::{complain, decimal, print};
 use super::outputs::{Force, Kind};
 use super::progress::Progress;
@@ -10,7 +9,7 @@ use super::{WrongUsage, parse};
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
-use terrasoar::flight::generate::{FlightKind, FlightPlan, generate};
+use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround, generate};
 use terrasoar::flight::incoherence::{MAX_TRIALS, solve};
 use terrasoar::flyover::mean_incoherence_percent;
 use terrasoar::sink::is_stream;

@@ -11,7 +11,6 @@ mod defect;
 mod drape;
 mod edit;
 mod flight;
-mod ground;
 mod height;
 mod info;
 mod iobench;

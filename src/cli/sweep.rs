@@ -3,11 +3,10 @@
 //! A point flies a short stretch: the middle of the flight for tolerances, a new flight of the same kind at a solved speed for
 //! incoherences. An incoherence that this terrain and flight cannot reach is left out with a note, not a failure.
 
-use super::ground::TerrainGround;
 use super::progress::Progress;
 use super::replay::fly;
 use anyhow::Result;
-use terrasoar::flight::generate::{FlightKind, FlightPlan};
+use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround};
 use terrasoar::flight::incoherence::{SolveError, solve};
 use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::{EngineKind, Quality, mean_incoherence_percent};

@@ -13,6 +13,7 @@ use std::time::Duration;
 use terrasoar_layout::edit::history;
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::testing::Random;
 use terrasoar_layout::verify::verify;
 
 /// Kills where nothing else is said.
@@ -143,16 +144,6 @@ impl Deed {
     }
 }
 
-/// Numbers that repeat; the moments of kills are the machine's.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
-        (self.0 >> 33) % end
-    }
-}
-
 /// A bench with a picture to drape and a file whose rectangles have one height.
 fn bench() -> Bench {
     let bench = Bench::with_terrain();
@@ -183,7 +174,7 @@ fn whatever_is_killed_whole_steps_are_there_and_none_that_was_told_is_lost() {
             scope.spawn(move || reads(land, reader == 0, is_over, looks));
         }
         let _over = Over(&is_over);
-        let mut random = Random(kills);
+        let mut random = Random::new(kills);
         let mut killed = 0;
         while killed < kills {
             std::fs::copy(bench.path("begin.iqt"), bench.path("new.iqt")).unwrap();

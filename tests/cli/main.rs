@@ -5,6 +5,7 @@ mod aliases;
 mod build;
 mod drape;
 mod edit;
+mod edit_flights;
 mod edit_processes;
 mod engines;
 mod harmless;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 use terrasoar::flight::FlightFrame;
-use terrasoar::flight::generate::{FlightKind, FlightPlan, Ground, generate};
+use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround, generate};
 use terrasoar::flyover::{
     EngineKind, Quality, TimedBatch, frame_mesh, mean_incoherence_percent, replay, replay_edited,
 };
@@ -17,23 +17,6 @@ use terrasoar_layout::edit::{Crater, Edit, SampleRect};
 use terrasoar_layout::loader::Loader;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::with_records;
-
-/// Heights of a terrain, as flights are made over them.
-struct Heights<'t>(&'t Terrain);
-
-impl Ground for Heights<'_> {
-    fn extent_m(&self) -> [f64; 2] {
-        self.0.grid().extent_m()
-    }
-
-    fn height_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
-        self.0.height_m(east_m, north_m).ok().flatten()
-    }
-
-    fn height_range_m(&self) -> [f64; 2] {
-        self.0.header().height_range_m
-    }
-}
 
 /// Frames near the ground, far above it and turning.
 fn frames(terrain: &Terrain) -> Vec<FlightFrame> {
@@ -65,9 +48,13 @@ fn quality(culling: Culling, vertical_exaggeration: f64) -> Quality {
     }
 }
 
-/// Flies over the file at `path`, which opens.
-pub fn fly(path: &Path) {
-    let Ok(terrain) = Terrain::open(path) else { return };
+/// Flies over the file at `path`, with the edits in `overlay` if there is one. Returns whether it opened.
+pub fn fly(path: &Path, overlay: Option<&Path>) -> bool {
+    let opened = match overlay {
+        Some(overlay) => Terrain::open_with_overlay(path, overlay),
+        None => Terrain::open(path),
+    };
+    let Ok(terrain) = opened else { return false };
     let terrain = Arc::new(terrain);
     let frames = frames(&terrain);
     let edits = [
@@ -98,7 +85,7 @@ pub fn fly(path: &Path) {
     let pairs: Vec<_> = frames.windows(2).map(|pair| (pair[0], pair[1])).collect();
     let _ = mean_incoherence_percent(&terrain, &pairs, quality(Culling::Vertices, 1.0));
     for kind in FlightKind::ALL {
-        let _ = generate(&Heights(&terrain), &FlightPlan::new(kind, 5, 3.0));
+        let _ = generate(&TerrainGround::new(&terrain), &FlightPlan::new(kind, 5, 3.0));
     }
     let quality = quality(Culling::Vertices, 1.0);
     let views: Vec<View> =
@@ -114,6 +101,7 @@ pub fn fly(path: &Path) {
     count(&terrain, &views, quality.culling, Reader::Engine(EngineKind::Soar), &options, &mut |_| {})
         .expect("a terrain in memory is counted over");
     stream(&terrain, &views);
+    true
 }
 
 /// Flies over a pool.

@@ -5,6 +5,7 @@
 //! was synced after it was given; of later ones the first few may have arrived, in their order. That a file was synced says nothing of its name.
 
 use super::{Disk, SystemDisk};
+use crate::testing::Random;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::Result;
@@ -108,7 +109,7 @@ impl ForgetfulDisk {
                 }
             }
         }
-        let mut random = Random(cut.seed);
+        let mut random = Random::new(cut.seed);
         let arrived = match cut.seed {
             0 => 0,
             1 => pending_names.len(),
@@ -187,20 +188,6 @@ impl Log {
         self.handles.push(file.try_clone()?);
         self.ids.insert(key, self.handles.len() - 1);
         Ok(self.handles.len() - 1)
-    }
-}
-
-/// Numbers that look random and are the same each time.
-struct Random(u64);
-
-impl Random {
-    /// A number below `end`, after Steele et al., "Fast splittable pseudorandom number generators" (2014).
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % end
     }
 }
 

@@ -60,20 +60,12 @@ pub fn compact(
 
 /// The lock of `file` if it is to be replaced.
 fn lock_if_same(file: &Path, out: &Path) -> Result<Option<WriteLock>, LayoutError> {
-    if !same_file(file, out) {
+    if !same_file::is_same_file(file, out).unwrap_or(false) {
         return Ok(None);
     }
     let lock = WriteLock::take(out)?;
     lock.check_only_name(out)?;
     Ok(Some(lock))
-}
-
-/// Whether two names lead to one file.
-fn same_file(a: &Path, b: &Path) -> bool {
-    match (std::fs::File::open(a), std::fs::metadata(b)) {
-        (Ok(file), Ok(meta)) if meta.is_file() => crate::file::lock::is_named(&file, b),
-        _ => false,
-    }
 }
 
 fn rewrite(

@@ -146,10 +146,9 @@ fn names(file: &File) -> u64 {
 
 #[cfg(unix)]
 mod system {
-    use rustix::fs::OFlags;
+    use crate::file::opening::without_waiting;
     use std::fs::File;
     use std::io::{Error, Result};
-    use std::os::unix::fs::OpenOptionsExt;
     use std::path::Path;
 
     #[derive(Clone, Copy)]
@@ -158,15 +157,12 @@ mod system {
         Shared,
     }
 
-    /// Opening a FIFO without this would wait for whoever has its other end.
-    const NO_WAITING: i32 = OFlags::NONBLOCK.bits() as i32;
-
     pub(super) fn open_for_writing(path: &Path) -> Result<File> {
-        File::options().read(true).write(true).custom_flags(NO_WAITING).open(path)
+        without_waiting(File::options().read(true).write(true)).open(path)
     }
 
     pub(super) fn open_for_reading(path: &Path) -> Result<File> {
-        File::options().read(true).custom_flags(NO_WAITING).open(path)
+        without_waiting(File::options().read(true)).open(path)
     }
 
     pub(super) fn is_taken(_: &Error) -> bool {

@@ -7,12 +7,14 @@
 //! * `journal`: what commits led to and what was before them.
 //! * `slots`: which of a file's two headers counts.
 //! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
-//! * `publish`: a terrain file that does not open is not published.
+//! * `publish`: a terrain file that does not open is not published; `seen`: nor is one put in the place of a terrain that was edited meanwhile.
+//! * `opening`: pipes are not waited for.
 
 pub mod atomic;
 pub(crate) mod directory;
 pub(crate) mod journal;
 pub(crate) mod lock;
+pub(crate) mod opening;
 pub(crate) mod publish;
 mod seen;
 pub(crate) mod slots;

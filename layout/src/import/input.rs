@@ -4,6 +4,7 @@
 //! a name leads to is looked at before it is opened, and once more in what was opened. Cost: two calls of the system.
 
 use crate::error::LayoutError;
+use crate::file::opening::without_waiting;
 use std::fs::{File, FileType};
 use std::path::Path;
 
@@ -14,7 +15,7 @@ use std::path::Path;
 pub(crate) fn open(path: &Path, action: &'static str) -> Result<File, LayoutError> {
     let failed = |source| LayoutError::io(path, action, source);
     check(path, std::fs::metadata(path).map_err(failed)?.file_type())?;
-    let file = File::open(path).map_err(failed)?;
+    let file = without_waiting(File::options().read(true)).open(path).map_err(failed)?;
     check(path, file.metadata().map_err(failed)?.file_type())?;
     Ok(file)
 }

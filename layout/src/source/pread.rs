@@ -3,6 +3,7 @@
 use super::Source;
 use crate::disk::read_at;
 use crate::error::LayoutError;
+use crate::file::opening::without_waiting;
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -21,8 +22,9 @@ impl PreadSource {
     /// # Errors
     /// [`LayoutError::Io`] if it cannot be opened or someone is writing to it; [`LayoutError::NotThisFormat`] for what is not a regular file.
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
-        let file =
-            open_without_waiting(path).map_err(|e| LayoutError::io(path, "cannot open the file", e))?;
+        let file = without_waiting(File::options().read(true))
+            .open(path)
+            .map_err(|e| LayoutError::io(path, "cannot open the file", e))?;
         Self::over(path, file)
     }
 
@@ -61,18 +63,6 @@ impl PreadSource {
         self.byte_count = meta.len();
         Ok(())
     }
-}
-
-/// Opens what may be a FIFO, too, whose other end nobody has: it is told apart by what it is, once it is open.
-fn open_without_waiting(path: &Path) -> std::io::Result<File> {
-    let mut options = File::options();
-    options.read(true);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::OpenOptionsExt;
-        options.custom_flags(rustix::fs::OFlags::NONBLOCK.bits() as i32);
-    }
-    options.open(path)
 }
 
 impl Source for PreadSource {

@@ -5,7 +5,9 @@ use rayon::prelude::*;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 pub mod drape;
+pub mod edits;
 pub mod paint;
+pub mod paint_reference;
 
 pub use terrasoar_layout::dem::MemoryDem;
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, SampleType, Window};

@@ -2,24 +2,28 @@
 //!
 //! The ground's interface knows no failure; the first one is kept and asked for when the flight is made.
 
+use super::Ground;
 use std::cell::RefCell;
-use terrasoar::flight::generate::Ground;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::terrain::Terrain;
 
-/// Heights of a terrain.
-pub(super) struct TerrainGround<'a> {
+/// Heights of a terrain. What cannot be read counts as void, until [`TerrainGround::check`] says so.
+pub struct TerrainGround<'a> {
     terrain: &'a Terrain,
     failure: RefCell<Option<LayoutError>>,
 }
 
 impl<'a> TerrainGround<'a> {
-    pub(super) fn new(terrain: &'a Terrain) -> Self {
+    /// The ground of `terrain`.
+    pub fn new(terrain: &'a Terrain) -> Self {
         Self { terrain, failure: RefCell::new(None) }
     }
 
     /// Whether every height so far could be read.
-    pub(super) fn check(&self) -> Result<(), LayoutError> {
+    ///
+    /// # Errors
+    /// The first one of reading a height, once; a flight made until then is not to be used.
+    pub fn check(&self) -> Result<(), LayoutError> {
         self.failure.borrow_mut().take().map_or(Ok(()), Err)
     }
 }
