@@ -8,10 +8,6 @@
 //! Nothing is drawn, so that a software driver does not set the pace: the mesh is refined, tiles are asked for, read by threads, and sent. The first second is for starting from
 //! nothing and is told apart. Prints Markdown. Keep runs under benches/runs/.
 
-#[path = "../tests/pictures/app.rs"]
-mod app;
-
-use app::scene::{Drawn, Scene, SceneOptions, TileService};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,6 +15,7 @@ use terrasoar::flight::Flight;
 use terrasoar::view::Viewport;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::Gpu;
+use terrasoar_scene::scene::{Drawn, Scene, SceneOptions, TileService};
 
 type Failure = Box<dyn std::error::Error>;
 

@@ -9,16 +9,13 @@
 //!
 //! Renderer and device are warm: figures leave out the first tenth of the frames. Prints Markdown and the adapter's name.
 
-#[path = "../tests/pictures/app.rs"]
-mod app;
-
-use app::scene::{Scene, SceneOptions, TileService};
 use std::path::PathBuf;
 use std::time::Instant;
 use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{Gpu, Look, Offscreen, wgpu};
+use terrasoar_scene::scene::{Scene, SceneOptions, TileService};
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -119,7 +116,7 @@ fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -
         let refined = scene.update(&view);
         let updated = Instant::now();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let mut tiles = app::scene::Drawn::default();
+        let mut tiles = terrasoar_scene::scene::Drawn::default();
         scene.serve_tiles(&view, &mut tiles)?;
         let served = Instant::now();
         // Nothing is wanted any more within the bound that was not given.

@@ -16,6 +16,9 @@ pub mod report;
 pub mod sink;
 pub mod stats;
 pub mod stream;
+#[cfg(any(test, feature = "testing"))]
+#[doc(hidden)]
+pub mod testing;
 pub mod view;
 
 /// The program in EMBEDDING.md, run as a test.

@@ -145,7 +145,7 @@ mod tests {
     /// What strips over records of nonsense are made of.
     #[test]
     fn no_triangle_of_whatever_corners_is_too_much() {
-        let terrain = crate::iobench::tests::square_terrain(3);
+        let terrain = crate::testing::square_terrain(3);
         let records = terrain.records().unwrap();
         terrasoar_layout::with_records!(records, records => {
             let grid = *terrain.grid();

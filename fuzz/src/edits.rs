@@ -37,7 +37,9 @@ pub(crate) fn body(data: &[u8]) {
     }
     script.batches.truncate(MOST_BATCHES);
     bring_stamps(&mut script, folder.path());
-    let Some(batches) = told(Loader::new(&path).script(&script)) else { return };
+    let Some(batches) = told(Loader::new(&path, terrasoar_layout::import::open_file).script(&script)) else {
+        return;
+    };
     does(&batches, folder.path());
     replays(&batches, folder.path());
 }

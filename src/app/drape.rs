@@ -30,7 +30,7 @@ const RETRY_FRAMES: u64 = 120;
 
 /// Image tiles a frame was given.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Served {
+pub struct Served {
     /// Tiles.
     pub tiles: u64,
     /// Bytes of them.
@@ -39,7 +39,7 @@ pub(crate) struct Served {
 
 /// The image of one terrain on its way to one renderer.
 #[derive(Debug)]
-pub(crate) struct Drape {
+pub struct Drape {
     reader: Arc<Reader>,
     threads: Option<Threads>,
     shape: ImageryShape,
@@ -60,7 +60,7 @@ impl Drape {
     ///
     /// # Errors
     /// The imagery is damaged or cannot be read, or the system gives no thread.
-    pub(crate) fn of(
+    pub fn of(
         terrain: Arc<Terrain>,
         formats: &[ImageryFormat],
         threads: bool,
@@ -73,7 +73,7 @@ impl Drape {
     ///
     /// # Errors
     /// The system gives no thread.
-    pub(crate) fn over(
+    pub fn over(
         PictureFile { terrain, imagery }: PictureFile,
         formats: &[ImageryFormat],
         threads: bool,
@@ -103,7 +103,7 @@ impl Drape {
     }
 
     /// Suits the tiles to a device that takes such formats, in place of the one before.
-    pub(crate) fn suit(&mut self, formats: &[ImageryFormat]) {
+    pub fn suit(&mut self, formats: &[ImageryFormat]) {
         let (format, decodes) = taken_as(self.reader.imagery.shape().format, formats);
         self.shape.format = format;
         if decodes != self.reader.decodes {
@@ -113,17 +113,17 @@ impl Drape {
     }
 
     /// What the renderer is told of the image.
-    pub(crate) fn shape(&self) -> ImageryShape {
+    pub fn shape(&self) -> ImageryShape {
         self.shape
     }
 
     /// Whether the image can be painted by this build.
-    pub(crate) fn can_be_painted(&self) -> bool {
+    pub fn can_be_painted(&self) -> bool {
         self.reader.imagery.shape().format.can_be_made()
     }
 
     /// Takes over what was painted, committed, undone or redone of this picture.
-    pub(crate) fn repainted(&mut self, renderer: &mut Renderer, repaint: Repaint) {
+    pub fn repainted(&mut self, renderer: &mut Renderer, repaint: Repaint) {
         if let Picture::Moved(PictureFile { terrain, imagery }) = repaint.picture {
             self.turn_to(Reader { terrain, imagery, decodes: self.reader.decodes });
         }
@@ -148,7 +148,7 @@ impl Drape {
     ///
     /// # Errors
     /// What the renderer says.
-    pub(crate) fn serve(
+    pub fn serve(
         &mut self,
         renderer: &mut Renderer,
         view: &FrameView,
@@ -167,12 +167,12 @@ impl Drape {
     }
 
     /// Whether tiles that the last frame wanted are on their way.
-    pub(crate) fn is_waiting(&self) -> bool {
+    pub fn is_waiting(&self) -> bool {
         self.is_behind || self.threads.as_ref().is_some_and(Threads::is_reading)
     }
 
     /// What could not be read and nobody has heard of yet.
-    pub(crate) fn take_error(&mut self) -> Option<LayoutError> {
+    pub fn take_error(&mut self) -> Option<LayoutError> {
         self.errors.pop_front()
     }
 

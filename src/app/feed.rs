@@ -18,7 +18,7 @@ use terrasoar_render::{HEIGHTS_PER_TILE, MeshVertex, TILE_BORDER, TILE_CELLS, Ti
 
 /// Which engine makes the mesh. Both make the same one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum PictureEngine {
+pub enum PictureEngine {
     /// Changes from frame to frame: the one to fly with.
     #[default]
     Kinetic,
@@ -28,7 +28,7 @@ pub(crate) enum PictureEngine {
 
 /// What an update of the mesh did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Refined {
+pub struct Refined {
     /// The engine's own account; SOAR fills in its tests only.
     pub work: Work,
     /// Triangles in the mesh.
@@ -42,7 +42,7 @@ pub(crate) struct Refined {
 }
 
 /// An engine over a terrain.
-pub(crate) trait Feed {
+pub trait Feed {
     /// Brings the mesh to a view.
     fn update(&mut self, view: &View) -> Refined;
 
@@ -106,7 +106,7 @@ pub(crate) trait Feed {
 }
 
 /// The feed of an engine over a terrain; none if the terrain's source lends no bytes.
-pub(crate) fn feed(terrain: &Terrain, engine: PictureEngine, culling: Culling) -> Option<Box<dyn Feed + '_>> {
+pub fn feed(terrain: &Terrain, engine: PictureEngine, culling: Culling) -> Option<Box<dyn Feed + '_>> {
     Some(with_records!(terrain.records()?, records => match engine {
         PictureEngine::Kinetic => {
             Box::new(KineticFeed { engine: Kinetic::new(records.clone(), culling), reads: Reads::over(&records), records }) as Box<dyn Feed + '_>
@@ -116,7 +116,7 @@ pub(crate) fn feed(terrain: &Terrain, engine: PictureEngine, culling: Culling) -
 }
 
 /// A vertex of a patch as the renderer takes it.
-pub(crate) fn mesh_vertex(vertex: &PatchVertex) -> MeshVertex {
+pub fn mesh_vertex(vertex: &PatchVertex) -> MeshVertex {
     let PatchVertex { x, y, height_m, error_m, radius_m, ends, flags } = *vertex;
     MeshVertex { x, y, height_m, error_m, radius_m, ends, flags }
 }
@@ -129,7 +129,7 @@ struct KineticFeed<'a, C: RecordCodec> {
 
 /// The pages of the records that an update reads, each read a page.
 #[derive(Debug, Default)]
-pub(crate) struct Reads {
+pub struct Reads {
     slots_a_page: u64,
     pages: Vec<u64>,
 }
@@ -141,12 +141,12 @@ impl Probe for Reads {
 }
 
 impl Reads {
-    pub(crate) fn over<S: RecordStore>(_: &S) -> Self {
+    pub fn over<S: RecordStore>(_: &S) -> Self {
         Self { slots_a_page: S::records_per_page(), pages: Vec::new() }
     }
 
     /// How many reads there were, and of how many pages; forgets them.
-    pub(crate) fn take(&mut self) -> [u64; 2] {
+    pub fn take(&mut self) -> [u64; 2] {
         let reads = self.pages.len() as u64;
         self.pages.sort_unstable();
         self.pages.dedup();
@@ -192,7 +192,7 @@ impl<C: RecordCodec> Feed for KineticFeed<'_, C> {
 }
 
 /// Grid points of a tile and its border, south-west first; those beyond the data are the nearest sample.
-pub(crate) fn tile_points(samples: [u32; 2], tile: TileId) -> impl Iterator<Item = GridPoint> {
+pub fn tile_points(samples: [u32; 2], tile: TileId) -> impl Iterator<Item = GridPoint> {
     let points = move |axis: usize| {
         let (first, last) = (i64::from(tile.first_sample()[axis]), i64::from(samples[axis]) - 1);
         let at =
@@ -203,11 +203,7 @@ pub(crate) fn tile_points(samples: [u32; 2], tile: TileId) -> impl Iterator<Item
 }
 
 /// Heights of the points of a tile.
-pub(crate) fn tile_heights_m<C: RecordCodec>(
-    records: &Records<'_, C>,
-    tile: TileId,
-    heights_m: &mut Vec<f32>,
-) {
+pub fn tile_heights_m<C: RecordCodec>(records: &Records<'_, C>, tile: TileId, heights_m: &mut Vec<f32>) {
     heights_m.clear();
     heights_m.reserve(HEIGHTS_PER_TILE);
     heights_m
@@ -215,6 +211,6 @@ pub(crate) fn tile_heights_m<C: RecordCodec>(
 }
 
 /// Height of a sample as tiles have it.
-pub(crate) fn shown_m(vertex: &Vertex) -> f32 {
+pub fn shown_m(vertex: &Vertex) -> f32 {
     if vertex.class.is_void() { f32::NAN } else { vertex.height_m as f32 }
 }

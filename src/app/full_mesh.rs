@@ -15,7 +15,7 @@ use terrasoar_layout::terrain::Records;
 use terrasoar_render::TileId;
 
 /// SOAR and its mesh.
-pub(crate) struct FullMesh<'a, C: RecordCodec> {
+pub struct FullMesh<'a, C: RecordCodec> {
     engine: Soar<Records<'a, C>>,
     records: Records<'a, C>,
     patch: Patch,
@@ -23,7 +23,7 @@ pub(crate) struct FullMesh<'a, C: RecordCodec> {
 
 impl<'a, C: RecordCodec> FullMesh<'a, C> {
     /// Over `records`, culled as `culling` says.
-    pub(crate) fn new(records: Records<'a, C>, culling: Culling) -> Self {
+    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
         Self { engine: Soar::new(records.clone(), culling), records, patch: Patch::default() }
     }
 

@@ -4,17 +4,15 @@
 //! the command line, so tests and benchmarks take it in as it is.
 
 mod border;
-pub(crate) mod drape;
-pub(crate) mod feed;
-pub(crate) mod full_mesh;
+pub mod drape;
+pub mod feed;
+pub mod full_mesh;
 mod options;
-pub(crate) mod overview;
+pub mod overview;
 mod pending;
-pub(crate) mod repaint;
-#[allow(dead_code, reason = "windows and tests use more of a scene than pictures do")]
-pub(crate) mod scene;
+pub mod repaint;
+pub mod scene;
 mod sight;
-#[allow(dead_code, reason = "pictures without a window are of mapped files")]
-pub(crate) mod streamed;
-pub(crate) mod studio;
+pub mod streamed;
+pub mod studio;
 mod tile_reader;

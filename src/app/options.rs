@@ -8,7 +8,7 @@ use terrasoar_render::{DrawStats, RenderError, Renderer, UploadStats};
 
 /// How a scene is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct SceneOptions {
+pub struct SceneOptions {
     /// What makes the mesh.
     pub engine: PictureEngine,
     /// Where what lies out of view is left out.
@@ -42,7 +42,7 @@ impl Default for SceneOptions {
 
 /// How many of the normal tiles that a view lacks it is given before it is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum TileService {
+pub enum TileService {
     /// All: the picture depends on the view alone.
     #[default]
     All,
@@ -53,7 +53,7 @@ pub(crate) enum TileService {
 /// Why there is no scene or picture.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub(crate) enum SceneError {
+pub enum SceneError {
     /// The terrain's source does not lend its bytes.
     #[error("{0}: pictures need a mapped or in-memory terrain")]
     NotInAddressSpace(String),
@@ -67,7 +67,7 @@ pub(crate) enum SceneError {
 
 /// What a picture cost.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Drawn {
+pub struct Drawn {
     /// Mesh sent to the device.
     pub upload: UploadStats,
     /// Draw calls.

@@ -12,15 +12,10 @@ const PITCH_DEG: f64 = -38.0;
 const MARGIN: f64 = 1.03;
 
 /// Vertical field of view where none is asked for, degrees.
-pub(crate) const FOV_DEG: f64 = 45.0;
+pub const FOV_DEG: f64 = 45.0;
 
 /// A view from `eye_m` with a heading and a climb in radians, at a tolerance of a pixel and true scale.
-pub(crate) fn view_from(
-    eye_m: DVec3,
-    [yaw_rad, pitch_rad]: [f64; 2],
-    fov_deg: f64,
-    viewport: Viewport,
-) -> View {
+pub fn view_from(eye_m: DVec3, [yaw_rad, pitch_rad]: [f64; 2], fov_deg: f64, viewport: Viewport) -> View {
     View {
         eye_m,
         yaw_rad,
@@ -42,14 +37,14 @@ fn box_of(terrain: &Terrain, exaggeration: f64) -> [DVec3; 2] {
 }
 
 /// Heading and climb in radians from a place to the terrain's middle.
-pub(crate) fn towards_middle(terrain: &Terrain, exaggeration: f64, eye_m: DVec3) -> [f64; 2] {
+pub fn towards_middle(terrain: &Terrain, exaggeration: f64, eye_m: DVec3) -> [f64; 2] {
     let [middle, _] = box_of(terrain, exaggeration);
     let to = middle - eye_m;
     [to.x.atan2(to.y), to.z.atan2(to.truncate().length())]
 }
 
 /// The nearest view in a fixed direction that has the terrain's whole box in the picture.
-pub(crate) fn overview(terrain: &Terrain, exaggeration: f64, fov_deg: f64, viewport: Viewport) -> View {
+pub fn overview(terrain: &Terrain, exaggeration: f64, fov_deg: f64, viewport: Viewport) -> View {
     let angles = [YAW_DEG.to_radians(), PITCH_DEG.to_radians()];
     let view = view_from(DVec3::ZERO, angles, fov_deg, viewport);
     let [middle, half] = box_of(terrain, exaggeration);

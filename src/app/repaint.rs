@@ -16,7 +16,7 @@ const READ_BYTES: usize = 8 << 20;
 
 /// What became of the picture since the last one of these.
 #[derive(Debug)]
-pub(crate) struct Repaint {
+pub struct Repaint {
     /// Which picture it is now.
     pub picture: Picture,
     /// Tiles whose bytes are others now.
@@ -29,7 +29,7 @@ pub(crate) struct Repaint {
 
 /// Which picture a terrain has.
 #[derive(Debug)]
-pub(crate) enum Picture {
+pub enum Picture {
     /// The one before.
     Same,
     /// The one before, with tiles that lie elsewhere.
@@ -42,7 +42,7 @@ pub(crate) enum Picture {
 
 /// A picture in a file, and how it is read.
 #[derive(Debug)]
-pub(crate) struct PictureFile {
+pub struct PictureFile {
     /// How the file is read.
     pub terrain: Arc<Terrain>,
     /// Where tiles lie in it.
@@ -57,7 +57,7 @@ impl PictureFile {
 
 /// Watches the picture of one session for one drape.
 #[derive(Debug, Default)]
-pub(crate) struct PictureWatch {
+pub struct PictureWatch {
     /// Where the picture lay when it was told last; none before.
     told: Option<Option<ImageryPlace>>,
 }
@@ -67,7 +67,7 @@ impl PictureWatch {
     ///
     /// # Errors
     /// Another picture, which an undo or a redo led to, cannot be read.
-    pub(crate) fn look(&mut self, session: &mut EditSession) -> Result<Option<Repaint>, LayoutError> {
+    pub fn look(&mut self, session: &mut EditSession) -> Result<Option<Repaint>, LayoutError> {
         let Repainted { tiles, is_another } = session.take_repainted();
         let place = session.header().imagery;
         if is_another {

@@ -9,7 +9,7 @@
 //!
 //! Cost on the processor: the engine's update, a copy of its patch, some 2 ms a tile.
 
-pub(crate) use super::options::{Drawn, SceneError, SceneOptions, TileService};
+pub use super::options::{Drawn, SceneError, SceneOptions, TileService};
 
 use super::border::border;
 use super::drape::Drape;
@@ -41,7 +41,7 @@ const IMAGE_TILES_A_FRAME: usize = 8;
 const WIDEST_SCORCH: f64 = 2048.0;
 
 /// An opened terrain, its engine and its renderer.
-pub(crate) struct Scene<'a> {
+pub struct Scene<'a> {
     feed: Box<dyn Feed + 'a>,
     renderer: Renderer,
     options: SceneOptions,
@@ -64,7 +64,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// [`SceneError::NotInAddressSpace`], and what [`Renderer::new`] says.
-    pub(crate) fn new(terrain: &'a Terrain, gpu: &Gpu, options: SceneOptions) -> Result<Self, SceneError> {
+    pub fn new(terrain: &'a Terrain, gpu: &Gpu, options: SceneOptions) -> Result<Self, SceneError> {
         let feed = feed(terrain, options.engine, options.culling)
             .ok_or_else(|| SceneError::NotInAddressSpace(terrain.path().display().to_string()))?;
         // Tiles are read, not mapped, whatever the records are.
@@ -84,7 +84,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// [`SceneError::Layout`], and what [`Renderer::new`] says.
-    pub(crate) fn streamed(
+    pub fn streamed(
         terrain: &Arc<Terrain>,
         cache_bytes: u64,
         gpu: &Gpu,
@@ -120,17 +120,17 @@ impl<'a> Scene<'a> {
     }
 
     /// What the mesh and its light are made from: heights of the ground, and what could not be read.
-    pub(crate) fn feed(&self) -> &(dyn Feed + 'a) {
+    pub fn feed(&self) -> &(dyn Feed + 'a) {
         &*self.feed
     }
 
     /// As [`Scene::feed`], to ask for more.
-    pub(crate) fn feed_mut(&mut self) -> &mut (dyn Feed + 'a) {
+    pub fn feed_mut(&mut self) -> &mut (dyn Feed + 'a) {
         &mut *self.feed
     }
 
     /// Brings the mesh to a view. Touches no device.
-    pub(crate) fn update(&mut self, view: &View) -> Refined {
+    pub fn update(&mut self, view: &View) -> Refined {
         let refined = self.feed.update(view);
         self.ways = [self.ways[1], Some(*view)];
         self.pending.changed = true;
@@ -145,7 +145,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// [`SceneError::Render`]: a mesh too large for the device, or a view that is none.
-    pub(crate) fn draw(
+    pub fn draw(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         target: Target<'_>,
@@ -170,7 +170,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn draw_served(
+    pub fn draw_served(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         target: Target<'_>,
@@ -187,7 +187,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Records what changed in the mesh; [`Scene::draw`] does so by itself.
-    pub(crate) fn send(&mut self, encoder: &mut wgpu::CommandEncoder) -> Result<UploadStats, SceneError> {
+    pub fn send(&mut self, encoder: &mut wgpu::CommandEncoder) -> Result<UploadStats, SceneError> {
         let pending = &mut self.pending;
         if !pending.changed {
             return Ok(UploadStats::default());
@@ -207,7 +207,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// What the renderer says.
-    pub(crate) fn serve_tiles(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
+    pub fn serve_tiles(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
         let view = &frame_view(view);
         let most = match self.options.tiles {
             TileService::All => usize::MAX,
@@ -239,7 +239,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Gives the renderer tiles of the image that the view lacks, and counts them in `drawn`. A frame of a window is given what has come.
-    pub(crate) fn serve_image(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
+    pub fn serve_image(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
         let Some(drape) = &mut self.drape else { return Ok(()) };
         self.shows_image = true;
         let ahead = match self.ways {
@@ -256,7 +256,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// Edits of another terrain.
-    pub(crate) fn ground_changed(&mut self, patch: GroundPatch) -> Result<bool, LayoutError> {
+    pub fn ground_changed(&mut self, patch: GroundPatch) -> Result<bool, LayoutError> {
         let areas = patch.samples.clone();
         if !self.feed.ground_changed(patch)? {
             return Ok(false);
@@ -268,7 +268,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Takes notice that edits are in the file: these pages lie there now, as they were told last.
-    pub(crate) fn committed(&mut self, places: &[(u64, Entry)]) {
+    pub fn committed(&mut self, places: &[(u64, Entry)]) {
         self.feed.relocate(places);
     }
 
@@ -276,7 +276,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// Another image, which an undo or a redo led to, cannot be shown.
-    pub(crate) fn repainted(&mut self, mut repaint: Repaint) -> Result<(), SceneError> {
+    pub fn repainted(&mut self, mut repaint: Repaint) -> Result<(), SceneError> {
         match std::mem::replace(&mut repaint.picture, Picture::Same) {
             Picture::Another(file) => {
                 let threads = self.options.is_for_a_window();
@@ -301,7 +301,7 @@ impl<'a> Scene<'a> {
     }
 
     /// What craters among these edits burn into the image: nothing where there is none, or none that this build can paint, and by none that is too wide to follow the hand.
-    pub(crate) fn scorches_of(&self, edits: &[Edit]) -> Vec<Paint> {
+    pub fn scorches_of(&self, edits: &[Edit]) -> Vec<Paint> {
         let Some(drape) = self.drape.as_ref().filter(|drape| drape.can_be_painted()) else {
             return Vec::new();
         };
@@ -318,23 +318,23 @@ impl<'a> Scene<'a> {
     }
 
     /// Whether an image is draped over the terrain.
-    pub(crate) fn has_image(&self) -> bool {
+    pub fn has_image(&self) -> bool {
         self.drape.is_some()
     }
 
     /// Whether something that the last picture lacked is on its way.
-    pub(crate) fn is_waiting(&self) -> bool {
+    pub fn is_waiting(&self) -> bool {
         self.feed.is_waiting() || self.shows_image && self.drape.as_ref().is_some_and(Drape::is_waiting)
     }
 
     /// What could not be read and nobody has heard of yet.
-    pub(crate) fn take_error(&mut self) -> Option<LayoutError> {
+    pub fn take_error(&mut self) -> Option<LayoutError> {
         self.feed.take_error().or_else(|| self.drape.as_mut().and_then(Drape::take_error))
     }
 
     /// Puts walls below the terrain's border, down to `bottom_m` (before exaggeration), so that it stands as a block. They go along the mesh of the
     /// last update: after another one raise them anew. Costs a walk over the mesh.
-    pub(crate) fn raise_walls(&mut self, bottom_m: f32) {
+    pub fn raise_walls(&mut self, bottom_m: f32) {
         let edges = border(&self.feed.whole(), self.renderer.terrain().samples);
         self.renderer.set_walls(&edges, bottom_m);
         self.walls = Some((edges, bottom_m));
@@ -345,7 +345,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// What [`Renderer::new`] says; an image that the new device cannot show.
-    pub(crate) fn recover(&mut self, gpu: &Gpu) -> Result<(), SceneError> {
+    pub fn recover(&mut self, gpu: &Gpu) -> Result<(), SceneError> {
         self.formats = gpu.capabilities.imagery_formats();
         if let Some(drape) = &mut self.drape {
             drape.suit(self.formats);
@@ -364,7 +364,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// As [`Scene::recover`]; the scene is then as it was.
-    pub(crate) fn set_culling(&mut self, culling: Culling, gpu: &Gpu) -> Result<bool, SceneError> {
+    pub fn set_culling(&mut self, culling: Culling, gpu: &Gpu) -> Result<bool, SceneError> {
         let renderer = new_renderer(*self.renderer.terrain(), self.drape.as_ref(), gpu, self.options)?;
         if !self.feed.set_culling(culling) {
             return Ok(false);
@@ -378,17 +378,17 @@ impl<'a> Scene<'a> {
     }
 
     /// The renderer, for what it counts: tiles, bytes, depth, time.
-    pub(crate) fn renderer(&self) -> &Renderer {
+    pub fn renderer(&self) -> &Renderer {
         &self.renderer
     }
 
     /// What the tiles did so far.
-    pub(crate) fn tile_stats(&self) -> TileStats {
+    pub fn tile_stats(&self) -> TileStats {
         self.renderer.tile_stats()
     }
 
     /// The device's time for the newest frame that is known, milliseconds.
-    pub(crate) fn gpu_time_ms(&mut self) -> Option<f64> {
+    pub fn gpu_time_ms(&mut self) -> Option<f64> {
         self.renderer.gpu_time_ms()
     }
 }

@@ -20,7 +20,7 @@ pub(super) fn ahead(before: &View, now: &View) -> View {
 }
 
 /// What the renderer needs to know of a terrain.
-pub(crate) fn shape(terrain: &Terrain) -> TerrainShape {
+pub fn shape(terrain: &Terrain) -> TerrainShape {
     let grid = terrain.grid();
     TerrainShape {
         spacing_m: grid.spacing_m(),
@@ -30,7 +30,7 @@ pub(crate) fn shape(terrain: &Terrain) -> TerrainShape {
 }
 
 /// A view as the renderer takes it.
-pub(crate) fn frame_view(view: &View) -> FrameView {
+pub fn frame_view(view: &View) -> FrameView {
     let [right, up, forward] = view.axes();
     FrameView {
         eye_m: view.eye_m,

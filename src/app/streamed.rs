@@ -45,7 +45,7 @@ struct StreamedFeed<C: RecordCodec> {
 ///
 /// # Errors
 /// The first page cannot be read, or the system gives no thread.
-pub(crate) fn streamed_feed(
+pub fn streamed_feed(
     terrain: &Arc<Terrain>,
     cache_bytes: u64,
     culling: Culling,

@@ -10,7 +10,7 @@ use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{Capabilities, Gpu, Look, Offscreen, RenderError};
 
 /// Takes pictures of one terrain, all of one size.
-pub(crate) struct Studio<'a> {
+pub struct Studio<'a> {
     gpu: Gpu,
     scene: Scene<'a>,
     offscreen: Offscreen,
@@ -22,11 +22,7 @@ impl<'a> Studio<'a> {
     ///
     /// # Errors
     /// [`SceneError::Render`] with [`RenderError::NoAdapter`] where there is none, which says what to install; a size that the device cannot have.
-    pub(crate) fn new(
-        terrain: &'a Terrain,
-        options: SceneOptions,
-        viewport: Viewport,
-    ) -> Result<Self, SceneError> {
+    pub fn new(terrain: &'a Terrain, options: SceneOptions, viewport: Viewport) -> Result<Self, SceneError> {
         let gpu = Gpu::headless_blocking()?;
         let scene = Scene::new(terrain, &gpu, options)?;
         let offscreen = offscreen(&gpu, viewport)?;
@@ -34,12 +30,12 @@ impl<'a> Studio<'a> {
     }
 
     /// Brings the mesh to a view, without a picture.
-    pub(crate) fn fly(&mut self, view: &View) -> Refined {
+    pub fn fly(&mut self, view: &View) -> Refined {
         self.scene.update(view)
     }
 
     /// Makes the terrain a block: walls from its border down to `bottom_m`, heights before exaggeration.
-    pub(crate) fn raise_walls(&mut self, bottom_m: f64) {
+    pub fn raise_walls(&mut self, bottom_m: f64) {
         self.scene.raise_walls(bottom_m as f32);
     }
 
@@ -47,7 +43,7 @@ impl<'a> Studio<'a> {
     ///
     /// # Errors
     /// [`SceneError::Render`].
-    pub(crate) fn picture(&mut self, view: &View, look: &Look) -> Result<Vec<u8>, SceneError> {
+    pub fn picture(&mut self, view: &View, look: &Look) -> Result<Vec<u8>, SceneError> {
         match self.try_picture(view, look) {
             Err(SceneError::Render(RenderError::DeviceLost { .. })) => {
                 self.gpu = Gpu::headless_blocking()?;
@@ -71,12 +67,12 @@ impl<'a> Studio<'a> {
     }
 
     /// Whether an image is draped over the terrain.
-    pub(crate) fn has_image(&self) -> bool {
+    pub fn has_image(&self) -> bool {
         self.scene.has_image()
     }
 
     /// The device's adapter.
-    pub(crate) fn capabilities(&self) -> &Capabilities {
+    pub fn capabilities(&self) -> &Capabilities {
         &self.gpu.capabilities
     }
 }

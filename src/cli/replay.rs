@@ -134,7 +134,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
 
 /// A script's batches at their frames. Those whose moment never comes are told.
 pub(super) fn batches_of(script: &Path, frames: &[FlightFrame]) -> Result<Vec<TimedBatch>> {
-    let batches = Loader::new(script).script(&Script::read(script)?)?;
+    let batches = Loader::new(script, terrasoar_layout::import::open_file).script(&Script::read(script)?)?;
     let late = batches.iter().filter(|batch| batch.frame(frames).is_none()).count();
     if late > 0 {
         complain(&format!(

@@ -7,13 +7,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::dem::{DemSource, SampleSink, Window};
 use terrasoar_layout::edit::{Edit, MAX_EDIT_SAMPLES, Stamp};
-use terrasoar_layout::import;
+
+/// Opens a stamp's elevation data. The program says which formats there are.
+pub type OpenDem = fn(&Path) -> Result<Box<dyn DemSource>, LayoutError>;
 
 /// Heights of stamps that were read already, by file.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Loader {
     /// The script, which errors name.
     script: PathBuf,
+    open: OpenDem,
     stamps: HashMap<PathBuf, ([u32; 2], Arc<[f64]>)>,
 }
 
@@ -29,9 +32,9 @@ pub struct LoadedBatch {
 }
 
 impl Loader {
-    /// For the batches of the script at `path`, in whose folder relative names of stamps start.
-    pub fn new(path: &Path) -> Self {
-        Self { script: path.to_owned(), stamps: HashMap::new() }
+    /// For the batches of the script at `path`, in whose folder relative names of stamps start; `open` opens them.
+    pub fn new(path: &Path, open: OpenDem) -> Self {
+        Self { script: path.to_owned(), open, stamps: HashMap::new() }
     }
 
     /// All batches of a script.
@@ -64,7 +67,7 @@ impl Loader {
     fn stamp(&mut self, stamp: &StampFile) -> Result<Stamp, LayoutError> {
         let path = self.script.parent().unwrap_or(Path::new("")).join(&stamp.file);
         if !self.stamps.contains_key(&path) {
-            let source = import::open(std::slice::from_ref(&path))?;
+            let source = (self.open)(&path)?;
             self.stamps.insert(path.clone(), heights_of(source.as_ref(), &path)?);
         }
         let (samples, heights_m) = &self.stamps[&path];

@@ -18,7 +18,7 @@ use terrasoar_layout::edit::{Edit, StampMode};
 
 pub use error::ScriptError;
 pub use format::{MAX_EDITS, VERSION};
-pub use load::{LoadedBatch, Loader};
+pub use load::{LoadedBatch, Loader, OpenDem};
 pub use timed::timed;
 
 /// A script: batches in the order in which they are done.

@@ -146,8 +146,8 @@ fn tiled_index(k: u32, p: GridPoint) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{padded_terrain, square_terrain};
     use super::*;
+    use crate::testing::{padded_terrain, square_terrain};
     use std::collections::HashSet;
     use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners, slot_of};
 

@@ -114,9 +114,9 @@ impl<S: RecordStore> Walk<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::iobench::tests::{square_terrain, view_at};
     use crate::refine::soar::Soar;
     use crate::refine::{Engine, Probe};
+    use crate::testing::{square_terrain, view_at};
     use glam::DVec3;
     use terrasoar_layout::with_records;
 

@@ -2,7 +2,6 @@
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 pub mod checks;
-pub mod exercise;
 pub mod mirror;
 
 use terrasoar::flight::FlightFrame;

@@ -1,12 +1,12 @@
 //! Where ground covers the whole picture no pixel shows what is behind it, at any frame: the mesh has no cracks.
 
-use super::app::feed::PictureEngine;
-use super::app::scene::SceneOptions;
 use super::rig::{Rig, view};
 use super::{Outcome, Test, ensure};
 use terrasoar::refine::Culling;
 use terrasoar::view::View;
 use terrasoar_render::{Gpu, Look};
+use terrasoar_scene::feed::PictureEngine;
+use terrasoar_scene::scene::SceneOptions;
 
 pub const TESTS: &[Test] = &[
     ("cracks::none_along_a_flight", along_a_flight),

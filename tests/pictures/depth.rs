@@ -1,6 +1,5 @@
 //! What is drawn is the terrain: depth against rays cast through every sample of the DEM.
 
-use super::app::scene::SceneOptions;
 use super::rig::{Rig, puget_sound, view};
 use super::{Outcome, Test, ensure};
 use glam::DVec3;
@@ -8,6 +7,7 @@ use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::with_records;
 use terrasoar_render::{Gpu, Look};
+use terrasoar_scene::scene::SceneOptions;
 
 pub const TESTS: &[Test] = &[("depth::agrees_with_the_dem", agrees_with_the_dem)];
 

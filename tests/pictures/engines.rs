@@ -1,12 +1,12 @@
 //! A mesh is a mesh: what the device has been told in changes looks as what it is told at once.
 
-use super::app::feed::PictureEngine;
-use super::app::scene::SceneOptions;
 use super::rig::{Rig, view};
 use super::{Outcome, Test, ensure};
 use terrasoar::refine::Culling;
 use terrasoar::view::View;
 use terrasoar_render::{Gpu, LOOKS, Look};
+use terrasoar_scene::feed::PictureEngine;
+use terrasoar_scene::scene::SceneOptions;
 
 pub const TESTS: &[Test] = &[
     ("engines::kinetic_looks_as_soar", kinetic_looks_as_soar),

@@ -1,24 +1,14 @@
-//! What is seen of real data: no cracks, the same picture from both engines, the right depth, and the verbs that draw.
+//! What is seen of real data: no cracks, the same picture from both engines, the right depth.
 //!
 //! These need a graphics adapter; a software one does. Where there is none they count as ignored and say why; with TERRASOAR_NEED_ADAPTER=1, as
 //! continuous integration sets it, that is a failure.
 
-mod app;
 mod cracks;
 mod depth;
 mod engines;
-#[cfg(unix)]
-#[path = "../cli/killed.rs"]
-#[allow(dead_code, reason = "shared with the tests of the other verbs")]
-mod killed;
 mod loss;
-mod outputs;
 mod paint;
-mod program;
 mod rig;
-#[path = "../cli/support.rs"]
-#[allow(dead_code, reason = "shared with the tests of the other verbs")]
-mod support;
 
 use libtest_mimic::{Arguments, Completion, Failed, Trial};
 use std::process::ExitCode;
@@ -46,26 +36,18 @@ fn main() -> ExitCode {
         }
     };
     let reads_depth = |name: &str| ["cracks::", "depth::"].iter().any(|part| name.starts_with(part));
-    let trials = [
-        cracks::TESTS,
-        depth::TESTS,
-        engines::TESTS,
-        loss::TESTS,
-        outputs::TESTS,
-        paint::TESTS,
-        program::TESTS,
-    ]
-    .concat()
-    .into_iter()
-    .map(|(name, test): Test| {
-        Trial::ignorable_test(name, move || match gpu {
-            None => Ok(Completion::ignored_with("no adapter")),
-            Some(gpu) if reads_depth(name) && !gpu.capabilities.depth_copies => {
-                Ok(Completion::ignored_with("depth cannot be read on this device"))
-            }
-            Some(gpu) => test(gpu).map(|()| Completion::Completed).map_err(Failed::from),
-        })
-    });
+    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, loss::TESTS, paint::TESTS]
+        .concat()
+        .into_iter()
+        .map(|(name, test): Test| {
+            Trial::ignorable_test(name, move || match gpu {
+                None => Ok(Completion::ignored_with("no adapter")),
+                Some(gpu) if reads_depth(name) && !gpu.capabilities.depth_copies => {
+                    Ok(Completion::ignored_with("depth cannot be read on this device"))
+                }
+                Some(gpu) => test(gpu).map(|()| Completion::Completed).map_err(Failed::from),
+            })
+        });
     libtest_mimic::run(&arguments, trials.collect()).exit_code()
 }
 

@@ -1,7 +1,5 @@
 //! Paint of an editing session on a draped picture, as a window's scene shows it: in the very next frame, and gone in the next after it is taken back.
 
-use super::app::repaint::PictureWatch;
-use super::app::scene::{Scene, SceneOptions, TileService};
 use super::rig::view;
 use super::{Outcome, Test, ensure};
 use std::sync::Arc;
@@ -13,6 +11,8 @@ use terrasoar_layout::edit::{Crater, Edit, EditSession};
 use terrasoar_layout::imagery::{DrapeOptions, ImageSource, MemoryImage, Paint, Scorch, TileFormat, drape};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{Gpu, Look, Offscreen};
+use terrasoar_scene::repaint::PictureWatch;
+use terrasoar_scene::scene::{Scene, SceneOptions, TileService};
 
 pub const TESTS: &[Test] = &[
     ("paint::shows_in_the_next_frame_and_goes_in_the_next", in_the_next_frame),

@@ -1,6 +1,5 @@
 //! Real terrain, a scene of it, and pictures of that.
 
-use super::app::scene::{Scene, SceneOptions};
 use glam::DVec3;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -10,6 +9,7 @@ use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::import;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::{Gpu, Look, Offscreen, read_depth_m};
+use terrasoar_scene::scene::{Scene, SceneOptions};
 
 /// Puget Sound: 1,025 x 1,025 samples 160 m apart.
 pub fn puget_sound() -> &'static Terrain {

@@ -21,7 +21,7 @@ mod source;
 pub(crate) use append::Append;
 pub use decode::decode_tile;
 pub use drape::{DrapeOptions, Draped, drape, drape_on};
-pub use image::open as open_image;
+pub use image::open_image;
 pub use paint::{
     Fill, OtherState, Paint, PaintChanges, PaintedSection, PaintedTile, Painter, Region, Scorch, TexelRect,
 };

@@ -16,7 +16,7 @@ mod parallel;
 mod png;
 pub(crate) mod png_stream;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::dem::DemSource;
 use crate::error::LayoutError;
@@ -51,6 +51,14 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
         Format::Tiff => Box::new(geotiff::TiffDem::open(path)?),
         Format::Hgt => Box::new(hgt::HgtDem::open(paths)?),
     })
+}
+
+/// As [`open`], of one file.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_file(path: &Path) -> Result<Box<dyn DemSource>, LayoutError> {
+    open(std::slice::from_ref(&path.to_owned()))
 }
 
 /// Several files make one data set only if every one is an `.hgt` tile, whose name says where it lies.

@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
 /// Applies a script, which lies at `path`, and tells what became of it.
 fn apply(target: Target<'_>, script: &Script, path: &Path, how: &HowArgs) -> Result<()> {
     let progress = Progress::new("edits");
-    let batches = Loader::new(path).script(script)?;
+    let batches = Loader::new(path, terrasoar_layout::import::open_file).script(script)?;
     let work = Work { target, batches: &batches, paints: !how.no_scorch, progress: &progress };
     let told = if how.dry_run { work.rehearse()? } else { work.perform()? };
     drop(progress);

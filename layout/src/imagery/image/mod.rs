@@ -19,7 +19,7 @@ use std::path::Path;
 /// # Errors
 /// [`LayoutError::Io`] for a file that is missing or cannot be read; [`LayoutError::NotThisFormat`] for none of these formats;
 /// [`LayoutError::Unsupported`] and [`LayoutError::Damaged`] from the reader.
-pub fn open(path: &Path) -> Result<Box<dyn ImageSource>, LayoutError> {
+pub fn open_image(path: &Path) -> Result<Box<dyn ImageSource>, LayoutError> {
     let mut head = Vec::with_capacity(16);
     if path.is_dir() {
         return Err(LayoutError::not_this_format(path, "this is a directory; name the images in it"));
