@@ -14,9 +14,9 @@ use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround};
 use terrasoar::flight::{FlightFrame, incoherence};
 use terrasoar::flyover::{EngineKind, Quality, mean_incoherence_percent, replay};
 use terrasoar::stats::Comparison;
+use terrasoar_import::synth::{SynthOptions, write};
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::header::ErrorKind;
-use terrasoar_layout::synth::{SynthOptions, write};
 use terrasoar_layout::terrain::Terrain;
 
 type Failure = Box<dyn std::error::Error>;
@@ -83,7 +83,7 @@ fn build_and_report(error: &str) -> Result<(), Failure> {
         spacing_m: spacing_m.map(|s| [s, s]),
         ..Default::default()
     };
-    build(&*terrasoar_layout::import::open(std::slice::from_ref(dem))?, out, &options, &Silent)?;
+    build(&*terrasoar_import::open(std::slice::from_ref(dem))?, out, &options, &Silent)?;
     if let Ok(status) = std::fs::read_to_string("/proc/self/status")
         && let Some(line) = status.lines().find(|l| l.starts_with("VmHWM"))
     {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the small pictures in layout/tests/image_fixtures: one for each way of storing one that is read, and those that are refused.
+"""Makes the small pictures in import/tests/image_fixtures: one for each way of storing one that is read, and those that are refused.
 
 Usage: data-scripts/make-image-fixtures.py        (from anywhere; needs gdal-bin 3.6 or later, no Python packages)
 

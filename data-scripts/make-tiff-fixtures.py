@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the small GeoTIFF files in layout/tests/fixtures and the list of what GDAL reads in them.
+"""Makes the small GeoTIFF files in import/tests/fixtures and the list of what GDAL reads in them.
 
 Usage: data-scripts/make-tiff-fixtures.py        (from anywhere; needs gdal-bin 3.6 or later, no Python packages)
 

@@ -1,18 +1,15 @@
 //! Terrasoar: fly over terrain far larger than memory, every visible sample within a tolerance in pixels.
 //!
 //! The engine half of the project: a [`view::View`] and a terrain file (package `terrasoar-layout`) go in, a conforming triangle mesh comes
-//! out. [`refine`] has the engines, [`flyover`] replays recorded [`flight`]s through them and counts, [`iobench`] counts what they
-//! read, [`report`] shows what they cost. EMBEDDING.md shows how to use it in a program, ARCHITECTURE.md how it is built.
+//! out. [`refine`] has the engines, [`flyover`] replays recorded [`flight`]s through them and counts, `terrasoar_lab::iobench` counts what they
+//! read, `terrasoar_lab::report` shows what they cost. EMBEDDING.md shows how to use it in a program, ARCHITECTURE.md how it is built.
 
 pub mod edits;
 pub mod flight;
 pub mod flyover;
-pub mod iobench;
 pub mod mesh;
 pub mod metric;
-pub mod picture;
 pub mod refine;
-pub mod report;
 pub mod sink;
 pub mod stats;
 pub mod stream;

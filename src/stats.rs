@@ -140,7 +140,7 @@ fn percentile(sorted: &[f64], q: f64) -> f64 {
 }
 
 /// Median of `values`, which it sorts; 0 for no values.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
+pub fn median(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     percentile(values, 0.5)
 }

@@ -1,11 +1,11 @@
 //! What libraries say names no flag of the command line: they do not know that they are behind one. What would mend a refusal goes with the
-//! error as a `Remedy`, and `src/cli/remedy.rs` makes a flag of it.
+//! error as a `Remedy`, and `cli/src/verbs/remedy.rs` makes a flag of it.
 
 use std::path::{Path, PathBuf};
 
 /// Folders of library code, and what in them is the program's.
-const LIBRARIES: [&str; 3] = ["layout/src", "render/src", "src"];
-const PROGRAM: [&str; 3] = ["src/cli", "src/window", "src/main.rs"];
+const LIBRARIES: [&str; 6] = ["layout/src", "import/src", "render/src", "src", "scene/src", "lab/src"];
+const PROGRAM: [&str; 3] = ["cli/src/verbs", "cli/src/window", "cli/src/main.rs"];
 
 #[test]
 fn messages_of_libraries_name_no_flags() {

@@ -10,7 +10,6 @@ use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar_layout::build::{BuildOptions, Silent, build};
-use terrasoar_layout::import;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -19,7 +18,7 @@ fn built(name: &str, options: &BuildOptions) -> (tempfile::TempDir, Terrain) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("t.iqt");
     let dem = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
-    build(&*import::open(&[dem]).unwrap(), &out, options, &Silent).unwrap();
+    build(&*terrasoar_import::open(&[dem]).unwrap(), &out, options, &Silent).unwrap();
     let terrain = Terrain::open(&out).unwrap();
     (folder, terrain)
 }

@@ -19,7 +19,7 @@ fn pages(terrain: &Terrain) -> Vec<u8> {
 fn bombard(dem: &str, spacing_m: Option<[f64; 2]>, z_scale: f64) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.iqt");
-    let dem = terrasoar_layout::import::open(&[Path::new("tests/data").join(dem)]).unwrap();
+    let dem = terrasoar_import::open(&[Path::new("tests/data").join(dem)]).unwrap();
     build(&*dem, &path, &BuildOptions { spacing_m, z_scale, ..Default::default() }, &Silent).unwrap();
     let [low, high] = Terrain::open(&path).unwrap().header().height_range_m;
     let room = HeightRoom { lowest_m: low - 2000.0, highest_m: high + 2000.0 };

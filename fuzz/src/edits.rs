@@ -37,7 +37,7 @@ pub(crate) fn body(data: &[u8]) {
     }
     script.batches.truncate(MOST_BATCHES);
     bring_stamps(&mut script, folder.path());
-    let Some(batches) = told(Loader::new(&path, terrasoar_layout::import::open_file).script(&script)) else {
+    let Some(batches) = told(Loader::new(&path, terrasoar_import::open_file).script(&script)) else {
         return;
     };
     does(&batches, folder.path());

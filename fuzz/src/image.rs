@@ -4,10 +4,9 @@ use crate::land::PLAIN;
 use crate::seeds::{self, Inputs};
 use crate::words::{refused, told};
 use std::path::Path;
+use terrasoar_import::open_image;
 use terrasoar_layout::build::Silent;
-use terrasoar_layout::imagery::{
-    DrapeOptions, Extent, ImageSource, Imagery, TileFormat, decode_tile, drape, open_image,
-};
+use terrasoar_layout::imagery::{DrapeOptions, Extent, ImageSource, Imagery, TileFormat, decode_tile, drape};
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
@@ -19,10 +18,10 @@ const MOST_BYTES: usize = 1 << 20;
 const MEMORY_MIB: u64 = 64;
 
 pub(crate) fn seeds() -> Inputs {
-    let mut seeds = seeds::folder("layout/tests/image_fixtures", &["png", "jpg", "tif"]);
+    let mut seeds = seeds::folder("import/tests/image_fixtures", &["png", "jpg", "tif"]);
     // Elevation data are pictures too, as far as one can tell.
     seeds.extend(
-        seeds::folder("layout/tests/fixtures", &["tif"])
+        seeds::folder("import/tests/fixtures", &["tif"])
             .into_iter()
             .filter(|(name, _)| name.starts_with("byte")),
     );

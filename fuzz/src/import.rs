@@ -8,7 +8,6 @@ use std::sync::PoisonError;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, Silent, build};
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
-use terrasoar_layout::import;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
@@ -16,7 +15,7 @@ use terrasoar_layout::verify::verify;
 const MOST_SAMPLES: u64 = 1 << 16;
 
 pub(crate) fn seeds() -> Inputs {
-    let mut seeds = seeds::folder("layout/tests/fixtures", &["tif"]);
+    let mut seeds = seeds::folder("import/tests/fixtures", &["tif"]);
     seeds.extend(seeds::elevation());
     seeds
 }
@@ -30,7 +29,7 @@ pub(crate) fn body(data: &[u8]) {
     // These tiles alone are told by their name.
     let path = folder.path().join(if is_hgt { "N10E010.hgt" } else { "dem" });
     seeds::write(&path, &seeds::with_png_sums(data));
-    let Some(dem) = told(import::open(std::slice::from_ref(&path))) else { return };
+    let Some(dem) = told(terrasoar_import::open(std::slice::from_ref(&path))) else { return };
     let info = dem.info();
     assert!(info.samples_wide >= 2 && info.samples_high >= 2, "{info:?}");
     let sink = Sink::new(info);

@@ -3,10 +3,10 @@
 use crate::image::reads_and_drapes;
 use crate::seeds::{self, Inputs};
 use crate::words::told;
-use terrasoar_layout::imagery::open_image;
+use terrasoar_import::open_image;
 
 /// The picture.
-const PICTURE: &[u8] = include_bytes!("../../layout/tests/image_fixtures/rgba.png");
+const PICTURE: &[u8] = include_bytes!("../../import/tests/image_fixtures/rgba.png");
 
 pub(crate) fn seeds() -> Inputs {
     seeds::world_files()

@@ -1,6 +1,6 @@
 //! The Terrasoar terrain file: elevation data in, error bounds and nested spheres computed, pages out, and a reader of it.
 //!
-//! The way data takes: [`import`] turns a DEM into a [`dem::DemSource`]; [`build`] computes what refinement needs and writes
+//! The way data takes: `terrasoar_import` turns a DEM into a [`dem::DemSource`]; [`build`] computes what refinement needs and writes
 //! the file that FORMAT.md specifies; [`terrain`] opens it. This crate knows bytes and knows no camera.
 mod bound;
 pub mod build;
@@ -15,7 +15,6 @@ pub mod file;
 pub mod grid;
 pub mod header;
 pub mod imagery;
-pub mod import;
 pub mod loader;
 pub mod octave;
 mod opening;
@@ -24,18 +23,17 @@ pub mod pool;
 pub mod prefetch;
 pub mod printable;
 pub mod record;
-mod records;
+pub mod records;
 pub mod remedy;
 pub mod source;
 pub mod store;
-pub mod synth;
 pub mod terrain;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 pub mod unfinished;
 pub mod unused;
 pub mod verify;
-mod words;
+pub mod words;
 
 pub use error::LayoutError;
 pub use file::atomic as atomic_file;

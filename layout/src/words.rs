@@ -16,7 +16,7 @@ pub(crate) fn number(value: f64) -> String {
 }
 
 /// At most `most` characters of `text`, without those that do something rather than show something.
-pub(crate) fn harmless(text: &str, most: usize) -> String {
+pub fn harmless(text: &str, most: usize) -> String {
     text.chars().filter(|c| is_harmless(*c)).take(most).collect()
 }
 

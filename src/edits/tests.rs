@@ -186,7 +186,7 @@ fn stamps_are_loaded_from_the_scripts_folder_once() {
     let path = folder.path().join("x.edits");
     std::fs::write(&path, format!("{HEAD}stamp a.bt sample 4,5 mode add\nstamp a.bt sample -1,0")).unwrap();
     let script = Script::read(&path).unwrap();
-    let loaded = match Loader::new(&path, terrasoar_layout::import::open_file).script(&script) {
+    let loaded = match Loader::new(&path, terrasoar_import::open_file).script(&script) {
         Ok(loaded) => loaded,
         Err(error) => panic!("{error}"),
     };
@@ -195,8 +195,7 @@ fn stamps_are_loaded_from_the_scripts_folder_once() {
     assert_eq!(&stamp.heights_m()[..5], [0.0, 1.0, 2.0, 10.0, 11.0]);
     assert_eq!(loaded[0].label, "2 x stamp");
     let missing = parse(&format!("{HEAD}\nstamp none.tif sample 1,1")).unwrap();
-    let error =
-        Loader::new(&path, terrasoar_layout::import::open_file).script(&missing).unwrap_err().to_string();
+    let error = Loader::new(&path, terrasoar_import::open_file).script(&missing).unwrap_err().to_string();
     assert!(error.contains("x.edits:4: stamp: ") && error.contains("none.tif"), "{error}");
 }
 

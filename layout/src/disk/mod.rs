@@ -138,12 +138,12 @@ impl Disk for SystemDisk {
 }
 
 /// Writes all of `bytes` at `offset`.
-pub(crate) fn write_at(file: &File, bytes: &[u8], offset: u64) -> Result<()> {
+pub fn write_at(file: &File, bytes: &[u8], offset: u64) -> Result<()> {
     SystemDisk.write_at(file, bytes, offset)
 }
 
 /// Fills `bytes` from `offset`.
-pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> Result<()> {
+pub fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> Result<()> {
     #[cfg(unix)]
     return std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset);
     #[cfg(windows)]

@@ -14,7 +14,7 @@ pub mod atomic;
 pub(crate) mod directory;
 pub(crate) mod journal;
 pub(crate) mod lock;
-pub(crate) mod opening;
+pub mod opening;
 pub(crate) mod publish;
 mod seen;
 pub(crate) mod slots;

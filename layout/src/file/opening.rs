@@ -3,7 +3,7 @@
 use std::fs::OpenOptions;
 
 /// `options` for a file that may be a pipe. Regular files are opened as ever.
-pub(crate) fn without_waiting(options: &mut OpenOptions) -> &mut OpenOptions {
+pub fn without_waiting(options: &mut OpenOptions) -> &mut OpenOptions {
     #[cfg(unix)]
     {
         use std::os::unix::fs::OpenOptionsExt;

@@ -7,7 +7,6 @@ mod append;
 mod decode;
 mod drape;
 mod encode;
-mod image;
 mod linear;
 mod mosaic;
 mod paint;
@@ -21,7 +20,6 @@ mod source;
 pub(crate) use append::Append;
 pub use decode::decode_tile;
 pub use drape::{DrapeOptions, Draped, drape, drape_on};
-pub use image::open_image;
 pub use paint::{
     Fill, OtherState, Paint, PaintChanges, PaintedSection, PaintedTile, Painter, Region, Scorch, TexelRect,
 };

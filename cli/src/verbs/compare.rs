@@ -1,0 +1,186 @@
+//! `terrasoar compare`: engines on the same flight, side by side, and a report.
+
+use super::output::{columns, complain, grouped, print, print_json};
+use super::outputs::{Force, Kind};
+use super::progress::Progress;
+use super::replay::{QualityArgs, fly};
+use super::terrain::TerrainArgs;
+use super::{WrongUsage, parse, sweep};
+use anyhow::{Result, bail};
+use std::path::{Path, PathBuf};
+use terrasoar::flight::Flight;
+use terrasoar::flyover::EngineKind;
+use terrasoar::stats::{Comparison, FrameStats};
+use terrasoar_lab::report::{ComparisonReport, FLIGHT_PICTURE, FlightPicture, ReportTitle};
+use terrasoar_layout::terrain::Terrain;
+
+/// Fly a recorded flight with several engines, compare them and write a report.
+///
+/// The first engine named is the one that the others are measured against; the first frame, which starts from nothing, is left out of the ratios. The
+/// report has a CSV file an engine, a JSON summary, plots, a picture where there is a graphics driver, and one page, report.html. Exit code 1 if the engines' meshes differ.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar compare alps.iqt --flight low.flight -o report
+  terrasoar compare alps.iqt --flight low.flight --engines naive,soar,smart,kinetic --no-sweeps -o report --json
+
+Two sweeps redo the plots of the SMART paper: speed-up by tolerance (0.5 to 8 px) and by incoherence (0.6, 1.4, 5.3 %). They fly up to 120
+frames a point; --no-sweeps leaves them out.")]
+pub(super) struct Args {
+    #[command(flatten)]
+    terrain: TerrainArgs,
+    /// Flight file
+    #[arg(long, value_name = "F")]
+    flight: PathBuf,
+    /// Engines, the first being the base of the ratios
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "soar,smart,kinetic", value_parser = parse::engine())]
+    engines: Vec<EngineKind>,
+    #[command(flatten)]
+    quality: QualityArgs,
+    /// Folder for the report, made if missing
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    force: Force,
+    /// Leave out the sweeps over tolerance and incoherence
+    #[arg(long)]
+    no_sweeps: bool,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl Args {
+    fn check(&self) -> Result<(), WrongUsage> {
+        let names: Vec<&str> = self.engines.iter().map(|e| e.name()).collect();
+        let twice = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name));
+        match twice {
+            Some((_, name)) => {
+                Err(WrongUsage(format!("--engines names {name} twice; name each engine once")))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    args.check()?;
+    let engines: Vec<&str> = args.engines.iter().map(|engine| engine.name()).collect();
+    let files: Vec<_> = ComparisonReport::files(&engines)
+        .into_iter()
+        .map(|(name, file)| (name, Kind::Report(file)))
+        .collect();
+    args.force.folder(&args.output, &files, &args.terrain.inputs(&[&args.flight]))?;
+    let terrain = args.terrain.open()?;
+    let flight = Flight::read(&args.flight)?;
+    let quality = args.quality.quality();
+    let progress = Progress::new("frames");
+    let mut runs: Vec<(String, Vec<FrameStats>)> = Vec::new();
+    for engine in &args.engines {
+        let frames = fly(&terrain, &flight.frames, quality, *engine, engine.name(), &progress)?;
+        runs.push((engine.name().to_owned(), frames));
+    }
+    let comparison = Comparison::of(&runs);
+    // Engines that disagree are compared no further.
+    let (by_tolerance, by_incoherence) = if args.no_sweeps || !comparison.same_mesh {
+        (Vec::new(), Vec::new())
+    } else {
+        let sweep = sweep::Sweep {
+            terrain: &terrain,
+            flight: &flight,
+            quality,
+            engines: &args.engines,
+            progress: &progress,
+        };
+        (sweep.by_tolerance()?, sweep.by_incoherence()?)
+    };
+    drop(progress);
+    let picture = middle_frame(args, &terrain, &flight);
+    let title = ReportTitle {
+        terrain: name(&args.terrain.file),
+        flight: name(&args.flight),
+        tolerance_px: quality.tolerance_px,
+        viewport: quality.viewport,
+    };
+    let report = ComparisonReport {
+        title: &title,
+        runs: &runs,
+        comparison: &comparison,
+        tolerance_sweep: &by_tolerance,
+        incoherence_sweep: &by_incoherence,
+        picture: match &picture {
+            Ok((file, caption)) => FlightPicture::Png { file, caption },
+            Err(why) => FlightPicture::Missing(why),
+        },
+    };
+    let written = report.write(&args.output)?;
+    if picture.is_err() {
+        // An older report's picture shows another flight. It is one, or may be lost: that was looked at first.
+        let _ = std::fs::remove_file(args.output.join(FLIGHT_PICTURE));
+    }
+    if args.json {
+        print_json(&comparison)?;
+    } else {
+        print(&text(&comparison))?;
+    }
+    if let Some(page) = written.last() {
+        // With --json standard output holds the object and nothing else.
+        let line = format!("report: {}", page.display());
+        if args.json { complain(&line) } else { print(&line)? }
+    }
+    match first_difference(&runs) {
+        Some((engine, frame)) => bail!(
+            "the meshes differ: {engine} draws other triangles than {} first in frame {frame}; please report it with terrain and flight",
+            runs[0].0
+        ),
+        None => Ok(()),
+    }
+}
+
+/// Draws the flight's middle frame; gives a PNG file and a caption, or says why there is none. A report without a picture is a report.
+#[cfg(feature = "view")]
+fn middle_frame(args: &Args, terrain: &Terrain, flight: &Flight) -> Result<(Vec<u8>, String), String> {
+    let frame = flight.frames.len() / 2;
+    let drawn = super::picture::draw_frame(terrain, flight, frame, args.quality.quality());
+    let (file, drawn_by) = drawn.map_err(|error| super::message(&error))?;
+    Ok((file, format!("Frame {frame} of {}, drawn by {drawn_by}.", flight.frames.len())))
+}
+
+#[cfg(not(feature = "view"))]
+fn middle_frame(_: &Args, _: &Terrain, _: &Flight) -> Result<(Vec<u8>, String), String> {
+    Err("this program was built without the feature view".into())
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// The first engine, and its first frame, whose mesh is not the first engine's.
+fn first_difference(runs: &[(String, Vec<FrameStats>)]) -> Option<(&str, u64)> {
+    let (_, base) = runs.first()?;
+    runs.iter().find_map(|(engine, frames)| {
+        let differs = base.iter().zip(frames).find(|(a, b)| a.mesh_hash != b.mesh_hash);
+        differs.map(|(_, frame)| (engine.as_str(), frame.frame))
+    })
+}
+
+fn text(comparison: &Comparison) -> String {
+    let head = ["engine", "triangles", "vertex tests", "ratio", "worst", "median ms", "speed-up", "pages"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for engine in &comparison.engines {
+        let s = &engine.summary;
+        rows.push(vec![
+            s.engine.clone(),
+            format!("{:.0}", s.triangles_mean),
+            grouped(s.vertex_tests_total),
+            format!("{:.2} %", 100.0 * engine.vertex_tests_ratio),
+            format!("{:.2} %", 100.0 * engine.vertex_tests_ratio_worst_frame),
+            format!("{:.3}", s.update_ms.p50),
+            format!("{:.2}", engine.speedup_median),
+            grouped(s.pages_touched_total),
+        ]);
+    }
+    let same = if comparison.same_mesh { "yes, in every frame" } else { "NO" };
+    let incoherence = comparison.engines.first().map_or(0.0, |e| e.summary.incoherence_percent);
+    format!("{}same mesh: {same}; incoherence {incoherence:.3} %\n", columns(&rows))
+}

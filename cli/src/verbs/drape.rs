@@ -1,0 +1,125 @@
+//! `terrasoar drape`: images in, the imagery of a terrain file out.
+
+use super::output::{complain, decimal, grouped, print};
+use super::parse;
+use super::progress::{Progress, short};
+use anyhow::{Context, Result};
+use clap::ValueEnum;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use terrasoar_import::open_image;
+use terrasoar_layout::imagery::{DrapeOptions, Draped, Extent, ImageSource, PlaceOrigin, TileFormat, drape};
+
+/// Drape an image over a terrain file.
+///
+/// Reads PNG, JPEG and GeoTIFF of any size (JPEG only as far as memory allows), grey, RGB or palette, with or without alpha. Appends a pyramid of
+/// compressed tiles to the file; until it is complete the file reads as before, whatever happens, and programs that have it open are not
+/// disturbed. Draping again puts other imagery in the place of the first, whose space is not used again.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar drape alps.iqt --image alps-photo.tif
+  terrasoar drape alps.iqt --image west.tif east.tif
+  terrasoar drape alps.iqt --image photo.png --extent 0,0,20480,15360
+  terrasoar drape alps.iqt --image photo.jpg --extent-crs 600000,180000,620480,195360
+
+Where an image lies is taken from --extent, else from its georeference (GeoTIFF, or a world file beside it) if the terrain has one too; else
+it is laid over the whole terrain. Later images of a mosaic lie above earlier ones.")]
+pub(super) struct Args {
+    /// Terrain file (.iqt)
+    file: PathBuf,
+    /// Image: one, or several that make a mosaic
+    #[arg(long = "image", required = true, num_args = 1.., value_name = "IMG")]
+    images: Vec<PathBuf>,
+    /// Where the image lies: west, south, east, north in metres from the terrain's south-west sample
+    #[arg(long, value_name = "W,S,E,N", value_parser = parse::extent, allow_hyphen_values = true, conflicts_with = "extent_crs")]
+    extent: Option<Sides>,
+    /// Where the image lies: west, south, east, north in units of the terrain's reference system
+    #[arg(long, value_name = "W,S,E,N", value_parser = parse::extent, allow_hyphen_values = true)]
+    extent_crs: Option<Sides>,
+    /// How texels are stored
+    #[arg(long, value_name = "FORMAT", default_value = "bc1")]
+    format: FormatWord,
+    /// Memory to use at most, in MiB
+    #[arg(long, value_name = "MIB", default_value_t = 512, value_parser = clap::value_parser!(u64).range(48..=1 << 24))]
+    memory: u64,
+    /// Threads to use; all cores without it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// West, south, east, north.
+type Sides = [f64; 4];
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum FormatWord {
+    /// Half a byte a texel, alpha 0 or 1
+    Bc1,
+    /// A byte a texel, alpha in steps; finer, slower
+    Bc7,
+    /// Four bytes a texel, nothing lost
+    Raw,
+}
+
+impl Args {
+    fn options(&self) -> DrapeOptions {
+        DrapeOptions {
+            format: match self.format {
+                FormatWord::Bc1 => TileFormat::Bc1,
+                FormatWord::Bc7 => TileFormat::Bc7,
+                FormatWord::Raw => TileFormat::Rgba8,
+            },
+            extent: self.extent.map(Extent::Metres).or(self.extent_crs.map(Extent::Crs)),
+            memory_mib: self.memory,
+        }
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if let Some(threads) = args.threads {
+        pool = pool.num_threads(usize::from(threads));
+    }
+    let pool = pool.build().context("cannot start the threads; give fewer with --threads")?;
+    let start = Instant::now();
+    let draped = pool.install(|| -> Result<Draped> {
+        let images: Vec<Box<dyn ImageSource>> =
+            args.images.iter().map(|path| open_image(path)).collect::<Result<_, _>>()?;
+        for image in &images {
+            for note in &image.info().notes {
+                complain(&format!("note: {}: {note}", image.path().display()));
+            }
+        }
+        Ok(drape(&args.file, &images, &args.options(), &Progress::new("texels"))?)
+    })?;
+    let seconds = start.elapsed().as_secs_f64();
+    if draped.place == PlaceOrigin::Assumed {
+        complain(
+            "note: neither --extent nor a georeference that the terrain shares says where the image lies; it was laid over the \
+             whole terrain",
+        );
+    }
+    print(&summary(&args.file, &draped, seconds))
+}
+
+fn summary(file: &Path, draped: &Draped, seconds: f64) -> String {
+    let shape = draped.shape;
+    let [wide, high] = shape.texels.map(u64::from);
+    let raw = (wide * high * 3) as f64;
+    let bytes = draped.header.imagery.map_or(0, |place| place.bytes);
+    format!(
+        "{}: {} x {} texels of {} x {} m in {seconds:.1} s ({}B of RGB/s)\n\
+         {} tiles of {} levels as {}, {} bytes ({:.4} of raw RGB)",
+        file.display(),
+        grouped(wide),
+        grouped(high),
+        decimal(shape.texel_m[0], 4),
+        decimal(shape.texel_m[1], 4),
+        short(raw / seconds.max(1e-9)),
+        grouped(draped.stored_tiles),
+        shape.levels,
+        shape.format.name(),
+        grouped(bytes),
+        bytes as f64 / raw
+    )
+}

@@ -1,0 +1,313 @@
+//! Batches applied to a file, one durable commit each, or in memory only; the file rewritten with more room where it must be.
+
+use super::paint::paints_of;
+use crate::verbs::output::{complain, decimal, grouped};
+use crate::verbs::progress::{Progress, short};
+use anyhow::{Context, Result, anyhow, bail};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+use terrasoar::edits::LoadedBatch;
+use terrasoar_layout::LayoutError;
+use terrasoar_layout::build::HeightRoom;
+use terrasoar_layout::disk::SystemDisk;
+use terrasoar_layout::edit::{Changes, EditSession, Editor, Foresight, holds_heights, widen};
+use terrasoar_layout::grid::Grid;
+use terrasoar_layout::header::Header;
+use terrasoar_layout::record::RecordKind;
+use terrasoar_layout::terrain::Terrain;
+
+/// Memory for rewriting a file in MiB.
+const WIDEN_MIB: u64 = 512;
+/// Times that one batch may make the file be rewritten: once for heights, once for slopes, and one to spare.
+const MOST_WIDENINGS: u32 = 3;
+
+/// What is edited: a file, or an overlay over it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Target<'a> {
+    pub(super) file: &'a Path,
+    pub(super) overlay: Option<&'a Path>,
+}
+
+impl Target<'_> {
+    pub(super) fn session(self) -> Result<EditSession, LayoutError> {
+        match self.overlay {
+            Some(overlay) => EditSession::open_overlay(self.file, overlay),
+            None => EditSession::open(self.file),
+        }
+    }
+
+    /// The file that edits go to.
+    pub(super) fn path(&self) -> &Path {
+        self.overlay.unwrap_or(self.file)
+    }
+
+    /// The terrain as it is, for looking only; an overlay that does not exist yet is an empty one.
+    fn terrain(self) -> Result<Terrain, LayoutError> {
+        match self.overlay {
+            Some(overlay) if overlay.exists() => Terrain::open_with_overlay_unmapped(self.file, overlay),
+            _ => Terrain::open_unmapped(self.file),
+        }
+    }
+}
+
+/// What was done.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Told {
+    file: String,
+    overlay: Option<String>,
+    dry_run: bool,
+    batches: u64,
+    edits: u64,
+    edits_outside: u64,
+    samples: u64,
+    records_changed: u64,
+    voids_passed: u64,
+    tiles_painted: u64,
+    pages_written: u64,
+    bytes_appended: u64,
+    widenings: u32,
+    needs_widening: bool,
+    seconds: f64,
+}
+
+impl Told {
+    fn note(&mut self, batch: &LoadedBatch, grid: &Grid, changes: &Changes) {
+        self.batches += 1;
+        self.edits += batch.edits.len() as u64;
+        self.edits_outside += batch.edits.iter().filter(|edit| edit.bounds(grid).is_none()).count() as u64;
+        self.samples += changes.samples.iter().map(|rect| rect.count() as u64).sum::<u64>();
+        self.records_changed += changes.vertices.len() as u64;
+        self.voids_passed += changes.voids_passed;
+    }
+
+    pub(super) fn text(&self) -> String {
+        let plural = |count: u64, one: &str, more: &str| {
+            format!("{} {}", grouped(count), if count == 1 { one } else { more })
+        };
+        let file = self.overlay.as_ref().unwrap_or(&self.file);
+        let mut text = format!(
+            "{file}: {} in {}, {:.2} s ({} edits/s)\n{} looked at, {} changed, {} passed over",
+            plural(self.edits, "edit", "edits"),
+            plural(self.batches, "batch", "batches"),
+            self.seconds,
+            short(self.edits as f64 / self.seconds.max(1e-9)),
+            plural(self.samples, "sample", "samples"),
+            plural(self.records_changed, "record", "records"),
+            plural(self.voids_passed, "void", "voids"),
+        );
+        if self.tiles_painted > 0 {
+            text += &format!("\n{} of the picture painted", plural(self.tiles_painted, "tile", "tiles"));
+        }
+        if self.edits_outside > 0 {
+            text += &format!("\n{} beyond the terrain", plural(self.edits_outside, "edit lies", "edits lie"));
+        }
+        text += &match (self.dry_run, self.needs_widening) {
+            (true, false) => "\na dry run: nothing was written".to_owned(),
+            (true, true) => {
+                "\na dry run, as far as the file's range of heights goes: nothing was written".to_owned()
+            }
+            _ => format!(
+                "\n{} written, {} bytes appended",
+                plural(self.pages_written, "page", "pages"),
+                grouped(self.bytes_appended)
+            ),
+        };
+        text
+    }
+}
+
+/// A script being carried out.
+pub(super) struct Work<'a> {
+    pub(super) target: Target<'a>,
+    pub(super) batches: &'a [LoadedBatch],
+    /// Whether the picture follows, where there is one.
+    pub(super) paints: bool,
+    pub(super) progress: &'a Progress,
+}
+
+impl Work<'_> {
+    fn begin(&self, dry_run: bool) -> Told {
+        let edits = self.batches.iter().map(|batch| batch.edits.len() as u64).sum();
+        self.progress.begin(if dry_run { "trying" } else { "editing" }, edits);
+        Told {
+            file: self.target.file.display().to_string(),
+            overlay: self.target.overlay.map(|overlay| overlay.display().to_string()),
+            dry_run,
+            ..Told::default()
+        }
+    }
+
+    /// Refuses a script of which not everything can be applied, before anything is; rewrites the file if it has no room for the heights that the script leads to.
+    fn prepare(&self, held: Option<EditSession>) -> Result<u32> {
+        let terrain = self.target.terrain()?;
+        self.check(terrain.grid())?;
+        let header = terrain.header().clone();
+        let edits = self.batches.iter().map(|batch| batch.edits.len() as u64).sum();
+        self.progress.begin("looking ahead", edits);
+        let mut foresight = Foresight::new(Arc::new(terrain))?;
+        for edit in self.batches.iter().flat_map(|batch| &batch.edits) {
+            foresight.follow(edit)?;
+            self.progress.add(1);
+        }
+        let Some(heights_m) = foresight.heights_m().filter(|range| !holds_heights(&header, *range)) else {
+            return Ok(0);
+        };
+        // The rewriting takes the lock for itself.
+        drop((foresight, held));
+        let [low, high] = header.height_range_m.map(|m| decimal(m, 1));
+        let [lowest, highest] = heights_m.map(|m| decimal(m, 1));
+        self.widen(
+            &header,
+            heights_m,
+            &format!("the edits lead to heights from {lowest} to {highest} m, and records of a file from {low} to {high} m cannot hold them"),
+        )?;
+        Ok(1)
+    }
+
+    fn check(&self, grid: &Grid) -> Result<()> {
+        for (number, batch) in (1_u64..).zip(self.batches) {
+            for edit in &batch.edits {
+                edit.check(grid).with_context(|| self.named(number, batch))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn named(&self, number: u64, batch: &LoadedBatch) -> String {
+        format!("{}: batch {number} ({})", self.target.path().display(), batch.label)
+    }
+
+    /// Applies everything in memory.
+    pub(super) fn rehearse(&self) -> Result<Told> {
+        let start = Instant::now();
+        let terrain = Arc::new(self.target.terrain()?);
+        let grid = *terrain.grid();
+        self.check(&grid)?;
+        let mut told = self.begin(true);
+        let mut editor = Editor::new(Arc::clone(&terrain));
+        if terrain.header().history.is_some() {
+            editor.set_original(Arc::new(terrain.open_again_unmapped()?.into_original()?));
+        }
+        for (number, batch) in (1_u64..).zip(self.batches) {
+            match editor.apply(&batch.edits) {
+                Ok(changes) => told.note(batch, &grid, &changes),
+                Err(LayoutError::OutOfRange { problem, .. }) => {
+                    told.needs_widening = true;
+                    self.progress.note(&format!(
+                        "note: {}: {problem}; without --dry-run it is",
+                        self.named(number, batch)
+                    ));
+                    break;
+                }
+                Err(error) => return Err(anyhow!(error).context(self.named(number, batch))),
+            }
+            self.progress.add(batch.edits.len() as u64);
+        }
+        told.seconds = start.elapsed().as_secs_f64();
+        Ok(told)
+    }
+
+    /// Applies everything, batch by batch, each durable before the next.
+    pub(super) fn perform(&self) -> Result<Told> {
+        let start = Instant::now();
+        // The lock first, so that a second writer hears of it before anything else; an overlay is not made for a script that is refused.
+        let held = if self.target.overlay.is_none() { Some(self.target.session()?) } else { None };
+        let widenings = self.prepare(held)?;
+        let mut session = self.target.session()?;
+        let grid = *session.editor().terrain().grid();
+        let mut told = self.begin(false);
+        told.widenings = widenings;
+        for (number, batch) in (1_u64..).zip(self.batches) {
+            let before = told.batches;
+            let failed = || match before {
+                0 => self.named(number, batch),
+                done => format!(
+                    "{}; {} before it are in the file, and terrasoar undo takes them back",
+                    self.named(number, batch),
+                    if done == 1 { "the batch".to_owned() } else { format!("{done} batches") },
+                ),
+            };
+            let mut widenings = 0;
+            let changes = loop {
+                let paints = match session.header().imagery {
+                    Some(_) if self.paints => paints_of(&batch.edits, &grid),
+                    _ => Vec::new(),
+                };
+                match session.apply_and_paint(&batch.edits, &paints) {
+                    Ok((changes, painted)) => {
+                        told.tiles_painted += painted.tiles.len() as u64;
+                        break changes;
+                    }
+                    Err(LayoutError::OutOfRange { heights_m, problem, .. }) if widenings < MOST_WIDENINGS => {
+                        widenings += 1;
+                        let header = session.header().clone();
+                        // The rewriting takes the lock for itself.
+                        drop(session);
+                        self.widen(&header, heights_m, &problem).with_context(failed)?;
+                        session = self.target.session()?;
+                        self.progress
+                            .begin("editing", self.batches.iter().map(|b| b.edits.len() as u64).sum());
+                        self.progress.set(told.edits);
+                    }
+                    Err(error) => return Err(anyhow!(error).context(failed())),
+                }
+            };
+            told.widenings += widenings;
+            let committed = session.commit(&batch.label).with_context(failed)?;
+            told.note(batch, &grid, &changes);
+            told.pages_written += committed.pages;
+            told.bytes_appended += committed.bytes;
+            self.progress.set(told.edits);
+        }
+        told.seconds = start.elapsed().as_secs_f64();
+        Ok(told)
+    }
+
+    /// Rewrites the file, which has this header, with room for other heights.
+    fn widen(&self, header: &Header, heights_m: [f64; 2], problem: &str) -> Result<()> {
+        let file = self.target.file.display();
+        if let Some(overlay) = self.target.overlay {
+            let with =
+                if overlay.exists() { format!(" --overlay {}", overlay.display()) } else { String::new() };
+            bail!(
+                "{}: {problem}; an overlay cannot change that: make a file of its own with `terrasoar compact {file}{with} -o NEW.iqt` and edit that",
+                overlay.display()
+            );
+        }
+        let room = room_for(header, heights_m);
+        let [lowest, highest] = [room.lowest_m, room.highest_m].map(|m| decimal(m, 1));
+        let ends = match header.history {
+            Some(_) => "; what was edited before can no longer be undone",
+            None => "",
+        };
+        self.progress.note(&format!(
+            "note: {file}: {problem}: rewriting it with room for {lowest} to {highest} m{ends}"
+        ));
+        let new = widen(&SystemDisk, self.target.file, room, WIDEN_MIB, self.progress)?;
+        if new.record_kind != header.record_kind {
+            let bytes = new.record_kind.bytes();
+            complain(&format!(
+                "note: {file}: records take {bytes} bytes now instead of {}",
+                header.record_kind.bytes()
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Room for heights that a file cannot hold: as much again beyond its range as they ask for, so that a long script does not rewrite it for every batch; less where
+/// that would take larger records.
+fn room_for(header: &Header, heights_m: [f64; 2]) -> HeightRoom {
+    let [low, high] = header.height_range_m;
+    // Slopes that are too steep come without heights.
+    let lowest = if heights_m[0].is_nan() { low } else { heights_m[0].min(low) };
+    let highest = if heights_m[1].is_nan() { high } else { heights_m[1].max(high) };
+    let roomy = HeightRoom { lowest_m: 2.0 * lowest - low, highest_m: 2.0 * highest - high };
+    let steps = (roomy.highest_m - roomy.lowest_m) / header.scale.height_step_m;
+    if header.record_kind == RecordKind::Compact && steps > 60_000.0 {
+        return HeightRoom { lowest_m: lowest, highest_m: highest };
+    }
+    roomy
+}

@@ -1,0 +1,158 @@
+//! What `iobench` prints: a line a run, and under it what flights over a pool did and what other layouts cost.
+
+use crate::verbs::output::{columns, grouped};
+use terrasoar_lab::iobench::{IoBench, IoRun};
+
+pub(super) fn text(bench: &IoBench) -> String {
+    let known = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    let mut rows = vec![
+        [
+            "engine",
+            "layout",
+            "source",
+            "prefetch",
+            "pages",
+            "lines",
+            "record KB",
+            "needed MB",
+            "realtime MB",
+            "late pages",
+            "update ms",
+            "p99",
+            "cold ms",
+            "cold p99",
+            "io ms p99",
+            "major faults",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
+    for r in &bench.runs {
+        rows.push(vec![
+            r.engine.clone(),
+            r.layout.clone(),
+            r.source.clone(),
+            r.prefetch.clone(),
+            format!("{:.1}", r.distinct_pages_per_frame_mean),
+            format!("{:.0}", r.distinct_lines_per_frame_mean),
+            format!("{:.1}", r.record_bytes_per_frame_mean / 1e3),
+            format!("{:.3}", r.needed_mb),
+            format!("{:.4}", r.realtime_mb),
+            grouped(r.late_pages),
+            known(r.update_ms),
+            known(r.update_ms_p99),
+            known(r.update_ms_cold),
+            known(r.update_ms_p99_cold),
+            known(r.io_ms_p99),
+            r.frame_thread_major_faults.map_or("-".to_owned(), grouped),
+        ]);
+    }
+    let frames = bench.runs.first().map_or(0, |r| r.frames);
+    let mut out = format!(
+        "{}, {}, {} frames; a frame's means, the first left out; cache {} MiB\n",
+        bench.terrain,
+        bench.flight,
+        grouped(frames),
+        bench.cache_mib
+    );
+    out += &columns(&rows);
+    if bench.runs.iter().any(|r| r.scratch_map.is_some()) {
+        out += &scratch_text(bench);
+    }
+    out += &stream_text(bench);
+    if bench.runs.iter().any(|r| r.was_cold == Some(false)) {
+        out += "the file was not cold: it lies on no disk, or another program has it mapped; cold figures are of a file in memory\n";
+    }
+    if let Some(cap) = bench.cap {
+        out += &format!(
+            "memory capped at {} MiB, page cache included (control group version {})\n",
+            cap.mib, cap.control_group_version
+        );
+    }
+    if let Some(note) = &bench.cap_note {
+        out += &format!("memory not capped: {note}\n");
+    }
+    if !bench.kernel_known {
+        out += "page faults and bytes read are not known on this system\n";
+    }
+    out
+}
+
+/// What flights over a pool did, if there are any.
+fn stream_text(bench: &IoBench) -> String {
+    let heads = [
+        "prefetch",
+        "late pages",
+        "late error px",
+        "asked",
+        "come",
+        "lead",
+        "reads",
+        "ms a read",
+        "longest",
+        "peak MB",
+    ];
+    let row = |r: &IoRun| {
+        let s = r.stream.as_ref()?;
+        Some(vec![
+            r.prefetch.clone(),
+            grouped(r.late_pages),
+            format!("{:.2}", s.late_error_px_max),
+            grouped(s.pages_asked),
+            grouped(s.pages_come),
+            format!("{:.0}", s.lead_frames_max),
+            grouped(s.reads),
+            format!("{:.3}", s.read_ms_mean),
+            format!("{:.1}", s.read_ms_max),
+            r.peak_rss_mb.map_or("-".to_owned(), |mb| format!("{mb:.0}")),
+        ])
+    };
+    let rows: Vec<Vec<String>> = bench.runs.iter().filter_map(row).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let pace = if bench.frames_per_second > 0.0 {
+        format!("{} frames a second", bench.frames_per_second)
+    } else {
+        "as fast as frames are made".to_owned()
+    };
+    let head = heads.map(str::to_owned).to_vec();
+    format!(
+        "over the pool, {pace}, read by {}; cold, sums and largest of all frames but the first\n{}",
+        bench.reads,
+        columns(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
+    )
+}
+
+fn scratch_text(bench: &IoBench) -> String {
+    let heads = [
+        "engine",
+        "layout",
+        "read by",
+        "ms",
+        "ms p99",
+        "first frame ms",
+        "major faults",
+        "disk MB",
+        "file MB",
+    ];
+    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+    for r in &bench.runs {
+        for (how, cost) in [("map", r.scratch_map), ("pread", r.scratch_pread)] {
+            rows.extend(cost.map(|c| {
+                vec![
+                    r.engine.clone(),
+                    r.layout.clone(),
+                    how.to_owned(),
+                    format!("{:.3}", c.frame_ms),
+                    format!("{:.3}", c.frame_ms_p99),
+                    format!("{:.1}", c.first_frame_ms),
+                    c.major_faults.map_or("-".to_owned(), grouped),
+                    c.disk_read_mb_total.map_or("-".to_owned(), |v| format!("{v:.1}")),
+                    format!("{:.0}", r.file_mb),
+                ]
+            }));
+        }
+    }
+    format!("pages replayed against a scratch file, cold at the start\n{}", columns(&rows))
+}

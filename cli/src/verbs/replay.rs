@@ -1,0 +1,187 @@
+//! `terrasoar replay`: a recorded flight through one engine.
+
+use super::output::{columns, complain, grouped, print, print_json};
+use super::outputs::{Force, Kind};
+use super::progress::Progress;
+use super::terrain::TerrainArgs;
+use super::{WrongUsage, parse};
+use anyhow::{Context, Result};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use terrasoar::edits::{Loader, Script, timed};
+use terrasoar::flight::{Flight, FlightFrame};
+use terrasoar::flyover::{EngineKind, Quality, TimedBatch, replay, replay_edited};
+use terrasoar::refine::Culling;
+use terrasoar::stats::{FrameStats, ReplaySummary};
+use terrasoar::view::Viewport;
+use terrasoar_lab::report::{ReportFile, write_frames_csv};
+use terrasoar_layout::terrain::Terrain;
+
+/// Fly a recorded flight with one engine and print what it cost.
+///
+/// kinetic: only what can have changed, without looking at the rest. smart: only what can have changed is tested, all is looked at. soar:
+/// top-down refinement, every frame anew. naive: every triangle from scratch, by definition. All give the same mesh. Everything printed but the times is the same in every replay.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar replay alps.iqt --flight low.flight
+  terrasoar replay alps.iqt --flight low.flight --engine soar --tolerance-px 2 --stats frames.csv --json
+  terrasoar replay alps.iqt --flight low.flight --edits war.edits")]
+pub(super) struct Args {
+    #[command(flatten)]
+    terrain: TerrainArgs,
+    /// Flight file
+    #[arg(long, value_name = "F")]
+    flight: PathBuf,
+    /// Engine
+    #[arg(long, value_name = "ENGINE", default_value = EngineKind::default().name(), value_parser = parse::engine())]
+    engine: EngineKind,
+    #[command(flatten)]
+    quality: QualityArgs,
+    /// Edit the ground on the way, in memory only, by this script's moments (`frame N`, `at SECONDS`)
+    #[arg(long, value_name = "E.edits")]
+    edits: Option<PathBuf>,
+    /// Make at most N vertex tests a frame (kinetic only); what is late stays coarse, and the figures say how much
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    budget_tests: Option<u64>,
+    /// Also write every frame's figures to this file
+    #[arg(long, value_name = "CSV")]
+    stats: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Picture and precision.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct QualityArgs {
+    /// Largest error on the screen in pixels
+    #[arg(long, value_name = "PX", default_value = "1", value_parser = parse::tolerance_px)]
+    tolerance_px: f64,
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = parse::viewport)]
+    viewport: Viewport,
+    /// Multiply heights by this factor
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = parse::exaggeration)]
+    exaggeration: f64,
+    /// What is left out of view: vertices (the mesh is coarse there) or clusters (the mesh is refined all around, clusters are not drawn)
+    #[arg(long, value_name = "WHAT", default_value = Culling::default().name(), value_parser = parse::culling())]
+    culling: Culling,
+}
+
+impl QualityArgs {
+    pub(super) fn quality(self) -> Quality {
+        Quality {
+            viewport: self.viewport,
+            tolerance_px: self.tolerance_px,
+            vertical_exaggeration: self.exaggeration,
+            culling: self.culling,
+            budget_tests: None,
+        }
+    }
+}
+
+/// Flies `frames` with one engine, showing progress under `title`.
+pub(super) fn fly(
+    terrain: &Terrain,
+    frames: &[FlightFrame],
+    quality: Quality,
+    engine: EngineKind,
+    title: &str,
+    progress: &Progress,
+) -> Result<Vec<FrameStats>> {
+    // One pass times, one counts.
+    progress.begin(title, 2 * frames.len() as u64);
+    Ok(replay(terrain, frames, quality, engine, &mut |done| progress.set(done))?)
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    if let Some(stats) = &args.stats {
+        let others: Vec<_> =
+            [Some(&args.flight), args.edits.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+        args.force.stream(stats, Kind::Report(ReportFile::Frames), &args.terrain.inputs(&others))?;
+    }
+    let terrain = Arc::new(args.terrain.open()?);
+    let flight = Flight::read(&args.flight)?;
+    let progress = Progress::new("frames");
+    let name = args.engine.name();
+    let quality = Quality { budget_tests: args.budget_tests, ..args.quality.quality() };
+    if quality.budget_tests.is_some() && args.engine != EngineKind::Kinetic {
+        return Err(WrongUsage(format!(
+            "--budget-tests is for the engine kinetic; {name} does all or nothing"
+        ))
+        .into());
+    }
+    let frames = match &args.edits {
+        None => fly(&terrain, &flight.frames, quality, args.engine, name, &progress)?,
+        Some(script) => {
+            let batches = batches_of(script, &flight.frames)?;
+            progress.begin(name, 2 * flight.frames.len() as u64);
+            let done = &mut |done| progress.set(done);
+            replay_edited(&terrain, &flight.frames, quality, args.engine, &batches, done)
+                .with_context(|| not_replayed(script, &args.terrain.file))?
+        }
+    };
+    drop(progress);
+    if let Some(path) = &args.stats {
+        write_frames_csv(path, &frames)?;
+    }
+    let summary = ReplaySummary::of(name, &frames);
+    if args.json { print_json(&summary) } else { print(&text(&summary)) }
+}
+
+/// A script's batches at their frames. Those whose moment never comes are told.
+pub(super) fn batches_of(script: &Path, frames: &[FlightFrame]) -> Result<Vec<TimedBatch>> {
+    let batches = Loader::new(script, terrasoar_import::open_file).script(&Script::read(script)?)?;
+    let late = batches.iter().filter(|batch| batch.frame(frames).is_none()).count();
+    if late > 0 {
+        complain(&format!(
+            "note: {}: {late} of {} batches would come after the flight's last frame and are left out",
+            script.display(),
+            batches.len()
+        ));
+    }
+    Ok(timed(&batches, frames))
+}
+
+/// What is said of a script that cannot be replayed.
+pub(super) fn not_replayed(script: &Path, terrain: &Path) -> String {
+    format!(
+        "{} cannot be replayed over {} (terrasoar edit applies it to a copy, with more room if need be)",
+        script.display(),
+        terrain.display()
+    )
+}
+
+fn text(s: &ReplaySummary) -> String {
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let head = format!("{}, {} frames\n", s.engine, grouped(s.frames));
+    let t = s.update_ms;
+    head + &columns(&[
+        row("triangles a frame", format!("{:.0}", s.triangles_mean)),
+        row("incoherence", format!("{:.3} %", s.incoherence_percent)),
+        row("vertex tests", grouped(s.vertex_tests_total)),
+        row("splits", grouped(s.splits_total)),
+        row("merges", grouped(s.merges_total)),
+        row("live ranges over", grouped(s.expired_total)),
+        row("triangle slots written", grouped(s.slots_written_total)),
+        row("patch bytes", grouped(s.patch_bytes_total)),
+        row("late, sum over frames", grouped(s.late_total)),
+        row("largest late error", format!("{:.2} px", s.late_error_px_max)),
+        row("pages touched", grouped(s.pages_touched_total)),
+        row("record bytes read", grouped(s.record_bytes_touched_total)),
+        row("update, median", format!("{:.3} ms", t.p50)),
+        row("update, 95 %", format!("{:.3} ms", t.p95)),
+        row("update, 99 %", format!("{:.3} ms", t.p99)),
+        row("update, worst", format!("{:.3} ms", t.max)),
+        row("update, mean", format!("{:.3} ms", t.mean)),
+        row("scan, median", format!("{:.1} us", s.scan_us_p50)),
+        row("test, median", format!("{:.1} us", s.test_us_p50)),
+        row("apply, median", format!("{:.1} us", s.apply_us_p50)),
+        row("records edited", grouped(s.edited_records_total)),
+        row("edits of a frame, worst", format!("{:.3} ms", s.edit_ms_max)),
+        row("mesh hash", s.mesh_hash.clone()),
+    ])
+}

@@ -1,0 +1,203 @@
+//! `terrasoar snapshot`: one picture.
+
+use super::output::{decimal, grouped, print, print_json};
+use super::outputs::{Force, Kind};
+use super::picture::{PictureArgs, angles, png};
+use super::progress::Progress;
+use super::terrain::TerrainArgs;
+use super::{WrongUsage, parse};
+use anyhow::{Context, Result};
+use glam::DVec3;
+use serde::Serialize;
+use std::io::Write;
+use std::path::PathBuf;
+use terrasoar::flight::Flight;
+use terrasoar::flyover::ReplayError;
+use terrasoar::sink::FileSink;
+use terrasoar::view::View;
+use terrasoar_layout::terrain::Terrain;
+use terrasoar_render::Haze;
+use terrasoar_scene::overview::{FOV_DEG, overview, towards_middle, view_from};
+use terrasoar_scene::studio::Studio;
+
+/// Draw a picture of a terrain as PNG.
+///
+/// Of a frame of a flight, of a view that is given, or of the whole terrain from obliquely above. With a flight the engine flies all frames before it.
+/// Needs a graphics driver; one in software does. The same input gives the same bytes on the same driver.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar snapshot alps.iqt -o alps.png
+  terrasoar snapshot alps.iqt --flight low.flight --frame 99 --style wireframe -o frame.png
+  terrasoar snapshot alps.iqt --at 1500,820.5,3000 --look 45,-20 --ramp atlas --contours 100 -o view.png")]
+pub(super) struct Args {
+    #[command(flatten)]
+    terrain: TerrainArgs,
+    /// Flight file
+    #[arg(long, value_name = "F", requires = "frame")]
+    flight: Option<PathBuf>,
+    /// Frame of the flight, from 0
+    #[arg(long, value_name = "N", requires = "flight")]
+    frame: Option<usize>,
+    /// Where the eye is: metres east and north of the south-west sample, and up
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true, conflicts_with = "flight")]
+    at: Option<DVec3>,
+    /// Where it looks: degrees clockwise from north, and above the horizon; to the terrain's middle without it
+    #[arg(long, value_name = "YAW,PITCH", value_parser = look, allow_hyphen_values = true, requires = "at")]
+    look: Option<[f64; 2]>,
+    /// Vertical field of view in degrees, 45 without it
+    #[arg(long, value_name = "DEG", value_parser = field_of_view, conflicts_with = "flight")]
+    fov: Option<f64>,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Picture to write
+    #[arg(short, long, value_name = "OUT.png", value_parser = parse::with_extension(&["png"]))]
+    output: PathBuf,
+    #[command(flatten)]
+    force: Force,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+fn place(text: &str) -> Result<DVec3, String> {
+    let numbers = text.split(',').map(parse::finite).collect::<Result<Vec<f64>, String>>()?;
+    let [east, north, up] = numbers[..] else {
+        return Err("give three numbers, metres east, north and up, such as 1500,820.5,3000".into());
+    };
+    Ok(DVec3::new(east, north, up))
+}
+
+fn look(text: &str) -> Result<[f64; 2], String> {
+    let [yaw, pitch] = angles(text)?;
+    if (-90.0..=90.0).contains(&pitch) {
+        Ok([yaw, pitch])
+    } else {
+        Err("the second number, degrees above the horizon, must be from -90 to 90".into())
+    }
+}
+
+fn field_of_view(text: &str) -> Result<f64, String> {
+    let degrees = parse::positive(text)?;
+    if degrees <= 170.0 { Ok(degrees) } else { Err("it must be at most 170 degrees".into()) }
+}
+
+#[derive(Debug, Serialize)]
+struct Answer {
+    output: String,
+    size_px: [u32; 2],
+    style: String,
+    ramp: &'static str,
+    /// Null without a flight.
+    frame: Option<usize>,
+    eye_m: [f64; 3],
+    yaw_deg: f64,
+    pitch_deg: f64,
+    vertical_fov_deg: f64,
+    tolerance_px: f64,
+    exaggeration: f64,
+    engine: &'static str,
+    triangles: u64,
+    adapter: String,
+    backend: String,
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    let flight: Vec<_> = args.flight.as_deref().into_iter().collect();
+    args.force.file(&args.output, Kind::Picture, &args.terrain.inputs(&flight))?;
+    let terrain = args.terrain.open()?;
+    let views = args.views(&terrain)?;
+    let picture = &args.picture;
+    let mut studio = Studio::new(&terrain, picture.scene(), picture.size)?;
+    let progress = Progress::new("frames");
+    progress.begin("flying", views.len() as u64);
+    let mut triangles = 0;
+    for view in &views {
+        triangles = studio.fly(view).triangles;
+        progress.add(1);
+    }
+    drop(progress);
+    let Some(view) = views.last() else { return Err(WrongUsage("a flight without frames".into()).into()) };
+    let has_image = studio.has_image();
+    let mut look = picture.look(has_image);
+    if args.is_overview() {
+        // A block on a table: no air between it and the eye.
+        look.haze = Haze::Off;
+        studio.raise_walls(block_bottom_m(&terrain, picture.exaggeration));
+    }
+    let rgb = studio.picture(view, &look)?;
+    let mut file = FileSink::create(&args.output)?;
+    file.write_all(&png(&rgb, picture.size)?).with_context(|| {
+        format!("{}: cannot write the picture; check the free space", args.output.display())
+    })?;
+    file.publish()?;
+    let [width, height] = [picture.size.width_px, picture.size.height_px];
+    let adapter = studio.capabilities();
+    if args.json {
+        return print_json(&Answer {
+            output: args.output.display().to_string(),
+            size_px: [width, height],
+            style: picture.style(has_image).to_owned(),
+            ramp: look.ramp.name,
+            frame: args.frame,
+            eye_m: view.eye_m.to_array(),
+            yaw_deg: view.yaw_rad.to_degrees(),
+            pitch_deg: view.pitch_rad.to_degrees(),
+            vertical_fov_deg: view.vertical_fov_rad.to_degrees(),
+            tolerance_px: view.tolerance_px,
+            exaggeration: view.vertical_exaggeration,
+            engine: picture.engine_name(),
+            triangles,
+            adapter: adapter.adapter.clone(),
+            backend: adapter.backend.clone(),
+        });
+    }
+    let at = view.eye_m.to_array().map(|m| decimal(m, 1)).join(",");
+    print(&format!(
+        "{}: {width} x {height} pixels, {} triangles, seen from {at}; drawn by {} ({})",
+        args.output.display(),
+        grouped(triangles),
+        adapter.adapter,
+        adapter.backend
+    ))
+}
+
+/// Where the block that the terrain is shown as ends: a fortieth of its width below the lowest ground, as drawn.
+fn block_bottom_m(terrain: &Terrain, exaggeration: f64) -> f64 {
+    let [east_m, north_m] = terrain.grid().extent_m();
+    terrain.header().height_range_m[0] - 0.025 * east_m.min(north_m) / exaggeration
+}
+
+impl Args {
+    /// Whether nothing says where the eye is.
+    fn is_overview(&self) -> bool {
+        self.flight.is_none() && self.at.is_none()
+    }
+
+    /// The views to fly through; the last is the picture's.
+    fn views(&self, terrain: &Terrain) -> Result<Vec<View>> {
+        let (size, exaggeration) = (self.picture.size, self.picture.exaggeration);
+        let fov_deg = self.fov.unwrap_or(FOV_DEG);
+        if let Some(path) = &self.flight {
+            let mut frames = Flight::read(path)?.frames;
+            let asked = self.frame.unwrap_or_default();
+            if asked >= frames.len() {
+                return Err(ReplayError::NoSuchFrame { asked, last: frames.len() - 1 }.into());
+            }
+            frames.truncate(asked + 1);
+            let view = |frame: &terrasoar::flight::FlightFrame| frame.view(size, self.picture.tolerance_px);
+            return Ok(frames.iter().map(|frame| self.picture.refine(view(frame))).collect());
+        }
+        let view = match self.at {
+            None => overview(terrain, exaggeration, fov_deg, size),
+            Some(eye_m) => {
+                let angles = self.look.map_or_else(
+                    || towards_middle(terrain, exaggeration, eye_m),
+                    |degrees| degrees.map(f64::to_radians),
+                );
+                view_from(eye_m, angles, fov_deg, size)
+            }
+        };
+        Ok(vec![self.picture.refine(view)])
+    }
+}

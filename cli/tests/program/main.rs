@@ -1,0 +1,24 @@
+//! The real program in a temporary folder: what it prints, what it leaves, how it ends.
+
+#[cfg(target_os = "linux")]
+mod aliases;
+mod build;
+mod drape;
+mod edit;
+mod edit_flights;
+mod edit_processes;
+mod engines;
+mod harmless;
+mod hostile_imports;
+mod iobench;
+#[cfg(unix)]
+mod killed;
+#[cfg(unix)]
+mod kills;
+mod outputs;
+mod pictures;
+mod support;
+#[path = "../../../layout/tests/import_support/tiff.rs"]
+mod tiff;
+mod usage;
+mod verbs;

@@ -1,0 +1,186 @@
+//! Where the chunks of an image lie: two lists of numbers in the file, read a block at a time.
+//!
+//! The lists are as long as the image has chunks, and a file of a few gigabytes, all holes, can list hundreds of millions. So they are never in memory as a whole: a
+//! [`Listing`] knows where they stand, a [`Places`] has a block of them at hand. Cost: 16 KiB a reader; two reads of the file a block of
+//! [`BLOCK`] chunks, as long as chunks are asked for in order.
+
+use super::tags::whole_number;
+use std::fs::File;
+use std::io::ErrorKind;
+use std::path::Path;
+use terrasoar_layout::disk::read_at;
+use terrasoar_layout::error::LayoutError;
+
+/// Chunks whose places are at hand at once.
+const BLOCK: u64 = 1024;
+
+/// A list of unsigned numbers in a TIFF file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Column {
+    pub(super) count: u64,
+    /// Bytes of a number: 1, 2, 4 or 8.
+    pub(super) value_bytes: usize,
+    pub(super) big_endian: bool,
+    /// The numbers themselves where they stand in the directory.
+    pub(super) inline: Option<[u8; 8]>,
+    /// Where they stand otherwise.
+    pub(super) at: u64,
+}
+
+impl Column {
+    /// Appends the numbers `first..first + count`, which there are, to `numbers`.
+    fn read(&self, file: &File, first: u64, count: u64, numbers: &mut Vec<u64>) -> std::io::Result<()> {
+        let size = self.value_bytes;
+        let (from, bytes) = (first * size as u64, count as usize * size);
+        let mut read;
+        let values = match &self.inline {
+            // All of them are 8 bytes at most.
+            Some(values) => &values[from as usize..from as usize + bytes],
+            None => {
+                read = vec![0; bytes];
+                read_at(file, &mut read, self.at + from)?;
+                &read[..]
+            }
+        };
+        numbers.extend(values.chunks_exact(size).map(|value| whole_number(value, self.big_endian)));
+        Ok(())
+    }
+}
+
+/// Where offsets and packed lengths of the chunks are listed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Listing {
+    offsets: Column,
+    lengths: Column,
+}
+
+impl Listing {
+    /// Both lists, if they are of one length.
+    pub(super) fn new(offsets: Column, lengths: Column) -> Option<Self> {
+        (offsets.count == lengths.count).then_some(Self { offsets, lengths })
+    }
+
+    /// Number of chunks listed.
+    pub(super) fn count(&self) -> u64 {
+        self.offsets.count
+    }
+}
+
+/// Reads places of chunks from `file`.
+#[derive(Debug)]
+pub(super) struct Places<'f> {
+    path: &'f Path,
+    file: &'f File,
+    listing: Listing,
+    /// First chunk at hand.
+    first: u64,
+    offsets: Vec<u64>,
+    lengths: Vec<u64>,
+}
+
+impl<'f> Places<'f> {
+    pub(super) fn new(path: &'f Path, file: &'f File, listing: Listing) -> Self {
+        Self { path, file, listing, first: 0, offsets: Vec::new(), lengths: Vec::new() }
+    }
+
+    /// Offset and packed length of a chunk; `None` if the file left it out.
+    pub(super) fn get(&mut self, chunk: u64) -> Result<Option<(u64, u64)>, LayoutError> {
+        if chunk < self.first || chunk - self.first >= self.offsets.len() as u64 {
+            self.turn_to(chunk)?;
+        }
+        let at = (chunk - self.first) as usize;
+        let place = self.offsets.get(at).copied().zip(self.lengths.get(at).copied());
+        Ok(place.filter(|(offset, length)| *offset != 0 && *length != 0))
+    }
+
+    /// The first chunk from `chunk` on that the file has, with its offset and packed length.
+    pub(super) fn next(&mut self, mut chunk: u64) -> Result<Option<(u64, u64, u64)>, LayoutError> {
+        while chunk < self.listing.count() {
+            // Brings it to hand.
+            self.get(chunk)?;
+            let at = (chunk - self.first) as usize;
+            let mut rest = self.offsets[at..].iter().zip(&self.lengths[at..]);
+            match rest.position(|(offset, length)| *offset != 0 && *length != 0) {
+                Some(skipped) => {
+                    let at = at + skipped;
+                    return Ok(Some((self.first + at as u64, self.offsets[at], self.lengths[at])));
+                }
+                None => chunk = self.first + self.offsets.len() as u64,
+            }
+        }
+        Ok(None)
+    }
+
+    /// Brings the block of `chunk` to hand.
+    fn turn_to(&mut self, chunk: u64) -> Result<(), LayoutError> {
+        self.first = chunk / BLOCK * BLOCK;
+        self.offsets.clear();
+        self.lengths.clear();
+        let count = BLOCK.min(self.listing.count().saturating_sub(self.first));
+        let Listing { offsets, lengths } = self.listing;
+        offsets
+            .read(self.file, self.first, count, &mut self.offsets)
+            .and_then(|()| lengths.read(self.file, self.first, count, &mut self.lengths))
+            .map_err(|source| match source.kind() {
+                ErrorKind::UnexpectedEof => LayoutError::damaged(
+                    self.path,
+                    "table of chunks",
+                    "the file was cut short while it was read; start again",
+                ),
+                _ => LayoutError::io(self.path, "cannot read the TIFF file", source),
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    #[test]
+    fn places_are_read_in_any_order_and_type() {
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&[0; 8]).unwrap();
+        let count = 3 * BLOCK / 2;
+        for chunk in 0..count {
+            file.write_all(&(100 + chunk as u32).to_be_bytes()).unwrap();
+        }
+        for chunk in 0..count {
+            file.write_all(&(chunk as u16 % 7).to_be_bytes()).unwrap();
+        }
+        let column = |value_bytes, at| Column { count, value_bytes, big_endian: true, inline: None, at };
+        let listing = Listing::new(column(4, 8), column(2, 8 + 4 * count)).unwrap();
+        let mut places = Places::new(Path::new("t.tif"), &file, listing);
+        for chunk in [0, 1, BLOCK, BLOCK - 1, count - 1, 8] {
+            let length = chunk % 7;
+            assert_eq!(places.get(chunk).unwrap(), (length != 0).then_some((100 + chunk, length)), "{chunk}");
+        }
+        assert_eq!(places.get(count).unwrap(), None);
+        let mut next = 0;
+        while let Some((chunk, offset, length)) = places.next(next).unwrap() {
+            assert_eq!((chunk, offset, length), (next + u64::from(next % 7 == 0), 100 + chunk, chunk % 7));
+            next = chunk + 1;
+        }
+        assert!(next + 7 > count, "{next} of {count}");
+        file.set_len(100).unwrap();
+        let mut places = Places::new(Path::new("t.tif"), &file, listing);
+        assert!(places.get(BLOCK).unwrap_err().to_string().contains("cut short"));
+    }
+
+    #[test]
+    fn short_lists_stand_in_the_directory() {
+        let column = |values: [u8; 8]| Column {
+            count: 2,
+            value_bytes: 4,
+            big_endian: false,
+            inline: Some(values),
+            at: 0,
+        };
+        let listing =
+            Listing::new(column([9, 0, 0, 0, 8, 1, 0, 0]), column([5, 0, 0, 0, 6, 0, 0, 0])).unwrap();
+        let file = tempfile::tempfile().unwrap();
+        let mut places = Places::new(Path::new("t.tif"), &file, listing);
+        assert_eq!([0, 1].map(|chunk| places.get(chunk).unwrap().unwrap()), [(9, 5), (264, 6)]);
+        assert!(Listing::new(column([0; 8]), Column { count: 3, ..column([0; 8]) }).is_none());
+    }
+}

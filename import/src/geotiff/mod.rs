@@ -1,0 +1,133 @@
+//! GeoTIFF, BigTIFF and cloud-optimised ones, one chunk (strip or tile) at a time.
+//!
+//! [`tags`] reads the directory and holds every declared size against the file, [`chunks`] makes the
+//! table of chunks of it, [`geokeys`] and [`metadata`] say where the grid lies and what a unit is.
+//! Chunks are read piecewise, however large: uncompressed ones by [`raw`], compressed ones by
+//! [`packed`] with [`codec`] and [`predictor`]. [`convert`] turns bytes into samples. Of a file with
+//! several images the first full-resolution one is read. Memory: some rows a worker, whatever the file declares.
+//!
+//! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
+//! are not inverted for "white is zero" files. Masks in images of their own are not applied.
+
+mod chunk_grid;
+mod chunks;
+mod codec;
+mod colour;
+mod colour_table;
+mod convert;
+mod geokeys;
+mod listing;
+mod metadata;
+mod packed;
+mod predictor;
+mod raw;
+mod tags;
+mod zstd_frame;
+
+use std::path::{Path, PathBuf};
+
+use chunks::Chunks;
+pub(crate) use colour::TiffImage;
+use convert::Void;
+use tags::TiffFile;
+use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
+use terrasoar_layout::error::LayoutError;
+
+use super::WINDOW_SAMPLES;
+
+/// Longest text of the void value: a number.
+const MAX_NODATA_BYTES: u64 = 256;
+/// Longest metadata; those of a DEM are a few KiB.
+const MAX_METADATA_BYTES: u64 = 4 << 20;
+
+/// A GeoTIFF with one band of heights.
+#[derive(Debug)]
+pub(super) struct TiffDem {
+    path: PathBuf,
+    info: DemInfo,
+    chunks: Chunks,
+    void: Void,
+}
+
+impl TiffDem {
+    /// Reads the directory of the first full-resolution image.
+    pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
+        let mut file = TiffFile::open(path)?;
+        let directory = file.first_full_image()?;
+        let chunks = Chunks::read(&mut file, &directory)?;
+        let nodata = file.text(&directory, tags::GDAL_NODATA, MAX_NODATA_BYTES)?;
+        let void = Void::parse(path, nodata.as_deref(), chunks.sample_type)?;
+        if !void.absent().is_nan() {
+            let advice = "the others would all be heights of 0, for it declares no void value; if they are voids, say so: \
+                          gdal_edit.py -a_nodata -9999 FILE";
+            chunks.grid.check_sparse(&file, chunks.stored_samples, advice)?;
+        }
+        let (georeference, vertical_unit_m) = geokeys::read(&mut file, &directory)?;
+        let bands = file.text(&directory, tags::GDAL_METADATA, MAX_METADATA_BYTES)?.unwrap_or_default();
+        let heights = metadata::heights(&bands);
+        let unit_m = heights.unit_m.unwrap_or(vertical_unit_m);
+        let info = DemInfo {
+            samples_wide: chunks.grid.width,
+            samples_high: chunks.grid.height,
+            sample_type: chunks.sample_type,
+            height_scale: heights.scale * unit_m,
+            height_offset_m: heights.offset * unit_m,
+            georeference,
+            format: format!(
+                "{}{}, {}, {}",
+                if file.is_big() { "BigTIFF" } else { "TIFF" },
+                if directory.has_georeference() { " with georeference" } else { "" },
+                chunks.describe(),
+                chunks.compression.name()
+            ),
+        };
+        Ok(Self { path: path.to_owned(), info, chunks, void })
+    }
+}
+
+impl DemSource for TiffDem {
+    fn info(&self) -> &DemInfo {
+        &self.info
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.chunks.memory_bytes()
+    }
+
+    fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        if self.chunks.is_raw() {
+            raw::stream(&self.path, &self.chunks, &self.void, sink)
+        } else {
+            packed::stream(&self.path, &self.chunks, &self.void, sink)
+        }
+    }
+}
+
+/// Pushes `window` full of one value, a few rows at a time.
+fn put_constant(sink: &dyn SampleSink, window: Window, value: f64) -> Result<(), LayoutError> {
+    let rows = rows_at_once(window.width).min(window.height);
+    if value.is_nan() {
+        return sink.put_void(window);
+    }
+    // At most a window's worth, or one row, of which a build has no longer ones than 65,537.
+    let samples = vec![value; window.width as usize * rows as usize];
+    for part in parts(window, rows) {
+        sink.put(part, &samples[..part.width as usize * part.height as usize])?;
+    }
+    Ok(())
+}
+
+/// Cuts `window` into windows of at most `rows` rows.
+fn parts(window: Window, rows: u32) -> impl Iterator<Item = Window> {
+    let bottom = window.row + window.height;
+    (window.row..bottom).step_by(rows.max(1) as usize).map(move |row| Window {
+        row,
+        height: rows.min(bottom - row),
+        ..window
+    })
+}
+
+/// Rows of `width` samples in one window of a sink, at least 1.
+fn rows_at_once(width: u32) -> u32 {
+    u32::try_from(WINDOW_SAMPLES / u64::from(width.max(1))).unwrap_or(u32::MAX).max(1)
+}

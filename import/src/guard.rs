@@ -1,0 +1,55 @@
+//! Keeps a panic inside a third-party decoder from leaving the reader.
+//!
+//! The decoders are fuzzed by their makers, and still assert and index; on hostile bytes an assertion
+//! that fires is damage in the file and nothing else. State that a panic interrupted is dropped by
+//! every caller. A program that speaks up at a panic can ask whether it is one of these ([`is_guarded`]). Cost: none on the good path.
+
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use terrasoar_layout::error::LayoutError;
+
+thread_local! {
+    /// How many guards this thread is in.
+    static GUARDS: Cell<u32> = const { Cell::new(0) };
+}
+
+/// Whether this thread is where a panic becomes an error of the file, and so is no defect.
+pub fn is_guarded() -> bool {
+    GUARDS.get() > 0
+}
+
+/// Runs `decode`; a panic in it becomes [`LayoutError::Damaged`] at `place` of `path`.
+pub(crate) fn guard<T>(
+    path: &Path,
+    place: impl FnOnce() -> String,
+    decode: impl FnOnce() -> Result<T, LayoutError>,
+) -> Result<T, LayoutError> {
+    GUARDS.set(GUARDS.get() + 1);
+    let decoded = catch_unwind(AssertUnwindSafe(decode));
+    GUARDS.set(GUARDS.get() - 1);
+    decoded.unwrap_or_else(|_| {
+        Err(LayoutError::damaged(
+            path,
+            place(),
+            "the decoder gave up on these bytes; fetch or write the file again",
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_damage_and_known_as_such_while_it_happens() {
+        let path = Path::new("a");
+        assert!(!is_guarded());
+        let inner = guard(path, || "here".into(), || guard(path, || "there".into(), || Ok(is_guarded())));
+        assert!(inner.unwrap() && !is_guarded());
+        let error = guard::<()>(path, || "here".into(), || panic!("an assertion of a decoder"));
+        assert!(error.unwrap_err().to_string().starts_with("a: here: the decoder gave up"));
+        assert!(!is_guarded());
+    }
+}

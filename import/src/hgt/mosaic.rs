@@ -1,0 +1,258 @@
+//! Merges `.hgt` tiles into one grid.
+//!
+//! The grid is cut into one cell a degree. A cell pushes the samples of its own tile without the tile's
+//! last row and column, which the cells to the south and east push as their first; at the grid's
+//! southern and eastern edge a cell pushes its last ones too. So every sample is pushed once.
+//!
+//! Where tiles share a sample, the first of them that is not void gives it, in this order: the
+//! cell's own tile, then its neighbour to the north, to the west, to the north-west. Memory: two bands
+//! of rows a worker.
+
+use std::collections::BTreeMap;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::path::PathBuf;
+
+use super::super::WINDOW_SAMPLES;
+use super::super::input;
+use super::super::parallel::each_task;
+use super::{name, side_of};
+use terrasoar_layout::dem::{SampleSink, Window};
+use terrasoar_layout::error::LayoutError;
+
+const VOID: i16 = -32768;
+
+/// Cells a mosaic may span for each tile it has: scattered tiles are a mistake, or several data sets.
+const CELLS_PER_TILE: u64 = 1000;
+
+/// Tiles with their places in the grid.
+#[derive(Debug)]
+pub(super) struct Mosaic {
+    /// Samples along a tile's side.
+    pub(super) side: u32,
+    pub(super) samples_wide: u32,
+    pub(super) samples_high: u32,
+    /// Latitude and longitude of the first sample, unless the only tile's name does not say.
+    pub(super) north_west: Option<(f64, f64)>,
+    cells_wide: u32,
+    cells_high: u32,
+    /// Tiles by (cell row from the north, cell column from the west).
+    tiles: BTreeMap<(u32, u32), PathBuf>,
+}
+
+impl Mosaic {
+    /// Works out where the tiles at `paths` lie and that they fit together.
+    pub(super) fn place(paths: &[PathBuf]) -> Result<Self, LayoutError> {
+        let mut side = None;
+        for path in paths {
+            let metadata = std::fs::metadata(path);
+            let bytes =
+                metadata.map_err(|source| LayoutError::io(path, "cannot read the .hgt tile", source))?.len();
+            let this = side_of(path, bytes)?;
+            if *side.get_or_insert(this) != this {
+                return Err(LayoutError::Usage(format!(
+                    "{}: this tile has {this} x {this} heights and {} has {side} x {side}; a mosaic needs tiles of one \
+                     resolution: build them apart, or resample with gdalwarp",
+                    path.display(),
+                    paths[0].display(),
+                    side = side.unwrap_or(this),
+                )));
+            }
+        }
+        let side = side.ok_or_else(|| LayoutError::Usage("no .hgt tile was named".into()))?;
+        let mut corners: Vec<(i32, i32)> = Vec::with_capacity(paths.len());
+        for path in paths {
+            match name::corner(path) {
+                Some(corner) => corners.push(corner),
+                None if paths.len() == 1 => {
+                    return Self::with_cells(side, None, (1, 1), vec![((0, 0), path.clone())]);
+                }
+                None => {
+                    return Err(LayoutError::Usage(format!(
+                        "{}: the name does not say where the tile lies; in a mosaic name every tile by its south-west \
+                         corner, like N29E080.hgt",
+                        path.display()
+                    )));
+                }
+            }
+        }
+        join_across_antimeridian(&mut corners);
+        let south = corners.iter().map(|c| c.0).min().unwrap_or(0);
+        let north = corners.iter().map(|c| c.0).max().unwrap_or(0);
+        let west = corners.iter().map(|c| c.1).min().unwrap_or(0);
+        let east = corners.iter().map(|c| c.1).max().unwrap_or(0);
+        let cells = (north.abs_diff(south) + 1, east.abs_diff(west) + 1);
+        let placed = corners
+            .iter()
+            .zip(paths)
+            .map(|(c, path)| ((north.abs_diff(c.0), c.1.abs_diff(west)), path.clone()));
+        Self::with_cells(side, Some((f64::from(north + 1), f64::from(west))), cells, placed.collect())
+    }
+
+    fn with_cells(
+        side: u32,
+        north_west: Option<(f64, f64)>,
+        (cells_high, cells_wide): (u32, u32),
+        placed: Vec<((u32, u32), PathBuf)>,
+    ) -> Result<Self, LayoutError> {
+        let samples = |cells: u32| {
+            u32::try_from(u64::from(cells) * u64::from(side - 1) + 1).map_err(|_| {
+                LayoutError::Usage(format!(
+                    "a mosaic of {cells} tiles in a line has too many samples; name fewer"
+                ))
+            })
+        };
+        let (samples_high, samples_wide) = (samples(cells_high)?, samples(cells_wide)?);
+        if u64::from(cells_high) * u64::from(cells_wide) > CELLS_PER_TILE * placed.len() as u64 {
+            return Err(LayoutError::Usage(format!(
+                "the {} tiles lie scattered over {cells_wide} x {cells_high} degrees, nearly all of it void; name tiles \
+                 that belong together",
+                placed.len()
+            )));
+        }
+        let mut tiles = BTreeMap::new();
+        for (cell, path) in placed {
+            if let Some(earlier) = tiles.insert(cell, path.clone()) {
+                return Err(LayoutError::Usage(format!(
+                    "{} and {} are the same tile; name each tile once",
+                    earlier.display(),
+                    path.display()
+                )));
+            }
+        }
+        Ok(Self { side, samples_wide, samples_high, north_west, cells_wide, cells_high, tiles })
+    }
+
+    /// Pushes every sample of the grid once.
+    pub(super) fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let band_rows =
+            u32::try_from(WINDOW_SAMPLES / u64::from(self.side)).unwrap_or(u32::MAX).clamp(1, self.side);
+        let bands = u64::from(self.side.div_ceil(band_rows));
+        let tasks = u64::from(self.cells_wide) * u64::from(self.cells_high) * bands;
+        each_task(
+            tasks,
+            usize::MAX,
+            || Ok(()),
+            |(), task| {
+                let cell = task / bands;
+                // Both are below the number of cells along a side, and bands below the side.
+                let (down, across) =
+                    ((cell / u64::from(self.cells_wide)) as u32, (cell % u64::from(self.cells_wide)) as u32);
+                let first = (task % bands) as u32 * band_rows;
+                let height = if down + 1 == self.cells_high { self.side } else { self.side - 1 };
+                let width = if across + 1 == self.cells_wide { self.side } else { self.side - 1 };
+                if first >= height {
+                    return Ok(());
+                }
+                let rows = band_rows.min(height - first);
+                let window = Window {
+                    col: across * (self.side - 1),
+                    row: down * (self.side - 1) + first,
+                    width,
+                    height: rows,
+                };
+                match self.band((down, across), first, rows, width)? {
+                    Some(samples) => sink.put(window, &samples),
+                    None => sink.put_void(window),
+                }
+            },
+        )
+    }
+
+    /// The samples of a cell's rows `first..first + rows` and its first `width` columns; `None` if all are void.
+    fn band(
+        &self,
+        cell: (u32, u32),
+        first: u32,
+        rows: u32,
+        width: u32,
+    ) -> Result<Option<Vec<f64>>, LayoutError> {
+        let (down, across) = cell;
+        let side = self.side as usize;
+        let width = width as usize;
+        let mut heights = vec![VOID; width * rows as usize];
+        if let Some(own) = self.rows_of(Some(down), Some(across), first, rows)? {
+            for (to, from) in heights.chunks_exact_mut(width).zip(own.chunks_exact(side)) {
+                to.copy_from_slice(&from[..width]);
+            }
+        }
+        let last = self.side - 1;
+        if first == 0
+            && heights[..width].contains(&VOID)
+            && let Some(north) = self.rows_of(down.checked_sub(1), Some(across), last, 1)?
+        {
+            heights[..width].iter_mut().zip(&north).for_each(|(to, from)| fill(to, *from));
+        }
+        if heights.iter().step_by(width).any(|height| *height == VOID)
+            && let Some(west) = self.rows_of(Some(down), across.checked_sub(1), first, rows)?
+        {
+            let borders = west.chunks_exact(side).map(|row| row[side - 1]);
+            heights.iter_mut().step_by(width).zip(borders).for_each(|(to, from)| fill(to, from));
+        }
+        if first == 0
+            && heights[0] == VOID
+            && let Some(corner) = self.rows_of(down.checked_sub(1), across.checked_sub(1), last, 1)?
+        {
+            heights[0] = corner[side - 1];
+        }
+        if heights.iter().all(|height| *height == VOID) {
+            return Ok(None);
+        }
+        let to_sample = |height: i16| if height == VOID { f64::NAN } else { f64::from(height) };
+        Ok(Some(heights.into_iter().map(to_sample).collect()))
+    }
+
+    /// Whole rows of the tile in a cell, or `None` where there is no tile.
+    fn rows_of(
+        &self,
+        down: Option<u32>,
+        across: Option<u32>,
+        first: u32,
+        rows: u32,
+    ) -> Result<Option<Vec<i16>>, LayoutError> {
+        let (Some(down), Some(across)) = (down, across) else {
+            return Ok(None);
+        };
+        let Some(path) = self.tiles.get(&(down, across)) else {
+            return Ok(None);
+        };
+        let row_bytes = self.side as usize * 2;
+        let mut bytes = vec![0; row_bytes * rows as usize];
+        let mut file = input::open(path, "cannot open the .hgt tile")?;
+        let read = file
+            .seek(SeekFrom::Start(u64::from(first) * row_bytes as u64))
+            .and_then(|_| file.read_exact(&mut bytes));
+        read.map_err(|source| match source.kind() {
+            ErrorKind::UnexpectedEof => LayoutError::damaged(
+                path,
+                format!("row {first}"),
+                "the tile was cut short while it was read; start again",
+            ),
+            _ => LayoutError::io(path, "cannot read the .hgt tile", source),
+        })?;
+        Ok(Some(bytes.chunks_exact(2).map(|pair| i16::from_be_bytes([pair[0], pair[1]])).collect()))
+    }
+}
+
+/// Takes a neighbour's height where there is none.
+fn fill(height: &mut i16, neighbour: i16) {
+    if *height == VOID {
+        *height = neighbour;
+    }
+}
+
+/// Tiles on both sides of 180 degrees are close together if the western hemisphere is counted on past 180.
+fn join_across_antimeridian(corners: &mut [(i32, i32)]) {
+    let span = |longitudes: &mut dyn Iterator<Item = i32>| {
+        longitudes
+            .fold(None, |span: Option<(i32, i32)>, x| {
+                Some(span.map_or((x, x), |(a, b)| (a.min(x), b.max(x))))
+            })
+            .map_or(0, |(a, b)| b - a)
+    };
+    let past = |longitude: i32| if longitude < 0 { longitude + 360 } else { longitude };
+    let plain = span(&mut corners.iter().map(|c| c.1));
+    let shifted = span(&mut corners.iter().map(|c| past(c.1)));
+    if plain > 180 && shifted < plain {
+        corners.iter_mut().for_each(|corner| corner.1 = past(corner.1));
+    }
+}

@@ -1,0 +1,149 @@
+//! Pictures as JPEG, baseline and progressive, decoded by jpeg-decoder.
+//!
+//! No Rust decoder gives a JPEG row by row, so its texels are held as a whole while it is read, and more while it is decoded ([`JpegFrame::memory_bytes`]): 4.5 bytes a
+//! texel of the usual kind, 7.5 of a progressive one. That counts against the memory budget; larger pictures go through a tiled GeoTIFF.
+
+use super::png::spread;
+use super::world;
+use crate::jpeg_frame::JpegFrame;
+use crate::{guard, input};
+use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat, UnsupportedFeature};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
+
+/// A JPEG picture.
+#[derive(Debug)]
+pub(super) struct JpegImage {
+    path: PathBuf,
+    info: ImageInfo,
+    channels: usize,
+}
+
+impl JpegImage {
+    /// Reads the header.
+    pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
+        let frame = JpegFrame::read(reader(path)?)
+            .map_err(|source| LayoutError::io(path, "cannot read the JPEG file", source))?;
+        frame.check().map_err(|problem| LayoutError::unsupported(path, problem))?;
+        let mut decoder = Decoder::new(reader(path)?);
+        guard(path, || "header".into(), || decoder.read_info().map_err(|e| decoding_error(path, e)))?;
+        let Some(header) = decoder.info() else {
+            return Err(LayoutError::damaged(path, "header", "it says no size; fetch the file again"));
+        };
+        let channels = channels(path, header.pixel_format)?;
+        let texels = [u32::from(header.width), u32::from(header.height)];
+        if texels.contains(&0) {
+            return Err(LayoutError::damaged(path, "header", "it has no texels; fetch the file again"));
+        }
+        let progressive = header.coding_process == CodingProcess::DctProgressive;
+        let info = ImageInfo {
+            texels,
+            georeference: world::georeference(path, &["jgw", "jpgw", "jpegw", "wld"])?,
+            format: format!(
+                "{}{} JPEG",
+                if progressive { "progressive " } else { "" },
+                if channels == 1 { "grey" } else { "RGB" }
+            ),
+            notes: Vec::new(),
+            memory_bytes: frame.memory_bytes(),
+        };
+        Ok(Self { path: path.to_owned(), info, channels })
+    }
+}
+
+impl ImageSource for JpegImage {
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn info(&self) -> &ImageInfo {
+        &self.info
+    }
+
+    fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
+        let mut decoder = Decoder::new(reader(&self.path)?);
+        let texels = guard(
+            &self.path,
+            || "image data".into(),
+            || decoder.decode().map_err(|e| decoding_error(&self.path, e)),
+        )?;
+        let [wide, high] = self.info.texels.map(|side| side as usize);
+        if texels.len() != wide * high * self.channels {
+            return Err(LayoutError::damaged(
+                &self.path,
+                "image data",
+                "it has another size than its header says",
+            ));
+        }
+        Ok(Box::new(Rows { texels, channels: self.channels, at: 0 }))
+    }
+}
+
+struct Rows {
+    texels: Vec<u8>,
+    channels: usize,
+    at: usize,
+}
+
+impl RowReader for Rows {
+    fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
+        let end = (self.at + rgba.len() / 4 * self.channels).min(self.texels.len());
+        spread(&self.texels[self.at..end], self.channels, rgba);
+        self.at = end;
+        Ok(())
+    }
+}
+
+fn reader(path: &Path) -> Result<BufReader<File>, LayoutError> {
+    Ok(BufReader::with_capacity(1 << 18, input::open(path, "cannot open the JPEG file")?))
+}
+
+fn channels(path: &Path, format: PixelFormat) -> Result<usize, LayoutError> {
+    match format {
+        PixelFormat::L8 => Ok(1),
+        PixelFormat::RGB24 => Ok(3),
+        PixelFormat::CMYK32 => Err(LayoutError::unsupported(
+            path,
+            "the JPEG is in CMYK, the inks of a press, and textures are RGB; convert it with its colour profile, for example: \
+             magick INPUT -colorspace sRGB output.jpg",
+        )),
+        PixelFormat::L16 => Err(LayoutError::unsupported(
+            path,
+            "the JPEG is lossless of more than 8 bits, which is not read; convert it: gdal_translate -ot Byte -scale INPUT output.tif",
+        )),
+    }
+}
+
+fn decoding_error(path: &Path, error: Error) -> LayoutError {
+    match error {
+        Error::Io(source) if source.raw_os_error().is_some() => {
+            LayoutError::io(path, "cannot read the JPEG file", source)
+        }
+        Error::Unsupported(feature) => LayoutError::unsupported(
+            path,
+            format!(
+                "the JPEG {}, which is not read; convert it: gdal_translate -co TILED=YES INPUT output.tif",
+                words_for(&feature)
+            ),
+        ),
+        Error::Io(_) => LayoutError::damaged(path, "image data", "the file is cut short; fetch it again"),
+        _ => LayoutError::damaged(path, "image data", "its JPEG stream is damaged; fetch the file again"),
+    }
+}
+
+fn words_for(feature: &UnsupportedFeature) -> String {
+    match feature {
+        UnsupportedFeature::Hierarchical => "is hierarchical".into(),
+        UnsupportedFeature::ArithmeticEntropyCoding => "is packed by arithmetic coding".into(),
+        UnsupportedFeature::SamplePrecision(bits) => format!("has {bits} bits a channel"),
+        UnsupportedFeature::ComponentCount(count) => format!("has {count} channels"),
+        UnsupportedFeature::DNL => "says its height behind its picture".into(),
+        UnsupportedFeature::SubsamplingRatio | UnsupportedFeature::NonIntegerSubsamplingRatio => {
+            "samples its channels in an unusual ratio".into()
+        }
+        _ => "is of an unusual kind".into(),
+    }
+}

@@ -1,0 +1,175 @@
+//! Pictures as files: every way of storing one that is read gives the colours it was made of; what is not read is refused with a word of what to do.
+//!
+//! The fixtures are made by `data-scripts/make-image-fixtures.py`.
+
+#[path = "../../layout/tests/common/mod.rs"]
+mod common;
+
+use std::path::{Path, PathBuf};
+use terrasoar_import::open_image;
+use terrasoar_layout::LayoutError;
+
+const SIZE: [u32; 2] = [72, 56];
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/image_fixtures").join(name)
+}
+
+/// The colours all fixtures show.
+fn colour(x: u32, y: u32) -> [u8; 3] {
+    [40 + 2 * x + y, 220 - x - y, 60 + x * y / 40].map(|value| value as u8)
+}
+
+fn is_hole(x: u32, y: u32) -> bool {
+    x + y < 20
+}
+
+/// All texels, read in uneven steps.
+fn texels(path: &Path) -> Result<Vec<[u8; 4]>, LayoutError> {
+    let image = open_image(path)?;
+    let mut rows = image.rows()?;
+    let [wide, high] = image.info().texels;
+    let mut all = Vec::new();
+    let mut left = high;
+    for step in [1, 7, 64, 3].into_iter().cycle() {
+        let step = left.min(step);
+        let mut rgba = vec![0; (step * wide * 4) as usize];
+        rows.read(&mut rgba)?;
+        all.extend_from_slice(rgba.as_chunks::<4>().0);
+        left -= step;
+        if left == 0 {
+            return Ok(all);
+        }
+    }
+    Ok(all)
+}
+
+fn each(found: &[[u8; 4]], mut check: impl FnMut(u32, u32, [u8; 4])) {
+    assert_eq!(found.len(), (SIZE[0] * SIZE[1]) as usize);
+    for (i, texel) in (0..).zip(found) {
+        check(i % SIZE[0], i / SIZE[0], *texel);
+    }
+}
+
+#[test]
+fn lossless_pictures_come_back() {
+    for name in [
+        "rgb-strips.tif",
+        "rgb-one-strip.tif",
+        "rgb-tiles-deflate-p2.tif",
+        "rgb-tiles-big-endian-lzw.tif",
+        "rgb-16-big-endian.tif",
+        "rgb-16.png",
+    ] {
+        each(&texels(&fixture(name)).unwrap(), |x, y, texel| {
+            let [r, g, b] = colour(x, y);
+            assert_eq!(texel, [r, g, b, 255], "{name} {x} {y}");
+        });
+    }
+    for name in ["grey.tif", "grey-16.tif"] {
+        each(&texels(&fixture(name)).unwrap(), |x, y, texel| {
+            let grey = colour(x, y)[0];
+            assert_eq!(texel, [grey, grey, grey, 255], "{name} {x} {y}");
+        });
+    }
+    for name in ["rgba-tiles-zstd.tif", "rgb-nodata.tif", "rgba.png"] {
+        each(&texels(&fixture(name)).unwrap(), |x, y, texel| {
+            let [r, g, b] = colour(x, y);
+            assert_eq!(texel[3], if is_hole(x, y) { 0 } else { 255 }, "{name} {x} {y}");
+            assert!(texel[3] == 0 || texel == [r, g, b, 255], "{name} {x} {y}: {texel:?}");
+        });
+    }
+}
+
+#[test]
+fn jpeg_pictures_come_back_about() {
+    for (name, is_grey) in [
+        ("jpeg-ycbcr.tif", false),
+        ("jpeg-rgb.tif", false),
+        ("jpeg-grey.tif", true),
+        ("baseline.jpg", false),
+        ("progressive.jpg", false),
+        ("grey.jpg", true),
+    ] {
+        let (mut sum, mut most) = (0, 0);
+        each(&texels(&fixture(name)).unwrap(), |x, y, texel| {
+            let [r, g, b] = colour(x, y);
+            let wanted = if is_grey { [r; 3] } else { [r, g, b] };
+            for c in 0..3 {
+                let difference = u32::from(texel[c].abs_diff(wanted[c]));
+                (sum, most) = (sum + difference, most.max(difference));
+            }
+            assert_eq!(texel[3], 255);
+        });
+        // Halved chroma and what fills the tiles at the rim show in single texels, as they do in GDAL.
+        let mean = f64::from(sum) / f64::from(3 * SIZE[0] * SIZE[1]);
+        assert!(mean < 1.5 && most < 50, "{name}: {mean:.2} on average, {most} at most");
+    }
+    // The very texel as GDAL 3.6 shows it.
+    assert_eq!(texels(&fixture("jpeg-ycbcr.tif")).unwrap()[71], [173, 149, 85, 255]);
+}
+
+#[test]
+fn places_and_notes_are_read() {
+    for name in ["rgb-strips.tif", "jpeg-ycbcr.tif", "rgba.png"] {
+        let image = open_image(&fixture(name)).unwrap();
+        let map = image.info().georeference.pixel_to_crs;
+        assert_eq!(map, Some([1001.0, 2.0, 0.0, 4999.0, 0.0, -2.0]), "{name}");
+        assert!(image.info().notes.is_empty(), "{name}");
+    }
+    for name in ["grey-16.tif", "rgb-16-big-endian.tif", "rgb-16.png"] {
+        let image = open_image(&fixture(name)).unwrap();
+        assert!(image.info().notes[0].contains("16 bits"), "{name}");
+    }
+}
+
+#[test]
+fn what_is_not_read_is_refused_with_a_way_out() {
+    let refused = |path: &Path, words: [&str; 2]| {
+        let error = open_image(path).err().expect("an error").to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{words:?}: {error}");
+    };
+    refused(&fixture("refused-cmyk.tif"), ["CMYK", "magick"]);
+    refused(&fixture("refused-cmyk.jpg"), ["CMYK", "magick"]);
+    refused(&fixture("refused-planes.tif"), ["one after the other", "INTERLEAVE=PIXEL"]);
+    refused(&fixture("missing.tif"), ["cannot read the image", "missing"]);
+    refused(Path::new(env!("CARGO_MANIFEST_DIR")), ["directory", "name the images"]);
+    refused(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("../layout/FORMAT.md"),
+        ["no PNG, JPEG or TIFF", "gdal_translate"],
+    );
+    let floats = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/float32-strips.tif");
+    refused(&floats, ["32 bits", "-ot Byte"]);
+}
+
+/// Cut anywhere, or with any byte changed: an answer, never a panic.
+#[test]
+fn damaged_pictures_are_answered() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut errors, mut tries) = (0, 0);
+    for name in [
+        "rgb-tiles-deflate-p2.tif",
+        "rgba-tiles-zstd.tif",
+        "rgb-one-strip.tif",
+        "jpeg-ycbcr.tif",
+        "rgba.png",
+        "baseline.jpg",
+        "progressive.jpg",
+    ] {
+        let bytes = std::fs::read(fixture(name)).unwrap();
+        let path = folder.path().join("x");
+        let step = (bytes.len() / 150).max(1);
+        for at in (0..bytes.len()).step_by(step) {
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 0x5a;
+            for damaged in [&flipped[..], &bytes[..at]] {
+                std::fs::write(&path, damaged).unwrap();
+                tries += 1;
+                errors += u32::from(texels(&path).is_err());
+            }
+        }
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        assert!(texels(&path).is_err(), "half of {name}");
+    }
+    assert!(errors > tries / 3, "{errors} of {tries}");
+}

@@ -1,0 +1,116 @@
+//! A thousand samples of each format against a live `gdallocationinfo`.
+//!
+//! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-layout --test import_gdal -- --ignored`.
+
+mod import_support;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use import_support::{Random, data, fixtures, read, write_hgt};
+use tempfile::tempdir;
+use terrasoar_import::open;
+use terrasoar_import::synth;
+use terrasoar_import::synth::SynthOptions;
+use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::terrain::Terrain;
+
+/// Compares random samples of `path`.
+fn agrees(path: &Path) {
+    let grid = read(&[path.to_owned()]).unwrap();
+    let mut random = Random(path.as_os_str().len() as u64);
+    let places: Vec<(u32, u32)> = (0..1000)
+        .map(|_| {
+            (
+                random.below(grid.info.samples_wide.into()) as u32,
+                random.below(grid.info.samples_high.into()) as u32,
+            )
+        })
+        .collect();
+    let mut child = Command::new("gdallocationinfo")
+        .arg("-valonly")
+        .arg(path)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("gdallocationinfo is needed: install gdal-bin");
+    let mut input = child.stdin.take().unwrap();
+    let asked = places.clone();
+    let writer =
+        std::thread::spawn(move || asked.iter().try_for_each(|(col, row)| writeln!(input, "{col} {row}")));
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap().unwrap();
+    assert!(output.status.success());
+    let answers = String::from_utf8(output.stdout).unwrap();
+    let answers: Vec<f64> = answers.lines().map(|line| line.trim().parse().unwrap()).collect();
+    assert_eq!(answers.len(), places.len());
+    file_agrees(path, &places, &answers);
+    for ((col, row), wanted) in places.into_iter().zip(answers) {
+        let got = grid.at(col, row);
+        let void = got.is_nan() && (wanted.is_nan() || wanted == -32768.0 || wanted < -3e38);
+        assert!(got == wanted || void, "{}: ({col}, {row}) is {got}, GDAL says {wanted}", path.display());
+    }
+}
+
+/// Compares the heights of a terrain file built from `path`: equal, for every record kind chosen by itself is exact.
+fn file_agrees(path: &Path, places: &[(u32, u32)], answers: &[f64]) {
+    let folder = tempdir().unwrap();
+    let out = folder.path().join("t.iqt");
+    let dem = open(&[path.to_owned()]).unwrap();
+    let info = dem.info().clone();
+    match build(&*dem, &out, &BuildOptions::default(), &Silent) {
+        Err(e) if e.to_string().contains("every sample is void") => return,
+        built => assert!(!built.unwrap().heights_rounded),
+    }
+    let terrain = Terrain::open(&out).unwrap();
+    for ((col, row), wanted) in places.iter().zip(answers) {
+        let vertex = terrain.checked_vertex(GridPoint::new(*col, info.samples_high - 1 - row)).unwrap();
+        let wanted_m = wanted * info.height_scale + info.height_offset_m;
+        let void = vertex.class.is_void() && (wanted.is_nan() || *wanted == -32768.0 || wanted.abs() > 3e38);
+        let near =
+            (vertex.height_m - wanted_m).abs() <= 1e-12 * wanted_m.abs().max(info.height_offset_m.abs());
+        let shown = path.display();
+        assert!(near || void, "{shown}: ({col}, {row}) is {} m, GDAL says {wanted_m} m", vertex.height_m);
+    }
+}
+
+#[test]
+#[ignore = "needs gdallocationinfo"]
+fn png_bt_and_hgt() {
+    let folder = tempdir().unwrap();
+    let tile = folder.path().join("N29E080.hgt");
+    write_hgt(
+        &tile,
+        1201,
+        |col, row| if (col + row) % 97 == 0 { -32768 } else { (col * 3 + row) as i16 - 500 },
+    );
+    for path in [data("puget_sound_1025.png"), data("crater_lake_1025.bt"), tile] {
+        agrees(&path);
+    }
+}
+
+#[test]
+#[ignore = "needs gdallocationinfo"]
+fn synthetic_terrain() {
+    let folder = tempdir().unwrap();
+    for name in ["t.tif", "t.png"] {
+        let path = folder.path().join(name);
+        synth::write(&SynthOptions { size: 1025, ..SynthOptions::default() }, &path, &|_| ()).unwrap();
+        agrees(&path);
+    }
+}
+
+#[test]
+#[ignore = "needs gdallocationinfo"]
+fn geotiff_fixtures() {
+    let mut paths: Vec<PathBuf> =
+        std::fs::read_dir(fixtures()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    // gdallocationinfo answers masked samples with the band's value as we do; what is refused is not compared.
+    paths.retain(|path| {
+        path.extension().is_some_and(|e| e == "tif") && !path.to_string_lossy().contains("refused-")
+    });
+    assert!(paths.len() > 50);
+    paths.iter().for_each(|path| agrees(path));
+}

@@ -1,0 +1,246 @@
+//! The counting run: a flight through one reader, what its reads touch under every layout, and what a page cache of a stated size misses.
+//!
+//! One pass serves all layouts and all ways of preloading: the engine's reads are the same. Within a frame a page is needed once, however often it is read.
+//! Preloads come from a disk of stated speed: so many pages between two frames, the coarsest first. **Nothing here reads a clock or the state of the machine**: equal
+//! input gives equal counts.
+
+use super::layouts::{LINE_BYTES, Layout, LayoutKind, UNIT_BYTES};
+use super::{FrameIo, IoBenchError, Prefetch, Reader, Run};
+use lru::LruCache;
+use std::num::NonZeroUsize;
+use terrasoar::flyover::EngineKind;
+use terrasoar::refine::kinetic::Kinetic;
+use terrasoar::refine::naive::Naive;
+use terrasoar::refine::smart::Smart;
+use terrasoar::refine::soar::Soar;
+use terrasoar::refine::{Culling, Engine, Probe};
+use terrasoar::stream::ExtendedView;
+use terrasoar::view::View;
+use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::terrain::{Records, Terrain};
+use terrasoar_layout::with_records;
+
+const LINES_PER_PAGE: u64 = PAGE_BYTES as u64 / LINE_BYTES;
+const LINES_PER_UNIT: u64 = UNIT_BYTES / LINE_BYTES;
+
+/// What is counted, and with what means.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CountOptions {
+    /// Layouts to count under.
+    pub layouts: Vec<LayoutKind>,
+    /// Ways of preloading.
+    pub preloads: Vec<Prefetch>,
+    /// Pages that the cache holds; one at the least.
+    pub cache_pages: usize,
+    /// Pages that the disk delivers between two frames.
+    pub disk_pages: usize,
+    /// How far the frustum is moved back for preloading, in metres.
+    pub block_m: f64,
+    /// Whether to keep the pages of every frame in the order they are first read, for replaying them.
+    pub trace: bool,
+}
+
+/// Flies `views` with one reader and counts. `done` hears the number of frames finished.
+///
+/// # Errors
+/// [`IoBenchError::NotInAddressSpace`]; [`IoBenchError::NoDeadlines`] if preloading by deadline is asked for.
+pub fn count(
+    terrain: &Terrain,
+    views: &[View],
+    culling: Culling,
+    reader: Reader,
+    options: &CountOptions,
+    done: &mut dyn FnMut(u64),
+) -> Result<Vec<Run>, IoBenchError> {
+    if options.preloads.contains(&Prefetch::Deadline) {
+        return Err(IoBenchError::NoDeadlines { reader });
+    }
+    let records = terrain
+        .records()
+        .ok_or_else(|| IoBenchError::NotInAddressSpace(terrain.path().display().to_string()))?;
+    let mut counts: Vec<LayoutCount<'_>> =
+        options.layouts.iter().map(|kind| LayoutCount::new(Layout::new(*kind, terrain), options)).collect();
+    with_records!(records, records => {
+        let mut sink = Sink { records: &records, views, culling, options, counts: &mut counts, done };
+        match reader.engine() {
+            EngineKind::Naive => sink.fly(Naive::new(records.clone(), culling)),
+            EngineKind::Soar => sink.fly(Soar::new(records.clone(), culling)),
+            EngineKind::Smart => sink.fly(Smart::new(records.clone(), culling)),
+            EngineKind::Kinetic => sink.fly(Kinetic::new(records.clone(), culling)),
+        }
+    });
+    Ok(counts.into_iter().flat_map(|count| count.into_runs(reader)).collect())
+}
+
+/// Remembers the slots read.
+#[derive(Default)]
+struct Reads(Vec<u64>);
+
+impl Probe for Reads {
+    fn read(&mut self, slot: u64) {
+        self.0.push(slot);
+    }
+}
+
+/// Where the reads of a flight go.
+struct Sink<'s, 't, C: RecordCodec> {
+    records: &'s Records<'t, C>,
+    views: &'s [View],
+    culling: Culling,
+    options: &'s CountOptions,
+    counts: &'s mut [LayoutCount<'t>],
+    done: &'s mut dyn FnMut(u64),
+}
+
+impl<C: RecordCodec> Sink<'_, '_, C> {
+    fn fly(&mut self, mut engine: impl Engine) {
+        let mut reads = Reads::default();
+        let extends = self.options.preloads.contains(&Prefetch::Frustum);
+        let mut before: Option<&View> = None;
+        for (i, view) in self.views.iter().enumerate() {
+            reads.0.clear();
+            engine.update(view, &mut reads);
+            for count in self.counts.iter_mut() {
+                count.frame(i as u64, &reads.0);
+            }
+            if extends {
+                let plain = ExtendedView::plain(view).slots(self.records, self.culling);
+                let extended = ExtendedView::after(before.unwrap_or(view), view, self.options.block_m)
+                    .slots(self.records, self.culling);
+                let extension: Vec<u64> =
+                    extended.into_iter().filter(|slot| plain.binary_search(slot).is_err()).collect();
+                for count in self.counts.iter_mut() {
+                    count.preload(&plain, &extension, self.options.disk_pages);
+                }
+            }
+            before = Some(view);
+            (self.done)(i as u64 + 1);
+        }
+    }
+}
+
+/// The counts of one layout.
+struct LayoutCount<'t> {
+    layout: Layout<'t>,
+    lines: Vec<u64>,
+    pages: Vec<u64>,
+    modes: Vec<Mode>,
+    /// Pages of each frame as first read, if wanted.
+    trace: Option<Vec<Vec<u64>>>,
+}
+
+/// One way of preloading under one layout.
+struct Mode {
+    kind: Prefetch,
+    /// The page cache as it is imagined: the page not touched for longest goes first.
+    cache: LruCache<u64, ()>,
+    frames: Vec<FrameIo>,
+    /// Pages loaded since the last frame.
+    preloaded: u64,
+}
+
+impl<'t> LayoutCount<'t> {
+    fn new(layout: Layout<'t>, options: &CountOptions) -> Self {
+        let mode = |kind: &Prefetch| Mode {
+            kind: *kind,
+            cache: page_cache(options.cache_pages),
+            frames: Vec::new(),
+            preloaded: 0,
+        };
+        Self {
+            layout,
+            lines: Vec::new(),
+            pages: Vec::new(),
+            modes: options.preloads.iter().map(mode).collect(),
+            trace: options.trace.then(Vec::new),
+        }
+    }
+
+    /// Distinct pages of the records at `slots`, sorted, into `pages`.
+    fn gather(&mut self, slots: &[u64]) {
+        self.lines.clear();
+        for [first, last] in slots.iter().filter_map(|slot| self.layout.lines(*slot)) {
+            self.lines.push(first);
+            if last != first {
+                self.lines.push(last);
+            }
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.push(in_order_of_first_touch(self.lines.iter().map(|line| line / LINES_PER_PAGE)));
+        }
+        self.lines.sort_unstable();
+        self.lines.dedup();
+        self.pages.clear();
+        self.pages.extend(self.lines.iter().map(|line| line / LINES_PER_PAGE));
+        self.pages.dedup();
+    }
+
+    fn frame(&mut self, frame: u64, slots: &[u64]) {
+        self.gather(slots);
+        let mut units: Vec<u64> = self.lines.iter().map(|line| line / LINES_PER_UNIT).collect();
+        units.dedup();
+        for mode in &mut self.modes {
+            let missing = self.pages.iter().filter(|page| !mode.cache.contains(*page)).count();
+            self.pages.iter().for_each(|page| {
+                mode.cache.put(*page, ());
+            });
+            mode.frames.push(FrameIo {
+                frame,
+                reads: slots.len() as u64,
+                record_bytes: slots.len() as u64 * self.layout.record_bytes(),
+                pages: self.pages.len() as u64,
+                lines: self.lines.len() as u64,
+                units: units.len() as u64,
+                realtime_pages: missing as u64,
+                preloaded_pages: std::mem::take(&mut mode.preloaded),
+            });
+        }
+    }
+
+    /// Loads pages of `extension` that are not of the view, whose records are at `plain`.
+    fn preload(&mut self, plain: &[u64], extension: &[u64], disk_pages: usize) {
+        let page_of = |line: u64| line / LINES_PER_PAGE;
+        let lines = |slots: &[u64]| -> Vec<u64> {
+            slots.iter().filter_map(|slot| self.layout.lines(*slot)).flatten().map(page_of).collect()
+        };
+        let mut view = lines(plain);
+        view.sort_unstable();
+        let wanted = in_order_of_first_touch(lines(extension).into_iter());
+        for mode in self.modes.iter_mut().filter(|mode| mode.kind == Prefetch::Frustum) {
+            let missing =
+                wanted.iter().filter(|p| view.binary_search(p).is_err() && !mode.cache.contains(*p));
+            let loads: Vec<u64> = missing.take(disk_pages).copied().collect();
+            mode.preloaded = loads.len() as u64;
+            for page in loads {
+                mode.cache.put(page, ());
+            }
+        }
+    }
+
+    fn into_runs(self, reader: Reader) -> impl Iterator<Item = Run> {
+        let (layout, trace) = (self.layout, self.trace);
+        self.modes.into_iter().map(move |mode| Run {
+            reader,
+            layout: layout.kind(),
+            preload: mode.kind,
+            record_bytes: layout.record_bytes(),
+            file_bytes: layout.file_bytes(),
+            frames: mode.frames,
+            trace: if mode.kind == Prefetch::None { trace.clone() } else { None },
+        })
+    }
+}
+
+/// An empty cache, which takes memory as it fills.
+fn page_cache(pages: usize) -> LruCache<u64, ()> {
+    let mut cache = LruCache::unbounded();
+    cache.resize(NonZeroUsize::new(pages).unwrap_or(NonZeroUsize::MIN));
+    cache
+}
+
+/// `pages` without repetition.
+fn in_order_of_first_touch(pages: impl Iterator<Item = u64>) -> Vec<u64> {
+    let mut seen = std::collections::HashSet::new();
+    pages.filter(|page| seen.insert(*page)).collect()
+}

@@ -1,0 +1,84 @@
+//! The frames of a replay as CSV: a header with the field names of [`FrameStats`], then a line a frame.
+//!
+//! Hashes are 16 hexadecimal digits; times have the shortest digits that read back the same.
+
+use super::ReportError;
+use std::io::Write;
+use std::path::Path;
+use terrasoar::sink::FileSink;
+use terrasoar::stats::FrameStats;
+
+pub(super) const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,update_ms,scan_us,test_us,apply_us,edited_records,edit_ms,mesh_hash";
+
+/// Writes `frames` to `path`: a file appears when it is complete, a stream such as a pipe is written to directly.
+///
+/// # Errors
+/// [`ReportError::Write`] or [`ReportError::Output`].
+pub fn write_frames_csv(path: &Path, frames: &[FrameStats]) -> Result<(), ReportError> {
+    let mut sink = FileSink::create(path).map_err(ReportError::of_output)?;
+    write_frames(&mut sink, frames).map_err(|source| ReportError::Write { path: path.into(), source })?;
+    sink.publish().map_err(ReportError::of_output)
+}
+
+pub(super) fn write_frames(to: &mut dyn Write, frames: &[FrameStats]) -> std::io::Result<()> {
+    writeln!(to, "{HEADER}")?;
+    for f in frames {
+        // Named one by one, so that a new field cannot be forgotten.
+        let FrameStats {
+            frame,
+            triangles,
+            new_triangles,
+            vertex_tests,
+            splits,
+            merges,
+            expired,
+            slots_written,
+            patch_bytes,
+            late,
+            late_error_px,
+            pages_touched,
+            record_bytes_touched,
+            update_ms,
+            scan_us,
+            test_us,
+            apply_us,
+            edited_records,
+            edit_ms,
+            mesh_hash,
+        } = f;
+        writeln!(
+            to,
+            "{frame},{triangles},{new_triangles},{vertex_tests},{splits},{merges},{expired},{slots_written},{patch_bytes},{late},{late_error_px},\
+{pages_touched},{record_bytes_touched},{update_ms},{scan_us},{test_us},{apply_us},{edited_records},{edit_ms},{mesh_hash:016x}"
+        )?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_header_names_the_fields_in_order() {
+        let json = serde_json::to_string(&FrameStats::default()).unwrap();
+        let names: Vec<&str> = json.split('"').skip(1).step_by(2).collect();
+        assert_eq!(names.join(","), HEADER);
+    }
+
+    #[test]
+    fn a_line_holds_a_frame() {
+        let frame =
+            FrameStats { frame: 7, triangles: 5, update_ms: 0.1, mesh_hash: 0xab, ..Default::default() };
+        let mut text = Vec::new();
+        write_frames(&mut text, &[frame]).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert_eq!(text.lines().nth(1), Some("7,5,0,0,0,0,0,0,0,0,0,0,0,0.1,0,0,0,0,0,00000000000000ab"));
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_made_is_named() {
+        let error = write_frames_csv(Path::new("/no/such/a.csv"), &[]).unwrap_err().to_string();
+        assert!(error.contains("/no/such/a.csv"), "{error}");
+    }
+}
