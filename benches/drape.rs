@@ -11,8 +11,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use terrasoar_import::open_image;
-use terrasoar_layout::build::Silent;
 use terrasoar_layout::imagery::{DrapeOptions, ImageSource, Imagery, TileFormat, TileId, decode_tile, drape};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 
 type Failure = Box<dyn std::error::Error>;

@@ -25,7 +25,8 @@ use terrasoar_layout::edit::{Edit, Editor};
 use terrasoar_layout::edited::EditedRecords;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::{Records, Terrain};
+use terrasoar_layout::records::Records;
+use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Frames flown before the first craters fall.

@@ -12,11 +12,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::imagery::{
     DrapeOptions, ImageSource, Imagery, MemoryImage, Paint, Painter, Scorch, drape,
 };
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 
 type Failure = Box<dyn std::error::Error>;

@@ -2,8 +2,9 @@
 
 use crate::view::{View, Viewport};
 use glam::DVec3;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::source::MemorySource;
 use terrasoar_layout::terrain::Terrain;
 

@@ -18,7 +18,8 @@ use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::{Records, Terrain};
+use terrasoar_layout::records::Records;
+use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Flies `views` with all engines and checks every frame.

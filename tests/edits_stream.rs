@@ -15,9 +15,11 @@ use terrasoar::view::View;
 use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::edit::{Crater, Edit, Editor, SampleRect};
 use terrasoar_layout::edited::EditedRecords;
+use terrasoar_layout::kinds::ByKind;
 use terrasoar_layout::pool::PagePool;
 use terrasoar_layout::record::Compact;
-use terrasoar_layout::terrain::{ByKind, Records, Terrain};
+use terrasoar_layout::records::Records;
+use terrasoar_layout::terrain::Terrain;
 
 /// Frames flown.
 const FRAMES: u32 = 60;

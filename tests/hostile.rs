@@ -16,10 +16,12 @@ use terrasoar::stream::{Fetch, Prefetch, Streamed, Threads};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::kinds::ByKind;
 use terrasoar_layout::loader::Loader;
 use terrasoar_layout::record::{Compact, RecordCodec};
+use terrasoar_layout::records::Records;
 use terrasoar_layout::source::{CountingSource, Fault, HostileSource, Hostility, MemorySource};
-use terrasoar_layout::terrain::{ByKind, Records, Terrain};
+use terrasoar_layout::terrain::Terrain;
 
 /// Faults of each kind.
 const FAULTS: u64 = 1000;

@@ -9,7 +9,8 @@ use terrasoar::refine::naive::Naive;
 use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::with_records;
 

@@ -103,16 +103,15 @@ fn fly(terrain: &Arc<Terrain>, flown: &[View], how: How) -> Vec<StreamFrame> {
     }
     match (pool, terrain.records().unwrap()) {
         (
-            terrasoar_layout::terrain::ByKind::Compact(pool),
-            terrasoar_layout::terrain::ByKind::Compact(records),
+            terrasoar_layout::kinds::ByKind::Compact(pool),
+            terrasoar_layout::kinds::ByKind::Compact(records),
         ) => flight!(pool, records),
+        (terrasoar_layout::kinds::ByKind::Exact8(pool), terrasoar_layout::kinds::ByKind::Exact8(records)) => {
+            flight!(pool, records)
+        }
         (
-            terrasoar_layout::terrain::ByKind::Exact8(pool),
-            terrasoar_layout::terrain::ByKind::Exact8(records),
-        ) => flight!(pool, records),
-        (
-            terrasoar_layout::terrain::ByKind::Exact16(pool),
-            terrasoar_layout::terrain::ByKind::Exact16(records),
+            terrasoar_layout::kinds::ByKind::Exact16(pool),
+            terrasoar_layout::kinds::ByKind::Exact16(records),
         ) => flight!(pool, records),
         _ => unreachable!("pool and records are of one kind"),
     }

@@ -5,8 +5,8 @@ use crate::seeds::{self, Inputs};
 use crate::words::{refused, told};
 use std::path::Path;
 use terrasoar_import::open_image;
-use terrasoar_layout::build::Silent;
 use terrasoar_layout::imagery::{DrapeOptions, Extent, ImageSource, Imagery, TileFormat, decode_tile, drape};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 

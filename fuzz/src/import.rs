@@ -6,8 +6,9 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 

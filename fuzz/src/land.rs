@@ -1,10 +1,11 @@
 //! Sound files to begin from, made once a process.
 
 use std::sync::LazyLock;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{Georeference, HorizontalUnit, MemoryDem, SampleType};
 use terrasoar_layout::edit::{Area, Crater, Edit, SampleRect};
 use terrasoar_layout::imagery::{Paint, Scorch};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::testing::{Seed, seeds};
 
 /// A terrain of 60 x 50 samples that lies somewhere: its south-west sample at 1000, 4000 of EPSG 32610, 10 m a sample. With some voids.

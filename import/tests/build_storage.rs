@@ -14,9 +14,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use tempfile::TempDir;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, Silent, build, build_on};
+use terrasoar_layout::build::{BuildOptions, build, build_on};
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, SampleType, Window};
 use terrasoar_layout::disk::{FailingDisk, Failure};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use terrasoar_import::open_image;
-use terrasoar_layout::build::Silent;
 use terrasoar_layout::imagery::{DrapeOptions, Draped, drape};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::{LayoutError, Remedy};
 use tiff::{DATA_AT, DEFLATE, JPEG, LZW, PACK_BITS, RAW, Tag, ZSTD, claimed, longs, shorts, tiff};
 

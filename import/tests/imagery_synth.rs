@@ -7,8 +7,9 @@ use common::drape::Opened;
 use std::path::Path;
 use terrasoar_import::open_image;
 use terrasoar_import::synth::{ColourOptions, SynthOptions, write, write_colour};
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::imagery::{DrapeOptions, PlaceOrigin, TileFormat, drape};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 
 /// A terrain of 513 x 513 samples, and its picture of so many texels a sample.

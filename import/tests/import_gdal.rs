@@ -13,8 +13,9 @@ use tempfile::tempdir;
 use terrasoar_import::open;
 use terrasoar_import::synth;
 use terrasoar_import::synth::SynthOptions;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 
 /// Compares random samples of `path`.

@@ -6,8 +6,8 @@ use crate::bytes::{PAGE_BYTES, Page, to_usize};
 use crate::error::LayoutError;
 use crate::prefetch::prefetch;
 use crate::record::RecordCodec;
+use crate::records::Records;
 use crate::store::{RawOf, RecordShape, RecordStore};
-use crate::terrain::Records;
 
 /// The page is the file's. Zero, so that pages that are never replaced take no memory.
 const FILES: u32 = 0;

@@ -2,8 +2,8 @@
 //! not our format, damaged, unsupported, I/O, wrong usage. Every message says what, where, and
 //! what to do; how that is done in a program, by which flag or button, is the program's to add ([`Remedy`]).
 
-use crate::disk::is_full;
 use crate::remedy::Remedy;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Anything that can go wrong between a DEM and a terrain file, or in reading one.
@@ -123,4 +123,9 @@ impl LayoutError {
             }
         }
     }
+}
+
+/// Whether there was no room: the disk is full, or a quota or limit of the size of files is reached.
+pub(crate) fn is_full(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
 }

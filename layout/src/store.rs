@@ -1,6 +1,6 @@
 //! What refinement reads records from: all of a file, or what is at hand of it.
 //!
-//! [`Records`](crate::terrain::Records) lends every record of a mapped file, [`EditedRecords`](crate::edited::EditedRecords) those of one that is edited meanwhile; [`PagePool`](crate::pool::PagePool) holds some pages of a file of any size and
+//! [`Records`](crate::records::Records) lends every record of a mapped file, [`EditedRecords`](crate::edited::EditedRecords) those of one that is edited meanwhile; [`PagePool`](crate::pool::PagePool) holds some pages of a file of any size and
 //! says which it lacks. An engine written for the trait flies over both; where all records are at hand, what it does about absent ones compiles to nothing.
 
 use crate::grid::{Grid, GridPoint};

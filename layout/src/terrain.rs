@@ -4,8 +4,6 @@
 //!
 //! Invariant: every page number in the table lies inside the source as it was when it was opened.
 
-pub use crate::records::Records;
-
 use crate::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::directory::Entry;
 use crate::error::LayoutError;
@@ -14,9 +12,7 @@ use crate::grid::{Grid, GridPoint};
 use crate::header::{Header, INERT_PAGE};
 use crate::opening::{read_directory, read_growing, read_structure};
 use crate::order::slot_of;
-use crate::pool::PagePool;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
-use crate::records::Slices;
 use crate::source::{MapSource, PreadSource, Source};
 use crate::store::RecordShape;
 use std::path::Path;
@@ -77,38 +73,6 @@ impl Terrain {
         let header = Header { history: None, ..tip.original.put_into(&self.header) };
         let entries = read_directory(&*self.source, &header)?;
         Ok(Self::of(self.source, header, entries))
-    }
-
-    /// Opens the terrain file `base` with the edits in `overlay` (see [`EditSession::open_overlay`](crate::edit::EditSession::open_overlay)). Both are mapped.
-    ///
-    /// # Errors
-    /// As [`Terrain::open`] of either; [`LayoutError::Usage`] if the overlay belongs to another terrain, or to another state of this one.
-    pub fn open_with_overlay(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
-        crate::edit::open_layers(base, overlay, true)
-    }
-
-    /// As [`Terrain::open_with_overlay`], without maps.
-    ///
-    /// # Errors
-    /// As [`Terrain::open_with_overlay`].
-    pub fn open_with_overlay_unmapped(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
-        crate::edit::open_layers(base, overlay, false)
-    }
-
-    /// The terrain file under an overlay; none if there is no overlay, whose name [`Terrain::path`] is then.
-    pub fn base_path(&self) -> Option<&Path> {
-        self.source.base_path()
-    }
-
-    /// Opens the file, with its overlay if it has one, once more, without maps.
-    ///
-    /// # Errors
-    /// As [`Terrain::open`].
-    pub fn open_again_unmapped(&self) -> Result<Self, LayoutError> {
-        match self.source.base_path() {
-            Some(base) => Self::open_with_overlay_unmapped(base, self.path()),
-            None => Self::open_unmapped(self.path()),
-        }
     }
 
     pub(crate) fn of(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Self {
@@ -266,38 +230,6 @@ impl Terrain {
         Ok(Some(height))
     }
 
-    /// The records as refinement reads them. `None` if the source cannot lend its bytes as one slice.
-    pub fn records(&self) -> Option<AnyRecords<'_>> {
-        let bytes =
-            Slices { first: self.source.bytes()?, behind: self.source.bytes_behind().unwrap_or_default() };
-        Some(match self.codec() {
-            ByKind::Compact(codec) => ByKind::Compact(Records::new(self, bytes, codec)),
-            ByKind::Exact8(codec) => ByKind::Exact8(Records::new(self, bytes, codec)),
-            ByKind::Exact16(codec) => ByKind::Exact16(Records::new(self, bytes, codec)),
-        })
-    }
-
-    /// A pool of at most `cache_bytes` for the pages of this terrain, whatever its source.
-    ///
-    /// # Errors
-    /// As [`PagePool::new`].
-    pub fn pool(&self, cache_bytes: u64) -> Result<AnyPool, LayoutError> {
-        Ok(match self.codec() {
-            ByKind::Compact(codec) => ByKind::Compact(PagePool::new(self, self.shape(codec), cache_bytes)?),
-            ByKind::Exact8(codec) => ByKind::Exact8(PagePool::new(self, self.shape(codec), cache_bytes)?),
-            ByKind::Exact16(codec) => ByKind::Exact16(PagePool::new(self, self.shape(codec), cache_bytes)?),
-        })
-    }
-
-    fn codec(&self) -> ByKind<Compact, Exact8, Exact16> {
-        let (grid, scale) = (self.grid(), &self.header.scale);
-        match self.header.record_kind {
-            RecordKind::Compact => ByKind::Compact(Compact::new(grid, scale)),
-            RecordKind::Exact8 => ByKind::Exact8(Exact8::new(grid, scale)),
-            RecordKind::Exact16 => ByKind::Exact16(Exact16::new(grid, scale)),
-        }
-    }
-
     pub(crate) fn shape<C>(&self, codec: C) -> RecordShape<C> {
         let Header { grid, height_range_m, has_voids, .. } = self.header;
         RecordShape { codec, grid, height_range_m, has_voids }
@@ -315,33 +247,4 @@ fn open_settled(path: &Path) -> Result<(PreadSource, Header, Vec<Entry>), Layout
 fn snap(v: f64) -> f64 {
     let near = v.round();
     if (v - near).abs() < 1e-9 * near.abs().max(1.0) { near } else { v }
-}
-
-/// One thing for whichever kind of records a terrain has.
-#[derive(Debug, Clone)]
-pub enum ByKind<A, B, C> {
-    /// 4-byte records.
-    Compact(A),
-    /// 8-byte records.
-    Exact8(B),
-    /// 16-byte records.
-    Exact16(C),
-}
-
-/// The records of a terrain, of whichever kind.
-pub type AnyRecords<'a> = ByKind<Records<'a, Compact>, Records<'a, Exact8>, Records<'a, Exact16>>;
-
-/// A pool of pages, of whichever kind.
-pub type AnyPool = ByKind<PagePool<Compact>, PagePool<Exact8>, PagePool<Exact16>>;
-
-/// Runs `$body` with `$records` bound to the records, or the pool, of whichever kind.
-#[macro_export]
-macro_rules! with_records {
-    ($any:expr, $records:ident => $body:expr) => {
-        match $any {
-            $crate::terrain::ByKind::Compact($records) => $body,
-            $crate::terrain::ByKind::Exact8($records) => $body,
-            $crate::terrain::ByKind::Exact16($records) => $body,
-        }
-    };
 }

@@ -8,16 +8,18 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::bytes::Page;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::{Area, Changes, Edit, EditSession, SampleRect};
+use terrasoar_layout::kinds::ByKind;
 use terrasoar_layout::loader::{Arrival, Loader, Outcome, PageRequest};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::record::{Compact, RecordCodec};
 use terrasoar_layout::source::{Fault, HostileSource, Hostility, PreadSource};
 use terrasoar_layout::store::RecordStore;
-use terrasoar_layout::terrain::{ByKind, Terrain};
+use terrasoar_layout::terrain::Terrain;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 

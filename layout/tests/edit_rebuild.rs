@@ -5,7 +5,7 @@ mod common;
 use common::{MemoryDem, build_bytes, open_bytes};
 use proptest::prelude::*;
 use std::sync::Arc;
-use terrasoar_layout::build::{BuildOptions, Silent, rebuild};
+use terrasoar_layout::build::{BuildOptions, rebuild};
 use terrasoar_layout::bytes::Page;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::disk::SystemDisk;
@@ -13,6 +13,7 @@ use terrasoar_layout::edit::{Changes, Editor, HeightWindow, SampleRect};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::header::ErrorKind;
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::record::RecordKind;
 use terrasoar_layout::terrain::Terrain;
 

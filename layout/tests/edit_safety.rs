@@ -7,12 +7,13 @@ use common::edits::{Bench, pages, session_pages, set};
 use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, HeightRoom, Silent, build};
+use terrasoar_layout::build::{BuildOptions, HeightRoom, build};
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::disk::{FailingDisk, Failure, SystemDisk};
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, history, widen};
 use terrasoar_layout::header::Header;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage, Paint, Scorch};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 

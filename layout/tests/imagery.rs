@@ -4,10 +4,10 @@ mod common;
 
 use common::drape::{Opened, draped, land, raw};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use terrasoar_layout::build::BuildProgress;
 use terrasoar_layout::imagery::{
     DrapeOptions, Extent, ImageSource, Imagery, MemoryImage, PlaceOrigin, TileFormat, TileId, drape,
 };
+use terrasoar_layout::progress::BuildProgress;
 use terrasoar_layout::source::PreadSource;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::unused::unused_bytes;
@@ -322,7 +322,7 @@ fn mosaics_join_where_their_georeferences_say() {
         image.info_mut().georeference.pixel_to_crs = Some(map);
         Box::new(image)
     };
-    let progress = terrasoar_layout::build::Silent;
+    let progress = terrasoar_layout::progress::Silent;
     let [red, blue] = [[200, 0, 0, 255], [0, 0, 200, 255]];
     let images = [part(1100.0, 4500.0, 2.0, red), part(1140.0, 4480.0, 2.0, blue)];
     let done = drape(&path, &images, &raw(), &progress).unwrap();

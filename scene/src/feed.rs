@@ -2,29 +2,17 @@
 //!
 //! Invariant: the changes told since the last [`Feed::whole`], applied in order to it, give the mesh. Cost: an engine's update and a copy of its patch.
 
-use super::full_mesh::FullMesh;
-use terrasoar::refine::kinetic::{Kinetic, Patch, PatchVertex};
-use terrasoar::refine::{Culling, Engine, Probe, Work};
-use terrasoar::stream::{GroundPatch, sound};
+use terrasoar::refine::kinetic::{Patch, PatchVertex};
+use terrasoar::refine::{Culling, Probe, Work};
+use terrasoar::stream::GroundPatch;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::directory::Entry;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::record::{RecordCodec, Vertex};
+use terrasoar_layout::records::Records;
 use terrasoar_layout::store::RecordStore;
-use terrasoar_layout::terrain::{Records, Terrain};
-use terrasoar_layout::with_records;
 use terrasoar_render::{HEIGHTS_PER_TILE, MeshVertex, TILE_BORDER, TILE_CELLS, TileId};
-
-/// Which engine makes the mesh. Both make the same one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum PictureEngine {
-    /// Changes from frame to frame: the one to fly with.
-    #[default]
-    Kinetic,
-    /// The whole mesh anew every frame: the reference.
-    Soar,
-}
 
 /// What an update of the mesh did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -105,26 +93,10 @@ pub trait Feed {
     }
 }
 
-/// The feed of an engine over a terrain; none if the terrain's source lends no bytes.
-pub fn feed(terrain: &Terrain, engine: PictureEngine, culling: Culling) -> Option<Box<dyn Feed + '_>> {
-    Some(with_records!(terrain.records()?, records => match engine {
-        PictureEngine::Kinetic => {
-            Box::new(KineticFeed { engine: Kinetic::new(records.clone(), culling), reads: Reads::over(&records), records }) as Box<dyn Feed + '_>
-        }
-        PictureEngine::Soar => Box::new(FullMesh::new(records, culling)),
-    }))
-}
-
 /// A vertex of a patch as the renderer takes it.
 pub fn mesh_vertex(vertex: &PatchVertex) -> MeshVertex {
     let PatchVertex { x, y, height_m, error_m, radius_m, ends, flags } = *vertex;
     MeshVertex { x, y, height_m, error_m, radius_m, ends, flags }
-}
-
-struct KineticFeed<'a, C: RecordCodec> {
-    engine: Kinetic<Records<'a, C>>,
-    records: Records<'a, C>,
-    reads: Reads,
 }
 
 /// The pages of the records that an update reads, each read a page.
@@ -154,41 +126,6 @@ impl Reads {
         let pages = self.pages.len() as u64;
         self.pages.clear();
         [reads, pages]
-    }
-}
-
-impl<C: RecordCodec> Feed for KineticFeed<'_, C> {
-    fn update(&mut self, view: &View) -> Refined {
-        self.engine.update(view, &mut self.reads);
-        let [reads, pages_read] = self.reads.take();
-        Refined {
-            work: self.engine.work(),
-            triangles: self.engine.triangle_count() as u64,
-            record_bytes_read: reads * C::BYTES as u64,
-            pages_read,
-            ..Refined::default()
-        }
-    }
-
-    fn patch(&self) -> &Patch {
-        self.engine.patch()
-    }
-
-    fn whole(&self) -> Patch {
-        self.engine.whole_patch()
-    }
-
-    fn heights_m(&mut self, tile: TileId, heights_m: &mut Vec<f32>) -> bool {
-        tile_heights_m(&self.records, tile, heights_m);
-        true
-    }
-
-    fn height_range_m(&self) -> [f64; 2] {
-        self.records.height_range_m()
-    }
-
-    fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
-        sound(&self.records, east_m, north_m).height_m
     }
 }
 

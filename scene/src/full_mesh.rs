@@ -11,7 +11,7 @@ use terrasoar::stream::sound;
 use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::records::Records;
 use terrasoar_render::TileId;
 
 /// SOAR and its mesh.

@@ -7,6 +7,7 @@ mod border;
 pub mod drape;
 pub mod feed;
 pub mod full_mesh;
+pub mod mapped;
 pub mod options;
 pub mod overview;
 mod pending;

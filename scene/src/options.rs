@@ -1,7 +1,7 @@
 //! How a scene is made, what its pictures cost, and why there may be none: plain values.
 
 use super::drape::Served;
-use super::feed::PictureEngine;
+use crate::mapped::PictureEngine;
 use terrasoar::refine::Culling;
 use terrasoar_layout::LayoutError;
 use terrasoar_render::{DrawStats, RenderError, Renderer, UploadStats};

@@ -73,8 +73,9 @@ pub fn overview(terrain: &Terrain, exaggeration: f64, fov_deg: f64, viewport: Vi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrasoar_layout::build::{BuildOptions, Silent, build};
+    use terrasoar_layout::build::{BuildOptions, build};
     use terrasoar_layout::dem::{MemoryDem, SampleType};
+    use terrasoar_layout::progress::Silent;
 
     #[test]
     fn the_whole_box_is_in_the_picture_and_fills_it_one_way() {

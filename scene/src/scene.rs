@@ -13,11 +13,12 @@ pub use super::options::{Drawn, SceneError, SceneOptions, TileService};
 
 use super::border::border;
 use super::drape::Drape;
-use super::feed::{Feed, Refined, feed};
+use super::feed::{Feed, Refined};
 use super::pending::Pending;
 use super::repaint::{Picture, Repaint};
 use super::sight::{ahead, frame_view, shape};
 use super::streamed::streamed_feed;
+use crate::mapped::feed;
 use std::sync::Arc;
 use terrasoar::refine::Culling;
 use terrasoar::stream::GroundPatch;

@@ -254,7 +254,7 @@ fn timed(mut stats: Vec<FrameStats>, times: Vec<FrameTimes>) -> Vec<FrameStats> 
     stats
 }
 
-fn records_of(terrain: &Terrain) -> Result<terrasoar_layout::terrain::AnyRecords<'_>, ReplayError> {
+fn records_of(terrain: &Terrain) -> Result<terrasoar_layout::kinds::AnyRecords<'_>, ReplayError> {
     terrain.records().ok_or_else(|| ReplayError::NotInAddressSpace(terrain.path().display().to_string()))
 }
 

@@ -8,7 +8,7 @@ use crate::refine::{Engine, Phase, Probe};
 use crate::stats::FrameStats;
 use std::time::Instant;
 use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Records;
+use terrasoar_layout::records::Records;
 
 /// Times of one frame.
 pub(super) struct FrameTimes {

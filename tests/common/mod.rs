@@ -5,10 +5,11 @@ pub mod checks;
 pub mod mirror;
 
 use terrasoar::flight::FlightFrame;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::edited::EditedRecords;
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::record::RecordCodec;
 use terrasoar_layout::source::MemorySource;
 use terrasoar_layout::terrain::Terrain;

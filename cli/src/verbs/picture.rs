@@ -12,7 +12,7 @@ use terrasoar_lab::picture::encode;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
 use terrasoar_render::{Contours, LOOKS, Look, Sun};
-use terrasoar_scene::feed::PictureEngine;
+use terrasoar_scene::mapped::PictureEngine;
 use terrasoar_scene::scene::SceneOptions;
 use terrasoar_scene::studio::Studio;
 

@@ -3,7 +3,7 @@
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::time::Duration;
-use terrasoar_layout::build::BuildProgress;
+use terrasoar_layout::progress::BuildProgress;
 
 /// A bar that counts `unit`s.
 pub(super) struct Progress {

@@ -6,6 +6,7 @@ use super::Plan;
 use super::display::plain;
 use super::settings::Settings;
 use super::viewer::{Next, Viewer};
+use super::wake::Wake;
 use anyhow::{Result, anyhow};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,10 +19,6 @@ use winit::event::{ElementState, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
 use winit::keyboard::PhysicalKey;
 use winit::window::{Window, WindowId};
-
-/// A thread has something to tell.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Wake;
 
 /// Runs the loop.
 pub(super) fn run(

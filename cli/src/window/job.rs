@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use terrasoar_layout::build::{BuildOptions, BuildProgress, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::header::SpacingOrigin;
+use terrasoar_layout::progress::BuildProgress;
 
 /// How a build gets on.
 #[derive(Debug, Default)]

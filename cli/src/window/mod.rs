@@ -23,6 +23,7 @@ mod stage;
 mod threads;
 mod tool;
 mod viewer;
+mod wake;
 mod workshop;
 
 use anyhow::Result;

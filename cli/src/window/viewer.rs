@@ -13,7 +13,6 @@ mod tell;
 
 use super::Plan;
 use super::camera::Rig;
-use super::events::Wake;
 use super::flights::{Player, Recorder};
 use super::hand::Hand;
 use super::history::History;
@@ -25,6 +24,7 @@ use super::screen::Screen;
 use super::settings::Settings;
 use super::stage::Stage;
 use super::tool::{Stroke, ToolBox};
+use super::wake::Wake;
 use super::workshop::Workshop;
 use anyhow::Result;
 use std::sync::Arc;

@@ -4,10 +4,11 @@ use super::driver::{Display, Window};
 use super::{Outcome, ensure};
 use std::path::Path;
 use std::sync::Arc;
-use terrasoar_layout::build::{HeightRoom, Silent, rebuild};
+use terrasoar_layout::build::{HeightRoom, rebuild};
 use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{EditSession, history};
 use terrasoar_layout::imagery::{DrapeOptions, ImageSource, MemoryImage, TileFormat, drape};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 

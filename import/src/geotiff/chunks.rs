@@ -2,7 +2,7 @@
 //! read here.
 
 use super::chunk_grid::{ChunkGrid, side};
-use super::packed::{LARGEST_WHOLE, Span};
+use super::span::{LARGEST_WHOLE, Span};
 use super::tags::{self, Directory, TiffFile};
 use super::zstd_frame;
 use std::io::Read;

@@ -4,7 +4,6 @@
 //! [`Listing`] knows where they stand, a [`Places`] has a block of them at hand. Cost: 16 KiB a reader; two reads of the file a block of
 //! [`BLOCK`] chunks, as long as chunks are asked for in order.
 
-use super::tags::whole_number;
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -130,6 +129,12 @@ impl<'f> Places<'f> {
                 _ => LayoutError::io(self.path, "cannot read the TIFF file", source),
             })
     }
+}
+
+/// The unsigned number in at most 8 bytes.
+pub(super) fn whole_number(bytes: &[u8], big_endian: bool) -> u64 {
+    let add = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
+    if big_endian { bytes.iter().fold(0, add) } else { bytes.iter().rev().fold(0, add) }
 }
 
 #[cfg(test)]

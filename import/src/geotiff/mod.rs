@@ -21,6 +21,7 @@ mod metadata;
 mod packed;
 mod predictor;
 mod raw;
+mod span;
 mod tags;
 mod zstd_frame;
 

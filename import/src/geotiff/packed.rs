@@ -13,10 +13,10 @@ use super::super::{WINDOW_SAMPLES, input};
 use super::chunks::{Chunks, Compression, Predictor};
 use super::codec::{Failure, Unpacker};
 use super::convert::Void;
+use super::span::{LARGEST_WHOLE, Span};
 use super::zstd_frame;
 use super::{parts, predictor, put_constant};
 use terrasoar_layout::dem::{SampleSink, Window};
-use terrasoar_layout::disk::read_at;
 use terrasoar_layout::error::LayoutError;
 
 /// Memory that all workers together take, unless one takes more.
@@ -27,9 +27,6 @@ const PART_BYTES: u64 = 1 << 18;
 const INPUT_BYTES: u64 = 1 << 16;
 /// State of a codec, without ZSTD's window.
 const CODEC_BYTES: u64 = 1 << 18;
-/// Longest chunk of ZSTD that is unpacked at once where its window is larger than itself.
-pub(super) const LARGEST_WHOLE: u64 = 8 << 20;
-
 impl Chunks {
     /// Memory that a worker takes.
     fn worker_bytes(&self) -> u64 {
@@ -199,22 +196,4 @@ fn unpack_whole(
 fn part_rows(width: u32, stride: u64) -> u32 {
     let rows = (PART_BYTES / stride.max(1)).min(WINDOW_SAMPLES / u64::from(width.max(1)));
     u32::try_from(rows).unwrap_or(u32::MAX).max(1)
-}
-
-/// A part of a file, read from its begin to its end.
-#[derive(Clone, Copy)]
-pub(super) struct Span<'f> {
-    pub(super) file: &'f File,
-    pub(super) at: u64,
-    pub(super) left: u64,
-}
-
-impl Read for Span<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        let count = buffer.len().min(usize::try_from(self.left).unwrap_or(usize::MAX));
-        read_at(self.file, &mut buffer[..count], self.at)?;
-        self.at += count as u64;
-        self.left -= count as u64;
-        Ok(count)
-    }
 }

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::input;
 use super::listing::Column;
+use super::listing::whole_number;
 use terrasoar_layout::error::LayoutError;
 
 pub(super) const NEW_SUBFILE_TYPE: u16 = 254;
@@ -409,12 +410,6 @@ impl TiffFile {
     fn u64(&self, bytes: &[u8]) -> u64 {
         whole_number(&bytes[..8], self.big_endian)
     }
-}
-
-/// The unsigned number in at most 8 bytes.
-pub(super) fn whole_number(bytes: &[u8], big_endian: bool) -> u64 {
-    let add = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-    if big_endian { bytes.iter().fold(0, add) } else { bytes.iter().rev().fold(0, add) }
 }
 
 /// Bytes of one value of a TIFF type; unknown types count as bytes, their tags are not read.

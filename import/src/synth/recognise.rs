@@ -180,7 +180,8 @@ fn number(bytes: &[u8]) -> u64 {
 mod tests {
     use super::super::{ColourOptions, SynthOptions, write, write_colour};
     use super::*;
-    use terrasoar_layout::build::{BuildOptions, Silent, build};
+    use terrasoar_layout::build::{BuildOptions, build};
+    use terrasoar_layout::progress::Silent;
     use terrasoar_layout::terrain::Terrain;
 
     #[test]

@@ -18,7 +18,8 @@ use terrasoar::stream::ExtendedView;
 use terrasoar::view::View;
 use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::{Records, Terrain};
+use terrasoar_layout::records::Records;
+use terrasoar_layout::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 const LINES_PER_PAGE: u64 = PAGE_BYTES as u64 / LINE_BYTES;

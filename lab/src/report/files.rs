@@ -2,11 +2,10 @@
 //!
 //! Whoever is about to replace a file asks this first. **The answer is by how the file starts**, so that a table or a page of somebody else is known as such whatever it is called.
 
+use super::html::FLIGHT_PICTURE;
 use super::{ComparisonReport, csv, file_parts, html, io};
 use crate::picture;
 
-/// The name that a picture of the flight has in a report.
-pub const FLIGHT_PICTURE: &str = "flight.png";
 /// Bytes from a file's start that are enough to tell.
 pub const START_BYTES: usize = 1 << 16;
 

@@ -4,7 +4,7 @@
 //! All text that comes from outside is escaped.
 
 use super::number::{exact, grouped, rounded};
-use super::{ComparisonReport, FLIGHT_PICTURE, FlightPicture, PlotFile, SweepPoint};
+use super::{ComparisonReport, FlightPicture, PlotFile, SweepPoint};
 use std::fmt::Write as _;
 
 const STYLE: &str = "\
@@ -203,6 +203,9 @@ pub(super) fn escaped(text: &str) -> String {
     }
     out
 }
+
+/// The name that a picture of the flight has in a report.
+pub const FLIGHT_PICTURE: &str = "flight.png";
 
 #[cfg(test)]
 mod tests {

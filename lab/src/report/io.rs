@@ -7,7 +7,11 @@
 //! | `plot-io-*.svg`, `plot-io-*.png` | the plots, with the feature `plots` |
 //! | `report.html` | tables and plots in one file that needs no other |
 
-use super::{PlotFile, ReportError, io_page};
+#[cfg(feature = "plots")]
+mod figures;
+mod page;
+
+use super::{PlotFile, ReportError};
 use crate::iobench::{FrameIo, IoBench, Run, Timed, UpdateCost};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -37,13 +41,13 @@ impl IoReport<'_> {
             .map_err(|source| ReportError::Json { path: dir.join("summary.json"), source })?;
         super::add_text(&mut out, "summary.json", &(json + "\n"))?;
         let plots = self.add_plots(dir, &mut out)?;
-        super::add_text(&mut out, "report.html", &io_page::page(self.bench, &plots))?;
+        super::add_text(&mut out, "report.html", &page::page(self.bench, &plots))?;
         out.publish().map_err(|error| ReportError::of_folder(dir, error))
     }
 
     #[cfg(feature = "plots")]
     fn add_plots(&self, dir: &Path, out: &mut FolderSink) -> Result<Vec<PlotFile>, ReportError> {
-        super::add_charts(super::io_figures::all(self), dir, out)
+        super::add_charts(figures::all(self), dir, out)
     }
 
     #[cfg(not(feature = "plots"))]

@@ -18,15 +18,13 @@ mod figures;
 mod files;
 mod html;
 mod io;
-#[cfg(feature = "plots")]
-mod io_figures;
-mod io_page;
 mod number;
 #[cfg(feature = "plots")]
 mod plot;
 
 pub use csv::write_frames_csv;
-pub use files::{FLIGHT_PICTURE, ReportFile, START_BYTES};
+pub use files::{ReportFile, START_BYTES};
+pub use html::FLIGHT_PICTURE;
 pub use io::{IoReport, write_io_frames_csv};
 
 use serde::Serialize;

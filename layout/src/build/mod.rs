@@ -25,10 +25,11 @@ use crate::dem::DemSource;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
-use crate::file::publish::publish_terrain;
 use crate::grid::Grid;
 use crate::header::{ErrorKind, Header, SpacingOrigin};
 use crate::order::corners;
+use crate::progress::BuildProgress;
+use crate::publish::publish_terrain;
 use crate::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
 use crate::remedy::Remedy;
 use crate::words::{harmless, number};
@@ -81,23 +82,6 @@ impl Default for BuildOptions {
             largest_tile: LARGEST_TILE,
         }
     }
-}
-
-/// Hears how a build gets on.
-pub trait BuildProgress: Sync {
-    /// A stage begins that will work through `samples` samples.
-    fn stage(&self, name: &'static str, samples: u64);
-    /// More samples of the stage are done.
-    fn advance(&self, samples: u64);
-}
-
-/// Hears nothing.
-#[derive(Debug, Clone, Copy)]
-pub struct Silent;
-
-impl BuildProgress for Silent {
-    fn stage(&self, _: &'static str, _: u64) {}
-    fn advance(&self, _: u64) {}
 }
 
 /// Builds the terrain file `out` from `dem`, on the current rayon pool, and returns its header. `out` appears only when it is

@@ -2,17 +2,20 @@
 //!
 //! The samples are read back from the records, so nothing is lost that the file had. Voids keep the heights they are filled with. Cost and memory are a build's.
 
+use super::spool::Spool;
 use super::survey::HeightCode;
-use super::{BuildOptions, BuildProgress, MemoryPlan, Work, spool::Spool};
+use super::{BuildOptions, MemoryPlan, Work};
 use crate::dem::{DemInfo, DemSource, Georeference, SampleSink, SampleType, Window};
 use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
-use crate::file::publish::publish_terrain;
 use crate::grid::GridPoint;
 use crate::header::Header;
+use crate::progress::BuildProgress;
+use crate::publish::publish_terrain;
 use crate::record::{RecordCodec, RecordKind, RecordScale};
-use crate::terrain::{Records, Terrain};
+use crate::records::Records;
+use crate::terrain::Terrain;
 use crate::with_records;
 use rayon::prelude::*;
 use std::path::Path;

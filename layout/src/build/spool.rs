@@ -7,8 +7,9 @@
 
 use crate::bound::range;
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
-use crate::disk::{Disk, is_full};
+use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::error::is_full;
 use crate::remedy::Remedy;
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -151,15 +151,10 @@ pub fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> Result<()> {
         let mut done = 0;
         while done < bytes.len() {
             match std::os::windows::fs::FileExt::seek_read(file, &mut bytes[done..], offset + done as u64)? {
-                0 => return Err(ErrorKind::UnexpectedEof.into()),
+                0 => return Err(std::io::ErrorKind::UnexpectedEof.into()),
                 count => done += count,
             }
         }
         Ok(())
     }
-}
-
-/// Whether there was no room: the disk is full, or a quota or limit of the size of files is reached.
-pub(crate) fn is_full(error: &std::io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
 }

@@ -3,10 +3,10 @@
 //! **A sample lies in a disc if its own position does**, computed from its column and row alone, so every window over it agrees. `samples` is as
 //! tight as that: each side of the rectangle is a row or column that the disc's extent holds. Cost: none a sample beyond the squared distance.
 
-use super::check::{checked_centre, checked_radius};
 use super::window::{HeightWindow, SampleRect};
 use crate::error::LayoutError;
 use crate::grid::Grid;
+use crate::numbers::{checked_centre, checked_radius};
 
 /// A part of the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]

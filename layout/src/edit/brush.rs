@@ -4,10 +4,10 @@
 //! Smoothing reads old heights only, so the result does not depend on the order of samples. Cost: O(samples), nine reads each for smoothing.
 
 use super::area::{disc_samples, each_sample, offset_m};
-use super::check::{checked_amount, checked_centre, checked_fraction, checked_height, checked_radius};
 use super::window::{HeightWindow, SampleRect};
 use crate::error::LayoutError;
 use crate::grid::Grid;
+use crate::numbers::{checked_amount, checked_centre, checked_fraction, checked_height, checked_radius};
 
 /// A stroke of a round brush.
 #[derive(Debug, Clone, Copy, PartialEq)]

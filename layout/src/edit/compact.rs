@@ -1,6 +1,5 @@
 //! A terrain file written anew as a build would have left it: pages in order, imagery behind them, and nothing of what edits replaced.
 
-use crate::build::BuildProgress;
 use crate::bytes::PAGE_BYTES;
 use crate::directory::{Entry, absent};
 use crate::disk::Disk;
@@ -8,12 +7,13 @@ use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::directory::{page_at, put_all_leaves, root_bytes};
 use crate::file::lock::WriteLock;
-use crate::file::publish::publish_terrain;
 use crate::file::slots::Slots;
 use crate::file::tail::Tail;
 use crate::header::{Header, INERT_PAGE};
 use crate::imagery::{Append, Imagery, MadeTile};
 use crate::opening::inert_page;
+use crate::progress::BuildProgress;
+use crate::publish::publish_terrain;
 use crate::terrain::Terrain;
 use std::path::Path;
 

@@ -15,10 +15,11 @@
 //! sample of the rim, none in the bowl.
 
 use super::area::{disc_samples, each_sample, offset_m};
-use super::check::{checked, checked_amount, checked_centre, checked_radius};
 use super::window::{HeightWindow, SampleRect};
 use crate::error::LayoutError;
 use crate::grid::Grid;
+use crate::imagery::{Paint, Scorch};
+use crate::numbers::{checked, checked_amount, checked_centre, checked_radius};
 
 /// How far the rim reaches, in radii.
 pub const REACH: f64 = 2.0;
@@ -73,6 +74,24 @@ impl Crater {
         each_sample(window, self.bounds(grid), |x, y, height| {
             *height += self.change_m(offset_m(grid, self.centre_m, x, y), [east, north]);
         });
+    }
+}
+
+/// Radii of a crater that its scorch has.
+const SCORCH_RADII: f64 = 1.5;
+
+/// How much of the light a crater's scorch takes at most.
+const SCORCH_STRENGTH: f64 = 0.85;
+
+impl Paint {
+    /// The scorch of a crater: 1.5 times as wide as its bowl, ejecta flying where the shell flew.
+    pub fn scorch_of(crater: &Crater) -> Self {
+        Self::Scorch(Scorch {
+            centre_m: crater.centre_m,
+            radius_m: SCORCH_RADII * crater.radius_m,
+            direction_deg: crater.direction_deg,
+            strength: SCORCH_STRENGTH,
+        })
     }
 }
 

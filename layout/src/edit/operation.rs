@@ -5,12 +5,13 @@
 
 use super::area::{Area, each_sample};
 use super::brush::Brush;
-use super::check::{checked_height, checked_size};
+use super::check::checked_size;
 use super::crater::Crater;
 use super::stamp::Stamp;
 use super::window::{HeightWindow, SampleRect};
 use crate::error::LayoutError;
 use crate::grid::Grid;
+use crate::numbers::checked_height;
 
 /// One change of the ground. Positions are metres east and north of the south-west sample.
 #[derive(Debug, Clone, PartialEq)]

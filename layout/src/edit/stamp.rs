@@ -1,10 +1,10 @@
 //! Stamps: heights from elsewhere, put on the ground sample by sample.
 
 use super::area::each_sample;
-use super::check::{MAX_HEIGHT_M, checked};
 use super::window::{HeightWindow, SampleRect};
 use crate::error::LayoutError;
 use crate::grid::Grid;
+use crate::numbers::{MAX_HEIGHT_M, checked};
 use std::fmt;
 use std::sync::Arc;
 

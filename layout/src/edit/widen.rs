@@ -1,14 +1,15 @@
 //! A terrain file rewritten so that its records have room for other heights.
 
 use super::compact::copy_imagery;
-use crate::build::{BuildProgress, HeightRoom, rebuild_into};
+use crate::build::{HeightRoom, rebuild_into};
 use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::lock::WriteLock;
-use crate::file::publish::publish_terrain;
 use crate::file::slots::Slots;
 use crate::header::Header;
+use crate::progress::BuildProgress;
+use crate::publish::publish_terrain;
 use crate::terrain::Terrain;
 use std::path::Path;
 

@@ -137,7 +137,7 @@ impl AtomicFile {
     }
 
     /// As [`AtomicFile::publish_on`], in place of the file that `lock` is of.
-    pub(super) fn publish_over(self, disk: &dyn Disk, lock: &WriteLock) -> Result<(), LayoutError> {
+    pub(crate) fn publish_over(self, disk: &dyn Disk, lock: &WriteLock) -> Result<(), LayoutError> {
         self.finish(disk, Replaced::Held(lock)).map(drop)
     }
 

@@ -15,7 +15,6 @@ pub(crate) mod directory;
 pub(crate) mod journal;
 pub(crate) mod lock;
 pub mod opening;
-pub(crate) mod publish;
 mod seen;
 pub(crate) mod slots;
 pub(crate) mod tail;

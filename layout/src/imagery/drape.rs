@@ -11,7 +11,6 @@ use super::place::{Extent, PlaceOrigin};
 use super::pyramid::{Pyramid, STEP_ROWS, memory_bytes};
 use super::shape::{ImageryShape, TileFormat};
 use super::source::{ImageSource, RowReader};
-use crate::build::BuildProgress;
 use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::file::journal::Lineage;
@@ -19,6 +18,7 @@ use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
 use crate::file::tail::{Attempted, Tail};
 use crate::header::Header;
+use crate::progress::BuildProgress;
 use crate::remedy::Remedy;
 use crate::source::{PreadSource, Source};
 use crate::terrain::Terrain;
@@ -171,9 +171,10 @@ fn append_tiles(
 mod tests {
     use super::super::{Imagery, MemoryImage};
     use super::*;
-    use crate::build::{BuildOptions, Silent, build};
+    use crate::build::{BuildOptions, build};
     use crate::dem::{MemoryDem, SampleType};
     use crate::disk::{FailingDisk, Failure};
+    use crate::progress::Silent;
     use crate::source::MemorySource;
 
     fn terrain_bytes() -> Vec<u8> {

@@ -1,11 +1,12 @@
 //! Small sound files to begin with: all kinds of records, padding and voids, several directory leaves, edits undone and not, pictures draped and painted, an overlay.
 
 use super::sealed::Sealed;
-use crate::build::{BuildOptions, Silent, build};
+use crate::build::{BuildOptions, build};
 use crate::dem::{MemoryDem, SampleType};
 use crate::edit::{Area, Edit, EditSession};
 use crate::error::LayoutError;
 use crate::imagery::{DrapeOptions, Extent, Fill, MemoryImage, Paint, Region, TileFormat, drape};
+use crate::progress::Silent;
 use crate::record::RecordKind;
 use std::path::Path;
 use std::sync::OnceLock;

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{Georeference, HorizontalUnit, MemoryDem, SampleType};
 use terrasoar_layout::imagery::{
     DrapeOptions, Draped, ImageSource, Imagery, MemoryImage, TileFormat, TileId, decode_tile, drape,
 };
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 
 /// A terrain of 61 x 41 samples 20 m apart, its south-west sample at 1000, 4000 of EPSG 32610.

@@ -2,9 +2,10 @@
 
 use super::MemoryDem;
 use std::path::PathBuf;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect};
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::terrain::Terrain;
 
 /// A folder with a terrain in it.

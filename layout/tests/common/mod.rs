@@ -3,7 +3,8 @@
 
 use rayon::prelude::*;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, Silent, build};
+use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::progress::Silent;
 pub mod drape;
 pub mod edits;
 pub mod paint;

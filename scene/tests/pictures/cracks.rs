@@ -5,7 +5,7 @@ use super::{Outcome, Test, ensure};
 use terrasoar::refine::Culling;
 use terrasoar::view::View;
 use terrasoar_render::{Gpu, Look};
-use terrasoar_scene::feed::PictureEngine;
+use terrasoar_scene::mapped::PictureEngine;
 use terrasoar_scene::scene::SceneOptions;
 
 pub const TESTS: &[Test] = &[

@@ -2,7 +2,6 @@
 
 use super::{Viewer, sight};
 use crate::window::camera::ground_below_m;
-use crate::window::events::Wake;
 use crate::window::flights::{Player, Recorder};
 use crate::window::job::{self, Job};
 use crate::window::keep;
@@ -10,6 +9,7 @@ use crate::window::keys::Action;
 use crate::window::panel::Wish;
 use crate::window::stage::Stage;
 use crate::window::tool::{STEP, Tool, ToolBox};
+use crate::window::wake::Wake;
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flight::generate::Ground;

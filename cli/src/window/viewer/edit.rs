@@ -4,9 +4,9 @@
 //! is on the disk, [`MOST_HELD`] pages at most.
 
 use super::Viewer;
-use crate::window::events::Wake;
 use crate::window::stage::Stage;
 use crate::window::tool::{RADII_M, Stroke, Tool};
+use crate::window::wake::Wake;
 use crate::window::workshop::{News, Seen, Workshop};
 use std::time::{Duration, Instant};
 use terrasoar::edits::rain::Rain as RainOfCraters;

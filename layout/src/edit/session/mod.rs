@@ -5,12 +5,11 @@
 
 mod checked_state;
 mod past;
+pub(super) mod picture;
 
 pub use past::{HistoryEntry, history};
 
 use super::commit::{CommitJob, Content};
-use super::overlay::{create_overlay, overlay_slots};
-use super::picture::Picture;
 use super::{Changes, Edit, Editor, HeightWindow};
 use crate::bytes::PAGE_BYTES;
 use crate::directory::{Entry, copy_of};
@@ -23,9 +22,11 @@ use crate::file::slots::Slots;
 use crate::file::tail::{Attempt, Attempted, Tail};
 use crate::header::{Header, ImageryPlace};
 use crate::opening::{read_directory, read_growing, read_root, read_structure};
+use crate::overlay::{create_overlay, overlay_slots};
 use crate::remedy::Remedy;
 use crate::source::{LayeredSource, PreadSource, Source};
 use crate::terrain::Terrain;
+use picture::Picture;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

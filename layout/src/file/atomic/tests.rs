@@ -163,8 +163,9 @@ fn what_somebody_writes_to_is_not_replaced() {
 /// Edits that were told as durable while the new file was made are not lost, and neither is a terrain that came into being meanwhile.
 #[test]
 fn a_terrain_that_was_edited_meanwhile_is_not_replaced() {
-    use crate::build::{BuildOptions, Silent, build};
+    use crate::build::{BuildOptions, build};
     use crate::edit::{Edit, EditSession, SampleRect};
+    use crate::progress::Silent;
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("a.iqt");
     let dem = crate::dem::MemoryDem::from_fn([9, 9], crate::dem::SampleType::I16, |x, y| f64::from(x + y));

@@ -4,8 +4,6 @@
 //! between. Lumps move that edge, grain spares single texels in part. Rays turn with the direction and all differs from scorch to scorch, for hashes begin
 //! with its centre; the same scorch is always the same.
 
-use super::operation::{Scorch, WHOLE};
-
 /// Rays of ejecta all around.
 const RAYS: u32 = 28;
 /// Lumps along a radius.
@@ -112,6 +110,22 @@ fn hash(value: u32) -> u32 {
 fn part(hash: u32) -> f64 {
     f64::from(hash >> 8) * (1.0 / f64::from(1 << 24))
 }
+
+/// Ground burnt by an explosion: darkest in the middle, with rays of ejecta, the longest ahead, and a soft edge. What is transparent stays so.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scorch {
+    /// Its centre in metres.
+    pub centre_m: [f64; 2],
+    /// Radius in metres. No ray reaches farther.
+    pub radius_m: f64,
+    /// Where the ejecta fly, degrees clockwise from north.
+    pub direction_deg: f64,
+    /// How much of the light it takes in the middle, 0 to 1.
+    pub strength: f64,
+}
+
+/// Weights are parts of this.
+pub(super) const WHOLE: u32 = 1 << 16;
 
 #[cfg(test)]
 mod tests {

@@ -16,7 +16,8 @@ mod operation;
 mod section;
 mod tile;
 
-pub use operation::{Fill, Paint, Region, Scorch};
+pub use burn::Scorch;
+pub use operation::{Fill, Paint, Region};
 pub use section::PaintedSection;
 pub use tile::PaintedTile;
 

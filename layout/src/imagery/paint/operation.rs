@@ -7,14 +7,9 @@ use super::super::linear::{Linear, TABLES};
 use super::super::shape::ImageryShape;
 use super::blocks::Rect;
 use super::burn::Burn;
-use crate::edit::Crater;
-use crate::edit::check::{checked, checked_centre, checked_fraction, checked_radius};
+use super::burn::{Scorch, WHOLE};
 use crate::error::LayoutError;
-
-/// Radii of a crater that its scorch has.
-const SCORCH_RADII: f64 = 1.5;
-/// How much of the light a crater's scorch takes at most.
-const SCORCH_STRENGTH: f64 = 0.85;
+use crate::numbers::{checked, checked_centre, checked_fraction, checked_radius};
 
 /// One change of the picture over the terrain. Positions are metres east and north of the south-west sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,19 +21,6 @@ pub enum Paint {
     /// The picture as it was before all paint. Whole blocks of 4 x 4 texels that the region touches go back to their own bytes, and so does all of the coarser
     /// levels over which nothing is painted any more.
     Restore(Region),
-}
-
-/// Ground burnt by an explosion: darkest in the middle, with rays of ejecta, the longest ahead, and a soft edge. What is transparent stays so.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scorch {
-    /// Its centre in metres.
-    pub centre_m: [f64; 2],
-    /// Radius in metres. No ray reaches farther.
-    pub radius_m: f64,
-    /// Where the ejecta fly, degrees clockwise from north.
-    pub direction_deg: f64,
-    /// How much of the light it takes in the middle, 0 to 1.
-    pub strength: f64,
 }
 
 /// A region in one colour.
@@ -74,16 +56,6 @@ pub enum Region {
 }
 
 impl Paint {
-    /// The scorch of a crater: 1.5 times as wide as its bowl, ejecta flying where the shell flew.
-    pub fn scorch_of(crater: &Crater) -> Self {
-        Self::Scorch(Scorch {
-            centre_m: crater.centre_m,
-            radius_m: SCORCH_RADII * crater.radius_m,
-            direction_deg: crater.direction_deg,
-            strength: SCORCH_STRENGTH,
-        })
-    }
-
     /// Checks that all numbers are usable.
     ///
     /// # Errors
@@ -193,9 +165,6 @@ fn around(centre_m: [f64; 2], radius_m: f64) -> ([f64; 2], [f64; 2]) {
     (centre_m.map(|m| m - radius_m), centre_m.map(|m| m + radius_m))
 }
 
-/// Weights are parts of this.
-pub(super) const WHOLE: u32 = 1 << 16;
-
 /// A paint ready to be asked for texels.
 #[derive(Debug)]
 pub(super) enum Brush {
@@ -272,7 +241,8 @@ mod tests {
         for paint in [Paint::Scorch(scorch), Paint::Fill(fill), Paint::Restore(disc(2.0))] {
             paint.check().unwrap();
         }
-        let crater = Crater { centre_m: [7.0, 8.0], direction_deg: 30.0, radius_m: 10.0, depth_m: 2.0 };
+        let crater =
+            crate::edit::Crater { centre_m: [7.0, 8.0], direction_deg: 30.0, radius_m: 10.0, depth_m: 2.0 };
         let Paint::Scorch(scorch) = Paint::scorch_of(&crater) else { panic!("no scorch") };
         assert_eq!((scorch.centre_m, scorch.radius_m, scorch.direction_deg), ([7.0, 8.0], 15.0, 30.0));
     }

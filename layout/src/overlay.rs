@@ -9,15 +9,13 @@ use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::slots::Slots;
 use crate::header::{Header, seal};
-use crate::opening::{read_directory, read_growing};
-use crate::source::{LayeredSource, MapSource, PreadSource, Source, split_of};
-use crate::terrain::Terrain;
+use crate::source::{PreadSource, Source, split_of};
 use std::path::Path;
 
 /// First bytes of an overlay.
-pub(super) const MAGIC: [u8; 8] = *b"\x89IQO\r\n\x1a\n";
+pub(crate) const MAGIC: [u8; 8] = *b"\x89IQO\r\n\x1a\n";
 /// Pages that an overlay begins with: its header slots.
-pub(super) const FIRST_PAGES: u64 = 2;
+pub(crate) const FIRST_PAGES: u64 = 2;
 
 /// The state of a base that an overlay belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +48,7 @@ impl Base {
 ///
 /// # Errors
 /// As [`AtomicFile`]'s.
-pub(super) fn create_overlay(
+pub(crate) fn create_overlay(
     disk: &dyn Disk,
     base: &Path,
     slots: &Slots,
@@ -90,7 +88,7 @@ fn empty_overlay(base: &Slots, base_name: &str) -> Vec<u8> {
 }
 
 /// The header slots of the overlay over `base`, and where in the two together it begins.
-pub(super) fn overlay_slots(
+pub(crate) fn overlay_slots(
     base: &PreadSource,
     overlay: &mut PreadSource,
 ) -> Result<(Slots, u64), LayoutError> {
@@ -131,22 +129,4 @@ fn not_an_overlay(path: &Path) -> LayoutError {
         path,
         "this is no overlay of edits (.iqo); name one, or a new file for one, when the terrain is edited",
     )
-}
-
-/// The base with its overlay as one terrain.
-pub(crate) fn open_layers(base: &Path, overlay: &Path, is_mapped: bool) -> Result<Terrain, LayoutError> {
-    let mut base_file = PreadSource::open(base)?;
-    // The base must be a sound terrain by itself.
-    let (base_header, _) = read_growing(&mut base_file)?;
-    let mut overlay_file = PreadSource::open(overlay)?;
-    let (slots, _) = overlay_slots(&base_file, &mut overlay_file)?;
-    let source: Box<dyn Source> = if is_mapped {
-        let layers = [Box::new(MapSource::map(base_file)?), Box::new(MapSource::map(overlay_file)?)];
-        let [base, overlay] = layers;
-        Box::new(LayeredSource::new(base, base_header.file_bytes, overlay))
-    } else {
-        Box::new(LayeredSource::new(Box::new(base_file), base_header.file_bytes, Box::new(overlay_file)))
-    };
-    let entries = read_directory(&*source, &slots.header)?;
-    Ok(Terrain::of(source, slots.header, entries))
 }

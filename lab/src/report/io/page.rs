@@ -1,12 +1,12 @@
 //! The page of a measurement of reading: two tables, what is needed and what it cost, and the plots.
 
-use super::PlotFile;
-use super::html::{begin, escaped, figures, push};
-use super::number::{exact, grouped, rounded};
 use crate::iobench::{IoBench, IoRun};
+use crate::report::PlotFile;
+use crate::report::html::{begin, escaped, figures, push};
+use crate::report::number::{exact, grouped, rounded};
 
 /// The whole page.
-pub(super) fn page(bench: &IoBench, plots: &[PlotFile]) -> String {
+pub(crate) fn page(bench: &IoBench, plots: &[PlotFile]) -> String {
     let mut out = String::new();
     let [wide, high] = bench.viewport_px;
     let of = format!(
@@ -225,8 +225,8 @@ fn streamed(out: &mut String, bench: &IoBench) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::io::tests::made_up;
     use super::*;
+    use crate::report::io::tests::made_up;
 
     #[test]
     fn the_page_is_whole_and_names_stay_in_their_place() {

@@ -1,13 +1,13 @@
 //! Which charts a measurement of reading has: pages a frame by layout and by engine, and what preloading leaves to be read in real time.
 
-use super::chart::{Chart, Series};
-use super::figures::{frame_axis, scaled_axis};
-use super::io::IoReport;
-use super::number::exact;
+use super::IoReport;
 use crate::iobench::{FrameIo, LayoutKind, Prefetch, Reader, Run};
+use crate::report::chart::{Chart, Series};
+use crate::report::figures::{frame_axis, scaled_axis};
+use crate::report::number::exact;
 
 /// The charts of a report, in the order shown.
-pub(super) fn all(report: &IoReport<'_>) -> Vec<Chart> {
+pub(crate) fn all(report: &IoReport<'_>) -> Vec<Chart> {
     let runs: Vec<&Run> = report.runs.iter().map(|(run, _)| run).collect();
     let Some(first) = runs.first() else { return Vec::new() };
     // Flights over a pool count what is late, not what is read.

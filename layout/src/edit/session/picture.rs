@@ -2,8 +2,8 @@
 //!
 //! The picture is opened when it is first painted or when going to another state changes it; a session that only edits heights reads nothing of it.
 
-use super::session::EditSession;
-use super::{Changes, Edit};
+use super::EditSession;
+use crate::edit::{Changes, Edit};
 use crate::error::LayoutError;
 use crate::header::{Header, ImageryPlace};
 use crate::imagery::{OtherState, Paint, PaintChanges, PaintedSection, Painter, TileId};
@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// What a session knows of the picture.
 #[derive(Debug, Default)]
-pub(super) struct Picture {
+pub(crate) struct Picture {
     painter: Option<Painter>,
     repainted: Repainted,
 }
@@ -28,7 +28,7 @@ pub struct Repainted {
 }
 
 /// What another state of the file makes of the picture.
-pub(super) enum Turn {
+pub(crate) enum Turn {
     Same,
     Other(Box<OtherState>),
     Another,
@@ -36,12 +36,12 @@ pub(super) enum Turn {
 
 impl Picture {
     /// Whether all paint is in the file.
-    pub(super) fn is_committed(&self) -> bool {
+    pub(crate) fn is_committed(&self) -> bool {
         self.painter.as_ref().is_none_or(Painter::is_committed)
     }
 
     /// What a commit is to write from page `first_page` on.
-    pub(super) fn section(&mut self, first_page: u64) -> Result<Option<PaintedSection>, LayoutError> {
+    pub(crate) fn section(&mut self, first_page: u64) -> Result<Option<PaintedSection>, LayoutError> {
         let Some(painter) = self.painter.as_mut().filter(|painter| !painter.is_committed()) else {
             return Ok(None);
         };
@@ -51,21 +51,21 @@ impl Picture {
     }
 
     /// A section was written.
-    pub(super) fn committed(&mut self, section: PaintedSection) {
+    pub(crate) fn committed(&mut self, section: PaintedSection) {
         if let Some(painter) = &mut self.painter {
             painter.committed(section);
         }
     }
 
     /// The section that was asked for last was not written: all of it is to be painted again.
-    pub(super) fn failed(&mut self) {
+    pub(crate) fn failed(&mut self) {
         if let Some(painter) = &mut self.painter {
             painter.failed();
         }
     }
 
     /// Takes back what was painted since the last section.
-    pub(super) fn roll_back(&mut self) {
+    pub(crate) fn roll_back(&mut self) {
         if let Some(painter) = &mut self.painter {
             self.repainted.tiles.extend(painter.roll_back().tiles);
         }
@@ -88,7 +88,7 @@ impl Picture {
     }
 
     /// Looks at the picture of another state of the file.
-    pub(super) fn turn(
+    pub(crate) fn turn(
         &mut self,
         terrain: &Arc<Terrain>,
         header: &Header,
@@ -106,7 +106,7 @@ impl Picture {
     }
 
     /// The file is in that state now.
-    pub(super) fn turn_to(&mut self, turn: Turn) {
+    pub(crate) fn turn_to(&mut self, turn: Turn) {
         match (turn, &mut self.painter) {
             (Turn::Same, _) => {}
             (Turn::Other(state), Some(painter)) => self.repainted.tiles.extend(painter.turn_to(*state).tiles),

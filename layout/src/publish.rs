@@ -3,10 +3,10 @@
 //! Whatever was written is read back from the file as whoever opens it would: header, directory, inert page, the imagery's directory. What would be refused then is refused now, and
 //! whatever had the name stays.
 
-use super::atomic::AtomicFile;
-use super::lock::WriteLock;
 use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::lock::WriteLock;
 use crate::header::Header;
 use crate::imagery::Imagery;
 use crate::source::PreadSource;
@@ -43,9 +43,10 @@ fn check_opens(file: &AtomicFile) -> Result<Header, LayoutError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::{BuildOptions, Silent, build};
+    use crate::build::{BuildOptions, build};
     use crate::dem::{MemoryDem, SampleType};
     use crate::disk::SystemDisk;
+    use crate::progress::Silent;
 
     /// Each of a file's pages damaged in turn: what leads to it is checked, and the file that has the name stays.
     #[test]

@@ -1,0 +1,18 @@
+//! How long work gets on, for whoever waits for it.
+
+/// Hears how a build gets on.
+pub trait BuildProgress: Sync {
+    /// A stage begins that will work through `samples` samples.
+    fn stage(&self, name: &'static str, samples: u64);
+    /// More samples of the stage are done.
+    fn advance(&self, samples: u64);
+}
+
+/// Hears nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Silent;
+
+impl BuildProgress for Silent {
+    fn stage(&self, _: &'static str, _: u64) {}
+    fn advance(&self, _: u64) {}
+}
