@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use terrasoar_layout::edit::{Edit, Editor};
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 fn main() -> Result<(), Failure> {
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");

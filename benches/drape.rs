@@ -13,7 +13,7 @@ use std::time::Instant;
 use terrasoar_import::open_image;
 use terrasoar_layout::imagery::{DrapeOptions, ImageSource, Imagery, TileFormat, TileId, decode_tile, drape};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 type Failure = Box<dyn std::error::Error>;
 

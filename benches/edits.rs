@@ -22,11 +22,11 @@ use terrasoar::refine::kinetic::Kinetic;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::edit::{Edit, Editor};
-use terrasoar_layout::edited::EditedRecords;
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::records::Records;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Frames flown before the first craters fall.

@@ -16,9 +16,9 @@ use terrasoar::flyover::{EngineKind, Quality, mean_incoherence_percent, replay};
 use terrasoar::stats::Comparison;
 use terrasoar_import::synth::{SynthOptions, write};
 use terrasoar_layout::build::{BuildOptions, build};
-use terrasoar_layout::header::ErrorKind;
+use terrasoar_layout::file::header::ErrorKind;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 type Failure = Box<dyn std::error::Error>;
 

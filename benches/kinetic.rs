@@ -21,9 +21,9 @@ use terrasoar::refine::kinetic::Kinetic;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::{View, Viewport};
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::records::Records;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 type Failure = Box<dyn std::error::Error>;

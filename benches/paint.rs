@@ -18,7 +18,7 @@ use terrasoar_layout::imagery::{
     DrapeOptions, ImageSource, Imagery, MemoryImage, Paint, Painter, Scorch, drape,
 };
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 type Failure = Box<dyn std::error::Error>;
 

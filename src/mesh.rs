@@ -5,7 +5,7 @@
 //! section 1).
 
 use terrasoar_layout::grid::{Grid, GridPoint};
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 /// A triangle's corners in counter-clockwise order seen from above.
 pub type Triangle = [GridPoint; 3];

@@ -7,7 +7,7 @@
 //! the last bit. It is the only file that knows the projection. Cost: some ten floating-point operations a test.
 
 use crate::view::View;
-use terrasoar_layout::record::Vertex;
+use terrasoar_layout::grid::record::Vertex;
 
 /// Number of side planes of the view pyramid.
 pub const PLANES: usize = 4;

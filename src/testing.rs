@@ -4,9 +4,9 @@ use crate::view::{View, Viewport};
 use glam::DVec3;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
+use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::source::MemorySource;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 fn terrain(samples: [u32; 2]) -> Terrain {
     let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| {

@@ -21,10 +21,10 @@ use terrasoar::view::View;
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Area, Changes, Crater, Edit, Editor, SampleRect};
-use terrasoar_layout::edited::EditedRecords;
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::record::{RecordCodec, RecordKind};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::record::{RecordCodec, RecordKind};
+use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 fn terrain(samples: [u32; 2], seed: u64, holes: bool) -> Arc<Terrain> {

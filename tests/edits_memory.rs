@@ -12,14 +12,14 @@ use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::stream::{Fetch, GroundPatch, ModelDisk, Prefetch, Streamed, Threads};
 use terrasoar::view::View;
 use terrasoar_layout::build::{BuildOptions, build};
-use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Changes, Crater, Edit, EditSession};
-use terrasoar_layout::kinds::ByKind;
-use terrasoar_layout::loader::Loader;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::grid::record::Compact;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::record::Compact;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::loader::Loader;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Pages of the pool, of some 450 that the file has.
 const CACHE_PAGES: u64 = 80;

@@ -12,14 +12,14 @@ use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::stream::{ModelDisk, Prefetch, Streamed};
 use terrasoar::view::View;
-use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::edit::{Crater, Edit, Editor, SampleRect};
-use terrasoar_layout::edited::EditedRecords;
-use terrasoar_layout::kinds::ByKind;
-use terrasoar_layout::pool::PagePool;
-use terrasoar_layout::record::Compact;
-use terrasoar_layout::records::Records;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::grid::record::Compact;
+use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::pool::PagePool;
+use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Frames flown.
 const FRAMES: u32 = 60;

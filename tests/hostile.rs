@@ -15,13 +15,13 @@ use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::stream::{Fetch, Prefetch, Streamed, Threads};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::bytes::PAGE_BYTES;
-use terrasoar_layout::kinds::ByKind;
-use terrasoar_layout::loader::Loader;
-use terrasoar_layout::record::{Compact, RecordCodec};
-use terrasoar_layout::records::Records;
-use terrasoar_layout::source::{CountingSource, Fault, HostileSource, Hostility, MemorySource};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::file::source::{CountingSource, Fault, HostileSource, Hostility, MemorySource};
+use terrasoar_layout::grid::record::{Compact, RecordCodec};
+use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::loader::Loader;
+use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Faults of each kind.
 const FAULTS: u64 = 1000;

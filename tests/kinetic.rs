@@ -13,7 +13,7 @@ use terrasoar::refine::kinetic::{Budget, Kinetic, Patch};
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::View;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// A straight flight with a turn at its end.

@@ -11,7 +11,7 @@ use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Builds and opens a committed DEM.

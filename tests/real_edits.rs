@@ -3,10 +3,10 @@
 use std::path::Path;
 use terrasoar::edits::rain::Rain;
 use terrasoar_layout::build::{BuildOptions, HeightRoom, build, rebuild};
-use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{Edit, EditSession, widen};
+use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 const CRATERS: u64 = 10_000;

@@ -14,9 +14,9 @@ use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::stream::{ModelDisk, Prefetch, StreamFrame, Streamed, sound};
 use terrasoar::view::View;
 use terrasoar_layout::build::BuildOptions;
-use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// A terrain of some 1,700 pages.
@@ -103,15 +103,18 @@ fn fly(terrain: &Arc<Terrain>, flown: &[View], how: How) -> Vec<StreamFrame> {
     }
     match (pool, terrain.records().unwrap()) {
         (
-            terrasoar_layout::kinds::ByKind::Compact(pool),
-            terrasoar_layout::kinds::ByKind::Compact(records),
+            terrasoar_layout::read::kinds::ByKind::Compact(pool),
+            terrasoar_layout::read::kinds::ByKind::Compact(records),
         ) => flight!(pool, records),
-        (terrasoar_layout::kinds::ByKind::Exact8(pool), terrasoar_layout::kinds::ByKind::Exact8(records)) => {
+        (
+            terrasoar_layout::read::kinds::ByKind::Exact8(pool),
+            terrasoar_layout::read::kinds::ByKind::Exact8(records),
+        ) => {
             flight!(pool, records)
         }
         (
-            terrasoar_layout::kinds::ByKind::Exact16(pool),
-            terrasoar_layout::kinds::ByKind::Exact16(records),
+            terrasoar_layout::read::kinds::ByKind::Exact16(pool),
+            terrasoar_layout::read::kinds::ByKind::Exact16(records),
         ) => flight!(pool, records),
         _ => unreachable!("pool and records are of one kind"),
     }

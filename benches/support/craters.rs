@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::build::{HeightRoom, rebuild};
-use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{Crater, Edit};
+use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 pub type Failure = Box<dyn std::error::Error>;
 

@@ -9,7 +9,7 @@ use terrasoar::edits::{LoadedBatch, Loader, Script, Step, timed};
 use terrasoar::flyover::{EngineKind, Quality, replay_edited};
 use terrasoar::view::Viewport;
 use terrasoar_layout::edit::EditSession;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 /// Batches that are done.

@@ -15,8 +15,8 @@ use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::stream::{ModelDisk, Prefetch, Streamed};
 use terrasoar::view::{View, Viewport};
 use terrasoar_lab::iobench::{CountOptions, LayoutKind, Reader, count};
-use terrasoar_layout::bytes::PAGE_BYTES;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Largest terrain that brute force flies over: 2^7 + 1 samples a side.

@@ -7,7 +7,7 @@ use std::path::Path;
 use terrasoar_import::open_image;
 use terrasoar_layout::imagery::{DrapeOptions, Extent, ImageSource, Imagery, TileFormat, decode_tile, drape};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 /// Texels of a picture that is read to its end and draped.

@@ -9,7 +9,7 @@ use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 /// Samples that are looked at one by one, and built.

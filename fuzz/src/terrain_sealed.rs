@@ -5,7 +5,7 @@
 use crate::land::TERRAINS;
 use crate::seeds::{self, Inputs};
 use crate::use_files::uses;
-use terrasoar_layout::header::MAGIC;
+use terrasoar_layout::file::header::MAGIC;
 use terrasoar_layout::testing::{Counts, Sealed, reseal};
 
 pub(crate) fn seeds() -> Inputs {

@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::HeightRoom;
-use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{Area, Compacted, Edit, EditSession, compact, history, widen};
+use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage, TileFormat, drape};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::testing::Sealed;
-use terrasoar_layout::unused::unused_bytes;
+use terrasoar_layout::verify::unused::unused_bytes;
 use terrasoar_layout::verify::verify;
 
 /// Steps of a file's past that are gone through.

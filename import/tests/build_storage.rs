@@ -16,9 +16,9 @@ use tempfile::TempDir;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, build, build_on};
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, SampleType, Window};
-use terrasoar_layout::disk::{FailingDisk, Failure};
+use terrasoar_layout::file::disk::{FailingDisk, Failure};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 /// A folder to build in, and what must be in it afterwards.

@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{DemInfo, DemSource, MemoryDem, SampleSink, SampleType};
+use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::progress::{BuildProgress, Silent};
-use terrasoar_layout::record::RecordKind;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::{LayoutError, Remedy};
 use tiff::{DATA_AT, DEFLATE, RAW, Tag, ZSTD, heights, one_strip, reals, shorts, text, tiff};
 

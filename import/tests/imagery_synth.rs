@@ -10,7 +10,7 @@ use terrasoar_import::synth::{ColourOptions, SynthOptions, write, write_colour};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::imagery::{DrapeOptions, PlaceOrigin, TileFormat, drape};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// A terrain of 513 x 513 samples, and its picture of so many texels a sample.
 fn land(folder: &Path, texels_a_sample: u32) -> [std::path::PathBuf; 2] {

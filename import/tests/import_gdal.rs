@@ -16,7 +16,7 @@ use terrasoar_import::synth::SynthOptions;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Compares random samples of `path`.
 fn agrees(path: &Path) {

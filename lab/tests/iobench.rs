@@ -12,7 +12,7 @@ use terrasoar::view::View;
 use terrasoar_lab::iobench::{CountOptions, IoRun, LayoutKind, Prefetch, Reader, Run, count};
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 const ENGINES: [EngineKind; 3] = [EngineKind::Soar, EngineKind::Smart, EngineKind::Kinetic];
 

@@ -3,14 +3,14 @@
 //! Whatever was written is read back from the file as whoever opens it would: header, directory, inert page, the imagery's directory. What would be refused then is refused now, and
 //! whatever had the name stays.
 
-use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
+use crate::file::disk::Disk;
+use crate::file::header::Header;
 use crate::file::lock::WriteLock;
-use crate::header::Header;
+use crate::file::source::PreadSource;
 use crate::imagery::Imagery;
-use crate::source::PreadSource;
-use crate::terrain::Terrain;
+use crate::read::terrain::Terrain;
 
 /// Publishes a terrain file in place of whatever has its name, or of the file that `over` is the lock of.
 ///
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
     use crate::build::{BuildOptions, build};
     use crate::dem::{MemoryDem, SampleType};
-    use crate::disk::SystemDisk;
+    use crate::file::disk::SystemDisk;
     use crate::progress::Silent;
 
     /// Each of a file's pages damaged in turn: what leads to it is checked, and the file that has the name stays.

@@ -14,11 +14,12 @@ mod journal;
 mod nesting;
 mod states;
 mod structure;
+pub mod unused;
 
-use crate::bytes::{PAGE_BYTES, checksum};
 use crate::error::LayoutError;
-use crate::record::{Compact, Exact8, Exact16, RecordKind};
-use crate::terrain::Terrain;
+use crate::file::bytes::{PAGE_BYTES, checksum};
+use crate::grid::record::{Compact, Exact8, Exact16, RecordKind};
+use crate::read::terrain::Terrain;
 use rayon::prelude::*;
 use std::fmt;
 

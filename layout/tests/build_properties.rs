@@ -7,10 +7,10 @@ use common::{MemoryDem, build_bytes, open_bytes};
 use proptest::prelude::*;
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::file::header::ErrorKind;
+use terrasoar_layout::grid::record::{RecordKind, Vertex, VertexClass};
 use terrasoar_layout::grid::{Grid, GridPoint};
-use terrasoar_layout::header::ErrorKind;
-use terrasoar_layout::record::{RecordKind, Vertex, VertexClass};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 fn all_points(grid: &Grid) -> impl Iterator<Item = GridPoint> + use<> {

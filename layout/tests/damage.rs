@@ -8,12 +8,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, SampleType, Window};
+use terrasoar_layout::file::source::{FailingSource, MemorySource};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::slot_of;
+use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::grid::record::{RecordKind, VertexClass};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::record::{RecordKind, VertexClass};
-use terrasoar_layout::source::{FailingSource, MemorySource};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::{VerifyReport, verify};
 use terrasoar_layout::with_records;
 

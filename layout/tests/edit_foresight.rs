@@ -11,8 +11,8 @@ use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{
     Area, Brush, BrushAction, Crater, Edit, Editor, Falloff, Foresight, SampleRect, holds_heights,
 };
-use terrasoar_layout::record::RecordKind;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::record::RecordKind;
+use terrasoar_layout::read::terrain::Terrain;
 
 const SAMPLES: [u32; 2] = [150, 120];
 

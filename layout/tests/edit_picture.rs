@@ -7,14 +7,14 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::disk::{Disk, FailingDisk, Failure, SystemDisk};
 use terrasoar_layout::edit::{Crater, Edit, EditSession, compact};
+use terrasoar_layout::file::disk::{Disk, FailingDisk, Failure, SystemDisk};
 use terrasoar_layout::imagery::{
     DrapeOptions, Extent, Imagery, MemoryImage, Paint, Region, TileFormat, TileId,
 };
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
-use terrasoar_layout::unused::unused_bytes;
+use terrasoar_layout::read::terrain::Terrain;
+use terrasoar_layout::verify::unused::unused_bytes;
 use terrasoar_layout::verify::verify;
 
 const SIZE: [u32; 2] = [600, 40];

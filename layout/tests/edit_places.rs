@@ -9,17 +9,17 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, build};
-use terrasoar_layout::bytes::Page;
 use terrasoar_layout::dem::SampleType;
-use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::{Area, Changes, Edit, EditSession, SampleRect};
-use terrasoar_layout::kinds::ByKind;
-use terrasoar_layout::loader::{Arrival, Loader, Outcome, PageRequest};
+use terrasoar_layout::file::bytes::Page;
+use terrasoar_layout::file::entries::Entry;
+use terrasoar_layout::file::source::{Fault, HostileSource, Hostility, PreadSource};
+use terrasoar_layout::grid::record::{Compact, RecordCodec};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::record::{Compact, RecordCodec};
-use terrasoar_layout::source::{Fault, HostileSource, Hostility, PreadSource};
-use terrasoar_layout::store::RecordStore;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::loader::{Arrival, Loader, Outcome, PageRequest};
+use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::read::terrain::Terrain;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -113,7 +113,7 @@ fn an_overlay_opened_before_is_read_where_its_pages_lie_by_now() {
 fn a_ring_reads_what_was_appended_since_it_was_opened() {
     let folder = tempfile::tempdir().unwrap();
     let path = terrain_in(&folder);
-    match terrasoar_layout::source::UringSource::open(&path) {
+    match terrasoar_layout::file::source::UringSource::open(&path) {
         Ok(source) => {
             let opened = Terrain::from_source(Box::new(source)).unwrap();
             follows(opened, EditSession::open(&path).unwrap(), &path, None);

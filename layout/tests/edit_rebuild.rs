@@ -6,16 +6,16 @@ use common::{MemoryDem, build_bytes, open_bytes};
 use proptest::prelude::*;
 use std::sync::Arc;
 use terrasoar_layout::build::{BuildOptions, rebuild};
-use terrasoar_layout::bytes::Page;
 use terrasoar_layout::dem::SampleType;
-use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{Changes, Editor, HeightWindow, SampleRect};
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::file::bytes::Page;
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::file::header::ErrorKind;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::header::ErrorKind;
+use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::record::RecordKind;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// A terrain in memory and its bytes.
 struct Bench {
@@ -71,7 +71,8 @@ impl Bench {
                 for i in 0..per_page as usize {
                     let range = i * bytes..(i + 1) * bytes;
                     if ours[range.clone()] != theirs[range.clone()] {
-                        let p = terrasoar_layout::order::point_of(grid.k(), logical * per_page + i as u64);
+                        let p =
+                            terrasoar_layout::grid::order::point_of(grid.k(), logical * per_page + i as u64);
                         let p = p.unwrap();
                         panic!(
                             "({}, {}) of {n}, level {}: {:?} instead of {:?}",

@@ -9,12 +9,12 @@ use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, HeightRoom, build};
 use terrasoar_layout::dem::SampleType;
-use terrasoar_layout::disk::{FailingDisk, Failure, SystemDisk};
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, history, widen};
-use terrasoar_layout::header::Header;
+use terrasoar_layout::file::disk::{FailingDisk, Failure, SystemDisk};
+use terrasoar_layout::file::header::Header;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage, Paint, Scorch};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 /// What is in the folder of a bench.

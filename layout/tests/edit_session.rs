@@ -8,11 +8,11 @@ use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::HeightRoom;
-use terrasoar_layout::disk::{Disk, FailingDisk, Failure, SystemDisk};
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, history, widen};
+use terrasoar_layout::file::disk::{Disk, FailingDisk, Failure, SystemDisk};
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 /// What a test edits: a terrain, or an overlay of it.

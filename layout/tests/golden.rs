@@ -6,7 +6,7 @@ use common::{MemoryDem, build_bytes, open_bytes};
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::{Georeference, HorizontalUnit, SampleType};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::record::VertexClass;
+use terrasoar_layout::grid::record::VertexClass;
 
 /// Heights in metres, north at the top as on a map; the void is the pit of a quarry.
 const HEIGHTS: [[f64; 5]; 4] = [

@@ -4,13 +4,13 @@ mod common;
 
 use common::drape::{Opened, draped, land, raw};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use terrasoar_layout::file::source::PreadSource;
 use terrasoar_layout::imagery::{
     DrapeOptions, Extent, ImageSource, Imagery, MemoryImage, PlaceOrigin, TileFormat, TileId, drape,
 };
 use terrasoar_layout::progress::BuildProgress;
-use terrasoar_layout::source::PreadSource;
-use terrasoar_layout::terrain::Terrain;
-use terrasoar_layout::unused::unused_bytes;
+use terrasoar_layout::read::terrain::Terrain;
+use terrasoar_layout::verify::unused::unused_bytes;
 use terrasoar_layout::verify::verify;
 
 const INNER: i64 = 504;

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terrasoar_layout::build::{BuildOptions, HeightRoom, build_on};
 use terrasoar_layout::dem::SampleType;
-use terrasoar_layout::disk::{Disk, ForgetfulDisk, PowerCut, SystemDisk};
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, widen};
+use terrasoar_layout::file::disk::{Disk, ForgetfulDisk, PowerCut, SystemDisk};
 use terrasoar_layout::imagery::{DrapeOptions, Imagery, MemoryImage, Paint, Scorch, drape_on};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 /// Seeds of what arrives: nothing, everything, and some of it in several ways.

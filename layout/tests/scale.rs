@@ -10,10 +10,10 @@ use std::path::Path;
 use std::time::Instant;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{ROOTS, child_slots, point_of, slot_count, slot_of};
+use terrasoar_layout::grid::order::{ROOTS, child_slots, point_of, slot_count, slot_of};
+use terrasoar_layout::grid::record::VertexClass;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::record::VertexClass;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 use terrasoar_layout::with_records;
 
@@ -35,7 +35,7 @@ fn islands(side: u32) -> Islands {
 /// Descends from a root to the smallest triangle around (`east`, `north`), in steps, by slots alone; gives the slots of all split vertices.
 fn walk(terrain: &Terrain, east: f64, north: f64) -> Vec<u64> {
     let k = terrain.grid().k();
-    let corners = terrasoar_layout::order::corners(k);
+    let corners = terrasoar_layout::grid::order::corners(k);
     let at = |p: GridPoint| [f64::from(p.x()), f64::from(p.y())];
     let side = |a: GridPoint, b: GridPoint| {
         let ([ax, ay], [bx, by]) = (at(a), at(b));

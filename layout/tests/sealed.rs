@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use std::time::{Duration, Instant};
-use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::testing::{Counts, Mutation, Random, Sealed, Seed, exercise, reseal, seeds};
 

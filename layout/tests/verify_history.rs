@@ -3,9 +3,9 @@
 mod common;
 
 use common::open_bytes;
-use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::edit::EditSession;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::testing::{Counts, Sealed, reseal, seeds};
 use terrasoar_layout::verify::verify;
 

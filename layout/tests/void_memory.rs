@@ -2,10 +2,10 @@
 #![cfg(target_os = "linux")]
 
 use std::sync::Arc;
-use terrasoar_layout::bytes::PAGE_BYTES;
 use terrasoar_layout::edit::{Edit, EditSession, SampleRect};
-use terrasoar_layout::edited::EditedRecords;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::testing::{Counts, reseal, seeds};
 use terrasoar_layout::verify::verify;
 use terrasoar_layout::with_records;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::flight::Flight;
 use terrasoar::view::Viewport;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::Gpu;
 use terrasoar_scene::scene::{Drawn, Scene, SceneOptions, TileService};
 

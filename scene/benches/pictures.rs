@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::view::{View, Viewport};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{Gpu, Look, Offscreen, wgpu};
 use terrasoar_scene::scene::{Scene, SceneOptions, TileService};
 

@@ -16,7 +16,7 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::imagery::{Imagery, PaintedTile, TileFormat, TileId};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{FrameView, ImageTileId, ImageryFormat, ImageryShape, RenderError, Renderer};
 
 /// Tiles of the current view on a frame's list.

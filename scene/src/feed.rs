@@ -7,11 +7,11 @@ use terrasoar::refine::{Culling, Probe, Work};
 use terrasoar::stream::GroundPatch;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::directory::Entry;
+use terrasoar_layout::file::entries::Entry;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::record::{RecordCodec, Vertex};
-use terrasoar_layout::records::Records;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::record::{RecordCodec, Vertex};
+use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::store::RecordStore;
 use terrasoar_render::{HEIGHTS_PER_TILE, MeshVertex, TILE_BORDER, TILE_CELLS, TileId};
 
 /// What an update of the mesh did.

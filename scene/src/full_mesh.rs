@@ -10,8 +10,8 @@ use terrasoar::refine::{Culling, Engine, Unobserved, Work};
 use terrasoar::stream::sound;
 use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::records::Records;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::records::Records;
 use terrasoar_render::TileId;
 
 /// SOAR and its mesh.

@@ -6,9 +6,9 @@ use terrasoar::refine::kinetic::{Kinetic, Patch};
 use terrasoar::refine::{Culling, Engine};
 use terrasoar::stream::sound;
 use terrasoar::view::View;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::records::Records;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 use terrasoar_render::TileId;
 

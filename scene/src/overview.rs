@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use terrasoar::view::{View, Viewport};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Heading of the overview, degrees: the light comes from the left, as on maps.
 const YAW_DEG: f64 = 16.0;

@@ -7,9 +7,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{EditSession, Repainted};
-use terrasoar_layout::header::ImageryPlace;
+use terrasoar_layout::file::header::ImageryPlace;
 use terrasoar_layout::imagery::{Imagery, PaintedTile, Painter, TileId};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Bytes of tiles that are read beforehand at most: 64 tiles of BC1, what a few strokes change in all levels.
 const READ_BYTES: usize = 8 << 20;

@@ -24,10 +24,10 @@ use terrasoar::refine::Culling;
 use terrasoar::stream::GroundPatch;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::Edit;
+use terrasoar_layout::file::entries::Entry;
 use terrasoar_layout::imagery::{Imagery, Paint};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{
     Frame, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target, TerrainShape,
     TileId, TileStats, UploadStats, wgpu,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 use terrasoar::view::View;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{FrameView, TerrainShape};
 
 /// Frames ahead of the eye that tiles of the image are asked for.

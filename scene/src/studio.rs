@@ -6,7 +6,7 @@
 use super::feed::Refined;
 use super::scene::{Scene, SceneError, SceneOptions};
 use terrasoar::view::{View, Viewport};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{Capabilities, Gpu, Look, Offscreen, RenderError};
 
 /// Takes pictures of one terrain, all of one size.

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::imagery::{Imagery, TileId, decode_tile};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::ImageTileId;
 
 /// Threads that read and decode.

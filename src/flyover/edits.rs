@@ -6,9 +6,9 @@ use crate::refine::ground::GroundChange;
 use std::sync::Arc;
 use std::time::Instant;
 use terrasoar_layout::edit::{Changes, Edit, Editor};
-use terrasoar_layout::edited::EditedRecords;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Edits that happen before one frame of a flight.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use crate::mesh::{Triangle, is_drawn};
 use crate::refine::Engine;
 use std::collections::HashMap;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 /// One frame's drawn triangles with shared vertices.
 #[derive(Debug, Clone, Default, PartialEq)]

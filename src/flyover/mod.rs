@@ -24,9 +24,9 @@ use mesh::collect_mesh;
 use passes::{FrameTimes, count_frames, time_updates};
 use sets::{FrameSets, not_in};
 use std::sync::Arc;
-use terrasoar_layout::edited::EditedRecords;
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// The engines, by name.
@@ -213,7 +213,7 @@ pub fn replay(
 /// use std::{path::Path, sync::Arc};
 /// use terrasoar::flyover::{EngineKind, Quality, TimedBatch, replay_edited};
 /// use terrasoar_layout::edit::{Crater, Edit};
-/// use terrasoar_layout::terrain::Terrain;
+/// use terrasoar_layout::read::terrain::Terrain;
 ///
 /// let terrain = Arc::new(Terrain::open(Path::new("alps.iqt"))?);
 /// let crater = Crater { centre_m: [5e3, 4e3], direction_deg: 90.0, radius_m: 40.0, depth_m: 12.0 };
@@ -254,7 +254,7 @@ fn timed(mut stats: Vec<FrameStats>, times: Vec<FrameTimes>) -> Vec<FrameStats> 
     stats
 }
 
-fn records_of(terrain: &Terrain) -> Result<terrasoar_layout::kinds::AnyRecords<'_>, ReplayError> {
+fn records_of(terrain: &Terrain) -> Result<terrasoar_layout::read::kinds::AnyRecords<'_>, ReplayError> {
     terrain.records().ok_or_else(|| ReplayError::NotInAddressSpace(terrain.path().display().to_string()))
 }
 

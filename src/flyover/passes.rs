@@ -7,8 +7,8 @@ use crate::flight::FlightFrame;
 use crate::refine::{Engine, Phase, Probe};
 use crate::stats::FrameStats;
 use std::time::Instant;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::records::Records;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::records::Records;
 
 /// Times of one frame.
 pub(super) struct FrameTimes {

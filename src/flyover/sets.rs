@@ -4,7 +4,7 @@ use crate::mesh::{TriangleKey, is_drawn, parent, with_apex_first};
 use crate::refine::Engine;
 use std::collections::HashSet;
 use std::hash::{BuildHasherDefault, Hasher};
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 /// How many of sorted `a` are not in sorted `b`.
 pub(super) fn not_in(a: &[TriangleKey], b: &[TriangleKey]) -> u64 {

@@ -1,8 +1,8 @@
 //! What engines are told when the ground was edited, and which of their vertices that can concern.
 
 use std::ops::Range;
-use terrasoar_layout::bytes::Page;
 use terrasoar_layout::edit::SampleRect;
+use terrasoar_layout::file::bytes::Page;
 use terrasoar_layout::grid::{Grid, GridPoint};
 
 /// A change of the ground between two frames.

@@ -15,7 +15,7 @@ mod strip;
 use crate::mesh::Triangle;
 use crate::view::View;
 use ground::GroundChange;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 /// Where what lies out of view is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

@@ -9,8 +9,8 @@ use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{corners, slot_of};
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::order::{corners, slot_of};
+use terrasoar_layout::read::store::RecordStore;
 
 /// Steps a side of the largest square that replays use it for: half a second a frame.
 pub const MOST_STEPS: u32 = 1 << 12;

@@ -22,8 +22,8 @@ use crate::metric::Metric;
 use crate::view::View;
 use std::ops::Range;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
+use terrasoar_layout::read::store::RecordStore;
 
 /// Status bit: the vertex is selected and not culled.
 const ACTIVE: u32 = 1 << 31;

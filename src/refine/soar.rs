@@ -12,8 +12,8 @@ use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
+use terrasoar_layout::read::store::RecordStore;
 
 /// A vertex of the strip: 12 bytes, ready to be uploaded.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::atomic_file::AtomicFile;
+use terrasoar_layout::file::atomic::AtomicFile;
 
 /// Links that are followed before it is given up.
 const MOST_LINKS: usize = 40;

@@ -4,11 +4,11 @@
 //! the file as any other, which lies elsewhere. Cost: 4 KiB a page that differs from the file, as many as a stroke touches where strokes are committed.
 
 use std::collections::HashMap;
-use terrasoar_layout::bytes::Page;
-use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::{Changes, Editor, SampleRect};
-use terrasoar_layout::pool::PagePool;
-use terrasoar_layout::record::RecordCodec;
+use terrasoar_layout::file::bytes::Page;
+use terrasoar_layout::file::entries::Entry;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::pool::PagePool;
 
 /// What edits, an undo or a redo made of the ground, apart from the editor that did it: what one thread does another may show.
 #[derive(Debug, Clone, Default)]

@@ -1,8 +1,8 @@
 //! What brings pages: threads that read a file, or a model of a disk that makes every replay the same.
 
 use std::time::Duration;
-use terrasoar_layout::directory::Entry;
-use terrasoar_layout::loader::{Arrival, Loader, PageRequest};
+use terrasoar_layout::file::entries::Entry;
+use terrasoar_layout::read::loader::{Arrival, Loader, PageRequest};
 
 /// Brings pages that were asked for.
 pub trait Fetch {

@@ -11,9 +11,9 @@
 use crate::metric::{ALL_PLANES, Metric};
 use crate::refine::Culling;
 use crate::view::View;
+use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
 use terrasoar_layout::grid::{Grid, GridPoint};
-use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 /// A view and what of its surroundings is to be at hand.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -30,14 +30,14 @@ use lead::Lead;
 use requests::Requests;
 use std::collections::{HashMap, VecDeque};
 use std::time::{Duration, Instant};
-use terrasoar_layout::bytes::Page;
-use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::loader::Outcome;
-use terrasoar_layout::pool::PagePool;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::file::bytes::Page;
+use terrasoar_layout::file::entries::Entry;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::loader::Outcome;
+use terrasoar_layout::read::pool::PagePool;
+use terrasoar_layout::read::store::RecordStore;
 
 /// Pages put into the pool in one frame at most: two megabytes are copied in a fraction of a millisecond.
 const INSTALLS_A_FRAME: usize = 512;

@@ -3,9 +3,9 @@
 use super::Fetch;
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::Arc;
-use terrasoar_layout::directory::Entry;
-use terrasoar_layout::loader::{Arrival, Outcome, PageRequest, STALE_FRAMES};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::entries::Entry;
+use terrasoar_layout::read::loader::{Arrival, Outcome, PageRequest, STALE_FRAMES};
+use terrasoar_layout::read::terrain::Terrain;
 
 /// The model over a terrain, whose source it reads at once and hands over later.
 #[derive(Debug)]

@@ -4,7 +4,7 @@
 //! each time. Cost: a look into a table a page that is wanted.
 
 use std::collections::HashMap;
-use terrasoar_layout::loader::{PageRequest, STALE_FRAMES};
+use terrasoar_layout::read::loader::{PageRequest, STALE_FRAMES};
 
 /// A page needed earlier by no more frames than this is not asked for again.
 const SLACK: u64 = 4;

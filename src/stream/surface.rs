@@ -1,13 +1,13 @@
 //! The height of the ground at a place, from whatever records are at hand.
 //!
-//! With the four samples around the place at hand it is their bilinear mean, as [`Terrain::height_m`](terrasoar_layout::terrain::Terrain::height_m) gives it. Where one is
+//! With the four samples around the place at hand it is their bilinear mean, as [`Terrain::height_m`](terrasoar_layout::read::terrain::Terrain::height_m) gives it. Where one is
 //! away it is the height of the finest triangle around the place whose corners are at hand, off by no more than the error of the vertex that would split it.
 //! Cost: four records, or two a level of the way down to that triangle.
 
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners, slot_of};
-use terrasoar_layout::record::Vertex;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners, slot_of};
+use terrasoar_layout::grid::record::Vertex;
+use terrasoar_layout::read::store::RecordStore;
 
 /// A height, and how good it is.
 #[derive(Debug, Clone, Copy, PartialEq)]

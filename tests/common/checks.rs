@@ -6,7 +6,7 @@ use terrasoar::mesh::{Triangle, TriangleKey, has_area, is_drawn, twice_area, wit
 use terrasoar::refine::Engine;
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 pub const VIEWPORT: Viewport = Viewport { width_px: 320, height_px: 240 };
 

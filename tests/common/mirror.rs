@@ -3,7 +3,7 @@
 use terrasoar::mesh::{Triangle, TriangleKey, is_drawn};
 use terrasoar::refine::kinetic::{Kinetic, NO_LEVEL, Patch, PatchVertex};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 #[derive(Default)]
 pub struct Mirror {

@@ -8,11 +8,11 @@ use terrasoar::flight::FlightFrame;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Changes, Editor};
-use terrasoar_layout::edited::EditedRecords;
+use terrasoar_layout::file::source::MemorySource;
+use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::source::MemorySource;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Builds a terrain in memory.
 pub fn terrain_of(dem: &MemoryDem, options: &BuildOptions) -> Terrain {

@@ -9,8 +9,8 @@ use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use terrasoar_layout::build::{BuildOptions, build};
-use terrasoar_layout::header::{ErrorKind, Header, SpacingOrigin};
-use terrasoar_layout::record::RecordKind;
+use terrasoar_layout::file::header::{ErrorKind, Header, SpacingOrigin};
+use terrasoar_layout::grid::record::RecordKind;
 
 /// Make a terrain file (.iqt) from elevation data.
 ///

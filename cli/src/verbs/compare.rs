@@ -12,7 +12,7 @@ use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
 use terrasoar::stats::{Comparison, FrameStats};
 use terrasoar_lab::report::{ComparisonReport, FLIGHT_PICTURE, FlightPicture, ReportTitle};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Fly a recorded flight with several engines, compare them and write a report.
 ///

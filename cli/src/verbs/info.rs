@@ -6,8 +6,8 @@ use anyhow::Result;
 use serde::Serialize;
 use terrasoar_layout::edit::history;
 use terrasoar_layout::imagery::Imagery;
-use terrasoar_layout::terrain::Terrain;
-use terrasoar_layout::unused::unused_bytes;
+use terrasoar_layout::read::terrain::Terrain;
+use terrasoar_layout::verify::unused::unused_bytes;
 
 /// Show what a terrain file says about itself.
 ///

@@ -5,7 +5,7 @@ use anyhow::{Context, Result};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use terrasoar::flyover::FrameMesh;
-use terrasoar_layout::atomic_file::AtomicFile;
+use terrasoar_layout::file::atomic::AtomicFile;
 
 /// What to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

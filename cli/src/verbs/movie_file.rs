@@ -14,7 +14,7 @@ use std::thread::JoinHandle;
 use terrasoar::sink::FolderSink;
 use terrasoar::view::Viewport;
 use terrasoar_lab::picture;
-use terrasoar_layout::atomic_file::AtomicFile;
+use terrasoar_layout::file::atomic::AtomicFile;
 
 /// What a movie is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

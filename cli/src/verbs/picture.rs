@@ -9,7 +9,7 @@ use terrasoar::flyover::Quality;
 use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
 use terrasoar_lab::picture::encode;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
 use terrasoar_render::{Contours, LOOKS, Look, Sun};
 use terrasoar_scene::mapped::PictureEngine;

@@ -15,7 +15,7 @@ use terrasoar::refine::Culling;
 use terrasoar::stats::{FrameStats, ReplaySummary};
 use terrasoar::view::Viewport;
 use terrasoar_lab::report::{ReportFile, write_frames_csv};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Fly a recorded flight with one engine and print what it cost.
 ///

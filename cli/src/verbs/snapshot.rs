@@ -15,7 +15,7 @@ use terrasoar::flight::Flight;
 use terrasoar::flyover::ReplayError;
 use terrasoar::sink::FileSink;
 use terrasoar::view::View;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::Haze;
 use terrasoar_scene::overview::{FOV_DEG, overview, towards_middle, view_from};
 use terrasoar_scene::studio::Studio;

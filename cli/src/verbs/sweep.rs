@@ -12,7 +12,7 @@ use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::{EngineKind, Quality, mean_incoherence_percent};
 use terrasoar::stats::Comparison;
 use terrasoar_lab::report::SweepPoint;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Frames a point.
 const FRAMES: usize = 120;

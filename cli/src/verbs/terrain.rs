@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 use std::path::{Path, PathBuf};
-use terrasoar_layout::header::{Header, SpacingOrigin};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::header::{Header, SpacingOrigin};
+use terrasoar_layout::read::terrain::Terrain;
 
 use super::output::decimal;
 

@@ -4,7 +4,7 @@
 
 use terrasoar::flight::generate::Ground;
 use terrasoar_layout::grid::Grid;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_scene::feed::Feed;
 
 /// Heights of a terrain on show.

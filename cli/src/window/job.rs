@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use terrasoar_layout::build::{BuildOptions, build};
-use terrasoar_layout::header::SpacingOrigin;
+use terrasoar_layout::file::header::SpacingOrigin;
 use terrasoar_layout::progress::BuildProgress;
 
 /// How a build gets on.
@@ -150,7 +150,7 @@ mod tests {
         let built = run(&input).unwrap();
         assert_eq!(built.path, folder.path().join("puget.iqt"));
         assert!(built.note.unwrap().contains("--spacing"));
-        let terrain = terrasoar_layout::terrain::Terrain::open(&built.path).unwrap();
+        let terrain = terrasoar_layout::read::terrain::Terrain::open(&built.path).unwrap();
         assert_eq!(terrain.grid().samples(), [1025, 1025]);
         assert_eq!(output_for(&input), folder.path().join("puget-2.iqt"), "nothing is replaced");
     }

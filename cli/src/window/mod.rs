@@ -29,7 +29,7 @@ mod workshop;
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 pub(crate) use keys::list as list_of_keys;
 

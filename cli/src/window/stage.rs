@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terrasoar::refine::Culling;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::Gpu;
 use terrasoar_scene::scene::{Scene, SceneOptions, TileService};
 

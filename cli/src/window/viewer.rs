@@ -32,7 +32,7 @@ use std::time::{Duration, Instant};
 use terrasoar::flight::Flight;
 use terrasoar::flight::generate::Ground;
 use terrasoar::view::View;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use winit::event_loop::{EventLoopProxy, OwnedDisplayHandle};
 use winit::window::Window;
 

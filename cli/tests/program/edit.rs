@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, text};
 use serde_json::json;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 const HEAD: &str = "terrasoar-edits 1\nunits metres degrees\n";
 

@@ -3,7 +3,7 @@
 use crate::edit::{heights, read, with_script, write};
 use std::path::Path;
 use std::time::Duration;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 #[test]
 fn a_second_writer_is_told() {

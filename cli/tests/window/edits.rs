@@ -5,11 +5,11 @@ use super::{Outcome, ensure};
 use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::build::{HeightRoom, rebuild};
-use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{EditSession, history};
+use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::imagery::{DrapeOptions, ImageSource, MemoryImage, TileFormat, drape};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 
 /// A copy of the terrain with room for other heights.
@@ -185,7 +185,7 @@ pub fn ground_and_picture_changed_by_hand(display: &Display) -> Outcome {
 /// Whether the ground is that of another file, page by page.
 fn same_pages(path: &Path, original: &[u8]) -> Outcome {
     let open = |bytes: Vec<u8>| {
-        Terrain::from_source(Box::new(terrasoar_layout::source::MemorySource::new("original", bytes)))
+        Terrain::from_source(Box::new(terrasoar_layout::file::source::MemorySource::new("original", bytes)))
     };
     let now = Terrain::open(path).map_err(|e| e.to_string())?;
     let then = open(original.to_vec()).map_err(|e| e.to_string())?;

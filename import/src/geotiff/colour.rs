@@ -16,8 +16,8 @@ use rayon::prelude::*;
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use terrasoar_layout::disk::read_at;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::file::disk::read_at;
 use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
 
 /// Rows of strips unpacked at once, about.

@@ -7,8 +7,8 @@
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::Path;
-use terrasoar_layout::disk::read_at;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::file::disk::read_at;
 
 /// Chunks whose places are at hand at once.
 const BLOCK: u64 = 1024;

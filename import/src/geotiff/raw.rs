@@ -15,8 +15,8 @@ use super::convert::Void;
 use super::listing::Places;
 use super::{put_constant, rows_at_once};
 use terrasoar_layout::dem::{SampleSink, Window};
-use terrasoar_layout::disk::read_at;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::file::disk::read_at;
 
 /// Bytes read at once, unless a row of the image has more.
 const LARGEST_READ: u64 = 4 << 20;

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::Read;
-use terrasoar_layout::disk::read_at;
+use terrasoar_layout::file::disk::read_at;
 
 /// Longest chunk of ZSTD that is unpacked at once where its window is larger than itself.
 pub(super) const LARGEST_WHOLE: u64 = 8 << 20;

@@ -9,11 +9,11 @@ use super::noise::{fractal, hash, signed_unit, smoothstep};
 use super::tiff_header;
 use rayon::prelude::*;
 use std::path::Path;
-use terrasoar_layout::disk::write_at;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::atomic::AtomicFile;
+use terrasoar_layout::file::disk::write_at;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Texels a side of the tiles written.

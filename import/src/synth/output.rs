@@ -9,8 +9,8 @@ use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, StreamWriter
 
 use super::{HEIGHT_SCALE, tiff_header};
 use crate::{PNG_HEIGHT_SCALE_KEY, PNG_SPACING_KEY};
-use terrasoar_layout::atomic_file::AtomicFile;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::file::atomic::AtomicFile;
 
 /// The words of a PNG, in their order.
 pub(super) const PNG_KEYS: [&str; 2] = [PNG_SPACING_KEY, PNG_HEIGHT_SCALE_KEY];

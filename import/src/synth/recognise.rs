@@ -12,7 +12,7 @@ use png::{BitDepth, ColorType, Decoder, Limits};
 use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
-use terrasoar_layout::disk::read_at;
+use terrasoar_layout::file::disk::read_at;
 
 /// Longest header that is compared: that of a picture of 800 GB.
 const MAX_TILES: u64 = 1 << 20;
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
     use terrasoar_layout::build::{BuildOptions, build};
     use terrasoar_layout::progress::Silent;
-    use terrasoar_layout::terrain::Terrain;
+    use terrasoar_layout::read::terrain::Terrain;
 
     #[test]
     fn what_is_made_here_is_known_and_nothing_else() {

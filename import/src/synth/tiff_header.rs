@@ -5,7 +5,7 @@
 
 use super::HEIGHT_SCALE;
 use terrasoar_layout::dem::HorizontalUnit;
-use terrasoar_layout::header::Header;
+use terrasoar_layout::file::header::Header;
 
 const SHORT: u16 = 3;
 const LONG: u16 = 4;

@@ -16,10 +16,10 @@ use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Probe};
 use terrasoar::stream::ExtendedView;
 use terrasoar::view::View;
-use terrasoar_layout::bytes::PAGE_BYTES;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::records::Records;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 const LINES_PER_PAGE: u64 = PAGE_BYTES as u64 / LINE_BYTES;

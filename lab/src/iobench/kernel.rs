@@ -2,7 +2,7 @@
 //!
 //! Linux tells all of it in files under /proc, and takes the order to forget through `posix_fadvise`. Elsewhere, and where /proc is not mounted, every answer is
 //! `None`: not known, which is not 0. How much of a file is in memory is asked where files are mapped
-//! ([`resident_bytes`](terrasoar_layout::source::resident_bytes)). Cost: one small
+//! ([`resident_bytes`](terrasoar_layout::file::source::resident_bytes)). Cost: one small
 //! file read an answer, some tens of microseconds, so ask outside what is timed.
 
 use std::path::Path;

@@ -11,11 +11,11 @@
 //! differs. A 20-byte record may lie across two lines or pages and then touches both. Invariant: no two grid points share a byte, but for those whose page is
 //! absent from the terrain file, which all read the inert page. Cost: a few shifts a record.
 
-use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::file::header::INERT_PAGE;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::header::INERT_PAGE;
-use terrasoar_layout::order::{point_of, slot_count, spread};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::order::{point_of, slot_count, spread};
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Bytes of a record that holds what SOAR's does.
 pub const SOAR_RECORD_BYTES: u64 = 20;
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
     use terrasoar::testing::{padded_terrain, square_terrain};
-    use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, child_slots, corners, slot_of};
+    use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners, slot_of};
 
     fn points(k: u32) -> impl Iterator<Item = GridPoint> {
         let n = 1 << k;

@@ -33,7 +33,7 @@ use terrasoar::flyover::EngineKind;
 use terrasoar_layout::{LayoutError, Remedy};
 
 /// Bytes a page.
-const PAGE_BYTES: u64 = terrasoar_layout::bytes::PAGE_BYTES as u64;
+const PAGE_BYTES: u64 = terrasoar_layout::file::bytes::PAGE_BYTES as u64;
 
 /// Who reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

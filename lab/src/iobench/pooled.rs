@@ -12,10 +12,10 @@ use terrasoar::refine::{Culling, Unobserved};
 use terrasoar::stream::{Prefetch, StreamFrame, Streamed, Threads};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::loader::{Loader, LoaderStats};
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::source::resident_bytes;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::source::resident_bytes;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::loader::{Loader, LoaderStats};
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Longest that the first frame waits for its pages.
@@ -47,7 +47,9 @@ impl ReadBy {
         match self {
             Self::Threads => Terrain::open_unmapped(path),
             #[cfg(target_os = "linux")]
-            Self::Ring => Terrain::from_source(Box::new(terrasoar_layout::source::UringSource::open(path)?)),
+            Self::Ring => {
+                Terrain::from_source(Box::new(terrasoar_layout::file::source::UringSource::open(path)?))
+            }
             #[cfg(not(target_os = "linux"))]
             Self::Ring => Err(LayoutError::Usage("io_uring is Linux's; read by threads here".into())),
         }

@@ -10,7 +10,7 @@ use std::fs::File;
 use std::hint::black_box;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use terrasoar_layout::source::{MapSource, Source};
+use terrasoar_layout::file::source::{MapSource, Source};
 
 /// Room to leave on the disk.
 const SPARE_BYTES: u64 = 256 << 20;

@@ -8,7 +8,7 @@ use super::{FrameIo, PAGE_BYTES, Pooled, Run, Timed, UpdateCost};
 use serde::Serialize;
 use terrasoar::stats::TimeSpread;
 use terrasoar::stream::StreamFrame;
-use terrasoar_layout::loader::LoaderStats;
+use terrasoar_layout::read::loader::LoaderStats;
 
 /// All figures of a flight, and with what means they were taken.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -14,10 +14,10 @@ use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::View;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::records::Records;
-use terrasoar_layout::source::resident_bytes;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::file::source::resident_bytes;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// One update as clock and kernel saw it.

@@ -14,8 +14,8 @@ use terrasoar::stream::{Streamed, Threads, sound};
 use terrasoar::view::{View, Viewport};
 use terrasoar_lab::iobench::{CountOptions, LayoutKind, Prefetch, Reader, count};
 use terrasoar_layout::edit::{Crater, Edit, SampleRect};
-use terrasoar_layout::loader::Loader;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::loader::Loader;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Frames near the ground, far above it and turning.

@@ -10,13 +10,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::refine::{Culling, Unobserved};
 use terrasoar::stream::{Prefetch, Streamed, Threads};
-use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::kinds::ByKind;
-use terrasoar_layout::loader::Loader;
-use terrasoar_layout::order::slot_of;
-use terrasoar_layout::source::MemorySource;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::loader::Loader;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::testing::{Counts, Random, reseal, seeds};
 
 /// Longest that all uses of one small file may take.

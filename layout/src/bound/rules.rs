@@ -5,9 +5,9 @@
 
 use super::padding::{deviation, has_area};
 use super::{larger, smaller};
+use crate::file::header::ErrorKind;
+use crate::grid::record::{RecordCodec, RecordScale, Vertex, VertexClass, f32_at_least};
 use crate::grid::{Grid, GridPoint};
-use crate::header::ErrorKind;
-use crate::record::{RecordCodec, RecordScale, Vertex, VertexClass, f32_at_least};
 
 /// Factor on nested radii: twice the margin that FORMAT.md promises.
 const MARGIN: f64 = 1.0 + 1.0 / (1 << 19) as f64;

@@ -4,9 +4,9 @@
 
 use super::levels::{LevelShape, Levels};
 use super::plan::{PagePart, block_bounds};
+use crate::grid::order::{BLOCK_SLOTS, BlockPoints, level_slots};
+use crate::grid::record::RecordCodec;
 use crate::grid::{Grid, GridPoint};
-use crate::order::{BLOCK_SLOTS, BlockPoints, level_slots};
-use crate::record::RecordCodec;
 
 /// Rows that a block of slots can touch, and one more: 32 for white vertices, 63 for black ones, whose blocks stand on a corner.
 const ROWS: usize = 64;

@@ -6,7 +6,7 @@ use super::BuildOptions;
 use crate::dem::SampleType;
 use crate::error::LayoutError;
 use crate::grid::Grid;
-use crate::record::RecordKind;
+use crate::grid::record::RecordKind;
 use crate::remedy::Remedy;
 
 /// Mebibyte.
@@ -55,7 +55,7 @@ impl MemoryPlan {
             (_, false) => 16,
         };
         // Pages of the directory and their plan, some 34 bytes each.
-        let directory = crate::order::slot_count(grid.k()) * record_bytes / 4096 * 34;
+        let directory = crate::grid::order::slot_count(grid.k()) * record_bytes / 4096 * 34;
         let fixed = RESERVED_BYTES + directory;
         let work = |tile: u32| {
             let tile = u64::from(tile);

@@ -5,10 +5,10 @@
 //! to be all void are taken out at the end. Cost: a few blocks a part, single slots only along the data's outline.
 
 use super::levels::LevelShape;
-use crate::bytes::to_usize;
 use crate::error::LayoutError;
+use crate::file::bytes::to_usize;
 use crate::grid::Grid;
-use crate::order::{BLOCK_SLOTS, level_slots, point_of, slot_count};
+use crate::grid::order::{BLOCK_SLOTS, level_slots, point_of, slot_count};
 use rayon::prelude::*;
 
 /// The slots of one page that lie in one block of one level: gathered together once the last of their rows is known. There are some two a
@@ -142,7 +142,7 @@ fn block_rows(k: u32, shape: &LevelShape, base: u64, offset: u64, order: u32, ro
 
 /// Bounds in x and y of a block of 4^order slots, ghosts included.
 pub(super) fn block_bounds(k: u32, shape: &LevelShape, offset: u64, order: u32) -> [[i64; 2]; 2] {
-    use crate::order::{black_block_at, white_block_at};
+    use crate::grid::order::{black_block_at, white_block_at};
     let d = k - 1 - shape.level() / 2;
     let t = shape.level() / 2;
     let last = (1i64 << order) - 1;

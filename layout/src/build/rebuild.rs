@@ -6,16 +6,16 @@ use super::spool::Spool;
 use super::survey::HeightCode;
 use super::{BuildOptions, MemoryPlan, Work};
 use crate::dem::{DemInfo, DemSource, Georeference, SampleSink, SampleType, Window};
-use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
+use crate::file::disk::Disk;
+use crate::file::header::Header;
 use crate::grid::GridPoint;
-use crate::header::Header;
+use crate::grid::record::{RecordCodec, RecordKind, RecordScale};
 use crate::progress::BuildProgress;
 use crate::publish::publish_terrain;
-use crate::record::{RecordCodec, RecordKind, RecordScale};
-use crate::records::Records;
-use crate::terrain::Terrain;
+use crate::read::records::Records;
+use crate::read::terrain::Terrain;
 use crate::with_records;
 use rayon::prelude::*;
 use std::path::Path;
@@ -55,7 +55,7 @@ impl<C: RecordCodec> DemSource for OwnHeights<'_, C> {
             for row in first..first + rows {
                 let y = high - 1 - row;
                 samples.extend((0..wide).map(|x| {
-                    let raw = self.records.raw(crate::order::slot_of(k, GridPoint::new(x, y)));
+                    let raw = self.records.raw(crate::grid::order::slot_of(k, GridPoint::new(x, y)));
                     let is_void = self.records.decode(raw, 0).class.is_void();
                     if is_void { f64::NAN } else { C::height_value(raw) }
                 }));
@@ -178,7 +178,7 @@ fn kept_fill<C: RecordCodec>(records: &Records<'_, C>, void: GridPoint) -> Optio
         (padding_to(void.x(), wide, void.y()), padding_to(void.y(), high, void.x()))
     };
     let images = (void.y()..=y_to).flat_map(|y| (void.x()..=x_to).map(move |x| GridPoint::new(x, y)));
-    let mut raws = images.map(|p| records.raw(crate::order::slot_of(grid.k(), p)));
+    let mut raws = images.map(|p| records.raw(crate::grid::order::slot_of(grid.k(), p)));
     raws.find(|raw| *raw != C::INERT).map(C::height_value)
 }
 

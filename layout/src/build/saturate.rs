@@ -7,9 +7,9 @@ use super::levels::{LevelShape, Levels};
 use super::scan::OwnErrors;
 use crate::bound::{Below, FIRST_SCANNED, Rules};
 use crate::error::LayoutError;
+use crate::file::header::ErrorKind;
+use crate::grid::record::{RecordCodec, VertexClass};
 use crate::grid::{Grid, GridPoint};
-use crate::header::ErrorKind;
-use crate::record::{RecordCodec, VertexClass};
 use std::sync::atomic::Ordering;
 
 /// Makes records; one for a whole build.

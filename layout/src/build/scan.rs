@@ -10,8 +10,8 @@ use super::levels::{Levels, index_in};
 use crate::bound::{
     Plane, Samples, farthest_diagonal, farthest_level, farthest_upright, larger, scanned_error_m,
 };
+use crate::grid::order::corners;
 use crate::grid::{Grid, GridPoint};
-use crate::order::corners;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -2,7 +2,7 @@
 
 use crate::dem::{DemInfo, Georeference, HorizontalUnit};
 use crate::error::LayoutError;
-use crate::header::SpacingOrigin;
+use crate::file::header::SpacingOrigin;
 use crate::remedy::Remedy;
 use crate::words::number;
 

@@ -7,9 +7,9 @@
 
 use crate::bound::range;
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
-use crate::disk::Disk;
 use crate::error::LayoutError;
 use crate::error::is_full;
+use crate::file::disk::Disk;
 use crate::remedy::Remedy;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -105,7 +105,7 @@ impl<'a> Spool<'a> {
         let double = !info.sample_type.fits_f32();
         let bytes = u64::from(info.samples_wide) * u64::from(info.samples_high) * if double { 8 } else { 4 };
         let storage = if bytes <= memory_bytes {
-            Storage::Memory(RwLock::new(vec![0; crate::bytes::to_usize(bytes)?]))
+            Storage::Memory(RwLock::new(vec![0; crate::file::bytes::to_usize(bytes)?]))
         } else {
             let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
             let file = tempfile::tempfile_in(folder)

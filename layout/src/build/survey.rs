@@ -5,7 +5,7 @@ use crate::bound::{larger, largest_difference};
 use crate::dem::{DemInfo, SampleType};
 use crate::error::LayoutError;
 use crate::grid::Grid;
-use crate::record::{RecordKind, RecordScale};
+use crate::grid::record::{RecordKind, RecordScale};
 use crate::remedy::Remedy;
 use crate::words::number;
 use rayon::prelude::*;

@@ -8,49 +8,34 @@
 //!
 //! Invariant: after any batch every record is the one that a build in the file's own scale makes of the edited heights; a batch that fails changes nothing.
 
-mod area;
-mod brush;
-pub(crate) mod check;
-mod commit;
-mod compact;
-mod core;
-mod crater;
-mod farthest;
-mod foresight;
-mod ground;
-mod near;
-mod operation;
-mod pages;
+mod engine;
+pub(crate) mod operations;
 mod session;
-mod stamp;
-mod update;
-mod widen;
-mod window;
 
-pub use area::Area;
-pub use brush::{Brush, BrushAction, Falloff};
-pub use check::MAX_EDIT_SAMPLES;
-pub use commit::CommitJob;
-pub use compact::{Compacted, compact};
-pub use crater::Crater;
-pub use foresight::{Foresight, holds_heights};
-pub use operation::Edit;
+pub use engine::foresight::{Foresight, holds_heights};
+pub use operations::area::Area;
+pub use operations::brush::{Brush, BrushAction, Falloff};
+pub use operations::check::MAX_EDIT_SAMPLES;
+pub use operations::crater::Crater;
+pub use operations::edit::Edit;
+pub use operations::stamp::{Stamp, StampMode};
+pub use operations::window::{HeightWindow, SampleRect};
+pub use session::commit::CommitJob;
+pub use session::compact::{Compacted, compact};
 pub use session::picture::Repainted;
+pub use session::widen::widen;
 pub use session::{Committed, EditSession, HistoryEntry, history};
-pub use stamp::{Stamp, StampMode};
-pub use widen::widen;
-pub use window::{HeightWindow, SampleRect};
 
-use self::core::{Core, Replacement};
-use crate::bytes::Page;
-use crate::directory::Entry;
 use crate::error::LayoutError;
+use crate::file::bytes::Page;
+use crate::file::entries::Entry;
+use crate::file::header::Header;
 use crate::grid::GridPoint;
-use crate::header::Header;
-use crate::kinds::ByKind;
-use crate::record::{Compact, Exact8, Exact16, Vertex};
-use crate::terrain::Terrain;
+use crate::grid::record::{Compact, Exact8, Exact16, Vertex};
+use crate::read::kinds::ByKind;
+use crate::read::terrain::Terrain;
 use crate::with_records;
+use engine::core::{Core, Replacement};
 use std::sync::Arc;
 
 /// What a batch of edits, an undo or a redo changed.
@@ -77,13 +62,13 @@ impl Editor {
     pub fn new(terrain: Arc<Terrain>) -> Self {
         let (grid, scale) = (*terrain.grid(), terrain.header().scale);
         let core = match terrain.header().record_kind {
-            crate::record::RecordKind::Compact => {
+            crate::grid::record::RecordKind::Compact => {
                 ByKind::Compact(Core::new(terrain, Compact::new(&grid, &scale)))
             }
-            crate::record::RecordKind::Exact8 => {
+            crate::grid::record::RecordKind::Exact8 => {
                 ByKind::Exact8(Core::new(terrain, Exact8::new(&grid, &scale)))
             }
-            crate::record::RecordKind::Exact16 => {
+            crate::grid::record::RecordKind::Exact16 => {
                 ByKind::Exact16(Core::new(terrain, Exact16::new(&grid, &scale)))
             }
         };

@@ -11,9 +11,9 @@
 //! **A nameless file cannot replace another.** Where the target exists it gets a name of its own first, `.NAME.*.terrasoar-new`, and is renamed at once. A process killed between
 //! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away. What has a name before it is complete is on the list of [`unfinished`].
 
+use super::disk::{Disk, SystemDisk};
 use super::lock::{ReplaceLock, WriteLock};
 use super::seen::Seen;
-use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
 use crate::unfinished;
 use std::fs::{File, Metadata};

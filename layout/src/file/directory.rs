@@ -2,8 +2,8 @@
 //!
 //! Builds, rewritten files and commits all write it here. Invariant: no page number is handed out that 32 bits do not hold.
 
-use crate::bytes::{PAGE_BYTES, checksum};
-use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use super::bytes::{PAGE_BYTES, checksum};
+use super::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::error::LayoutError;
 use std::path::Path;
 

@@ -2,13 +2,13 @@
 //!
 //! Nothing is ever written over, so every state that a file was in is still there; a journal page says where. Going back is a header that names an older state.
 
-use crate::bytes::{
+use super::bytes::{
     PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64, put_f64, put_text, put_u16,
     put_u32, put_u64,
 };
+use super::header::{Header, History, ImageryPlace, seal};
+use super::source::Source;
 use crate::error::LayoutError;
-use crate::header::{Header, History, ImageryPlace, seal};
-use crate::source::Source;
 use std::path::Path;
 
 /// First bytes of a journal page.

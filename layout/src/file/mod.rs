@@ -11,10 +11,17 @@
 //! * `opening`: pipes are not waited for.
 
 pub mod atomic;
+pub mod bytes;
 pub(crate) mod directory;
+pub mod disk;
+pub mod entries;
+pub mod header;
 pub(crate) mod journal;
 pub(crate) mod lock;
 pub mod opening;
+pub(crate) mod overlay;
 mod seen;
 pub(crate) mod slots;
+pub mod source;
+pub(crate) mod structure;
 pub(crate) mod tail;

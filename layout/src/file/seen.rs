@@ -3,8 +3,8 @@
 //! Whoever makes a file for minutes, and replaces another by it, has looked at the other one first. Edits that were committed to it meanwhile were told as durable: they must not be lost.
 //! So the header pages, which every commit changes, are kept and compared at the end. Of other files nothing is kept. Cost: two pages.
 
-use crate::bytes::PAGE_BYTES;
-use crate::header::MAGIC;
+use super::bytes::PAGE_BYTES;
+use super::header::MAGIC;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! The two header slots of a file that is written to while others read it, and which of them counts (FORMAT.md, section 4).
 
-use crate::bytes::{PAGE_BYTES, Page};
+use super::bytes::{PAGE_BYTES, Page};
+use super::header::{Header, MAGIC};
+use super::source::Source;
 use crate::error::LayoutError;
-use crate::header::{Header, MAGIC};
-use crate::source::Source;
 use std::path::Path;
 
 const PAGE: u64 = PAGE_BYTES as u64;

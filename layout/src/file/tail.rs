@@ -5,12 +5,12 @@
 //!
 //! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers it, so that the next write goes behind what that header counts and takes the generation after its.
 
+use super::bytes::{PAGE_BYTES, Page};
+use super::disk::Disk;
+use super::header::Header;
 use super::lock::WriteLock;
 use super::slots::Slots;
-use crate::bytes::{PAGE_BYTES, Page};
-use crate::disk::Disk;
 use crate::error::LayoutError;
-use crate::header::Header;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -6,13 +6,13 @@
 use super::pyramid::MadeTile;
 use super::section::{Section, TileEntry};
 use super::shape::{ImageryShape, TileId};
-use crate::bytes::{PAGE_BYTES, checksum, to_usize};
-use crate::disk::Disk;
 use crate::error::LayoutError;
+use crate::file::bytes::{PAGE_BYTES, checksum, to_usize};
 use crate::file::directory::page_at;
+use crate::file::disk::Disk;
+use crate::file::header::{Header, History, ImageryPlace};
 use crate::file::journal::{Lineage, State};
 use crate::file::tail::Tail;
-use crate::header::{Header, History, ImageryPlace};
 
 const PAGE: u64 = PAGE_BYTES as u64;
 

@@ -11,17 +11,17 @@ use super::place::{Extent, PlaceOrigin};
 use super::pyramid::{Pyramid, STEP_ROWS, memory_bytes};
 use super::shape::{ImageryShape, TileFormat};
 use super::source::{ImageSource, RowReader};
-use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
+use crate::file::disk::{Disk, SystemDisk};
+use crate::file::header::Header;
 use crate::file::journal::Lineage;
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
+use crate::file::source::{PreadSource, Source};
 use crate::file::tail::{Attempted, Tail};
-use crate::header::Header;
 use crate::progress::BuildProgress;
+use crate::read::terrain::Terrain;
 use crate::remedy::Remedy;
-use crate::source::{PreadSource, Source};
-use crate::terrain::Terrain;
 use std::path::Path;
 
 /// How to drape.
@@ -173,9 +173,9 @@ mod tests {
     use super::*;
     use crate::build::{BuildOptions, build};
     use crate::dem::{MemoryDem, SampleType};
-    use crate::disk::{FailingDisk, Failure};
+    use crate::file::disk::{FailingDisk, Failure};
+    use crate::file::source::MemorySource;
     use crate::progress::Silent;
-    use crate::source::MemorySource;
 
     fn terrain_bytes() -> Vec<u8> {
         let dem = MemoryDem::from_fn([40, 30], SampleType::I16, |x, y| f64::from(x * 3 + y));

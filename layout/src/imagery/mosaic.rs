@@ -7,7 +7,7 @@ use super::place::{Extent, Place, PlaceOrigin, place};
 use super::shape::{ImageryShape, MAX_TEXELS, TileFormat};
 use super::source::{ImageSource, RowReader};
 use crate::error::LayoutError;
-use crate::header::Header;
+use crate::file::header::Header;
 use crate::remedy::Remedy;
 use crate::words::{harmless, number};
 

@@ -6,7 +6,7 @@
 use super::section::is_place;
 use super::source::ImageSource;
 use crate::error::LayoutError;
-use crate::header::Header;
+use crate::file::header::Header;
 use crate::remedy::Remedy;
 use crate::words::number;
 

@@ -10,8 +10,8 @@ use super::encode::{Texels, encode, is_transparent};
 use super::linear::{Linear, TABLES, mean};
 use super::section::TileEntry;
 use super::shape::{BORDER_TEXELS, INNER_TEXELS, ImageryShape, TILE_TEXELS, TileId};
-use crate::bytes::checksum;
 use crate::error::LayoutError;
+use crate::file::bytes::checksum;
 use rayon::prelude::*;
 
 /// Rows that arrive at once.

@@ -5,12 +5,12 @@
 
 use super::section::{Section, TILE_ENTRY_BYTES, TileEntry, damaged};
 use super::shape::{ImageryShape, TILE_TEXELS, TileFormat, TileId};
-use crate::bytes::{PAGE_BYTES, checksum, to_usize};
-use crate::directory::PageUses;
 use crate::error::LayoutError;
-use crate::header::ImageryPlace;
-use crate::source::Source;
-use crate::terrain::Terrain;
+use crate::file::bytes::{PAGE_BYTES, checksum, to_usize};
+use crate::file::entries::PageUses;
+use crate::file::header::ImageryPlace;
+use crate::file::source::Source;
+use crate::read::terrain::Terrain;
 
 /// The imagery section of a terrain file.
 #[derive(Debug, Clone)]

@@ -4,12 +4,12 @@
 //! in the section, so whoever reads it allocates no more than the file has.
 
 use super::shape::{BORDER_TEXELS, ImageryShape, MAX_TEXELS, TILE_TEXELS, TileFormat, TileId};
-use crate::bytes::{
+use crate::error::LayoutError;
+use crate::file::bytes::{
     PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64, put_f64, put_text, put_u16,
     put_u32, put_u64,
 };
-use crate::error::LayoutError;
-use crate::header::ImageryPlace;
+use crate::file::header::ImageryPlace;
 use std::path::Path;
 
 /// First bytes of the section.
@@ -164,7 +164,7 @@ impl Section {
         }
         let wanted = self.shape.format.stored_bytes(self.shape.stored_texels(id));
         let begin = u64::from(entry.page) * PAGE_BYTES as u64;
-        entry.page > crate::header::INERT_PAGE
+        entry.page > crate::file::header::INERT_PAGE
             && entry.bytes as usize == wanted
             && begin + u64::from(entry.bytes) <= file_bytes
     }

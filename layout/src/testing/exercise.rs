@@ -1,15 +1,15 @@
 //! Everything that this crate does with a file, done to one that may hold nonsense: each part works or says why not, and what it makes is in proportion to what it was given.
 
 use super::sealed::Sealed;
-use crate::disk::SystemDisk;
 use crate::edit::{
     Area, Brush, BrushAction, Crater, Edit, EditSession, Falloff, SampleRect, compact, history,
 };
+use crate::file::disk::SystemDisk;
 use crate::grid::GridPoint;
 use crate::imagery::{Imagery, Paint, Region, decode_tile};
 use crate::progress::Silent;
-use crate::terrain::Terrain;
-use crate::unused::unused_bytes;
+use crate::read::terrain::Terrain;
+use crate::verify::unused::unused_bytes;
 use crate::verify::verify;
 use crate::with_records;
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! The bytes of a file by their offset: its own, and in front of them those of the base, if it is an overlay. Only its own can be changed.
 
-use crate::bytes::{PAGE_BYTES, checksum, get_u32, get_u64};
-use crate::header::MAGIC;
-use crate::source::split_of;
+use crate::file::bytes::{PAGE_BYTES, checksum, get_u32, get_u64};
+use crate::file::header::MAGIC;
+use crate::file::source::split_of;
 
 /// First bytes of an overlay.
 const OVERLAY_MAGIC: [u8; 8] = *b"\x89IQO\r\n\x1a\n";

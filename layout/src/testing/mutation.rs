@@ -4,8 +4,8 @@
 
 use super::image::Image;
 use super::parts::{Part, What};
-use crate::bytes::PAGE_BYTES;
-use crate::directory::ENTRY_BYTES;
+use crate::file::bytes::PAGE_BYTES;
+use crate::file::entries::ENTRY_BYTES;
 
 /// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

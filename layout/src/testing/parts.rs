@@ -1,8 +1,8 @@
 //! Where the parts of a file lie, as far as its header slots and its journal lead to them. Whatever leads nowhere is left out.
 
 use super::image::{Image, JOURNAL_MAGIC, SECTION_MAGIC};
-use crate::bytes::{PAGE_BYTES, get_u32};
-use crate::directory::ENTRY_BYTES;
+use crate::file::bytes::{PAGE_BYTES, get_u32};
+use crate::file::entries::ENTRY_BYTES;
 use std::collections::BTreeSet;
 
 /// Journal pages that are followed.

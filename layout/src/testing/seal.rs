@@ -5,11 +5,11 @@
 
 use super::image::Image;
 use super::parts::{Parts, entry_pages, page_of, tile_directory};
-use crate::bytes::{PAGE_BYTES, checksum, get_u32};
-use crate::directory::ENTRY_BYTES;
+use crate::file::bytes::{PAGE_BYTES, checksum, get_u32};
+use crate::file::entries::ENTRY_BYTES;
+use crate::file::header::LEAF_ENTRIES;
 use crate::grid::Grid;
-use crate::header::LEAF_ENTRIES;
-use crate::order::slot_count;
+use crate::grid::order::slot_count;
 use std::collections::{BTreeMap, BTreeSet};
 
 const ROUNDS: usize = 4;

@@ -5,8 +5,8 @@ use super::mutation::Mutation;
 use super::parts::Parts;
 use super::seal::{Counts, seal};
 use crate::error::LayoutError;
-use crate::source::MemorySource;
-use crate::terrain::Terrain;
+use crate::file::source::MemorySource;
+use crate::read::terrain::Terrain;
 use std::path::{Path, PathBuf};
 
 /// Mutations of a recipe that are carried out.

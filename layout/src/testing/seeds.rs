@@ -5,9 +5,9 @@ use crate::build::{BuildOptions, build};
 use crate::dem::{MemoryDem, SampleType};
 use crate::edit::{Area, Edit, EditSession};
 use crate::error::LayoutError;
+use crate::grid::record::RecordKind;
 use crate::imagery::{DrapeOptions, Extent, Fill, MemoryImage, Paint, Region, TileFormat, drape};
 use crate::progress::Silent;
-use crate::record::RecordKind;
 use std::path::Path;
 use std::sync::OnceLock;
 

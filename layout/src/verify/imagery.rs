@@ -3,10 +3,10 @@
 //! Cost: every tile is read once, in parallel; a tile a thread is held.
 
 use super::Findings;
-use crate::bytes::PAGE_BYTES;
 use crate::error::LayoutError;
+use crate::file::bytes::PAGE_BYTES;
 use crate::imagery::{Imagery, TileId};
-use crate::terrain::Terrain;
+use crate::read::terrain::Terrain;
 use rayon::prelude::*;
 
 /// Pages of work that the imagery's part reports; of damaged imagery those of its section.

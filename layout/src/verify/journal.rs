@@ -5,9 +5,9 @@
 use super::Findings;
 use super::states::States;
 use crate::error::LayoutError;
+use crate::file::header::{Header, History};
 use crate::file::journal::{Commit, State};
-use crate::header::{Header, History};
-use crate::terrain::Terrain;
+use crate::read::terrain::Terrain;
 
 /// A commit and the journal page it is on.
 type Listed = (u32, Commit);

@@ -6,13 +6,13 @@
 //! and the count of heights shows whether samples got lost in one. Cost: four children a vertex, about 0.2 microseconds.
 
 use super::{Findings, TASK_PAGES, record_page};
-use crate::bytes::{PAGE_BYTES, Page};
 use crate::error::LayoutError;
+use crate::file::bytes::{PAGE_BYTES, Page};
+use crate::file::header::{Header, INERT_PAGE};
+use crate::grid::order::{point_of, slot_of};
+use crate::grid::record::{RecordCodec, Vertex, VertexClass};
 use crate::grid::{Grid, GridPoint};
-use crate::header::{Header, INERT_PAGE};
-use crate::order::{point_of, slot_of};
-use crate::record::{RecordCodec, Vertex, VertexClass};
-use crate::terrain::Terrain;
+use crate::read::terrain::Terrain;
 use rayon::prelude::*;
 
 /// Pages a task keeps; a power of two. A page's children lie in a handful of places.

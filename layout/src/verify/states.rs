@@ -6,14 +6,14 @@
 //! opening takes.
 
 use super::Findings;
-use crate::bytes::{PAGE_BYTES, checksum, to_usize};
-use crate::directory::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, copy_of};
 use crate::error::LayoutError;
+use crate::file::bytes::{PAGE_BYTES, checksum, to_usize};
+use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, copy_of};
+use crate::file::header::Header;
 use crate::file::journal::State;
-use crate::header::Header;
+use crate::file::structure::{read_leaf, read_root};
 use crate::imagery::Imagery;
-use crate::opening::{read_leaf, read_root};
-use crate::terrain::Terrain;
+use crate::read::terrain::Terrain;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 

@@ -3,8 +3,8 @@
 //! Opening has checked checksums of root and leaves, that every page lies in the file, and that none has two uses. Cost: a look at each entry.
 
 use super::{Findings, record_page};
-use crate::directory::Entry;
-use crate::terrain::Terrain;
+use crate::file::entries::Entry;
+use crate::read::terrain::Terrain;
 
 pub(super) fn check(terrain: &Terrain) -> Findings {
     let header = terrain.header();

@@ -8,7 +8,7 @@ use terrasoar_layout::imagery::{
     DrapeOptions, Draped, ImageSource, Imagery, MemoryImage, TileFormat, TileId, decode_tile, drape,
 };
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// A terrain of 61 x 41 samples 20 m apart, its south-west sample at 1000, 4000 of EPSG 32610.
 pub fn land(path: &Path) {

@@ -6,7 +6,7 @@ use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// A folder with a terrain in it.
 pub struct Bench {

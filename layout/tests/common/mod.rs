@@ -12,7 +12,7 @@ pub mod paint_reference;
 
 pub use terrasoar_layout::dem::MemoryDem;
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, SampleType, Window};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Builds a file from `dem` and returns its bytes.
 pub fn build_bytes(dem: &MemoryDem, options: &BuildOptions) -> Result<Vec<u8>, LayoutError> {
@@ -24,7 +24,7 @@ pub fn build_bytes(dem: &MemoryDem, options: &BuildOptions) -> Result<Vec<u8>, L
 
 /// Opens a terrain over bytes in memory.
 pub fn open_bytes(bytes: Vec<u8>) -> Result<Terrain, LayoutError> {
-    Terrain::from_source(Box::new(terrasoar_layout::source::MemorySource::new("memory", bytes)))
+    Terrain::from_source(Box::new(terrasoar_layout::file::source::MemorySource::new("memory", bytes)))
 }
 
 /// A rectangle of ground in a sea of voids, in samples from the south-west one.

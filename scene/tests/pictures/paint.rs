@@ -10,7 +10,7 @@ use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Crater, Edit, EditSession};
 use terrasoar_layout::imagery::{DrapeOptions, ImageSource, MemoryImage, Paint, Scorch, TileFormat, drape};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{Gpu, Look, Offscreen};
 use terrasoar_scene::repaint::PictureWatch;
 use terrasoar_scene::scene::{Scene, SceneOptions, TileService};

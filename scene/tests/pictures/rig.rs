@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{Gpu, Look, Offscreen, read_depth_m};
 use terrasoar_scene::scene::{Scene, SceneOptions};
 

@@ -5,7 +5,7 @@
 use super::Ground;
 use std::cell::RefCell;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Heights of a terrain. What cannot be read counts as void, until [`TerrainGround::check`] says so.
 pub struct TerrainGround<'a> {

@@ -21,8 +21,8 @@ use super::nodes::{STATUS, UNREAD};
 use super::queue::{Entry, Queue};
 use std::collections::HashSet;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::slot_of;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::read::store::RecordStore;
 
 /// Vertices that the looks of one frame may test, two to five milliseconds; the rest is looked at in the next.
 const TESTS_A_FRAME: usize = 8000;

@@ -299,7 +299,7 @@ mod tests {
     use crate::view::{View, Viewport};
     use glam::DVec3;
     use proptest::prelude::*;
-    use terrasoar_layout::record::{Vertex, VertexClass};
+    use terrasoar_layout::grid::record::{Vertex, VertexClass};
 
     fn view(eye_m: DVec3, yaw: f64, pitch: f64, fov: f64, exaggeration: f64) -> View {
         View {

@@ -10,8 +10,8 @@ use super::clocks::{BANDS, HORIZON, Kind, Pose, clock_id};
 use super::nodes::{SPLIT, STATUS};
 use super::queue::Entry;
 use crate::refine::{Phase, Probe};
-use terrasoar_layout::prefetch::prefetch;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::prefetch::prefetch;
+use terrasoar_layout::read::store::RecordStore;
 
 impl<S: RecordStore> Kinetic<S> {
     /// Takes from the queue what is over, and brings clocks and courses in order.

@@ -11,7 +11,7 @@ use super::labels::level_of;
 use super::nodes::{CENTRE, NONE, SPLIT, STATUS, UNREAD, body};
 use super::pages::{Dealing, PAGE};
 use super::queue::Entry;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 /// Nodes moved in one frame at most.
 const MOVES_PER_FRAME: usize = 32;

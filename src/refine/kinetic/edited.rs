@@ -15,11 +15,11 @@ use super::queue::Entry;
 use super::{Kinetic, root_label};
 use crate::refine::ground::{Areas, GroundChange};
 use std::ops::Range;
-use terrasoar_layout::bytes::PAGE_BYTES;
-use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
-use terrasoar_layout::prefetch::prefetch;
-use terrasoar_layout::record::RecordCodec;
-use terrasoar_layout::store::{RawOf, RecordStore};
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::prefetch::prefetch;
+use terrasoar_layout::read::store::{RawOf, RecordStore};
 
 /// Lists below this length are left as they are.
 const SHORT: usize = 4096;

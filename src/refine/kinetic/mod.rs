@@ -57,9 +57,9 @@ use nodes::{CENTRE, NONE, Nodes, SPLIT, STATUS, body};
 use pages::{Dealing, Pages};
 use queue::{Entry, Queue};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{CENTRE_SLOT, ROOTS, corners};
-use terrasoar_layout::record::{RecordCodec, Vertex};
-use terrasoar_layout::store::{RawOf, RecordStore};
+use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners};
+use terrasoar_layout::grid::record::{RecordCodec, Vertex};
+use terrasoar_layout::read::store::{RawOf, RecordStore};
 use vertices::Vertices;
 
 /// Levels of the largest terrain.

@@ -12,8 +12,8 @@ use super::nodes::{SPLIT, STATUS, UNREAD};
 use super::queue::Entry;
 use crate::refine::{Phase, Probe};
 use rayon::prelude::*;
-use terrasoar_layout::order::slot_of;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::read::store::RecordStore;
 
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;

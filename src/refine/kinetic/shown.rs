@@ -8,7 +8,7 @@ use super::pages::{Dealing, Pages};
 use crate::mesh::has_area;
 use crate::metric::Metric;
 use crate::refine::Culling;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::read::store::RecordStore;
 
 impl<S: RecordStore> Kinetic<S> {
     /// What a slot of `node` sends to the GPU: nothing where voids touch or padding takes the area.

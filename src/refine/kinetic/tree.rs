@@ -9,9 +9,9 @@ use super::bounds::Bounds;
 use super::labels::{child_point, level_of};
 use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::slot_of;
-use terrasoar_layout::prefetch::prefetch;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::read::prefetch::prefetch;
+use terrasoar_layout::read::store::RecordStore;
 
 impl<S: RecordStore> Kinetic<S> {
     /// The child of a split node that lies at `at`; `None` at the finest level, where there are none.

@@ -6,7 +6,7 @@
 use super::capacity::grow;
 use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::record::Vertex;
+use terrasoar_layout::grid::record::Vertex;
 
 #[derive(Debug, Default)]
 pub(super) struct Vertices {

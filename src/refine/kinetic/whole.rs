@@ -7,9 +7,9 @@ use crate::refine::soar::StripVertex;
 use crate::refine::strip::StripBuilder;
 use std::collections::HashMap;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::order::{ROOTS, corners};
-use terrasoar_layout::record::Vertex;
-use terrasoar_layout::store::RecordStore;
+use terrasoar_layout::grid::order::{ROOTS, corners};
+use terrasoar_layout::grid::record::Vertex;
+use terrasoar_layout::read::store::RecordStore;
 
 impl<S: RecordStore> Kinetic<S> {
     /// The whole mesh as a patch to an empty one, for a GPU that has lost its copy.

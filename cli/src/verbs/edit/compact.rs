@@ -9,8 +9,8 @@ use anyhow::Result;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
-use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{Compacted, compact};
+use terrasoar_layout::file::disk::SystemDisk;
 
 /// Write a terrain file anew without what edits left behind.
 ///

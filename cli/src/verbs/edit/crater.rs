@@ -11,7 +11,7 @@ use terrasoar::edits::rain::Rain;
 use terrasoar::edits::{Batch, MAX_EDITS, Script};
 use terrasoar::sink::is_stream;
 use terrasoar_layout::edit::{Crater, Edit};
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Blast a crater into the ground of a terrain file, or a rain of them.
 ///

@@ -11,12 +11,12 @@ use std::time::Instant;
 use terrasoar::edits::LoadedBatch;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::HeightRoom;
-use terrasoar_layout::disk::SystemDisk;
 use terrasoar_layout::edit::{Changes, EditSession, Editor, Foresight, holds_heights, widen};
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::file::header::Header;
 use terrasoar_layout::grid::Grid;
-use terrasoar_layout::header::Header;
-use terrasoar_layout::record::RecordKind;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::grid::record::RecordKind;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Memory for rewriting a file in MiB.
 const WIDEN_MIB: u64 = 512;

@@ -13,7 +13,7 @@ use terrasoar_lab::iobench::{
     CountOptions, LayoutKind, PoolOptions, Pooled, Prefetch, Reader, Run, ScratchCost, Timed, count,
     fly_pooled, time,
 };
-use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
 
 /// The counting run of all readers, and the block length it used.
 pub(super) fn counted(args: &Args, views: &[View], progress: &Progress) -> Result<(Vec<Run>, f64)> {

@@ -17,7 +17,7 @@ use terrasoar::flyover::EngineKind;
 use terrasoar::view::View;
 use terrasoar_lab::iobench::{IoBench, IoRun, LayoutKind, Prefetch, ReadBy, Reader, Run, Timed, kernel};
 use terrasoar_lab::report::{IoReport, ReportFile, write_io_frames_csv};
-use terrasoar_layout::bytes::PAGE_BYTES;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
 
 /// Measure how much of a file a flight touches, by engine and layout.
 ///

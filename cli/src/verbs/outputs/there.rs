@@ -6,9 +6,9 @@ use std::io::{self, Read};
 use std::path::Path;
 use terrasoar_lab::report::START_BYTES;
 use terrasoar_layout::edit::history;
-use terrasoar_layout::header;
+use terrasoar_layout::file::header;
 use terrasoar_layout::imagery::Imagery;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// The first bytes of a file, as many as anybody needs.
 pub(super) fn start_of(path: &Path) -> io::Result<Vec<u8>> {

@@ -24,7 +24,7 @@ use std::thread::JoinHandle;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{Edit, EditSession};
 use terrasoar_layout::imagery::Paint;
-use terrasoar_layout::terrain::Terrain;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Opens the session, on the workshop's thread.
 type Open = Arc<dyn Fn() -> Result<EditSession, LayoutError> + Send + Sync>;

@@ -2,8 +2,8 @@
 
 use terrasoar::stream::GroundPatch;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::{CommitJob, Edit};
+use terrasoar_layout::file::entries::Entry;
 use terrasoar_layout::imagery::Paint;
 use terrasoar_scene::repaint::Repaint;
 

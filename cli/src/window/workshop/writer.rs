@@ -12,8 +12,8 @@ use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::disk::Disk;
 use terrasoar_layout::edit::CommitJob;
+use terrasoar_layout::file::disk::Disk;
 
 /// A thread that writes.
 pub(super) struct Writer {

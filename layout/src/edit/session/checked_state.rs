@@ -3,14 +3,14 @@
 //! Undoing and redoing write a header alone, so nothing but this stands between a journal of nonsense and a file that does not open. Cost: what opening the file costs, less the
 //! leaves that the state has in common with the one that is known.
 
-use crate::bytes::{Page, get_u64};
-use crate::directory::Entry;
 use crate::error::LayoutError;
+use crate::file::bytes::{Page, get_u64};
 use crate::file::directory::Directory;
-use crate::header::Header;
+use crate::file::entries::Entry;
+use crate::file::header::Header;
+use crate::file::structure::read_directory_beside;
 use crate::imagery::Imagery;
-use crate::opening::read_directory_beside;
-use crate::terrain::Terrain;
+use crate::read::terrain::Terrain;
 
 /// A state that opens.
 pub(super) struct CheckedState {

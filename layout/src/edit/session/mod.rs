@@ -4,28 +4,31 @@
 //! their own: a header that leads to a state that is in the file already. One session at a time has a file; readers need not stop.
 
 mod checked_state;
+pub(crate) mod commit;
+pub(crate) mod compact;
 mod past;
 pub(super) mod picture;
+pub(crate) mod widen;
 
 pub use past::{HistoryEntry, history};
 
-use super::commit::{CommitJob, Content};
 use super::{Changes, Edit, Editor, HeightWindow};
-use crate::bytes::PAGE_BYTES;
-use crate::directory::{Entry, copy_of};
-use crate::disk::{Disk, SystemDisk};
 use crate::error::LayoutError;
+use crate::file::bytes::PAGE_BYTES;
 use crate::file::directory::Directory;
+use crate::file::disk::{Disk, SystemDisk};
+use crate::file::entries::{Entry, copy_of};
+use crate::file::header::{Header, ImageryPlace};
 use crate::file::journal::{Lineage, State};
 use crate::file::lock::WriteLock;
+use crate::file::overlay::{create_overlay, overlay_slots};
 use crate::file::slots::Slots;
+use crate::file::source::{LayeredSource, PreadSource, Source};
+use crate::file::structure::{read_directory, read_growing, read_root, read_structure};
 use crate::file::tail::{Attempt, Attempted, Tail};
-use crate::header::{Header, ImageryPlace};
-use crate::opening::{read_directory, read_growing, read_root, read_structure};
-use crate::overlay::{create_overlay, overlay_slots};
+use crate::read::terrain::Terrain;
 use crate::remedy::Remedy;
-use crate::source::{LayeredSource, PreadSource, Source};
-use crate::terrain::Terrain;
+use commit::{CommitJob, Content};
 use picture::Picture;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

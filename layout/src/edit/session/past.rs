@@ -2,14 +2,14 @@
 
 use super::EditSession;
 use super::checked_state::check_state;
-use crate::directory::Entry;
+use super::commit::CommitJob;
 use crate::edit::Changes;
-use crate::edit::commit::CommitJob;
 use crate::error::LayoutError;
+use crate::file::entries::Entry;
+use crate::file::header::{Header, History};
 use crate::file::journal::Commit;
-use crate::header::{Header, History};
-use crate::source::Source;
-use crate::terrain::Terrain;
+use crate::file::source::Source;
+use crate::read::terrain::Terrain;
 use std::sync::Arc;
 
 /// A commit of a file's history.

@@ -5,9 +5,9 @@
 use super::EditSession;
 use crate::edit::{Changes, Edit};
 use crate::error::LayoutError;
-use crate::header::{Header, ImageryPlace};
+use crate::file::header::{Header, ImageryPlace};
 use crate::imagery::{OtherState, Paint, PaintChanges, PaintedSection, Painter, TileId};
-use crate::terrain::Terrain;
+use crate::read::terrain::Terrain;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 

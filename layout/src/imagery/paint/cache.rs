@@ -4,7 +4,7 @@ use super::super::Imagery;
 use super::super::shape::TileId;
 use super::tile::Tile;
 use crate::error::LayoutError;
-use crate::terrain::Terrain;
+use crate::read::terrain::Terrain;
 use std::collections::HashMap;
 use std::sync::Arc;
 

@@ -7,9 +7,9 @@ use super::super::reader::check_uses;
 use super::super::section::{Section, TILE_ENTRY_BYTES, TileEntry};
 use super::super::shape::TileId;
 use super::Painter;
-use crate::bytes::{PAGE_BYTES, checksum};
 use crate::error::LayoutError;
-use crate::header::ImageryPlace;
+use crate::file::bytes::{PAGE_BYTES, checksum};
+use crate::file::header::ImageryPlace;
 use rayon::prelude::*;
 
 const PAGE: u64 = PAGE_BYTES as u64;

@@ -8,10 +8,10 @@ use std::fs::File;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use terrasoar_layout::build::{BuildOptions, build};
-use terrasoar_layout::bytes::Page;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
-use terrasoar_layout::disk::{Disk, SystemDisk};
 use terrasoar_layout::edit::{Crater, Editor};
+use terrasoar_layout::file::bytes::Page;
+use terrasoar_layout::file::disk::{Disk, SystemDisk};
 use terrasoar_layout::progress::Silent;
 
 /// Longest that anything here may take.

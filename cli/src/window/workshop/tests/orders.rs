@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::window::threads::while_frames_have_all_threads;
-use terrasoar_layout::directory::Entry;
 use terrasoar_layout::edit::history;
+use terrasoar_layout::file::entries::Entry;
 use terrasoar_layout::imagery::{DrapeOptions, ImageSource, Imagery, MemoryImage, TileFormat, TileId, drape};
 use terrasoar_scene::repaint::Picture;
 

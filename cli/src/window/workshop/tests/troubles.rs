@@ -2,7 +2,7 @@
 
 use super::*;
 use std::sync::atomic::AtomicBool;
-use terrasoar_layout::disk::{FailingDisk, Failure};
+use terrasoar_layout::file::disk::{FailingDisk, Failure};
 
 #[test]
 fn a_commit_that_panics_is_told_and_what_it_was_to_write_is_in_the_next() {

@@ -1,0 +1,434 @@
+//! From new heights to new records, bottom-up: every vertex whose triangles touch what changed, and whoever depends on a record that changed (engine of the
+//! update: recompute as the maximum over all contributions, up until nothing changes, so that values fall as well as rise).
+//!
+//! The work goes level by level. At a level, the vertices whose diamonds touch the changed rectangle are enumerated, and the parents of changed children outside it
+//! are added. A bounded error has contributions from all samples in the diamond; most of the time two comparisons show that it stays as it is, else
+//! [`Search`] finds the farthest sample. Cost: the samples of the rectangle, some ten vertices a level above them, a few tens of records for each search.
+
+use super::farthest::Search;
+use super::midway::{Ground, NewCodes};
+use super::near::{NEAR_LEVELS, Near, first_of_row};
+use super::pages::Pages;
+use crate::bound::{Below, FIRST_SCANNED, Plane, Rules, farthest_diagonal, farthest_level, farthest_upright};
+use crate::edit::operations::window::SampleRect;
+use crate::error::LayoutError;
+use crate::file::header::ErrorKind;
+use crate::grid::order::{corners, slot_of};
+use crate::grid::record::{RecordCodec, Vertex, VertexClass};
+use crate::grid::{Grid, GridPoint};
+
+/// Changed children that a vertex's former error is looked up among; with more of them it is found by search.
+const FEW: usize = 64;
+
+/// Lists that outlive an update, so that none is allocated anew.
+#[derive(Debug)]
+pub(crate) struct Scratch<C: RecordCodec> {
+    pub(crate) near: Near<C>,
+    /// Vertices of the level below that changed, and their former records.
+    below: Vec<(GridPoint, C::Raw)>,
+    /// The same of this level.
+    here: Vec<(GridPoint, C::Raw)>,
+    /// Parents of changed children that lie apart from what changed.
+    apart: Vec<GridPoint>,
+}
+
+impl<C: RecordCodec> Default for Scratch<C> {
+    fn default() -> Self {
+        Self { near: Near::default(), below: Vec::new(), here: Vec::new(), apart: Vec::new() }
+    }
+}
+
+/// One update.
+pub(crate) struct Update<'u, C: RecordCodec> {
+    rules: &'u Rules<C>,
+    ground: Ground<'u, C>,
+    /// Grid points whose height changed: the changed rectangle, and the padding that folds onto it.
+    area: SampleRect,
+    scratch: &'u mut Scratch<C>,
+}
+
+impl<'u, C: RecordCodec> Update<'u, C> {
+    pub(crate) fn new(
+        rules: &'u Rules<C>,
+        pages: &'u mut Pages<C>,
+        new: NewCodes<'u>,
+        scratch: &'u mut Scratch<C>,
+    ) -> Self {
+        let grid = rules.grid;
+        let area = with_padding(&grid, new.rect);
+        Self { rules, ground: Ground { grid, pages, new }, area, scratch }
+    }
+
+    /// Brings all records up to date. What fails is kept by the pages.
+    pub(crate) fn run(mut self) {
+        let grid = self.rules.grid;
+        // An update that failed may have left both as they were.
+        self.scratch.below.clear();
+        self.scratch.here.clear();
+        for level in 0..grid.levels() {
+            self.level(level);
+            if self.ground.pages.has_failed() {
+                return;
+            }
+            std::mem::swap(&mut self.scratch.below, &mut self.scratch.here);
+            self.scratch.here.clear();
+        }
+        for (slot, corner) in corners(grid.k()).into_iter().enumerate() {
+            if self.area.contains(corner.x(), corner.y()) {
+                self.corner(corner, slot as u64);
+            }
+        }
+    }
+
+    fn corner(&mut self, corner: GridPoint, slot: u64) {
+        let old = self.ground.pages.raw(slot);
+        let class = self.rules.codec.decode(old, 0).class;
+        if !class.is_void() {
+            let code = self.ground.code_of(corner, old);
+            let new = self.rules.codec.encode(0, code, class, 0.0, 0.0);
+            self.put(corner, slot, old, new);
+        }
+    }
+
+    fn level(&mut self, level: u32) {
+        let grid = self.rules.grid;
+        let s = 1u32 << (level / 2);
+        let reach = grid.reach_steps(level);
+        let limit = grid.samples().map(|count| (count - 1 + reach - 1).min(grid.side_steps()));
+        let span = |low: u32, high: u32, limit: u32| (low.saturating_sub(s), (high + s).min(limit));
+        let (west, east) = span(self.area.west, self.area.east, limit[0]);
+        let (south, north) = span(self.area.south, self.area.north, limit[1]);
+        let is_near = level < NEAR_LEVELS;
+        let near = NearLevel::new(self.rules, level);
+        for y in (south.next_multiple_of(s)..=north).step_by(s as usize) {
+            let Some(first) = first_of_row(level, west, y) else { continue };
+            for x in (first..=east).step_by(2 * s as usize) {
+                if level & 1 == 0 && self.steps_from_area(x, y) > s {
+                    continue;
+                }
+                let v = GridPoint::new(x, y);
+                if !(is_near && self.renew_near(v, &near)) {
+                    self.renew(v, level);
+                }
+            }
+        }
+        self.renew_apart(level, limit);
+    }
+
+    /// Steps along both axes from a point to the area.
+    fn steps_from_area(&self, x: u32, y: u32) -> u32 {
+        let off = |v: u32, low: u32, high: u32| low.saturating_sub(v) + v.saturating_sub(high);
+        off(x, self.area.west, self.area.east) + off(y, self.area.south, self.area.north)
+    }
+
+    /// Whether the diamond of a vertex touches the area.
+    fn touches(&self, p: GridPoint, level: u32) -> bool {
+        let s = 1u32 << (level / 2);
+        let off = |v: u32, low: u32, high: u32| low.saturating_sub(v) + v.saturating_sub(high);
+        let dx = off(p.x(), self.area.west, self.area.east);
+        let dy = off(p.y(), self.area.south, self.area.north);
+        if level & 1 == 1 { dx <= s && dy <= s } else { dx + dy <= s }
+    }
+
+    /// Vertices of the level that do not touch the area and have a child that changed.
+    fn renew_apart(&mut self, level: u32, limit: [u32; 2]) {
+        let mut apart = std::mem::take(&mut self.scratch.apart);
+        apart.clear();
+        // Diamonds hold their children: those of a child inside the area touch it.
+        let outside = self.scratch.below.iter().filter(|(p, _)| !self.area.contains(p.x(), p.y()));
+        for (child, _) in outside {
+            let parents = self.rules.grid.apexes(*child);
+            apart.extend(parents.filter(|p| {
+                p.x() <= limit[0]
+                    && p.y() <= limit[1]
+                    && !self.rules.grid.is_corner(*p)
+                    && !self.touches(*p, level)
+            }));
+        }
+        apart.sort_unstable();
+        apart.dedup();
+        for v in &apart {
+            self.renew(*v, level);
+        }
+        self.scratch.apart = apart;
+    }
+
+    /// Makes the record of one vertex anew.
+    fn renew(&mut self, v: GridPoint, level: u32) {
+        let (grid, rules) = (self.rules.grid, self.rules);
+        let slot = slot_of(grid.k(), v);
+        let old = self.ground.pages.raw(slot);
+        let was = rules.codec.decode(old, level);
+        if was.class == VertexClass::Inert {
+            return;
+        }
+        let (step, [wide, high]) = (1u32 << (level / 2), grid.samples());
+        let folded = v.x() + step >= wide || v.y() + step >= high;
+        let is_void = was.class.is_void();
+        let code = self.ground.code_of(v, old);
+        let mut below = Below::default();
+        if level == 0 {
+            below.fringe = was.class == VertexClass::Fringe;
+        } else {
+            let height_m = code * rules.scale.height_step_m;
+            for child in grid.children(v) {
+                let raw = self.ground.pages.raw(slot_of(grid.k(), child));
+                let child_vertex = rules.codec.decode(raw, level - 1);
+                if child_vertex.class == VertexClass::Inert && grid.is_beyond(child, level - 1) {
+                    continue;
+                }
+                below.add(&child_vertex, rules.ground2(v, child), height_m, rules.scale.height_base_m);
+            }
+        }
+        let own_m = if rules.error_kind == ErrorKind::Bounded && level >= FIRST_SCANNED && !folded {
+            self.bounded_error_m(v, level, slot, old, &was, below.error_m)
+        } else {
+            rules.own_error_m(v, grid.edge_ends(v), folded, |p| self.ground.code(p))
+        };
+        let new = rules.record(level, code, is_void, own_m, folded, &below);
+        if self.put(v, slot, old, new).is_some() {
+            self.scratch.here.push((v, old));
+        }
+    }
+
+    /// Makes the record of a vertex of the finest levels anew, if nothing around it is void, padding or the square's border; else returns false.
+    #[inline(always)]
+    fn renew_near(&mut self, v: GridPoint, of: &NearLevel) -> bool {
+        let (rules, near) = (self.rules, &self.scratch.near);
+        let (s, [wide, high]) = (of.step, rules.grid.samples());
+        let (x, y) = (v.x(), v.y());
+        if x < s || y < s || x + s >= wide || y + s >= high {
+            return false;
+        }
+        let at = near.index(x, y);
+        let old = near.raw(at);
+        if rules.codec.decode(old, of.level).class != VertexClass::Plain {
+            return false;
+        }
+        let code = near.value(at);
+        let row = near.row_length();
+        let mut below = Below::default();
+        if of.level > 0 {
+            let height_m = code * rules.scale.height_step_m;
+            for (child, ground2) in of.children(at, row) {
+                let child = rules.codec.decode(near.raw(child), of.level - 1);
+                below.add(&child, ground2, height_m, rules.scale.height_base_m);
+            }
+        }
+        let own_m = if rules.error_kind == ErrorKind::Bounded && of.level >= FIRST_SCANNED {
+            let [x, y] = near.within(v);
+            let farthest = match of.edge(v) {
+                Edge::Upright => farthest_upright(near, x, y, s),
+                Edge::Level => farthest_level(near, x, y, s),
+                edge => farthest_diagonal(near, x, y, s, edge == Edge::Rising),
+            };
+            f64::from(rules.scanned_error_m(farthest))
+        } else {
+            let s = s as usize;
+            let (b, d) = match of.edge(v) {
+                Edge::Upright => (at - s * row, at + s * row),
+                Edge::Level => (at - s, at + s),
+                Edge::Rising => (at - s * row - s, at + s * row + s),
+                Edge::Falling => (at - s * row + s, at + s * row - s),
+            };
+            rules.step_error_m(code, [near.value(b), near.value(d)])
+        };
+        let slot = near.slot(at);
+        let new = rules.encode(of.level, code, VertexClass::Plain, own_m, &below);
+        if self.put(v, slot, old, new).is_some() {
+            self.scratch.here.push((v, old));
+        }
+        true
+    }
+
+    /// Stores a record; returns it if it is another one than before.
+    fn put(&mut self, v: GridPoint, slot: u64, old: C::Raw, new: Option<C::Raw>) -> Option<C::Raw> {
+        match new {
+            Some(new) if new != old => {
+                self.ground.pages.write(v, slot, new);
+                self.scratch.near.note(v, new);
+                Some(new)
+            }
+            Some(_) => None,
+            None => {
+                self.ground.pages.fail(LayoutError::OutOfRange {
+                    path: self.ground.pages.terrain().path().to_owned(),
+                    heights_m: [f64::NAN; 2],
+                    problem: format!(
+                        "the ground at ({}, {}) would be steeper than this file's records can say; rewrite it with room for that",
+                        v.x(),
+                        v.y()
+                    ),
+                });
+                None
+            }
+        }
+    }
+
+    /// The triangles that a vertex splits, none of whose corners is void, as (corners, height codes).
+    fn triangles(&mut self, v: GridPoint) -> impl Iterator<Item = ([GridPoint; 3], [f64; 3])> + use<C> {
+        let [b, d] = self.rules.grid.edge_ends(v);
+        let ends = [b, d].map(|p| self.ground.code_unless_void(p));
+        let mut found = [None; 2];
+        for (a, place) in self.rules.grid.apexes(v).zip(&mut found) {
+            let code = self.ground.code_unless_void(a);
+            if !(code.is_nan() || ends[0].is_nan() || ends[1].is_nan()) {
+                *place = Some(([a, b, d], [code, ends[0], ends[1]]));
+            }
+        }
+        found.into_iter().flatten()
+    }
+
+    /// The error in metres, children included, of a vertex whose triangles lie in the data: a number that its record says as it is.
+    /// `children_m` is what its children's records say now.
+    fn bounded_error_m(
+        &mut self,
+        v: GridPoint,
+        level: u32,
+        slot: u64,
+        old: C::Raw,
+        was: &Vertex,
+        children_m: f64,
+    ) -> f64 {
+        let rules = self.rules;
+        if let Some(error_m) = self.unchanged_error_m(v, level, was, children_m) {
+            return error_m;
+        }
+        let mut limit_m = rules.stored_error_m(level, was.class, children_m);
+        for (corners, codes) in self.triangles(v) {
+            let [a, b, d] = corners;
+            let plane = Plane::of([(a, codes[0]), (b, codes[1]), (d, codes[2])]);
+            let mut search = Search::new(rules, plane, level, was.class, limit_m);
+            let corners = in_walk_order(&rules.grid, corners, level);
+            search.run(&mut self.ground, corners, [slot_of(rules.grid.k(), a), slot], old);
+            limit_m = search.limit_m;
+        }
+        limit_m
+    }
+
+    /// The error in metres of a vertex of which a look at its children and at the range of heights shows that no search is needed.
+    fn unchanged_error_m(&mut self, v: GridPoint, level: u32, was: &Vertex, children_m: f64) -> Option<f64> {
+        let rules = self.rules;
+        let before_m = was.error_m;
+        let s = 1 << (level / 2);
+        // Where the changed rectangle and the diamond's bounds meet.
+        let rect = self.ground.new.rect;
+        let low = [rect.west.max(v.x().saturating_sub(s)), rect.south.max(v.y().saturating_sub(s))];
+        let high = [rect.east.min(v.x() + s), rect.north.min(v.y() + s)];
+        let mut now_m = 0.0f64;
+        let mut then_m = 0.0f64;
+        if low[0] <= high[0] && low[1] <= high[1] {
+            for (corners, codes) in self.triangles(v) {
+                if corners.iter().any(|p| rect.contains(p.x(), p.y())) {
+                    return None;
+                }
+                let [a, b, d] = [0, 1, 2].map(|i| (corners[i], codes[i]));
+                let [plane_low, plane_high] = Plane::of([a, b, d]).range(low, high);
+                let [then, now] = self
+                    .ground
+                    .new
+                    .ranges
+                    .map(|[low, high]| (high - plane_low).max(plane_high - low).max(0.0) * (1.0 + 1e-9));
+                then_m = then_m.max(f64::from(rules.scanned_error_m(then)));
+                now_m = now_m.max(f64::from(rules.scanned_error_m(now)));
+            }
+        }
+        if now_m > before_m {
+            return None;
+        }
+        // Samples that did not change are no farther than before.
+        if children_m >= before_m {
+            return Some(rules.stored_error_m(level, was.class, children_m));
+        }
+        if before_m <= rules.stored_error_m(level, was.class, 0.0) {
+            return Some(before_m);
+        }
+        // Something made the error what it was; if neither a sample that changed nor a child did, it still does.
+        if rules.stored_error_m(level, was.class, then_m) >= before_m || self.scratch.below.len() > FEW {
+            return None;
+        }
+        for child in rules.grid.children(v) {
+            let changed = self.scratch.below.iter().find(|(p, _)| *p == child);
+            let was_m = changed.map_or(0.0, |(_, old)| rules.codec.decode(*old, level - 1).error_m);
+            // Fringe vertices round errors in steps of their own.
+            if rules.stored_error_m(level, was.class, was_m) >= before_m {
+                return None;
+            }
+        }
+        Some(before_m)
+    }
+}
+
+/// A rectangle of samples and the padding that folds onto it.
+fn with_padding(grid: &Grid, rect: SampleRect) -> SampleRect {
+    let ([wide, high], n) = (grid.samples(), grid.side_steps());
+    SampleRect {
+        east: if rect.east == wide - 1 { n } else { rect.east },
+        north: if rect.north == high - 1 { n } else { rect.north },
+        ..rect
+    }
+}
+
+/// How the edge runs that a vertex splits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Edge {
+    Upright,
+    Level,
+    Rising,
+    Falling,
+}
+
+/// What the vertices of one of the finest levels have in common.
+struct NearLevel {
+    level: u32,
+    /// Steps from a vertex to its nearest ancestors.
+    step: u32,
+    /// Square metres over the ground to the children beside a vertex, and to those north and south.
+    ground2: [f64; 2],
+}
+
+impl NearLevel {
+    fn new<C: RecordCodec>(rules: &Rules<C>, level: u32) -> Self {
+        let step = 1u32 << (level / 2);
+        let [dx, dy] = rules.grid.spacing_m();
+        let [e, n] = [dx, dy].map(|d| d * f64::from(if level & 1 == 1 { step } else { step / 2 }));
+        let ground2 = if level & 1 == 1 { [e * e, n * n] } else { [e * e + n * n; 2] };
+        Self { level, step, ground2 }
+    }
+
+    /// Indices of the children of the vertex at index `at`, in rows of `row`, and square metres to them.
+    #[inline(always)]
+    fn children(&self, at: usize, row: usize) -> [(usize, f64); 4] {
+        let [beside, across] = self.ground2;
+        if self.level & 1 == 1 {
+            let s = self.step as usize;
+            [(at + s, beside), (at - s, beside), (at + s * row, across), (at - s * row, across)]
+        } else {
+            let h = self.step as usize / 2;
+            let (south, north) = (at - h * row, at + h * row);
+            [(south - h, beside), (south + h, beside), (north - h, beside), (north + h, beside)]
+        }
+    }
+
+    /// See [`Grid::edge_ends`].
+    #[inline(always)]
+    fn edge(&self, v: GridPoint) -> Edge {
+        let (column, row) = (v.x() >> (self.level / 2), v.y() >> (self.level / 2));
+        match (self.level & 1 == 1, row & 1 == 1) {
+            (false, true) => Edge::Upright,
+            (false, false) => Edge::Level,
+            (true, _) if (column ^ row) & 2 == 0 => Edge::Rising,
+            (true, _) => Edge::Falling,
+        }
+    }
+}
+
+/// The ends of the base in the order in which the walk from the roots meets them: counter-clockwise for the roots, and turned about from level to level.
+fn in_walk_order(grid: &Grid, [a, b, d]: [GridPoint; 3], level: u32) -> [GridPoint; 3] {
+    let along = |p: GridPoint| (i64::from(p.x()) - i64::from(a.x()), i64::from(p.y()) - i64::from(a.y()));
+    let ((bx, by), (dx, dy)) = (along(b), along(d));
+    let is_ccw = bx * dy - by * dx > 0;
+    // The roots' split vertices have the level below the centre's.
+    let wants_ccw = (grid.levels() - level).is_multiple_of(2);
+    if is_ccw == wants_ccw { [a, b, d] } else { [a, d, b] }
+}

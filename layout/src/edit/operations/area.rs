@@ -1,0 +1,162 @@
+//! Places on the ground: rectangles of samples and discs in metres, and the samples that lie in them.
+//!
+//! **A sample lies in a disc if its own position does**, computed from its column and row alone, so every window over it agrees. `samples` is as
+//! tight as that: each side of the rectangle is a row or column that the disc's extent holds. Cost: none a sample beyond the squared distance.
+
+use super::window::{HeightWindow, SampleRect};
+use crate::error::LayoutError;
+use crate::grid::Grid;
+use crate::numbers::{checked_centre, checked_radius};
+
+/// A part of the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Area {
+    /// A rectangle of samples, which may reach beyond the data north and east.
+    Rect(SampleRect),
+    /// All samples not farther from a place than a radius.
+    Disc {
+        /// Metres east and north of the south-west sample.
+        centre_m: [f64; 2],
+        /// Metres.
+        radius_m: f64,
+    },
+}
+
+impl Area {
+    /// Whether the numbers are usable; `what` names the edit.
+    pub(crate) fn check(&self, what: &str) -> Result<(), LayoutError> {
+        match self {
+            Self::Rect(rect) if rect.west > rect.east || rect.south > rect.north => {
+                Err(LayoutError::Usage(format!(
+                    "{what}: the rectangle from sample {},{} to {},{} is inside out; give its south-west corner first",
+                    rect.west, rect.south, rect.east, rect.north
+                )))
+            }
+            Self::Rect(_) => Ok(()),
+            Self::Disc { centre_m, radius_m } => {
+                checked_centre(what, *centre_m)?;
+                checked_radius(what, *radius_m)
+            }
+        }
+    }
+
+    /// The smallest rectangle that holds all samples in it; `None` if it lies outside the data or between samples.
+    pub fn samples(&self, grid: &Grid) -> Option<SampleRect> {
+        match *self {
+            Self::Rect(rect) => clipped(rect, grid),
+            Self::Disc { centre_m, radius_m } => disc_samples(centre_m, radius_m, grid),
+        }
+    }
+
+    /// Whether the sample lies in it.
+    #[inline(always)]
+    pub(crate) fn contains(&self, grid: &Grid, x: u32, y: u32) -> bool {
+        match *self {
+            Self::Rect(rect) => rect.contains(x, y),
+            Self::Disc { centre_m, radius_m } => {
+                let [east, north] = offset_m(grid, centre_m, x, y);
+                east * east + north * north <= radius_m * radius_m
+            }
+        }
+    }
+}
+
+/// Metres east and north from `centre_m` to a sample.
+#[inline(always)]
+pub(crate) fn offset_m(grid: &Grid, centre_m: [f64; 2], x: u32, y: u32) -> [f64; 2] {
+    let spacing = grid.spacing_m();
+    [f64::from(x) * spacing[0] - centre_m[0], f64::from(y) * spacing[1] - centre_m[1]]
+}
+
+/// The part of a rectangle that has data.
+pub(crate) fn clipped(rect: SampleRect, grid: &Grid) -> Option<SampleRect> {
+    let [wide, high] = grid.samples();
+    (rect.west < wide && rect.south < high && rect.west <= rect.east && rect.south <= rect.north)
+        .then(|| SampleRect { east: rect.east.min(wide - 1), north: rect.north.min(high - 1), ..rect })
+}
+
+/// The part that two rectangles share.
+pub(crate) fn shared(a: SampleRect, b: SampleRect) -> Option<SampleRect> {
+    let both = SampleRect {
+        west: a.west.max(b.west),
+        south: a.south.max(b.south),
+        east: a.east.min(b.east),
+        north: a.north.min(b.north),
+    };
+    (both.west <= both.east && both.south <= both.north).then_some(both)
+}
+
+/// The rectangle of samples in the square around a disc.
+pub(crate) fn disc_samples(centre_m: [f64; 2], radius_m: f64, grid: &Grid) -> Option<SampleRect> {
+    let [x, y] = [0, 1].map(|axis| {
+        let spacing = grid.spacing_m()[axis];
+        let last = f64::from(grid.samples()[axis] - 1);
+        let low = ((centre_m[axis] - radius_m) / spacing).ceil().max(0.0);
+        let high = ((centre_m[axis] + radius_m) / spacing).floor().min(last);
+        // Not-a-numbers compare as nothing does: such a disc has no samples.
+        (low <= high).then_some([low as u32, high as u32])
+    });
+    let ([west, east], [south, north]) = (x?, y?);
+    Some(SampleRect { west, south, east, north })
+}
+
+/// Calls `change` for every sample that `bounds` and the window share and that is no void, with its column, row and height.
+#[inline(always)]
+pub(crate) fn each_sample(
+    window: &mut HeightWindow,
+    bounds: Option<SampleRect>,
+    mut change: impl FnMut(u32, u32, &mut f64),
+) {
+    let Some(rect) = bounds.and_then(|bounds| shared(bounds, window.rect())) else { return };
+    for y in rect.south..=rect.north {
+        let first = window.index(rect.west, y);
+        let row = &mut window.heights_m_mut()[first..first + rect.wide() as usize];
+        for (x, height) in (rect.west..).zip(row) {
+            if !height.is_nan() {
+                change(x, y, height);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_discs_samples_are_those_within_its_radius(
+            centre_m in prop::array::uniform2(-60.0..200.0f64),
+            radius_m in prop_oneof![0.01..120.0f64, Just(10.0)],
+            spacing_m in prop::array::uniform2(1.0..20.0f64),
+        ) {
+            let grid = Grid::new([9, 14], spacing_m).unwrap();
+            let disc = Area::Disc { centre_m, radius_m };
+            let bounds = disc.samples(&grid);
+            for y in 0..14 {
+                for x in 0..9 {
+                    let [east, north] = offset_m(&grid, centre_m, x, y);
+                    // Along an axis rounding may leave a sample on the very circle out.
+                    if east.hypot(north) < radius_m * (1.0 - 1e-12) {
+                        prop_assert!(bounds.is_some_and(|b| b.contains(x, y)));
+                    }
+                    if bounds.is_some_and(|b| b.contains(x, y)) {
+                        prop_assert!(east.abs().max(north.abs()) <= radius_m * (1.0 + 1e-12));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rectangles_are_cut_to_the_data() {
+        let grid = Grid::new([9, 14], [1.0, 1.0]).unwrap();
+        let rect = |west, south, east, north| SampleRect { west, south, east, north };
+        assert_eq!(Area::Rect(rect(3, 4, 99, 5)).samples(&grid), Some(rect(3, 4, 8, 5)));
+        assert_eq!(Area::Rect(rect(9, 4, 99, 5)).samples(&grid), None);
+        let inside_out = Area::Rect(rect(3, 4, 2, 5));
+        assert_eq!(inside_out.samples(&grid), None);
+        assert!(inside_out.check("set").unwrap_err().to_string().contains("inside out"));
+    }
+}

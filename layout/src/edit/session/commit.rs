@@ -1,0 +1,137 @@
+//! A batch of edits on its way to the disk: everything that changed goes behind the file's end in one write, and when it is there, a header that leads to it (FORMAT.md, section 7).
+//!
+//! Nothing that a header leads to is ever written over. Killed at any moment the file holds a whole number of batches; readers that have it open keep what they opened.
+//! Cost: the pages that changed, the directory leaves that lead to them, the root; two syncs.
+
+use crate::error::LayoutError;
+use crate::file::bytes::{Page, checksum};
+use crate::file::directory::{Directory, page_at, put_leaf, root_bytes};
+use crate::file::disk::Disk;
+use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
+use crate::file::header::{Header, History};
+use crate::file::journal::{Lineage, State};
+use crate::file::tail::{Attempt, NextHeader, Tail};
+use crate::imagery::PaintedSection;
+use std::sync::Arc;
+
+/// What a commit is about.
+pub(crate) struct Content<'c> {
+    /// Logical pages that changed, ascending, and what they hold now.
+    pub(crate) pages: Vec<(u64, &'c Page)>,
+    /// Range of heights and error top now.
+    pub(crate) header: &'c Header,
+    /// Painted tiles, to lie at the tail's begin.
+    pub(crate) section: Option<PaintedSection>,
+    pub(crate) edits: u64,
+    pub(crate) label: &'c str,
+}
+
+/// A commit that is ready to be written, on any thread. Dropped without having run it wrote nothing, and the session finds that out.
+#[derive(Debug)]
+pub struct CommitJob {
+    tail: Tail,
+    /// What goes behind the file's end.
+    data: Vec<u8>,
+    pub(crate) next: NextHeader,
+    /// Directory entries that change with it: (logical page or leaf, entry).
+    pub(crate) entries: Vec<(usize, Entry)>,
+    pub(crate) leaves: Vec<(usize, Entry)>,
+    /// Painted tiles in it, without their bytes.
+    pub(crate) section: Option<PaintedSection>,
+}
+
+impl CommitJob {
+    /// Record pages that it writes.
+    pub fn pages(&self) -> u64 {
+        self.entries.len() as u64
+    }
+
+    /// Bytes by which the file grows.
+    pub fn bytes(&self) -> u64 {
+        self.data.len() as u64
+    }
+
+    /// How far it has come, for whoever waits for it.
+    pub(crate) fn attempt(&self) -> Arc<Attempt> {
+        Arc::clone(&self.next.attempt)
+    }
+
+    /// Puts `content` behind the end of a file with the current header `old` and this directory.
+    pub(crate) fn new(
+        tail: Tail,
+        old: &Header,
+        directory: &Directory,
+        lineage: &Lineage,
+        mut content: Content<'_>,
+    ) -> Result<Self, LayoutError> {
+        let (begin, generation) = (tail.begin(), tail.generation());
+        let mut data = content.section.as_mut().map_or_else(Vec::new, |s| std::mem::take(&mut s.bytes));
+        let next_page = |data: &Vec<u8>| page_at(tail.path(), begin + data.len() as u64);
+        let mut entries = Vec::with_capacity(content.pages.len());
+        for (logical, page) in &content.pages {
+            let entry = Entry { page: next_page(&data)?, checksum: checksum(&page[..]), generation };
+            entries.push((*logical as usize, entry));
+            data.extend_from_slice(&page[..]);
+        }
+        let mut leaves = Vec::new();
+        for of_leaf in entries.chunk_by(|a, b| a.0 / ENTRIES_PER_LEAF == b.0 / ENTRIES_PER_LEAF) {
+            let leaf = of_leaf[0].0 / ENTRIES_PER_LEAF;
+            let first = leaf * ENTRIES_PER_LEAF;
+            let last = (first + ENTRIES_PER_LEAF).min(directory.entries.len());
+            let mut all = directory.entries[first..last].to_vec();
+            of_leaf.iter().for_each(|(logical, entry)| all[logical - first] = *entry);
+            let entry = put_leaf(&all, next_page(&data)?, generation, |bytes| {
+                data.extend_from_slice(bytes);
+                Ok(())
+            })?;
+            leaves.push((leaf, entry));
+        }
+        let added = entries.iter().filter(|(logical, _)| !directory.entries[*logical].is_present()).count();
+        let mut root = directory.root.clone();
+        leaves.iter().for_each(|(leaf, entry)| root[*leaf] = *entry);
+        let root = root_bytes(&root);
+        let state = State {
+            root_page: next_page(&data)?,
+            root_checksum: root.checksum,
+            stored_pages: old.stored_pages + added as u64,
+            height_range_m: content.header.height_range_m,
+            error_top_m: content.header.scale.error_top_m,
+            imagery: content.section.as_ref().map_or(old.imagery, |section| Some(section.place)),
+        };
+        data.extend_from_slice(&root.bytes);
+        let commit_page = next_page(&data)?;
+        data.extend_from_slice(&lineage.commit(state, content.edits, content.label).to_page()[..]);
+        let next = tail.next_header(Header {
+            file_bytes: begin + data.len() as u64,
+            history: Some(History { commit_page, tip_page: commit_page }),
+            ..state.put_into(old)
+        })?;
+        Ok(Self { tail, data, next, entries, leaves, section: content.section })
+    }
+
+    /// A header alone: another state that is in the file already.
+    pub(crate) fn turn(tail: Tail, header: Header) -> Result<Self, LayoutError> {
+        let next = tail.next_header(header)?;
+        Ok(Self { tail, data: Vec::new(), next, entries: Vec::new(), leaves: Vec::new(), section: None })
+    }
+
+    /// Brings it to the disk.
+    ///
+    /// # Errors
+    /// [`LayoutError::Io`], or [`LayoutError::Usage`] if the file was replaced under its name. The file reads as before then, or as after if only the last sync failed; the commit
+    /// may be tried again.
+    pub fn run(&self) -> Result<(), LayoutError> {
+        self.run_on(&crate::file::disk::SystemDisk)
+    }
+
+    /// As [`CommitJob::run`], on another disk than the system's.
+    ///
+    /// # Errors
+    /// As [`CommitJob::run`].
+    pub fn run_on(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
+        if !self.data.is_empty() {
+            self.tail.write(disk, &self.data, self.tail.begin())?;
+        }
+        self.tail.flip(disk, &self.next)
+    }
+}

@@ -1,0 +1,175 @@
+//! A terrain file written anew as a build would have left it: pages in order, imagery behind them, and nothing of what edits replaced.
+
+use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::bytes::PAGE_BYTES;
+use crate::file::directory::{page_at, put_all_leaves, root_bytes};
+use crate::file::disk::Disk;
+use crate::file::entries::{Entry, absent};
+use crate::file::header::{Header, INERT_PAGE};
+use crate::file::lock::WriteLock;
+use crate::file::slots::Slots;
+use crate::file::structure::inert_page;
+use crate::file::tail::Tail;
+use crate::imagery::{Append, Imagery, MadeTile};
+use crate::progress::BuildProgress;
+use crate::publish::publish_terrain;
+use crate::read::terrain::Terrain;
+use std::path::Path;
+
+const PAGE: u64 = PAGE_BYTES as u64;
+/// Bytes written at a time.
+const CHUNK_BYTES: usize = 1 << 20;
+
+/// What became of a file that was written anew.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Compacted {
+    /// Header of the new file.
+    pub header: Header,
+    /// Bytes of the old one, with its overlay if it had one.
+    pub bytes_before: u64,
+    /// Commits that could be undone or redone in the old one; 0 if its journal cannot be read.
+    pub commits_before: u64,
+}
+
+/// Writes the terrain file `file` with the edits of `overlay`, if there is one, as it is now to `out`: the same records and imagery, in order, without journal. `out` may be `file` itself, by
+/// whatever name; nobody else writes to it from before it is read until it is replaced. `out` appears when it is complete.
+///
+/// # Errors
+/// Damage and I/O of the terrain; I/O of `out`; [`LayoutError::Usage`] while another program writes to it, and if `out` is `file` and has other names (hard links), which would keep the old contents.
+pub fn compact(
+    disk: &dyn Disk,
+    file: &Path,
+    overlay: Option<&Path>,
+    out: &Path,
+    progress: &dyn BuildProgress,
+) -> Result<Compacted, LayoutError> {
+    // The lock comes first: what is committed before it is read, and nothing is committed after it.
+    let lock = lock_if_same(file, out)?;
+    let terrain = match overlay {
+        Some(overlay) => Terrain::open_with_overlay_unmapped(file, overlay)?,
+        None => Terrain::open_unmapped(file)?,
+    };
+    let bytes_before = terrain.source().byte_count();
+    // A file whose journal is damaged is written anew all the same.
+    let commits_before = crate::edit::history(&terrain).map_or(0, |commits| commits.len() as u64);
+    let header = rewrite(disk, &terrain, AtomicFile::create(out)?, lock.as_ref(), progress)?;
+    Ok(Compacted { header, bytes_before, commits_before })
+}
+
+/// The lock of `file` if it is to be replaced.
+fn lock_if_same(file: &Path, out: &Path) -> Result<Option<WriteLock>, LayoutError> {
+    if !same_file::is_same_file(file, out).unwrap_or(false) {
+        return Ok(None);
+    }
+    let lock = WriteLock::take(out)?;
+    lock.check_only_name(out)?;
+    Ok(Some(lock))
+}
+
+fn rewrite(
+    disk: &dyn Disk,
+    terrain: &Terrain,
+    file: AtomicFile,
+    over: Option<&WriteLock>,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
+    progress.stage("compacting", terrain.header().stored_pages * terrain.header().records_per_page());
+    let mut writer = Writer { disk, file: &file, chunk: Vec::with_capacity(CHUNK_BYTES), offset: 0 };
+    let slots = write_terrain(&mut writer, terrain, progress)?;
+    copy_imagery(disk, &file, slots, terrain)?;
+    progress.stage("syncing", 0);
+    publish_terrain(disk, file, over)
+}
+
+/// Writes on and on.
+struct Writer<'w> {
+    disk: &'w dyn Disk,
+    file: &'w AtomicFile,
+    chunk: Vec<u8>,
+    /// Where the chunk goes.
+    offset: u64,
+}
+
+impl Writer<'_> {
+    fn put(&mut self, bytes: &[u8]) -> Result<(), LayoutError> {
+        self.chunk.extend_from_slice(bytes);
+        if self.chunk.len() >= CHUNK_BYTES { self.flush() } else { Ok(()) }
+    }
+
+    fn flush(&mut self) -> Result<(), LayoutError> {
+        self.write(&self.chunk, self.offset)?;
+        self.offset += self.chunk.len() as u64;
+        self.chunk.clear();
+        Ok(())
+    }
+
+    fn write(&self, bytes: &[u8], offset: u64) -> Result<(), LayoutError> {
+        let when_full = "cannot write the file, for which there is no room; make some on its disk, or name an output on another";
+        self.disk
+            .write_at(self.file.file(), bytes, offset)
+            .map_err(|e| LayoutError::write(self.file.target(), "cannot write the file", when_full, e))
+    }
+
+    /// Page that is written next.
+    fn page(&self) -> Result<u32, LayoutError> {
+        page_at(self.file.target(), self.offset + self.chunk.len() as u64)
+    }
+}
+
+fn write_terrain(
+    writer: &mut Writer<'_>,
+    terrain: &Terrain,
+    progress: &dyn BuildProgress,
+) -> Result<Slots, LayoutError> {
+    let old = terrain.header();
+    // The header comes last.
+    writer.put(&[0; 2 * PAGE_BYTES])?;
+    debug_assert_eq!(writer.page()?, INERT_PAGE);
+    writer.put(&inert_page(old.record_kind)[..])?;
+    let mut entries = absent(terrain.entries().len());
+    let pages = (0u64..).zip(terrain.entries()).zip(&mut entries);
+    for ((logical, entry), place) in pages.filter(|((_, entry), _)| entry.is_present()) {
+        let page = terrain.checked_page(logical)?;
+        *place = Entry { page: writer.page()?, generation: 1, ..*entry };
+        writer.put(&page[..])?;
+        progress.advance(old.records_per_page());
+    }
+    let (root, root_page) = put_all_leaves(&entries, writer.page()?, |_, bytes| writer.put(bytes))?;
+    let root = root_bytes(&root);
+    writer.put(&root.bytes)?;
+    writer.flush()?;
+    let header = Header {
+        generation: 1,
+        root_page,
+        root_checksum: root.checksum,
+        file_bytes: u64::from(root_page) * PAGE + root.bytes.len() as u64,
+        imagery: None,
+        history: None,
+        ..old.clone()
+    };
+    let page = header.to_page();
+    writer.write(&page[..], 0)?;
+    Ok(Slots { current: page, current_slot: 0, header })
+}
+
+/// Copies the imagery of `terrain`, if it has any, behind the file with these header slots, which is not published yet; returns the file's header.
+pub(crate) fn copy_imagery(
+    disk: &dyn Disk,
+    file: &AtomicFile,
+    slots: Slots,
+    terrain: &Terrain,
+) -> Result<Header, LayoutError> {
+    let Some(imagery) = Imagery::open(terrain)? else { return Ok(slots.header) };
+    let tail = Tail::of_new(file.target(), file.file(), &slots)?;
+    let length = slots.header.file_bytes;
+    let mut append = Append::begin(disk, tail, slots.header, None, imagery.shape())?;
+    for id in imagery.shape().ids() {
+        let mut bytes = Vec::new();
+        if let Some(entry) = imagery.read_stored(terrain, id, &mut bytes)? {
+            append.put(&MadeTile { id, entry, bytes })?;
+        }
+    }
+    append.commit(imagery.source(), length)
+}

@@ -1,0 +1,39 @@
+//! A terrain file rewritten so that its records have room for other heights.
+
+use super::compact::copy_imagery;
+use crate::build::{HeightRoom, rebuild_into};
+use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::disk::Disk;
+use crate::file::header::Header;
+use crate::file::lock::WriteLock;
+use crate::file::slots::Slots;
+use crate::progress::BuildProgress;
+use crate::publish::publish_terrain;
+use crate::read::terrain::Terrain;
+use std::path::Path;
+
+/// Rewrites the terrain file at `path` with room for the heights of `room` beside its own, and for slopes as steep as all of them over one sample. No height and nothing of the
+/// imagery changes; errors and radii are rounded up in another scale; where 16 bits do not hold the steps, records take 8 bytes instead of 4. The journal ends: what was edited before can no longer be undone. Readers go on reading
+/// the old file. Returns the new header.
+///
+/// # Errors
+/// Damage and I/O; [`LayoutError::Usage`] while another program writes to it, for a file with other names (hard links), which would keep the old contents, and as
+/// [`rebuild`](crate::build::rebuild). The file is as before then.
+pub fn widen(
+    disk: &dyn Disk,
+    path: &Path,
+    room: HeightRoom,
+    memory_mib: u64,
+    progress: &dyn BuildProgress,
+) -> Result<Header, LayoutError> {
+    let lock = WriteLock::take(path)?;
+    lock.check_only_name(path)?;
+    let terrain = Terrain::open(path)?;
+    let file = AtomicFile::create(path)?;
+    let header = rebuild_into(disk, &terrain, &file, Some(room), memory_mib, progress)?;
+    let slots = Slots { current: header.to_page(), current_slot: 0, header };
+    copy_imagery(disk, &file, slots, &terrain)?;
+    progress.stage("syncing", 0);
+    publish_terrain(disk, file, Some(&lock))
+}

@@ -1,0 +1,414 @@
+//! The header: FORMAT.md, section 4, field by field, and the checks of section 6 that need nothing else.
+//!
+//! Invariant: a [`Header`] that [`Header::parse`] returned has every field in range and consistent with the others.
+
+mod numbers;
+
+use super::bytes::{
+    PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64, put_f64, put_text, put_u16,
+    put_u32, put_u64,
+};
+use crate::dem::HorizontalUnit;
+use crate::error::LayoutError;
+use crate::grid::Grid;
+use crate::grid::order::slot_count;
+use crate::grid::record::{RecordKind, RecordScale};
+use std::path::Path;
+
+/// First bytes of every terrain file.
+pub const MAGIC: [u8; 8] = *b"\x89IQT\r\n\x1a\n";
+/// The page that absent record pages read as.
+pub const INERT_PAGE: u32 = 2;
+/// Entries a directory leaf page.
+pub const LEAF_ENTRIES: u64 = 256;
+
+/// Which error bound the records hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// Distance to the surface over all samples: what is drawn keeps its promise.
+    Bounded,
+    /// The papers' distance of the vertex from the edge it splits.
+    Step,
+}
+
+impl ErrorKind {
+    /// The word the command line uses.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bounded => "bounded",
+            Self::Step => "step",
+        }
+    }
+}
+
+/// Where the sample spacing in metres came from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SpacingOrigin {
+    /// The DEM gives it in a unit of length.
+    Dem,
+    /// Converted from degrees at the latitude of the DEM's centre, in degrees.
+    Degrees {
+        /// Latitude in degrees at which the conversion was made.
+        centre_latitude_deg: f64,
+    },
+    /// The user stated it.
+    User,
+    /// Nothing was known.
+    Assumed,
+}
+
+/// Where the imagery section lies (FORMAT.md, section 8).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageryPlace {
+    /// First byte, of a page.
+    pub offset: u64,
+    /// Length in bytes, of whole pages.
+    pub bytes: u64,
+}
+
+impl ImageryPlace {
+    /// First byte after it.
+    pub fn end(self) -> u64 {
+        self.offset.saturating_add(self.bytes)
+    }
+}
+
+/// Where the journal of a file that was edited begins (FORMAT.md, section 7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct History {
+    /// Journal page of the commit that led to the state the file is in; 0 for the state in which it was built.
+    pub commit_page: u32,
+    /// Journal page of the newest commit that redoing leads to.
+    pub tip_page: u32,
+}
+
+/// What a terrain file says about itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Grid shape and spacing.
+    pub grid: Grid,
+    /// Kind of its records.
+    pub record_kind: RecordKind,
+    /// Scale of its records.
+    pub scale: RecordScale,
+    /// Kind of its errors.
+    pub error_kind: ErrorKind,
+    /// Whether any sample is void.
+    pub has_voids: bool,
+    /// Whether heights were rounded to the height step.
+    pub heights_rounded: bool,
+    /// Generation: 1 for a new file.
+    pub generation: u32,
+    /// Lowest and highest height in metres.
+    pub height_range_m: [f64; 2],
+    /// Samples without a height.
+    pub nodata_samples: u64,
+    /// Record pages present.
+    pub stored_pages: u64,
+    /// First page of the directory root.
+    pub root_page: u32,
+    /// CRC-32 of the directory root.
+    pub root_checksum: u32,
+    /// Length of the file.
+    pub file_bytes: u64,
+    /// Where its imagery lies, if it has any.
+    pub imagery: Option<ImageryPlace>,
+    /// Where its journal begins, if it was edited.
+    pub history: Option<History>,
+    /// Samples (east, north of the south-west sample) to reference-system coordinates, if known.
+    pub sample_to_crs: Option<[f64; 6]>,
+    /// EPSG code, if known.
+    pub epsg: Option<u32>,
+    /// Unit of the reference system.
+    pub crs_unit: HorizontalUnit,
+    /// Where the spacing came from.
+    pub spacing_origin: SpacingOrigin,
+    /// Radius of the body's equator in metres, if the DEM names one.
+    pub body_radius_m: Option<f64>,
+    /// Name of the reference system.
+    pub crs_name: String,
+    /// Format of the DEM.
+    pub source: String,
+}
+
+impl Header {
+    /// Records a page.
+    pub fn records_per_page(&self) -> u64 {
+        (PAGE_BYTES / self.record_kind.bytes()) as u64
+    }
+
+    /// Logical record pages, absent ones included.
+    pub fn record_pages(&self) -> u64 {
+        slot_count(self.grid.k()).div_ceil(self.records_per_page())
+    }
+
+    /// Entries of the directory root.
+    pub fn root_entries(&self) -> u64 {
+        self.record_pages().div_ceil(LEAF_ENTRIES)
+    }
+
+    /// The header as a page.
+    pub fn to_page(&self) -> Box<Page> {
+        let mut page = Box::new([0; PAGE_BYTES]);
+        let p = &mut page[..];
+        p[..8].copy_from_slice(&MAGIC);
+        put_u16(p, 0x008, 1);
+        let minor = if self.history.is_some() { 2 } else { u16::from(self.imagery.is_some()) };
+        put_u16(p, 0x00a, minor);
+        put_u32(p, 0x00c, PAGE_BYTES as u32);
+        p[0x010] = self.grid.k() as u8;
+        p[0x011] = match self.record_kind {
+            RecordKind::Compact => 1,
+            RecordKind::Exact8 => 2,
+            RecordKind::Exact16 => 3,
+        };
+        p[0x012] = match self.error_kind {
+            ErrorKind::Bounded => 1,
+            ErrorKind::Step => 2,
+        };
+        p[0x013] = u8::from(self.has_voids) | u8::from(self.heights_rounded) << 1;
+        put_u32(p, 0x014, self.grid.samples()[0]);
+        put_u32(p, 0x018, self.grid.samples()[1]);
+        put_u32(p, 0x01c, self.generation);
+        put_f64(p, 0x020, self.grid.spacing_m()[0]);
+        put_f64(p, 0x028, self.grid.spacing_m()[1]);
+        put_f64(p, 0x030, self.scale.height_base_m);
+        put_f64(p, 0x038, self.scale.height_step_m);
+        put_f64(p, 0x040, self.height_range_m[0]);
+        put_f64(p, 0x048, self.height_range_m[1]);
+        put_f64(p, 0x050, self.scale.error_top_m);
+        let compact = self.record_kind == RecordKind::Compact;
+        put_u32(p, 0x058, if compact { self.scale.radius_steps_per_octave } else { 0 });
+        put_u64(p, 0x060, self.nodata_samples);
+        put_u64(p, 0x068, self.record_pages());
+        put_u64(p, 0x070, self.stored_pages);
+        put_u32(p, 0x078, self.root_page);
+        put_u32(p, 0x07c, self.root_entries() as u32);
+        put_u32(p, 0x080, self.root_checksum);
+        put_u64(p, 0x088, self.file_bytes);
+        put_u64(p, 0x090, self.imagery.map_or(0, |place| place.offset));
+        put_u64(p, 0x098, self.imagery.map_or(0, |place| place.bytes));
+        for (i, m) in self.sample_to_crs.unwrap_or_default().iter().enumerate() {
+            put_f64(p, 0x0a0 + 8 * i, *m);
+        }
+        put_u32(p, 0x0d0, self.epsg.unwrap_or(0));
+        p[0x0d4] = match self.crs_unit {
+            HorizontalUnit::Unknown => 0,
+            HorizontalUnit::Metre => 1,
+            HorizontalUnit::Degree => 2,
+            HorizontalUnit::Foot => 3,
+            HorizontalUnit::UsSurveyFoot => 4,
+        };
+        let (origin, latitude) = match self.spacing_origin {
+            SpacingOrigin::Dem => (1, f64::NAN),
+            SpacingOrigin::Degrees { centre_latitude_deg } => (2, centre_latitude_deg),
+            SpacingOrigin::User => (3, f64::NAN),
+            SpacingOrigin::Assumed => (4, f64::NAN),
+        };
+        p[0x0d5] = origin;
+        put_f64(p, 0x0d8, latitude);
+        put_f64(p, 0x0e0, self.body_radius_m.unwrap_or(0.0));
+        put_u32(p, 0x0e8, self.history.map_or(0, |history| history.commit_page));
+        put_u32(p, 0x0ec, self.history.map_or(0, |history| history.tip_page));
+        put_text(p, 0x200, &self.crs_name);
+        put_text(p, 0x300, &self.source);
+        seal(&mut page);
+        page
+    }
+
+    /// The page of an older header with what appends change: version, generation, range of heights, directory, length, imagery, journal. Fields that this version does
+    /// not know stay as they are.
+    pub(crate) fn amended(&self, older: &Page) -> Box<Page> {
+        let mut page = Box::new(*older);
+        let ours = self.to_page();
+        if get_u16(&page[..], 0x00a) < get_u16(&ours[..], 0x00a) {
+            page[0x00a..0x00c].copy_from_slice(&ours[0x00a..0x00c]);
+        }
+        for range in [0x01c..0x020, 0x040..0x058, 0x070..0x07c, 0x080..0x084, 0x088..0x0a0, 0x0e8..0x0f0] {
+            page[range.clone()].copy_from_slice(&ours[range]);
+        }
+        seal(&mut page);
+        page
+    }
+
+    /// The current header of the two slots.
+    ///
+    /// # Errors
+    /// [`LayoutError::NotThisFormat`] without the magic, [`LayoutError::Unsupported`] for another version,
+    /// [`LayoutError::Damaged`] for anything out of place.
+    pub fn current(path: &Path, slot_a: &Page, slot_b: &Page) -> Result<Self, LayoutError> {
+        Self::current_as(path, slot_a, slot_b, MAGIC)
+    }
+
+    /// As [`Header::current`], of a file that begins with `magic`.
+    pub(crate) fn current_as(
+        path: &Path,
+        slot_a: &Page,
+        slot_b: &Page,
+        magic: [u8; 8],
+    ) -> Result<Self, LayoutError> {
+        if slot_a[..8] != magic && slot_b[..8] != magic {
+            return Err(LayoutError::not_this_format(
+                path,
+                "this is not a terrain file (.iqt); make one from elevation data with `terrasoar build`",
+            ));
+        }
+        match (Self::parse_as(path, slot_a, magic), Self::parse_as(path, slot_b, magic)) {
+            (Ok(a), Ok(b)) => Ok(if b.generation > a.generation { b } else { a }),
+            (Ok(a), Err(_)) => Ok(a),
+            (Err(_), Ok(b)) => Ok(b),
+            // A slot that was never written says nothing; the other one's problem is the news.
+            (Err(a), Err(b)) => Err(if slot_a[..8] == magic { a } else { b }),
+        }
+    }
+
+    /// Reads and checks one header slot.
+    ///
+    /// # Errors
+    /// As for [`Header::current`].
+    pub fn parse(path: &Path, page: &Page) -> Result<Self, LayoutError> {
+        Self::parse_as(path, page, MAGIC)
+    }
+
+    /// As [`Header::parse`], of a file that begins with `magic`.
+    pub(crate) fn parse_as(path: &Path, page: &Page, magic: [u8; 8]) -> Result<Self, LayoutError> {
+        let p = &page[..];
+        let damaged = |problem: String| {
+            LayoutError::damaged(path, "header", format!("{problem}; build the file again or restore a copy"))
+        };
+        if p[..8] != magic {
+            return Err(damaged("the magic bytes are missing".into()));
+        }
+        let major = get_u16(p, 0x008);
+        if major != 1 {
+            return Err(LayoutError::unsupported(
+                path,
+                format!(
+                    "the file has format version {major}, this program reads version 1; use a newer terrasoar"
+                ),
+            ));
+        }
+        if get_u32(p, 0xffc) != checksum(&p[..0xffc]) {
+            return Err(damaged("the checksum does not match".into()));
+        }
+        let check = |holds: bool, field: &str| {
+            if holds {
+                Ok(())
+            } else {
+                Err(damaged(format!("the field {field} is out of range or contradicts another")))
+            }
+        };
+        check(get_u32(p, 0x00c) == PAGE_BYTES as u32, "page_bytes")?;
+        let record_kind = match p[0x011] {
+            1 => RecordKind::Compact,
+            2 => RecordKind::Exact8,
+            3 => RecordKind::Exact16,
+            _ => return Err(damaged("the field record_kind is out of range".into())),
+        };
+        let error_kind = match p[0x012] {
+            1 => ErrorKind::Bounded,
+            2 => ErrorKind::Step,
+            _ => return Err(damaged("the field error_kind is out of range".into())),
+        };
+        check(p[0x013] <= 3, "flags")?;
+        let grid = Grid::new([get_u32(p, 0x014), get_u32(p, 0x018)], [get_f64(p, 0x020), get_f64(p, 0x028)])
+            .map_err(|_| damaged("the size or spacing of the grid is out of range".into()))?;
+        check(u32::from(p[0x010]) == grid.k(), "k")?;
+        let scale = RecordScale {
+            height_base_m: get_f64(p, 0x030),
+            height_step_m: get_f64(p, 0x038),
+            error_top_m: get_f64(p, 0x050),
+            radius_steps_per_octave: match (record_kind, get_u32(p, 0x058)) {
+                (RecordKind::Compact, steps @ (8 | 16 | 32 | 64)) => steps,
+                (RecordKind::Exact8 | RecordKind::Exact16, 0) => 64,
+                _ => return Err(damaged("the field radius_steps_per_octave is out of range".into())),
+            },
+        };
+        let height_range_m = [get_f64(p, 0x040), get_f64(p, 0x048)];
+        let latitude = get_f64(p, 0x0d8);
+        let spacing_origin = match p[0x0d5] {
+            1 => SpacingOrigin::Dem,
+            2 => SpacingOrigin::Degrees { centre_latitude_deg: latitude },
+            3 => SpacingOrigin::User,
+            4 => SpacingOrigin::Assumed,
+            _ => return Err(damaged("the field spacing_origin is out of range".into())),
+        };
+        let crs_unit = match p[0x0d4] {
+            0 => HorizontalUnit::Unknown,
+            1 => HorizontalUnit::Metre,
+            2 => HorizontalUnit::Degree,
+            3 => HorizontalUnit::Foot,
+            4 => HorizontalUnit::UsSurveyFoot,
+            _ => return Err(damaged("the field crs_unit is out of range".into())),
+        };
+        let map: [f64; 6] = std::array::from_fn(|i| get_f64(p, 0x0a0 + 8 * i));
+        let body_radius_m = get_f64(p, 0x0e0);
+        let text = |offset, field| {
+            get_text(p, offset).ok_or_else(|| damaged(format!("the field {field} is not text")))
+        };
+        let imagery = match [get_u64(p, 0x090), get_u64(p, 0x098)] {
+            [0, 0] => None,
+            [offset, bytes] => Some(ImageryPlace { offset, bytes }),
+        };
+        let history = match [get_u32(p, 0x0e8), get_u32(p, 0x0ec)] {
+            [0, 0] => None,
+            [commit_page, tip_page] => Some(History { commit_page, tip_page }),
+        };
+        let header = Self {
+            grid,
+            record_kind,
+            scale,
+            error_kind,
+            has_voids: p[0x013] & 1 != 0,
+            heights_rounded: p[0x013] & 2 != 0,
+            generation: get_u32(p, 0x01c),
+            height_range_m,
+            nodata_samples: get_u64(p, 0x060),
+            stored_pages: get_u64(p, 0x070),
+            root_page: get_u32(p, 0x078),
+            root_checksum: get_u32(p, 0x080),
+            file_bytes: get_u64(p, 0x088),
+            imagery,
+            history,
+            sample_to_crs: (map != [0.0; 6]).then_some(map),
+            epsg: Some(get_u32(p, 0x0d0)).filter(|code| *code != 0),
+            crs_unit,
+            spacing_origin,
+            body_radius_m: Some(body_radius_m).filter(|r| *r != 0.0),
+            crs_name: text(0x200, "crs_name")?,
+            source: text(0x300, "source")?,
+        };
+        if let Some(field) = header.first_wrong_number() {
+            check(false, field.name())?;
+        }
+        let samples = u64::from(grid.samples()[0]) * u64::from(grid.samples()[1]);
+        check(header.nodata_samples <= samples, "nodata_samples")?;
+        check(get_u64(p, 0x068) == header.record_pages(), "record_pages")?;
+        check(header.stored_pages <= header.record_pages(), "stored_pages")?;
+        check(u64::from(get_u32(p, 0x07c)) == header.root_entries(), "root_entries")?;
+        let root_end = u64::from(header.root_page) * PAGE_BYTES as u64 + 16 * header.root_entries();
+        check(header.root_page > INERT_PAGE && root_end <= header.file_bytes, "root_page")?;
+        check(header.file_bytes <= u64::from(u32::MAX) * PAGE_BYTES as u64, "file_bytes")?;
+        let fits = |place: ImageryPlace| {
+            let page = PAGE_BYTES as u64;
+            place.offset > u64::from(INERT_PAGE) * page
+                && [place.offset, place.bytes].iter().all(|v| v.is_multiple_of(page))
+                && (2 * page..=header.file_bytes).contains(&place.bytes)
+                && place.end() <= header.file_bytes
+        };
+        check(header.imagery.is_none_or(fits), "imagery")?;
+        let is_page =
+            |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * PAGE_BYTES as u64 <= header.file_bytes;
+        let has_pages = |history: History| {
+            is_page(history.tip_page) && (history.commit_page == 0 || is_page(history.commit_page))
+        };
+        check(header.history.is_none_or(has_pages), "commit_page or tip_page")?;
+        Ok(header)
+    }
+}
+
+/// Stores the checksum of a page that ends with one.
+pub(crate) fn seal(page: &mut Page) {
+    let sum = checksum(&page[..0xffc]);
+    put_u32(page, 0xffc, sum);
+}

@@ -1,0 +1,66 @@
+//! A terrain file and what was written behind it in another file, as one: the base up to a whole page, then the overlay (FORMAT.md, section 7.3).
+
+use super::Source;
+use crate::error::LayoutError;
+use crate::file::bytes::PAGE_BYTES;
+use std::path::Path;
+
+/// Two sources in one range of offsets.
+pub(crate) struct LayeredSource {
+    base: Box<dyn Source>,
+    overlay: Box<dyn Source>,
+    /// First offset of the overlay.
+    split: u64,
+}
+
+/// Offset at which an overlay of a base of so many bytes begins.
+pub(crate) fn split_of(base_bytes: u64) -> u64 {
+    base_bytes.next_multiple_of(PAGE_BYTES as u64)
+}
+
+impl LayeredSource {
+    /// The overlay begins where the `base_bytes` bytes of the base that count end.
+    pub(crate) fn new(base: Box<dyn Source>, base_bytes: u64, overlay: Box<dyn Source>) -> Self {
+        Self { base, overlay, split: split_of(base_bytes) }
+    }
+}
+
+impl Source for LayeredSource {
+    /// The overlay's: it is what tells this terrain from the base.
+    fn path(&self) -> &Path {
+        self.overlay.path()
+    }
+
+    fn base_path(&self) -> Option<&Path> {
+        Some(self.base.path())
+    }
+
+    fn byte_count(&self) -> u64 {
+        self.split + self.overlay.byte_count()
+    }
+
+    fn own_start(&self) -> u64 {
+        self.split
+    }
+
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
+        if offset >= self.split {
+            return self.overlay.read_at(offset - self.split, buffer);
+        }
+        let in_base = (self.split - offset).min(buffer.len() as u64) as usize;
+        let (low, high) = buffer.split_at_mut(in_base);
+        self.base.read_at(offset, low)?;
+        if high.is_empty() { Ok(()) } else { self.overlay.read_at(0, high) }
+    }
+
+    fn bytes(&self) -> Option<&[u8]> {
+        let base = self.base.bytes()?;
+        // Whatever lies behind the part that counts is none of this terrain's.
+        self.overlay.bytes()?;
+        base.get(..base.len().min(self.split as usize))
+    }
+
+    fn bytes_behind(&self) -> Option<(u64, &[u8])> {
+        Some((self.split, self.overlay.bytes()?))
+    }
+}

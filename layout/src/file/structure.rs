@@ -1,0 +1,185 @@
+//! What is checked when a terrain file is opened: header, directory, inert page (FORMAT.md, section 6). Record pages are checked when they are read.
+//!
+//! Invariant: every page number of the directory that is handed out lies inside the source as it was when it was opened, and no page has two uses. Cost: a read a leaf page.
+
+use super::bytes::{PAGE_BYTES, Page, checksum, to_usize};
+use super::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, absent};
+use super::header::{Header, INERT_PAGE};
+use super::source::{PreadSource, Source};
+use crate::error::LayoutError;
+use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
+use std::path::Path;
+
+/// Reads and checks header and directory (FORMAT.md, section 6).
+pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>), LayoutError> {
+    let header = read_header(source)?;
+    let entries = check_structure(source, &header)?;
+    Ok((header, entries))
+}
+
+/// As [`read_structure`], of a file that others may append to at this moment.
+pub(crate) fn read_growing(file: &mut PreadSource) -> Result<(Header, Vec<Entry>), LayoutError> {
+    // The header first and then the length: what a header counts was in the file before the header was.
+    let header = read_header(file)?;
+    file.measure_again()?;
+    let entries = check_structure(file, &header)?;
+    Ok((header, entries))
+}
+
+/// The current header.
+fn read_header(source: &dyn Source) -> Result<Header, LayoutError> {
+    let path = source.path();
+    let length = source.byte_count();
+    let page_bytes = PAGE_BYTES as u64;
+    let mut slot_a = Box::new([0; PAGE_BYTES]);
+    let mut slot_b = Box::new([0; PAGE_BYTES]);
+    if length < 4 * page_bytes {
+        let mut start = [0; 8];
+        let have = (length as usize).min(8);
+        source.read_at(0, &mut start[..have])?;
+        return Err(if have > 0 && super::header::MAGIC.starts_with(&start[..have]) {
+            truncated(path, length, None)
+        } else {
+            LayoutError::not_this_format(
+                path,
+                "this is not a terrain file (.iqt); make one from elevation data with `terrasoar build`",
+            )
+        });
+    }
+    source.read_at(0, &mut slot_a[..])?;
+    source.read_at(page_bytes, &mut slot_b[..])?;
+    Header::current(path, &slot_a, &slot_b)
+}
+
+/// Whether all that a header leads to is there; the directory.
+fn check_structure(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
+    let length = source.byte_count();
+    if length < header.file_bytes {
+        return Err(truncated(source.path(), length, Some(header.file_bytes)));
+    }
+    check_inert_page(source, header)?;
+    read_directory(source, header)
+}
+
+/// The directory's root: where the leaves lie.
+pub(crate) fn read_root(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
+    let root_bytes = to_usize(header.root_entries() * ENTRY_BYTES as u64)?;
+    let mut root = vec![0; root_bytes];
+    source.read_at(u64::from(header.root_page) * PAGE_BYTES as u64, &mut root)?;
+    if checksum(&root) != header.root_checksum {
+        return Err(damaged(source, "directory root".into(), "the checksum does not match"));
+    }
+    Ok((0..header.root_entries() as usize).map(|i| Entry::read(&root, i)).collect())
+}
+
+/// Fills `entries` with those of leaf `i`, which the root says lies at `here`; leaves them as they are if it is absent.
+pub(crate) fn read_leaf(
+    source: &dyn Source,
+    header: &Header,
+    i: usize,
+    here: Entry,
+    entries: &mut [Entry],
+) -> Result<(), LayoutError> {
+    if !here.is_present() {
+        return Ok(());
+    }
+    let page_bytes = PAGE_BYTES as u64;
+    let in_file = |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * page_bytes <= header.file_bytes;
+    if !in_file(here.page) {
+        return Err(damaged(source, format!("directory leaf {i}"), "it lies outside the file"));
+    }
+    let mut leaf = [0; PAGE_BYTES];
+    source.read_at(u64::from(here.page) * page_bytes, &mut leaf)?;
+    if checksum(&leaf) != here.checksum {
+        return Err(damaged(source, format!("directory leaf {i}"), "the checksum does not match"));
+    }
+    for (j, place) in entries.iter_mut().enumerate() {
+        *place = Entry::read(&leaf, j);
+        if place.is_present() && !in_file(place.page) {
+            let place = format!("directory entry of record page {}", i * ENTRIES_PER_LEAF + j);
+            return Err(damaged(source, place, "the page lies outside the file"));
+        }
+    }
+    Ok(())
+}
+
+/// A directory as it is held in memory: the root, an entry a leaf, and all entries, one a logical page.
+pub(crate) type Tables = (Vec<Entry>, Vec<Entry>);
+
+/// The whole directory that `header` names, checked.
+pub(crate) fn read_directory(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
+    read_directory_beside(source, header, None).map(|(_, entries)| entries)
+}
+
+/// As [`read_directory`], of a state beside one of the same file whose root and entries are `known`: leaves that both have are not read again.
+pub(crate) fn read_directory_beside(
+    source: &dyn Source,
+    header: &Header,
+    known: Option<(&[Entry], &[Entry])>,
+) -> Result<Tables, LayoutError> {
+    let root = read_root(source, header)?;
+    let mut uses = PageUses::new(source, header.file_bytes)?;
+    uses.take_root(source, header, &root)?;
+    let mut entries = absent(to_usize(header.record_pages())?);
+    let mut stored = 0;
+    for (i, (here, leaf)) in root.iter().zip(entries.chunks_mut(ENTRIES_PER_LEAF)).enumerate() {
+        let first = i * ENTRIES_PER_LEAF;
+        let same = known.filter(|(root, _)| here.is_present() && root.get(i) == Some(here));
+        match same.and_then(|(_, entries)| entries.get(first..first + leaf.len())) {
+            Some(known) => leaf.copy_from_slice(known),
+            None => read_leaf(source, header, i, *here, leaf)?,
+        }
+        if here.is_present() {
+            uses.take_entries(source, first, leaf)?;
+            stored += leaf.iter().filter(|entry| entry.is_present()).count() as u64;
+        }
+    }
+    if stored != header.stored_pages {
+        let problem = "it holds another number of pages than the header says";
+        return Err(damaged(source, "directory".into(), problem));
+    }
+    Ok((root, entries))
+}
+
+fn damaged(source: &dyn Source, place: String, problem: &str) -> LayoutError {
+    let problem = format!("{problem}; restore a copy of the file or build it again");
+    LayoutError::damaged(source.path(), place, problem)
+}
+
+fn check_inert_page(source: &dyn Source, header: &Header) -> Result<(), LayoutError> {
+    let mut page = Box::new([0; PAGE_BYTES]);
+    source.read_at(u64::from(INERT_PAGE) * PAGE_BYTES as u64, &mut page[..])?;
+    if page[..] != inert_page(header.record_kind)[..] {
+        return Err(LayoutError::damaged(
+            source.path(),
+            "inert page",
+            "it holds something else; restore a copy of the file or build it again",
+        ));
+    }
+    Ok(())
+}
+
+/// A page of inert records.
+pub(crate) fn inert_page(kind: RecordKind) -> Box<Page> {
+    fn fill<C: RecordCodec>() -> Box<Page> {
+        let mut page = Box::new([0; PAGE_BYTES]);
+        for record in page.chunks_exact_mut(C::BYTES) {
+            C::write(C::INERT, record);
+        }
+        page
+    }
+    match kind {
+        RecordKind::Compact => fill::<Compact>(),
+        RecordKind::Exact8 => fill::<Exact8>(),
+        RecordKind::Exact16 => fill::<Exact16>(),
+    }
+}
+
+fn truncated(path: &Path, length: u64, wanted: Option<u64>) -> LayoutError {
+    let wanted = wanted.map_or(String::new(), |w| format!(" of {w}"));
+    LayoutError::damaged(
+        path,
+        format!("byte {length}"),
+        format!("the file is cut short: it has {length} bytes{wanted}; copy it again or build it again"),
+    )
+}

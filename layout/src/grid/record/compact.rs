@@ -1,0 +1,174 @@
+//! The 4-byte record: heights in steps, errors and radii as logarithms (FORMAT.md, section 3.1).
+
+use super::{RecordCodec, RecordScale, Vertex, VertexClass};
+use crate::grid::octave::OctaveTable;
+use crate::grid::{Grid, MAX_K};
+
+/// First of the error codes of fringe vertices.
+const FRINGE: u8 = 248;
+/// First of the error codes of fringe vertices whose sample is void.
+const FRINGE_VOID: u8 = 252;
+/// Factors of edge length that fringe codes stand for.
+const FRINGE_FACTORS: [f64; 4] = [1.0, 16.0, 256.0, f64::INFINITY];
+/// Plain error codes an octave.
+const ERROR_STEPS: u32 = 16;
+/// Fringe radius codes an octave.
+const FRINGE_RADIUS_STEPS: u32 = 8;
+
+/// Makes a rounded quotient a lower bound; comparing products then decides.
+const BELOW: f64 = 1.0 - 1e-12;
+
+/// The first code from `guess` on that stands for at least `value`.
+#[inline(always)]
+fn first_at_least(guess: u8, value: f64, stands_for: impl Fn(u8) -> f64) -> Option<u8> {
+    // The guess came from a product rounded down: it is the answer or the code before it.
+    if stands_for(guess) >= value {
+        Some(guess)
+    } else {
+        guess.checked_add(1).filter(|c| stands_for(*c) >= value)
+    }
+}
+
+/// Codec of 4-byte records.
+#[derive(Debug, Clone)]
+pub struct Compact {
+    height_base_m: f64,
+    height_step_m: f64,
+    per_least_error: f64,
+    errors: [f64; 256],
+    radii: [f64; 256],
+    flat_radius_m: [f64; 2 * MAX_K as usize],
+    per_flat_radius: [f64; 2 * MAX_K as usize],
+    edge_m: [f64; 2 * MAX_K as usize],
+    error_steps: OctaveTable,
+    radius_steps: OctaveTable,
+    fringe_radius_steps: OctaveTable,
+}
+
+impl Compact {
+    /// The codec of a file with this grid and scale.
+    pub fn new(grid: &Grid, scale: &RecordScale) -> Self {
+        let error_steps = OctaveTable::new(ERROR_STEPS);
+        let radius_steps = OctaveTable::new(scale.radius_steps_per_octave);
+        let bottom = scale.error_top_m / error_steps.power(FRINGE - 2);
+        let per_level = |f: &dyn Fn(u32) -> f64| {
+            std::array::from_fn(|l| if (l as u32) < grid.levels() { f(l as u32) } else { 0.0 })
+        };
+        Self {
+            height_base_m: scale.height_base_m,
+            height_step_m: scale.height_step_m,
+            per_least_error: BELOW / bottom,
+            errors: std::array::from_fn(|i| match i as u8 {
+                0 => 0.0,
+                code => bottom * error_steps.power(code - 1),
+            }),
+            radii: std::array::from_fn(|i| if i == 255 { 0.0 } else { radius_steps.power(i as u8) }),
+            flat_radius_m: per_level(&|l| grid.flat_radius_m(l)),
+            per_flat_radius: per_level(&|l| BELOW / grid.flat_radius_m(l)),
+            edge_m: per_level(&|l| grid.edge_m(l)),
+            error_steps,
+            radius_steps,
+            fringe_radius_steps: OctaveTable::new(FRINGE_RADIUS_STEPS),
+        }
+    }
+
+    #[cold]
+    fn decode_fringe(&self, height_m: f64, error_code: u8, radius_code: u8, level: u32) -> Vertex {
+        Vertex {
+            height_m,
+            error_m: self.edge_m[level as usize] * FRINGE_FACTORS[usize::from(error_code & 3)],
+            radius_m: self.flat_radius_m[level as usize] * self.fringe_radius_steps.power(radius_code),
+            class: if error_code < FRINGE_VOID { VertexClass::Fringe } else { VertexClass::FringeVoid },
+        }
+    }
+}
+
+impl RecordCodec for Compact {
+    const BYTES: usize = 4;
+    const INERT: u32 = 0xff00_0000;
+    type Raw = u32;
+
+    #[inline(always)]
+    fn read(bytes: &[u8]) -> u32 {
+        u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
+    }
+
+    #[inline(always)]
+    fn write(raw: u32, bytes: &mut [u8]) {
+        bytes[..4].copy_from_slice(&raw.to_le_bytes());
+    }
+
+    #[inline(always)]
+    fn decode(&self, raw: u32, level: u32) -> Vertex {
+        let [low, high, error_code, radius_code] = raw.to_le_bytes();
+        let height_m = self.height_base_m + f64::from(u16::from_le_bytes([low, high])) * self.height_step_m;
+        if error_code >= FRINGE {
+            return self.decode_fringe(height_m, error_code, radius_code, level);
+        }
+        Vertex {
+            height_m,
+            error_m: self.errors[usize::from(error_code)],
+            radius_m: self.flat_radius_m[level as usize] * self.radii[usize::from(radius_code)],
+            class: if error_code == 0 && radius_code == 255 {
+                VertexClass::Inert
+            } else {
+                VertexClass::Plain
+            },
+        }
+    }
+
+    #[inline]
+    fn encode(&self, level: u32, value: f64, class: VertexClass, error_m: f64, radius_m: f64) -> Option<u32> {
+        if class == VertexClass::Inert {
+            return Some(Self::INERT);
+        }
+        if !(0.0..=65535.0).contains(&value) {
+            return None;
+        }
+        let [low, high] = (value as u16).to_le_bytes();
+        let flat = self.flat_radius_m[level as usize];
+        let radius_code = |table: &OctaveTable| {
+            if radius_m <= flat {
+                return Some(0);
+            }
+            let guess = table.index_at_least(radius_m * self.per_flat_radius[level as usize])?;
+            first_at_least(guess, radius_m, |code| flat * table.power(code))
+        };
+        let (error_code, radius_code) = match class {
+            VertexClass::Plain => {
+                let error_code = if error_m <= 0.0 {
+                    0
+                } else {
+                    let guess =
+                        self.error_steps.index_at_least(error_m * self.per_least_error)?.checked_add(1)?;
+                    first_at_least(guess, error_m, |code| self.errors[usize::from(code)])
+                        .filter(|code| *code < FRINGE)?
+                };
+                (error_code, radius_code(&self.radius_steps).filter(|code| *code < 255)?)
+            }
+            fringe => {
+                let edge = self.edge_m[level as usize];
+                let factor = FRINGE_FACTORS.iter().position(|f| edge * f >= error_m)?;
+                let first = if fringe == VertexClass::Fringe { FRINGE } else { FRINGE_VOID };
+                (first + factor as u8, radius_code(&self.fringe_radius_steps)?)
+            }
+        };
+        Some(u32::from_le_bytes([low, high, error_code, radius_code]))
+    }
+
+    #[inline(always)]
+    fn is_void(raw: u32) -> bool {
+        let [_, _, error_code, radius_code] = raw.to_le_bytes();
+        error_code >= FRINGE_VOID || (error_code == 0 && radius_code == 255)
+    }
+
+    #[inline(always)]
+    fn height_value(raw: u32) -> f64 {
+        f64::from(raw as u16)
+    }
+
+    #[inline]
+    fn round_height(value: f64) -> f64 {
+        value.round_ties_even()
+    }
+}

@@ -1,0 +1,95 @@
+//! The records of a mapped terrain with pages of it replaced: what engines fly over that need all records at hand while the ground is edited.
+//!
+//! Pages are the file's until they are installed, and then this store's own. Cost over [`Records`]: a branch a record, and 4 bytes a logical page.
+
+use super::prefetch::prefetch;
+use super::records::Records;
+use super::store::{RawOf, RecordShape, RecordStore};
+use crate::error::LayoutError;
+use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
+use crate::grid::record::RecordCodec;
+
+/// The page is the file's. Zero, so that pages that are never replaced take no memory.
+const FILES: u32 = 0;
+
+/// Records of a terrain, some of them others than the file's.
+#[derive(Debug, Clone)]
+pub struct EditedRecords<'a, C: RecordCodec> {
+    records: Records<'a, C>,
+    shape: RecordShape<C>,
+    /// Which own page each logical page is, counted from 1, or [`FILES`].
+    own: Vec<u32>,
+    /// Own pages, one after the other.
+    bytes: Vec<u8>,
+}
+
+impl<'a, C: RecordCodec> EditedRecords<'a, C> {
+    /// Binary logarithm of the records a page.
+    const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
+
+    /// The records as the file has them.
+    pub fn new(records: Records<'a, C>) -> Self {
+        let own = vec![FILES; records.page_count()];
+        Self { shape: records.shape().clone(), records, own, bytes: Vec::new() }
+    }
+
+    /// Replaces a page.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] if the terrain has no such page.
+    pub fn install(&mut self, logical_page: u64, page: &Page) -> Result<(), LayoutError> {
+        let count = self.own.len();
+        let Some(own) = self.own.get_mut(to_usize(logical_page)?) else {
+            return Err(LayoutError::Usage(format!(
+                "page {logical_page} does not exist; the terrain has {count}"
+            )));
+        };
+        if *own == FILES {
+            *own = (self.bytes.len() / PAGE_BYTES) as u32 + 1;
+            self.bytes.extend_from_slice(page);
+        } else {
+            self.bytes[(*own as usize - 1) * PAGE_BYTES..][..PAGE_BYTES].copy_from_slice(page);
+        }
+        Ok(())
+    }
+
+    /// States the lowest and highest height in metres that there is now.
+    pub fn set_height_range_m(&mut self, range_m: [f64; 2]) {
+        self.shape.height_range_m = range_m;
+    }
+
+    /// Own page and byte in it of a slot; `None` if it is the file's.
+    #[inline(always)]
+    fn place(&self, slot: u64) -> Option<usize> {
+        let own = *self.own.get((slot >> Self::PAGE_SHIFT) as usize)?;
+        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        (own != FILES).then(|| (own as usize - 1) * PAGE_BYTES + within)
+    }
+}
+
+impl<C: RecordCodec> RecordStore for EditedRecords<'_, C> {
+    type Codec = C;
+
+    const IS_COMPLETE: bool = true;
+
+    #[inline(always)]
+    fn shape(&self) -> &RecordShape<C> {
+        &self.shape
+    }
+
+    #[inline(always)]
+    fn get(&self, slot: u64) -> Option<RawOf<Self>> {
+        Some(match self.place(slot) {
+            Some(at) => C::read(&self.bytes[at..at + C::BYTES]),
+            None => self.records.raw(slot),
+        })
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, slot: u64) {
+        match self.place(slot) {
+            Some(at) => prefetch(&self.bytes, at),
+            None => self.records.prefetch(slot),
+        }
+    }
+}

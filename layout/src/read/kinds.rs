@@ -1,0 +1,72 @@
+//! The three kinds of records as one: what a terrain's records and pools are, whichever kind its file has.
+
+use super::pool::PagePool;
+use super::records::{Records, Slices};
+use super::terrain::Terrain;
+use crate::error::LayoutError;
+use crate::grid::record::{Compact, Exact8, Exact16, RecordKind};
+
+/// One thing for whichever kind of records a terrain has.
+#[derive(Debug, Clone)]
+pub enum ByKind<A, B, C> {
+    /// 4-byte records.
+    Compact(A),
+    /// 8-byte records.
+    Exact8(B),
+    /// 16-byte records.
+    Exact16(C),
+}
+
+/// The records of a terrain, of whichever kind.
+pub type AnyRecords<'a> = ByKind<Records<'a, Compact>, Records<'a, Exact8>, Records<'a, Exact16>>;
+
+/// A pool of pages, of whichever kind.
+pub type AnyPool = ByKind<PagePool<Compact>, PagePool<Exact8>, PagePool<Exact16>>;
+
+/// Runs `$body` with `$records` bound to the records, or the pool, of whichever kind.
+#[macro_export]
+macro_rules! with_records {
+    ($any:expr, $records:ident => $body:expr) => {
+        match $any {
+            $crate::read::kinds::ByKind::Compact($records) => $body,
+            $crate::read::kinds::ByKind::Exact8($records) => $body,
+            $crate::read::kinds::ByKind::Exact16($records) => $body,
+        }
+    };
+}
+
+impl Terrain {
+    /// The records as refinement reads them. `None` if the source cannot lend its bytes as one slice.
+    pub fn records(&self) -> Option<AnyRecords<'_>> {
+        let bytes = Slices {
+            first: self.source().bytes()?,
+            behind: self.source().bytes_behind().unwrap_or_default(),
+        };
+        Some(match self.codec() {
+            ByKind::Compact(codec) => ByKind::Compact(Records::new(self, bytes, codec)),
+            ByKind::Exact8(codec) => ByKind::Exact8(Records::new(self, bytes, codec)),
+            ByKind::Exact16(codec) => ByKind::Exact16(Records::new(self, bytes, codec)),
+        })
+    }
+
+    /// A pool of at most `cache_bytes` for the pages of this terrain, whatever its source.
+    ///
+    /// # Errors
+    /// As [`PagePool::new`].
+    pub fn pool(&self, cache_bytes: u64) -> Result<AnyPool, LayoutError> {
+        Ok(match self.codec() {
+            ByKind::Compact(codec) => ByKind::Compact(PagePool::new(self, self.shape(codec), cache_bytes)?),
+            ByKind::Exact8(codec) => ByKind::Exact8(PagePool::new(self, self.shape(codec), cache_bytes)?),
+            ByKind::Exact16(codec) => ByKind::Exact16(PagePool::new(self, self.shape(codec), cache_bytes)?),
+        })
+    }
+
+    fn codec(&self) -> ByKind<Compact, Exact8, Exact16> {
+        let (grid, scale) = (self.grid(), &self.header().scale);
+        match self.header().record_kind {
+            RecordKind::Compact => ByKind::Compact(Compact::new(grid, scale)),
+            RecordKind::Exact8 => ByKind::Exact8(Exact8::new(grid, scale)),
+            RecordKind::Exact16 => ByKind::Exact16(Exact16::new(grid, scale)),
+        }
+    }
+}

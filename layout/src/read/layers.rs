@@ -1,0 +1,60 @@
+//! A terrain opened together with an overlay of edits (see [`overlay`](crate::file::overlay)), so that both read as one file.
+
+use super::terrain::Terrain;
+use crate::error::LayoutError;
+use crate::file::overlay::overlay_slots;
+use crate::file::source::{LayeredSource, MapSource, PreadSource, Source};
+use crate::file::structure::{read_directory, read_growing};
+use std::path::Path;
+
+/// The base with its overlay as one terrain.
+fn open_layers(base: &Path, overlay: &Path, is_mapped: bool) -> Result<Terrain, LayoutError> {
+    let mut base_file = PreadSource::open(base)?;
+    // The base must be a sound terrain by itself.
+    let (base_header, _) = read_growing(&mut base_file)?;
+    let mut overlay_file = PreadSource::open(overlay)?;
+    let (slots, _) = overlay_slots(&base_file, &mut overlay_file)?;
+    let source: Box<dyn Source> = if is_mapped {
+        let layers = [Box::new(MapSource::map(base_file)?), Box::new(MapSource::map(overlay_file)?)];
+        let [base, overlay] = layers;
+        Box::new(LayeredSource::new(base, base_header.file_bytes, overlay))
+    } else {
+        Box::new(LayeredSource::new(Box::new(base_file), base_header.file_bytes, Box::new(overlay_file)))
+    };
+    let entries = read_directory(&*source, &slots.header)?;
+    Ok(Terrain::of(source, slots.header, entries))
+}
+
+impl Terrain {
+    /// Opens the terrain file `base` with the edits in `overlay` (see [`EditSession::open_overlay`](crate::edit::EditSession::open_overlay)). Both are mapped.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`] of either; [`LayoutError::Usage`] if the overlay belongs to another terrain, or to another state of this one.
+    pub fn open_with_overlay(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
+        open_layers(base, overlay, true)
+    }
+
+    /// As [`Terrain::open_with_overlay`], without maps.
+    ///
+    /// # Errors
+    /// As [`Terrain::open_with_overlay`].
+    pub fn open_with_overlay_unmapped(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
+        open_layers(base, overlay, false)
+    }
+
+    /// The terrain file under an overlay; none if there is no overlay, whose name [`Terrain::path`] is then.
+    pub fn base_path(&self) -> Option<&Path> {
+        self.source().base_path()
+    }
+
+    /// Opens the file, with its overlay if it has one, once more, without maps.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn open_again_unmapped(&self) -> Result<Self, LayoutError> {
+        match self.source().base_path() {
+            Some(base) => Self::open_with_overlay_unmapped(base, self.path()),
+            None => Self::open_unmapped(self.path()),
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The hot path from a slot to a vertex: a codec, the page table and the bytes of a terrain, resolved once, so that a vertex costs one table lookup, one load and a decode.
+//!
+//! Invariant: every page number in the table lies inside the bytes.
+
+use super::prefetch::prefetch;
+use super::store::{RecordShape, RecordStore};
+use super::terrain::Terrain;
+use crate::file::bytes::PAGE_BYTES;
+use crate::file::header::INERT_PAGE;
+use crate::grid::order::slot_of;
+use crate::grid::record::{RecordCodec, Vertex};
+use crate::grid::{Grid, GridPoint};
+
+/// The bytes of a source: one slice, or two.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slices<'a> {
+    pub(crate) first: &'a [u8],
+    /// Offset of the second, and it.
+    pub(crate) behind: (u64, &'a [u8]),
+}
+
+impl Slices<'_> {
+    /// The record at an offset. A second slice costs the first nothing: it takes the place of the end of a check of bounds.
+    #[inline(always)]
+    fn record<C: RecordCodec>(&self, at: usize) -> C::Raw {
+        match self.first.get(at..at + C::BYTES) {
+            Some(bytes) => C::read(bytes),
+            None => self.record_behind::<C>(at),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn record_behind<C: RecordCodec>(&self, at: usize) -> C::Raw {
+        let (start, bytes) = self.behind;
+        let at = at - start as usize;
+        C::read(&bytes[at..at + C::BYTES])
+    }
+}
+
+/// The records of a terrain, of kind `C`: the hot path from slot to vertex.
+#[derive(Debug, Clone)]
+pub struct Records<'a, C: RecordCodec> {
+    bytes: Slices<'a>,
+    /// Counted from the inert page.
+    pages: &'a [u32],
+    shape: RecordShape<C>,
+}
+
+impl<'a, C: RecordCodec> Records<'a, C> {
+    /// Binary logarithm of the records a page.
+    const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
+
+    pub(crate) fn new(terrain: &'a Terrain, bytes: Slices<'a>, codec: C) -> Self {
+        Self { bytes, pages: terrain.pages(), shape: terrain.shape(codec) }
+    }
+
+    /// Grid shape and spacing.
+    #[inline(always)]
+    pub fn grid(&self) -> &Grid {
+        &self.shape.grid
+    }
+
+    /// Lowest and highest height in metres.
+    pub fn height_range_m(&self) -> [f64; 2] {
+        self.shape.height_range_m
+    }
+
+    /// Whether any sample is void.
+    pub fn has_voids(&self) -> bool {
+        self.shape.has_voids
+    }
+
+    /// Logical pages.
+    pub fn page_count(&self) -> usize {
+        self.pages.len()
+    }
+
+    /// Bytes a record.
+    pub const fn record_bytes(&self) -> usize {
+        C::BYTES
+    }
+
+    /// Logical page of a slot.
+    #[inline(always)]
+    pub fn page_of(slot: u64) -> u64 {
+        slot >> Self::PAGE_SHIFT
+    }
+
+    /// The record at `slot`, not yet decoded. Reading records early, before they are needed, hides the time memory takes.
+    ///
+    /// # Panics
+    /// For a slot past the last page.
+    #[inline(always)]
+    pub fn raw(&self, slot: u64) -> C::Raw {
+        let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize + INERT_PAGE as usize;
+        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        self.bytes.record::<C>(page * PAGE_BYTES + within)
+    }
+
+    /// Asks memory for the record at `slot`. A hint: reads nothing, and does nothing for a slot past the last page.
+    #[inline(always)]
+    pub fn prefetch(&self, slot: u64) {
+        if let Some(page) = self.pages.get((slot >> Self::PAGE_SHIFT) as usize) {
+            let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+            prefetch(self.bytes.first, (*page + INERT_PAGE) as usize * PAGE_BYTES + within);
+        }
+    }
+
+    /// The vertex of a record at `level` (0 for corners).
+    #[inline(always)]
+    pub fn decode(&self, raw: C::Raw, level: u32) -> Vertex {
+        self.shape.codec.decode(raw, level)
+    }
+
+    /// The vertex at `slot`, whose level is `level` (0 for corners).
+    ///
+    /// # Panics
+    /// For a slot past the last page.
+    #[inline(always)]
+    pub fn vertex(&self, slot: u64, level: u32) -> Vertex {
+        self.decode(self.raw(slot), level)
+    }
+
+    /// The vertex at a grid point.
+    pub fn vertex_at(&self, p: GridPoint) -> Vertex {
+        let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };
+        self.vertex(slot_of(self.grid().k(), p), level)
+    }
+}
+
+impl<C: RecordCodec> RecordStore for Records<'_, C> {
+    type Codec = C;
+
+    const IS_COMPLETE: bool = true;
+
+    #[inline(always)]
+    fn shape(&self) -> &RecordShape<C> {
+        &self.shape
+    }
+
+    #[inline(always)]
+    fn get(&self, slot: u64) -> Option<C::Raw> {
+        Some(self.raw(slot))
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, slot: u64) {
+        Records::prefetch(self, slot);
+    }
+}

@@ -1,0 +1,250 @@
+//! An opened terrain file: checked header and directory over a source, and the way from a slot to a vertex.
+//!
+//! [`Terrain`] owns the source and knows what the header knows. [`Records`] is what refinement holds.
+//!
+//! Invariant: every page number in the table lies inside the source as it was when it was opened.
+
+use super::store::RecordShape;
+use crate::error::LayoutError;
+use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
+use crate::file::entries::Entry;
+use crate::file::header::{Header, INERT_PAGE};
+use crate::file::journal::Commit;
+use crate::file::source::{MapSource, PreadSource, Source};
+use crate::file::structure::{read_directory, read_growing, read_structure};
+use crate::grid::order::slot_of;
+use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
+use crate::grid::{Grid, GridPoint};
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// An opened and checked terrain file.
+pub struct Terrain {
+    source: Box<dyn Source>,
+    header: Header,
+    entries: Vec<Entry>,
+    /// Page of each logical page, counted from the inert page, which absent ones read as. Made when records are first asked for.
+    pages: OnceLock<Vec<u32>>,
+}
+
+impl std::fmt::Debug for Terrain {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Terrain")
+            .field("path", &self.path())
+            .field("header", &self.header)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Terrain {
+    /// Opens the file at `path`: checks it by plain reads, then maps it (see [`MapSource`] for what that asks of others).
+    ///
+    /// # Errors
+    /// As FORMAT.md, section 6: not a terrain file, another version, truncated or damaged; or I/O.
+    pub fn open(path: &Path) -> Result<Self, LayoutError> {
+        let (file, header, entries) = open_settled(path)?;
+        Ok(Self::of(Box::new(MapSource::map(file)?), header, entries))
+    }
+
+    /// Opens the file at `path` without mapping it: for [`Terrain::pool`], whose pages are read. Files that others may truncate raise no signal then.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn open_unmapped(path: &Path) -> Result<Self, LayoutError> {
+        let (file, header, entries) = open_settled(path)?;
+        Ok(Self::of(Box::new(file), header, entries))
+    }
+
+    /// Opens the file at `path` as it was before all edits that its journal knows; as it is, if it has none. Mapped.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`]; a damaged journal.
+    pub fn open_original(path: &Path) -> Result<Self, LayoutError> {
+        Self::open(path)?.into_original()
+    }
+
+    /// This terrain before all edits that its journal knows.
+    ///
+    /// # Errors
+    /// I/O; a damaged journal or directory of that time.
+    pub fn into_original(self) -> Result<Self, LayoutError> {
+        let Some(history) = self.header.history else { return Ok(self) };
+        let tip = Commit::read(&*self.source, &self.header, history.tip_page)?;
+        let header = Header { history: None, ..tip.original.put_into(&self.header) };
+        let entries = read_directory(&*self.source, &header)?;
+        Ok(Self::of(self.source, header, entries))
+    }
+
+    pub(crate) fn of(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Self {
+        Self { source, header, entries, pages: OnceLock::new() }
+    }
+
+    /// Opens any source.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn from_source(source: Box<dyn Source>) -> Result<Self, LayoutError> {
+        let (header, entries) = read_structure(&*source)?;
+        Ok(Self::of(source, header, entries))
+    }
+
+    /// Page of each logical page, counted from [`INERT_PAGE`].
+    pub(crate) fn pages(&self) -> &[u32] {
+        self.pages.get_or_init(|| {
+            // Zeros that are never written take no memory: most of a void terrain.
+            let mut pages = vec![0; self.entries.len()];
+            let present = self.entries.iter().zip(&mut pages).filter(|(entry, _)| entry.is_present());
+            present.for_each(|(entry, page)| *page = entry.page - INERT_PAGE);
+            pages
+        })
+    }
+
+    /// The file's name for messages.
+    pub fn path(&self) -> &Path {
+        self.source.path()
+    }
+
+    /// What the file says about itself.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Grid shape and spacing.
+    pub fn grid(&self) -> &Grid {
+        &self.header.grid
+    }
+
+    /// The directory: one entry a logical record page.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// Bytes per sample of the DEM, everything but imagery counted.
+    pub fn bytes_per_sample(&self) -> f64 {
+        let [wide, high] = self.grid().samples();
+        let imagery = self.header.imagery.map_or(0, |place| place.bytes);
+        (self.header.file_bytes - imagery) as f64 / (f64::from(wide) * f64::from(high))
+    }
+
+    /// The source it reads from.
+    pub fn source(&self) -> &dyn Source {
+        &*self.source
+    }
+
+    /// One record page, checked against its checksum. Absent pages read as inert ones.
+    ///
+    /// # Errors
+    /// [`LayoutError::Damaged`] naming the page if it does not match; I/O.
+    pub fn checked_page(&self, logical_page: u64) -> Result<Box<Page>, LayoutError> {
+        let entry = self.entries.get(to_usize(logical_page)?).copied();
+        self.checked_page_at(logical_page, entry.unwrap_or_default())
+    }
+
+    /// One record page where `entry` says it lies: where a commit has written it since the terrain was opened, or where it lay in another state of the file. Sources that read reach
+    /// what was appended since then; one that holds its bytes in memory does not grow.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`].
+    pub fn checked_page_at(&self, logical_page: u64, entry: Entry) -> Result<Box<Page>, LayoutError> {
+        if to_usize(logical_page)? >= self.entries.len() {
+            return Err(LayoutError::Usage(format!(
+                "page {logical_page} does not exist; the file has {}",
+                self.entries.len()
+            )));
+        }
+        let mut page = Box::new([0; PAGE_BYTES]);
+        let number = if entry.is_present() { entry.page } else { INERT_PAGE };
+        self.source.read_at(u64::from(number) * PAGE_BYTES as u64, &mut page[..])?;
+        if entry.is_present() {
+            self.check_page(logical_page, entry, &page)?;
+        }
+        Ok(page)
+    }
+
+    /// Checks what was read for a page that is present.
+    pub(crate) fn check_page(&self, logical_page: u64, entry: Entry, page: &Page) -> Result<(), LayoutError> {
+        if checksum(page) == entry.checksum {
+            return Ok(());
+        }
+        Err(LayoutError::damaged(
+            self.path(),
+            format!("record page {logical_page} (file page {})", entry.page),
+            "the checksum does not match; restore a copy of the file or build it again",
+        ))
+    }
+
+    /// One vertex, read from a checked page.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`]; [`LayoutError::Usage`] for a point outside the square.
+    pub fn checked_vertex(&self, p: GridPoint) -> Result<Vertex, LayoutError> {
+        let n = self.grid().side_steps();
+        if p.x() > n || p.y() > n {
+            return Err(LayoutError::Usage(format!(
+                "sample ({}, {}) lies outside the terrain",
+                p.x(),
+                p.y()
+            )));
+        }
+        let slot = slot_of(self.grid().k(), p);
+        let per_page = self.header.records_per_page();
+        let page = self.checked_page(slot / per_page)?;
+        let at = (slot % per_page) as usize * self.header.record_kind.bytes();
+        let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };
+        let (grid, scale) = (self.grid(), &self.header.scale);
+        Ok(match self.header.record_kind {
+            RecordKind::Compact => Compact::new(grid, scale).decode(Compact::read(&page[at..]), level),
+            RecordKind::Exact8 => Exact8::new(grid, scale).decode(Exact8::read(&page[at..]), level),
+            RecordKind::Exact16 => Exact16::new(grid, scale).decode(Exact16::read(&page[at..]), level),
+        })
+    }
+
+    /// Height in metres at a horizontal position in metres east and north of the south-west sample, interpolated
+    /// bilinearly between the four samples around it. `Ok(None)` outside the data or where one of them is void.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`].
+    pub fn height_m(&self, east_m: f64, north_m: f64) -> Result<Option<f64>, LayoutError> {
+        let [dx, dy] = self.grid().spacing_m();
+        let [wide, high] = self.grid().samples();
+        let (gx, gy) = (snap(east_m / dx), snap(north_m / dy));
+        let (last_x, last_y) = (f64::from(wide - 1), f64::from(high - 1));
+        if !((0.0..=last_x).contains(&gx) && (0.0..=last_y).contains(&gy)) {
+            return Ok(None);
+        }
+        let (x0, y0) = (gx.floor() as u32, gy.floor() as u32);
+        let (fx, fy) = (gx - f64::from(x0), gy - f64::from(y0));
+        let mut height = 0.0;
+        for (x, wx) in [(x0, 1.0 - fx), (x0 + 1, fx)] {
+            for (y, wy) in [(y0, 1.0 - fy), (y0 + 1, fy)] {
+                // A sample without weight may lie outside or be void.
+                if wx * wy > 0.0 {
+                    let vertex = self.checked_vertex(GridPoint::new(x, y))?;
+                    if vertex.class.is_void() {
+                        return Ok(None);
+                    }
+                    height += vertex.height_m * wx * wy;
+                }
+            }
+        }
+        Ok(Some(height))
+    }
+
+    pub(crate) fn shape<C>(&self, codec: C) -> RecordShape<C> {
+        let Header { grid, height_range_m, has_voids, .. } = self.header;
+        RecordShape { codec, grid, height_range_m, has_voids }
+    }
+}
+
+/// Opens and checks a file that others may append to at this moment.
+fn open_settled(path: &Path) -> Result<(PreadSource, Header, Vec<Entry>), LayoutError> {
+    let mut file = PreadSource::open(path)?;
+    let (header, entries) = read_growing(&mut file)?;
+    Ok((file, header, entries))
+}
+
+/// Positions a hair off a sample, from spacings that are not exact in binary, mean the sample.
+fn snap(v: f64) -> f64 {
+    let near = v.round();
+    if (v - near).abs() < 1e-9 * near.abs().max(1.0) { near } else { v }
+}
