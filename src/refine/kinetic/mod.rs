@@ -15,52 +15,37 @@
 //!
 //! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
 
-mod ahead;
-mod bounds;
-mod budget;
 mod capacity;
-mod certificate;
-mod clocks;
-mod collect;
-mod compact;
-mod edited;
-mod labels;
-mod nodes;
-mod pages;
-mod patch;
-mod queue;
-mod resolve;
-mod shown;
-mod tree;
-mod vertices;
-mod whole;
+mod frame;
+mod mesh;
+mod time;
 
-pub use ahead::Want;
-pub use bounds::Bounds;
-pub use budget::Budget;
-pub use patch::{NO_LEVEL, Patch, PatchVertex};
+pub use frame::ahead::Want;
+pub use frame::budget::Budget;
+pub use mesh::bounds::Bounds;
+pub use mesh::patch::{NO_LEVEL, Patch, PatchVertex};
 
 use super::ground::GroundChange;
 use super::{Culling, Engine, Phase, Probe, Work};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
-use ahead::Ahead;
-use budget::Allowance;
 use capacity::settle;
-use certificate::Judge;
-use clocks::{Clocks, Pose};
-use edited::Edits;
+use frame::ahead::Ahead;
+use frame::budget::Allowance;
+use frame::edited::Edits;
 use glam::DVec3;
-use labels::level_of;
-use nodes::{CENTRE, NONE, Nodes, SPLIT, STATUS, body};
-use pages::{Dealing, Pages};
-use queue::{Entry, Queue};
+use mesh::clusters::{Clusters, Dealing};
+use mesh::labels::level_of;
+use mesh::nodes::{CENTRE, NONE, Nodes, SPLIT, STATUS, body};
+use mesh::vertices::Vertices;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners};
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};
 use terrasoar_layout::read::store::{RawOf, RecordStore};
-use vertices::Vertices;
+use time::certificate::Judge;
+use time::clocks::{Clocks, Pose};
+use time::queue::{Entry, Queue};
 
 /// Levels of the largest terrain.
 const LEVELS: usize = 32;
@@ -78,9 +63,9 @@ pub struct Kinetic<S: RecordStore> {
     corners: [Vertex; 4],
     /// Triangles in the mesh.
     triangles: usize,
-    /// The page whose bounds are due to be made anew.
+    /// The cluster whose bounds are due to be made anew.
     stale: usize,
-    /// The page that was looked at last for being sparse.
+    /// The cluster that was looked at last for being sparse.
     sparse: usize,
     clocks: Clocks,
     queue: Queue,
@@ -122,7 +107,7 @@ impl<S: RecordStore> Kinetic<S> {
         let dealing = if culling == Culling::Clusters { Dealing::Near } else { Dealing::Packed };
         Self {
             culling,
-            nodes: Nodes::new(Pages::new(dealing)),
+            nodes: Nodes::new(Clusters::new(dealing)),
             vertices: Vertices::default(),
             corners: [nowhere; 4],
             triangles: 0,
@@ -164,7 +149,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
     }
 
-    /// Pages that the mesh lacks or will need, in no order and some more than once. What is away is wanted again every few frames.
+    /// Clusters that the mesh lacks or will need, in no order and some more than once. What is away is wanted again every few frames.
     pub fn wants(&self) -> &[Want] {
         &self.wants
     }
@@ -181,7 +166,7 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Bounds and triangle slots of the clusters of the mesh. Bounds are kept with [`Culling::Clusters`] only; without it they are empty.
     pub fn clusters(&self) -> impl Iterator<Item = (Bounds, std::ops::Range<u32>)> {
-        self.nodes.pages.clusters()
+        self.nodes.clusters.clusters()
     }
 
     /// Triangles in the mesh, also those that are not drawn.
@@ -191,7 +176,7 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Vertices under watch: those in the mesh and those that the next splits would add.
     pub fn node_count(&self) -> usize {
-        self.nodes.pages.taken()
+        self.nodes.clusters.taken()
     }
 
     /// Bytes held by all arrays, spare capacity included.
@@ -269,9 +254,9 @@ impl<S: RecordStore> Kinetic<S> {
     /// Gives back what only a large frame before this one has needed.
     fn settle(&mut self) {
         // A frame that made most of the mesh says nothing about the next ones.
-        let made_anew = self.work.tests as usize > self.nodes.pages.taken() / 2;
+        let made_anew = self.work.tests as usize > self.nodes.clusters.taken() / 2;
         let used = if made_anew {
-            self.nodes.pages.taken() / 128
+            self.nodes.clusters.taken() / 128
         } else {
             (self.work.tests + self.work.slots_written) as usize
         };
@@ -289,7 +274,7 @@ impl<S: RecordStore> Kinetic<S> {
         settle(&mut self.verdicts, used);
         settle(&mut self.patch.vertices, used);
         settle(&mut self.patch.triangles, used);
-        self.edits.settle(self.nodes.pages.taken());
+        self.edits.settle(self.nodes.clusters.taken());
     }
 
     /// A record of the first page.
@@ -370,7 +355,7 @@ impl<S: RecordStore> Engine for Kinetic<S> {
         let is_true = |e: Entry| nodes.get(e.node as usize).is_some_and(|n| n.word & !SPLIT == e.word);
         for queue in std::iter::once(&mut self.queue).chain(self.ahead.as_mut().map(|ahead| &mut ahead.far)) {
             // The more, the faster: edits end many words long before their time.
-            for _ in 0..(queue.len() / (2 * self.nodes.pages.taken())).min(MOST_SWEEPS) {
+            for _ in 0..(queue.len() / (2 * self.nodes.clusters.taken())).min(MOST_SWEEPS) {
                 queue.sweep_some(is_true);
             }
         }

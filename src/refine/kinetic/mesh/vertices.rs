@@ -3,13 +3,13 @@
 //! It lies beside the bin-tree array but has an order of its own, so that nodes moved in that array move no vertex on the GPU. The first
 //! five slots are the square's corners and its centre. Cost: 13 bytes a vertex, half a vertex a triangle.
 
-use super::capacity::grow;
+use crate::refine::kinetic::capacity::grow;
 use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::Vertex;
 
 #[derive(Debug, Default)]
-pub(super) struct Vertices {
+pub(crate) struct Vertices {
     all: Vec<StripVertex>,
     /// Whether a vertex's sample is void.
     void: Vec<bool>,
@@ -18,7 +18,7 @@ pub(super) struct Vertices {
 
 impl Vertices {
     /// Places a vertex; returns its slot.
-    pub(super) fn place(&mut self, at: GridPoint, vertex: &Vertex) -> u32 {
+    pub(crate) fn place(&mut self, at: GridPoint, vertex: &Vertex) -> u32 {
         let placed = StripVertex { x: at.x(), y: at.y(), height_m: vertex.height_m as f32 };
         let is_void = vertex.class.is_void();
         if let Some(slot) = self.free.pop() {
@@ -34,34 +34,34 @@ impl Vertices {
     }
 
     /// Moves a vertex up or down.
-    pub(super) fn set_height(&mut self, slot: u32, height_m: f64) {
+    pub(crate) fn set_height(&mut self, slot: u32, height_m: f64) {
         self.all[slot as usize].height_m = height_m as f32;
     }
 
     /// Gives a slot back.
-    pub(super) fn remove(&mut self, slot: u32) {
+    pub(crate) fn remove(&mut self, slot: u32) {
         grow(&mut self.free, 1);
         self.free.push(slot);
     }
 
     #[inline(always)]
-    pub(super) fn point(&self, slot: u32) -> GridPoint {
+    pub(crate) fn point(&self, slot: u32) -> GridPoint {
         let v = &self.all[slot as usize];
         GridPoint::new(v.x, v.y)
     }
 
     #[inline(always)]
-    pub(super) fn get(&self, slot: u32) -> &StripVertex {
+    pub(crate) fn get(&self, slot: u32) -> &StripVertex {
         &self.all[slot as usize]
     }
 
     #[inline(always)]
-    pub(super) fn is_void(&self, slot: u32) -> bool {
+    pub(crate) fn is_void(&self, slot: u32) -> bool {
         self.void[slot as usize]
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.all.capacity() * size_of::<StripVertex>()
             + self.void.capacity()
             + self.free.capacity() * size_of::<u32>()

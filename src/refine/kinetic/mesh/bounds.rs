@@ -16,11 +16,11 @@ pub struct Bounds {
 
 impl Bounds {
     /// The box around nothing.
-    pub(super) const EMPTY: Self = Self { least: [f32::INFINITY; 3], largest: [f32::NEG_INFINITY; 3] };
+    pub(crate) const EMPTY: Self = Self { least: [f32::INFINITY; 3], largest: [f32::NEG_INFINITY; 3] };
 
     /// Widens the box to contain a point.
     #[inline(always)]
-    pub(super) fn include(&mut self, p: [f32; 3]) {
+    pub(crate) fn include(&mut self, p: [f32; 3]) {
         for (i, p) in p.into_iter().enumerate() {
             self.least[i] = self.least[i].min(p);
             self.largest[i] = self.largest[i].max(p);
@@ -30,7 +30,7 @@ impl Bounds {
 
 /// The boxes of all clusters.
 #[derive(Debug, Default)]
-pub(super) struct BoundsColumns {
+pub(crate) struct BoundsColumns {
     least: [Vec<f32>; 3],
     largest: [Vec<f32>; 3],
     /// Of each box, how far it is beyond the plane that it is farthest beyond.
@@ -38,21 +38,21 @@ pub(super) struct BoundsColumns {
 }
 
 impl BoundsColumns {
-    pub(super) fn get(&self, at: usize) -> Bounds {
+    pub(crate) fn get(&self, at: usize) -> Bounds {
         Bounds {
             least: [0, 1, 2].map(|axis| self.least[axis][at]),
             largest: [0, 1, 2].map(|axis| self.largest[axis][at]),
         }
     }
 
-    pub(super) fn set(&mut self, at: usize, bounds: Bounds) {
+    pub(crate) fn set(&mut self, at: usize, bounds: Bounds) {
         for axis in 0..3 {
             self.least[axis][at] = bounds.least[axis];
             self.largest[axis][at] = bounds.largest[axis];
         }
     }
 
-    pub(super) fn push_empty(&mut self) {
+    pub(crate) fn push_empty(&mut self) {
         for axis in 0..3 {
             self.least[axis].push(f32::INFINITY);
             self.largest[axis].push(f32::NEG_INFINITY);
@@ -60,7 +60,7 @@ impl BoundsColumns {
         self.beyond.push(0.0);
     }
 
-    pub(super) fn pop(&mut self) {
+    pub(crate) fn pop(&mut self) {
         let shorter = self.beyond.len().saturating_sub(1);
         self.least
             .iter_mut()
@@ -70,7 +70,7 @@ impl BoundsColumns {
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.least
             .iter()
             .chain(&self.largest)
@@ -80,7 +80,7 @@ impl BoundsColumns {
     }
 
     /// Says of each box whether it may be seen: whether it is not wholly beyond any plane.
-    pub(super) fn cull(&mut self, planes: &[BoxPlane; PLANES]) -> impl Fn(usize) -> bool + '_ {
+    pub(crate) fn cull(&mut self, planes: &[BoxPlane; PLANES]) -> impl Fn(usize) -> bool + '_ {
         self.beyond.fill(f32::NEG_INFINITY);
         for BoxPlane { normal: [a, b, c], offset } in planes {
             // The corner farthest inside.

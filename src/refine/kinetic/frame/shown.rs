@@ -3,17 +3,17 @@
 //! Whether a triangle is drawn follows from what its node holds, so no file is read for it. A triangle whose split vertex has not come yet is drawn; whether void
 //! touches it is known when it comes. Cost: the slots that changed.
 
-use super::Kinetic;
-use super::pages::{Dealing, Pages};
 use crate::mesh::has_area;
 use crate::metric::Metric;
 use crate::refine::Culling;
+use crate::refine::kinetic::Kinetic;
+use crate::refine::kinetic::mesh::clusters::{Clusters, Dealing};
 use terrasoar_layout::read::store::RecordStore;
 
 impl<S: RecordStore> Kinetic<S> {
     /// What a slot of `node` sends to the GPU: nothing where voids touch or padding takes the area.
     #[inline(always)]
-    pub(super) fn shown(&self, node: u32, corners: Option<[u32; 3]>) -> [u32; 3] {
+    pub(crate) fn shown(&self, node: u32, corners: Option<[u32; 3]>) -> [u32; 3] {
         corners.filter(|corners| self.is_drawn(node, corners)).unwrap_or([0; 3])
     }
 
@@ -35,31 +35,31 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Lists the slots that show something else than in the frame before.
-    pub(super) fn list_written(&mut self) {
+    pub(crate) fn list_written(&mut self) {
         let mut written = std::mem::take(&mut self.patch.triangles);
-        let mut pages = std::mem::replace(&mut self.nodes.pages, Pages::new(Dealing::Packed));
-        pages.take_written(|node, side| {
+        let mut clusters = std::mem::replace(&mut self.nodes.clusters, Clusters::new(Dealing::Packed));
+        clusters.take_written(|node, side| {
             written.push((2 * node + side as u32, self.shown(node, self.nodes.triangles(node)[side])));
         });
-        self.nodes.pages = pages;
+        self.nodes.clusters = clusters;
         self.patch.triangles = written;
     }
 
     /// Lists what there is to draw: all slots, or those of the clusters that the view's planes do not cull.
-    pub(super) fn list_draws(&mut self, metric: &Metric) {
+    pub(crate) fn list_draws(&mut self, metric: &Metric) {
         if self.culling == Culling::Vertices {
-            self.patch.draws.push(0..2 * self.nodes.pages.places() as u32);
+            self.patch.draws.push(0..2 * self.nodes.clusters.places() as u32);
             return;
         }
         if self.work.merges > 0 || self.edits.loose > 0 {
             self.edits.loose = self.edits.loose.saturating_sub(1);
-            self.stale = (self.stale + 1) % self.nodes.pages.len();
+            self.stale = (self.stale + 1) % self.nodes.clusters.len();
             self.tighten(self.stale);
         }
         let grid = self.records.grid();
         let [low, high] = self.records.shape().height_range_m;
         let largest = f64::from(grid.side_steps()).max(low.abs()).max(high.abs());
         let draws = &mut self.patch.draws;
-        self.nodes.pages.cull(&metric.box_planes(grid.spacing_m(), largest), |range| draws.push(range));
+        self.nodes.clusters.cull(&metric.box_planes(grid.spacing_m(), largest), |range| draws.push(range));
     }
 }

@@ -3,19 +3,19 @@
 //! Invariant: afterwards every live word is in one of the queues exactly once, or due. Cost: what is over; moving a course's words when the eye takes
 //! another.
 
-use super::Kinetic;
 use super::ahead::Ahead;
-use super::certificate::{expiry_of, with_certificate};
-use super::clocks::{BANDS, HORIZON, Kind, Pose, clock_id};
-use super::nodes::{SPLIT, STATUS};
-use super::queue::Entry;
+use crate::refine::kinetic::Kinetic;
+use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS};
+use crate::refine::kinetic::time::certificate::{expiry_of, with_certificate};
+use crate::refine::kinetic::time::clocks::{BANDS, HORIZON, Kind, Pose, clock_id};
+use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::{Phase, Probe};
 use terrasoar_layout::read::prefetch::prefetch;
 use terrasoar_layout::read::store::RecordStore;
 
 impl<S: RecordStore> Kinetic<S> {
     /// Takes from the queue what is over, and brings clocks and courses in order.
-    pub(super) fn collect<P: Probe>(&mut self, pose: Pose, probe: &mut P) {
+    pub(crate) fn collect<P: Probe>(&mut self, pose: Pose, probe: &mut P) {
         let moved = self.clocks.move_to(pose);
         if let Some(ahead) = &mut self.ahead {
             ahead.keep_pace(&self.clocks);
@@ -73,7 +73,7 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Enters a word under its expiry.
     #[inline(always)]
-    pub(super) fn enter(&mut self, clock: usize, entry: Entry) {
+    pub(crate) fn enter(&mut self, clock: usize, entry: Entry) {
         if !S::IS_COMPLETE
             && let Some(ahead) = &mut self.ahead
         {

@@ -42,7 +42,7 @@ impl Patch {
         (self.vertices.len() * size_of::<PatchVertex>() + self.triangles.len() * size_of::<[u32; 3]>()) as u64
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.vertices.clear();
         self.triangles.clear();
         self.draws.clear();

@@ -4,12 +4,12 @@
 //! however many threads they are made; splits and merges go one by one, in an order that the list of what was over decides. Cost: what is over, and the
 //! children of what is split.
 
-use super::Kinetic;
 use super::budget::Allowance;
-use super::certificate::{ACTIVE, Judge, clock_of, expiry_of};
-use super::labels::level_of;
-use super::nodes::{SPLIT, STATUS, UNREAD};
-use super::queue::Entry;
+use crate::refine::kinetic::Kinetic;
+use crate::refine::kinetic::mesh::labels::level_of;
+use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
+use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
+use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::{Phase, Probe};
 use rayon::prelude::*;
 use terrasoar_layout::grid::order::slot_of;
@@ -22,7 +22,7 @@ const FETCH_AHEAD: [(u32, usize); 3] = [(2, 6), (1, 4), (0, 2)];
 
 impl<S: RecordStore> Kinetic<S> {
     /// Tests what is due, as far as the budget allows.
-    pub(super) fn test_due<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+    pub(crate) fn test_due<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
         let mut batch = std::mem::take(&mut self.list);
         while !self.due.is_empty() {
             let splits_wait = self.to_split.iter().any(|nodes| !nodes.is_empty());
@@ -86,7 +86,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Tests the children that splits have made.
-    pub(super) fn test_fresh<P: Probe>(&mut self, judge: &Judge, probe: &mut P) {
+    pub(crate) fn test_fresh<P: Probe>(&mut self, judge: &Judge, probe: &mut P) {
         let mut fresh = std::mem::take(&mut self.fresh);
         self.test(&fresh, true, judge, probe);
         fresh.clear();
@@ -94,7 +94,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Splits and merges what is to be, until no child made on the way is left untested.
-    pub(super) fn apply<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+    pub(crate) fn apply<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
         let mut list = std::mem::take(&mut self.list);
         // From fine to coarse, so that children have merged before their parents.
         list.extend(self.to_merge.iter_mut().flat_map(|nodes| nodes.drain(..)));

@@ -8,12 +8,12 @@
 //! Invariant: after the walk every node that has a record has the one that there is. Cost: the nodes met, which are those whose record changed, their ancestors and a few around each
 //! area; nothing is allocated once the lists have grown.
 
-use super::certificate::{clock_of, expiry_of};
-use super::labels::{child_point, level_of};
-use super::nodes::{CENTRE, NONE, STATUS, body};
-use super::queue::Entry;
-use super::{Kinetic, root_label};
 use crate::refine::ground::{Areas, GroundChange};
+use crate::refine::kinetic::mesh::labels::{child_point, level_of};
+use crate::refine::kinetic::mesh::nodes::{CENTRE, NONE, STATUS, body};
+use crate::refine::kinetic::time::certificate::{clock_of, expiry_of};
+use crate::refine::kinetic::time::queue::Entry;
+use crate::refine::kinetic::{Kinetic, root_label};
 use std::ops::Range;
 use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
@@ -26,7 +26,7 @@ const SHORT: usize = 4096;
 
 /// What edits have done since the last update, and where.
 #[derive(Debug, Default)]
-pub(super) struct Edits {
+pub(crate) struct Edits {
     areas: Areas,
     /// Calls since the last update.
     calls: u32,
@@ -42,7 +42,7 @@ pub(super) struct Edits {
 
 impl Edits {
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.areas.bytes()
             + self.moved.capacity() * size_of::<(u32, u32, [u32; 2])>()
             + (self.leaves.capacity() + self.looks.capacity()) * size_of::<u32>()
@@ -59,7 +59,7 @@ impl Edits {
     }
 
     /// Gives back what exceeds a mesh of so many nodes.
-    pub(super) fn settle(&mut self, nodes: usize) {
+    pub(crate) fn settle(&mut self, nodes: usize) {
         let most = nodes.max(SHORT);
         if self.moved.capacity() > 2 * most {
             self.moved.shrink_to(most);
@@ -74,7 +74,7 @@ impl Edits {
 
 impl<S: RecordStore> Kinetic<S> {
     /// Takes over what changed of the ground, between two frames. Pages of the store are replaced before, as far as it holds them.
-    pub(in super::super) fn take_edit(&mut self, change: &GroundChange<'_>) {
+    pub(in crate::refine) fn take_edit(&mut self, change: &GroundChange<'_>) {
         let [low, high] = change.height_range_m;
         self.clocks.raise_tallest(low.abs().max(high.abs()));
         if self.nodes.is_empty() || change.areas.is_empty() {
@@ -89,11 +89,12 @@ impl<S: RecordStore> Kinetic<S> {
             let root = self.nodes.get(CENTRE).body[label];
             self.descend(root, turned([b as u32, d as u32], label), &all, &mut edits, change);
         }
-        if self.nodes.pages.has_bounds() {
-            edits.loose = self.nodes.pages.len();
+        if self.nodes.clusters.has_bounds() {
+            edits.loose = self.nodes.clusters.len();
         }
         // Frames may be far between.
-        if edits.moved.len().max(edits.leaves.len()).max(edits.looks.len()) > 2 * self.nodes.pages.taken() {
+        if edits.moved.len().max(edits.leaves.len()).max(edits.looks.len()) > 2 * self.nodes.clusters.taken()
+        {
             edits.unite();
         }
         self.edits = edits;
@@ -165,7 +166,7 @@ impl<S: RecordStore> Kinetic<S> {
             edits.looks.push(node);
         }
         if !is_inner {
-            if self.nodes.pages.has_bounds() {
+            if self.nodes.clusters.has_bounds() {
                 edits.leaves.push(node);
             }
             return;
@@ -210,7 +211,7 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// At the start of an update: sends the vertices that edits have moved, covers them, and looks ahead where what is seen may be another thing. The patch is empty yet: what
     /// splits and merges do to slots comes after.
-    pub(super) fn tell_edits(&mut self) {
+    pub(crate) fn tell_edits(&mut self) {
         if self.edits.calls == 0 {
             return;
         }

@@ -19,7 +19,7 @@ const BATCH: usize = 256;
 
 /// What is left of a frame's budget.
 #[derive(Debug)]
-pub(super) struct Allowance {
+pub(crate) struct Allowance {
     tests: u64,
     until: Option<Instant>,
     /// Tests kept for the children of splits that wait.
@@ -29,7 +29,7 @@ pub(super) struct Allowance {
 }
 
 impl Allowance {
-    pub(super) fn new(budget: Budget) -> Self {
+    pub(crate) fn new(budget: Budget) -> Self {
         let until = budget.time.map(|time| Instant::now() + time);
         let tests = budget.tests.unwrap_or(u64::MAX);
         let kept = budget.tests.map_or(0, |tests| usize::try_from(tests.div_ceil(2)).unwrap_or(usize::MAX));
@@ -38,7 +38,7 @@ impl Allowance {
 
     /// How many of `wanted` tests may be made before asking again; takes them off. While splits wait, half is kept for them, lest tests alone use up every
     /// frame.
-    pub(super) fn tests(&mut self, wanted: usize, splits_wait: bool) -> usize {
+    pub(crate) fn tests(&mut self, wanted: usize, splits_wait: bool) -> usize {
         if self.is_over() {
             return 0;
         }
@@ -51,13 +51,13 @@ impl Allowance {
 
     /// Whether one more vertex may be split.
     #[inline]
-    pub(super) fn split(&mut self) -> bool {
+    pub(crate) fn split(&mut self) -> bool {
         self.tests > 0 && !(self.until.is_some() && self.is_over_by_now())
     }
 
     /// Takes off tests that will be made.
     #[inline]
-    pub(super) fn charge(&mut self, tests: usize) {
+    pub(crate) fn charge(&mut self, tests: usize) {
         self.tests = self.tests.saturating_sub(tests as u64);
     }
 

@@ -8,8 +8,8 @@
 //! Invariant: an entry's expiry is not below its wheel's tick, and differs from it in no digit above its level. Cost: a few nanoseconds to
 //! enter, the same for each level on the way out, nothing for entries whose turn has not come. All entries lie in chunks of one pool.
 
-use super::capacity::grow;
 use super::clocks::{CLOCKS, EXPIRY_BITS};
+use crate::refine::kinetic::capacity::grow;
 
 /// Bits of a digit.
 const DIGIT: u32 = 6;
@@ -24,7 +24,7 @@ const CHUNK_ENTRIES: usize = 7;
 
 /// A node and the word it had when it was entered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Entry {
+pub(crate) struct Entry {
     pub node: u32,
     pub word: u32,
 }
@@ -54,7 +54,7 @@ struct Wheel {
 
 /// The queue of one engine.
 #[derive(Debug)]
-pub(super) struct Queue {
+pub(crate) struct Queue {
     wheels: Box<[Wheel]>,
     chunks: Vec<Chunk>,
     free: u32,
@@ -66,7 +66,7 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let wheel = Wheel { now: 0, occupied: [0; LEVELS], heads: [[NONE; SLOTS]; LEVELS] };
         Self {
             wheels: vec![wheel; CLOCKS].into(),
@@ -79,7 +79,7 @@ impl Queue {
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.wheels.len() * size_of::<Wheel>()
             + self.chunks.capacity() * size_of::<Chunk>()
             + self.moving.capacity() * size_of::<Entry>()
@@ -87,7 +87,7 @@ impl Queue {
 
     /// Enters a node under its word's expiry on clock `clock`.
     #[inline]
-    pub(super) fn enter(&mut self, clock: usize, entry: Entry) {
+    pub(crate) fn enter(&mut self, clock: usize, entry: Entry) {
         self.entries += 1;
         let wheel = &mut self.wheels[clock];
         let expiry = entry.expiry().max(wheel.now);
@@ -119,7 +119,7 @@ impl Queue {
     }
 
     /// Moves a wheel on to tick `now` and hands out all entries whose expiry is not above it.
-    pub(super) fn advance(&mut self, clock: usize, now: u64, mut due: impl FnMut(Entry)) {
+    pub(crate) fn advance(&mut self, clock: usize, now: u64, mut due: impl FnMut(Entry)) {
         let wheel = &mut self.wheels[clock];
         if wheel.occupied == [0; LEVELS] {
             wheel.now = now.min(u64::from(u32::MAX)) as u32;
@@ -156,7 +156,7 @@ impl Queue {
     }
 
     /// Takes all entries of a clock out.
-    pub(super) fn drain(&mut self, clock: usize, mut each: impl FnMut(Entry)) {
+    pub(crate) fn drain(&mut self, clock: usize, mut each: impl FnMut(Entry)) {
         for level in 0..LEVELS {
             let mut slots = self.wheels[clock].occupied[level];
             while slots != 0 {
@@ -167,12 +167,12 @@ impl Queue {
     }
 
     /// Entries, those of words that have changed since included.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.entries
     }
 
     /// Looks through a few slots and drops entries that `keep` does not want.
-    pub(super) fn sweep_some(&mut self, keep: impl Fn(Entry) -> bool) {
+    pub(crate) fn sweep_some(&mut self, keep: impl Fn(Entry) -> bool) {
         const SLOTS_A_FRAME: usize = 64;
         let mut kept = std::mem::take(&mut self.moving);
         for _ in 0..SLOTS_A_FRAME {
@@ -190,7 +190,7 @@ impl Queue {
     }
 
     /// Sets the tick of an empty wheel.
-    pub(super) fn restart(&mut self, clock: usize, now: u32) {
+    pub(crate) fn restart(&mut self, clock: usize, now: u32) {
         debug_assert_eq!(self.wheels[clock].occupied, [0; LEVELS]);
         self.wheels[clock].now = now;
     }

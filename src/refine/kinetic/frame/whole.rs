@@ -1,8 +1,8 @@
 //! The whole mesh at once, for those who cannot follow patches: as one patch, as triangles, as SOAR's strip. Cost: proportional to the mesh; updates need
 //! none of it.
 
-use super::nodes::{CENTRE, body};
-use super::{Kinetic, Patch, root_label};
+use crate::refine::kinetic::mesh::nodes::{CENTRE, body};
+use crate::refine::kinetic::{Kinetic, Patch, root_label};
 use crate::refine::soar::StripVertex;
 use crate::refine::strip::StripBuilder;
 use std::collections::HashMap;
@@ -69,11 +69,11 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// All nodes and annexes.
     fn nodes(&self) -> impl Iterator<Item = u32> {
-        (0..self.nodes.pages.len()).flat_map(|page| self.nodes.pages.places_of(page))
+        (0..self.nodes.clusters.len()).flat_map(|cluster| self.nodes.clusters.places_of(cluster))
     }
 
     /// Calls `visit` with every triangle of the mesh and its slot.
-    pub(super) fn for_each_slot(&self, mut visit: impl FnMut(u32, [u32; 3])) {
+    pub(crate) fn for_each_slot(&self, mut visit: impl FnMut(u32, [u32; 3])) {
         for node in self.nodes() {
             for (side, corners) in self.nodes.triangles(node).into_iter().enumerate() {
                 if let Some(corners) = corners {

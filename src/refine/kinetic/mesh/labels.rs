@@ -11,25 +11,25 @@ use terrasoar_layout::grid::GridPoint;
 
 /// Whether a point lies on the border of the square.
 #[inline(always)]
-pub(super) fn is_on_border(p: GridPoint, side_steps: u32) -> bool {
+pub(crate) fn is_on_border(p: GridPoint, side_steps: u32) -> bool {
     p.x() == 0 || p.y() == 0 || p.x() == side_steps || p.y() == side_steps
 }
 
 /// Level of a vertex that is no corner: as [`Grid::level`](terrasoar_layout::grid::Grid::level), from the point alone.
 #[inline(always)]
-pub(super) fn level_of(p: GridPoint) -> u32 {
+pub(crate) fn level_of(p: GridPoint) -> u32 {
     let shift = (p.x() | p.y()).trailing_zeros();
     2 * shift + ((p.x() & p.y()) >> shift & 1)
 }
 
 /// Whether a node at this level is white, a cell's centre.
-pub(super) const fn is_white(level: u32) -> bool {
+pub(crate) const fn is_white(level: u32) -> bool {
     level & 1 == 1
 }
 
 /// The low bit of a node's labels at its parents.
 #[inline(always)]
-pub(super) fn orientation(p: GridPoint) -> usize {
+pub(crate) fn orientation(p: GridPoint) -> usize {
     let shift = (p.x() | p.y()).trailing_zeros();
     let (x, y) = (p.x() >> shift, p.y() >> shift);
     // White: parents lie across the diagonal that its cell is not split along. Black: across its edge.
@@ -39,13 +39,13 @@ pub(super) fn orientation(p: GridPoint) -> usize {
 
 /// The label of the child that follows the parent of label `label` counter-clockwise.
 #[inline(always)]
-pub(super) const fn first_child(label: usize, level: u32) -> usize {
+pub(crate) const fn first_child(label: usize, level: u32) -> usize {
     (label + if is_white(level) { 2 } else { 3 }) & 3
 }
 
 /// The child with `label` of a node at `p` of `level`, which is above 0.
 #[inline(always)]
-pub(super) fn child_point(p: GridPoint, level: u32, label: usize) -> GridPoint {
+pub(crate) fn child_point(p: GridPoint, level: u32, label: usize) -> GridPoint {
     const WHITE: [[i32; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
     const BLACK: [[i32; 2]; 4] = [[1, -1], [1, 1], [-1, 1], [-1, -1]];
     let ([dx, dy], step) = if is_white(level) {

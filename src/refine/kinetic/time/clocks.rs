@@ -16,17 +16,17 @@
 use glam::{DQuat, DVec3};
 
 /// Share of the way along the course that is counted. A smaller one lets words last longer on course and shorter off it.
-pub(super) const RATE: f64 = 0.1;
+pub(crate) const RATE: f64 = 0.1;
 /// Courses, the one without direction included.
-pub(super) const COURSES: usize = 4;
+pub(crate) const COURSES: usize = 4;
 /// Bands: powers of two.
-pub(super) const BANDS: usize = 16;
+pub(crate) const BANDS: usize = 16;
 /// All clocks.
-pub(super) const CLOCKS: usize = COURSES * 2 * BANDS;
+pub(crate) const CLOCKS: usize = COURSES * 2 * BANDS;
 /// Bits of a word that hold its expiry in ticks.
-pub(super) const EXPIRY_BITS: u32 = 23;
+pub(crate) const EXPIRY_BITS: u32 = 23;
 /// Longest life in ticks, and the tick at which a clock is set back.
-pub(super) const HORIZON: u32 = (1 << (EXPIRY_BITS - 1)) - 1;
+pub(crate) const HORIZON: u32 = (1 << (EXPIRY_BITS - 1)) - 1;
 
 /// Fixed-point units a metre.
 const UNITS_PER_M: f64 = (1u64 << 20) as f64;
@@ -43,7 +43,7 @@ const EXP_SLOPE: f64 = 1.3;
 
 /// What a status rests on besides the distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// The error test alone.
     Error,
     /// The view's planes as well.
@@ -51,13 +51,13 @@ pub(super) enum Kind {
 }
 
 /// Number of a clock.
-pub(super) const fn clock_id(course: usize, kind: Kind, band: usize) -> usize {
+pub(crate) const fn clock_id(course: usize, kind: Kind, band: usize) -> usize {
     course * 2 * BANDS + (kind as usize) * BANDS + band
 }
 
 /// What of a view moves the clocks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pose {
+pub(crate) struct Pose {
     pub eye_m: DVec3,
     /// Right, up and forward.
     pub axes: [DVec3; 3],
@@ -68,7 +68,7 @@ pub(super) struct Pose {
 
 /// What the eye is expected to keep doing.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Course {
+pub(crate) struct Course {
     /// Unit vector it moves along, or zero.
     pub direction: DVec3,
     /// Unit vector it turns about, right-handed, or zero.
@@ -116,7 +116,7 @@ impl Trend {
 
 /// The clocks of one engine.
 #[derive(Debug)]
-pub(super) struct Clocks {
+pub(crate) struct Clocks {
     /// Used since a clock was last set back, in units.
     totals: [u64; CLOCKS],
     /// Units that the newest move has used.
@@ -137,7 +137,7 @@ pub(super) struct Clocks {
 
 /// What [`Clocks::move_to`] has done.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Moved {
+pub(crate) struct Moved {
     /// Bit c: clock c has advanced.
     pub clocks: u128,
     /// A course whose words are to be moved to course 0, after which [`Clocks::take_course`] is called.
@@ -146,12 +146,12 @@ pub(super) struct Moved {
 
 impl Clocks {
     /// Heights may lie so far from height 0 from now on. What was counted before moved nothing that was not there.
-    pub(super) fn raise_tallest(&mut self, tallest_m: f64) {
+    pub(crate) fn raise_tallest(&mut self, tallest_m: f64) {
         self.tallest_m = self.tallest_m.max(tallest_m);
     }
 
     /// Clocks for a terrain whose samples are `spacing_m` apart and at most `tallest_m` from height 0.
-    pub(super) fn new(spacing_m: f64, tallest_m: f64) -> Self {
+    pub(crate) fn new(spacing_m: f64, tallest_m: f64) -> Self {
         let shift = (spacing_m / 256.0 * UNITS_PER_M).log2().floor().clamp(0.0, 40.0) as u32;
         Self {
             // Expiry 0 is kept for words that are not in the queue.
@@ -170,7 +170,7 @@ impl Clocks {
     }
 
     /// Counts the way from the last pose to `pose`.
-    pub(super) fn move_to(&mut self, pose: Pose) -> Moved {
+    pub(crate) fn move_to(&mut self, pose: Pose) -> Moved {
         self.steps = [0; CLOCKS];
         let Some(last) = self.last.replace(pose) else { return Moved::default() };
         let step = pose.eye_m - last.eye_m;
@@ -223,7 +223,7 @@ impl Clocks {
     }
 
     /// Makes new words on course `number` from now on. No word may be left on it.
-    pub(super) fn take_course(&mut self, number: usize, course: Course) {
+    pub(crate) fn take_course(&mut self, number: usize, course: Course) {
         self.courses[number] = course;
         self.current = number;
         self.newest = number;
@@ -233,27 +233,27 @@ impl Clocks {
     }
 
     /// The course that new words are made on, and its number.
-    pub(super) fn course(&self) -> (usize, Course) {
+    pub(crate) fn course(&self) -> (usize, Course) {
         (self.current, self.courses[self.current])
     }
 
     /// Current tick of a clock; may exceed the horizon until [`Clocks::set_back`] is called.
-    pub(super) fn now(&self, clock: usize) -> u64 {
+    pub(crate) fn now(&self, clock: usize) -> u64 {
         self.totals[clock] >> self.shift
     }
 
     /// Ticks, and parts of them, that the newest move took on a clock.
-    pub(super) fn newest_step(&self, clock: usize) -> f32 {
+    pub(crate) fn newest_step(&self, clock: usize) -> f32 {
         self.steps[clock] as f32 / (1u64 << self.shift) as f32
     }
 
     /// Ticks of all clocks, once none exceeds the horizon.
-    pub(super) fn all_now(&self) -> [u32; CLOCKS] {
+    pub(crate) fn all_now(&self) -> [u32; CLOCKS] {
         std::array::from_fn(|c| self.now(c) as u32)
     }
 
     /// Starts clock `clock` again at tick 1; returns the ticks that expiries must be set back by, or `None` if it is not time.
-    pub(super) fn set_back(&mut self, clock: usize) -> Option<u64> {
+    pub(crate) fn set_back(&mut self, clock: usize) -> Option<u64> {
         let now = self.now(clock);
         if now < u64::from(HORIZON) {
             return None;
@@ -263,7 +263,7 @@ impl Clocks {
     }
 
     /// Ticks a metre.
-    pub(super) fn ticks_per_m(&self) -> f64 {
+    pub(crate) fn ticks_per_m(&self) -> f64 {
         UNITS_PER_M / (1u64 << self.shift) as f64
     }
 
@@ -273,7 +273,7 @@ impl Clocks {
     }
 
     /// Reciprocal of the metres of band 0.
-    pub(super) fn bands_per_m(&self) -> f64 {
+    pub(crate) fn bands_per_m(&self) -> f64 {
         1.0 / self.least_band_m
     }
 }
@@ -318,7 +318,7 @@ impl Pose {
 
 /// The smallest band that covers `scale` times the metres of band 0.
 #[inline(always)]
-pub(super) fn band_of(scale: f64) -> usize {
+pub(crate) fn band_of(scale: f64) -> usize {
     // The binary exponent, rounded up; NaN and infinity end in the last band.
     let bits = scale.to_bits() + ((1 << 52) - 1);
     ((bits >> 52) as i64 - 1023).clamp(0, BANDS as i64 - 1) as usize

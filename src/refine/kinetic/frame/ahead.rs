@@ -13,12 +13,12 @@
 //! Based on: the deadline of a vertex, max of what the error test and the planes allow, which is what a certificate states along the course; earliest deadline first
 //! is C. Liu, J. Layland, "Scheduling Algorithms for Multiprogramming in a Hard-Real-Time Environment", JACM 20(1), 1973.
 
-use super::Kinetic;
-use super::certificate::{ACTIVE, Judge, clock_of, expiry_of};
-use super::clocks::{CLOCKS, Clocks};
-use super::labels::{child_point, level_of};
-use super::nodes::{STATUS, UNREAD};
-use super::queue::{Entry, Queue};
+use crate::refine::kinetic::Kinetic;
+use crate::refine::kinetic::mesh::labels::{child_point, level_of};
+use crate::refine::kinetic::mesh::nodes::{STATUS, UNREAD};
+use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
+use crate::refine::kinetic::time::clocks::{CLOCKS, Clocks};
+use crate::refine::kinetic::time::queue::{Entry, Queue};
 use std::collections::HashSet;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
@@ -51,7 +51,7 @@ pub struct Want {
 
 /// What looks ahead.
 #[derive(Debug)]
-pub(super) struct Ahead {
+pub(crate) struct Ahead {
     /// Words that will not be over for a while.
     pub far: Queue,
     /// The tick of each clock that has been looked ahead to. Words that are over by then lie in the engine's own queue.
@@ -71,7 +71,7 @@ pub(super) struct Ahead {
 }
 
 impl Ahead {
-    pub(super) fn new(lead_frames: f32) -> Self {
+    pub(crate) fn new(lead_frames: f32) -> Self {
         Self {
             far: Queue::new(),
             until: [0; CLOCKS],
@@ -85,12 +85,12 @@ impl Ahead {
         }
     }
 
-    pub(super) fn set_lead(&mut self, frames: f32) {
+    pub(crate) fn set_lead(&mut self, frames: f32) {
         self.lead_frames = frames;
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.far.bytes()
             + self.looks.capacity() * size_of::<u32>()
             + self.blocked.capacity() * size_of::<(u64, u32)>()
@@ -99,7 +99,7 @@ impl Ahead {
     }
 
     /// Takes in what the clocks did in this frame.
-    pub(super) fn keep_pace(&mut self, clocks: &Clocks) {
+    pub(crate) fn keep_pace(&mut self, clocks: &Clocks) {
         self.frame += 1;
         for (clock, pace) in self.pace.iter_mut().enumerate() {
             let step = clocks.newest_step(clock);
@@ -109,14 +109,14 @@ impl Ahead {
     }
 
     /// The tick of `clock`, which is at `now`, to look ahead to.
-    pub(super) fn reach(&mut self, clock: usize, now: u64) -> u64 {
+    pub(crate) fn reach(&mut self, clock: usize, now: u64) -> u64 {
         let ahead = (self.pace[clock] * self.lead_frames).ceil() as u64;
         self.until[clock] = self.until[clock].max(now.saturating_add(ahead));
         self.until[clock]
     }
 
     /// Enters a word whose end has been looked ahead to.
-    pub(super) fn near(&mut self, entry: Entry) {
+    pub(crate) fn near(&mut self, entry: Entry) {
         self.looks.push(entry.node);
     }
 
@@ -132,7 +132,7 @@ impl Ahead {
 
 impl<S: RecordStore> Kinetic<S> {
     /// Looks for the pages that the next frames will need. From nodes only that are close to being over; nodes that wait for their own record want its page.
-    pub(super) fn look(&mut self, judge: &Judge) {
+    pub(crate) fn look(&mut self, judge: &Judge) {
         let k = self.records.grid().k();
         self.wants.clear();
         self.wants.extend(self.unread.iter().filter(|node| self.nodes.is_unread(**node)).map(|node| {
@@ -234,7 +234,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Makes fresh those unread nodes whose record has come.
-    pub(super) fn take_arrivals(&mut self) {
+    pub(crate) fn take_arrivals(&mut self) {
         if S::IS_COMPLETE {
             return;
         }
@@ -249,7 +249,7 @@ impl<S: RecordStore> Kinetic<S> {
                 record.word = 0;
                 self.fresh.push(*node);
                 // What its triangles show may depend on it.
-                (0..2).for_each(|side| self.nodes.pages.touch(*node, side));
+                (0..2).for_each(|side| self.nodes.clusters.touch(*node, side));
             }
             is_away
         });

@@ -29,22 +29,22 @@ use crate::metric::{Metric, PLANES, Sighting};
 use glam::DVec3;
 
 /// Status bit: the vertex is selected and not culled.
-pub(super) const ACTIVE: u32 = 1 << 31;
+pub(crate) const ACTIVE: u32 = 1 << 31;
 /// Where the clock's number starts in a word; one bit between it and [`ACTIVE`] is the tree's own.
 const CLOCK_SHIFT: u32 = EXPIRY_BITS;
 
 /// The clock of a word.
-pub(super) fn clock_of(word: u32) -> usize {
+pub(crate) fn clock_of(word: u32) -> usize {
     (word >> CLOCK_SHIFT) as usize % CLOCKS
 }
 
 /// The expiry of a word in ticks of its clock; 0 if it has none.
-pub(super) fn expiry_of(word: u32) -> u32 {
+pub(crate) fn expiry_of(word: u32) -> u32 {
     word & ((1 << EXPIRY_BITS) - 1)
 }
 
 /// A word's status and a new certificate.
-pub(super) fn with_certificate(word: u32, clock: usize, expiry: u32) -> u32 {
+pub(crate) fn with_certificate(word: u32, clock: usize, expiry: u32) -> u32 {
     (word & ACTIVE) | (clock as u32) << CLOCK_SHIFT | expiry
 }
 
@@ -53,7 +53,7 @@ const SQUARE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Tests vertices of one frame and states how long the answers hold.
 #[derive(Debug, Clone)]
-pub(super) struct Judge {
+pub(crate) struct Judge {
     metric: Metric,
     culls: bool,
     course: usize,
@@ -87,7 +87,7 @@ struct Life {
 
 impl Judge {
     /// The judge of a frame, after the clocks have moved to it. Without `culls` the view's planes are not asked.
-    pub(super) fn new(metric: Metric, clocks: &Clocks, culls: bool) -> Self {
+    pub(crate) fn new(metric: Metric, clocks: &Clocks, culls: bool) -> Self {
         let (course, Course { direction, axis, turn_per_m }) = clocks.course();
         let normals = metric.normals().map(DVec3::from_array);
         let slopes = normals.map(|n| n.dot(direction));
@@ -116,18 +116,18 @@ impl Judge {
 
     /// The frame's tick of a clock.
     #[inline(always)]
-    pub(super) fn now(&self, clock: usize) -> u32 {
+    pub(crate) fn now(&self, clock: usize) -> u32 {
         self.now[clock]
     }
 
     /// The frame's metric.
-    pub(super) fn metric(&self) -> &Metric {
+    pub(crate) fn metric(&self) -> &Metric {
         &self.metric
     }
 
     /// The word of a vertex: its status by the same operations as every engine's, and its certificate.
     #[inline(always)]
-    pub(super) fn word(&self, sighting: &Sighting) -> u32 {
+    pub(crate) fn word(&self, sighting: &Sighting) -> u32 {
         let life = self.life(sighting);
         let margin_m = life.margin_m - sighting.guard_m();
         let band = band_of(life.scale_m * self.bands_per_m);

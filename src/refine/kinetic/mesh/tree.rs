@@ -4,10 +4,10 @@
 //! each of a node's one or two, a merge the reverse. Cost: six slots, at most four nodes made or freed; what it costs is the wait for memory, which
 //! [`Kinetic::fetch`] shortens by asking for a node's relatives some splits ahead.
 
-use super::Kinetic;
 use super::bounds::Bounds;
 use super::labels::{child_point, level_of};
 use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
+use crate::refine::kinetic::Kinetic;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::read::prefetch::prefetch;
@@ -15,7 +15,7 @@ use terrasoar_layout::read::store::RecordStore;
 
 impl<S: RecordStore> Kinetic<S> {
     /// The child of a split node that lies at `at`; `None` at the finest level, where there are none.
-    pub(super) fn child_at(&self, node: u32, at: GridPoint) -> Option<u32> {
+    pub(crate) fn child_at(&self, node: u32, at: GridPoint) -> Option<u32> {
         let node = self.nodes.get(node);
         let level = level_of(node.point);
         (0..4)
@@ -24,7 +24,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Makes the root with `label` at the centre: the triangle (centre; p, q), whose split vertex is the middle of a side of the square.
-    pub(super) fn plant_root(&mut self, label: usize, [apex, p, q]: [u32; 3]) {
+    pub(crate) fn plant_root(&mut self, label: usize, [apex, p, q]: [u32; 3]) {
         let centre = *self.nodes.get(CENTRE);
         let point = child_point(centre.point, level_of(centre.point), label);
         let node = self.nodes.create(CENTRE, point, centre.raw);
@@ -44,7 +44,7 @@ impl<S: RecordStore> Kinetic<S> {
         child.body[body::P] = p;
         child.body[body::Q] = q;
         child.body[body::APEX + side] = apex;
-        self.nodes.pages.touch(node, side);
+        self.nodes.clusters.touch(node, side);
     }
 
     /// Folded position and height of a vertex.
@@ -56,29 +56,29 @@ impl<S: RecordStore> Kinetic<S> {
         [folded.x() as f32, folded.y() as f32, v.height_m]
     }
 
-    /// Widens the bounds of a node's page to contain vertices.
+    /// Widens the bounds of a node's cluster to contain vertices.
     #[inline(always)]
-    pub(super) fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
-        if self.nodes.pages.has_bounds() {
+    pub(crate) fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
+        if self.nodes.clusters.has_bounds() {
             let places = vertices.map(|v| self.place_of(v));
-            self.nodes.pages.cover(node, &places);
+            self.nodes.clusters.cover(node, &places);
         }
     }
 
-    /// Makes the bounds of a page anew, which merges and edits leave too large.
-    pub(super) fn tighten(&mut self, page: usize) {
+    /// Makes the bounds of a cluster anew, which merges and edits leave too large.
+    pub(crate) fn tighten(&mut self, cluster: usize) {
         let mut bounds = Bounds::EMPTY;
-        for node in self.nodes.pages.places_of(page) {
+        for node in self.nodes.clusters.places_of(cluster) {
             for vertex in self.nodes.triangles(node).into_iter().flatten().flatten() {
                 bounds.include(self.place_of(vertex));
             }
         }
-        self.nodes.pages.set_bounds(page, bounds);
+        self.nodes.clusters.set_bounds(cluster, bounds);
     }
 
     /// Asks memory for what splitting or merging a node will look at. `ahead` 2: itself; 1: its vertices and parents; 0: its neighbours.
     #[inline(always)]
-    pub(super) fn fetch(&self, node: u32, ahead: u32) {
+    pub(crate) fn fetch(&self, node: u32, ahead: u32) {
         // A record may begin in one cache line and end in the next.
         let both_lines = |node: u32| [0, 1].iter().for_each(|i| prefetch(&self.nodes.all, node as usize + i));
         if ahead == 2 {
@@ -96,7 +96,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Splits a node. `false`, and nothing done, if a triangle on one of its sides is yet to come.
-    pub(super) fn split(&mut self, node: u32) -> bool {
+    pub(crate) fn split(&mut self, node: u32) -> bool {
         if !self.nodes.is_complete(node, self.records.grid().side_steps()) {
             return false;
         }
@@ -116,7 +116,7 @@ impl<S: RecordStore> Kinetic<S> {
         for (i, side) in sides.into_iter().enumerate() {
             let Some(side) = side else { continue };
             let [_, apex, p, q] = half(&leaf, i);
-            self.nodes.pages.touch(node, i);
+            self.nodes.clusters.touch(node, i);
             self.triangles += 1;
             if level == 0 {
                 self.cover(node, &[here, apex, p, q]);
@@ -128,8 +128,8 @@ impl<S: RecordStore> Kinetic<S> {
         if level == 0 {
             let annex = self.nodes.create_annex(node);
             self.nodes.get_mut(node).body[body::ANNEX] = annex;
-            self.nodes.pages.touch(annex, 0);
-            self.nodes.pages.touch(annex, 1);
+            self.nodes.clusters.touch(annex, 0);
+            self.nodes.clusters.touch(annex, 1);
             let corners = [here, leaf.body[body::P], leaf.body[body::Q]];
             self.cover(annex, &corners);
             for apex in [0, 1].into_iter().filter(|i| leaf.parents[*i] != NONE) {
@@ -177,15 +177,15 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Merges a split node. Children that are still split are merged before it.
-    pub(super) fn merge(&mut self, node: u32) {
+    pub(crate) fn merge(&mut self, node: u32) {
         let split = *self.nodes.get(node);
         let level = level_of(split.point);
         let sides = self.nodes.sides(node, level);
         self.nodes.get_mut(node).word &= !SPLIT;
         if level == 0 {
             let annex = split.body[body::ANNEX];
-            self.nodes.pages.touch(annex, 0);
-            self.nodes.pages.touch(annex, 1);
+            self.nodes.clusters.touch(annex, 0);
+            self.nodes.clusters.touch(annex, 1);
             self.nodes.get_mut(annex).parents = [NONE; 2];
             self.nodes.free(annex);
         } else {
@@ -208,7 +208,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         for i in 0..2 {
             if split.parents[i] != NONE {
-                self.nodes.pages.touch(node, i);
+                self.nodes.clusters.touch(node, i);
                 self.triangles -= 1;
                 let [_, apex, p, q] = half(self.nodes.get(node), i);
                 self.cover(node, &[apex, p, q]);
@@ -233,7 +233,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// Takes a leaf's parent on `side` from it; frees it if that was the last.
     #[inline(always)]
     fn desert(&mut self, node: u32, side: usize) {
-        self.nodes.pages.touch(node, side);
+        self.nodes.clusters.touch(node, side);
         let leaf = self.nodes.get_mut(node);
         leaf.parents[side] = NONE;
         if leaf.parents == [NONE; 2] {

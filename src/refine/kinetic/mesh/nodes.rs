@@ -10,43 +10,43 @@
 //! parents is free. The word's own bits ([`ACTIVE`] and the certificate) say what is wanted, [`SPLIT`] what is.
 //! Cost: 48 bytes a node with compact records, and a little more than a node a triangle.
 
-use super::capacity::grow;
-use super::certificate::ACTIVE;
-use super::clocks::EXPIRY_BITS;
+use super::clusters::{CLUSTER, Clusters};
 use super::labels::{first_child, is_on_border, level_of, orientation};
-use super::pages::{PAGE, Pages};
+use crate::refine::kinetic::capacity::grow;
+use crate::refine::kinetic::time::certificate::ACTIVE;
+use crate::refine::kinetic::time::clocks::EXPIRY_BITS;
 use terrasoar_layout::grid::GridPoint;
 
 /// Tree bit of a word: the node's triangles are split.
-pub(super) const SPLIT: u32 = 1 << 30;
+pub(crate) const SPLIT: u32 = 1 << 30;
 /// The bits of a word that are no certificate.
-pub(super) const STATUS: u32 = ACTIVE | SPLIT;
+pub(crate) const STATUS: u32 = ACTIVE | SPLIT;
 /// The word of a free node, and of an annex: no live word has this certificate.
 const NO_VERTEX: u32 = SPLIT - 1;
 /// The word of a node whose record has not come yet: nor has any this one.
-pub(super) const UNREAD: u32 = NO_VERTEX - (1 << EXPIRY_BITS);
+pub(crate) const UNREAD: u32 = NO_VERTEX - (1 << EXPIRY_BITS);
 /// No node, no vertex.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 /// The square's centre, which is always split.
-pub(super) const CENTRE: u32 = 0;
+pub(crate) const CENTRE: u32 = 0;
 
 /// Places in [`Node::body`].
-pub(super) mod body {
+pub(crate) mod body {
     /// Leaf, and split node of level 0: vertex slots of the edge's ends, as the triangle of side 0 has them counter-clockwise.
-    pub(in super::super) const P: usize = 0;
-    pub(in super::super) const Q: usize = 1;
+    pub(in crate::refine::kinetic) const P: usize = 0;
+    pub(in crate::refine::kinetic) const Q: usize = 1;
     /// Leaf, and split node of level 0: vertex slot of the apex of side 0; that of side 1 follows.
-    pub(in super::super) const APEX: usize = 2;
+    pub(in crate::refine::kinetic) const APEX: usize = 2;
     /// Split node: its own vertex slot. Children by label lie before it if the level is above 0.
-    pub(in super::super) const HERE: usize = 4;
+    pub(in crate::refine::kinetic) const HERE: usize = 4;
     /// Split node of level 0: its annex.
-    pub(in super::super) const ANNEX: usize = 5;
+    pub(in crate::refine::kinetic) const ANNEX: usize = 5;
 }
 
 /// One record of the bin-tree array.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub(super) struct Node<R> {
+pub(crate) struct Node<R> {
     /// Live-range word.
     pub word: u32,
     /// The vertex's record as the file has it, so that testing again reads no file.
@@ -60,66 +60,66 @@ pub(super) struct Node<R> {
 
 /// The bin-tree array.
 #[derive(Debug)]
-pub(super) struct Nodes<R> {
+pub(crate) struct Nodes<R> {
     pub all: Vec<Node<R>>,
     /// Which places are taken, and which slots have changed.
-    pub pages: Pages,
+    pub clusters: Clusters,
 }
 
 impl<R: Copy> Nodes<R> {
-    pub(super) fn new(pages: Pages) -> Self {
-        Self { all: Vec::new(), pages }
+    pub(crate) fn new(clusters: Clusters) -> Self {
+        Self { all: Vec::new(), clusters }
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
-        self.all.capacity() * size_of::<Node<R>>() + self.pages.bytes()
+    pub(crate) fn bytes(&self) -> usize {
+        self.all.capacity() * size_of::<Node<R>>() + self.clusters.bytes()
     }
 
     #[inline(always)]
-    pub(super) fn get(&self, node: u32) -> &Node<R> {
+    pub(crate) fn get(&self, node: u32) -> &Node<R> {
         &self.all[node as usize]
     }
 
     #[inline(always)]
-    pub(super) fn get_mut(&mut self, node: u32) -> &mut Node<R> {
+    pub(crate) fn get_mut(&mut self, node: u32) -> &mut Node<R> {
         &mut self.all[node as usize]
     }
 
     /// The word at a place that may have been given up since, if it is the one that was entered for it.
     #[inline(always)]
-    pub(super) fn word_if(&mut self, node: u32, entered: u32) -> Option<&mut u32> {
+    pub(crate) fn word_if(&mut self, node: u32, entered: u32) -> Option<&mut u32> {
         self.all.get_mut(node as usize).map(|node| &mut node.word).filter(|word| **word & !SPLIT == entered)
     }
 
     /// Whether the place holds a vertex.
     #[inline(always)]
-    pub(super) fn is_live(&self, node: u32) -> bool {
+    pub(crate) fn is_live(&self, node: u32) -> bool {
         self.get(node).word & !STATUS != NO_VERTEX
     }
 
     /// Whether the node waits for its record.
     #[inline(always)]
-    pub(super) fn is_unread(&self, node: u32) -> bool {
+    pub(crate) fn is_unread(&self, node: u32) -> bool {
         self.get(node).word == UNREAD
     }
 
     #[inline(always)]
-    pub(super) fn is_split(&self, node: u32) -> bool {
+    pub(crate) fn is_split(&self, node: u32) -> bool {
         self.get(node).word & SPLIT != 0
     }
 
     /// A new node beside another, without parents and certificate; `raw` stands in for its record until that is read.
-    pub(super) fn create(&mut self, beside: u32, point: GridPoint, raw: R) -> u32 {
+    pub(crate) fn create(&mut self, beside: u32, point: GridPoint, raw: R) -> u32 {
         self.place(beside, Node { word: 0, raw, point, parents: [NONE; 2], body: [NONE; 6] })
     }
 
     /// A new annex of `owner`, beside it.
-    pub(super) fn create_annex(&mut self, owner: u32) -> u32 {
+    pub(crate) fn create_annex(&mut self, owner: u32) -> u32 {
         let raw = self.get(owner).raw;
         let parents = [owner, NONE];
         self.place(
@@ -129,53 +129,53 @@ impl<R: Copy> Nodes<R> {
     }
 
     fn place(&mut self, beside: u32, record: Node<R>) -> u32 {
-        let node = self.pages.take(beside);
-        if self.all.len() < self.pages.places() {
+        let node = self.clusters.take(beside);
+        if self.all.len() < self.clusters.places() {
             let (parents, body) = ([NONE; 2], [NONE; 6]);
             let free = Node { word: NO_VERTEX, parents, body, ..record };
-            grow(&mut self.all, PAGE);
-            self.all.resize(self.pages.places(), free);
+            grow(&mut self.all, CLUSTER);
+            self.all.resize(self.clusters.places(), free);
         }
         *self.get_mut(node) = record;
         node
     }
 
-    /// Cuts the array off after the last page.
-    pub(super) fn shorten(&mut self) {
-        self.all.truncate(self.pages.places());
+    /// Cuts the array off after the last cluster.
+    pub(crate) fn shorten(&mut self) {
+        self.all.truncate(self.clusters.places());
         if self.all.capacity() > 2 * self.all.len() {
             self.all.shrink_to(self.all.len() + self.all.len() / 8);
         }
     }
 
     /// Frees a node or an annex.
-    pub(super) fn free(&mut self, node: u32) {
+    pub(crate) fn free(&mut self, node: u32) {
         self.get_mut(node).word = NO_VERTEX;
-        self.pages.give_back(node);
+        self.clusters.give_back(node);
     }
 
     /// Frees a place whose record has moved elsewhere.
-    pub(super) fn vacate(&mut self, node: u32) {
+    pub(crate) fn vacate(&mut self, node: u32) {
         self.get_mut(node).parents = [NONE; 2];
         self.free(node);
     }
 
     /// The label of a node at its parent on `side`.
     #[inline(always)]
-    pub(super) fn label(&self, node: u32, side: usize) -> usize {
+    pub(crate) fn label(&self, node: u32, side: usize) -> usize {
         2 * side + orientation(self.get(node).point)
     }
 
     /// Whether both of the node's triangles exist, or the only one it can have.
     #[inline(always)]
-    pub(super) fn is_complete(&self, node: u32, side_steps: u32) -> bool {
+    pub(crate) fn is_complete(&self, node: u32, side_steps: u32) -> bool {
         let Node { parents, point, .. } = self.get(node);
         (parents[0] != NONE && parents[1] != NONE) || is_on_border(*point, side_steps)
     }
 
     /// The sides of a node that have a triangle.
     #[inline(always)]
-    pub(super) fn sides(&self, node: u32, level: u32) -> [Option<Side>; 2] {
+    pub(crate) fn sides(&self, node: u32, level: u32) -> [Option<Side>; 2] {
         let parents = self.get(node).parents;
         let side = |side: usize| {
             let first = first_child(self.label(node, side), level);
@@ -185,7 +185,7 @@ impl<R: Copy> Nodes<R> {
     }
 
     /// What the two slots of a place show: triangles of vertex slots, counter-clockwise, apex first.
-    pub(super) fn triangles(&self, node: u32) -> [Option<[u32; 3]>; 2] {
+    pub(crate) fn triangles(&self, node: u32) -> [Option<[u32; 3]>; 2] {
         let Node { word, parents, body, point, .. } = self.get(node);
         if *word & !STATUS == NO_VERTEX {
             // Whatever is free has no owner; an annex shows the last half of each side.
@@ -209,7 +209,7 @@ impl<R: Copy> Nodes<R> {
 
 /// Own vertex slot, apex, and edge ends counter-clockwise, of one side of a node that has them.
 #[inline(always)]
-pub(super) fn half<R>(node: &Node<R>, side: usize) -> [u32; 4] {
+pub(crate) fn half<R>(node: &Node<R>, side: usize) -> [u32; 4] {
     let [p, q] = if side == 0 {
         [node.body[body::P], node.body[body::Q]]
     } else {
@@ -220,7 +220,7 @@ pub(super) fn half<R>(node: &Node<R>, side: usize) -> [u32; 4] {
 
 /// One side of a node: its parent there, and the labels of the two children that side's triangle has.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Side {
+pub(crate) struct Side {
     pub parent: u32,
     /// Between parent and edge end p, counter-clockwise: child triangle (v; parent, p).
     pub first: usize,

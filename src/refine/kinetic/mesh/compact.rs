@@ -1,57 +1,57 @@
 //! Keeping the bin-tree array dense, a few nodes a frame.
 //!
-//! Splits take places and merges give them back, so that after a while, or when the mesh shrinks, pages are part empty. Packed pages: once a quarter of all
-//! places is free, nodes of the last page move to the first places that are free, and empty pages at the end are given up. Near pages: the
-//! few nodes of a page that is nearly empty move beside their parents. At most [`MOVES_PER_FRAME`] nodes move in a frame, so that no
+//! Splits take places and merges give them back, so that after a while, or when the mesh shrinks, clusters are part empty. Packed clusters: once a quarter of all
+//! places is free, nodes of the last cluster move to the first places that are free, and empty clusters at the end are given up. Near clusters: the
+//! few nodes of a cluster that is nearly empty move beside their parents. At most [`MOVES_PER_FRAME`] nodes move in a frame, so that no
 //! frame is long. Moved triangles show in the patch like changed ones; vertices keep their slots.
 
-use super::Kinetic;
-use super::certificate::{ACTIVE, clock_of, expiry_of};
+use super::clusters::{CLUSTER, Dealing};
 use super::labels::level_of;
 use super::nodes::{CENTRE, NONE, SPLIT, STATUS, UNREAD, body};
-use super::pages::{Dealing, PAGE};
-use super::queue::Entry;
+use crate::refine::kinetic::Kinetic;
+use crate::refine::kinetic::time::certificate::{ACTIVE, clock_of, expiry_of};
+use crate::refine::kinetic::time::queue::Entry;
 use terrasoar_layout::read::store::RecordStore;
 
 /// Nodes moved in one frame at most.
 const MOVES_PER_FRAME: usize = 32;
-/// A near page with no more nodes is emptied.
-const SPARSE: usize = PAGE / 4;
+/// A near cluster with no more nodes is emptied.
+const SPARSE: usize = CLUSTER / 4;
 
 impl<S: RecordStore> Kinetic<S> {
     /// Moves a few nodes, if that is of use.
-    pub(super) fn compact(&mut self) {
-        match self.nodes.pages.dealing() {
-            Dealing::Packed => self.empty_last_page(),
-            Dealing::Near => self.empty_sparse_page(),
+    pub(crate) fn compact(&mut self) {
+        match self.nodes.clusters.dealing() {
+            Dealing::Packed => self.empty_last_cluster(),
+            Dealing::Near => self.empty_sparse_cluster(),
         }
-        if self.nodes.pages.give_up_empty_end() {
+        if self.nodes.clusters.give_up_empty_end() {
             self.nodes.shorten();
         }
     }
 
-    fn empty_last_page(&mut self) {
-        let pages = &self.nodes.pages;
-        // A few pages are not worth it.
-        if pages.taken() + 8 * PAGE > pages.places() - pages.places() / 4 {
+    fn empty_last_cluster(&mut self) {
+        let clusters = &self.nodes.clusters;
+        // A few clusters are not worth it.
+        if clusters.taken() + 8 * CLUSTER > clusters.places() - clusters.places() / 4 {
             return;
         }
-        let last = pages.len() - 1;
-        for from in pages.places_of(last).take(MOVES_PER_FRAME) {
-            let to = self.nodes.pages.take(CENTRE);
+        let last = clusters.len() - 1;
+        for from in clusters.places_of(last).take(MOVES_PER_FRAME) {
+            let to = self.nodes.clusters.take(CENTRE);
             self.relocate(from, to);
         }
     }
 
-    fn empty_sparse_page(&mut self) {
-        self.sparse = (self.sparse + 1) % self.nodes.pages.len();
-        if self.sparse == 0 || self.nodes.pages.places_of(self.sparse).count() > SPARSE {
+    fn empty_sparse_cluster(&mut self) {
+        self.sparse = (self.sparse + 1) % self.nodes.clusters.len();
+        if self.sparse == 0 || self.nodes.clusters.places_of(self.sparse).count() > SPARSE {
             return;
         }
-        for from in self.nodes.pages.places_of(self.sparse) {
+        for from in self.nodes.clusters.places_of(self.sparse) {
             let [first, second] = self.nodes.get(from).parents;
             let beside = if first != NONE { first } else { second };
-            if let Some(to) = self.nodes.pages.take_in_page_of(beside, self.sparse) {
+            if let Some(to) = self.nodes.clusters.take_in_cluster_of(beside, self.sparse) {
                 self.relocate(from, to);
                 for corners in self.nodes.triangles(to).into_iter().flatten() {
                     self.cover(to, &corners);
@@ -66,8 +66,8 @@ impl<S: RecordStore> Kinetic<S> {
         *self.nodes.get_mut(to) = record;
         self.nodes.vacate(from);
         for side in 0..2 {
-            self.nodes.pages.touch(from, side);
-            self.nodes.pages.touch(to, side);
+            self.nodes.clusters.touch(from, side);
+            self.nodes.clusters.touch(to, side);
         }
         if !self.nodes.is_live(to) {
             self.nodes.get_mut(record.parents[0]).body[body::ANNEX] = to;
