@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround, generate};
-use terrasoar::refine::ground::GroundChange;
+use terrasoar::refine::change::GroundChange;
 use terrasoar::refine::kinetic::Kinetic;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::view::{View, Viewport};

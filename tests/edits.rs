@@ -11,7 +11,7 @@ use std::sync::Arc;
 use terrasoar::flight::FlightFrame;
 use terrasoar::flyover::{EngineKind, Quality, TimedBatch, frame_mesh, replay_edited};
 use terrasoar::mesh::TriangleKey;
-use terrasoar::refine::ground::GroundChange;
+use terrasoar::refine::change::GroundChange;
 use terrasoar::refine::kinetic::{Budget, Kinetic};
 use terrasoar::refine::naive::Naive;
 use terrasoar::refine::smart::Smart;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
-use terrasoar::stream::{Fetch, GroundPatch, ModelDisk, Prefetch, Streamed, Threads};
+use terrasoar::stream::{Fetch, GroundPatch, ModelDisk, Prefetch, Streamed, ThreadFetch};
 use terrasoar::view::View;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
@@ -173,7 +173,7 @@ fn edited_pages_are_kept_until_they_are_in_the_file_and_then_read_from_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.iqt");
     terrain_at(&path);
-    let threads = |terrain: &Arc<Terrain>| Threads::from(Loader::start(Arc::clone(terrain), 3).unwrap());
+    let threads = |terrain: &Arc<Terrain>| ThreadFetch::from(Loader::start(Arc::clone(terrain), 3).unwrap());
     bombard(Flight::begin(&path, threads), &path);
 }
 

@@ -12,7 +12,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
-use terrasoar::stream::{Fetch, Prefetch, Streamed, Threads};
+use terrasoar::stream::{Fetch, Prefetch, Streamed, ThreadFetch};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::bytes::PAGE_BYTES;
@@ -51,12 +51,12 @@ fn compact(terrain: &Terrain) -> Records<'_, Compact> {
 }
 
 /// A flight over few pages of memory.
-fn flight(terrain: &Arc<Terrain>) -> Streamed<Compact, Threads> {
+fn flight(terrain: &Arc<Terrain>) -> Streamed<Compact, ThreadFetch> {
     let ByKind::Compact(pool) = terrain.pool(30 * PAGE_BYTES as u64).unwrap() else {
         panic!("compact records")
     };
     let loader = Loader::start(Arc::clone(terrain), 3).unwrap();
-    Streamed::new(pool, Threads::from(loader), Culling::Vertices, Prefetch::Deadline)
+    Streamed::new(pool, ThreadFetch::from(loader), Culling::Vertices, Prefetch::Deadline)
 }
 
 /// Stays where it is until nothing is late, and compares with SOAR over the sound file.

@@ -11,7 +11,7 @@ use std::time::Duration;
 use terrasoar::flight::FlightFrame;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
-use terrasoar::stream::{ModelDisk, Prefetch, StreamFrame, Streamed, sound};
+use terrasoar::stream::{ModelDisk, Prefetch, StreamFrame, Streamed, height_at};
 use terrasoar::view::View;
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
@@ -206,7 +206,7 @@ fn soundings_are_the_terrains_own_where_it_is_at_hand() {
         let mut streamed = Streamed::new(pool, ModelDisk::new(Arc::clone(&terrain), 8, 1), Culling::Vertices, Prefetch::None);
         let [mut coarse, mut largest_m] = [0.0f64; 2];
         for [east_m, north_m] in spots.iter().copied() {
-            let sounding = sound(streamed.engine().store(), east_m, north_m);
+            let sounding = height_at(streamed.engine().store(), east_m, north_m);
             if let (false, Some(height_m), Some(own_m)) = (sounding.is_exact, sounding.height_m, terrain.height_m(east_m, north_m).unwrap()) {
                 coarse += 1.0;
                 largest_m = largest_m.max((height_m - own_m).abs());
@@ -220,7 +220,7 @@ fn soundings_are_the_terrains_own_where_it_is_at_hand() {
             streamed.update(&view, &mut Unobserved);
         }
         for [east_m, north_m] in spots {
-            let sounding = sound(streamed.engine().store(), east_m, north_m);
+            let sounding = height_at(streamed.engine().store(), east_m, north_m);
             let own_m = terrain.height_m(east_m, north_m).unwrap();
             assert!(sounding.is_exact);
             let off_m = sounding.height_m.zip(own_m).map(|(a, b)| (a - b).abs());

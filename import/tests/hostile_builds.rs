@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{DemInfo, DemSource, MemoryDem, SampleSink, SampleType};
 use terrasoar_layout::grid::record::RecordKind;
-use terrasoar_layout::progress::{BuildProgress, Silent};
+use terrasoar_layout::progress::{Progress, Silent};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::{LayoutError, Remedy};
 use tiff::{DATA_AT, DEFLATE, RAW, Tag, ZSTD, heights, one_strip, reals, shorts, text, tiff};
@@ -23,7 +23,7 @@ use tiff::{DATA_AT, DEFLATE, RAW, Tag, ZSTD, heights, one_strip, reals, shorts, 
 #[derive(Default)]
 struct Reading(AtomicU64);
 
-impl BuildProgress for Reading {
+impl Progress for Reading {
     fn stage(&self, _: &'static str, _: u64) {}
     fn advance(&self, samples: u64) {
         self.0.fetch_add(samples, Ordering::Relaxed);

@@ -1,7 +1,7 @@
 //! How long work gets on, for whoever waits for it.
 
 /// Hears how a build gets on.
-pub trait BuildProgress: Sync {
+pub trait Progress: Sync {
     /// A stage begins that will work through `samples` samples.
     fn stage(&self, name: &'static str, samples: u64);
     /// More samples of the stage are done.
@@ -12,7 +12,7 @@ pub trait BuildProgress: Sync {
 #[derive(Debug, Clone, Copy)]
 pub struct Silent;
 
-impl BuildProgress for Silent {
+impl Progress for Silent {
     fn stage(&self, _: &'static str, _: u64) {}
     fn advance(&self, _: u64) {}
 }

@@ -8,7 +8,7 @@ use terrasoar_layout::file::source::PreadSource;
 use terrasoar_layout::imagery::{
     DrapeOptions, Extent, ImageSource, Imagery, MemoryImage, PlaceOrigin, TileFormat, TileId, drape,
 };
-use terrasoar_layout::progress::BuildProgress;
+use terrasoar_layout::progress::Progress;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::unused::unused_bytes;
 use terrasoar_layout::verify::verify;
@@ -351,7 +351,7 @@ fn readers_go_on_while_an_image_is_draped() {
         heights: &'t [Vec<u8>],
         calls: AtomicUsize,
     }
-    impl BuildProgress for Watching<'_> {
+    impl Progress for Watching<'_> {
         fn stage(&self, _: &'static str, _: u64) {}
         fn advance(&self, _: u64) {
             for (reader, heights) in self.readers.iter().zip(self.heights) {
@@ -400,7 +400,7 @@ fn readers_go_on_while_an_image_is_draped() {
 #[test]
 fn a_file_replaced_meanwhile_is_left_alone() {
     struct Replacing<'p>(&'p std::path::Path);
-    impl BuildProgress for Replacing<'_> {
+    impl Progress for Replacing<'_> {
         fn stage(&self, _: &'static str, _: u64) {}
         fn advance(&self, texels: u64) {
             if texels > 0 {

@@ -7,7 +7,7 @@ use terrasoar::mesh::{Triangle, is_drawn, with_apex_first};
 use terrasoar::refine::kinetic::{NO_LEVEL, Patch, PatchVertex};
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved, Work};
-use terrasoar::stream::sound;
+use terrasoar::stream::height_at;
 use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::RecordCodec;
@@ -94,6 +94,6 @@ impl<C: RecordCodec> Feed for FullMesh<'_, C> {
     }
 
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
-        sound(&self.records, east_m, north_m).height_m
+        height_at(&self.records, east_m, north_m).height_m
     }
 }

@@ -4,7 +4,7 @@ use crate::feed::{Feed, Reads, Refined, tile_heights_m};
 use crate::full_mesh::FullMesh;
 use terrasoar::refine::kinetic::{Kinetic, Patch};
 use terrasoar::refine::{Culling, Engine};
-use terrasoar::stream::sound;
+use terrasoar::stream::height_at;
 use terrasoar::view::View;
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::records::Records;
@@ -69,6 +69,6 @@ impl<C: RecordCodec> Feed for KineticFeed<'_, C> {
     }
 
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
-        sound(&self.records, east_m, north_m).height_m
+        height_at(&self.records, east_m, north_m).height_m
     }
 }

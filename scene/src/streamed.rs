@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use terrasoar::refine::Culling;
 use terrasoar::refine::kinetic::Patch;
-use terrasoar::stream::{GroundPatch, Prefetch, StreamFrame, Streamed, Threads, sound};
+use terrasoar::stream::{GroundPatch, Prefetch, StreamFrame, Streamed, ThreadFetch, height_at};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::entries::Entry;
@@ -33,7 +33,7 @@ const TILES_WAITING: usize = 256;
 
 /// A streamed engine as the renderer sees it.
 struct StreamedFeed<C: RecordCodec> {
-    streamed: Streamed<C, Threads>,
+    streamed: Streamed<C, ThreadFetch>,
     reads: Reads,
     frame: StreamFrame,
     /// Pages that tiles lack.
@@ -50,7 +50,7 @@ pub fn streamed_feed(
     cache_bytes: u64,
     culling: Culling,
 ) -> Result<Box<dyn Feed>, LayoutError> {
-    let loader = Threads::from(Loader::start(Arc::clone(terrain), THREADS)?);
+    let loader = ThreadFetch::from(Loader::start(Arc::clone(terrain), THREADS)?);
     Ok(with_records!(terrain.pool(cache_bytes)?, pool => {
         let reads = Reads::over(&pool);
         let streamed = Streamed::new(pool, loader, culling, Prefetch::Deadline);
@@ -123,7 +123,7 @@ impl<C: RecordCodec> Feed for StreamedFeed<C> {
                         shown_m(&pool.decode(raw, if grid.is_corner(point) { 0 } else { grid.level(point) }))
                     }
                     None => {
-                        let sounding = sound(pool, f64::from(point.x()) * dx, f64::from(point.y()) * dy);
+                        let sounding = height_at(pool, f64::from(point.x()) * dx, f64::from(point.y()) * dy);
                         sounding.height_m.map_or(f32::NAN, |height_m| height_m as f32)
                     }
                 },
@@ -144,7 +144,7 @@ impl<C: RecordCodec> Feed for StreamedFeed<C> {
     }
 
     fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
-        sound(self.streamed.engine().store(), east_m, north_m).height_m
+        height_at(self.streamed.engine().store(), east_m, north_m).height_m
     }
 
     fn ground_changed(&mut self, patch: GroundPatch) -> Result<bool, LayoutError> {

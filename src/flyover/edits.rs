@@ -2,7 +2,7 @@
 
 use super::ReplayError;
 use crate::refine::Engine;
-use crate::refine::ground::GroundChange;
+use crate::refine::change::GroundChange;
 use std::sync::Arc;
 use std::time::Instant;
 use terrasoar_layout::edit::{Changes, Edit, Editor};

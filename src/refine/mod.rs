@@ -4,8 +4,8 @@
 //! All engines draw the same triangles for the same view. They read records and nothing else, and report what they
 //! read to a [`Probe`] that costs nothing when nobody listens.
 
+pub mod change;
 mod clock;
-pub mod ground;
 pub mod kinetic;
 pub mod naive;
 pub mod smart;
@@ -14,7 +14,7 @@ mod strip;
 
 use crate::mesh::Triangle;
 use crate::view::View;
-use ground::GroundChange;
+use change::GroundChange;
 use terrasoar_layout::read::store::RecordStore;
 
 /// Where what lies out of view is left out.

@@ -3,7 +3,7 @@
 //! No tree is walked to decide, no answer is inherited or remembered. Cost: one test a vertex of the terrain a frame; for tests and
 //! small terrains.
 
-use super::ground::GroundChange;
+use super::change::GroundChange;
 use super::{Culling, Engine, Probe};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};

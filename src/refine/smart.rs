@@ -12,8 +12,8 @@
 //! Cost: an integer comparison for each of 2T - 1 nodes a frame, a record read and a test for those that expired. Allocates nothing
 //! once its arrays have grown.
 
+use super::change::{Areas, GroundChange};
 use super::clock::{EXPIRY_MASK, PathClock};
-use super::ground::{Areas, GroundChange};
 use super::soar::StripVertex;
 use super::strip::StripBuilder;
 use super::{Culling, Engine, Probe};

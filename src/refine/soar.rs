@@ -5,7 +5,7 @@
 //!
 //! Cost: 2T - 1 nodes for T triangles, a record read and a test each. Allocates nothing once the strip has grown.
 
-use super::ground::GroundChange;
+use super::change::GroundChange;
 use super::strip::StripBuilder;
 use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};

@@ -24,25 +24,25 @@ pub trait Fetch {
 
 /// A loader, and the arrival that a wait ended with.
 #[derive(Debug)]
-pub struct Threads {
+pub struct ThreadFetch {
     loader: Loader,
     waited_for: Option<Arrival>,
 }
 
-impl From<Loader> for Threads {
+impl From<Loader> for ThreadFetch {
     fn from(loader: Loader) -> Self {
         Self { loader, waited_for: None }
     }
 }
 
-impl Threads {
+impl ThreadFetch {
     /// The loader, for its figures.
     pub fn loader(&self) -> &Loader {
         &self.loader
     }
 }
 
-impl Fetch for Threads {
+impl Fetch for ThreadFetch {
     fn ask(&mut self, now: u64, requests: &[PageRequest]) {
         self.loader.ask(now, requests);
     }

@@ -16,12 +16,12 @@ mod requests;
 mod surface;
 
 pub use edited::GroundPatch;
-pub use fetch::{Fetch, Threads};
+pub use fetch::{Fetch, ThreadFetch};
 pub use frustum::ExtendedView;
 pub use model::ModelDisk;
-pub use surface::{Sounding, sound};
+pub use surface::{HeightAt, height_at};
 
-use crate::refine::ground::GroundChange;
+use crate::refine::change::GroundChange;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::{Culling, Engine, Probe, Work};
 use crate::view::View;

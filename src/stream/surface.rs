@@ -11,7 +11,7 @@ use terrasoar_layout::read::store::RecordStore;
 
 /// A height, and how good it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sounding {
+pub struct HeightAt {
     /// Metres; none outside the data and at voids.
     pub height_m: Option<f64>,
     /// Whether it is the data's own: no record that bears on it is away.
@@ -37,12 +37,12 @@ fn at_hand<S: RecordStore>(store: &S, point: GridPoint) -> Option<Vertex> {
 }
 
 /// Height at a place in metres east and north of the south-west sample.
-pub fn sound<S: RecordStore>(store: &S, east_m: f64, north_m: f64) -> Sounding {
+pub fn height_at<S: RecordStore>(store: &S, east_m: f64, north_m: f64) -> HeightAt {
     let grid = store.grid();
     let [dx, dy] = grid.spacing_m();
     let at = [east_m / dx, north_m / dy];
     let Some(([x, y], [fx, fy])) = cell(grid.samples(), at) else {
-        return Sounding { height_m: None, is_exact: true };
+        return HeightAt { height_m: None, is_exact: true };
     };
     let mut height_m = Some(0.0);
     for (point, weight) in [
@@ -55,11 +55,11 @@ pub fn sound<S: RecordStore>(store: &S, east_m: f64, north_m: f64) -> Sounding {
             continue;
         }
         let Some(vertex) = at_hand(store, point) else {
-            return Sounding { height_m: coarse_m(store, at), is_exact: false };
+            return HeightAt { height_m: coarse_m(store, at), is_exact: false };
         };
         height_m = height_m.filter(|_| !vertex.class.is_void()).map(|sum| sum + weight * vertex.height_m);
     }
-    Sounding { height_m, is_exact: true }
+    HeightAt { height_m, is_exact: true }
 }
 
 /// Pages that the exact height at a place needs and that are away.

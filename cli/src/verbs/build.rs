@@ -2,7 +2,7 @@
 
 use super::output::{complain, grouped, print};
 use super::outputs::{Force, Kind};
-use super::progress::{Progress, short};
+use super::progress::{Meter, short};
 use super::{parse, terrain};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
@@ -109,7 +109,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let start = Instant::now();
     let header = pool.install(|| {
         let dem = terrasoar_import::open(&args.inputs)?;
-        build(&*dem, &args.output, &args.options(), &Progress::new("samples"))
+        build(&*dem, &args.output, &args.options(), &Meter::new("samples"))
     })?;
     let seconds = start.elapsed().as_secs_f64();
     warn_about_spacing(&header);

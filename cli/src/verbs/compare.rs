@@ -2,7 +2,7 @@
 
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
-use super::progress::Progress;
+use super::progress::Meter;
 use super::replay::{QualityArgs, fly};
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse, sweep};
@@ -74,7 +74,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
     let quality = args.quality.quality();
-    let progress = Progress::new("frames");
+    let progress = Meter::new("frames");
     let mut runs: Vec<(String, Vec<FrameStats>)> = Vec::new();
     for engine in &args.engines {
         let frames = fly(&terrain, &flight.frames, quality, *engine, engine.name(), &progress)?;

@@ -2,7 +2,7 @@
 
 use super::output::{complain, decimal, grouped, print};
 use super::parse;
-use super::progress::{Progress, short};
+use super::progress::{Meter, short};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
                 complain(&format!("note: {}: {note}", image.path().display()));
             }
         }
-        Ok(drape(&args.file, &images, &args.options(), &Progress::new("texels"))?)
+        Ok(drape(&args.file, &images, &args.options(), &Meter::new("texels"))?)
     })?;
     let seconds = start.elapsed().as_secs_f64();
     if draped.place == PlaceOrigin::Assumed {

@@ -2,7 +2,7 @@
 
 use super::output::{complain, decimal, print};
 use super::outputs::{Force, Kind};
-use super::progress::Progress;
+use super::progress::Meter;
 use super::replay::QualityArgs;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
@@ -96,7 +96,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let (mut flight, told) = match args.pace.incoherence {
         None => (generate(&ground, &plan)?, String::new()),
         Some(wanted) => {
-            let progress = Progress::new("trials");
+            let progress = Meter::new("trials");
             progress.begin("finding the speed", MAX_TRIALS as u64);
             let quality = args.quality.quality();
             let solution = solve(&ground, &plan, wanted, |pairs| {

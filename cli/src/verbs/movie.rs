@@ -4,7 +4,7 @@ use super::movie_file::{MovieFile, MovieFormat};
 use super::output::{grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::picture::PictureArgs;
-use super::progress::Progress;
+use super::progress::Meter;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
 use anyhow::Result;
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let has_image = studio.has_image();
     let look = picture.look(has_image);
     let mut movie = MovieFile::create(&args.output, format, picture.size, args.fps, args.force.is_given())?;
-    let progress = Progress::new("frames");
+    let progress = Meter::new("frames");
     progress.begin("drawing", flight.frames.len() as u64);
     let (mut pictures, mut triangles) = (0_u32, 0_u64);
     for (i, frame) in flight.frames.iter().enumerate() {

@@ -3,15 +3,15 @@
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::time::Duration;
-use terrasoar_layout::progress::BuildProgress;
+use terrasoar_layout::progress::Progress;
 
 /// A bar that counts `unit`s.
-pub(super) struct Progress {
+pub(super) struct Meter {
     bar: ProgressBar,
     unit: &'static str,
 }
 
-impl Progress {
+impl Meter {
     /// A bar of no stage yet.
     pub(super) fn new(unit: &'static str) -> Self {
         Self { bar: ProgressBar::new(0), unit }
@@ -58,13 +58,13 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for Meter {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
 }
 
-impl BuildProgress for Progress {
+impl Progress for Meter {
     fn stage(&self, name: &'static str, samples: u64) {
         self.begin(name, samples);
     }

@@ -2,7 +2,7 @@
 
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
-use super::progress::Progress;
+use super::progress::Meter;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
 use anyhow::{Context, Result};
@@ -90,7 +90,7 @@ pub(super) fn fly(
     quality: Quality,
     engine: EngineKind,
     title: &str,
-    progress: &Progress,
+    progress: &Meter,
 ) -> Result<Vec<FrameStats>> {
     // One pass times, one counts.
     progress.begin(title, 2 * frames.len() as u64);
@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let terrain = Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
-    let progress = Progress::new("frames");
+    let progress = Meter::new("frames");
     let name = args.engine.name();
     let quality = Quality { budget_tests: args.budget_tests, ..args.quality.quality() };
     if quality.budget_tests.is_some() && args.engine != EngineKind::Kinetic {

@@ -3,7 +3,7 @@
 use super::output::{decimal, grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::picture::{PictureArgs, angles, png};
-use super::progress::Progress;
+use super::progress::Meter;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
 use anyhow::{Context, Result};
@@ -109,7 +109,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let views = args.views(&terrain)?;
     let picture = &args.picture;
     let mut studio = Studio::new(&terrain, picture.scene(), picture.size)?;
-    let progress = Progress::new("frames");
+    let progress = Meter::new("frames");
     progress.begin("flying", views.len() as u64);
     let mut triangles = 0;
     for view in &views {

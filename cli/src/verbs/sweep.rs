@@ -3,7 +3,7 @@
 //! A point flies a short stretch: the middle of the flight for tolerances, a new flight of the same kind at a solved speed for
 //! incoherences. An incoherence that this terrain and flight cannot reach is left out with a note, not a failure.
 
-use super::progress::Progress;
+use super::progress::Meter;
 use super::replay::fly;
 use anyhow::Result;
 use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround};
@@ -27,7 +27,7 @@ pub(super) struct Sweep<'a> {
     pub(super) flight: &'a Flight,
     pub(super) quality: Quality,
     pub(super) engines: &'a [EngineKind],
-    pub(super) progress: &'a Progress,
+    pub(super) progress: &'a Meter,
 }
 
 impl Sweep<'_> {

@@ -2,7 +2,7 @@
 
 use super::output::{grouped, print};
 use super::outputs::{Force, Kind};
-use super::progress::Progress;
+use super::progress::Meter;
 use super::{WrongUsage, parse, terrain};
 use anyhow::Result;
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     args.force.file(&args.output, Kind::Synthetic, &[])?;
     let size = args.size.unwrap_or(1025);
     let options = SynthOptions { size, seed, spacing_m: args.spacing };
-    let progress = Progress::new("rows");
+    let progress = Meter::new("rows");
     progress.begin("making terrain", size.into());
     write(&options, &args.output, &|rows| progress.set(rows))?;
     drop(progress);
@@ -70,7 +70,7 @@ fn colour(args: &Args, file: &Path, seed: u64) -> Result<()> {
     args.force.file(&args.output, Kind::Synthetic, &[file])?;
     let terrain = terrain::open(file)?;
     let options = ColourOptions { seed, texels_a_sample: args.texels };
-    let progress = Progress::new("rows");
+    let progress = Meter::new("rows");
     let rows = u64::from(terrain.grid().samples()[1] - 1) * u64::from(args.texels);
     progress.begin("painting", rows);
     let [wide, high] =

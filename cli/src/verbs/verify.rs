@@ -2,7 +2,7 @@
 
 use super::Lines;
 use super::output::{grouped, print_line};
-use super::progress::Progress;
+use super::progress::Meter;
 use super::terrain::TerrainArgs;
 use anyhow::Result;
 use terrasoar_layout::verify::{verify, verify_pages};
@@ -23,7 +23,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<()> {
     // Plain reads: a file that is cut while it is checked is an error, where a map would be a signal.
     let terrain = args.terrain.open_unmapped()?;
-    let progress = Progress::new("pages");
+    let progress = Meter::new("pages");
     progress.begin("verifying", verify_pages(&terrain));
     let report = verify(&terrain, &|pages| progress.add(pages))?;
     drop(progress);

@@ -10,17 +10,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::file::header::SpacingOrigin;
-use terrasoar_layout::progress::BuildProgress;
+use terrasoar_layout::progress::Progress;
 
 /// How a build gets on.
 #[derive(Debug, Default)]
-struct Progress {
+struct Meter {
     stage: Mutex<&'static str>,
     total: AtomicU64,
     done: AtomicU64,
 }
 
-impl BuildProgress for Progress {
+impl Progress for Meter {
     fn stage(&self, name: &'static str, samples: u64) {
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = name;
         self.total.store(samples, Ordering::Relaxed);
@@ -46,14 +46,14 @@ pub(crate) struct Built {
 pub(crate) struct Job {
     /// The elevation data.
     pub input: PathBuf,
-    progress: Arc<Progress>,
+    progress: Arc<Meter>,
     thread: Option<JoinHandle<Result<Built, String>>>,
 }
 
 impl Job {
     /// Starts to build. `wake` is called when it has ended.
     pub(crate) fn start(input: PathBuf, wake: impl Fn() + Send + 'static) -> Result<Self, String> {
-        let progress = Arc::new(Progress::default());
+        let progress = Arc::new(Meter::default());
         let (heard, from) = (Arc::clone(&progress), input.clone());
         let thread = std::thread::Builder::new()
             .name("build".into())
@@ -95,7 +95,7 @@ pub(crate) fn is_terrain(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("iqt"))
 }
 
-fn make(input: &Path, progress: &Progress) -> Result<Built, String> {
+fn make(input: &Path, progress: &Meter) -> Result<Built, String> {
     let dem =
         terrasoar_import::open(std::slice::from_ref(&input.to_path_buf())).map_err(|e| e.to_string())?;
     let path = output_for(input);

@@ -3,7 +3,7 @@
 //! The file is not mapped: pages of it are read by threads into memory of a fixed size, so that no frame waits for storage and nothing that happens to the file
 //! while it is on show ends the program.
 
-use super::ground::SceneGround;
+use super::heights::SceneGround;
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::refine::{Culling, Unobserved};
-use terrasoar::stream::{Prefetch, StreamFrame, Streamed, Threads};
+use terrasoar::stream::{Prefetch, StreamFrame, Streamed, ThreadFetch};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::source::resident_bytes;
@@ -151,7 +151,7 @@ fn pass(
     done: &mut dyn FnMut(u64),
 ) -> Result<Pass, IoBenchError> {
     let terrain = Arc::new(options.read_by.open(path)?);
-    let loader = Threads::from(Loader::start(Arc::clone(&terrain), options.read_by.threads())?);
+    let loader = ThreadFetch::from(Loader::start(Arc::clone(&terrain), options.read_by.threads())?);
     Ok(with_records!(terrain.pool(options.cache_bytes)?, pool => {
         let mut streamed = Streamed::new(pool, loader, options.culling, options.prefetch);
         options.block_m.into_iter().for_each(|block_m| streamed.set_block_m(block_m));
@@ -160,7 +160,7 @@ fn pass(
 }
 
 fn fly<C: RecordCodec>(
-    mut streamed: Streamed<C, Threads>,
+    mut streamed: Streamed<C, ThreadFetch>,
     views: &[View],
     frames_per_second: f64,
     done: &mut dyn FnMut(u64),

@@ -10,7 +10,7 @@ use terrasoar::flyover::{
     EngineKind, Quality, TimedBatch, frame_mesh, mean_incoherence_percent, replay, replay_edited,
 };
 use terrasoar::refine::{Culling, Unobserved};
-use terrasoar::stream::{Streamed, Threads, sound};
+use terrasoar::stream::{Streamed, ThreadFetch, height_at};
 use terrasoar::view::{View, Viewport};
 use terrasoar_lab::iobench::{CountOptions, LayoutKind, Prefetch, Reader, count};
 use terrasoar_layout::edit::{Crater, Edit, SampleRect};
@@ -108,7 +108,7 @@ pub fn fly(path: &Path, overlay: Option<&Path>) -> bool {
 fn stream(terrain: &Arc<Terrain>, views: &[View]) {
     for prefetch in Prefetch::ALL {
         let Ok(pool) = terrain.pool(1 << 17) else { continue };
-        let loader = Threads::from(Loader::start(Arc::clone(terrain), 2).expect("a thread is to be had"));
+        let loader = ThreadFetch::from(Loader::start(Arc::clone(terrain), 2).expect("a thread is to be had"));
         with_records!(pool, pool => {
             let mut streamed = Streamed::new(pool, loader, Culling::Vertices, prefetch);
             for view in views {
@@ -116,7 +116,7 @@ fn stream(terrain: &Arc<Terrain>, views: &[View]) {
                 streamed.update(view, &mut Unobserved);
             }
             for at in [[0.0, 0.0], [55.5, 33.3], [1e9, -1.0]] {
-                let _ = sound(streamed.engine().store(), at[0], at[1]);
+                let _ = height_at(streamed.engine().store(), at[0], at[1]);
             }
         });
     }

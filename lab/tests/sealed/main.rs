@@ -9,7 +9,7 @@ use exercise::fly;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::refine::{Culling, Unobserved};
-use terrasoar::stream::{Prefetch, Streamed, Threads};
+use terrasoar::stream::{Prefetch, Streamed, ThreadFetch};
 use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::grid::GridPoint;
@@ -74,7 +74,7 @@ fn filling_a_pool_ends_where_wanted_vertices_have_parents_that_are_not() {
     let view = frame.view(terrasoar::view::Viewport::default(), 1.0);
     for prefetch in Prefetch::ALL {
         let ByKind::Compact(pool) = terrain.pool(1 << 24).unwrap() else { panic!("compact records") };
-        let loader = Threads::from(Loader::start(Arc::clone(&terrain), 2).unwrap());
+        let loader = ThreadFetch::from(Loader::start(Arc::clone(&terrain), 2).unwrap());
         let mut streamed = Streamed::new(pool, loader, Culling::Vertices, prefetch);
         let begun = Instant::now();
         streamed.fill(&view, Duration::from_secs(60), &mut Unobserved);
@@ -110,7 +110,7 @@ fn looking_ahead_ends_where_everything_is_due_at_once() {
     let source = MemorySource::new("due", due_all_at_once());
     let terrain = Arc::new(Terrain::from_source(Box::new(source)).unwrap());
     let ByKind::Compact(pool) = terrain.pool(1 << 24).unwrap() else { panic!("compact records") };
-    let loader = Threads::from(Loader::start(Arc::clone(&terrain), 2).unwrap());
+    let loader = ThreadFetch::from(Loader::start(Arc::clone(&terrain), 2).unwrap());
     let mut streamed = Streamed::new(pool, loader, Culling::Vertices, Prefetch::Deadline);
     let begun = Instant::now();
     for i in 0..150 {

@@ -29,7 +29,7 @@ use crate::file::header::{ErrorKind, Header, SpacingOrigin};
 use crate::grid::Grid;
 use crate::grid::order::corners;
 use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
-use crate::progress::BuildProgress;
+use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::remedy::Remedy;
 use crate::words::{harmless, number};
@@ -93,7 +93,7 @@ pub fn build(
     dem: &dyn DemSource,
     out: &Path,
     options: &BuildOptions,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
     build_on(&SystemDisk, dem, out, options, progress)
 }
@@ -107,7 +107,7 @@ pub fn build_on(
     dem: &dyn DemSource,
     out: &Path,
     options: &BuildOptions,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
     let info = dem.info();
     if !(options.z_scale.is_finite() && options.z_scale > 0.0) {

@@ -12,7 +12,7 @@ use crate::file::disk::Disk;
 use crate::file::header::Header;
 use crate::grid::GridPoint;
 use crate::grid::record::{RecordCodec, RecordKind, RecordScale};
-use crate::progress::BuildProgress;
+use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::records::Records;
 use crate::read::terrain::Terrain;
@@ -76,7 +76,7 @@ pub fn rebuild(
     out: &Path,
     room: Option<HeightRoom>,
     memory_mib: u64,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
     let file = AtomicFile::create(out)?;
     rebuild_into(disk, terrain, &file, room, memory_mib, progress)?;
@@ -91,7 +91,7 @@ pub(crate) fn rebuild_into(
     file: &AtomicFile,
     room: Option<HeightRoom>,
     memory_mib: u64,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
     let Some(records) = terrain.records() else {
         return Err(LayoutError::Usage(format!(
@@ -109,7 +109,7 @@ fn rebuild_kind<C: RecordCodec>(
     file: &AtomicFile,
     room: Option<HeightRoom>,
     memory_mib: u64,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
     let old = terrain.header();
     let (grid, [wide, high]) = (old.grid, old.grid.samples());

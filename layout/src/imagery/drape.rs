@@ -19,7 +19,7 @@ use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
 use crate::file::source::{PreadSource, Source};
 use crate::file::tail::{Attempted, Tail};
-use crate::progress::BuildProgress;
+use crate::progress::Progress;
 use crate::read::terrain::Terrain;
 use crate::remedy::Remedy;
 use std::path::Path;
@@ -64,7 +64,7 @@ pub fn drape(
     path: &Path,
     images: &[Box<dyn ImageSource>],
     options: &DrapeOptions,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Draped, LayoutError> {
     drape_on(&SystemDisk, path, images, options, progress)
 }
@@ -78,7 +78,7 @@ pub fn drape_on(
     path: &Path,
     images: &[Box<dyn ImageSource>],
     options: &DrapeOptions,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Draped, LayoutError> {
     let lock = WriteLock::take(path)?;
     let file = lock.file();
@@ -95,7 +95,7 @@ fn append_all(
     source: &dyn Source,
     images: &[Box<dyn ImageSource>],
     options: &DrapeOptions,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Draped, LayoutError> {
     let images: Vec<&dyn ImageSource> = images.iter().map(|image| &**image).collect();
     check_format(options.format)?;
@@ -139,7 +139,7 @@ fn append_tiles(
     mosaic: &Mosaic<'_>,
     shape: &ImageryShape,
     first: &Path,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<(), LayoutError> {
     let mut pyramid = Pyramid::new(*shape);
     let mut rows = mosaic.rows()?;

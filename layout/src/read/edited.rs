@@ -4,7 +4,7 @@
 
 use super::prefetch::prefetch;
 use super::records::Records;
-use super::store::{RawOf, RecordShape, RecordStore};
+use super::store::{RawOf, RecordShape, RecordStore, page_shift};
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
 use crate::grid::record::RecordCodec;
@@ -25,7 +25,7 @@ pub struct EditedRecords<'a, C: RecordCodec> {
 
 impl<'a, C: RecordCodec> EditedRecords<'a, C> {
     /// Binary logarithm of the records a page.
-    const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
+    const PAGE_SHIFT: u32 = page_shift::<C>();
 
     /// The records as the file has them.
     pub fn new(records: Records<'a, C>) -> Self {

@@ -8,7 +8,7 @@
 //! System", 1968). Cost: 4 bytes a logical page of the file, a load more than a mapped file a record.
 
 use super::prefetch::prefetch;
-use super::store::{RawOf, RecordShape, RecordStore};
+use super::store::{RawOf, RecordShape, RecordStore, page_shift};
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
@@ -42,7 +42,7 @@ pub struct PagePool<C> {
 
 impl<C: RecordCodec> PagePool<C> {
     /// Binary logarithm of the records a page.
-    const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
+    const PAGE_SHIFT: u32 = page_shift::<C>();
 
     /// A pool for `terrain` of at most `cache_bytes`, 72 KiB at the least, holding page 0. Reads that page.
     ///

@@ -3,7 +3,7 @@
 //! Invariant: every page number in the table lies inside the bytes.
 
 use super::prefetch::prefetch;
-use super::store::{RecordShape, RecordStore};
+use super::store::{RecordShape, RecordStore, page_shift};
 use super::terrain::Terrain;
 use crate::file::bytes::PAGE_BYTES;
 use crate::file::header::INERT_PAGE;
@@ -49,7 +49,7 @@ pub struct Records<'a, C: RecordCodec> {
 
 impl<'a, C: RecordCodec> Records<'a, C> {
     /// Binary logarithm of the records a page.
-    const PAGE_SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
+    const PAGE_SHIFT: u32 = page_shift::<C>();
 
     pub(crate) fn new(terrain: &'a Terrain, bytes: Slices<'a>, codec: C) -> Self {
         Self { bytes, pages: terrain.pages(), shape: terrain.shape(codec) }

@@ -23,6 +23,11 @@ pub struct RecordShape<C> {
 /// Record of a store.
 pub type RawOf<S> = <<S as RecordStore>::Codec as RecordCodec>::Raw;
 
+/// Binary logarithm of the records a page: a slot shifted right by it is its logical page.
+pub const fn page_shift<C: RecordCodec>() -> u32 {
+    (crate::file::bytes::PAGE_BYTES / C::BYTES).trailing_zeros()
+}
+
 /// Records by slot (FORMAT.md, section 2).
 pub trait RecordStore: Send + Sync {
     /// Kind of the records.
@@ -46,7 +51,7 @@ pub trait RecordStore: Send + Sync {
     /// Logical page of a slot.
     #[inline(always)]
     fn page_of(slot: u64) -> u64 {
-        slot >> (crate::file::bytes::PAGE_BYTES / Self::Codec::BYTES).trailing_zeros()
+        slot >> page_shift::<Self::Codec>()
     }
 
     /// Records a page.

@@ -25,7 +25,7 @@ pub use frame::budget::Budget;
 pub use mesh::bounds::Bounds;
 pub use mesh::patch::{NO_LEVEL, Patch, PatchVertex};
 
-use super::ground::GroundChange;
+use super::change::GroundChange;
 use super::{Culling, Engine, Phase, Probe, Work};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};

@@ -3,7 +3,7 @@
 use crate::verbs::WrongUsage;
 use crate::verbs::output::{grouped, print, print_json};
 use crate::verbs::outputs::{Force, Kind};
-use crate::verbs::progress::Progress;
+use crate::verbs::progress::Meter;
 use crate::verbs::terrain::TerrainArgs;
 use anyhow::Result;
 use serde::Serialize;
@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             .into());
         }
     };
-    let progress = Progress::new("records");
+    let progress = Meter::new("records");
     let TerrainArgs { file, overlay } = &args.terrain;
     let Compacted { header, bytes_before, commits_before, .. } =
         compact(&SystemDisk, file, overlay.as_deref(), out, &progress)?;

@@ -7,7 +7,7 @@ pub(super) mod past;
 mod work;
 
 use super::output::print_json;
-use super::progress::Progress;
+use super::progress::Meter;
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 use terrasoar::edits::{Loader, Script};
@@ -75,7 +75,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
 
 /// Applies a script, which lies at `path`, and tells what became of it.
 fn apply(target: Target<'_>, script: &Script, path: &Path, how: &HowArgs) -> Result<()> {
-    let progress = Progress::new("edits");
+    let progress = Meter::new("edits");
     let batches = Loader::new(path, terrasoar_import::open_file).script(script)?;
     let work = Work { target, batches: &batches, paints: !how.no_scorch, progress: &progress };
     let told = if how.dry_run { work.rehearse()? } else { work.perform()? };

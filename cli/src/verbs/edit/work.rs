@@ -2,7 +2,7 @@
 
 use super::paint::paints_of;
 use crate::verbs::output::{complain, decimal, grouped};
-use crate::verbs::progress::{Progress, short};
+use crate::verbs::progress::{Meter, short};
 use anyhow::{Context, Result, anyhow, bail};
 use serde::Serialize;
 use std::path::Path;
@@ -124,7 +124,7 @@ pub(super) struct Work<'a> {
     pub(super) batches: &'a [LoadedBatch],
     /// Whether the picture follows, where there is one.
     pub(super) paints: bool,
-    pub(super) progress: &'a Progress,
+    pub(super) progress: &'a Meter,
 }
 
 impl Work<'_> {

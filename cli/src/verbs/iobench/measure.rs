@@ -2,7 +2,7 @@
 
 use super::Args;
 use crate::verbs::cap::Standing;
-use crate::verbs::progress::Progress;
+use crate::verbs::progress::Meter;
 use crate::verbs::terrain;
 use anyhow::Result;
 use std::path::Path;
@@ -16,7 +16,7 @@ use terrasoar_lab::iobench::{
 use terrasoar_layout::file::bytes::PAGE_BYTES;
 
 /// The counting run of all readers, and the block length it used.
-pub(super) fn counted(args: &Args, views: &[View], progress: &Progress) -> Result<(Vec<Run>, f64)> {
+pub(super) fn counted(args: &Args, views: &[View], progress: &Meter) -> Result<(Vec<Run>, f64)> {
     let terrain = terrain::open(&args.file)?;
     let block_m = args.block.unwrap_or_else(|| ExtendedView::block_m(terrain.grid()));
     let options = CountOptions {
@@ -48,7 +48,7 @@ pub(super) fn streamed(
     views: &[View],
     counted: &[(Run, Option<Timed>)],
     standing: &Standing,
-    progress: &Progress,
+    progress: &Meter,
 ) -> Result<Vec<(Run, Pooled)>> {
     if !args.flies_pooled() {
         return Ok(Vec::new());
@@ -86,7 +86,7 @@ pub(super) fn measured(
     args: &Args,
     views: &[View],
     standing: &Standing,
-    progress: &Progress,
+    progress: &Meter,
 ) -> Result<Vec<(Reader, Timed)>> {
     if !args.layouts.contains(&LayoutKind::Ours) || !args.prefetch.contains(&Prefetch::None) {
         return Ok(Vec::new());
@@ -108,7 +108,7 @@ pub(super) fn replayed(
     folder: &Path,
     runs: &[(Run, Option<Timed>)],
     standing: &Standing,
-    progress: &Progress,
+    progress: &Meter,
 ) -> Result<Vec<(usize, ScratchCost, ScratchCost)>> {
     let mut costs = Vec::new();
     for layout in LayoutKind::ALL {

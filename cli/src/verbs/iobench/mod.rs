@@ -6,7 +6,7 @@ mod table;
 use super::cap::{self, Asked, Standing};
 use super::output::{print, print_json};
 use super::outputs::{Force, Kind};
-use super::progress::Progress;
+use super::progress::Meter;
 use super::replay::QualityArgs;
 use super::{WrongUsage, parse};
 use anyhow::{Result, bail};
@@ -171,7 +171,7 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
             Asked::Ran => return Ok(()),
         },
     };
-    let progress = Progress::new("frames");
+    let progress = Meter::new("frames");
     let flight = Flight::read(&args.flight)?;
     let quality = args.quality.quality();
     let views: Vec<View> = flight

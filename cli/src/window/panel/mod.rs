@@ -4,12 +4,12 @@
 
 mod figures;
 mod flights;
-mod ground;
 mod help;
 mod look;
 mod notes;
 mod place;
 mod status;
+mod tools;
 
 use super::flights::{Player, Recorder};
 use super::history::History;
@@ -102,7 +102,7 @@ pub(crate) fn show(
     memory: &mut Memory,
 ) -> Vec<Wish> {
     let mut wishes = Vec::new();
-    ground::ring(ui, facts);
+    tools::ring(ui, facts);
     status::show(ui, facts, &mut wishes);
     if settings.panel {
         let frame = Frame::new().fill(super::overlay::PANEL).inner_margin(Margin::same(10));
@@ -113,7 +113,7 @@ pub(crate) fn show(
                 section(ui, "Look", true, |ui| look::show(ui, facts, settings));
                 section(ui, "Mesh", true, |ui| look::mesh(ui, facts, settings, &mut wishes));
                 section(ui, "Place", true, |ui| place::show(ui, facts, memory, &mut wishes));
-                section(ui, "Ground", true, |ui| ground::show(ui, facts, &mut wishes));
+                section(ui, "Ground", true, |ui| tools::show(ui, facts, &mut wishes));
                 section(ui, "Flight", true, |ui| flights::show(ui, facts, &mut wishes));
             });
         });

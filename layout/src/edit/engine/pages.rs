@@ -7,12 +7,13 @@
 //! written to since the last commit has a copy from before, which takes everything back; of a commit that is under way the copies from before it are kept until it has succeeded.
 
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
+use crate::file::bytes::{Page, to_usize};
 use crate::file::entries::Entry;
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::RecordCodec;
 use crate::read::prefetch::prefetch;
+use crate::read::store::page_shift;
 use crate::read::terrain::Terrain;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -61,7 +62,7 @@ pub(crate) struct Pages<C: RecordCodec> {
 
 impl<C: RecordCodec> Pages<C> {
     /// Binary logarithm of the records a page.
-    const SHIFT: u32 = (PAGE_BYTES / C::BYTES).trailing_zeros();
+    const SHIFT: u32 = page_shift::<C>();
 
     pub(crate) fn new(terrain: Arc<Terrain>) -> Self {
         let count = terrain.entries().len();

@@ -12,7 +12,7 @@ use crate::file::slots::Slots;
 use crate::file::structure::inert_page;
 use crate::file::tail::Tail;
 use crate::imagery::{Append, Imagery, MadeTile};
-use crate::progress::BuildProgress;
+use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
 use std::path::Path;
@@ -43,7 +43,7 @@ pub fn compact(
     file: &Path,
     overlay: Option<&Path>,
     out: &Path,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Compacted, LayoutError> {
     // The lock comes first: what is committed before it is read, and nothing is committed after it.
     let lock = lock_if_same(file, out)?;
@@ -73,7 +73,7 @@ fn rewrite(
     terrain: &Terrain,
     file: AtomicFile,
     over: Option<&WriteLock>,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
     progress.stage("compacting", terrain.header().stored_pages * terrain.header().records_per_page());
     let mut writer = Writer { disk, file: &file, chunk: Vec::with_capacity(CHUNK_BYTES), offset: 0 };
@@ -121,7 +121,7 @@ impl Writer<'_> {
 fn write_terrain(
     writer: &mut Writer<'_>,
     terrain: &Terrain,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Slots, LayoutError> {
     let old = terrain.header();
     // The header comes last.

@@ -8,7 +8,7 @@ use crate::file::disk::Disk;
 use crate::file::header::Header;
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
-use crate::progress::BuildProgress;
+use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
 use std::path::Path;
@@ -25,7 +25,7 @@ pub fn widen(
     path: &Path,
     room: HeightRoom,
     memory_mib: u64,
-    progress: &dyn BuildProgress,
+    progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
     let lock = WriteLock::take(path)?;
     lock.check_only_name(path)?;

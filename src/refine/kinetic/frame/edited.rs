@@ -8,7 +8,7 @@
 //! Invariant: after the walk every node that has a record has the one that there is. Cost: the nodes met, which are those whose record changed, their ancestors and a few around each
 //! area; nothing is allocated once the lists have grown.
 
-use crate::refine::ground::{Areas, GroundChange};
+use crate::refine::change::{Areas, GroundChange};
 use crate::refine::kinetic::mesh::labels::{child_point, level_of};
 use crate::refine::kinetic::mesh::nodes::{CENTRE, NONE, STATUS, body};
 use crate::refine::kinetic::time::certificate::{clock_of, expiry_of};
