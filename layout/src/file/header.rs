@@ -2,17 +2,16 @@
 //!
 //! Invariant: a [`Header`] that [`Header::parse`] returned has every field in range and consistent with the others.
 
+mod fields;
 mod numbers;
 
-use super::bytes::{
-    PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64, put_f64, put_text, put_u16,
-    put_u32, put_u64,
-};
+use super::bytes::{PAGE_BYTES, Page, checksum, get_u16, put_f64, put_text, put_u16, put_u32, put_u64};
 use crate::dem::HorizontalUnit;
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::grid::order::slot_count;
 use crate::grid::record::{RecordKind, RecordScale};
+use fields::Fields;
 use std::path::Path;
 
 /// First bytes of every terrain file.
@@ -272,137 +271,10 @@ impl Header {
 
     /// As [`Header::parse`], of a file that begins with `magic`.
     pub(crate) fn parse_as(path: &Path, page: &Page, magic: [u8; 8]) -> Result<Self, LayoutError> {
-        let p = &page[..];
-        let damaged = |problem: String| {
-            LayoutError::damaged(path, "header", format!("{problem}; build the file again or restore a copy"))
-        };
-        if p[..8] != magic {
-            return Err(damaged("the magic bytes are missing".into()));
-        }
-        let major = get_u16(p, 0x008);
-        if major != 1 {
-            return Err(LayoutError::unsupported(
-                path,
-                format!(
-                    "the file has format version {major}, this program reads version 1; use a newer terrasoar"
-                ),
-            ));
-        }
-        if get_u32(p, 0xffc) != checksum(&p[..0xffc]) {
-            return Err(damaged("the checksum does not match".into()));
-        }
-        let check = |holds: bool, field: &str| {
-            if holds {
-                Ok(())
-            } else {
-                Err(damaged(format!("the field {field} is out of range or contradicts another")))
-            }
-        };
-        check(get_u32(p, 0x00c) == PAGE_BYTES as u32, "page_bytes")?;
-        let record_kind = match p[0x011] {
-            1 => RecordKind::Compact,
-            2 => RecordKind::Exact8,
-            3 => RecordKind::Exact16,
-            _ => return Err(damaged("the field record_kind is out of range".into())),
-        };
-        let error_kind = match p[0x012] {
-            1 => ErrorKind::Bounded,
-            2 => ErrorKind::Step,
-            _ => return Err(damaged("the field error_kind is out of range".into())),
-        };
-        check(p[0x013] <= 3, "flags")?;
-        let grid = Grid::new([get_u32(p, 0x014), get_u32(p, 0x018)], [get_f64(p, 0x020), get_f64(p, 0x028)])
-            .map_err(|_| damaged("the size or spacing of the grid is out of range".into()))?;
-        check(u32::from(p[0x010]) == grid.k(), "k")?;
-        let scale = RecordScale {
-            height_base_m: get_f64(p, 0x030),
-            height_step_m: get_f64(p, 0x038),
-            error_top_m: get_f64(p, 0x050),
-            radius_steps_per_octave: match (record_kind, get_u32(p, 0x058)) {
-                (RecordKind::Compact, steps @ (8 | 16 | 32 | 64)) => steps,
-                (RecordKind::Exact8 | RecordKind::Exact16, 0) => 64,
-                _ => return Err(damaged("the field radius_steps_per_octave is out of range".into())),
-            },
-        };
-        let height_range_m = [get_f64(p, 0x040), get_f64(p, 0x048)];
-        let latitude = get_f64(p, 0x0d8);
-        let spacing_origin = match p[0x0d5] {
-            1 => SpacingOrigin::Dem,
-            2 => SpacingOrigin::Degrees { centre_latitude_deg: latitude },
-            3 => SpacingOrigin::User,
-            4 => SpacingOrigin::Assumed,
-            _ => return Err(damaged("the field spacing_origin is out of range".into())),
-        };
-        let crs_unit = match p[0x0d4] {
-            0 => HorizontalUnit::Unknown,
-            1 => HorizontalUnit::Metre,
-            2 => HorizontalUnit::Degree,
-            3 => HorizontalUnit::Foot,
-            4 => HorizontalUnit::UsSurveyFoot,
-            _ => return Err(damaged("the field crs_unit is out of range".into())),
-        };
-        let map: [f64; 6] = std::array::from_fn(|i| get_f64(p, 0x0a0 + 8 * i));
-        let body_radius_m = get_f64(p, 0x0e0);
-        let text = |offset, field| {
-            get_text(p, offset).ok_or_else(|| damaged(format!("the field {field} is not text")))
-        };
-        let imagery = match [get_u64(p, 0x090), get_u64(p, 0x098)] {
-            [0, 0] => None,
-            [offset, bytes] => Some(ImageryPlace { offset, bytes }),
-        };
-        let history = match [get_u32(p, 0x0e8), get_u32(p, 0x0ec)] {
-            [0, 0] => None,
-            [commit_page, tip_page] => Some(History { commit_page, tip_page }),
-        };
-        let header = Self {
-            grid,
-            record_kind,
-            scale,
-            error_kind,
-            has_voids: p[0x013] & 1 != 0,
-            heights_rounded: p[0x013] & 2 != 0,
-            generation: get_u32(p, 0x01c),
-            height_range_m,
-            nodata_samples: get_u64(p, 0x060),
-            stored_pages: get_u64(p, 0x070),
-            root_page: get_u32(p, 0x078),
-            root_checksum: get_u32(p, 0x080),
-            file_bytes: get_u64(p, 0x088),
-            imagery,
-            history,
-            sample_to_crs: (map != [0.0; 6]).then_some(map),
-            epsg: Some(get_u32(p, 0x0d0)).filter(|code| *code != 0),
-            crs_unit,
-            spacing_origin,
-            body_radius_m: Some(body_radius_m).filter(|r| *r != 0.0),
-            crs_name: text(0x200, "crs_name")?,
-            source: text(0x300, "source")?,
-        };
-        if let Some(field) = header.first_wrong_number() {
-            check(false, field.name())?;
-        }
-        let samples = u64::from(grid.samples()[0]) * u64::from(grid.samples()[1]);
-        check(header.nodata_samples <= samples, "nodata_samples")?;
-        check(get_u64(p, 0x068) == header.record_pages(), "record_pages")?;
-        check(header.stored_pages <= header.record_pages(), "stored_pages")?;
-        check(u64::from(get_u32(p, 0x07c)) == header.root_entries(), "root_entries")?;
-        let root_end = u64::from(header.root_page) * PAGE_BYTES as u64 + 16 * header.root_entries();
-        check(header.root_page > INERT_PAGE && root_end <= header.file_bytes, "root_page")?;
-        check(header.file_bytes <= u64::from(u32::MAX) * PAGE_BYTES as u64, "file_bytes")?;
-        let fits = |place: ImageryPlace| {
-            let page = PAGE_BYTES as u64;
-            place.offset > u64::from(INERT_PAGE) * page
-                && [place.offset, place.bytes].iter().all(|v| v.is_multiple_of(page))
-                && (2 * page..=header.file_bytes).contains(&place.bytes)
-                && place.end() <= header.file_bytes
-        };
-        check(header.imagery.is_none_or(fits), "imagery")?;
-        let is_page =
-            |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * PAGE_BYTES as u64 <= header.file_bytes;
-        let has_pages = |history: History| {
-            is_page(history.tip_page) && (history.commit_page == 0 || is_page(history.commit_page))
-        };
-        check(header.history.is_none_or(has_pages), "commit_page or tip_page")?;
+        let fields = Fields { path, page };
+        fields.check_seal(magic)?;
+        let header = fields.header()?;
+        fields.check_places(&header)?;
         Ok(header)
     }
 }

@@ -132,6 +132,16 @@ impl<'a, C: RecordCodec> Cache<'a, C> {
     }
 }
 
+/// What was found around and below a vertex.
+enum Below {
+    /// Nothing wrong: whether there is a void next to it, and whether all below it is inert.
+    Is { fringe: bool, all_inert: bool },
+    /// This is wrong.
+    Wrong(String),
+    /// A page of it is damaged, which is told elsewhere.
+    Unknown,
+}
+
 /// One task's walk over pages.
 struct Walk<'a, C: RecordCodec> {
     grid: &'a Grid,
@@ -236,54 +246,12 @@ impl<C: RecordCodec> Walk<'_, C> {
         if sample.is_some() {
             return Ok(sample);
         }
-        let (mut fringe, mut all_inert) = (false, true);
-        if level == 0 {
-            if self.header.has_voids {
-                for corner in self.grid.edge_ends(p).into_iter().chain(self.grid.apexes(p)) {
-                    match self.at(self.grid.fold(corner))? {
-                        None => return Ok(None),
-                        Some(corner) => fringe |= corner.class.is_void(),
-                    }
-                }
-            }
-        } else {
-            let [x, y] = self.grid.position_m(p);
-            for child in self.grid.children(p) {
-                let Some(c) = self.records.vertex(slot_of(self.grid.k(), child), level - 1)? else {
-                    return Ok(None);
-                };
-                if c.class == VertexClass::Inert {
-                    fringe |= !self.is_beyond(child, level - 1);
-                    continue;
-                }
-                all_inert = false;
-                fringe |= !c.class.is_plain();
-                if inert {
-                    continue;
-                }
-                if v.error_m < c.error_m {
-                    return Ok(Some(format!(
-                        "has an error of {} m, its child ({}, {}) of {} m",
-                        v.error_m,
-                        child.x(),
-                        child.y(),
-                        c.error_m
-                    )));
-                }
-                let [cx, cy] = self.grid.position_m(child);
-                let dz = v.height_m - c.height_m;
-                let distance_m = ((x - cx) * (x - cx) + (y - cy) * (y - cy) + dz * dz).sqrt();
-                let needed_m = MARGIN * (distance_m + c.radius_m);
-                if v.radius_m * ROUNDING < needed_m {
-                    return Ok(Some(format!(
-                        "has a radius of {} m, too small for its child ({}, {}) which needs {needed_m} m",
-                        v.radius_m,
-                        child.x(),
-                        child.y()
-                    )));
-                }
-            }
-        }
+        let below = if level == 0 { self.around(p)? } else { self.below(p, level, v)? };
+        let (fringe, all_inert) = match below {
+            Below::Is { fringe, all_inert } => (fringe, all_inert),
+            Below::Wrong(problem) => return Ok(Some(problem)),
+            Below::Unknown => return Ok(None),
+        };
         let expected = match (v.class.is_void(), all_inert, fringe) {
             (true, true, _) => VertexClass::Inert,
             (true, false, _) => VertexClass::FringeVoid,
@@ -306,20 +274,81 @@ impl<C: RecordCodec> Walk<'_, C> {
                 )));
             }
         }
-        if self.looks_up && !inert && level + 1 < self.grid.levels() {
-            for parent in self.grid.apexes(p) {
-                let slot = slot_of(self.grid.k(), parent);
-                if self.records.is_absent(slot) {
-                    return Ok(Some(format!(
-                        "is not inert and its parent ({}, {}) is, on the absent record page {}",
-                        parent.x(),
-                        parent.y(),
-                        Cache::<C>::page_of(slot)
-                    )));
+        Ok(if self.looks_up && !inert { self.above(p, level) } else { None })
+    }
+
+    /// What lies around a vertex of level 0.
+    fn around(&mut self, p: GridPoint) -> Result<Below, LayoutError> {
+        let mut fringe = false;
+        if self.header.has_voids {
+            for corner in self.grid.edge_ends(p).into_iter().chain(self.grid.apexes(p)) {
+                match self.at(self.grid.fold(corner))? {
+                    None => return Ok(Below::Unknown),
+                    Some(corner) => fringe |= corner.class.is_void(),
                 }
             }
         }
-        Ok(None)
+        Ok(Below::Is { fringe, all_inert: true })
+    }
+
+    /// What a vertex of another level is to its children: no less in error, its sphere around theirs.
+    fn below(&mut self, p: GridPoint, level: u32, v: &Vertex) -> Result<Below, LayoutError> {
+        let (mut fringe, mut all_inert) = (false, true);
+        let [x, y] = self.grid.position_m(p);
+        for child in self.grid.children(p) {
+            let Some(c) = self.records.vertex(slot_of(self.grid.k(), child), level - 1)? else {
+                return Ok(Below::Unknown);
+            };
+            if c.class == VertexClass::Inert {
+                fringe |= !self.is_beyond(child, level - 1);
+                continue;
+            }
+            all_inert = false;
+            fringe |= !c.class.is_plain();
+            if v.class == VertexClass::Inert {
+                continue;
+            }
+            if v.error_m < c.error_m {
+                return Ok(Below::Wrong(format!(
+                    "has an error of {} m, its child ({}, {}) of {} m",
+                    v.error_m,
+                    child.x(),
+                    child.y(),
+                    c.error_m
+                )));
+            }
+            let [cx, cy] = self.grid.position_m(child);
+            let dz = v.height_m - c.height_m;
+            let distance_m = ((x - cx) * (x - cx) + (y - cy) * (y - cy) + dz * dz).sqrt();
+            let needed_m = MARGIN * (distance_m + c.radius_m);
+            if v.radius_m * ROUNDING < needed_m {
+                return Ok(Below::Wrong(format!(
+                    "has a radius of {} m, too small for its child ({}, {}) which needs {needed_m} m",
+                    v.radius_m,
+                    child.x(),
+                    child.y()
+                )));
+            }
+        }
+        Ok(Below::Is { fringe, all_inert })
+    }
+
+    /// What is wrong with the parents of a vertex that is not inert: an absent one would never lead to it.
+    fn above(&self, p: GridPoint, level: u32) -> Option<String> {
+        if level + 1 >= self.grid.levels() {
+            return None;
+        }
+        self.grid.apexes(p).find_map(|parent| {
+            let slot = slot_of(self.grid.k(), parent);
+            self.records.is_absent(slot).then(|| {
+                format!(
+                    "is not inert and its parent ({}, {}) is, on the absent record page {}",
+                    parent.x(),
+                    parent.y(),
+                    Cache::<C>::page_of(slot)
+                )
+            })
+        })
     }
 }
 

@@ -4,14 +4,15 @@
 //! given one patch with the whole mesh and the tiles it then asks for. Cost of a frame on the processor: the patch,
 //! one block of uniforms, a handful of commands and one draw a visible range (or one for all of them).
 
+mod draw;
 mod imagery;
 
+use draw::begin_pass;
 use std::collections::HashMap;
-use std::ops::Range;
 
 use wgpu::util::DeviceExt;
 
-use crate::attachments::{Attachments, Key};
+use crate::attachments::Attachments;
 use crate::error::{RenderError, Result};
 use crate::frame::{DrawStats, Frame, RendererOptions, Target};
 use crate::mesh::{MeshBuffers, MeshPatch, Morph, UploadStats};
@@ -21,7 +22,7 @@ use crate::tiles::{
     GRADIENT_FORMAT, Imagery, Pyramid, TILE_CELLS, TileId, TilePool, TileStats, WantedTiles, pack_gradients,
 };
 use crate::timing::GpuTimer;
-use crate::uniforms::{Inputs, Uniforms};
+use crate::uniforms::Uniforms;
 use crate::view::{FrameView, TerrainShape, near_m};
 
 /// Frames whose commands may wait in one submission.
@@ -170,38 +171,12 @@ impl Renderer {
             return Err(RenderError::Usage("a target needs at least one pixel"));
         }
         let variant = Variant::of(frame.look, self.imagery.is_some(), target.format);
-        let samples = variant.samples;
-        let key = Key { size_px: target.size_px, format: target.format, samples };
-        self.attachments = Some(Attachments::keep_or_make(self.attachments.take(), &self.device, key));
-        self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(&self.device, &self.modules, variant));
-        self.set_ramp(frame.look.ramp);
-        self.bind();
-
-        let uniforms = Uniforms::new(&Inputs {
-            terrain: &self.terrain,
-            pyramid: &self.tiles.pyramid,
-            view: frame.view,
-            refined_for,
-            look: frame.look,
-            imagery: self.imagery.as_ref(),
-            wall_bottom_m: self.walls.as_ref().map_or(0.0, |w| w.bottom_m),
-        });
-        let place = self.uniform_stride * self.next_place;
-        self.next_place = (self.next_place + 1) % UNIFORM_PLACES;
-        self.queue.write_buffer(&self.uniforms, place, bytemuck::bytes_of(&uniforms));
-
-        let own_vertices = frame.look.needs_own_vertices();
-        let ranges = &self.mesh.draws.ranges;
-        let arguments = (self.multi_draw && !own_vertices && ranges.len() >= INDIRECT_FROM).then(|| {
-            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("draws"),
-                contents: bytemuck::cast_slice(&self.mesh.draws.indirect_words()),
-                usage: wgpu::BufferUsages::INDIRECT,
-            })
-        });
+        self.prepare(target, variant, frame.look);
+        let place = self.send_uniforms(&frame, refined_for);
+        let arguments = self.draw_arguments(frame.look.needs_own_vertices());
         let mut stats = DrawStats {
             triangles: self.mesh.draws.triangles(),
-            ranges: ranges.len() as u32,
+            ranges: self.mesh.draws.ranges.len() as u32,
             draw_calls: 0,
             bytes: size_of::<Uniforms>() as u64 + arguments.as_ref().map_or(0, wgpu::Buffer::size),
         };
@@ -219,58 +194,11 @@ impl Renderer {
             });
             self.morph.record(&mut pass, self.mesh.vertex_slots, place as u32);
         }
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("terrain"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: attachments.samples.as_ref().unwrap_or(target.view),
-                depth_slice: None,
-                resolve_target: attachments.samples.as_ref().map(|_| target.view),
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: if samples == 1 { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard },
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &attachments.depth_view,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: if samples == 1 { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard },
-                }),
-                stencil_ops: None,
-            }),
-            timestamp_writes: timed.map(|(timer, place)| timer.ends_with_render(place, !frame.look.morph)),
-            occlusion_query_set: None,
-            multiview_mask: None,
-        });
+        let timestamps = timed.map(|(timer, place)| timer.ends_with_render(place, !frame.look.morph));
+        let mut pass = begin_pass(encoder, attachments, target, timestamps);
         pass.set_bind_group(0, group, &[place as u32]);
-        if own_vertices {
-            pass.set_pipeline(&pipelines.own);
-            for Range { start, end } in ranges {
-                pass.draw(3 * start..3 * end, 0..1);
-                stats.draw_calls += 1;
-            }
-        } else {
-            pass.set_pipeline(&pipelines.shared);
-            pass.set_index_buffer(self.mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-            if let Some(arguments) = &arguments {
-                pass.multi_draw_indexed_indirect(arguments, 0, ranges.len() as u32);
-                stats.draw_calls += 1;
-            } else {
-                for Range { start, end } in ranges {
-                    pass.draw_indexed(3 * start..3 * end, 0, 0..1);
-                    stats.draw_calls += 1;
-                }
-            }
-        }
-        if let Some(walls) = &self.walls {
-            pass.set_pipeline(&pipelines.wall);
-            pass.set_vertex_buffer(0, walls.edges.slice(..));
-            pass.draw(0..6, 0..walls.count);
-            stats.draw_calls += 1;
-        }
-        pass.set_pipeline(&pipelines.sky);
-        pass.draw(0..3, 0..1);
-        stats.draw_calls += 1;
+        stats.draw_calls =
+            self.draw(&mut pass, pipelines, frame.look.needs_own_vertices(), arguments.as_ref());
         drop(pass);
         if let Some((timer, place)) = timed {
             timer.end(place, encoder);

@@ -215,7 +215,25 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
         sums.push(IoRun::of(&run).with_times(&pooled.timed).with_stream(&pooled));
         runs.push((run, Some(pooled.timed)));
     }
-    let bench = IoBench {
+    let bench = bench_of(args, block_m, standing, sums);
+    if let Some(path) = &args.frames {
+        write_io_frames_csv(path, &runs)?;
+    }
+    let written = match &args.output {
+        Some(folder) => IoReport { bench: &bench, runs: &runs }.write(folder)?,
+        None => Vec::new(),
+    };
+    if args.json {
+        return print_json(&bench);
+    }
+    let page = written.last().map_or(String::new(), |page| format!("report: {}\n", page.display()));
+    print(&(table::text(&bench) + &page))
+}
+
+/// What was measured, and how.
+fn bench_of(args: &Args, block_m: f64, standing: Standing, runs: Vec<IoRun>) -> IoBench {
+    let quality = args.quality.quality();
+    IoBench {
         terrain: name(&args.file),
         flight: name(&args.flight),
         tolerance_px: quality.tolerance_px,
@@ -229,20 +247,8 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
         cap: standing.cap,
         cap_note: standing.note,
         kernel_known: kernel::thread_faults().is_some() && kernel::read_bytes().is_some(),
-        runs: sums,
-    };
-    if let Some(path) = &args.frames {
-        write_io_frames_csv(path, &runs)?;
+        runs,
     }
-    let written = match &args.output {
-        Some(folder) => IoReport { bench: &bench, runs: &runs }.write(folder)?,
-        None => Vec::new(),
-    };
-    if args.json {
-        return print_json(&bench);
-    }
-    let page = written.last().map_or(String::new(), |page| format!("report: {}\n", page.display()));
-    print(&(table::text(&bench) + &page))
 }
 
 fn name(path: &Path) -> String {
