@@ -5,12 +5,12 @@
 //! first and one a frame.
 
 mod follow;
-mod ground;
 mod orbit;
 mod straight;
+mod terrain_ground;
 mod turn;
 
-pub use ground::TerrainGround;
+pub use terrain_ground::TerrainGround;
 
 use super::format::{MAGIC, MAX_FRAMES, UNITS, VERSION, fault_in, values};
 use super::{Flight, FlightFrame};
