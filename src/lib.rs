@@ -7,12 +7,14 @@
 pub mod edits;
 pub mod flight;
 pub mod flyover;
+pub mod ground;
 pub mod mesh;
 pub mod metric;
 pub mod refine;
 pub mod sink;
 pub mod stats;
 pub mod stream;
+pub mod terrain;
 #[cfg(any(test, feature = "testing"))]
 #[doc(hidden)]
 pub mod testing;
