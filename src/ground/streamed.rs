@@ -131,17 +131,15 @@ impl<C: RecordCodec> MeshEngine for StreamedMesh<C> {
             let [dx, dy] = grid.spacing_m();
             heights_m.clear();
             heights_m.reserve(tile.count());
-            heights_m.extend(tile.points(grid.samples()).map(
-                |point| match pool.get(slot_of(k, point)) {
-                    Some(raw) => {
-                        shown_m(&pool.decode(raw, if grid.is_corner(point) { 0 } else { grid.level(point) }))
-                    }
-                    None => {
-                        let sounding = height_at(pool, f64::from(point.x()) * dx, f64::from(point.y()) * dy);
-                        sounding.height_m.map_or(f32::NAN, |height_m| height_m as f32)
-                    }
-                },
-            ));
+            heights_m.extend(tile.points(grid.samples()).map(|point| match pool.get(slot_of(k, point)) {
+                Some(raw) => {
+                    shown_m(&pool.decode(raw, if grid.is_corner(point) { 0 } else { grid.level(point) }))
+                }
+                None => {
+                    let sounding = height_at(pool, f64::from(point.x()) * dx, f64::from(point.y()) * dy);
+                    sounding.height_m.map_or(f32::NAN, |height_m| height_m as f32)
+                }
+            }));
             return true;
         }
         away.iter().for_each(|page| self.streamed.want(*page, TILE_FRAMES));

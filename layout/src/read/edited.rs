@@ -4,7 +4,7 @@
 
 use super::prefetch::prefetch;
 use super::records::Records;
-use super::store::{RawOf, RecordShape, RecordStore, page_shift};
+use super::store::{CompleteStore, RawOf, RecordShape, RecordStore, page_shift};
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
 use crate::grid::record::RecordCodec;
@@ -66,6 +66,8 @@ impl<'a, C: RecordCodec> EditedRecords<'a, C> {
         (own != FILES).then(|| (own as usize - 1) * PAGE_BYTES + within)
     }
 }
+
+impl<C: RecordCodec> CompleteStore for EditedRecords<'_, C> {}
 
 impl<C: RecordCodec> RecordStore for EditedRecords<'_, C> {
     type Codec = C;

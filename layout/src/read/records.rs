@@ -3,7 +3,7 @@
 //! Invariant: every page number in the table lies inside the bytes.
 
 use super::prefetch::prefetch;
-use super::store::{RecordShape, RecordStore, page_shift};
+use super::store::{CompleteStore, RecordShape, RecordStore, page_shift};
 use super::terrain::Terrain;
 use crate::file::bytes::PAGE_BYTES;
 use crate::file::header::INERT_PAGE;
@@ -128,6 +128,8 @@ impl<'a, C: RecordCodec> Records<'a, C> {
         self.vertex(slot_of(self.grid().k(), p), level)
     }
 }
+
+impl<C: RecordCodec> CompleteStore for Records<'_, C> {}
 
 impl<C: RecordCodec> RecordStore for Records<'_, C> {
     type Codec = C;

@@ -86,3 +86,8 @@ pub trait RecordStore: Send + Sync {
         self.shape().codec.decode(raw, level)
     }
 }
+
+/// A store in which every record is at hand, always: [`RecordStore::get`] has an answer for every slot that there is, and [`RecordStore::IS_COMPLETE`] says so.
+///
+/// Engines that read records without asking whether they are there take no other: over a pool they would take what is away for ground without detail.
+pub trait CompleteStore: RecordStore {}
