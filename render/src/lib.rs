@@ -1,6 +1,6 @@
 //! Draws a terrain mesh that changes every frame, through wgpu: patches, normal tiles and image tiles in, pixels out.
 //!
-//! The crate opens no file, knows no engine and owns no window. The caller has the device, the queue and the target, and
+//! The crate opens no file, runs no engine (of `terrasoar` it uses plain types alone) and owns no window. The caller has the device, the queue and the target, and
 //! says what changed; the renderer records commands into the caller's encoder.
 //!
 //! # A frame
@@ -93,7 +93,7 @@ pub use error::{RenderError, Result};
 pub use frame::{DrawStats, Frame, RendererOptions, Target};
 pub use gpu::{Capabilities, DeviceWatch, Gpu};
 pub use look::{Contours, Haze, LOOKS, Look, Sun, Surface, Wireframe};
-pub use mesh::{MeshPatch, MeshVertex, UploadStats};
+pub use mesh::{MeshPatch, UploadStats};
 pub use offscreen::{Offscreen, read_depth_m};
 pub use renderer::Renderer;
 pub use tiles::{
@@ -102,5 +102,7 @@ pub use tiles::{
     WantedTiles, pack_gradients,
 };
 pub use view::{FrameView, TerrainShape};
+/// A vertex as the engine hands it out and the device holds it.
+pub use terrasoar::refine::kinetic::MeshVertex;
 /// The graphics interface of the version that this crate's types are of.
 pub use wgpu;

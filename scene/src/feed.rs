@@ -2,7 +2,7 @@
 //!
 //! Invariant: the changes told since the last [`Feed::whole`], applied in order to it, give the mesh. Cost: an engine's update and a copy of its patch.
 
-use terrasoar::refine::kinetic::{Patch, PatchVertex};
+use terrasoar::refine::kinetic::Patch;
 use terrasoar::refine::{Culling, Probe, Work};
 use terrasoar::stream::GroundPatch;
 use terrasoar::view::View;
@@ -12,7 +12,7 @@ use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};
 use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::store::RecordStore;
-use terrasoar_render::{HEIGHTS_PER_TILE, MeshVertex, TILE_BORDER, TILE_CELLS, TileId};
+use terrasoar_render::{HEIGHTS_PER_TILE, TILE_BORDER, TILE_CELLS, TileId};
 
 /// What an update of the mesh did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -91,12 +91,6 @@ pub trait Feed {
     fn take_error(&mut self) -> Option<LayoutError> {
         None
     }
-}
-
-/// A vertex of a patch as the renderer takes it.
-pub fn mesh_vertex(vertex: &PatchVertex) -> MeshVertex {
-    let PatchVertex { x, y, height_m, error_m, radius_m, ends, flags } = *vertex;
-    MeshVertex { x, y, height_m, error_m, radius_m, ends, flags }
 }
 
 /// The pages of the records that an update reads, each read a page.
