@@ -96,13 +96,14 @@ pub use look::{Contours, Haze, LOOKS, Look, Sun, Surface, Wireframe};
 pub use mesh::{MeshPatch, UploadStats};
 pub use offscreen::{Offscreen, read_depth_m};
 pub use renderer::Renderer;
-pub use tiles::{
-    HEIGHTS_PER_TILE, IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, ImageTileId, ImageryFormat,
-    ImageryShape, ImageryStats, Placement, Pyramid, Residency, TILE_BORDER, TILE_CELLS, TileId, TileStats,
-    WantedTiles, pack_gradients,
-};
-pub use view::{FrameView, TerrainShape};
 /// A vertex as the engine hands it out and the device holds it.
 pub use terrasoar::refine::kinetic::MeshVertex;
+/// Images and tiles as the terrain file has them. Slopes are in tiles named alike.
+pub use terrasoar_layout::imagery::{ImageryShape, TileFormat, TileId};
+pub use tiles::{
+    HEIGHTS_PER_TILE, ImageryStats, Placement, Pyramid, Residency, TILE_BORDER, TILE_CELLS, TileStats,
+    WantedTiles, pack_gradients, tile_lines,
+};
+pub use view::{FrameView, TerrainShape};
 /// The graphics interface of the version that this crate's types are of.
 pub use wgpu;

@@ -5,8 +5,9 @@ use glam::Vec3;
 
 use crate::look::{Haze, Look};
 use crate::ramps::linear_of;
-use crate::tiles::{IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, Imagery, Pyramid, TILE_CELLS};
+use crate::tiles::{Imagery, Pyramid, TILE_CELLS};
 use crate::view::{FrameView, LocalView, TerrainShape, clip_from_eye, near_m, whole_and_rest};
+use terrasoar_layout::imagery::{BORDER_TEXELS, INNER_TEXELS, TILE_TEXELS};
 
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -125,7 +126,7 @@ impl Uniforms {
             wire_colour: rgb(wire.colour, 0.0),
             tiles: [pyramid.levels(), TILE_CELLS.ilog2(), TILE_CELLS + 1, 0],
             terrain: [terrain.samples[0], terrain.samples[1], 0, 0],
-            image: [image.levels, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, IMAGE_TILE_BORDER],
+            image: [image.levels, INNER_TEXELS, TILE_TEXELS, BORDER_TEXELS],
             image_eye: image.eye,
             image_scale: image.scale,
             image_share: [look.imagery.clamp(0.0, 1.0), image.straight, 0.0, 0.0],
@@ -152,7 +153,7 @@ impl Image {
             levels: imagery.pool.pyramid.levels(),
             eye: [eye[0].0, eye[1].0, wide, high],
             scale: [east, north, eye[0].1 as f32, eye[1].1 as f32],
-            straight: f32::from(u8::from(shape.format.is_straight())),
+            straight: f32::from(u8::from(imagery.is_straight())),
         }
     }
 }

@@ -10,9 +10,10 @@ use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::entries::Entry;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};
+use terrasoar_layout::imagery::TileId;
 use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::store::RecordStore;
-use terrasoar_render::{HEIGHTS_PER_TILE, TILE_BORDER, TILE_CELLS, TileId};
+use terrasoar_render::{HEIGHTS_PER_TILE, tile_lines};
 
 /// What an update of the mesh did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -125,13 +126,8 @@ impl Reads {
 
 /// Grid points of a tile and its border, south-west first; those beyond the data are the nearest sample.
 pub fn tile_points(samples: [u32; 2], tile: TileId) -> impl Iterator<Item = GridPoint> {
-    let points = move |axis: usize| {
-        let (first, last) = (i64::from(tile.first_sample()[axis]), i64::from(samples[axis]) - 1);
-        let at =
-            move |i: u32| first + (i64::from(i) - i64::from(TILE_BORDER)) * i64::from(tile.cell_samples());
-        (0..TILE_CELLS + 1 + 2 * TILE_BORDER).map(move |i| at(i).clamp(0, last) as u32)
-    };
-    points(1).flat_map(move |y| points(0).map(move |x| GridPoint::new(x, y)))
+    let [columns, rows] = [0, 1].map(|axis| tile_lines(samples, tile, axis));
+    rows.flat_map(move |y| columns.clone().map(move |x| GridPoint::new(x, y)))
 }
 
 /// Heights of the points of a tile.

@@ -11,8 +11,8 @@ use terrasoar::stream::height_at;
 use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::imagery::TileId;
 use terrasoar_layout::read::records::Records;
-use terrasoar_render::TileId;
 
 /// SOAR and its mesh.
 pub struct FullMesh<'a, C: RecordCodec> {

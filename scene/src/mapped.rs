@@ -7,10 +7,10 @@ use terrasoar::refine::{Culling, Engine};
 use terrasoar::stream::height_at;
 use terrasoar::view::View;
 use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::imagery::TileId;
 use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
-use terrasoar_render::TileId;
 
 /// Which engine makes the mesh. Both make the same one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -26,11 +26,11 @@ use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::Edit;
 use terrasoar_layout::file::entries::Entry;
-use terrasoar_layout::imagery::{Imagery, Paint};
+use terrasoar_layout::imagery::{Imagery, Paint, TileFormat, TileId};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{
-    Frame, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target, TerrainShape,
-    TileId, TileStats, UploadStats, wgpu,
+    Frame, Gpu, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target, TerrainShape, TileStats,
+    UploadStats, wgpu,
 };
 
 /// Tiles that are asked for, for each that is given in a frame.
@@ -55,7 +55,7 @@ pub struct Scene<'a> {
     /// Whether the last picture had the image in it.
     shows_image: bool,
     /// What the device takes of images.
-    formats: &'static [ImageryFormat],
+    formats: &'static [TileFormat],
     /// The views of the last two updates, which say where the eye is going.
     ways: [Option<View>; 2],
 }
@@ -297,8 +297,13 @@ impl<'a> Scene<'a> {
     }
 
     fn show_drape(&mut self) -> Result<(), RenderError> {
-        let shape = self.drape.as_ref().map(Drape::shape);
-        self.renderer.set_imagery(shape, self.options.imagery_bytes)
+        match &self.drape {
+            Some(drape) => drape.show(&mut self.renderer, self.options.imagery_bytes),
+            None => {
+                self.renderer.clear_imagery();
+                Ok(())
+            }
+        }
     }
 
     /// What craters among these edits burn into the image: nothing where there is none, or none that this build can paint, and by none that is too wide to follow the hand.
@@ -403,6 +408,8 @@ fn new_renderer(
     let mut renderer_options = RendererOptions::from(&gpu.capabilities);
     renderer_options.timestamps &= options.timestamps;
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shape, renderer_options)?;
-    renderer.set_imagery(drape.map(Drape::shape), options.imagery_bytes)?;
+    if let Some(drape) = drape {
+        drape.show(&mut renderer, options.imagery_bytes)?;
+    }
     Ok(renderer)
 }

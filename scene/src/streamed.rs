@@ -15,12 +15,13 @@ use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::entries::Entry;
 use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::imagery::TileId;
 use terrasoar_layout::read::loader::Loader;
 use terrasoar_layout::read::pool::PagePool;
 use terrasoar_layout::read::store::RecordStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
-use terrasoar_render::{HEIGHTS_PER_TILE, TileId};
+use terrasoar_render::HEIGHTS_PER_TILE;
 
 /// Threads that read: as many reads are under way at once.
 const THREADS: usize = 4;

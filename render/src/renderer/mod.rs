@@ -19,11 +19,12 @@ use crate::mesh::{MeshBuffers, MeshPatch, Morph, UploadStats};
 use crate::pipelines::{Modules, Pipelines, Variant, bind_group_layout};
 use crate::ramps::Ramp;
 use crate::tiles::{
-    GRADIENT_FORMAT, Imagery, Pyramid, TILE_CELLS, TileId, TilePool, TileStats, WantedTiles, pack_gradients,
+    GRADIENT_FORMAT, Imagery, Pyramid, TILE_CELLS, TilePool, TileStats, WantedTiles, pack_gradients,
 };
 use crate::timing::GpuTimer;
 use crate::uniforms::Uniforms;
 use crate::view::{FrameView, TerrainShape, near_m};
+use terrasoar_layout::imagery::TileId;
 
 /// Frames whose commands may wait in one submission.
 const UNIFORM_PLACES: u64 = 16;

@@ -6,8 +6,9 @@
 
 use glam::DVec3;
 
-use super::{Pyramid, TileId};
+use super::Pyramid;
 use crate::view::{FrameView, TerrainShape};
+use terrasoar_layout::imagery::TileId;
 
 /// The flattest line of sight for which level ground still gets finer tiles along the line; the shader says the same.
 const FLATTEST: f64 = 0.15;

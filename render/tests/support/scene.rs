@@ -83,8 +83,8 @@ impl<'a> Scene<'a> {
 /// Heights of a tile, samples as they are.
 pub fn heights_of(square: &Square, tile: TileId) -> Vec<f32> {
     let side = i64::from(TILE_CELLS) + 3;
-    let [x0, y0] = tile.first_sample().map(i64::from);
-    let cell = i64::from(tile.cell_samples());
+    let [x0, y0] = [tile.x, tile.y].map(|t| i64::from(t * TILE_CELLS << tile.level));
+    let cell = 1_i64 << tile.level;
     let heights: Vec<f32> = (0..side * side)
         .map(|n| {
             let at = |first: i64, i: i64, corner: u32| first + (i - 1) * cell - i64::from(corner);

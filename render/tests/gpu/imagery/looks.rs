@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    Contours, DeviceWatch, FrameView, Gpu, Haze, ImageryFormat, ImageryShape, Look, Sun, Surface, Wireframe,
+    Contours, DeviceWatch, FrameView, Gpu, Haze, ImageryShape, Look, Sun, Surface, TileFormat, Wireframe,
     wgpu,
 };
 
@@ -91,7 +91,7 @@ fn half_transparent(gpu: &Gpu) -> Outcome {
     let look = Look { tint_range_m: Some([0.0, 9000.0]), rock: 0.0, ..bare() };
     let tint = scene.draw(&view, &Look { imagery: 0.0, ..look });
     let colour = [151, 75, 201, 129];
-    for format in gpu.capabilities.imagery_formats().iter().filter(|f| **f != ImageryFormat::Bc1) {
+    for format in gpu.capabilities.imagery_formats().iter().filter(|f| **f != TileFormat::Bc1) {
         let shape = ImageryShape { format: *format, ..Image::shape_over(&square.terrain, 1.0) };
         let image = Image::new(shape, move |_, _, _| colour);
         drape(&mut scene, &image, 16);
@@ -132,7 +132,7 @@ fn blocks(gpu: &Gpu) -> Outcome {
     let shape = Image::shape_over(&square.terrain, 1.5);
     let look = Look { imagery: 1.0, ..Look::default() };
     let mut pictures = Vec::new();
-    for format in [ImageryFormat::Bc1, ImageryFormat::Rgba8] {
+    for format in [TileFormat::Bc1, TileFormat::Rgba8] {
         let image = Image::new(ImageryShape { format, ..shape }, texel);
         drape(&mut scene, &image, 32);
         show_all(&mut scene, &image, &view);
@@ -147,7 +147,7 @@ fn blocks(gpu: &Gpu) -> Outcome {
         let [i, j] = [x.div_euclid(4), y.div_euclid(4)];
         [(i * 37 % 200) as u8 | 1, (j * 53 % 200) as u8 | 1, ((i + j) * 11 % 200) as u8 | 1, 255]
     };
-    let [seven, raw] = [ImageryFormat::Bc7, ImageryFormat::Rgba8].map(|format| {
+    let [seven, raw] = [TileFormat::Bc7, TileFormat::Rgba8].map(|format| {
         let image = Image::new(ImageryShape { format, ..shape }, plain);
         drape(&mut scene, &image, 32);
         show_all(&mut scene, &image, &view);
@@ -172,7 +172,7 @@ fn without_blocks(gpu: &Gpu) -> Outcome {
     let (device, queue) = pollster::block_on(request).map_err(|e| e.to_string())?;
     let watch = DeviceWatch::install(&device);
     let plain = Gpu { adapter, device, queue, capabilities, watch };
-    ensure(plain.capabilities.imagery_formats() == [ImageryFormat::Rgba8], || "it takes blocks".into())?;
+    ensure(plain.capabilities.imagery_formats() == [TileFormat::Rgba8], || "it takes blocks".into())?;
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
     let view = FrameView::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX);
     let image = chart(Image::shape_over(&square.terrain, 4.0));
@@ -187,8 +187,8 @@ fn without_blocks(gpu: &Gpu) -> Outcome {
         format!("they differ by {}", pictures[0].difference(&pictures[1]))
     })?;
     let mut scene = Scene::new(&plain, &square);
-    for format in [ImageryFormat::Bc1, ImageryFormat::Bc7] {
-        let refused = scene.renderer.set_imagery(Some(ImageryShape { format, ..image.shape }), 1 << 22);
+    for format in [TileFormat::Bc1, TileFormat::Bc7] {
+        let refused = scene.renderer.set_imagery(&image.shape, format, 1 << 22);
         ensure(refused.is_err_and(|e| e.to_string().contains("RGBA8")), || format!("{format:?} is taken"))?;
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! Texels are where they belong, to a fraction of their size, in every level and from every side.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Gpu, ImageryFormat, ImageryShape};
+use terrasoar_render::{FrameView, Gpu, ImageryShape, TileFormat};
 
 use super::{SIZE_PX, bare, chart, down, level_ground, pixel, show_all};
 use crate::support::image::{Image, drape, encoded, linear_of};
@@ -39,7 +39,7 @@ fn checkerboard(gpu: &Gpu) -> Outcome {
     scene.show(&square.down_to(0));
     let texel_m = [0.73, 0.61];
     let image = chart(ImageryShape {
-        format: ImageryFormat::Rgba8,
+        format: TileFormat::Rgba8,
         texels: [1100, 1301],
         levels: 9,
         origin_m: [210.3, -40.7],
@@ -154,7 +154,7 @@ fn far_away(gpu: &Gpu) -> Outcome {
         let square = Square::new(6, corner, [16.0, 16.0], hills);
         let start = DVec3::new(f64::from(corner[0]) * 16.0, f64::from(corner[1]) * 16.0, 0.0);
         let image = chart(ImageryShape {
-            format: ImageryFormat::Rgba8,
+            format: TileFormat::Rgba8,
             texels: [1024, 1024],
             levels: 9,
             origin_m: [start.x + 64.0, start.y + 32.0],
