@@ -7,16 +7,16 @@ use std::ops::Range;
 use criterion::{BatchSize, BenchmarkId, Criterion};
 use glam::DVec3;
 use terrasoar_render::{
-    Frame, FrameView, Gpu, ImageryShape, Look, MeshPatch, MeshVertex, Offscreen, Pyramid, Renderer,
-    RendererOptions, TerrainShape, WantedTiles,
+    Frame, Gpu, ImageryShape, Look, MeshPatch, MeshVertex, Offscreen, Pyramid, Renderer, RendererOptions,
+    TerrainShape, View, WantedTiles,
 };
 
 const TERRAIN: TerrainShape =
     TerrainShape { spacing_m: [10.0, 10.0], samples: [16_385, 16_385], height_range_m: [0.0, 4000.0] };
 
-fn view() -> FrameView {
+fn view() -> View {
     let eye = DVec3::new(80_000.0, 80_000.0, 5000.0);
-    FrameView::look_at(eye, eye + DVec3::new(1.0, 2.0, -0.5), [1920, 1080])
+    View::look_at(eye, eye + DVec3::new(1.0, 2.0, -0.5), [1920, 1080].into())
 }
 
 fn main() {

@@ -14,10 +14,11 @@ use super::repaint::{Picture, PictureFile, Repaint};
 use super::tile_reader::{Reader, Threads, Tile};
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
+use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::imagery::{Imagery, ImageryShape, PaintedTile, TileFormat, TileId};
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::{FrameView, RenderError, Renderer};
+use terrasoar_render::{RenderError, Renderer};
 
 /// Tiles of the current view on a frame's list.
 const WANTED: usize = 64;
@@ -155,8 +156,8 @@ impl Drape {
     pub fn serve(
         &mut self,
         renderer: &mut Renderer,
-        view: &FrameView,
-        ahead: &FrameView,
+        view: &View,
+        ahead: &View,
         most: usize,
     ) -> Result<Served, RenderError> {
         self.frame += 1;
@@ -180,7 +181,7 @@ impl Drape {
         self.errors.pop_front()
     }
 
-    fn serve_all(&mut self, renderer: &mut Renderer, view: &FrameView) -> Result<Served, RenderError> {
+    fn serve_all(&mut self, renderer: &mut Renderer, view: &View) -> Result<Served, RenderError> {
         let mut served = Served::default();
         self.at_hand.clear();
         loop {
@@ -202,8 +203,8 @@ impl Drape {
         &mut self,
         threads: &mut Threads,
         renderer: &mut Renderer,
-        view: &FrameView,
-        ahead: &FrameView,
+        view: &View,
+        ahead: &View,
         most: usize,
     ) -> Result<Served, RenderError> {
         let mut served = Served::default();

@@ -16,7 +16,7 @@ use super::drape::Drape;
 use super::feed::{Feed, Refined};
 use super::pending::Pending;
 use super::repaint::{Picture, Repaint};
-use super::sight::{ahead, frame_view, shape};
+use super::sight::{ahead, shape};
 use super::streamed::streamed_feed;
 use crate::mapped::feed;
 use std::sync::Arc;
@@ -179,10 +179,8 @@ impl<'a> Scene<'a> {
         look: &Look,
         refined_for: Option<&View>,
     ) -> Result<Drawn, SceneError> {
-        let view = frame_view(view);
-        let refined_for = refined_for.map(frame_view);
         let mut drawn = Drawn { upload: self.send(encoder)?, ..Drawn::default() };
-        let frame = Frame { view: &view, refined_for: refined_for.as_ref(), look };
+        let frame = Frame { view, refined_for, look };
         drawn.draw = self.renderer.render(encoder, target, frame)?;
         Ok(drawn)
     }
@@ -209,7 +207,6 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// What the renderer says.
     pub fn serve_tiles(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
-        let view = &frame_view(view);
         let most = match self.options.tiles {
             TileService::All => usize::MAX,
             TileService::AFrame(most) => most,
@@ -247,8 +244,7 @@ impl<'a> Scene<'a> {
             [Some(before), Some(now)] => ahead(&before, &now),
             _ => *view,
         };
-        drawn.image =
-            drape.serve(&mut self.renderer, &frame_view(view), &frame_view(&ahead), IMAGE_TILES_A_FRAME)?;
+        drawn.image = drape.serve(&mut self.renderer, view, &ahead, IMAGE_TILES_A_FRAME)?;
         drawn.image_missing = self.renderer.imagery_stats().missing;
         Ok(())
     }

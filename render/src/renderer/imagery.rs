@@ -3,7 +3,7 @@
 use super::Renderer;
 use crate::error::{RenderError, Result};
 use crate::tiles::{Imagery, ImageryStats};
-use crate::view::FrameView;
+use terrasoar::view::View;
 use terrasoar_layout::imagery::{ImageryShape, TileFormat, TileId};
 
 impl Renderer {
@@ -45,14 +45,14 @@ impl Renderer {
     /// whose texels are about a pixel on ground anywhere in the terrain's range of heights, and all coarser ones above them,
     /// coarse before fine and near before far. To be called once a frame; what it returns is to be answered with
     /// [`Renderer::give_imagery`] or [`Renderer::set_imagery_absent`], now or some frames later; until then it is asked for again.
-    pub fn want_imagery(&mut self, view: &FrameView, most: usize) -> &[TileId] {
+    pub fn want_imagery(&mut self, view: &View, most: usize) -> &[TileId] {
         let missing = self.imagery.as_mut().map_or(&[][..], |i| i.want(view));
         &missing[..missing.len().min(most)]
     }
 
     /// Tiles that a view some time ahead will want beside those of [`Renderer::want_imagery`], which is to be called before. They take no
     /// room that the current view needs, so a small pool may leave none for them.
-    pub fn want_imagery_ahead(&mut self, predicted: &FrameView, most: usize) -> &[TileId] {
+    pub fn want_imagery_ahead(&mut self, predicted: &View, most: usize) -> &[TileId] {
         let missing = self.imagery.as_mut().map_or(&[][..], |i| i.want_ahead(predicted));
         &missing[..missing.len().min(most)]
     }

@@ -14,7 +14,8 @@ use super::{Pyramid, Raster, TileLayout, TilePool, WantedTiles};
 use crate::error::{RenderError, Result};
 use crate::gpu::Capabilities;
 use crate::ramps::{encode, linear_of};
-use crate::view::{FrameView, TerrainShape};
+use crate::view::TerrainShape;
+use terrasoar::view::View;
 use terrasoar_layout::imagery::{ImageryShape, TILE_TEXELS, TileFormat, TileId};
 
 /// Memory that a page table may take beside a small pool: that of an image of a million texels a side needs a third.
@@ -159,7 +160,7 @@ impl Imagery {
         self.format == TileFormat::Bc7
     }
 
-    pub(crate) fn want(&mut self, view: &FrameView) -> &[TileId] {
+    pub(crate) fn want(&mut self, view: &View) -> &[TileId] {
         let absent = &self.absent;
         let wanted =
             self.wanted.find_on(&self.pool.pyramid, &self.raster, view, |tile| !absent.contains(&tile));
@@ -167,7 +168,7 @@ impl Imagery {
         self.pool.residency.missing()
     }
 
-    pub(crate) fn want_ahead(&mut self, view: &FrameView) -> &[TileId] {
+    pub(crate) fn want_ahead(&mut self, view: &View) -> &[TileId] {
         let absent = &self.absent;
         let wanted =
             self.wanted_ahead.find_on(&self.pool.pyramid, &self.raster, view, |tile| !absent.contains(&tile));
@@ -309,7 +310,7 @@ mod tests {
             let course = 0.02 * time_s;
             let eye = DVec3::new(3000.0 + 90.0 * time_s, 8000.0 + 900.0 * course.sin(), 1300.0);
             let ahead = DVec3::new(course.cos(), course.sin(), -0.35);
-            let view = FrameView::look_at(eye, eye + ahead, [1920, 1080]);
+            let view = View::look_at(eye, eye + ahead, [1920, 1080].into());
             let start = Instant::now();
             pool.want(wanted.find_on(&pyramid, &raster, &view, |_| true));
             times_us.push(start.elapsed().as_secs_f64() * 1e6);

@@ -1,7 +1,7 @@
 //! Images by formula, their tiles as they are or in blocks, and what a filter must make of them.
 
 use terrasoar_layout::imagery::{BORDER_TEXELS, INNER_TEXELS, ImageryShape, TILE_TEXELS, TileFormat, TileId};
-use terrasoar_render::{FrameView, Renderer, TerrainShape};
+use terrasoar_render::{Renderer, TerrainShape, View};
 
 use super::scene::Scene;
 
@@ -169,7 +169,7 @@ pub fn drape(scene: &mut Scene<'_>, image: &Image, tiles: u64) {
 pub fn give(
     renderer: &mut Renderer,
     image: &Image,
-    view: &FrameView,
+    view: &View,
     most: usize,
     except: impl Fn(TileId) -> bool,
 ) -> usize {

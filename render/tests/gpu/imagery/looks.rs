@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    Contours, DeviceWatch, FrameView, Gpu, Haze, ImageryShape, Look, Sun, Surface, TileFormat, Wireframe,
-    wgpu,
+    Contours, DeviceWatch, Gpu, Haze, ImageryShape, Look, Sun, Surface, TileFormat, View, Wireframe, wgpu,
 };
 
 use super::{SIZE_PX, bare, chart, down, level_ground, pixel, show_all};
@@ -38,7 +37,7 @@ fn transparent(gpu: &Gpu) -> Outcome {
     let image =
         Image::new(shape, |level, x, _| if (x << level) < 1080 { [60, 60, 200, 255] } else { [0; 4] });
     drape(&mut scene, &image, 64);
-    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 2400.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    let view = View::look_at(DVec3::new(640.0, 640.0, 2400.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX.into());
     show_all(&mut scene, &image, &view);
     scene.give_tiles(&view);
     let look = Look { haze: Haze::Off, morph: false, ..Look::default() };
@@ -46,15 +45,14 @@ fn transparent(gpu: &Gpu) -> Outcome {
     let photo = scene.draw(&view, &Look { imagery: 1.0, ..look });
     let half = scene.draw(&view, &Look { imagery: 0.5, ..look });
     let depth = scene.depth_m();
-    let [tan_x, tan_y] = view.half_tangents();
+    let ([right, up, forward], [tan_x, tan_y]) = (view.axes(), view.half_tangents());
     let [mut inside, mut outside] = [0, 0];
     for (i, depth_m) in (0..).zip(&depth) {
         let (x, y) = (i % SIZE_PX[0], i / SIZE_PX[0]);
         let across = |p: u32, n: u32, tan: f64| tan * (2.0 * (f64::from(p) + 0.5) / f64::from(n) - 1.0);
         let at = view.eye_m
             + f64::from(*depth_m)
-                * (view.forward + view.right * across(x, SIZE_PX[0], tan_x)
-                    - view.up * across(y, SIZE_PX[1], tan_y));
+                * (forward + right * across(x, SIZE_PX[0], tan_x) - up * across(y, SIZE_PX[1], tan_y));
         let [a, b, c] = [&tint, &photo, &half].map(|p| pixel(p, x, y));
         let margin_m = 30.0;
         let [east, north] = [at.x - 100.0, at.y - 100.0];
@@ -116,7 +114,8 @@ fn half_transparent(gpu: &Gpu) -> Outcome {
 fn blocks(gpu: &Gpu) -> Outcome {
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
     let mut scene = Scene::new(gpu, &square);
-    let view = FrameView::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX);
+    let view =
+        View::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX.into());
     scene.show(&square.refine(&view));
     scene.give_tiles(&view);
     let texel = |_: u32, x: i64, y: i64| {
@@ -174,7 +173,8 @@ fn without_blocks(gpu: &Gpu) -> Outcome {
     let plain = Gpu { adapter, device, queue, capabilities, watch };
     ensure(plain.capabilities.imagery_formats() == [TileFormat::Rgba8], || "it takes blocks".into())?;
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
-    let view = FrameView::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX);
+    let view =
+        View::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX.into());
     let image = chart(Image::shape_over(&square.terrain, 4.0));
     let pictures = [gpu, &plain].map(|gpu| {
         let mut scene = Scene::new(gpu, &square);
@@ -220,7 +220,7 @@ fn light(gpu: &Gpu) -> Outcome {
     scene.show(&square.down_to(0));
     let image = grey(Image::shape_over(&square.terrain, 2.0));
     drape(&mut scene, &image, 16);
-    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    let view = View::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX.into());
     show_all(&mut scene, &image, &view);
     scene.give_tiles(&view);
     for azimuth_deg in [0.0_f32, 120.0, 250.0] {
@@ -250,7 +250,7 @@ fn lines(gpu: &Gpu) -> Outcome {
     scene.show(&square.down_to(0));
     let image = Image::new(Image::shape_over(&square.terrain, 1.0), |_, _, _| [150, 140, 130, 255]);
     drape(&mut scene, &image, 16);
-    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    let view = View::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX.into());
     show_all(&mut scene, &image, &view);
     let look = bare();
     let plain = scene.draw(&view, &look);

@@ -1,7 +1,7 @@
 //! What is asked for, what is kept, and what stands in for what has not come.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Gpu, ImageryShape, Pyramid, RenderError, TileId};
+use terrasoar_render::{Gpu, ImageryShape, Pyramid, RenderError, TileId, View};
 
 use super::{SIZE_PX, bare, down, level_ground, show_all};
 use crate::support::image::{Image, Texel, drape, give};
@@ -105,7 +105,7 @@ fn needed(gpu: &Gpu) -> Outcome {
     let image = painted(Image::shape_over(&square.terrain, 0.5));
     let pyramid = Pyramid::of_image(&image.shape);
     let mut uneven =
-        FrameView::look_at(DVec3::new(300.0, 200.0, 1100.0), DVec3::new(1300.0, 1700.0, 500.0), SIZE_PX);
+        View::look_at(DVec3::new(300.0, 200.0, 1100.0), DVec3::new(1300.0, 1700.0, 500.0), SIZE_PX.into());
     for exaggeration in [1.0, 1.7] {
         uneven.vertical_exaggeration = exaggeration;
         uneven.eye_m.z *= exaggeration;
