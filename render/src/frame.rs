@@ -2,7 +2,7 @@
 
 use crate::gpu::Capabilities;
 use crate::look::Look;
-use crate::view::FrameView;
+use terrasoar::view::View;
 
 /// What a renderer is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,10 +43,10 @@ pub struct Target<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct Frame<'a> {
     /// The camera.
-    pub view: &'a FrameView,
+    pub view: &'a View,
     /// The camera that the mesh was refined for, where it is another (frozen refinement): vertices move by its eye, field of
     /// view and tolerance. Its exaggeration is taken to be that of `view`.
-    pub refined_for: Option<&'a FrameView>,
+    pub refined_for: Option<&'a View>,
     /// How it looks.
     pub look: &'a Look,
 }

@@ -95,7 +95,7 @@ fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -
     let options =
         SceneOptions { tiles: TileService::AFrame(TILES_A_FRAME), timestamps: true, ..Default::default() };
     let mut scene = Scene::new(terrain, gpu, options)?;
-    let offscreen = Offscreen::new(&gpu.device, [size.width_px, size.height_px])?;
+    let offscreen = Offscreen::new(&gpu.device, size.size_px())?;
     let look = Look::default();
     let names = [
         "patch of the engine, KB",
@@ -203,7 +203,7 @@ fn pops(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) ->
         // The haze hides little: what is measured is the ground.
         let look = Look { morph, tile_normals: false, ..Look::named("hillshade").unwrap_or_default() };
         let mut scene = Scene::new(terrain, gpu, SceneOptions::default())?;
-        let offscreen = Offscreen::new(&gpu.device, [small.width_px, small.height_px])?;
+        let offscreen = Offscreen::new(&gpu.device, small.size_px())?;
         let picture =
             |scene: &mut Scene<'_>, view: &View, refined_for: Option<&View>| -> Result<Vec<f32>, Failure> {
                 let mut encoder = gpu.device.create_command_encoder(&Default::default());

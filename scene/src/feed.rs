@@ -2,7 +2,7 @@
 //!
 //! Invariant: the changes told since the last [`Feed::whole`], applied in order to it, give the mesh. Cost: an engine's update and a copy of its patch.
 
-use terrasoar::refine::kinetic::{Patch, PatchVertex};
+use terrasoar::refine::kinetic::Patch;
 use terrasoar::refine::{Culling, Probe, Work};
 use terrasoar::stream::GroundPatch;
 use terrasoar::view::View;
@@ -10,9 +10,10 @@ use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::entries::Entry;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};
+use terrasoar_layout::imagery::TileId;
 use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::store::RecordStore;
-use terrasoar_render::{HEIGHTS_PER_TILE, MeshVertex, TILE_BORDER, TILE_CELLS, TileId};
+use terrasoar_render::{HEIGHTS_PER_TILE, tile_lines};
 
 /// What an update of the mesh did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -93,12 +94,6 @@ pub trait Feed {
     }
 }
 
-/// A vertex of a patch as the renderer takes it.
-pub fn mesh_vertex(vertex: &PatchVertex) -> MeshVertex {
-    let PatchVertex { x, y, height_m, error_m, radius_m, ends, flags } = *vertex;
-    MeshVertex { x, y, height_m, error_m, radius_m, ends, flags }
-}
-
 /// The pages of the records that an update reads, each read a page.
 #[derive(Debug, Default)]
 pub struct Reads {
@@ -131,13 +126,8 @@ impl Reads {
 
 /// Grid points of a tile and its border, south-west first; those beyond the data are the nearest sample.
 pub fn tile_points(samples: [u32; 2], tile: TileId) -> impl Iterator<Item = GridPoint> {
-    let points = move |axis: usize| {
-        let (first, last) = (i64::from(tile.first_sample()[axis]), i64::from(samples[axis]) - 1);
-        let at =
-            move |i: u32| first + (i64::from(i) - i64::from(TILE_BORDER)) * i64::from(tile.cell_samples());
-        (0..TILE_CELLS + 1 + 2 * TILE_BORDER).map(move |i| at(i).clamp(0, last) as u32)
-    };
-    points(1).flat_map(move |y| points(0).map(move |x| GridPoint::new(x, y)))
+    let [columns, rows] = [0, 1].map(|axis| tile_lines(samples, tile, axis));
+    rows.flat_map(move |y| columns.clone().map(move |x| GridPoint::new(x, y)))
 }
 
 /// Heights of the points of a tile.

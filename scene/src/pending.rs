@@ -2,10 +2,8 @@
 //!
 //! Invariant: once a mesh was sent, it and what is pending make the engine's mesh.
 
-use super::feed::mesh_vertex;
 use std::ops::Range;
-use terrasoar::refine::kinetic::Patch;
-use terrasoar_render::MeshVertex;
+use terrasoar::refine::kinetic::{MeshVertex, Patch};
 
 /// What the engine changed and the device has not heard of.
 #[derive(Debug, Default)]
@@ -24,7 +22,7 @@ pub(super) struct Pending {
 impl Pending {
     /// Adds a patch to those before it.
     pub(super) fn take(&mut self, patch: &Patch) {
-        self.vertices.extend(patch.vertices.iter().map(|(slot, vertex)| (*slot, mesh_vertex(vertex))));
+        self.vertices.extend_from_slice(&patch.vertices);
         self.triangles.extend_from_slice(&patch.triangles);
         self.end = patch.triangles.iter().fold(self.end, |end, (slot, _)| end.max(slot + 1));
         let end = self.end;

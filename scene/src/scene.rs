@@ -16,7 +16,7 @@ use super::drape::Drape;
 use super::feed::{Feed, Refined};
 use super::pending::Pending;
 use super::repaint::{Picture, Repaint};
-use super::sight::{ahead, frame_view, shape};
+use super::sight::{ahead, shape};
 use super::streamed::streamed_feed;
 use crate::mapped::feed;
 use std::sync::Arc;
@@ -26,11 +26,11 @@ use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::Edit;
 use terrasoar_layout::file::entries::Entry;
-use terrasoar_layout::imagery::{Imagery, Paint};
+use terrasoar_layout::imagery::{Imagery, Paint, TileFormat, TileId};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{
-    Frame, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target, TerrainShape,
-    TileId, TileStats, UploadStats, wgpu,
+    Frame, Gpu, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target, TerrainShape, TileStats,
+    UploadStats, wgpu,
 };
 
 /// Tiles that are asked for, for each that is given in a frame.
@@ -55,7 +55,7 @@ pub struct Scene<'a> {
     /// Whether the last picture had the image in it.
     shows_image: bool,
     /// What the device takes of images.
-    formats: &'static [ImageryFormat],
+    formats: &'static [TileFormat],
     /// The views of the last two updates, which say where the eye is going.
     ways: [Option<View>; 2],
 }
@@ -179,10 +179,8 @@ impl<'a> Scene<'a> {
         look: &Look,
         refined_for: Option<&View>,
     ) -> Result<Drawn, SceneError> {
-        let view = frame_view(view);
-        let refined_for = refined_for.map(frame_view);
         let mut drawn = Drawn { upload: self.send(encoder)?, ..Drawn::default() };
-        let frame = Frame { view: &view, refined_for: refined_for.as_ref(), look };
+        let frame = Frame { view, refined_for, look };
         drawn.draw = self.renderer.render(encoder, target, frame)?;
         Ok(drawn)
     }
@@ -209,7 +207,6 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// What the renderer says.
     pub fn serve_tiles(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
-        let view = &frame_view(view);
         let most = match self.options.tiles {
             TileService::All => usize::MAX,
             TileService::AFrame(most) => most,
@@ -247,8 +244,7 @@ impl<'a> Scene<'a> {
             [Some(before), Some(now)] => ahead(&before, &now),
             _ => *view,
         };
-        drawn.image =
-            drape.serve(&mut self.renderer, &frame_view(view), &frame_view(&ahead), IMAGE_TILES_A_FRAME)?;
+        drawn.image = drape.serve(&mut self.renderer, view, &ahead, IMAGE_TILES_A_FRAME)?;
         drawn.image_missing = self.renderer.imagery_stats().missing;
         Ok(())
     }
@@ -297,8 +293,13 @@ impl<'a> Scene<'a> {
     }
 
     fn show_drape(&mut self) -> Result<(), RenderError> {
-        let shape = self.drape.as_ref().map(Drape::shape);
-        self.renderer.set_imagery(shape, self.options.imagery_bytes)
+        match &self.drape {
+            Some(drape) => drape.show(&mut self.renderer, self.options.imagery_bytes),
+            None => {
+                self.renderer.clear_imagery();
+                Ok(())
+            }
+        }
     }
 
     /// What craters among these edits burn into the image: nothing where there is none, or none that this build can paint, and by none that is too wide to follow the hand.
@@ -403,6 +404,8 @@ fn new_renderer(
     let mut renderer_options = RendererOptions::from(&gpu.capabilities);
     renderer_options.timestamps &= options.timestamps;
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shape, renderer_options)?;
-    renderer.set_imagery(drape.map(Drape::shape), options.imagery_bytes)?;
+    if let Some(drape) = drape {
+        drape.show(&mut renderer, options.imagery_bytes)?;
+    }
     Ok(renderer)
 }

@@ -1,9 +1,9 @@
-//! Views and terrains as the renderer takes them.
+//! Where a steady eye will be, and a terrain as the renderer takes it.
 
 use std::f64::consts::FRAC_PI_2;
 use terrasoar::view::View;
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::{FrameView, TerrainShape};
+use terrasoar_render::TerrainShape;
 
 /// Frames ahead of the eye that tiles of the image are asked for.
 const FRAMES_AHEAD: f64 = 24.0;
@@ -26,20 +26,5 @@ pub fn shape(terrain: &Terrain) -> TerrainShape {
         spacing_m: grid.spacing_m(),
         samples: grid.samples(),
         height_range_m: terrain.header().height_range_m,
-    }
-}
-
-/// A view as the renderer takes it.
-pub fn frame_view(view: &View) -> FrameView {
-    let [right, up, forward] = view.axes();
-    FrameView {
-        eye_m: view.eye_m,
-        right,
-        up,
-        forward,
-        vertical_fov_rad: view.vertical_fov_rad,
-        viewport_px: [view.viewport.width_px, view.viewport.height_px],
-        tolerance_px: view.tolerance_px,
-        vertical_exaggeration: view.vertical_exaggeration,
     }
 }

@@ -78,5 +78,5 @@ impl<'a> Studio<'a> {
 }
 
 fn offscreen(gpu: &Gpu, viewport: Viewport) -> Result<Offscreen, RenderError> {
-    Offscreen::new(&gpu.device, [viewport.width_px, viewport.height_px])
+    Offscreen::new(&gpu.device, viewport.size_px())
 }

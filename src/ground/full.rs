@@ -5,7 +5,7 @@
 use super::engine::{MeshEngine, Refined};
 use super::samples::{HeightTile, tile_of};
 use crate::mesh::{Triangle, is_drawn, with_apex_first};
-use crate::refine::kinetic::{Budget, NO_LEVEL, Patch, PatchVertex};
+use crate::refine::kinetic::{Budget, MeshVertex, Patch};
 use crate::refine::soar::Soar;
 use crate::refine::{Culling, Engine, Unobserved, Work};
 use crate::stream::{HeightAt, height_at};
@@ -27,7 +27,7 @@ impl<'a, C: RecordCodec> FullMesh<'a, C> {
         Self { engine: Soar::new(records.clone(), culling), records, patch: Patch::default() }
     }
 
-    fn vertex(&self, point: GridPoint, slot: u32, slot_of: impl Fn(GridPoint) -> Option<u32>) -> PatchVertex {
+    fn vertex(&self, point: GridPoint, slot: u32, slot_of: impl Fn(GridPoint) -> Option<u32>) -> MeshVertex {
         let grid = self.records.grid();
         let (vertex, folded, middle) =
             (self.records.vertex_at(point), grid.fold(point), grid.side_steps() / 2);
@@ -35,14 +35,14 @@ impl<'a, C: RecordCodec> FullMesh<'a, C> {
         let own = grid.is_corner(point) || point == GridPoint::new(middle, middle);
         let ends =
             if own { [slot; 2] } else { grid.edge_ends(point).map(|end| slot_of(end).unwrap_or(slot)) };
-        PatchVertex {
+        MeshVertex {
             x: folded.x(),
             y: folded.y(),
             height_m: vertex.height_m as f32,
             error_m: vertex.error_m as f32,
             radius_m: vertex.radius_m as f32,
             ends,
-            flags: if grid.is_corner(point) { NO_LEVEL } else { grid.level(point) },
+            flags: if grid.is_corner(point) { MeshVertex::NO_LEVEL } else { grid.level(point) },
         }
     }
 }

@@ -19,7 +19,7 @@ use std::process::Command;
 /// Packages, and those of the workspace that each may use.
 const PACKAGES: [(&str, &[&str]); 7] = [
     ("terrasoar-layout", &[]),
-    ("terrasoar-render", &[]),
+    ("terrasoar-render", &["terrasoar", "terrasoar-layout"]),
     ("terrasoar-import", &["terrasoar-layout"]),
     ("terrasoar", &["terrasoar-layout"]),
     ("terrasoar-scene", &["terrasoar", "terrasoar-layout", "terrasoar-render"]),

@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     drop(progress);
     movie.finish()?;
-    let [width, height] = [picture.size.width_px, picture.size.height_px];
+    let [width, height] = picture.size.size_px();
     let adapter = studio.capabilities();
     let triangles_mean = triangles as f64 / f64::from(pictures.max(1));
     if args.json {

@@ -150,7 +150,7 @@ pub(super) fn angles(text: &str) -> Result<[f64; 2], String> {
 
 /// Three bytes a pixel as the bytes of a PNG file.
 pub(super) fn png(rgb: &[u8], size: Viewport) -> Result<Vec<u8>> {
-    encode(rgb, [size.width_px, size.height_px]).context("the picture is incomplete")
+    encode(rgb, size.size_px()).context("the picture is incomplete")
 }
 
 /// Draws a frame of a flight, flown to it; gives the bytes of a PNG file and the adapter's name.

@@ -131,7 +131,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         format!("{}: cannot write the picture; check the free space", args.output.display())
     })?;
     file.publish()?;
-    let [width, height] = [picture.size.width_px, picture.size.height_px];
+    let [width, height] = picture.size.size_px();
     let adapter = studio.capabilities();
     if args.json {
         return print_json(&Answer {

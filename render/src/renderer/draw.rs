@@ -6,8 +6,8 @@ use crate::frame::{Frame, Target};
 use crate::look::Look;
 use crate::pipelines::{Pipelines, Variant};
 use crate::uniforms::{Inputs, Uniforms};
-use crate::view::FrameView;
 use std::ops::Range;
+use terrasoar::view::View;
 use wgpu::util::DeviceExt;
 
 impl Renderer {
@@ -21,7 +21,7 @@ impl Renderer {
     }
 
     /// Sends a frame's numbers to the device; the byte at which they lie.
-    pub(super) fn send_uniforms(&mut self, frame: &Frame<'_>, refined_for: &FrameView) -> u64 {
+    pub(super) fn send_uniforms(&mut self, frame: &Frame<'_>, refined_for: &View) -> u64 {
         let uniforms = Uniforms::new(&Inputs {
             terrain: &self.terrain,
             pyramid: &self.tiles.pyramid,

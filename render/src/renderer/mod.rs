@@ -19,11 +19,13 @@ use crate::mesh::{MeshBuffers, MeshPatch, Morph, UploadStats};
 use crate::pipelines::{Modules, Pipelines, Variant, bind_group_layout};
 use crate::ramps::Ramp;
 use crate::tiles::{
-    GRADIENT_FORMAT, Imagery, Pyramid, TILE_CELLS, TileId, TilePool, TileStats, WantedTiles, pack_gradients,
+    GRADIENT_FORMAT, Imagery, Pyramid, TILE_CELLS, TilePool, TileStats, WantedTiles, pack_gradients,
 };
 use crate::timing::GpuTimer;
 use crate::uniforms::Uniforms;
-use crate::view::{FrameView, TerrainShape, near_m};
+use crate::view::{TerrainShape, check, near_m};
+use terrasoar::view::View;
+use terrasoar_layout::imagery::TileId;
 
 /// Frames whose commands may wait in one submission.
 const UNIFORM_PLACES: u64 = 16;
@@ -165,8 +167,8 @@ impl Renderer {
         frame: Frame<'_>,
     ) -> Result<DrawStats> {
         let refined_for = frame.refined_for.unwrap_or(frame.view);
-        frame.view.check()?;
-        refined_for.check()?;
+        check(frame.view)?;
+        check(refined_for)?;
         if target.size_px.contains(&0) {
             return Err(RenderError::Usage("a target needs at least one pixel"));
         }
@@ -208,7 +210,7 @@ impl Renderer {
 
     /// Finds out which normal tiles a view wants and returns those that are not on the device, most urgent first, at most
     /// `most`. To be called once a frame; tiles not wanted for longest make room for new ones.
-    pub fn want_tiles(&mut self, view: &FrameView, most: usize) -> &[TileId] {
+    pub fn want_tiles(&mut self, view: &View, most: usize) -> &[TileId] {
         let wanted = self.wanted.find(&self.tiles.pyramid, &self.terrain, view);
         self.tiles.residency.want(wanted);
         let missing = self.tiles.residency.missing();

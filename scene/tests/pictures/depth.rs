@@ -81,7 +81,7 @@ impl Dem {
 /// A ray whose length along the line of sight is 1, through a place in the picture in pixels.
 fn ray(view: &View, [x, y]: [f64; 2]) -> DVec3 {
     let [right, up, forward] = view.axes();
-    let tan_y = (0.5 * view.vertical_fov_rad).tan();
+    let [_, tan_y] = view.half_tangents();
     let per_px = 2.0 * tan_y / f64::from(SIZE_PX[1]);
     let [half_x, half_y] = SIZE_PX.map(|s| 0.5 * f64::from(s));
     forward + right * ((x - half_x) * per_px) + up * ((half_y - y) * per_px)

@@ -84,7 +84,7 @@ fn overview_beside_panel(stage: &Stage, screen: &Screen, window: &Window, settin
     // The eye steps aside by half the panel, as wide as that is in the middle of the terrain.
     let [east_m, north_m] = stage.ground().extent_m();
     let away_m = view.eye_m.distance(glam::DVec3::new(0.5 * east_m, 0.5 * north_m, 0.0));
-    let m_a_px = 2.0 * away_m * (0.5 * view.vertical_fov_rad).tan() / f64::from(height_px);
+    let m_a_px = 2.0 * away_m * view.half_tangents()[1] / f64::from(height_px);
     view.eye_m -= view.axes()[0] * (0.5 * panel_px * m_a_px);
     Camera::from(&view)
 }
