@@ -90,12 +90,12 @@ mod view;
 mod words;
 
 pub use error::{RenderError, Result};
-pub use frame::{DrawStats, Frame, RendererOptions, Target};
+pub use frame::{DepthRange, DrawStats, Frame, PassFormat, RendererOptions, Target};
 pub use gpu::{Capabilities, DeviceWatch, Gpu};
 pub use look::{Contours, Haze, LOOKS, Look, Sun, Surface, Wireframe};
 pub use mesh::{MeshPatch, UploadStats};
 pub use offscreen::{Offscreen, read_depth_m};
-pub use renderer::Renderer;
+pub use renderer::{Prepared, Renderer};
 /// A vertex as the engine hands it out and the device holds it.
 pub use terrasoar::refine::kinetic::MeshVertex;
 /// The camera of a frame, and the tolerance that its mesh was made for.

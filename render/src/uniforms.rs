@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use crate::frame::DepthRange;
 use crate::look::{Haze, Look};
 use crate::ramps::linear_of;
 use crate::tiles::{Imagery, Pyramid, TILE_CELLS};
@@ -51,6 +52,7 @@ pub(crate) struct Inputs<'a> {
     pub look: &'a Look,
     pub imagery: Option<&'a Imagery>,
     pub wall_bottom_m: f32,
+    pub depth_range: DepthRange,
 }
 
 impl Uniforms {
@@ -95,7 +97,7 @@ impl Uniforms {
         let wire = look.wireframe.unwrap_or_default();
         let image = inputs.imagery.map_or_else(Image::default, |imagery| Image::new(imagery, view));
         Self {
-            clip_from_eye: clip_from_eye(axes, tangents, near_m).to_cols_array_2d(),
+            clip_from_eye: clip_from_eye(axes, tangents, near_m, inputs.depth_range).to_cols_array_2d(),
             ray_right: with((right * tan_x).as_vec3(), 0.0),
             ray_up: with((up * tan_y).as_vec3(), 0.0),
             ray_forward: with(forward.as_vec3(), 0.0),

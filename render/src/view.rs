@@ -8,6 +8,7 @@
 use glam::{DVec3, Mat4, Vec3, Vec4};
 
 use crate::error::{RenderError, Result};
+use crate::frame::DepthRange;
 use terrasoar::view::View;
 
 /// What does not change while a terrain is shown.
@@ -100,17 +101,28 @@ pub(crate) fn near_m(terrain: &TerrainShape) -> f64 {
     (0.02 * terrain.spacing_m[0].min(terrain.spacing_m[1])).clamp(1e-4, 0.5)
 }
 
-/// From metres east, north, up of the eye to clip space, by a view's axes and half tangents: reversed depth, 1 at the near plane, 0 infinitely far.
-pub(crate) fn clip_from_eye([right, up, forward]: [DVec3; 3], [tan_x, tan_y]: [f64; 2], near_m: f64) -> Mat4 {
+/// From metres east, north, up of the eye to clip space, by a view's axes and half tangents. Depth is endless and runs as `range` says.
+pub(crate) fn clip_from_eye(
+    [right, up, forward]: [DVec3; 3],
+    [tan_x, tan_y]: [f64; 2],
+    near_m: f64,
+    range: DepthRange,
+) -> Mat4 {
     let row = |v: DVec3| -> Vec3 { v.as_vec3() };
     let x = row(right / tan_x);
     let y = row(up / tan_y);
     let w = row(forward);
+    let near = near_m as f32;
+    // Depth is near / distance, or what that lacks of 1.
+    let (z, z_near) = match range {
+        DepthRange::Reversed => (Vec3::ZERO, near),
+        DepthRange::Forward => (w, -near),
+    };
     Mat4::from_cols(
-        Vec4::new(x.x, y.x, 0.0, w.x),
-        Vec4::new(x.y, y.y, 0.0, w.y),
-        Vec4::new(x.z, y.z, 0.0, w.z),
-        Vec4::new(0.0, 0.0, near_m as f32, 0.0),
+        Vec4::new(x.x, y.x, z.x, w.x),
+        Vec4::new(x.y, y.y, z.y, w.y),
+        Vec4::new(x.z, y.z, z.z, w.z),
+        Vec4::new(0.0, 0.0, z_near, 0.0),
     )
 }
 
@@ -122,13 +134,18 @@ mod tests {
     fn depth_is_near_over_distance() {
         let view = View::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(5.0, 2.0, 3.0), [400, 300].into());
         let ([right, _, forward], tangents) = (view.axes(), view.half_tangents());
-        let clip_from_eye = clip_from_eye(view.axes(), tangents, 0.25);
+        let clip_from_eye = clip_from_eye(view.axes(), tangents, 0.25, DepthRange::Reversed);
         let clip = clip_from_eye * Vec4::new(10.0, 0.0, 0.0, 1.0);
         assert!((clip.z / clip.w - 0.025).abs() < 1e-7);
         assert!(clip.x.abs() < 1e-6 && clip.y.abs() < 1e-6);
         let right_edge = forward * 10.0 + right * 10.0 * tangents[0];
         let clip = clip_from_eye * right_edge.as_vec3().extend(1.0);
         assert!((clip.x / clip.w - 1.0).abs() < 1e-6);
+        let forward = super::clip_from_eye(view.axes(), tangents, 0.25, DepthRange::Forward);
+        for (away_m, depth) in [(0.25, 0.0), (10.0, 0.975), (1e9, 1.0)] {
+            let clip = forward * Vec4::new(away_m, 0.0, 0.0, 1.0);
+            assert!((clip.z / clip.w - depth).abs() < 1e-6, "{away_m} m");
+        }
     }
 
     #[test]

@@ -276,6 +276,11 @@ impl<'t> Ground<'t> {
 }
 
 impl MeshStep {
+    /// Whether both are of one mesh, so that slots mean the same in both.
+    pub fn is_of_same_mesh(self, other: Self) -> bool {
+        self.mesh == other.mesh
+    }
+
     /// The step before the first update of a mesh of its own number.
     fn first() -> Self {
         static MESHES: AtomicU64 = AtomicU64::new(0);
