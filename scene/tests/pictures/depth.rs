@@ -7,7 +7,6 @@ use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::with_records;
 use terrasoar_render::{Gpu, Look};
-use terrasoar_scene::scene::SceneOptions;
 
 pub const TESTS: &[Test] = &[("depth::agrees_with_the_dem", agrees_with_the_dem)];
 
@@ -91,7 +90,7 @@ fn ray(view: &View, [x, y]: [f64; 2]) -> DVec3 {
 /// mountains, it lies between those of the rays half a pixel around, of which there may be few.
 fn agrees_with_the_dem(gpu: &Gpu) -> Outcome {
     let dem = Dem::of_puget_sound();
-    let mut rig = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    let mut rig = Rig::plain(gpu, SIZE_PX);
     let mut random = 1_u64;
     let mut next = |below: u32| {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
