@@ -55,6 +55,53 @@ pub struct View {
 }
 
 impl View {
+    /// Looks from a place in metres east, north and up, with a heading in degrees clockwise from north and a climb in degrees, positive upwards. Level, at a tolerance of a
+    /// pixel and true scale, with a field of view of 45 degrees over 800 x 600 pixels; the methods below change that.
+    ///
+    /// ```
+    /// use terrasoar::View;
+    ///
+    /// let view = View::new([5000.0, 2000.0, 1800.0], 30.0, -15.0).tolerance_px(2.0).viewport([1920, 1080]);
+    /// assert_eq!(view.viewport.height_px, 1080);
+    /// ```
+    pub fn new(eye_m: impl Into<DVec3>, heading_deg: f64, climb_deg: f64) -> Self {
+        Self {
+            eye_m: eye_m.into(),
+            yaw_rad: heading_deg.to_radians(),
+            pitch_rad: climb_deg.to_radians(),
+            roll_rad: 0.0,
+            vertical_fov_rad: 45f64.to_radians(),
+            viewport: Viewport::default(),
+            tolerance_px: 1.0,
+            vertical_exaggeration: 1.0,
+        }
+    }
+
+    /// This view with another largest error on the screen, in pixels; above 0.
+    pub fn tolerance_px(self, tolerance_px: f64) -> Self {
+        Self { tolerance_px, ..self }
+    }
+
+    /// This view in a picture of another size, in pixels across and down.
+    pub fn viewport(self, viewport: impl Into<Viewport>) -> Self {
+        Self { viewport: viewport.into(), ..self }
+    }
+
+    /// This view with another vertical field of view, in degrees above 0 and below 180.
+    pub fn fov_deg(self, vertical_fov_deg: f64) -> Self {
+        Self { vertical_fov_rad: vertical_fov_deg.to_radians(), ..self }
+    }
+
+    /// This view with a roll in degrees, positive to the right.
+    pub fn roll_deg(self, roll_deg: f64) -> Self {
+        Self { roll_rad: roll_deg.to_radians(), ..self }
+    }
+
+    /// This view with heights multiplied by another factor above 0.
+    pub fn exaggeration(self, vertical_exaggeration: f64) -> Self {
+        Self { vertical_exaggeration, ..self }
+    }
+
     /// Looks from one point towards another, level, at a tolerance of a pixel and true scale, with a field of view of 0.8 radians. What looks
     /// straight down or up has north, or south, at the top; from a point towards itself the line of sight is north.
     pub fn look_at(eye_m: DVec3, at_m: DVec3, viewport: Viewport) -> Self {
