@@ -16,6 +16,21 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
+    /// These options with another number of normal tiles a frame.
+    pub fn tiles(self, tiles: TileService) -> Self {
+        Self { tiles, ..self }
+    }
+
+    /// These options with so many bytes of device memory for tiles of the image.
+    pub fn imagery_bytes(self, imagery_bytes: u64) -> Self {
+        Self { imagery_bytes, ..self }
+    }
+
+    /// These options with frames timed on the device, or not.
+    pub fn timestamps(self, timestamps: bool) -> Self {
+        Self { timestamps, ..self }
+    }
+
     /// Whether frames must not wait.
     pub(super) fn is_for_a_window(self) -> bool {
         self.tiles != TileService::All

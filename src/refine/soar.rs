@@ -43,6 +43,16 @@ pub struct Soar<S: RecordStore> {
 
 impl<S: CompleteStore> Soar<S> {
     /// An engine over `records`, all of which are at hand, that culls as `culling` says.
+    ///
+    /// A pool, of which pages may be away, is refused by the compiler: SOAR would take what is away for ground without detail.
+    ///
+    /// ```compile_fail,E0277
+    /// # use terrasoar::refine::{Culling, soar::Soar};
+    /// # use terrasoar_layout::{grid::record::Compact, read::pool::PagePool};
+    /// fn wrong(pool: PagePool<Compact>) -> Soar<PagePool<Compact>> {
+    ///     Soar::new(pool, Culling::Vertices)
+    /// }
+    /// ```
     pub fn new(records: S, culling: Culling) -> Self {
         Self { records, culling, strip: Vec::new() }
     }
