@@ -166,10 +166,10 @@ impl Terrain {
         if checksum(page) == entry.checksum {
             return Ok(());
         }
-        Err(LayoutError::damaged(
+        Err(LayoutError::damaged_terrain(
             self.path(),
             format!("record page {logical_page} (file page {})", entry.page),
-            "the checksum does not match; restore a copy of the file or build it again",
+            "the checksum does not match",
         ))
     }
 
