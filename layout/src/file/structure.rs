@@ -5,7 +5,9 @@
 use super::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use super::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, absent};
 use super::header::{Header, INERT_PAGE};
-use super::source::{PreadSource, Source};
+#[cfg(feature = "files")]
+use super::source::PreadSource;
+use super::source::Source;
 use crate::error::LayoutError;
 use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
 use std::path::Path;
@@ -18,6 +20,7 @@ pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>)
 }
 
 /// As [`read_structure`], of a file that others may append to at this moment.
+#[cfg(feature = "files")]
 pub(crate) fn read_growing(file: &mut PreadSource) -> Result<(Header, Vec<Entry>), LayoutError> {
     // The header first and then the length: what a header counts was in the file before the header was.
     let header = read_header(file)?;
