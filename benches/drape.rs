@@ -11,7 +11,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use terrasoar_import::open_image;
-use terrasoar_layout::imagery::{DrapeOptions, ImageSource, Imagery, TileFormat, TileId, decode_tile, drape};
+use terrasoar_layout::imagery::{
+    BORDER_TEXELS, DrapeOptions, INNER_TEXELS, ImageSource, Imagery, TILE_TEXELS, TileFormat, TileId,
+    decode_tile, drape,
+};
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -89,7 +92,7 @@ fn psnr_db(draped: &Path, picture: &dyn ImageSource) -> Result<f64, Failure> {
     let [wide, high] = shape.texels;
     let mut rows = picture.rows()?;
     let mut row = vec![0; wide as usize * 4];
-    let inner = shape.tile_texels - 2 * shape.border;
+    let inner = INNER_TEXELS;
     let mut tiles: (u32, Vec<Vec<u8>>) = (u32::MAX, Vec::new());
     let mut sum = 0u64;
     for y in (0..high).rev() {
@@ -102,7 +105,7 @@ fn psnr_db(draped: &Path, picture: &dyn ImageSource) -> Result<f64, Failure> {
             });
             tiles = (y / inner, row_of_tiles.collect::<Result<_, Failure>>()?);
         }
-        let at = ((y % inner + shape.border) * shape.tile_texels + shape.border) as usize * 4;
+        let at = ((y % inner + BORDER_TEXELS) * TILE_TEXELS + BORDER_TEXELS) as usize * 4;
         for (wanted, tile) in row.chunks(inner as usize * 4).zip(&tiles.1) {
             let texels = wanted.chunks_exact(4).zip(tile[at..].chunks_exact(4));
             let error =

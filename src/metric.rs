@@ -54,7 +54,7 @@ impl Metric {
     pub fn new(view: &View) -> Self {
         Self {
             eye_m: view.eye_m.to_array(),
-            nu: view.pixels_per_radian() / view.tolerance_px,
+            nu: view.nu(),
             exaggeration: view.vertical_exaggeration,
             radius_factor: view.vertical_exaggeration.max(1.0),
             normals: view.side_normals().map(|n| n.to_array()),

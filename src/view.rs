@@ -14,6 +14,19 @@ pub struct Viewport {
     pub height_px: u32,
 }
 
+impl Viewport {
+    /// Pixels across and down.
+    pub fn size_px(self) -> [u32; 2] {
+        [self.width_px, self.height_px]
+    }
+}
+
+impl From<[u32; 2]> for Viewport {
+    fn from([width_px, height_px]: [u32; 2]) -> Self {
+        Self { width_px, height_px }
+    }
+}
+
 impl Default for Viewport {
     fn default() -> Self {
         Self { width_px: 800, height_px: 600 }
@@ -23,7 +36,7 @@ impl Default for Viewport {
 /// One frame's camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Eye position in metres east, north and up.
+    /// Eye position in metres east, north and up, in the drawn (exaggerated) space.
     pub eye_m: DVec3,
     /// Heading in radians, clockwise from north.
     pub yaw_rad: f64,
@@ -42,6 +55,69 @@ pub struct View {
 }
 
 impl View {
+    /// Looks from a place in metres east, north and up, with a heading in degrees clockwise from north and a climb in degrees, positive upwards. Level, at a tolerance of a
+    /// pixel and true scale, with a field of view of 45 degrees over 800 x 600 pixels; the methods below change that.
+    ///
+    /// ```
+    /// use terrasoar::View;
+    ///
+    /// let view = View::new([5000.0, 2000.0, 1800.0], 30.0, -15.0).tolerance_px(2.0).viewport([1920, 1080]);
+    /// assert_eq!(view.viewport.height_px, 1080);
+    /// ```
+    pub fn new(eye_m: impl Into<DVec3>, heading_deg: f64, climb_deg: f64) -> Self {
+        Self {
+            eye_m: eye_m.into(),
+            yaw_rad: heading_deg.to_radians(),
+            pitch_rad: climb_deg.to_radians(),
+            roll_rad: 0.0,
+            vertical_fov_rad: 45f64.to_radians(),
+            viewport: Viewport::default(),
+            tolerance_px: 1.0,
+            vertical_exaggeration: 1.0,
+        }
+    }
+
+    /// This view with another largest error on the screen, in pixels; above 0.
+    pub fn tolerance_px(self, tolerance_px: f64) -> Self {
+        Self { tolerance_px, ..self }
+    }
+
+    /// This view in a picture of another size, in pixels across and down.
+    pub fn viewport(self, viewport: impl Into<Viewport>) -> Self {
+        Self { viewport: viewport.into(), ..self }
+    }
+
+    /// This view with another vertical field of view, in degrees above 0 and below 180.
+    pub fn fov_deg(self, vertical_fov_deg: f64) -> Self {
+        Self { vertical_fov_rad: vertical_fov_deg.to_radians(), ..self }
+    }
+
+    /// This view with a roll in degrees, positive to the right.
+    pub fn roll_deg(self, roll_deg: f64) -> Self {
+        Self { roll_rad: roll_deg.to_radians(), ..self }
+    }
+
+    /// This view with heights multiplied by another factor above 0.
+    pub fn exaggeration(self, vertical_exaggeration: f64) -> Self {
+        Self { vertical_exaggeration, ..self }
+    }
+
+    /// Looks from one point towards another, level, at a tolerance of a pixel and true scale, with a field of view of 0.8 radians. What looks
+    /// straight down or up has north, or south, at the top; from a point towards itself the line of sight is north.
+    pub fn look_at(eye_m: DVec3, at_m: DVec3, viewport: Viewport) -> Self {
+        let to = at_m - eye_m;
+        Self {
+            eye_m,
+            yaw_rad: to.x.atan2(to.y),
+            pitch_rad: to.z.atan2(to.x.hypot(to.y)),
+            roll_rad: 0.0,
+            vertical_fov_rad: 0.8,
+            viewport,
+            tolerance_px: 1.0,
+            vertical_exaggeration: 1.0,
+        }
+    }
+
     /// Unit vectors to the right, up and forward of the eye.
     pub fn axes(&self) -> [DVec3; 3] {
         let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
@@ -60,11 +136,21 @@ impl View {
         f64::from(self.viewport.height_px) / self.vertical_fov_rad
     }
 
+    /// Pixels a radian over the tolerance: a vertex is in the mesh when nearer than `nu * error + radius`.
+    pub fn nu(&self) -> f64 {
+        self.pixels_per_radian() / self.tolerance_px
+    }
+
+    /// Tangents of half the horizontal and half the vertical field of view.
+    pub fn half_tangents(&self) -> [f64; 2] {
+        let vertical = (0.5 * self.vertical_fov_rad).tan();
+        [vertical * f64::from(self.viewport.width_px) / f64::from(self.viewport.height_px), vertical]
+    }
+
     /// Outward unit normals of the left, right, bottom and top planes of the view pyramid; each passes through the eye.
     pub fn side_normals(&self) -> [DVec3; 4] {
         let [right, up, forward] = self.axes();
-        let tan_y = (0.5 * self.vertical_fov_rad).tan();
-        let tan_x = tan_y * f64::from(self.viewport.width_px) / f64::from(self.viewport.height_px);
+        let [tan_x, tan_y] = self.half_tangents();
         [
             (-right - forward * tan_x).normalize(),
             (right - forward * tan_x).normalize(),
@@ -102,6 +188,27 @@ mod tests {
             assert!(view.side_normals().iter().all(|n| n.dot(edge(-0.999)) < 0.0));
             assert!(view.side_normals().iter().any(|n| n.dot(edge(1.001)) > 0.0));
         }
+    }
+
+    #[test]
+    fn what_is_looked_at_is_in_the_middle_and_level() {
+        for (eye, at) in [
+            ([0.0, 0.0, 0.0], [3.0, 4.0, -5.0]),
+            ([1e6, 2e6, 3e3], [1e6 - 700.0, 2e6 - 200.0, 4e3]),
+            ([5.0, 5.0, 5.0], [6.0, 5.0, 5.0]),
+        ] {
+            let [eye, at] = [eye, at].map(DVec3::from);
+            let [right, up, forward] = View::look_at(eye, at, Viewport::default()).axes();
+            assert!((forward - (at - eye).normalize()).length() < 1e-12);
+            assert!(right.z.abs() < 1e-12 && up.z > 0.0);
+        }
+        let [right, up, _] = View::look_at(DVec3::Z, DVec3::ZERO, Viewport::default()).axes();
+        assert!(
+            (right - DVec3::X).length() < 1e-12 && (up - DVec3::Y).length() < 1e-12,
+            "north is at the top"
+        );
+        let [_, _, forward] = View::look_at(DVec3::X, DVec3::X, Viewport::default()).axes();
+        assert_eq!(forward, DVec3::Y);
     }
 
     #[test]

@@ -7,16 +7,16 @@ use std::ops::Range;
 use criterion::{BatchSize, BenchmarkId, Criterion};
 use glam::DVec3;
 use terrasoar_render::{
-    Frame, FrameView, Gpu, ImageryShape, Look, MeshPatch, MeshVertex, Offscreen, Pyramid, Renderer,
-    RendererOptions, TerrainShape, WantedTiles,
+    Frame, Gpu, ImageryShape, Look, MeshPatch, MeshVertex, Offscreen, Pyramid, Renderer, RendererOptions,
+    TerrainShape, View, WantedTiles,
 };
 
 const TERRAIN: TerrainShape =
     TerrainShape { spacing_m: [10.0, 10.0], samples: [16_385, 16_385], height_range_m: [0.0, 4000.0] };
 
-fn view() -> FrameView {
+fn view() -> View {
     let eye = DVec3::new(80_000.0, 80_000.0, 5000.0);
-    FrameView::look_at(eye, eye + DVec3::new(1.0, 2.0, -0.5), [1920, 1080])
+    View::look_at(eye, eye + DVec3::new(1.0, 2.0, -0.5), [1920, 1080].into())
 }
 
 fn main() {
@@ -36,17 +36,12 @@ fn main() {
 fn on_device(criterion: &mut Criterion, gpu: &Gpu) {
     let options = RendererOptions::from(&gpu.capabilities);
     let Ok(mut renderer) = Renderer::new(&gpu.device, &gpu.queue, TERRAIN, options) else { return };
-    let image = ImageryShape {
-        format: gpu.capabilities.imagery_formats()[0],
-        texels: [163_840, 163_840],
-        levels: 10,
-        origin_m: [0.0; 2],
-        texel_m: [1.0; 2],
-    };
-    if renderer.set_imagery(Some(image), Renderer::IMAGERY_BYTES).is_ok() {
+    let format = gpu.capabilities.imagery_formats()[0];
+    let image = ImageryShape::new(format, [163_840, 163_840], [0.0; 2], [1.0; 2]);
+    if renderer.set_imagery(&image, format, Renderer::IMAGERY_BYTES).is_ok() {
         let (view, mut ahead) = (view(), view());
         ahead.eye_m += DVec3::new(500.0, 1000.0, 0.0);
-        let tile = vec![0; image.format.tile_bytes()];
+        let tile = vec![0; format.tile_bytes()];
         for wanted in renderer.want_imagery(&view, usize::MAX).to_vec() {
             let _ = renderer.give_imagery(wanted, &tile);
         }
@@ -58,7 +53,7 @@ fn on_device(criterion: &mut Criterion, gpu: &Gpu) {
             b.iter(|| renderer.want_imagery_ahead(black_box(&ahead), 8).len());
         });
     }
-    let _ = renderer.set_imagery(None, 0);
+    renderer.clear_imagery();
     let encoder = || gpu.device.create_command_encoder(&Default::default());
     let vertex = MeshVertex {
         x: 1,

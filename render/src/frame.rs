@@ -2,7 +2,7 @@
 
 use crate::gpu::Capabilities;
 use crate::look::Look;
-use crate::view::FrameView;
+use terrasoar::view::View;
 
 /// What a renderer is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,14 +39,73 @@ pub struct Target<'a> {
     pub format: wgpu::TextureFormat,
 }
 
+/// What a render pass that ground is drawn into is like: the caller's own, with other things in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct PassFormat {
+    /// Format of its one colour target: any 8-bit or float colour format, sRGB or not; colours come out the same.
+    pub colour: wgpu::TextureFormat,
+    /// Format of its depth buffer.
+    pub depth: wgpu::TextureFormat,
+    /// Which way depth runs.
+    pub depth_range: DepthRange,
+    /// Samples a pixel.
+    pub samples: u32,
+}
+
+impl PassFormat {
+    /// A pass with one sample a pixel and 32-bit depth that is reversed, as this crate's own are.
+    pub fn new(colour: wgpu::TextureFormat) -> Self {
+        let depth = crate::pipelines::DEPTH_FORMAT;
+        Self { colour, depth, depth_range: DepthRange::Reversed, samples: 1 }
+    }
+
+    /// This pass with another depth buffer.
+    pub fn depth(self, depth: wgpu::TextureFormat, depth_range: DepthRange) -> Self {
+        Self { depth, depth_range, ..self }
+    }
+
+    /// This pass with so many samples a pixel.
+    pub fn samples(self, samples: u32) -> Self {
+        Self { samples, ..self }
+    }
+}
+
+/// Which way depth runs. Both are endless: there is no far plane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum DepthRange {
+    /// 1 at the near plane, 0 infinitely far: even precision with floating-point depth. To be cleared to 0; nearer is greater.
+    #[default]
+    Reversed,
+    /// 0 at the near plane, 1 infinitely far. To be cleared to 1; nearer is less. Far ground may flicker, for most of the precision lies near the eye.
+    Forward,
+}
+
+impl DepthRange {
+    /// What a depth buffer is to be cleared to.
+    pub const fn clear(self) -> f32 {
+        match self {
+            Self::Reversed => 0.0,
+            Self::Forward => 1.0,
+        }
+    }
+
+    /// How depths are to be compared.
+    pub const fn compare(self) -> wgpu::CompareFunction {
+        match self {
+            Self::Reversed => wgpu::CompareFunction::Greater,
+            Self::Forward => wgpu::CompareFunction::Less,
+        }
+    }
+}
+
 /// One frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame<'a> {
     /// The camera.
-    pub view: &'a FrameView,
+    pub view: &'a View,
     /// The camera that the mesh was refined for, where it is another (frozen refinement): vertices move by its eye, field of
     /// view and tolerance. Its exaggeration is taken to be that of `view`.
-    pub refined_for: Option<&'a FrameView>,
+    pub refined_for: Option<&'a View>,
     /// How it looks.
     pub look: &'a Look,
 }

@@ -1,6 +1,6 @@
 //! Draws a terrain mesh that changes every frame, through wgpu: patches, normal tiles and image tiles in, pixels out.
 //!
-//! The crate opens no file, knows no engine and owns no window. The caller has the device, the queue and the target, and
+//! The crate opens no file, runs no engine (of `terrasoar` it uses plain types alone) and owns no window. The caller has the device, the queue and the target, and
 //! says what changed; the renderer records commands into the caller's encoder.
 //!
 //! # A frame
@@ -15,7 +15,7 @@
 //! ```no_run
 //! use glam::DVec3;
 //! use terrasoar_render::{
-//!     Frame, FrameView, Gpu, HEIGHTS_PER_TILE, Look, MeshPatch, MeshVertex, Offscreen, Renderer, RendererOptions, TerrainShape,
+//!     Frame, Gpu, HEIGHTS_PER_TILE, Look, MeshPatch, MeshVertex, Offscreen, Renderer, RendererOptions, TerrainShape, View, Viewport,
 //! };
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -38,13 +38,13 @@
 //! assert_eq!(sent.bytes, 5 * 36 + 4 * 16);
 //!
 //! let eye_m = DVec3::new(-20.0, -30.0, 25.0);
-//! let view = FrameView::look_at(eye_m, DVec3::new(10.0, 10.0, 0.0), [800, 600]);
+//! let view = View::look_at(eye_m, DVec3::new(10.0, 10.0, 0.0), Viewport::default());
 //! for tile in renderer.want_tiles(&view, 4).to_vec() {
 //!     let heights_m = vec![0.0; HEIGHTS_PER_TILE];
 //!     renderer.give_tile(tile, &heights_m)?;
 //! }
 //!
-//! let picture = Offscreen::new(&gpu.device, view.viewport_px)?;
+//! let picture = Offscreen::new(&gpu.device, view.viewport.size_px())?;
 //! let look = Look::named("contours").unwrap_or_default();
 //! renderer.render(&mut encoder, picture.target(), Frame { view: &view, refined_for: None, look: &look })?;
 //! gpu.queue.submit([encoder.finish()]);
@@ -90,17 +90,22 @@ mod view;
 mod words;
 
 pub use error::{RenderError, Result};
-pub use frame::{DrawStats, Frame, RendererOptions, Target};
+pub use frame::{DepthRange, DrawStats, Frame, PassFormat, RendererOptions, Target};
 pub use gpu::{Capabilities, DeviceWatch, Gpu};
 pub use look::{Contours, Haze, LOOKS, Look, Sun, Surface, Wireframe};
-pub use mesh::{MeshPatch, MeshVertex, UploadStats};
+pub use mesh::{MeshPatch, UploadStats};
 pub use offscreen::{Offscreen, read_depth_m};
-pub use renderer::Renderer;
+pub use renderer::{Prepared, Renderer};
+/// A vertex as the engine hands it out and the device holds it.
+pub use terrasoar::refine::kinetic::MeshVertex;
+/// The camera of a frame, and the tolerance that its mesh was made for.
+pub use terrasoar::view::{View, Viewport};
+/// Images and tiles as the terrain file has them. Slopes are in tiles named alike.
+pub use terrasoar_layout::imagery::{ImageryShape, TileFormat, TileId};
 pub use tiles::{
-    HEIGHTS_PER_TILE, IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, ImageTileId, ImageryFormat,
-    ImageryShape, ImageryStats, Placement, Pyramid, Residency, TILE_BORDER, TILE_CELLS, TileId, TileStats,
-    WantedTiles, pack_gradients,
+    HEIGHTS_PER_TILE, ImageryStats, Placement, Pyramid, Residency, TILE_BORDER, TILE_CELLS, TileStats,
+    WantedTiles, pack_gradients, tile_lines,
 };
-pub use view::{FrameView, TerrainShape};
+pub use view::TerrainShape;
 /// The graphics interface of the version that this crate's types are of.
 pub use wgpu;

@@ -1,5 +1,6 @@
 //! Pipelines, one set for each target format and each combination of what a look shows, and the one layout that all share.
 
+use crate::frame::PassFormat;
 use crate::look::{Look, Surface};
 use crate::shaders;
 
@@ -53,8 +54,7 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
 /// What is fixed in a pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct Variant {
-    pub format: wgpu::TextureFormat,
-    pub samples: u32,
+    pub pass: PassFormat,
     pub surface: Surface,
     pub contours: bool,
     pub tiles: bool,
@@ -63,10 +63,9 @@ pub(crate) struct Variant {
 }
 
 impl Variant {
-    pub(crate) fn of(look: &Look, has_image: bool, format: wgpu::TextureFormat) -> Self {
+    pub(crate) fn of(look: &Look, has_image: bool, pass: PassFormat) -> Self {
         Self {
-            format,
-            samples: if look.multisample { 4 } else { 1 },
+            pass,
             surface: look.surface,
             contours: look.contours.is_some(),
             tiles: look.tile_normals,
@@ -76,7 +75,7 @@ impl Variant {
     }
 
     /// Values for the shaders' overrides.
-    fn constants(&self) -> [(&'static str, f64); 6] {
+    fn constants(&self) -> [(&'static str, f64); 7] {
         let surface = match self.surface {
             Surface::Tint => 0,
             Surface::Plain => 1,
@@ -90,7 +89,8 @@ impl Variant {
             ("TILES", f64::from(u8::from(self.tiles))),
             ("IMAGE", f64::from(u8::from(self.image))),
             ("MORPH", f64::from(u8::from(self.morph))),
-            ("ENCODES", f64::from(u8::from(self.format.is_srgb()))),
+            ("ENCODES", f64::from(u8::from(self.pass.colour.is_srgb()))),
+            ("FARTHEST", f64::from(self.pass.depth_range.clear())),
         ]
     }
 }
@@ -153,23 +153,23 @@ impl Pipelines {
                     // Nothing is culled by its winding: triangles deformed at the data's edge may turn over.
                     primitive: wgpu::PrimitiveState::default(),
                     depth_stencil: Some(wgpu::DepthStencilState {
-                        format: DEPTH_FORMAT,
+                        format: variant.pass.depth,
                         depth_write_enabled: Some(ground),
-                        // The sky is at depth 0, which only untouched pixels have.
+                        // The sky is infinitely far, where only untouched pixels are.
                         depth_compare: Some(if ground {
-                            wgpu::CompareFunction::Greater
+                            variant.pass.depth_range.compare()
                         } else {
-                            wgpu::CompareFunction::GreaterEqual
+                            wgpu::CompareFunction::Equal
                         }),
                         stencil: Default::default(),
                         bias: Default::default(),
                     }),
-                    multisample: wgpu::MultisampleState { count: variant.samples, ..Default::default() },
+                    multisample: wgpu::MultisampleState { count: variant.pass.samples, ..Default::default() },
                     fragment: Some(wgpu::FragmentState {
                         module,
                         entry_point: Some(&format!("{name}_fragment")),
                         compilation_options: options.clone(),
-                        targets: &[Some(variant.format.into())],
+                        targets: &[Some(variant.pass.colour.into())],
                     }),
                     multiview_mask: None,
                     cache: None,

@@ -3,10 +3,13 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use crate::frame::DepthRange;
 use crate::look::{Haze, Look};
 use crate::ramps::linear_of;
-use crate::tiles::{IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, Imagery, Pyramid, TILE_CELLS};
-use crate::view::{FrameView, LocalView, TerrainShape, clip_from_eye, near_m, whole_and_rest};
+use crate::tiles::{Imagery, Pyramid, TILE_CELLS};
+use crate::view::{LocalView, TerrainShape, clip_from_eye, near_m, whole_and_rest};
+use terrasoar::view::View;
+use terrasoar_layout::imagery::{BORDER_TEXELS, INNER_TEXELS, TILE_TEXELS};
 
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -44,11 +47,12 @@ pub(crate) struct Uniforms {
 pub(crate) struct Inputs<'a> {
     pub terrain: &'a TerrainShape,
     pub pyramid: &'a Pyramid,
-    pub view: &'a FrameView,
-    pub refined_for: &'a FrameView,
+    pub view: &'a View,
+    pub refined_for: &'a View,
     pub look: &'a Look,
     pub imagery: Option<&'a Imagery>,
     pub wall_bottom_m: f32,
+    pub depth_range: DepthRange,
 }
 
 impl Uniforms {
@@ -56,7 +60,8 @@ impl Uniforms {
         let Inputs { terrain, pyramid, view, refined_for, look, .. } = *inputs;
         let local = LocalView::new(view, terrain);
         let near_m = near_m(terrain);
-        let [tan_x, tan_y] = view.half_tangents();
+        let (axes, tangents) = (view.axes(), view.half_tangents());
+        let ([right, up, forward], [tan_x, tan_y]) = (axes, tangents);
         let with = |v: Vec3, w: f32| v.extend(w).to_array();
         let rgb = |[r, g, b]: [f32; 3], a: f32| [r, g, b, a];
         let scaled = |c: [f32; 3], by: f32| c.map(|c| c * by);
@@ -92,10 +97,10 @@ impl Uniforms {
         let wire = look.wireframe.unwrap_or_default();
         let image = inputs.imagery.map_or_else(Image::default, |imagery| Image::new(imagery, view));
         Self {
-            clip_from_eye: clip_from_eye(view, near_m).to_cols_array_2d(),
-            ray_right: with((view.right * tan_x).as_vec3(), 0.0),
-            ray_up: with((view.up * tan_y).as_vec3(), 0.0),
-            ray_forward: with(view.forward.as_vec3(), 0.0),
+            clip_from_eye: clip_from_eye(axes, tangents, near_m, inputs.depth_range).to_cols_array_2d(),
+            ray_right: with((right * tan_x).as_vec3(), 0.0),
+            ray_up: with((up * tan_y).as_vec3(), 0.0),
+            ray_forward: with(forward.as_vec3(), 0.0),
             grid: [local.origin[0], local.origin[1], 0, 0],
             spacing: [
                 terrain.spacing_m[0] as f32,
@@ -125,7 +130,7 @@ impl Uniforms {
             wire_colour: rgb(wire.colour, 0.0),
             tiles: [pyramid.levels(), TILE_CELLS.ilog2(), TILE_CELLS + 1, 0],
             terrain: [terrain.samples[0], terrain.samples[1], 0, 0],
-            image: [image.levels, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, IMAGE_TILE_BORDER],
+            image: [image.levels, INNER_TEXELS, TILE_TEXELS, BORDER_TEXELS],
             image_eye: image.eye,
             image_scale: image.scale,
             image_share: [look.imagery.clamp(0.0, 1.0), image.straight, 0.0, 0.0],
@@ -143,7 +148,7 @@ struct Image {
 }
 
 impl Image {
-    fn new(imagery: &Imagery, view: &FrameView) -> Self {
+    fn new(imagery: &Imagery, view: &View) -> Self {
         let shape = &imagery.shape;
         let eye = [0, 1].map(|i| whole_and_rest((view.eye_m[i] - shape.origin_m[i]) / shape.texel_m[i]));
         let [wide, high] = shape.texels.map(|n| n as i32);
@@ -152,7 +157,7 @@ impl Image {
             levels: imagery.pool.pyramid.levels(),
             eye: [eye[0].0, eye[1].0, wide, high],
             scale: [east, north, eye[0].1 as f32, eye[1].1 as f32],
-            straight: f32::from(u8::from(shape.format.is_straight())),
+            straight: f32::from(u8::from(imagery.is_straight())),
         }
     }
 }

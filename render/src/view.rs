@@ -8,6 +8,8 @@
 use glam::{DVec3, Mat4, Vec3, Vec4};
 
 use crate::error::{RenderError, Result};
+use crate::frame::DepthRange;
+use terrasoar::view::View;
 
 /// What does not change while a terrain is shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,85 +43,22 @@ impl TerrainShape {
     }
 }
 
-/// One frame's camera, and the tolerance its mesh was made for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameView {
-    /// The eye, metres east, north and up in the drawn (exaggerated) space.
-    pub eye_m: DVec3,
-    /// Unit vector to the right of the picture.
-    pub right: DVec3,
-    /// Unit vector to its top.
-    pub up: DVec3,
-    /// Unit vector along the line of sight; `right x up = -forward`.
-    pub forward: DVec3,
-    /// Vertical field of view in radians, above 0 and below pi.
-    pub vertical_fov_rad: f64,
-    /// Size of the picture in pixels.
-    pub viewport_px: [u32; 2],
-    /// Largest error on the screen the mesh may show, in pixels; above 0.
-    pub tolerance_px: f64,
-    /// Factor on heights; above 0.
-    pub vertical_exaggeration: f64,
-}
-
-impl FrameView {
-    /// Looks from one point towards another, north-up or, straight down, with `up` towards north.
-    pub fn look_at(eye_m: DVec3, at_m: DVec3, viewport_px: [u32; 2]) -> Self {
-        let forward = (at_m - eye_m).try_normalize().unwrap_or(DVec3::Y);
-        let right = forward.cross(DVec3::Z).try_normalize().unwrap_or(DVec3::X);
-        Self {
-            eye_m,
-            right,
-            up: right.cross(forward),
-            forward,
-            vertical_fov_rad: 0.8,
-            viewport_px,
-            tolerance_px: 1.0,
-            vertical_exaggeration: 1.0,
-        }
-    }
-
-    /// Pixels a radian of the vertical field of view.
-    pub fn pixels_per_radian(&self) -> f64 {
-        f64::from(self.viewport_px[1]) / self.vertical_fov_rad
-    }
-
-    /// Pixels a radian over the tolerance: a vertex is in the mesh when nearer than `nu * error + radius`.
-    pub fn nu(&self) -> f64 {
-        self.pixels_per_radian() / self.tolerance_px
-    }
-
-    /// Tangents of half the horizontal and half the vertical field of view.
-    pub fn half_tangents(&self) -> [f64; 2] {
-        let vertical = (0.5 * self.vertical_fov_rad).tan();
-        [vertical * f64::from(self.viewport_px[0]) / f64::from(self.viewport_px[1]), vertical]
-    }
-
-    /// Outward unit normals of the left, right, bottom and top planes of the view pyramid; each passes through the eye.
-    pub fn side_normals(&self) -> [DVec3; 4] {
-        let [tan_x, tan_y] = self.half_tangents();
-        [
-            (-self.right - self.forward * tan_x).normalize(),
-            (self.right - self.forward * tan_x).normalize(),
-            (-self.up - self.forward * tan_y).normalize(),
-            (self.up - self.forward * tan_y).normalize(),
-        ]
-    }
-
-    pub(crate) fn check(&self) -> Result<()> {
-        let ok = self.eye_m.is_finite()
-            && [self.right, self.up, self.forward].iter().all(|a| (a.length() - 1.0).abs() < 1e-3)
-            && self.vertical_fov_rad > 0.0
-            && self.vertical_fov_rad < std::f64::consts::PI
-            && self.viewport_px.iter().all(|p| *p > 0)
-            && self.tolerance_px > 0.0
-            && self.vertical_exaggeration > 0.0
-            && self.vertical_exaggeration.is_finite();
-        if ok {
-            Ok(())
-        } else {
-            Err(RenderError::Usage("a view needs a finite eye, unit axes and positive angles"))
-        }
+/// Whether a view can be drawn.
+pub(crate) fn check(view: &View) -> Result<()> {
+    let ok = view.eye_m.is_finite()
+        && [view.yaw_rad, view.pitch_rad, view.roll_rad].iter().all(|a| a.is_finite())
+        && view.vertical_fov_rad > 0.0
+        && view.vertical_fov_rad < std::f64::consts::PI
+        && view.viewport.size_px().iter().all(|p| *p > 0)
+        && view.tolerance_px > 0.0
+        && view.vertical_exaggeration > 0.0
+        && view.vertical_exaggeration.is_finite();
+    if ok {
+        Ok(())
+    } else {
+        Err(RenderError::Usage(
+            "a view needs a finite eye, finite angles and a field of view and numbers above 0",
+        ))
     }
 }
 
@@ -137,7 +76,7 @@ pub(crate) struct LocalView {
 }
 
 impl LocalView {
-    pub(crate) fn new(view: &FrameView, terrain: &TerrainShape) -> Self {
+    pub(crate) fn new(view: &View, terrain: &TerrainShape) -> Self {
         let cell = [0, 1].map(|i| whole_and_rest(view.eye_m[i] / terrain.spacing_m[i]).0);
         let height_origin_m = (view.eye_m.z / view.vertical_exaggeration) as f32;
         Self {
@@ -162,18 +101,28 @@ pub(crate) fn near_m(terrain: &TerrainShape) -> f64 {
     (0.02 * terrain.spacing_m[0].min(terrain.spacing_m[1])).clamp(1e-4, 0.5)
 }
 
-/// From metres east, north, up of the eye to clip space: reversed depth, 1 at the near plane, 0 infinitely far.
-pub(crate) fn clip_from_eye(view: &FrameView, near_m: f64) -> Mat4 {
-    let [tan_x, tan_y] = view.half_tangents();
+/// From metres east, north, up of the eye to clip space, by a view's axes and half tangents. Depth is endless and runs as `range` says.
+pub(crate) fn clip_from_eye(
+    [right, up, forward]: [DVec3; 3],
+    [tan_x, tan_y]: [f64; 2],
+    near_m: f64,
+    range: DepthRange,
+) -> Mat4 {
     let row = |v: DVec3| -> Vec3 { v.as_vec3() };
-    let x = row(view.right / tan_x);
-    let y = row(view.up / tan_y);
-    let w = row(view.forward);
+    let x = row(right / tan_x);
+    let y = row(up / tan_y);
+    let w = row(forward);
+    let near = near_m as f32;
+    // Depth is near / distance, or what that lacks of 1.
+    let (z, z_near) = match range {
+        DepthRange::Reversed => (Vec3::ZERO, near),
+        DepthRange::Forward => (w, -near),
+    };
     Mat4::from_cols(
-        Vec4::new(x.x, y.x, 0.0, w.x),
-        Vec4::new(x.y, y.y, 0.0, w.y),
-        Vec4::new(x.z, y.z, 0.0, w.z),
-        Vec4::new(0.0, 0.0, near_m as f32, 0.0),
+        Vec4::new(x.x, y.x, z.x, w.x),
+        Vec4::new(x.y, y.y, z.y, w.y),
+        Vec4::new(x.z, y.z, z.z, w.z),
+        Vec4::new(0.0, 0.0, z_near, 0.0),
     )
 }
 
@@ -183,13 +132,20 @@ mod tests {
 
     #[test]
     fn depth_is_near_over_distance() {
-        let view = FrameView::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(5.0, 2.0, 3.0), [400, 300]);
-        let clip = clip_from_eye(&view, 0.25) * Vec4::new(10.0, 0.0, 0.0, 1.0);
+        let view = View::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(5.0, 2.0, 3.0), [400, 300].into());
+        let ([right, _, forward], tangents) = (view.axes(), view.half_tangents());
+        let clip_from_eye = clip_from_eye(view.axes(), tangents, 0.25, DepthRange::Reversed);
+        let clip = clip_from_eye * Vec4::new(10.0, 0.0, 0.0, 1.0);
         assert!((clip.z / clip.w - 0.025).abs() < 1e-7);
         assert!(clip.x.abs() < 1e-6 && clip.y.abs() < 1e-6);
-        let right_edge = view.forward * 10.0 + view.right * 10.0 * view.half_tangents()[0];
-        let clip = clip_from_eye(&view, 0.25) * right_edge.as_vec3().extend(1.0);
+        let right_edge = forward * 10.0 + right * 10.0 * tangents[0];
+        let clip = clip_from_eye * right_edge.as_vec3().extend(1.0);
         assert!((clip.x / clip.w - 1.0).abs() < 1e-6);
+        let forward = super::clip_from_eye(view.axes(), tangents, 0.25, DepthRange::Forward);
+        for (away_m, depth) in [(0.25, 0.0), (10.0, 0.975), (1e9, 1.0)] {
+            let clip = forward * Vec4::new(away_m, 0.0, 0.0, 1.0);
+            assert!((clip.z / clip.w - depth).abs() < 1e-6, "{away_m} m");
+        }
     }
 
     #[test]
@@ -200,7 +156,7 @@ mod tests {
             height_range_m: [0.0, 9000.0],
         };
         let mut view =
-            FrameView::look_at(DVec3::new(1_234_567.891, 1_999_999.123, 4321.0987), DVec3::ZERO, [4, 3]);
+            View::look_at(DVec3::new(1_234_567.891, 1_999_999.123, 4321.0987), DVec3::ZERO, [4, 3].into());
         view.vertical_exaggeration = 1.7;
         let local = LocalView::new(&view, &terrain);
         for i in 0..2 {

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::flight::Flight;
+use terrasoar::ground::{Ground, StreamOptions};
 use terrasoar::view::Viewport;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::Gpu;
@@ -57,7 +58,8 @@ fn main() -> Result<(), Failure> {
         imagery_bytes: pool_mib << 20,
         ..SceneOptions::default()
     };
-    let mut scene = Scene::streamed(&terrain, 128 << 20, &gpu, options)?;
+    let mut ground = Ground::streamed(terrain, &StreamOptions::default().cache_mib(128))?;
+    let mut scene = Scene::new(&ground, &gpu, options)?;
     if !scene.has_image() {
         return Err("the terrain has no image; drape one over it".into());
     }
@@ -65,10 +67,10 @@ fn main() -> Result<(), Failure> {
     let mut next = Instant::now();
     for frame in &flight.frames {
         let view = frame.view(size, 2.0);
-        scene.update(&view);
+        ground.update(&view);
         let begun = Instant::now();
         let mut drawn = Drawn::default();
-        scene.serve_image(&view, &mut drawn)?;
+        scene.serve_image(&ground, &view, &mut drawn)?;
         let serve_ms = begun.elapsed().as_secs_f64() * 1e3;
         // What was sent goes with the next submission.
         gpu.queue.submit([]);

@@ -12,6 +12,8 @@
 use std::path::PathBuf;
 use std::time::Instant;
 use terrasoar::flight::{Flight, FlightFrame};
+use terrasoar::ground::{Ground, PictureEngine};
+use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{Gpu, Look, Offscreen, wgpu};
@@ -76,6 +78,12 @@ fn main() -> Result<(), Failure> {
     pops(&terrain, &gpu, &flight, plan.size)
 }
 
+/// The ground of a mapped terrain.
+fn mapped(terrain: &Terrain) -> Result<Ground<'_>, Failure> {
+    Ok(Ground::mapped(terrain, PictureEngine::Kinetic, Culling::Vertices)
+        .ok_or("the terrain is not mapped")?)
+}
+
 /// A list of figures and its percentiles.
 struct Figures(Vec<f64>);
 
@@ -94,8 +102,9 @@ impl Figures {
 fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -> Result<(), Failure> {
     let options =
         SceneOptions { tiles: TileService::AFrame(TILES_A_FRAME), timestamps: true, ..Default::default() };
-    let mut scene = Scene::new(terrain, gpu, options)?;
-    let offscreen = Offscreen::new(&gpu.device, [size.width_px, size.height_px])?;
+    let mut ground = mapped(terrain)?;
+    let mut scene = Scene::new(&ground, gpu, options)?;
+    let offscreen = Offscreen::new(&gpu.device, size.size_px())?;
     let look = Look::default();
     let names = [
         "patch of the engine, KB",
@@ -113,14 +122,15 @@ fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -
     for frame in flight {
         let view = frame.view(size, 1.0);
         let start = Instant::now();
-        let refined = scene.update(&view);
+        let refined = ground.update(&view);
         let updated = Instant::now();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut tiles = terrasoar_scene::scene::Drawn::default();
-        scene.serve_tiles(&view, &mut tiles)?;
+        scene.serve_tiles(&mut ground, &view, &mut tiles)?;
         let served = Instant::now();
         // Nothing is wanted any more within the bound that was not given.
-        let drawn = scene.draw_served(&mut encoder, offscreen.target(), &view, &look, None)?;
+        let upload = scene.sync_mesh(&ground, &mut encoder)?;
+        let draw = scene.draw(&mut encoder, offscreen.target(), &view, &look, None)?;
         let recorded = Instant::now();
         gpu.queue.submit([encoder.finish()]);
         gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
@@ -129,8 +139,8 @@ fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -
         let kb = |bytes: u64| bytes as f64 / 1e3;
         let row = [
             kb(refined.work.patch_bytes),
-            kb(drawn.upload.bytes),
-            kb(drawn.upload.bytes + drawn.draw.bytes + tiles.tiles[1]),
+            kb(upload.bytes),
+            kb(upload.bytes + draw.bytes + tiles.tiles[1]),
             refined.triangles as f64 / 1e3,
             ms(start, updated),
             ms(served, recorded),
@@ -202,25 +212,30 @@ fn pops(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) ->
     for morph in [true, false] {
         // The haze hides little: what is measured is the ground.
         let look = Look { morph, tile_normals: false, ..Look::named("hillshade").unwrap_or_default() };
-        let mut scene = Scene::new(terrain, gpu, SceneOptions::default())?;
-        let offscreen = Offscreen::new(&gpu.device, [small.width_px, small.height_px])?;
-        let picture =
-            |scene: &mut Scene<'_>, view: &View, refined_for: Option<&View>| -> Result<Vec<f32>, Failure> {
-                let mut encoder = gpu.device.create_command_encoder(&Default::default());
-                scene.draw(&mut encoder, offscreen.target(), view, &look, refined_for)?;
-                gpu.queue.submit([encoder.finish()]);
-                let rgba = offscreen.read_rgba(&gpu.device, &gpu.queue)?;
-                Ok(blocks(&rgba, small.width_px as usize))
-            };
+        let mut ground = mapped(terrain)?;
+        let mut scene = Scene::new(&ground, gpu, SceneOptions::default())?;
+        let offscreen = Offscreen::new(&gpu.device, small.size_px())?;
+        let picture = |scene: &mut Scene,
+                       ground: &mut Ground<'_>,
+                       view: &View,
+                       refined_for: Option<&View>|
+         -> Result<Vec<f32>, Failure> {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            scene.sync(ground, &mut encoder, view, &look)?;
+            scene.draw(&mut encoder, offscreen.target(), view, &look, refined_for)?;
+            gpu.queue.submit([encoder.finish()]);
+            let rgba = offscreen.read_rgba(&gpu.device, &gpu.queue)?;
+            Ok(blocks(&rgba, small.width_px as usize))
+        };
         let ([mut motion, mut detail], mut work) = ([Change::default(); 2], 0);
         let Some(first) = views.first() else { return Ok(()) };
-        scene.update(first);
-        let mut before = picture(&mut scene, first, None)?;
+        ground.update(first);
+        let mut before = picture(&mut scene, &mut ground, first, None)?;
         for [from, to] in views.array_windows() {
-            let frozen = picture(&mut scene, to, Some(from))?;
-            let did = scene.update(to).work;
+            let frozen = picture(&mut scene, &mut ground, to, Some(from))?;
+            let did = ground.update(to).work;
             work += did.splits + did.merges;
-            let refined = picture(&mut scene, to, None)?;
+            let refined = picture(&mut scene, &mut ground, to, None)?;
             motion.add(&before, &frozen);
             detail.add(&frozen, &refined);
             before = refined;

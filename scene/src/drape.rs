@@ -14,10 +14,11 @@ use super::repaint::{Picture, PictureFile, Repaint};
 use super::tile_reader::{Reader, Threads, Tile};
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
+use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::imagery::{Imagery, PaintedTile, TileFormat, TileId};
+use terrasoar_layout::imagery::{Imagery, ImageryShape, PaintedTile, TileFormat, TileId};
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::{FrameView, ImageTileId, ImageryFormat, ImageryShape, RenderError, Renderer};
+use terrasoar_render::{RenderError, Renderer};
 
 /// Tiles of the current view on a frame's list.
 const WANTED: usize = 64;
@@ -42,16 +43,17 @@ pub struct Served {
 pub struct Drape {
     reader: Arc<Reader>,
     threads: Option<Threads>,
-    shape: ImageryShape,
+    /// What the device is given.
+    format: TileFormat,
     /// Tiles that are not the file's.
-    painted: HashMap<ImageTileId, PaintedTile>,
+    painted: HashMap<TileId, PaintedTile>,
     /// Tiles of the file that are others since the last frame, as they were read.
-    at_hand: HashMap<ImageTileId, Option<Vec<u8>>>,
+    at_hand: HashMap<TileId, Option<Vec<u8>>>,
     /// Whether tiles in memory are left for the next frame.
     is_behind: bool,
     frame: u64,
     /// Tiles that could not be read, and the frame to try them again in.
-    trouble: HashMap<ImageTileId, u64>,
+    trouble: HashMap<TileId, u64>,
     errors: VecDeque<LayoutError>,
 }
 
@@ -62,7 +64,7 @@ impl Drape {
     /// The imagery is damaged or cannot be read, or the system gives no thread.
     pub fn of(
         terrain: Arc<Terrain>,
-        formats: &[ImageryFormat],
+        formats: &[TileFormat],
         threads: bool,
     ) -> Result<Option<Self>, LayoutError> {
         let Some(imagery) = Imagery::open(&terrain)? else { return Ok(None) };
@@ -75,24 +77,18 @@ impl Drape {
     /// The system gives no thread.
     pub fn over(
         PictureFile { terrain, imagery }: PictureFile,
-        formats: &[ImageryFormat],
+        formats: &[TileFormat],
         threads: bool,
     ) -> Result<Self, LayoutError> {
-        let own = imagery.shape();
-        let (format, decodes) = taken_as(own.format, formats);
-        let shape = ImageryShape {
-            format,
-            texels: own.texels,
-            levels: own.levels,
-            origin_m: own.origin_m,
-            texel_m: own.texel_m,
-        };
+        let own = imagery.shape().format;
+        let format = taken_as(own, formats);
+        let decodes = format != own;
         let reader = Arc::new(Reader { terrain, imagery, decodes });
         let threads = if threads { Some(Threads::start(&reader)?) } else { None };
         Ok(Self {
             reader,
             threads,
-            shape,
+            format,
             painted: HashMap::new(),
             at_hand: HashMap::new(),
             is_behind: false,
@@ -103,23 +99,32 @@ impl Drape {
     }
 
     /// Suits the tiles to a device that takes such formats, in place of the one before.
-    pub fn suit(&mut self, formats: &[ImageryFormat]) {
-        let (format, decodes) = taken_as(self.reader.imagery.shape().format, formats);
-        self.shape.format = format;
+    pub fn suit(&mut self, formats: &[TileFormat]) {
+        let own = self.shape().format;
+        self.format = taken_as(own, formats);
+        let decodes = self.format != own;
         if decodes != self.reader.decodes {
             let Reader { terrain, imagery, .. } = &*self.reader;
             self.turn_to(Reader { terrain: Arc::clone(terrain), imagery: imagery.clone(), decodes });
         }
     }
 
-    /// What the renderer is told of the image.
+    /// The image's shape, and the format of its tiles in the file.
     pub fn shape(&self) -> ImageryShape {
-        self.shape
+        self.reader.imagery.shape()
+    }
+
+    /// Drapes the image over a renderer's terrain, its tiles in `pool_bytes` of device memory.
+    ///
+    /// # Errors
+    /// What the renderer says.
+    pub fn show(&self, renderer: &mut Renderer, pool_bytes: u64) -> Result<(), RenderError> {
+        renderer.set_imagery(&self.shape(), self.format, pool_bytes)
     }
 
     /// Whether the image can be painted by this build.
     pub fn can_be_painted(&self) -> bool {
-        self.reader.imagery.shape().format.can_be_made()
+        self.shape().format.can_be_made()
     }
 
     /// Takes over what was painted, committed, undone or redone of this picture.
@@ -127,13 +132,13 @@ impl Drape {
         if let Picture::Moved(PictureFile { terrain, imagery }) = repaint.picture {
             self.turn_to(Reader { terrain, imagery, decodes: self.reader.decodes });
         }
-        self.painted = repaint.painted.into_iter().map(|(id, tile)| (of_renderer(id), tile)).collect();
-        let tiles: Vec<ImageTileId> = repaint.tiles.into_iter().map(of_renderer).collect();
+        self.painted = repaint.painted.into_iter().collect();
+        let tiles: Vec<TileId> = repaint.tiles.into_iter().collect();
         renderer.change_imagery(&tiles);
         tiles.iter().for_each(|id| {
             self.at_hand.remove(id);
         });
-        self.at_hand.extend(repaint.read.into_iter().map(|(id, texels)| (of_renderer(id), texels)));
+        self.at_hand.extend(repaint.read);
     }
 
     /// Reads by another reader from now on.
@@ -151,8 +156,8 @@ impl Drape {
     pub fn serve(
         &mut self,
         renderer: &mut Renderer,
-        view: &FrameView,
-        ahead: &FrameView,
+        view: &View,
+        ahead: &View,
         most: usize,
     ) -> Result<Served, RenderError> {
         self.frame += 1;
@@ -176,11 +181,11 @@ impl Drape {
         self.errors.pop_front()
     }
 
-    fn serve_all(&mut self, renderer: &mut Renderer, view: &FrameView) -> Result<Served, RenderError> {
+    fn serve_all(&mut self, renderer: &mut Renderer, view: &View) -> Result<Served, RenderError> {
         let mut served = Served::default();
         self.at_hand.clear();
         loop {
-            let wanted: Vec<ImageTileId> = renderer.want_imagery(view, usize::MAX).to_vec();
+            let wanted: Vec<TileId> = renderer.want_imagery(view, usize::MAX).to_vec();
             let before = served.tiles;
             let mut settled = false;
             for id in wanted.into_iter().filter(|id| !self.is_in_trouble(*id)).collect::<Vec<_>>() {
@@ -198,8 +203,8 @@ impl Drape {
         &mut self,
         threads: &mut Threads,
         renderer: &mut Renderer,
-        view: &FrameView,
-        ahead: &FrameView,
+        view: &View,
+        ahead: &View,
         most: usize,
     ) -> Result<Served, RenderError> {
         let mut served = Served::default();
@@ -213,7 +218,7 @@ impl Drape {
                 self.give(renderer, id, tile, &mut served)?;
             }
         }
-        let mut wanted: Vec<ImageTileId> = renderer.want_imagery(view, WANTED).to_vec();
+        let mut wanted: Vec<TileId> = renderer.want_imagery(view, WANTED).to_vec();
         wanted.extend_from_slice(renderer.want_imagery_ahead(ahead, WANTED_AHEAD));
         // Decoding a tile takes as long as sending many.
         let at_hand = if self.reader.decodes { most } else { AT_HAND };
@@ -226,7 +231,7 @@ impl Drape {
     fn serve_at_hand(
         &mut self,
         renderer: &mut Renderer,
-        wanted: &mut Vec<ImageTileId>,
+        wanted: &mut Vec<TileId>,
         most: usize,
         served: &mut Served,
     ) -> Result<(), RenderError> {
@@ -256,13 +261,13 @@ impl Drape {
     }
 
     /// A tile as it is now: painted, or else read.
-    fn tile(&self, id: ImageTileId) -> Tile {
+    fn tile(&self, id: TileId) -> Tile {
         let Some(painted) = self.painted.get(&id) else { return self.reader.read(id) };
         let mut tile = Vec::new();
         Ok(if painted.read(&mut tile) { self.reader.as_taken(tile) } else { None })
     }
 
-    fn is_in_trouble(&self, id: ImageTileId) -> bool {
+    fn is_in_trouble(&self, id: TileId) -> bool {
         self.trouble.get(&id).is_some_and(|until| self.frame < *until)
     }
 
@@ -270,7 +275,7 @@ impl Drape {
     fn give(
         &mut self,
         renderer: &mut Renderer,
-        id: ImageTileId,
+        id: TileId,
         tile: Tile,
         served: &mut Served,
     ) -> Result<bool, RenderError> {
@@ -295,16 +300,7 @@ impl Drape {
     }
 }
 
-fn of_renderer(TileId { level, x, y }: TileId) -> ImageTileId {
-    ImageTileId { level, x, y }
-}
-
-/// How a device that takes such formats is given tiles of a format, and whether they are decoded for that.
-fn taken_as(own: TileFormat, formats: &[ImageryFormat]) -> (ImageryFormat, bool) {
-    let format = match own {
-        TileFormat::Bc1 => ImageryFormat::Bc1,
-        TileFormat::Bc7 => ImageryFormat::Bc7,
-        TileFormat::Rgba8 => ImageryFormat::Rgba8,
-    };
-    if formats.contains(&format) { (format, false) } else { (ImageryFormat::Rgba8, true) }
+/// How a device that takes such formats is given tiles of a format: as they are, or decoded.
+fn taken_as(own: TileFormat, formats: &[TileFormat]) -> TileFormat {
+    if formats.contains(&own) { own } else { TileFormat::Rgba8 }
 }

@@ -5,15 +5,11 @@
 
 mod border;
 pub mod drape;
-pub mod feed;
-pub mod full_mesh;
-pub mod mapped;
+pub mod frame;
 pub mod options;
 pub mod overview;
-mod pending;
 pub mod repaint;
 pub mod scene;
 mod sight;
-pub mod streamed;
 pub mod studio;
 mod tile_reader;

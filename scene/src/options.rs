@@ -1,18 +1,12 @@
 //! How a scene is made, what its pictures cost, and why there may be none: plain values.
 
 use super::drape::Served;
-use crate::mapped::PictureEngine;
-use terrasoar::refine::Culling;
 use terrasoar_layout::LayoutError;
-use terrasoar_render::{DrawStats, RenderError, Renderer, UploadStats};
+use terrasoar_render::{RenderError, Renderer, UploadStats};
 
 /// How a scene is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneOptions {
-    /// What makes the mesh.
-    pub engine: PictureEngine,
-    /// Where what lies out of view is left out.
-    pub culling: Culling,
     /// Normal tiles given a frame.
     pub tiles: TileService,
     /// Device memory for the tiles of the image, in bytes.
@@ -22,6 +16,21 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
+    /// These options with another number of normal tiles a frame.
+    pub fn tiles(self, tiles: TileService) -> Self {
+        Self { tiles, ..self }
+    }
+
+    /// These options with so many bytes of device memory for tiles of the image.
+    pub fn imagery_bytes(self, imagery_bytes: u64) -> Self {
+        Self { imagery_bytes, ..self }
+    }
+
+    /// These options with frames timed on the device, or not.
+    pub fn timestamps(self, timestamps: bool) -> Self {
+        Self { timestamps, ..self }
+    }
+
     /// Whether frames must not wait.
     pub(super) fn is_for_a_window(self) -> bool {
         self.tiles != TileService::All
@@ -30,13 +39,7 @@ impl SceneOptions {
 
 impl Default for SceneOptions {
     fn default() -> Self {
-        Self {
-            engine: PictureEngine::default(),
-            culling: Culling::default(),
-            tiles: TileService::default(),
-            imagery_bytes: Renderer::IMAGERY_BYTES,
-            timestamps: false,
-        }
+        Self { tiles: TileService::default(), imagery_bytes: Renderer::IMAGERY_BYTES, timestamps: false }
     }
 }
 
@@ -57,6 +60,9 @@ pub enum SceneError {
     /// The terrain's source does not lend its bytes.
     #[error("{0}: pictures need a mapped or in-memory terrain")]
     NotInAddressSpace(String),
+    /// The scene was made for another terrain, or for this one opened another time.
+    #[error("{0}: the scene was made for another terrain; make one for this ground")]
+    AnotherTerrain(String),
     /// The terrain cannot be read.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -70,8 +76,6 @@ pub enum SceneError {
 pub struct Drawn {
     /// Mesh sent to the device.
     pub upload: UploadStats,
-    /// Draw calls.
-    pub draw: DrawStats,
     /// Tiles given and their bytes.
     pub tiles: [u64; 2],
     /// Tiles that the view still lacks.

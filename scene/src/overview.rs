@@ -49,8 +49,7 @@ pub fn overview(terrain: &Terrain, exaggeration: f64, fov_deg: f64, viewport: Vi
     let view = view_from(DVec3::ZERO, angles, fov_deg, viewport);
     let [middle, half] = box_of(terrain, exaggeration);
     let [right, up, forward] = view.axes();
-    let tan_y = (0.5 * view.vertical_fov_rad).tan();
-    let tan_x = tan_y * f64::from(viewport.width_px) / f64::from(viewport.height_px);
+    let [tan_x, tan_y] = view.half_tangents();
     let corners =
         (0..8).map(|i| half * DVec3::from([0, 1, 2].map(|bit| f64::from(i >> bit & 1) * 2.0 - 1.0)));
     // A corner c is between two opposite planes from distance d and a step s aside if |c . axis - s| <= tan (d + c . forward). The least d and

@@ -1,36 +1,35 @@
-//! A terrain in sight: an engine that refines it and a renderer that holds its mesh, kept in step.
+//! A terrain in sight: a renderer that holds the mesh of some ground, kept in step with it.
 //!
-//! A frame is [`Scene::update`], which brings the mesh to a view, and [`Scene::draw`], which sends what changed and records the picture. They
-//! come one by one, so refinement may be frozen while the eye goes on: draw without update, and say which view the mesh is for. Updates that
-//! are not drawn cost nothing but memory for their changes; before the first picture not even that.
+//! A frame is [`Ground::update`], which brings the mesh to a view, and then one of two ways to the picture. [`Scene::frame`] prepares it, and [`SceneFrame::draw`] draws it into a
+//! render pass of the caller's, beside whatever else is there: clearing, depth buffer and sky are the caller's. [`Scene::sync`] and [`Scene::draw`] record all of it, pass
+//! and sky included, into an encoder. Refinement may be frozen while the eye goes on: leave the update out, and say which view the mesh is for.
+//!
+//! **What is drawn is the ground's mesh as it is now.** The scene knows which step of it the device has, and sends what is missing: the change of one update, or all of it where
+//! more was missed. Ground of another terrain than the scene was made for is refused.
 //!
 //! **The device holds nothing that is not here.** After its loss [`Scene::recover`] takes a new one, which may be able to do other things, and the next picture is the same. Light
 //! comes from tiles of heights: a bounded number a frame for a window, all of them for a picture that must repeat byte by byte.
 //!
-//! Cost on the processor: the engine's update, a copy of its patch, some 2 ms a tile.
+//! Cost on the processor: a copy of what changed in the mesh, some 2 ms a tile.
 
 pub use super::options::{Drawn, SceneError, SceneOptions, TileService};
 
 use super::border::border;
 use super::drape::Drape;
-use super::feed::{Feed, Refined};
-use super::pending::Pending;
+use super::frame::SceneFrame;
 use super::repaint::{Picture, Repaint};
-use super::sight::{ahead, frame_view, shape};
-use super::streamed::streamed_feed;
-use crate::mapped::feed;
+use super::sight::{ahead, height_tile, shape};
+use std::ops::Range;
 use std::sync::Arc;
-use terrasoar::refine::Culling;
-use terrasoar::stream::GroundPatch;
+use terrasoar::ground::{Ground, MeshChange, MeshStep};
+use terrasoar::refine::kinetic::Patch;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::Edit;
-use terrasoar_layout::file::entries::Entry;
-use terrasoar_layout::imagery::{Imagery, Paint};
-use terrasoar_layout::read::terrain::Terrain;
+use terrasoar_layout::imagery::{Imagery, Paint, TileFormat, TileId};
 use terrasoar_render::{
-    Frame, Gpu, ImageryFormat, Look, MeshPatch, RenderError, Renderer, RendererOptions, Target, TerrainShape,
-    TileId, TileStats, UploadStats, wgpu,
+    DrawStats, Frame, Gpu, Look, MeshPatch, PassFormat, RenderError, Renderer, RendererOptions, Target,
+    TerrainShape, TileStats, UploadStats, wgpu,
 };
 
 /// Tiles that are asked for, for each that is given in a frame.
@@ -41,12 +40,21 @@ const IMAGE_TILES_A_FRAME: usize = 8;
 /// Texels across the scorch of a crater at most: one as wide takes a third of a second.
 const WIDEST_SCORCH: f64 = 2048.0;
 
-/// An opened terrain, its engine and its renderer.
-pub struct Scene<'a> {
-    feed: Box<dyn Feed + 'a>,
+/// The renderer of some ground.
+pub struct Scene {
     renderer: Renderer,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
     options: SceneOptions,
-    pending: Pending,
+    /// The opened terrain that it was made for.
+    terrain: u64,
+    /// The step of the mesh that the device has; none before the first.
+    seen: Option<MeshStep>,
+    /// One past the highest triangle slot ever sent. Slots past it are empty, and the device has not heard of them.
+    end: u32,
+    draws: Vec<Range<u32>>,
+    /// Edited rectangles of the ground that light knows of.
+    edits_seen: u64,
     /// Border edges, as vertex slots, and how far down walls go from them.
     walls: Option<(Vec<[u32; 2]>, f32)>,
     heights_m: Vec<f32>,
@@ -55,97 +63,115 @@ pub struct Scene<'a> {
     /// Whether the last picture had the image in it.
     shows_image: bool,
     /// What the device takes of images.
-    formats: &'static [ImageryFormat],
-    /// The views of the last two updates, which say where the eye is going.
-    ways: [Option<View>; 2],
+    formats: &'static [TileFormat],
 }
 
-impl<'a> Scene<'a> {
-    /// A scene without a mesh; the first [`Scene::update`] makes it. Reads nothing but the terrain's header.
+impl Scene {
+    /// A scene of `ground`, without a mesh; the first [`Scene::sync`] brings it. Reads the directory of the terrain's image, if it has one.
     ///
     /// # Errors
-    /// [`SceneError::NotInAddressSpace`], and what [`Renderer::new`] says.
-    pub fn new(terrain: &'a Terrain, gpu: &Gpu, options: SceneOptions) -> Result<Self, SceneError> {
-        let feed = feed(terrain, options.engine, options.culling)
-            .ok_or_else(|| SceneError::NotInAddressSpace(terrain.path().display().to_string()))?;
-        // Tiles are read, not mapped, whatever the records are.
-        let drape = match Imagery::open(terrain)? {
-            None => None,
-            Some(_) => Drape::of(
-                Arc::new(terrain.open_again_unmapped()?),
-                gpu.capabilities.imagery_formats(),
-                options.is_for_a_window(),
-            )?,
-        };
-        Self::over(feed, drape, terrain, gpu, options)
-    }
-
-    /// A scene over a terrain that need not be mapped: its pages are read into `cache_bytes` of memory by threads, and no frame waits for one. The engine
-    /// is [`PictureEngine::Kinetic`] whatever the options say.
-    ///
-    /// # Errors
-    /// [`SceneError::Layout`], and what [`Renderer::new`] says.
-    pub fn streamed(
-        terrain: &Arc<Terrain>,
-        cache_bytes: u64,
-        gpu: &Gpu,
-        options: SceneOptions,
-    ) -> Result<Self, SceneError> {
-        let feed = streamed_feed(terrain, cache_bytes, options.culling)?;
+    /// Damage of the image; what [`Renderer::new`] says.
+    pub fn new(ground: &Ground<'_>, gpu: &Gpu, options: SceneOptions) -> Result<Self, SceneError> {
         let formats = gpu.capabilities.imagery_formats();
-        let drape = Drape::of(Arc::clone(terrain), formats, options.is_for_a_window())?;
-        Self::over(feed, drape, terrain, gpu, options)
-    }
-
-    fn over(
-        feed: Box<dyn Feed + 'a>,
-        drape: Option<Drape>,
-        terrain: &Terrain,
-        gpu: &Gpu,
-        options: SceneOptions,
-    ) -> Result<Self, SceneError> {
-        let renderer = new_renderer(shape(terrain), drape.as_ref(), gpu, options)?;
+        let threads = options.is_for_a_window();
+        let drape = match ground.shared_terrain() {
+            Some(terrain) => Drape::of(Arc::clone(terrain), formats, threads)?,
+            None if Imagery::open(ground.terrain())?.is_none() => None,
+            // Tiles are read, not mapped, whatever the records are.
+            None => Drape::of(Arc::new(ground.terrain().open_again_unmapped()?), formats, threads)?,
+        };
+        let renderer = new_renderer(shape(ground.terrain()), drape.as_ref(), gpu, options)?;
         Ok(Self {
-            drape,
-            shows_image: false,
-            formats: gpu.capabilities.imagery_formats(),
-            ways: [None; 2],
-            feed,
             renderer,
+            device: gpu.device.clone(),
+            queue: gpu.queue.clone(),
             options,
-            pending: Pending::default(),
+            terrain: ground.terrain().instance(),
+            seen: None,
+            end: 0,
+            draws: Vec::new(),
+            edits_seen: ground.edited_since(0).1,
             walls: None,
             heights_m: Vec::new(),
             wanted: Vec::new(),
+            drape,
+            shows_image: false,
+            formats,
         })
     }
 
-    /// What the mesh and its light are made from: heights of the ground, and what could not be read.
-    pub fn feed(&self) -> &(dyn Feed + 'a) {
-        &*self.feed
-    }
-
-    /// As [`Scene::feed`], to ask for more.
-    pub fn feed_mut(&mut self) -> &mut (dyn Feed + 'a) {
-        &mut *self.feed
-    }
-
-    /// Brings the mesh to a view. Touches no device.
-    pub fn update(&mut self, view: &View) -> Refined {
-        let refined = self.feed.update(view);
-        self.ways = [self.ways[1], Some(*view)];
-        self.pending.changed = true;
-        if self.pending.begun {
-            self.pending.take(self.feed.patch());
-        }
-        refined
-    }
-
-    /// Records what changed and a picture into `encoder`. `refined_for` is the view of the last update where that is another than `view`
-    /// (frozen refinement). Submit the encoder before the next draw, and ask the device's watch whether all went well.
+    /// Brings the device what it lacks of the ground for a picture of `view`: the mesh, tiles of light and of the image. What it records into `encoder` must be submitted before
+    /// the next call.
     ///
     /// # Errors
-    /// [`SceneError::Render`]: a mesh too large for the device, or a view that is none.
+    /// [`SceneError::AnotherTerrain`] for ground of another terrain than the scene was made for; [`SceneError::Render`] for a mesh that is too large for the device.
+    pub fn sync(
+        &mut self,
+        ground: &mut Ground<'_>,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &View,
+        look: &Look,
+    ) -> Result<Drawn, SceneError> {
+        let mut drawn = Drawn::default();
+        self.note_edits(ground)?;
+        if look.tile_normals {
+            self.serve_tiles(ground, view, &mut drawn)?;
+        }
+        if look.imagery > 0.0 {
+            self.serve_image(ground, view, &mut drawn)?;
+        } else {
+            self.shows_image = false;
+        }
+        drawn.upload = self.sync_mesh(ground, encoder)?;
+        Ok(drawn)
+    }
+
+    /// Brings the device what it lacks of the mesh; [`Scene::sync`] does so by itself.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn sync_mesh(
+        &mut self,
+        ground: &Ground<'_>,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<UploadStats, SceneError> {
+        self.check(ground)?;
+        let sent = match ground.change_since(self.seen) {
+            MeshChange::Same => return Ok(UploadStats::default()),
+            MeshChange::Patch(patch) => self.send(encoder, patch)?,
+            MeshChange::Whole(patch) => {
+                let before = self.seen.take();
+                if before.is_some() {
+                    self.renderer.clear_mesh();
+                    self.end = 0;
+                }
+                if before.is_some_and(|seen| !seen.is_of_same_mesh(ground.step()))
+                    && self.walls.take().is_some()
+                {
+                    // They stood along another mesh.
+                    self.renderer.set_walls(&[], 0.0);
+                }
+                self.send(encoder, &patch)?
+            }
+        };
+        self.seen = Some(ground.step());
+        Ok(sent)
+    }
+
+    fn send(&mut self, encoder: &mut wgpu::CommandEncoder, patch: &Patch) -> Result<UploadStats, SceneError> {
+        self.end = patch.triangles.iter().fold(self.end, |end, (slot, _)| end.max(slot + 1));
+        let end = self.end;
+        self.draws.clear();
+        self.draws.extend(patch.draws.iter().map(|r| r.start.min(end)..r.end.min(end)));
+        let patch = MeshPatch { vertices: &patch.vertices, triangles: &patch.triangles, draws: &self.draws };
+        Ok(self.renderer.apply(encoder, &patch)?)
+    }
+
+    /// Records a picture of what the device has into `encoder`: clears `target`, draws ground, walls and sky. `refined_for` is the view of the ground's last update where that is another
+    /// than `view` (frozen refinement). Submit the encoder before the next picture, and ask the device's watch whether all went well.
+    ///
+    /// # Errors
+    /// [`SceneError::Render`]: a view that is none.
     pub fn draw(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
@@ -153,63 +179,48 @@ impl<'a> Scene<'a> {
         view: &View,
         look: &Look,
         refined_for: Option<&View>,
-    ) -> Result<Drawn, SceneError> {
-        let mut tiles = Drawn::default();
-        if look.tile_normals {
-            self.serve_tiles(view, &mut tiles)?;
-        }
-        if look.imagery > 0.0 {
-            self.serve_image(view, &mut tiles)?;
-        } else {
-            self.shows_image = false;
-        }
-        let drawn = self.draw_served(encoder, target, view, look, refined_for)?;
-        Ok(Drawn { upload: drawn.upload, draw: drawn.draw, ..tiles })
+    ) -> Result<DrawStats, SceneError> {
+        Ok(self.renderer.render(encoder, target, Frame { view, refined_for, look })?)
     }
 
-    /// [`Scene::draw`] without asking for tiles.
+    /// Brings the device all that a picture of `view` needs, and gives what draws it into a pass like `pass` of the caller's. Submits commands of its own; the caller's pass must be
+    /// submitted before the next frame is asked for.
     ///
     /// # Errors
-    /// As there.
-    pub fn draw_served(
+    /// As [`Scene::sync`] and [`Scene::draw`].
+    pub fn frame(
         &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        target: Target<'_>,
+        ground: &mut Ground<'_>,
         view: &View,
         look: &Look,
-        refined_for: Option<&View>,
-    ) -> Result<Drawn, SceneError> {
-        let view = frame_view(view);
-        let refined_for = refined_for.map(frame_view);
-        let mut drawn = Drawn { upload: self.send(encoder)?, ..Drawn::default() };
-        let frame = Frame { view: &view, refined_for: refined_for.as_ref(), look };
-        drawn.draw = self.renderer.render(encoder, target, frame)?;
-        Ok(drawn)
-    }
-
-    /// Records what changed in the mesh; [`Scene::draw`] does so by itself.
-    pub fn send(&mut self, encoder: &mut wgpu::CommandEncoder) -> Result<UploadStats, SceneError> {
-        let pending = &mut self.pending;
-        if !pending.changed {
-            return Ok(UploadStats::default());
-        }
-        if !pending.begun {
-            pending.take(&self.feed.whole());
-        }
-        let patch =
-            MeshPatch { vertices: &pending.vertices, triangles: &pending.triangles, draws: &pending.draws };
-        let sent = self.renderer.apply(encoder, &patch)?;
-        pending.begun = true;
-        pending.clear();
-        Ok(sent)
+        pass: &PassFormat,
+    ) -> Result<SceneFrame<'_>, SceneError> {
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let drawn = self.sync(ground, &mut encoder, view, look)?;
+        // A view that the mesh was not refined for: refinement is frozen.
+        let refined_for = ground.view().filter(|refined_for| *refined_for != view);
+        let prepared = self.renderer.prepare(&mut encoder, pass, Frame { view, refined_for, look })?;
+        self.queue.submit([encoder.finish()]);
+        Ok(SceneFrame {
+            renderer: &self.renderer,
+            prepared,
+            view: *view,
+            depth_range: pass.depth_range,
+            drawn,
+        })
     }
 
     /// Gives the renderer tiles that the view lacks, as many as the options say, and counts them in `drawn`.
     ///
     /// # Errors
-    /// What the renderer says.
-    pub fn serve_tiles(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
-        let view = &frame_view(view);
+    /// As [`Scene::sync`].
+    pub fn serve_tiles(
+        &mut self,
+        ground: &mut Ground<'_>,
+        view: &View,
+        drawn: &mut Drawn,
+    ) -> Result<(), SceneError> {
+        self.check(ground)?;
         let most = match self.options.tiles {
             TileService::All => usize::MAX,
             TileService::AFrame(most) => most,
@@ -223,7 +234,7 @@ impl<'a> Scene<'a> {
                 if given as usize == most {
                     break;
                 }
-                if self.feed.heights_m(*tile, &mut self.heights_m) {
+                if ground.tile_heights_m(height_tile(*tile), &mut self.heights_m) {
                     let bytes = self.renderer.give_tile(*tile, &self.heights_m)?;
                     given += u64::from(bytes > 0);
                     drawn.tiles[1] += bytes;
@@ -240,37 +251,50 @@ impl<'a> Scene<'a> {
     }
 
     /// Gives the renderer tiles of the image that the view lacks, and counts them in `drawn`. A frame of a window is given what has come.
-    pub fn serve_image(&mut self, view: &View, drawn: &mut Drawn) -> Result<(), SceneError> {
+    ///
+    /// # Errors
+    /// As [`Scene::sync`].
+    pub fn serve_image(
+        &mut self,
+        ground: &Ground<'_>,
+        view: &View,
+        drawn: &mut Drawn,
+    ) -> Result<(), SceneError> {
         let Some(drape) = &mut self.drape else { return Ok(()) };
         self.shows_image = true;
-        let ahead = match self.ways {
+        let ahead = match ground.last_views() {
             [Some(before), Some(now)] => ahead(&before, &now),
             _ => *view,
         };
-        drawn.image =
-            drape.serve(&mut self.renderer, &frame_view(view), &frame_view(&ahead), IMAGE_TILES_A_FRAME)?;
+        drawn.image = drape.serve(&mut self.renderer, view, &ahead, IMAGE_TILES_A_FRAME)?;
         drawn.image_missing = self.renderer.imagery_stats().missing;
         Ok(())
     }
 
-    /// Takes over edits of the ground: the next update's mesh shows them, and light follows within some frames. Whether it can: only scenes of windows do.
-    ///
-    /// # Errors
-    /// Edits of another terrain.
-    pub fn ground_changed(&mut self, patch: GroundPatch) -> Result<bool, LayoutError> {
-        let areas = patch.samples.clone();
-        if !self.feed.ground_changed(patch)? {
-            return Ok(false);
+    fn check(&self, ground: &Ground<'_>) -> Result<(), SceneError> {
+        if ground.terrain().instance() == self.terrain {
+            return Ok(());
         }
-        for rect in &areas {
-            self.renderer.change_heights([rect.west, rect.south], [rect.east, rect.north]);
-        }
-        Ok(true)
+        Err(SceneError::AnotherTerrain(ground.terrain().path().display().to_string()))
     }
 
-    /// Takes notice that edits are in the file: these pages lie there now, as they were told last.
-    pub fn committed(&mut self, places: &[(u64, Entry)]) {
-        self.feed.relocate(places);
+    /// Light follows edits of the ground within some frames.
+    fn note_edits(&mut self, ground: &Ground<'_>) -> Result<(), SceneError> {
+        self.check(ground)?;
+        let (rects, now) = ground.edited_since(self.edits_seen);
+        self.edits_seen = now;
+        match rects {
+            Some(rects) => {
+                for rect in rects {
+                    self.renderer.change_heights([rect.west, rect.south], [rect.east, rect.north]);
+                }
+            }
+            None => {
+                let [wide, high] = self.renderer.terrain().samples;
+                self.renderer.change_heights([0, 0], [wide - 1, high - 1]);
+            }
+        }
+        Ok(())
     }
 
     /// Takes over what became of the image in an editing session: the next picture shows paint, an undo and a redo.
@@ -297,8 +321,13 @@ impl<'a> Scene<'a> {
     }
 
     fn show_drape(&mut self) -> Result<(), RenderError> {
-        let shape = self.drape.as_ref().map(Drape::shape);
-        self.renderer.set_imagery(shape, self.options.imagery_bytes)
+        match &self.drape {
+            Some(drape) => drape.show(&mut self.renderer, self.options.imagery_bytes),
+            None => {
+                self.renderer.clear_imagery();
+                Ok(())
+            }
+        }
     }
 
     /// What craters among these edits burn into the image: nothing where there is none, or none that this build can paint, and by none that is too wide to follow the hand.
@@ -323,26 +352,33 @@ impl<'a> Scene<'a> {
         self.drape.is_some()
     }
 
-    /// Whether something that the last picture lacked is on its way.
+    /// Whether tiles of the image that the last picture lacked are on their way. [`Ground::is_waiting`] tells the same of the mesh.
     pub fn is_waiting(&self) -> bool {
-        self.feed.is_waiting() || self.shows_image && self.drape.as_ref().is_some_and(Drape::is_waiting)
+        self.shows_image && self.drape.as_ref().is_some_and(Drape::is_waiting)
     }
 
-    /// What could not be read and nobody has heard of yet.
+    /// What could not be read of the image and nobody has heard of yet. [`Ground::take_error`] tells of the mesh.
     pub fn take_error(&mut self) -> Option<LayoutError> {
-        self.feed.take_error().or_else(|| self.drape.as_mut().and_then(Drape::take_error))
+        self.drape.as_mut().and_then(Drape::take_error)
     }
 
     /// Puts walls below the terrain's border, down to `bottom_m` (before exaggeration), so that it stands as a block. They go along the mesh of the
-    /// last update: after another one raise them anew. Costs a walk over the mesh.
-    pub fn raise_walls(&mut self, bottom_m: f32) {
-        let edges = border(&self.feed.whole(), self.renderer.terrain().samples);
-        self.renderer.set_walls(&edges, bottom_m);
-        self.walls = Some((edges, bottom_m));
+    /// ground's last update: after another one raise them anew. Costs a walk over the mesh.
+    ///
+    /// # Errors
+    /// [`SceneError::AnotherTerrain`].
+    pub fn raise_walls(&mut self, ground: &Ground<'_>, bottom_m: f32) -> Result<(), SceneError> {
+        self.check(ground)?;
+        if let MeshChange::Whole(whole) = ground.change_since(None) {
+            let edges = border(&whole, self.renderer.terrain().samples);
+            self.renderer.set_walls(&edges, bottom_m);
+            self.walls = Some((edges, bottom_m));
+        }
+        Ok(())
     }
 
     /// Goes on with another device, after the loss of the old one: the next picture is as if nothing had happened. All that follows from what a device can do follows from the new
-    /// one: formats and decoding of the image's tiles, sizes of pools, how ranges are drawn. The engine is not touched.
+    /// one: formats and decoding of the image's tiles, sizes of pools, how ranges are drawn. The ground is not touched.
     ///
     /// # Errors
     /// What [`Renderer::new`] says; an image that the new device cannot show.
@@ -352,30 +388,12 @@ impl<'a> Scene<'a> {
             drape.suit(self.formats);
         }
         self.renderer = new_renderer(*self.renderer.terrain(), self.drape.as_ref(), gpu, self.options)?;
-        self.pending = Pending::default();
-        self.pending.changed = true;
+        (self.device, self.queue) = (gpu.device.clone(), gpu.queue.clone());
+        (self.seen, self.end) = (None, 0);
         if let Some((edges, bottom_m)) = &self.walls {
             self.renderer.set_walls(edges, *bottom_m);
         }
         Ok(())
-    }
-
-    /// Culls in another way from now on; whatever was edited stays so. The next update makes the mesh anew, and it goes to the device as a whole. Whether it can: only scenes of
-    /// windows do.
-    ///
-    /// # Errors
-    /// As [`Scene::recover`]; the scene is then as it was.
-    pub fn set_culling(&mut self, culling: Culling, gpu: &Gpu) -> Result<bool, SceneError> {
-        let renderer = new_renderer(*self.renderer.terrain(), self.drape.as_ref(), gpu, self.options)?;
-        if !self.feed.set_culling(culling) {
-            return Ok(false);
-        }
-        self.options.culling = culling;
-        self.renderer = renderer;
-        self.pending = Pending::default();
-        // They stood along the old mesh.
-        self.walls = None;
-        Ok(true)
     }
 
     /// The renderer, for what it counts: tiles, bytes, depth, time.
@@ -403,6 +421,8 @@ fn new_renderer(
     let mut renderer_options = RendererOptions::from(&gpu.capabilities);
     renderer_options.timestamps &= options.timestamps;
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, shape, renderer_options)?;
-    renderer.set_imagery(drape.map(Drape::shape), options.imagery_bytes)?;
+    if let Some(drape) = drape {
+        drape.show(&mut renderer, options.imagery_bytes)?;
+    }
     Ok(renderer)
 }

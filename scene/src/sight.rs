@@ -1,9 +1,11 @@
-//! Views and terrains as the renderer takes them.
+//! Where a steady eye will be, and a terrain as the renderer takes it.
 
 use std::f64::consts::FRAC_PI_2;
+use terrasoar::ground::HeightTile;
 use terrasoar::view::View;
+use terrasoar_layout::imagery::TileId;
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::{FrameView, TerrainShape};
+use terrasoar_render::{TILE_BORDER, TILE_CELLS, TerrainShape};
 
 /// Frames ahead of the eye that tiles of the image are asked for.
 const FRAMES_AHEAD: f64 = 24.0;
@@ -29,17 +31,9 @@ pub fn shape(terrain: &Terrain) -> TerrainShape {
     }
 }
 
-/// A view as the renderer takes it.
-pub fn frame_view(view: &View) -> FrameView {
-    let [right, up, forward] = view.axes();
-    FrameView {
-        eye_m: view.eye_m,
-        right,
-        up,
-        forward,
-        vertical_fov_rad: view.vertical_fov_rad,
-        viewport_px: [view.viewport.width_px, view.viewport.height_px],
-        tolerance_px: view.tolerance_px,
-        vertical_exaggeration: view.vertical_exaggeration,
-    }
+/// The samples of a tile of slopes, its border included.
+pub(super) fn height_tile(tile: TileId) -> HeightTile {
+    let step = 1 << tile.level.min(31);
+    let first = |at: u32| (i64::from(at) * i64::from(TILE_CELLS) - i64::from(TILE_BORDER)) * i64::from(step);
+    HeightTile { south_west: [first(tile.x), first(tile.y)], step, side: TILE_CELLS + 1 + 2 * TILE_BORDER }
 }

@@ -3,8 +3,9 @@
 //! **Equal views give equal bytes on one driver**, whatever was drawn before: all tiles are given before a picture is taken. A device that is lost
 //! on the way is replaced once; the picture is drawn again on the new one.
 
-use super::feed::Refined;
 use super::scene::{Scene, SceneError, SceneOptions};
+use terrasoar::ground::{Ground, PictureEngine, Refined};
+use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::{Capabilities, Gpu, Look, Offscreen, RenderError};
@@ -12,31 +13,43 @@ use terrasoar_render::{Capabilities, Gpu, Look, Offscreen, RenderError};
 /// Takes pictures of one terrain, all of one size.
 pub struct Studio<'a> {
     gpu: Gpu,
-    scene: Scene<'a>,
+    ground: Ground<'a>,
+    scene: Scene,
     offscreen: Offscreen,
     viewport: Viewport,
 }
 
 impl<'a> Studio<'a> {
-    /// A studio on the best adapter there is.
+    /// A studio for a mapped terrain, on the best adapter there is.
     ///
     /// # Errors
-    /// [`SceneError::Render`] with [`RenderError::NoAdapter`] where there is none, which says what to install; a size that the device cannot have.
-    pub fn new(terrain: &'a Terrain, options: SceneOptions, viewport: Viewport) -> Result<Self, SceneError> {
+    /// [`SceneError::Render`] with [`RenderError::NoAdapter`] where there is none, which says what to install; a size that the device cannot have;
+    /// [`SceneError::NotInAddressSpace`] for a terrain that is not mapped.
+    pub fn new(
+        terrain: &'a Terrain,
+        engine: PictureEngine,
+        culling: Culling,
+        viewport: Viewport,
+    ) -> Result<Self, SceneError> {
         let gpu = Gpu::headless_blocking()?;
-        let scene = Scene::new(terrain, &gpu, options)?;
+        let ground = Ground::mapped(terrain, engine, culling)
+            .ok_or_else(|| SceneError::NotInAddressSpace(terrain.path().display().to_string()))?;
+        let scene = Scene::new(&ground, &gpu, SceneOptions::default())?;
         let offscreen = offscreen(&gpu, viewport)?;
-        Ok(Self { gpu, scene, offscreen, viewport })
+        Ok(Self { gpu, ground, scene, offscreen, viewport })
     }
 
     /// Brings the mesh to a view, without a picture.
     pub fn fly(&mut self, view: &View) -> Refined {
-        self.scene.update(view)
+        self.ground.update(view)
     }
 
     /// Makes the terrain a block: walls from its border down to `bottom_m`, heights before exaggeration.
-    pub fn raise_walls(&mut self, bottom_m: f64) {
-        self.scene.raise_walls(bottom_m as f32);
+    ///
+    /// # Errors
+    /// As [`Scene::raise_walls`].
+    pub fn raise_walls(&mut self, bottom_m: f64) -> Result<(), SceneError> {
+        self.scene.raise_walls(&self.ground, bottom_m as f32)
     }
 
     /// A picture of the mesh as it is: three bytes a pixel, row by row from the top.
@@ -58,6 +71,7 @@ impl<'a> Studio<'a> {
     fn try_picture(&mut self, view: &View, look: &Look) -> Result<Vec<u8>, SceneError> {
         let Gpu { device, queue, watch, .. } = &self.gpu;
         let mut encoder = device.create_command_encoder(&Default::default());
+        self.scene.sync(&mut self.ground, &mut encoder, view, look)?;
         self.scene.draw(&mut encoder, self.offscreen.target(), view, look, None)?;
         queue.submit([encoder.finish()]);
         let rgba = self.offscreen.read_rgba(device, queue);
@@ -78,5 +92,5 @@ impl<'a> Studio<'a> {
 }
 
 fn offscreen(gpu: &Gpu, viewport: Viewport) -> Result<Offscreen, RenderError> {
-    Offscreen::new(&gpu.device, [viewport.width_px, viewport.height_px])
+    Offscreen::new(&gpu.device, viewport.size_px())
 }

@@ -8,7 +8,6 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::imagery::{Imagery, TileId, decode_tile};
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::ImageTileId;
 
 /// Threads that read and decode.
 const THREADS: usize = 2;
@@ -26,8 +25,7 @@ pub(super) struct Reader {
 pub(super) type Tile = Result<Option<Vec<u8>>, LayoutError>;
 
 impl Reader {
-    pub(super) fn read(&self, id: ImageTileId) -> Tile {
-        let id = TileId { level: id.level, x: id.x, y: id.y };
+    pub(super) fn read(&self, id: TileId) -> Tile {
         let mut tile = Vec::new();
         let is_there = self.imagery.read_tile(&self.terrain, id, &mut tile)?;
         Ok(if is_there { self.as_taken(tile) } else { None })
@@ -44,12 +42,12 @@ impl Reader {
 pub(super) struct Threads {
     shared: Arc<Shared>,
     arrivals: Receiver<Arrival>,
-    under_way: HashSet<ImageTileId>,
+    under_way: HashSet<TileId>,
     turn: u64,
 }
 
 /// A tile that was read, and in which turn.
-type Arrival = (u64, ImageTileId, Tile);
+type Arrival = (u64, TileId, Tile);
 
 #[derive(Debug)]
 struct Shared {
@@ -62,9 +60,9 @@ struct List {
     reader: Arc<Reader>,
     /// Number of the reader: which one a tile was read by.
     turn: u64,
-    wanted: VecDeque<ImageTileId>,
+    wanted: VecDeque<TileId>,
     /// Taken from the list since the last frame looked.
-    begun: Vec<ImageTileId>,
+    begun: Vec<TileId>,
     stopped: bool,
 }
 
@@ -112,13 +110,13 @@ impl Threads {
     }
 
     /// A tile that has come, and whether the reader that counts has read it.
-    pub(super) fn take(&mut self) -> Option<(bool, ImageTileId, Tile)> {
+    pub(super) fn take(&mut self) -> Option<(bool, TileId, Tile)> {
         let (turn, id, tile) = self.arrivals.try_recv().ok()?;
         Some((turn == self.turn, id, tile))
     }
 
     /// Leaves the list of a frame, which has taken those that have `come`; tiles that are being read are not read again.
-    pub(super) fn ask(&mut self, come: &[ImageTileId], wanted: impl Iterator<Item = ImageTileId>) {
+    pub(super) fn ask(&mut self, come: &[TileId], wanted: impl Iterator<Item = TileId>) {
         let mut list = self.shared.lock();
         // What has come was begun, in this frame perhaps.
         self.under_way.extend(list.begun.drain(..));

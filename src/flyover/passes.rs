@@ -9,6 +9,7 @@ use crate::stats::FrameStats;
 use std::time::Instant;
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::store::page_of;
 
 /// Times of one frame.
 pub(super) struct FrameTimes {
@@ -119,7 +120,7 @@ impl<C> Default for Counter<C> {
 impl<C: RecordCodec> Probe for Counter<C> {
     fn read(&mut self, slot: u64) {
         self.reads += 1;
-        let page = Records::<C>::page_of(slot);
+        let page = page_of::<C>(slot);
         // Neighbours in the walk are often neighbours in the file.
         if self.pages.last() != Some(&page) {
             self.pages.push(page);

@@ -10,7 +10,7 @@ use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{corners, slot_of};
-use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::read::store::{CompleteStore, RecordStore};
 
 /// Steps a side of the largest square that replays use it for: half a second a frame.
 pub const MOST_STEPS: u32 = 1 << 12;
@@ -25,7 +25,7 @@ pub struct Naive<S: RecordStore> {
     triangles: Vec<Triangle>,
 }
 
-impl<S: RecordStore> Naive<S> {
+impl<S: CompleteStore> Naive<S> {
     /// An engine over `records`, all of which are at hand, that culls as `culling` says.
     pub fn new(records: S, culling: Culling) -> Self {
         let side = records.grid().side_steps() as usize + 1;
@@ -50,7 +50,7 @@ impl<S: RecordStore> Naive<S> {
     }
 }
 
-impl<S: RecordStore> Engine for Naive<S> {
+impl<S: CompleteStore> Engine for Naive<S> {
     type Store = S;
 
     fn store_mut(&mut self) -> &mut S {

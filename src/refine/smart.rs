@@ -23,7 +23,7 @@ use crate::view::View;
 use std::ops::Range;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
-use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::read::store::{CompleteStore, RecordStore};
 
 /// Status bit: the vertex is selected and not culled.
 const ACTIVE: u32 = 1 << 31;
@@ -100,7 +100,7 @@ pub struct Smart<S: RecordStore> {
     strip: Vec<u32>,
 }
 
-impl<S: RecordStore> Smart<S> {
+impl<S: CompleteStore> Smart<S> {
     /// An engine over `records`, all of which are at hand, that culls as `culling` says, with nothing tested yet.
     pub fn new(records: S, culling: Culling) -> Self {
         let grid = *records.grid();
@@ -298,7 +298,7 @@ impl Expiry<'_> {
     }
 }
 
-impl<S: RecordStore> Engine for Smart<S> {
+impl<S: CompleteStore> Engine for Smart<S> {
     type Store = S;
 
     fn store_mut(&mut self) -> &mut S {

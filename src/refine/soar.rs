@@ -13,7 +13,7 @@ use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
-use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::read::store::{CompleteStore, RecordStore};
 
 /// A vertex of the strip: 12 bytes, ready to be uploaded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,8 +41,18 @@ pub struct Soar<S: RecordStore> {
     strip: Vec<StripVertex>,
 }
 
-impl<S: RecordStore> Soar<S> {
+impl<S: CompleteStore> Soar<S> {
     /// An engine over `records`, all of which are at hand, that culls as `culling` says.
+    ///
+    /// A pool, of which pages may be away, is refused by the compiler: SOAR would take what is away for ground without detail.
+    ///
+    /// ```compile_fail,E0277
+    /// # use terrasoar::refine::{Culling, soar::Soar};
+    /// # use terrasoar_layout::{grid::record::Compact, read::pool::PagePool};
+    /// fn wrong(pool: PagePool<Compact>) -> Soar<PagePool<Compact>> {
+    ///     Soar::new(pool, Culling::Vertices)
+    /// }
+    /// ```
     pub fn new(records: S, culling: Culling) -> Self {
         Self { records, culling, strip: Vec::new() }
     }
@@ -116,7 +126,7 @@ impl<S: RecordStore, P: Probe> Walk<'_, S, P> {
     }
 }
 
-impl<S: RecordStore> Engine for Soar<S> {
+impl<S: CompleteStore> Engine for Soar<S> {
     type Store = S;
 
     fn store_mut(&mut self) -> &mut S {

@@ -1,13 +1,13 @@
 //! A mesh that knows nothing but the patches it was sent, as a GPU does.
 
 use terrasoar::mesh::{Triangle, TriangleKey, is_drawn};
-use terrasoar::refine::kinetic::{Kinetic, NO_LEVEL, Patch, PatchVertex};
+use terrasoar::refine::kinetic::{Kinetic, MeshVertex, Patch};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::read::store::RecordStore;
 
 #[derive(Default)]
 pub struct Mirror {
-    vertices: Vec<Option<PatchVertex>>,
+    vertices: Vec<Option<MeshVertex>>,
     triangles: Vec<[u32; 3]>,
     draws: Vec<std::ops::Range<u32>>,
 }
@@ -27,7 +27,7 @@ impl Mirror {
         self.draws = patch.draws.clone();
     }
 
-    fn drawn(&self) -> impl Iterator<Item = [PatchVertex; 3]> {
+    fn drawn(&self) -> impl Iterator<Item = [MeshVertex; 3]> {
         let shown = |slot: u32| self.triangles.get(slot as usize).copied().unwrap_or_default();
         let slots = self.draws.iter().flat_map(|r| r.clone()).map(shown);
         slots
@@ -43,8 +43,8 @@ impl Mirror {
     /// What is drawn has the same vertices, all their numbers included.
     pub fn check_same(&self, other: &Self) {
         // Which end comes first means nothing.
-        let known = |v: Option<PatchVertex>| {
-            v.map(|v| PatchVertex { ends: [v.ends[0].min(v.ends[1]), v.ends[0].max(v.ends[1])], ..v })
+        let known = |v: Option<MeshVertex>| {
+            v.map(|v| MeshVertex { ends: [v.ends[0].min(v.ends[1]), v.ends[0].max(v.ends[1])], ..v })
         };
         for (slot, corners) in self.triangles.iter().enumerate().filter(|(_, [a, b, _])| a != b) {
             for v in corners.iter().map(|v| *v as usize) {
@@ -62,7 +62,7 @@ impl Mirror {
         for v in self.drawn().flatten() {
             let vertex = records.vertex_at(GridPoint::new(v.x, v.y));
             assert_eq!(v.height_m, vertex.height_m as f32);
-            assert!(v.flags < 32 || v.flags == NO_LEVEL);
+            assert!(v.flags < 32 || v.flags == MeshVertex::NO_LEVEL);
             assert!(v.error_m >= 0.0 && v.radius_m >= 0.0);
             assert!(v.ends.iter().all(|end| self.vertices[*end as usize].is_some()));
         }

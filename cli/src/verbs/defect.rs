@@ -64,9 +64,10 @@ mod tests {
     }
 
     fn met(backtrace: &str) -> Output {
-        let name = "cli::defect::tests::a_defect_is_met";
+        let (_, module) = module_path!().split_once("::").unwrap();
+        let name = format!("{module}::a_defect_is_met");
         let mut command = Command::new(std::env::current_exe().unwrap());
-        command.args(["--exact", name, "--ignored", "--nocapture", "--test-threads", "1"]);
+        command.args(["--exact", &name, "--ignored", "--nocapture", "--test-threads", "1"]);
         command.env(ASKED, "1").env("RUST_BACKTRACE", backtrace).output().unwrap()
     }
 

@@ -11,7 +11,6 @@ use anyhow::Result;
 use serde::Serialize;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
-use terrasoar_scene::studio::Studio;
 
 /// Draw a flight as a folder of PNG files, a GIF or an MP4.
 ///
@@ -80,7 +79,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
     let picture = &args.picture;
-    let mut studio = Studio::new(&terrain, picture.scene(), picture.size)?;
+    let mut studio = picture.studio(&terrain)?;
     let has_image = studio.has_image();
     let look = picture.look(has_image);
     let mut movie = MovieFile::create(&args.output, format, picture.size, args.fps, args.force.is_given())?;
@@ -99,7 +98,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     drop(progress);
     movie.finish()?;
-    let [width, height] = [picture.size.width_px, picture.size.height_px];
+    let [width, height] = picture.size.size_px();
     let adapter = studio.capabilities();
     let triangles_mean = triangles as f64 / f64::from(pictures.max(1));
     if args.json {

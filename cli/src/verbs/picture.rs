@@ -6,14 +6,14 @@ use clap::ArgAction;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::Quality;
+use terrasoar::ground::PictureEngine;
 use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
 use terrasoar_lab::picture::encode;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
 use terrasoar_render::{Contours, LOOKS, Look, Sun};
-use terrasoar_scene::mapped::PictureEngine;
-use terrasoar_scene::scene::SceneOptions;
+use terrasoar_scene::scene::SceneError;
 use terrasoar_scene::studio::Studio;
 
 /// The style of a terrain with an image.
@@ -93,9 +93,9 @@ impl PictureArgs {
         View { tolerance_px: self.tolerance_px, vertical_exaggeration: self.exaggeration, ..view }
     }
 
-    /// How the scene is made.
-    pub(super) fn scene(&self) -> SceneOptions {
-        SceneOptions { engine: self.engine, culling: self.culling, ..SceneOptions::default() }
+    /// A studio for `terrain`.
+    pub(super) fn studio<'t>(&self, terrain: &'t Terrain) -> Result<Studio<'t>, SceneError> {
+        Studio::new(terrain, self.engine, self.culling, self.size)
     }
 
     /// The engine's word.
@@ -150,7 +150,7 @@ pub(super) fn angles(text: &str) -> Result<[f64; 2], String> {
 
 /// Three bytes a pixel as the bytes of a PNG file.
 pub(super) fn png(rgb: &[u8], size: Viewport) -> Result<Vec<u8>> {
-    encode(rgb, [size.width_px, size.height_px]).context("the picture is incomplete")
+    encode(rgb, size.size_px()).context("the picture is incomplete")
 }
 
 /// Draws a frame of a flight, flown to it; gives the bytes of a PNG file and the adapter's name.
@@ -160,8 +160,7 @@ pub(super) fn draw_frame(
     frame: usize,
     quality: Quality,
 ) -> Result<(Vec<u8>, String)> {
-    let options = SceneOptions { culling: quality.culling, ..SceneOptions::default() };
-    let mut studio = Studio::new(terrain, options, quality.viewport)?;
+    let mut studio = Studio::new(terrain, PictureEngine::default(), quality.culling, quality.viewport)?;
     let view = |frame: &FlightFrame| View {
         vertical_exaggeration: quality.vertical_exaggeration,
         ..frame.view(quality.viewport, quality.tolerance_px)

@@ -18,7 +18,6 @@ use terrasoar::view::View;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::Haze;
 use terrasoar_scene::overview::{FOV_DEG, overview, towards_middle, view_from};
-use terrasoar_scene::studio::Studio;
 
 /// Draw a picture of a terrain as PNG.
 ///
@@ -108,7 +107,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let terrain = args.terrain.open()?;
     let views = args.views(&terrain)?;
     let picture = &args.picture;
-    let mut studio = Studio::new(&terrain, picture.scene(), picture.size)?;
+    let mut studio = picture.studio(&terrain)?;
     let progress = Meter::new("frames");
     progress.begin("flying", views.len() as u64);
     let mut triangles = 0;
@@ -123,7 +122,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.is_overview() {
         // A block on a table: no air between it and the eye.
         look.haze = Haze::Off;
-        studio.raise_walls(block_bottom_m(&terrain, picture.exaggeration));
+        studio.raise_walls(block_bottom_m(&terrain, picture.exaggeration))?;
     }
     let rgb = studio.picture(view, &look)?;
     let mut file = FileSink::create(&args.output)?;
@@ -131,7 +130,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         format!("{}: cannot write the picture; check the free space", args.output.display())
     })?;
     file.publish()?;
-    let [width, height] = [picture.size.width_px, picture.size.height_px];
+    let [width, height] = picture.size.size_px();
     let adapter = studio.capabilities();
     if args.json {
         return print_json(&Answer {

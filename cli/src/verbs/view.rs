@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         ramp: args.ramp.map(|ramp| ramp.name.to_owned()),
         tolerance_px: args.tolerance_px,
         exaggeration: args.exaggeration,
-        size_px: args.size.map(|size| [size.width_px, size.height_px]),
+        size_px: args.size.map(Viewport::size_px),
         narrate: args.narrate,
         drop: args.drop.clone(),
         exit_after_frames: args.exit_after_frames,

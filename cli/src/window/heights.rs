@@ -3,38 +3,35 @@
 //! A place outside the data or at a void has no height. Where records are away it is the height of the finest triangle at hand.
 
 use terrasoar::flight::generate::Ground;
-use terrasoar_layout::grid::Grid;
-use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_scene::feed::Feed;
+use terrasoar::ground::Ground as GroundOnShow;
 
 /// Heights of a terrain on show.
 pub(crate) struct SceneGround<'a> {
-    feed: &'a dyn Feed,
-    grid: Grid,
+    ground: &'a GroundOnShow<'static>,
 }
 
 impl<'a> SceneGround<'a> {
-    /// The ground of `terrain`, as `feed` knows it now.
-    pub(crate) fn new(terrain: &Terrain, feed: &'a dyn Feed) -> Self {
-        Self { feed, grid: *terrain.grid() }
+    /// The heights of `ground`, as it knows them now.
+    pub(crate) fn new(ground: &'a GroundOnShow<'static>) -> Self {
+        Self { ground }
     }
 
     /// Metres from sample to sample, east and north.
     pub(crate) fn spacing_m(&self) -> [f64; 2] {
-        self.grid.spacing_m()
+        self.ground.terrain().grid().spacing_m()
     }
 }
 
 impl Ground for SceneGround<'_> {
     fn extent_m(&self) -> [f64; 2] {
-        self.grid.extent_m()
+        self.ground.extent_m()
     }
 
     fn height_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
-        self.feed.ground_m(east_m, north_m)
+        self.ground.height_at(east_m, north_m).height_m
     }
 
     fn height_range_m(&self) -> [f64; 2] {
-        self.feed.height_range_m()
+        self.ground.height_range_m()
     }
 }

@@ -1,24 +1,27 @@
-//! The terrain on show: an opened file and its scene, opened, exchanged and closed as one.
+//! The terrain on show: an opened file, its ground and its scene, opened, exchanged and closed as one.
 //!
 //! The file is not mapped: pages of it are read by threads into memory of a fixed size, so that no frame waits for storage and nothing that happens to the file
 //! while it is on show ends the program.
 
 use super::heights::SceneGround;
-use anyhow::{Context, Result};
+use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use terrasoar::ground::{Ground, Refined, StreamOptions};
 use terrasoar::refine::Culling;
+use terrasoar::view::View;
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::Gpu;
-use terrasoar_scene::scene::{Scene, SceneOptions, TileService};
+use terrasoar_render::{Gpu, Look, Target, wgpu};
+use terrasoar_scene::scene::{Drawn, Scene, SceneOptions, TileService};
 
 /// Normal tiles a frame: each takes some 2 ms, and more would be felt.
 const TILES_A_FRAME: usize = 3;
 
 /// A terrain on show.
 pub(crate) struct Stage {
-    terrain: Arc<Terrain>,
-    pub scene: Scene<'static>,
+    pub ground: Ground<'static>,
+    pub scene: Scene,
     culling: Culling,
     cache_bytes: u64,
 }
@@ -27,13 +30,13 @@ impl Stage {
     /// Shows an opened terrain, with `cache_bytes` of memory for its pages.
     ///
     /// # Errors
-    /// What [`Scene::streamed`] says.
+    /// What [`Ground::streamed`] and [`Scene::new`] say.
     pub(crate) fn new(terrain: Terrain, gpu: &Gpu, culling: Culling, cache_bytes: u64) -> Result<Self> {
-        let options =
-            SceneOptions { culling, tiles: TileService::AFrame(TILES_A_FRAME), ..Default::default() };
-        let terrain = Arc::new(terrain);
-        let scene = Scene::streamed(&terrain, cache_bytes, gpu, options)?;
-        Ok(Self { terrain, scene, culling, cache_bytes })
+        let how = StreamOptions::default().culling(culling).cache_bytes(cache_bytes);
+        let ground = Ground::streamed(Arc::new(terrain), &how)?;
+        let options = SceneOptions { tiles: TileService::AFrame(TILES_A_FRAME), ..Default::default() };
+        let scene = Scene::new(&ground, gpu, options)?;
+        Ok(Self { ground, scene, culling, cache_bytes })
     }
 
     /// Opens a terrain file.
@@ -49,33 +52,67 @@ impl Stage {
     /// # Errors
     /// As [`Stage::open`].
     pub(crate) fn again(&self, gpu: &Gpu) -> Result<Self> {
-        Self::new(self.terrain.open_again_unmapped()?, gpu, self.culling, self.cache_bytes)
+        Self::new(self.terrain().open_again_unmapped()?, gpu, self.culling, self.cache_bytes)
     }
 
     /// The same terrain culled in another way, with whatever was edited.
     ///
     /// # Errors
-    /// As [`Scene::set_culling`]; the stage is then as it was.
-    pub(crate) fn set_culling(&mut self, culling: Culling, gpu: &Gpu) -> Result<()> {
+    /// Ground that cannot be culled in another way; it is then as it was.
+    pub(crate) fn set_culling(&mut self, culling: Culling) -> Result<()> {
         if culling != self.culling {
-            self.scene.set_culling(culling, gpu).context("the way of culling stays as it was")?;
+            if !self.ground.set_culling(culling) {
+                bail!("the way of culling stays as it was");
+            }
             self.culling = culling;
         }
         Ok(())
     }
 
+    /// Brings the mesh to a view.
+    pub(crate) fn update(&mut self, view: &View) -> Refined {
+        self.ground.update(view)
+    }
+
+    /// Records a picture into `encoder`; `frozen` is the view that the mesh was refined for, where that is another.
+    ///
+    /// # Errors
+    /// What the scene says.
+    pub(crate) fn draw(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: Target<'_>,
+        view: &View,
+        look: &Look,
+        frozen: Option<&View>,
+    ) -> Result<Drawn> {
+        let drawn = self.scene.sync(&mut self.ground, encoder, view, look)?;
+        self.scene.draw(encoder, target, view, look, frozen)?;
+        Ok(drawn)
+    }
+
+    /// Whether something that the last picture lacked is on its way.
+    pub(crate) fn is_waiting(&self) -> bool {
+        self.ground.is_waiting() || self.scene.is_waiting()
+    }
+
+    /// What could not be read and nobody has heard of yet.
+    pub(crate) fn take_error(&mut self) -> Option<LayoutError> {
+        self.ground.take_error().or_else(|| self.scene.take_error())
+    }
+
     /// The terrain file.
     pub(crate) fn path(&self) -> PathBuf {
-        self.terrain.path().to_path_buf()
+        self.terrain().path().to_path_buf()
     }
 
     /// The opened terrain.
     pub(crate) fn terrain(&self) -> &Terrain {
-        &self.terrain
+        self.ground.terrain()
     }
 
-    /// Its ground.
-    pub(crate) fn ground(&self) -> SceneGround<'_> {
-        SceneGround::new(&self.terrain, self.scene.feed())
+    /// Its heights.
+    pub(crate) fn heights(&self) -> SceneGround<'_> {
+        SceneGround::new(&self.ground)
     }
 }

@@ -115,7 +115,7 @@ impl Viewer {
         let overlay = Overlay::new(&window, &display, &screen);
         let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
         let rig = sight::start(&stage, &screen, &window, &settings);
-        let tools = ToolBox::new(stage.ground().extent_m());
+        let tools = ToolBox::new(stage.heights().extent_m());
         let workshop = edit::workshop_for(&stage, &proxy);
         let mut viewer = Self {
             terrain_name: String::new(),
@@ -207,7 +207,7 @@ impl Viewer {
         let pointer = self.hand.pointer.filter(|_| !self.overlay.has_pointer());
         self.under = self.pick(pointer);
         if let Some(hit) = &self.under {
-            self.stage.scene.feed_mut().want_ground(hit.at_m.x, hit.at_m.y);
+            self.stage.ground.want_height(hit.at_m.x, hit.at_m.y);
         }
         self.look_after_edits();
         self.go_on_with_stroke();
@@ -238,7 +238,7 @@ impl Viewer {
         let waits = [
             Some(again),
             // What cannot be read now is tried again.
-            (self.job.is_some() || self.is_saving() || self.unshown || self.stage.scene.feed().lacks_pages())
+            (self.job.is_some() || self.is_saving() || self.unshown || self.stage.ground.lacks_pages())
                 .then_some(LOOKS),
             news.map(|until| until.saturating_duration_since(now)),
         ];
@@ -260,7 +260,7 @@ impl Viewer {
         }
         let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
         let span_s = if rig.is_gliding() { played_s } else { span_s };
-        rig.advance(span_s, &controls, &self.stage.ground(), exaggeration);
+        rig.advance(span_s, &controls, &self.stage.heights(), exaggeration);
     }
 
     fn look_after_job(&mut self) {

@@ -200,7 +200,7 @@ impl ComparisonReport<'_> {
             terrain: &self.title.terrain,
             flight: &self.title.flight,
             tolerance_px: self.title.tolerance_px,
-            viewport_px: [self.title.viewport.width_px, self.title.viewport.height_px],
+            viewport_px: self.title.viewport.size_px(),
             comparison: self.comparison,
             tolerance_sweep: self.tolerance_sweep,
             incoherence_sweep: self.incoherence_sweep,

@@ -17,6 +17,8 @@ use crate::read::terrain::Terrain;
 pub struct Imagery {
     section: Section,
     entries: Vec<TileEntry>,
+    /// The opened terrain whose imagery it is.
+    of: u64,
 }
 
 impl Imagery {
@@ -59,7 +61,7 @@ impl Imagery {
             let problem = "it holds another number of tiles or bytes than the imagery header says";
             return Err(damaged(path, "imagery directory".into(), problem));
         }
-        Ok(Self { section, entries })
+        Ok(Self { section, entries, of: terrain.instance() })
     }
 
     /// What all tiles have in common, and where the image lies.
@@ -101,7 +103,7 @@ impl Imagery {
     /// last texels are repeated. `Ok(false)` where there is no tile; `texels` is empty then.
     ///
     /// # Errors
-    /// [`LayoutError::Damaged`] naming the tile if it does not match its checksum; I/O.
+    /// [`LayoutError::Damaged`] naming the tile if it does not match its checksum; [`LayoutError::Usage`] for another terrain than the one that it was opened of; I/O.
     pub fn read_tile(
         &self,
         terrain: &Terrain,
@@ -126,6 +128,12 @@ impl Imagery {
         texels: &mut Vec<u8>,
     ) -> Result<Option<TileEntry>, LayoutError> {
         texels.clear();
+        if terrain.instance() != self.of {
+            return Err(LayoutError::Usage(format!(
+                "{}: the image was opened of another terrain; open it of this one",
+                terrain.path().display()
+            )));
+        }
         let Some(entry) = self.entry(id) else { return Ok(None) };
         texels.resize(entry.bytes as usize, 0);
         terrain.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, texels)?;
@@ -146,9 +154,9 @@ impl Imagery {
         &self.entries
     }
 
-    /// Imagery from what its first page says and its directory.
-    pub(super) fn of(section: Section, entries: Vec<TileEntry>) -> Self {
-        Self { section, entries }
+    /// Imagery of the same opened terrain, from what its first page says and its directory.
+    pub(super) fn with(&self, section: Section, entries: Vec<TileEntry>) -> Self {
+        Self { section, entries, of: self.of }
     }
 
     /// Whether a tile lies at the same place in the file as that of `other`.

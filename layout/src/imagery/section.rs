@@ -84,8 +84,8 @@ impl Section {
             TileFormat::Rgba8 => 3,
         };
         p[0x00b] = 1;
-        put_u32(p, 0x00c, self.shape.tile_texels);
-        put_u32(p, 0x010, self.shape.border);
+        put_u32(p, 0x00c, TILE_TEXELS);
+        put_u32(p, 0x010, BORDER_TEXELS);
         put_u32(p, 0x014, self.shape.texels[0]);
         put_u32(p, 0x018, self.shape.texels[1]);
         put_u32(p, 0x01c, self.shape.levels);

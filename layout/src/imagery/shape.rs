@@ -55,15 +55,28 @@ impl TileFormat {
     }
 }
 
-/// A tile of the pyramid.
+/// A tile of a pyramid: of an image, or of what else covers a terrain in squares, each level twice as coarse as the one below.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TileId {
     /// Level: 0 is the finest.
     pub level: u32,
-    /// Tiles east of the image's south-west corner.
+    /// Tiles east of the south-west corner.
     pub x: u32,
     /// Tiles north of it.
     pub y: u32,
+}
+
+impl TileId {
+    /// The tile of the next coarser level that covers this one.
+    pub fn parent(self) -> Self {
+        Self { level: self.level + 1, x: self.x / 2, y: self.y / 2 }
+    }
+}
+
+impl std::fmt::Display for TileId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}/{}", self.level, self.x, self.y)
+    }
 }
 
 /// What all tiles have in common, and where the image lies.
@@ -76,10 +89,6 @@ pub struct ImageryShape {
     pub format: TileFormat,
     /// Texels east and north at level 0, 1 to 4,194,304.
     pub texels: [u32; 2],
-    /// Texels a side of a tile: [`TILE_TEXELS`].
-    pub tile_texels: u32,
-    /// Texels on each side of a tile that repeat its neighbours': [`BORDER_TEXELS`].
-    pub border: u32,
     /// Levels; the coarsest is one tile.
     pub levels: u32,
     /// South-west corner of the image, the outer corner of its first texel, in metres east and north of the terrain's south-west sample.
@@ -89,18 +98,10 @@ pub struct ImageryShape {
 }
 
 impl ImageryShape {
-    /// The shape of an image of `texels` (1 to 4,194,304 a side).
-    pub(super) fn new(format: TileFormat, texels: [u32; 2], origin_m: [f64; 2], texel_m: [f64; 2]) -> Self {
-        let mut shape = Self {
-            format,
-            texels,
-            tile_texels: TILE_TEXELS,
-            border: BORDER_TEXELS,
-            levels: 1,
-            origin_m,
-            texel_m,
-        };
-        while shape.tile_count(shape.levels - 1) != [1, 1] {
+    /// The shape of an image of `texels` (1 to 4,194,304 a side), with all levels up to the first that is one tile.
+    pub fn new(format: TileFormat, texels: [u32; 2], origin_m: [f64; 2], texel_m: [f64; 2]) -> Self {
+        let mut shape = Self { format, texels, levels: 1, origin_m, texel_m };
+        while shape.tile_count(shape.levels - 1).iter().any(|tiles| *tiles > 1) {
             shape.levels += 1;
         }
         shape

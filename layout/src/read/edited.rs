@@ -4,7 +4,7 @@
 
 use super::prefetch::prefetch;
 use super::records::Records;
-use super::store::{RawOf, RecordShape, RecordStore, page_shift};
+use super::store::{CompleteStore, RawOf, RecordShape, RecordStore, byte_in_page, page_of};
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
 use crate::grid::record::RecordCodec;
@@ -24,9 +24,6 @@ pub struct EditedRecords<'a, C: RecordCodec> {
 }
 
 impl<'a, C: RecordCodec> EditedRecords<'a, C> {
-    /// Binary logarithm of the records a page.
-    const PAGE_SHIFT: u32 = page_shift::<C>();
-
     /// The records as the file has them.
     pub fn new(records: Records<'a, C>) -> Self {
         let own = vec![FILES; records.page_count()];
@@ -61,11 +58,13 @@ impl<'a, C: RecordCodec> EditedRecords<'a, C> {
     /// Own page and byte in it of a slot; `None` if it is the file's.
     #[inline(always)]
     fn place(&self, slot: u64) -> Option<usize> {
-        let own = *self.own.get((slot >> Self::PAGE_SHIFT) as usize)?;
-        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        let own = *self.own.get(page_of::<C>(slot) as usize)?;
+        let within = byte_in_page::<C>(slot);
         (own != FILES).then(|| (own as usize - 1) * PAGE_BYTES + within)
     }
 }
+
+impl<C: RecordCodec> CompleteStore for EditedRecords<'_, C> {}
 
 impl<C: RecordCodec> RecordStore for EditedRecords<'_, C> {
     type Codec = C;

@@ -8,7 +8,7 @@
 //! System", 1968). Cost: 4 bytes a logical page of the file, a load more than a mapped file a record.
 
 use super::prefetch::prefetch;
-use super::store::{RawOf, RecordShape, RecordStore, page_shift};
+use super::store::{RawOf, RecordShape, RecordStore, byte_in_page, page_of};
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
@@ -41,9 +41,6 @@ pub struct PagePool<C> {
 }
 
 impl<C: RecordCodec> PagePool<C> {
-    /// Binary logarithm of the records a page.
-    const PAGE_SHIFT: u32 = page_shift::<C>();
-
     /// A pool for `terrain` of at most `cache_bytes`, 72 KiB at the least, holding page 0. Reads that page.
     ///
     /// # Errors
@@ -176,7 +173,7 @@ impl<C: RecordCodec> RecordStore for PagePool<C> {
 
     #[inline(always)]
     fn get(&self, slot: u64) -> Option<RawOf<Self>> {
-        let frame = self.frames[(slot >> Self::PAGE_SHIFT) as usize];
+        let frame = self.frames[page_of::<C>(slot) as usize];
         if frame == AWAY {
             return None;
         }
@@ -186,15 +183,15 @@ impl<C: RecordCodec> RecordStore for PagePool<C> {
         if !recent.load(Ordering::Relaxed) {
             recent.store(true, Ordering::Relaxed);
         }
-        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        let within = byte_in_page::<C>(slot);
         let at = frame * PAGE_BYTES + within;
         Some(C::read(&self.bytes[at..at + C::BYTES]))
     }
 
     #[inline(always)]
     fn prefetch(&self, slot: u64) {
-        if let Some(frame) = self.frames.get((slot >> Self::PAGE_SHIFT) as usize).filter(|f| **f != AWAY) {
-            let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        if let Some(frame) = self.frames.get(page_of::<C>(slot) as usize).filter(|f| **f != AWAY) {
+            let within = byte_in_page::<C>(slot);
             prefetch(&self.bytes, *frame as usize * PAGE_BYTES + within);
         }
     }

@@ -3,7 +3,7 @@
 //! Invariant: every page number in the table lies inside the bytes.
 
 use super::prefetch::prefetch;
-use super::store::{RecordShape, RecordStore, page_shift};
+use super::store::{CompleteStore, RecordShape, RecordStore, byte_in_page, page_of};
 use super::terrain::Terrain;
 use crate::file::bytes::PAGE_BYTES;
 use crate::file::header::INERT_PAGE;
@@ -48,9 +48,6 @@ pub struct Records<'a, C: RecordCodec> {
 }
 
 impl<'a, C: RecordCodec> Records<'a, C> {
-    /// Binary logarithm of the records a page.
-    const PAGE_SHIFT: u32 = page_shift::<C>();
-
     pub(crate) fn new(terrain: &'a Terrain, bytes: Slices<'a>, codec: C) -> Self {
         Self { bytes, pages: terrain.pages(), shape: terrain.shape(codec) }
     }
@@ -81,28 +78,22 @@ impl<'a, C: RecordCodec> Records<'a, C> {
         C::BYTES
     }
 
-    /// Logical page of a slot.
-    #[inline(always)]
-    pub fn page_of(slot: u64) -> u64 {
-        slot >> Self::PAGE_SHIFT
-    }
-
     /// The record at `slot`, not yet decoded. Reading records early, before they are needed, hides the time memory takes.
     ///
     /// # Panics
     /// For a slot past the last page.
     #[inline(always)]
     pub fn raw(&self, slot: u64) -> C::Raw {
-        let page = self.pages[(slot >> Self::PAGE_SHIFT) as usize] as usize + INERT_PAGE as usize;
-        let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        let page = self.pages[page_of::<C>(slot) as usize] as usize + INERT_PAGE as usize;
+        let within = byte_in_page::<C>(slot);
         self.bytes.record::<C>(page * PAGE_BYTES + within)
     }
 
     /// Asks memory for the record at `slot`. A hint: reads nothing, and does nothing for a slot past the last page.
     #[inline(always)]
     pub fn prefetch(&self, slot: u64) {
-        if let Some(page) = self.pages.get((slot >> Self::PAGE_SHIFT) as usize) {
-            let within = (slot as usize & ((1 << Self::PAGE_SHIFT) - 1)) * C::BYTES;
+        if let Some(page) = self.pages.get(page_of::<C>(slot) as usize) {
+            let within = byte_in_page::<C>(slot);
             prefetch(self.bytes.first, (*page + INERT_PAGE) as usize * PAGE_BYTES + within);
         }
     }
@@ -128,6 +119,8 @@ impl<'a, C: RecordCodec> Records<'a, C> {
         self.vertex(slot_of(self.grid().k(), p), level)
     }
 }
+
+impl<C: RecordCodec> CompleteStore for Records<'_, C> {}
 
 impl<C: RecordCodec> RecordStore for Records<'_, C> {
     type Codec = C;

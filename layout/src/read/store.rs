@@ -3,6 +3,7 @@
 //! [`Records`](super::records::Records) lends every record of a mapped file, [`EditedRecords`](super::edited::EditedRecords) those of one that is edited meanwhile; [`PagePool`](super::pool::PagePool) holds some pages of a file of any size and
 //! says which it lacks. An engine written for the trait flies over both; where all records are at hand, what it does about absent ones compiles to nothing.
 
+use crate::file::bytes::PAGE_BYTES;
 use crate::grid::order::slot_of;
 use crate::grid::record::{RecordCodec, Vertex};
 use crate::grid::{Grid, GridPoint};
@@ -23,9 +24,21 @@ pub struct RecordShape<C> {
 /// Record of a store.
 pub type RawOf<S> = <<S as RecordStore>::Codec as RecordCodec>::Raw;
 
-/// Binary logarithm of the records a page: a slot shifted right by it is its logical page.
-pub const fn page_shift<C: RecordCodec>() -> u32 {
-    (crate::file::bytes::PAGE_BYTES / C::BYTES).trailing_zeros()
+/// Records a page: a power of two.
+pub const fn records_per_page<C: RecordCodec>() -> u64 {
+    (PAGE_BYTES / C::BYTES) as u64
+}
+
+/// Logical page of a slot.
+#[inline(always)]
+pub const fn page_of<C: RecordCodec>(slot: u64) -> u64 {
+    slot >> const { records_per_page::<C>().trailing_zeros() }
+}
+
+/// Where the record of a slot begins in its page, in bytes.
+#[inline(always)]
+pub const fn byte_in_page<C: RecordCodec>(slot: u64) -> usize {
+    (slot & (records_per_page::<C>() - 1)) as usize * C::BYTES
 }
 
 /// Records by slot (FORMAT.md, section 2).
@@ -51,12 +64,12 @@ pub trait RecordStore: Send + Sync {
     /// Logical page of a slot.
     #[inline(always)]
     fn page_of(slot: u64) -> u64 {
-        slot >> page_shift::<Self::Codec>()
+        page_of::<Self::Codec>(slot)
     }
 
     /// Records a page.
     fn records_per_page() -> u64 {
-        (crate::file::bytes::PAGE_BYTES / Self::Codec::BYTES) as u64
+        records_per_page::<Self::Codec>()
     }
 
     /// Grid shape and spacing.
@@ -86,3 +99,8 @@ pub trait RecordStore: Send + Sync {
         self.shape().codec.decode(raw, level)
     }
 }
+
+/// A store in which every record is at hand, always: [`RecordStore::get`] has an answer for every slot that there is, and [`RecordStore::IS_COMPLETE`] says so.
+///
+/// Engines that read records without asking whether they are there take no other: over a pool they would take what is away for ground without detail.
+pub trait CompleteStore: RecordStore {}

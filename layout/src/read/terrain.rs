@@ -21,6 +21,7 @@ use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Ver
 use crate::grid::{Grid, GridPoint};
 use std::path::Path;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// An opened and checked terrain file.
 pub struct Terrain {
@@ -29,6 +30,8 @@ pub struct Terrain {
     entries: Vec<Entry>,
     /// Page of each logical page, counted from the inert page, which absent ones read as. Made when records are first asked for.
     pages: OnceLock<Vec<u32>>,
+    /// Which opened terrain of this process it is.
+    instance: u64,
 }
 
 impl std::fmt::Debug for Terrain {
@@ -83,7 +86,9 @@ impl Terrain {
     }
 
     pub(crate) fn of(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Self {
-        Self { source, header, entries, pages: OnceLock::new() }
+        static INSTANCES: AtomicU64 = AtomicU64::new(0);
+        let instance = INSTANCES.fetch_add(1, Ordering::Relaxed);
+        Self { source, header, entries, pages: OnceLock::new(), instance }
     }
 
     /// Opens any source.
@@ -104,6 +109,11 @@ impl Terrain {
             present.for_each(|(entry, page)| *page = entry.page - INERT_PAGE);
             pages
         })
+    }
+
+    /// A number that no other opened terrain of this process has, the same file opened twice included: what was made for one is not for another.
+    pub fn instance(&self) -> u64 {
+        self.instance
     }
 
     /// The file's name for messages.

@@ -12,6 +12,7 @@ use crate::file::header::{Header, INERT_PAGE};
 use crate::grid::order::{point_of, slot_of};
 use crate::grid::record::{RecordCodec, Vertex, VertexClass};
 use crate::grid::{Grid, GridPoint};
+use crate::read::store::{byte_in_page, page_of, records_per_page};
 use crate::read::terrain::Terrain;
 use rayon::prelude::*;
 
@@ -98,12 +99,8 @@ impl<'a, C: RecordCodec> Cache<'a, C> {
         Self { terrain, codec, damaged, held: std::iter::repeat_with(|| None).take(CACHED_PAGES).collect() }
     }
 
-    fn page_of(slot: u64) -> usize {
-        (slot / (PAGE_BYTES / C::BYTES) as u64) as usize
-    }
-
     fn is_absent(&self, slot: u64) -> bool {
-        self.terrain.entries().get(Self::page_of(slot)).is_none_or(|e| !e.is_present())
+        self.terrain.entries().get(page_of::<C>(slot) as usize).is_none_or(|e| !e.is_present())
     }
 
     fn page(&mut self, page: u32) -> Result<&Page, LayoutError> {
@@ -121,12 +118,12 @@ impl<'a, C: RecordCodec> Cache<'a, C> {
 
     /// The vertex at a slot; `None` on a damaged page.
     fn vertex(&mut self, slot: u64, level: u32) -> Result<Option<Vertex>, LayoutError> {
-        let page = Self::page_of(slot) as u32;
+        let page = page_of::<C>(slot) as u32;
         if !self.damaged.is_empty() && self.damaged.binary_search(&page).is_ok() {
             return Ok(None);
         }
         let codec = self.codec;
-        let at = (slot % (PAGE_BYTES / C::BYTES) as u64) as usize * C::BYTES;
+        let at = byte_in_page::<C>(slot);
         let bytes = self.page(page)?;
         Ok(Some(codec.decode(C::read(&bytes[at..]), level)))
     }
@@ -156,7 +153,7 @@ struct Walk<'a, C: RecordCodec> {
 impl<C: RecordCodec> Walk<'_, C> {
     /// Checks every record of a page; adds at most one problem, the first, with the number of all.
     fn page(&mut self, page: u32, tally: &mut Tally) -> Result<(), LayoutError> {
-        let per_page = (PAGE_BYTES / C::BYTES) as u64;
+        let per_page = records_per_page::<C>();
         let mut first: Option<String> = None;
         let mut count = 0u64;
         let start = u64::from(page) * per_page;
@@ -345,7 +342,7 @@ impl<C: RecordCodec> Walk<'_, C> {
                     "is not inert and its parent ({}, {}) is, on the absent record page {}",
                     parent.x(),
                     parent.y(),
-                    Cache::<C>::page_of(slot)
+                    page_of::<C>(slot)
                 )
             })
         })

@@ -88,6 +88,15 @@ impl MeshBuffers {
         }
     }
 
+    /// Forgets all vertices and triangles.
+    pub(crate) fn clear(&mut self, device: &wgpu::Device) {
+        self.vertices = create(device, Kind::Vertices, FIRST_SLOTS * VERTEX_BYTES);
+        self.indices = create(device, Kind::Triangles, FIRST_SLOTS * TRIANGLE_BYTES);
+        self.draws.clear();
+        (self.vertex_slots, self.triangle_slots) = (0, 0);
+        self.generation += 1;
+    }
+
     /// Records the patch into `encoder`. Nothing is changed when it returns an error.
     pub(crate) fn apply(
         &mut self,

@@ -9,6 +9,8 @@ use crate::error::{RenderError, Result};
 pub(crate) struct DrawList {
     /// Ascending, disjoint, not touching.
     pub ranges: Vec<Range<u32>>,
+    /// How often they were replaced.
+    pub number: u64,
 }
 
 impl DrawList {
@@ -17,6 +19,7 @@ impl DrawList {
         if let Some(bad) = draws.iter().find(|r| r.end > uploaded && r.start < r.end) {
             return Err(RenderError::RangeOutside { start: bad.start, end: bad.end, uploaded });
         }
+        self.number += 1;
         self.ranges.clear();
         self.ranges.extend(draws.iter().filter(|r| r.start < r.end).cloned());
         if !self.ranges.is_sorted_by_key(|r| r.start) {
@@ -31,6 +34,12 @@ impl DrawList {
             touches
         });
         Ok(())
+    }
+
+    /// Forgets all ranges.
+    pub(crate) fn clear(&mut self) {
+        self.number += 1;
+        self.ranges.clear();
     }
 
     /// Triangle slots in all ranges.

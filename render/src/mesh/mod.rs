@@ -13,33 +13,7 @@ pub(crate) use morph::Morph;
 
 use std::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
-
-/// One vertex of the mesh as the device holds it.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct MeshVertex {
-    /// Grid column, eastward; padding folded onto the data already. At most 2^24.
-    pub x: u32,
-    /// Grid row, northward. At most 2^24.
-    pub y: u32,
-    /// Height in metres, before exaggeration.
-    pub height_m: f32,
-    /// Saturated error in metres, before exaggeration; at least 0, may be infinite.
-    pub error_m: f32,
-    /// Nested-sphere radius in metres.
-    pub radius_m: f32,
-    /// Vertex slots of the two ends of the edge that this vertex splits: where it comes from when it appears. Its own slot, twice, for
-    /// corners and the centre. Both must hold vertices whenever this one is drawn, as in a conforming mesh they do.
-    pub ends: [u32; 2],
-    /// Bits 0 to 7: level, 0 the finest, [`MeshVertex::NO_LEVEL`] for corners. Other bits are reserved, 0.
-    pub flags: u32,
-}
-
-impl MeshVertex {
-    /// Level of a vertex that splits no edge.
-    pub const NO_LEVEL: u32 = 255;
-}
+use terrasoar::refine::kinetic::MeshVertex;
 
 /// What changed in the mesh, and what of it is seen.
 #[derive(Debug, Clone, Copy, Default)]

@@ -3,7 +3,7 @@
 //!
 //! Cost: sorting the patch, unless it came sorted. Keeps its arrays.
 
-use super::MeshVertex;
+use terrasoar::refine::kinetic::MeshVertex;
 
 /// Words of one vertex entry: slot and content.
 pub(super) const VERTEX_WORDS: usize = 9;
@@ -29,8 +29,7 @@ impl PatchPacker {
         let vertex_count = sort_slots(&mut self.order, vertices);
         for &i in &self.order {
             let (slot, vertex) = &vertices[i as usize];
-            self.words.push(*slot);
-            self.words.extend_from_slice(bytemuck::cast_slice(std::slice::from_ref(vertex)));
+            self.words.extend_from_slice(&vertex_words(*slot, vertex));
         }
         let vertex_end = self.order.last().map_or(0, |&i| u64::from(vertices[i as usize].0) + 1);
         let triangle_count = sort_slots(&mut self.order, triangles);
@@ -42,6 +41,12 @@ impl PatchPacker {
         let triangle_end = self.order.last().map_or(0, |&i| u64::from(triangles[i as usize].0) + 1);
         ([vertex_count, triangle_count], [vertex_end, triangle_end])
     }
+}
+
+/// A vertex as the shaders read it, behind its slot.
+fn vertex_words(slot: u32, vertex: &MeshVertex) -> [u32; VERTEX_WORDS] {
+    let MeshVertex { x, y, height_m, error_m, radius_m, ends, flags } = *vertex;
+    [slot, x, y, height_m.to_bits(), error_m.to_bits(), radius_m.to_bits(), ends[0], ends[1], flags]
 }
 
 /// Positions of the entries by ascending slot, of equal slots the last.

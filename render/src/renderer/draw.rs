@@ -1,27 +1,104 @@
 //! The parts of a frame, in order: what the device must have, the frame's numbers, the pass, what is drawn in it.
 
 use super::{INDIRECT_FROM, Renderer, UNIFORM_PLACES};
-use crate::attachments::{Attachments, Key};
-use crate::frame::{Frame, Target};
-use crate::look::Look;
+use crate::attachments::Attachments;
+use crate::error::{RenderError, Result};
+use crate::frame::{DepthRange, DrawStats, Frame, PassFormat, Target};
 use crate::pipelines::{Pipelines, Variant};
 use crate::uniforms::{Inputs, Uniforms};
-use crate::view::FrameView;
+use crate::view;
 use std::ops::Range;
+use terrasoar::view::View;
 use wgpu::util::DeviceExt;
 
+/// A frame whose numbers are on their way to the device.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The renderer that prepared it.
+    renderer: u64,
+    /// Where its numbers lie.
+    place: u64,
+    variant: Variant,
+    own_vertices: bool,
+    /// The bindings that it was prepared with.
+    group: wgpu::BindGroup,
+    /// Visible ranges for the device to draw by itself.
+    arguments: Option<wgpu::Buffer>,
+    /// State of the mesh.
+    generation: u64,
+    draws: u64,
+}
+
 impl Renderer {
-    /// Has everything made that a frame of this kind needs on the device.
-    pub(super) fn prepare(&mut self, target: Target<'_>, variant: Variant, look: &Look) {
-        let key = Key { size_px: target.size_px, format: target.format, samples: variant.samples };
-        self.attachments = Some(Attachments::keep_or_make(self.attachments.take(), &self.device, key));
+    /// As [`Renderer::prepare`], timed from the first command on where the device can.
+    pub(super) fn prepare_timed(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        format: &PassFormat,
+        frame: Frame<'_>,
+        timing: Option<usize>,
+    ) -> Result<Prepared> {
+        let refined_for = frame.refined_for.unwrap_or(frame.view);
+        view::check(frame.view)?;
+        view::check(refined_for)?;
+        let variant = Variant::of(frame.look, self.imagery.is_some(), *format);
         self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(&self.device, &self.modules, variant));
-        self.set_ramp(look.ramp);
+        self.set_ramp(frame.look.ramp);
         self.bind();
+        let Some((generation, group)) = self.bind_group.clone() else {
+            return Err(RenderError::Usage("a frame was begun without its parts"));
+        };
+        let place = self.send_uniforms(&frame, refined_for, format.depth_range);
+        let own_vertices = frame.look.needs_own_vertices();
+        if frame.look.morph {
+            let timed = self.timer.as_ref().zip(timing);
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("morph"),
+                timestamp_writes: timed.map(|(timer, place)| timer.begins_with_compute(place)),
+            });
+            self.morph.record(&mut pass, self.mesh.vertex_slots, place as u32);
+        }
+        let arguments = self.draw_arguments(own_vertices);
+        Ok(Prepared {
+            renderer: self.instance,
+            place,
+            variant,
+            own_vertices,
+            group,
+            arguments,
+            generation,
+            draws: self.mesh.draws.number,
+        })
+    }
+
+    /// As [`Renderer::draw`].
+    pub(super) fn draw_prepared(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        prepared: &Prepared,
+        sky: bool,
+    ) -> Result<DrawStats> {
+        let is_of_now = self.instance == prepared.renderer
+            && self.mesh.generation == prepared.generation
+            && self.mesh.draws.number == prepared.draws;
+        let (true, Some(pipelines)) = (is_of_now, self.pipelines.get(&prepared.variant)) else {
+            return Err(RenderError::Usage(
+                "the frame was prepared before the mesh changed, or by another renderer",
+            ));
+        };
+        pass.set_bind_group(0, &prepared.group, &[prepared.place as u32]);
+        let arguments = prepared.arguments.as_ref();
+        let draw_calls = self.draw_parts(pass, pipelines, prepared.own_vertices, arguments, sky);
+        Ok(DrawStats {
+            triangles: self.mesh.draws.triangles(),
+            ranges: self.mesh.draws.ranges.len() as u32,
+            draw_calls,
+            bytes: size_of::<Uniforms>() as u64 + arguments.map_or(0, wgpu::Buffer::size),
+        })
     }
 
     /// Sends a frame's numbers to the device; the byte at which they lie.
-    pub(super) fn send_uniforms(&mut self, frame: &Frame<'_>, refined_for: &FrameView) -> u64 {
+    fn send_uniforms(&mut self, frame: &Frame<'_>, refined_for: &View, depth_range: DepthRange) -> u64 {
         let uniforms = Uniforms::new(&Inputs {
             terrain: &self.terrain,
             pyramid: &self.tiles.pyramid,
@@ -30,6 +107,7 @@ impl Renderer {
             look: frame.look,
             imagery: self.imagery.as_ref(),
             wall_bottom_m: self.walls.as_ref().map_or(0.0, |w| w.bottom_m),
+            depth_range,
         });
         let place = self.uniform_stride * self.next_place;
         self.next_place = (self.next_place + 1) % UNIFORM_PLACES;
@@ -38,7 +116,7 @@ impl Renderer {
     }
 
     /// The visible ranges for the device to draw by itself, where that is worth it.
-    pub(super) fn draw_arguments(&self, own_vertices: bool) -> Option<wgpu::Buffer> {
+    fn draw_arguments(&self, own_vertices: bool) -> Option<wgpu::Buffer> {
         let is_worth_it = self.multi_draw && !own_vertices && self.mesh.draws.ranges.len() >= INDIRECT_FROM;
         is_worth_it.then(|| {
             self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -49,16 +127,17 @@ impl Renderer {
         })
     }
 
-    /// Draws ground, walls and sky; how many calls that took.
-    pub(super) fn draw(
+    /// Draws ground, walls and, if asked for, sky; how many calls that took.
+    fn draw_parts(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &Pipelines,
         own_vertices: bool,
         arguments: Option<&wgpu::Buffer>,
+        sky: bool,
     ) -> u32 {
         let ranges = &self.mesh.draws.ranges;
-        let mut calls = 1;
+        let mut calls = 0;
         if own_vertices {
             pass.set_pipeline(&pipelines.own);
             for Range { start, end } in ranges {
@@ -84,8 +163,11 @@ impl Renderer {
             pass.draw(0..6, 0..walls.count);
             calls += 1;
         }
-        pass.set_pipeline(&pipelines.sky);
-        pass.draw(0..3, 0..1);
+        if sky {
+            pass.set_pipeline(&pipelines.sky);
+            pass.draw(0..3, 0..1);
+            calls += 1;
+        }
         calls
     }
 }

@@ -7,23 +7,28 @@
 mod draw;
 mod imagery;
 
+pub use draw::Prepared;
 use draw::begin_pass;
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use wgpu::util::DeviceExt;
 
-use crate::attachments::Attachments;
+use crate::attachments::{Attachments, Key};
 use crate::error::{RenderError, Result};
-use crate::frame::{DrawStats, Frame, RendererOptions, Target};
+use crate::frame::{DepthRange, DrawStats, Frame, PassFormat, RendererOptions, Target};
 use crate::mesh::{MeshBuffers, MeshPatch, Morph, UploadStats};
 use crate::pipelines::{Modules, Pipelines, Variant, bind_group_layout};
 use crate::ramps::Ramp;
 use crate::tiles::{
-    GRADIENT_FORMAT, Imagery, Pyramid, TILE_CELLS, TileId, TilePool, TileStats, WantedTiles, pack_gradients,
+    GRADIENT_FORMAT, Imagery, Pyramid, TILE_CELLS, TilePool, TileStats, WantedTiles, pack_gradients,
 };
 use crate::timing::GpuTimer;
 use crate::uniforms::Uniforms;
-use crate::view::{FrameView, TerrainShape, near_m};
+use crate::view::{TerrainShape, clip_from_eye, near_m};
+use glam::Mat4;
+use terrasoar::view::View;
+use terrasoar_layout::imagery::TileId;
 
 /// Frames whose commands may wait in one submission.
 const UNIFORM_PLACES: u64 = 16;
@@ -37,6 +42,8 @@ pub struct Renderer {
     device: wgpu::Device,
     queue: wgpu::Queue,
     terrain: TerrainShape,
+    /// Which renderer of this process it is.
+    instance: u64,
     multi_draw: bool,
     mesh: MeshBuffers,
     morph: Morph,
@@ -78,12 +85,14 @@ impl Renderer {
         terrain: TerrainShape,
         options: RendererOptions,
     ) -> Result<Self> {
+        static INSTANCES: AtomicU64 = AtomicU64::new(0);
         terrain.check()?;
         let layout = bind_group_layout(device);
         let uniform_stride = (size_of::<Uniforms>() as u64)
             .next_multiple_of(u64::from(device.limits().min_uniform_buffer_offset_alignment));
         let tile_layout = crate::tiles::TileLayout { format: GRADIENT_FORMAT, texels: TILE_CELLS + 1 };
         Ok(Self {
+            instance: INSTANCES.fetch_add(1, Ordering::Relaxed),
             mesh: MeshBuffers::new(device),
             morph: Morph::new(device),
             walls: None,
@@ -152,6 +161,11 @@ impl Renderer {
         });
     }
 
+    /// Forgets the mesh: the next patch is applied to an empty one. Walls stay along the slots that they were set by.
+    pub fn clear_mesh(&mut self) {
+        self.mesh.clear(&self.device);
+    }
+
     /// Records the frame into `encoder`: clears the target, draws ground, walls and sky. What the caller records after
     /// it, such as an overlay, comes on top. At most 16 frames may lie in one submission.
     ///
@@ -164,51 +178,60 @@ impl Renderer {
         target: Target<'_>,
         frame: Frame<'_>,
     ) -> Result<DrawStats> {
-        let refined_for = frame.refined_for.unwrap_or(frame.view);
-        frame.view.check()?;
-        refined_for.check()?;
         if target.size_px.contains(&0) {
             return Err(RenderError::Usage("a target needs at least one pixel"));
         }
-        let variant = Variant::of(frame.look, self.imagery.is_some(), target.format);
-        self.prepare(target, variant, frame.look);
-        let place = self.send_uniforms(&frame, refined_for);
-        let arguments = self.draw_arguments(frame.look.needs_own_vertices());
-        let mut stats = DrawStats {
-            triangles: self.mesh.draws.triangles(),
-            ranges: self.mesh.draws.ranges.len() as u32,
-            draw_calls: 0,
-            bytes: size_of::<Uniforms>() as u64 + arguments.as_ref().map_or(0, wgpu::Buffer::size),
-        };
-
-        let (Some(attachments), Some((_, group)), Some(pipelines)) =
-            (&self.attachments, &self.bind_group, self.pipelines.get(&variant))
-        else {
-            return Err(RenderError::Usage("a frame was begun without its parts"));
-        };
-        let timed = self.timer.as_ref().and_then(|t| t.begin().map(|place| (t, place)));
-        if frame.look.morph {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some("morph"),
-                timestamp_writes: timed.map(|(timer, place)| timer.begins_with_compute(place)),
-            });
-            self.morph.record(&mut pass, self.mesh.vertex_slots, place as u32);
-        }
+        let format = PassFormat::new(target.format).samples(if frame.look.multisample { 4 } else { 1 });
+        let timing = self.timer.as_ref().and_then(GpuTimer::begin);
+        let prepared = self.prepare_timed(encoder, &format, frame, timing)?;
+        let key = Key { size_px: target.size_px, format: target.format, samples: format.samples };
+        let attachments = Attachments::keep_or_make(self.attachments.take(), &self.device, key);
+        let timed = self.timer.as_ref().zip(timing);
         let timestamps = timed.map(|(timer, place)| timer.ends_with_render(place, !frame.look.morph));
-        let mut pass = begin_pass(encoder, attachments, target, timestamps);
-        pass.set_bind_group(0, group, &[place as u32]);
-        stats.draw_calls =
-            self.draw(&mut pass, pipelines, frame.look.needs_own_vertices(), arguments.as_ref());
+        let mut pass = begin_pass(encoder, &attachments, target, timestamps);
+        let stats = self.draw_prepared(&mut pass, &prepared, true)?;
         drop(pass);
         if let Some((timer, place)) = timed {
             timer.end(place, encoder);
         }
+        self.attachments = Some(attachments);
         Ok(stats)
+    }
+
+    /// Records into `encoder` all that a frame needs before its render pass, which is the caller's and like `format` says: the numbers of the view, and the
+    /// movement of vertices. [`Renderer::draw`] then draws the frame in that pass. At most 16 frames may lie in one submission.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Usage`] for a view that is none.
+    pub fn prepare(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        format: &PassFormat,
+        frame: Frame<'_>,
+    ) -> Result<Prepared> {
+        self.prepare_timed(encoder, format, frame, None)
+    }
+
+    /// Draws a frame that was prepared last into the caller's pass: ground, walls and, if asked for, the sky where nothing was drawn yet. Clears nothing. Leaves pipeline, bind group 0, index and
+    /// vertex buffer of the pass changed.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Usage`] for a frame of another renderer, or one whose mesh was changed since.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, prepared: &Prepared, sky: bool) -> Result<DrawStats> {
+        self.draw_prepared(pass, prepared, sky)
+    }
+
+    /// From metres east, north and up of a view's eye, heights exaggerated, to clip space, as the ground is drawn: for whatever else is drawn in the same pass. Take
+    /// the eye off in double precision first.
+    pub fn clip_from_eye(&self, view: &View, range: DepthRange) -> Mat4 {
+        clip_from_eye(view.axes(), view.half_tangents(), self.near_m, range)
     }
 
     /// Finds out which normal tiles a view wants and returns those that are not on the device, most urgent first, at most
     /// `most`. To be called once a frame; tiles not wanted for longest make room for new ones.
-    pub fn want_tiles(&mut self, view: &FrameView, most: usize) -> &[TileId] {
+    pub fn want_tiles(&mut self, view: &View, most: usize) -> &[TileId] {
         let wanted = self.wanted.find(&self.tiles.pyramid, &self.terrain, view);
         self.tiles.residency.want(wanted);
         let missing = self.tiles.residency.missing();

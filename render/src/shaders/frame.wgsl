@@ -59,6 +59,8 @@ override IMAGE: bool = false;
 override MORPH: bool = true;
 // Whether the target encodes sRGB itself.
 override ENCODES: bool = true;
+// Depth infinitely far: 0 where depth is reversed, else 1.
+override FARTHEST: f32 = 0.0;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 

@@ -8,7 +8,7 @@ struct SkyPoint {
 @vertex
 fn sky_vertex(@builtin(vertex_index) i: u32) -> SkyPoint {
     let ndc = vec2(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0);
-    return SkyPoint(vec4(ndc, 0.0, 1.0), ndc);
+    return SkyPoint(vec4(ndc, FARTHEST, 1.0), ndc);
 }
 
 @fragment

@@ -4,9 +4,10 @@
 //! `TILE_CELLS + 1` squared grid points of a tile has the central difference of its neighbours, so neighbouring tiles
 //! agree on their common edge and bilinear filtering never looks outside.
 
-use super::{Pyramid, TILE_CELLS, TileId};
+use super::{Pyramid, TILE_CELLS};
 use crate::error::{RenderError, Result};
 use crate::view::TerrainShape;
+use terrasoar_layout::imagery::TileId;
 
 /// Grid points beyond each side of a tile whose heights are needed for the slopes on its edge.
 pub const TILE_BORDER: u32 = 1;
@@ -18,11 +19,21 @@ const SIDE: u32 = TILE_CELLS + 1 + 2 * TILE_BORDER;
 
 pub(crate) const GRADIENT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg16Float;
 
+/// Columns (`axis` 0) or rows (1) of the grid that a tile and its border have heights at, from the south-west: where one lies outside a terrain of
+/// so many samples, the nearest inside.
+pub fn tile_lines(samples: [u32; 2], tile: TileId, axis: usize) -> impl Iterator<Item = u32> + Clone + use<> {
+    let place = [tile.x, tile.y][axis];
+    let first = i64::from(place).saturating_mul(i64::from(TILE_CELLS) << tile.level.min(31)).min(1 << 40);
+    let last = i64::from(samples[axis].saturating_sub(1));
+    let step = 1_i64 << tile.level.min(31);
+    let at = move |i: u32| first + (i64::from(i) - i64::from(TILE_BORDER)) * step;
+    (0..SIDE).map(move |i| at(i).clamp(0, last) as u32)
+}
+
 /// Turns heights into the bytes of a tile.
 ///
-/// `heights_m` holds [`HEIGHTS_PER_TILE`] heights in metres before exaggeration, row by row from the south-west: value
-/// (i, j) belongs to sample `first_sample + (i - 1, j - 1) * cell_samples` ([`TileId`]), or where that lies outside the
-/// data to the nearest sample inside. Heights that are not finite (voids) count as level with
+/// `heights_m` holds [`HEIGHTS_PER_TILE`] heights in metres before exaggeration, row by row from the south-west, where the tile's columns and rows
+/// ([`tile_lines`]) cross. Heights that are not finite (voids) count as level with
 /// their neighbours. Averages over a cell make calmer pictures than plain samples on coarse levels; either will do.
 ///
 /// # Errors
@@ -39,15 +50,12 @@ pub fn pack_gradients(terrain: &TerrainShape, tile: TileId, heights_m: &[f32]) -
             got: heights_m.len(),
         });
     }
-    let cell = tile.cell_samples();
-    let first = tile.first_sample();
+    let lines = [0, 1].map(|axis| tile_lines(terrain.samples, tile, axis).collect::<Vec<u32>>());
     // Repeated samples beyond the edge of the data make differences over one cell, not two.
-    let inside = |axis: usize, i: u32| {
-        let at = i64::from(first[axis]) + (i64::from(i) - i64::from(TILE_BORDER)) * i64::from(cell);
-        at.clamp(0, i64::from(terrain.samples[axis]) - 1)
+    let run = |axis: usize, i: u32| {
+        let [before, after] = [i - 1, i + 1].map(|i| lines[axis][i as usize]);
+        f64::from(after - before) * terrain.spacing_m[axis]
     };
-    let run =
-        |axis: usize, i: u32| (inside(axis, i + 1) - inside(axis, i - 1)) as f64 * terrain.spacing_m[axis];
     let height = |i: u32, j: u32| heights_m[(j * SIDE + i) as usize];
     let slope = |low: f32, middle: f32, high: f32, run_m: f64| {
         let known = |h: f32| if h.is_finite() { h } else { middle };
@@ -113,12 +121,12 @@ mod tests {
             TileId { level: 1, x: 0, y: 1 },
             TileId { level: 2, x: 0, y: 0 },
         ] {
-            let [x0, y0] = tile.first_sample();
+            let [x0, y0] = [tile.x, tile.y].map(|t| t * TILE_CELLS << tile.level);
+            let cell = 1 << tile.level;
             let heights: Vec<f32> = (0..SIDE * SIDE)
                 .map(|n| {
                     let at = |first: u32, i: u32| {
-                        (i64::from(first) + (i64::from(i) - 1) * i64::from(tile.cell_samples())).clamp(0, 299)
-                            as f32
+                        (i64::from(first) + (i64::from(i) - 1) * i64::from(cell)).clamp(0, 299) as f32
                     };
                     at(x0, n % SIDE) * 10.0 * 0.5 - at(y0, n / SIDE) * 20.0 * 0.25
                 })
@@ -127,7 +135,7 @@ mod tests {
             for (n, texel) in bytes.chunks_exact(4).enumerate() {
                 let [i, j] = [n as u32 % 129, n as u32 / 129];
                 // Points whose neighbours are all one sample have no slope, and are never looked at.
-                let beyond = |first: u32, i: u32| first + i * tile.cell_samples() > 299 + tile.cell_samples();
+                let beyond = |first: u32, i: u32| first + i * cell > 299 + cell;
                 if beyond(x0, i + 1) || beyond(y0, j + 1) {
                     continue;
                 }

@@ -1,7 +1,7 @@
 //! Content for colour: a photograph, draped.
 //!
 //! Unlike slopes, which lie on the grid's points, texels are areas and the image has a place and a texel size of its own. Tiles carry a
-//! border, so that a filter as wide as [`IMAGE_TILE_BORDER`] needs one tile alone and there is no seam.
+//! border, so that a filter as wide as [`BORDER_TEXELS`](terrasoar_layout::imagery::BORDER_TEXELS) needs one tile alone and there is no seam.
 //!
 //! What is filtered fades into the ground below without a fringe where colours are multiplied by alpha, in linear light. Transparent texels
 //! of BC1 are black, so they are; RGBA8 is multiplied on its way to the device, for which opaque tiles cost a look;
@@ -10,106 +10,53 @@
 use std::borrow::Cow;
 use std::collections::HashSet;
 
-use super::{Pyramid, Raster, TileId, TileLayout, TilePool, WantedTiles};
+use super::{Pyramid, Raster, TileLayout, TilePool, WantedTiles};
 use crate::error::{RenderError, Result};
 use crate::gpu::Capabilities;
 use crate::ramps::{encode, linear_of};
-use crate::view::{FrameView, TerrainShape};
-
-/// Stored texels a side of an image tile, border included.
-pub const IMAGE_TILE_TEXELS: u32 = 512;
-/// Stored texels on each side that belong to the neighbours, or repeat the image's edge.
-pub const IMAGE_TILE_BORDER: u32 = 4;
-/// Texels a side that a tile is there for.
-pub const IMAGE_TILE_INNER: u32 = IMAGE_TILE_TEXELS - 2 * IMAGE_TILE_BORDER;
+use crate::view::TerrainShape;
+use terrasoar::view::View;
+use terrasoar_layout::imagery::{ImageryShape, TILE_TEXELS, TileFormat, TileId};
 
 /// Memory that a page table may take beside a small pool: that of an image of a million texels a side needs a third.
 const MOST_PAGE_TABLE_BYTES: u64 = 64 << 20;
 
-/// A tile of an image: level 0 the finest, x east and y north from the image's south-west corner, in tiles.
-pub type ImageTileId = TileId;
+/// Longest side of an image in texels.
+const MOST_TEXELS: u32 = 1 << 29;
 
-/// How texels are stored: sRGB, and alpha that they are not multiplied by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ImageryFormat {
-    /// Blocks of 4 x 4 texels in 8 bytes; alpha 0 or 1.
-    Bc1,
-    /// Blocks of 4 x 4 texels in 16 bytes. Texels of alpha 0 should have a colour like their neighbours', which shows half a texel far.
-    Bc7,
-    /// 4 bytes a texel.
-    Rgba8,
+/// How a device holds tiles of a format: sRGB, and alpha that the texels given are not multiplied by.
+fn layout_of(format: TileFormat) -> TileLayout {
+    let format = match format {
+        TileFormat::Bc1 => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
+        TileFormat::Bc7 => wgpu::TextureFormat::Bc7RgbaUnormSrgb,
+        TileFormat::Rgba8 => wgpu::TextureFormat::Rgba8UnormSrgb,
+    };
+    TileLayout { format, texels: TILE_TEXELS }
 }
 
-impl ImageryFormat {
-    /// Bytes of a tile: 131,072, 262,144 or 1,048,576.
-    pub fn tile_bytes(self) -> usize {
-        self.layout().layer_bytes() as usize
-    }
-
-    fn layout(self) -> TileLayout {
-        let format = match self {
-            Self::Bc1 => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
-            Self::Bc7 => wgpu::TextureFormat::Bc7RgbaUnormSrgb,
-            Self::Rgba8 => wgpu::TextureFormat::Rgba8UnormSrgb,
-        };
-        TileLayout { format, texels: IMAGE_TILE_TEXELS }
-    }
-
-    fn is_compressed(self) -> bool {
-        self != Self::Rgba8
-    }
-
-    /// Whether the device gets colours that are not multiplied by alpha.
-    pub(crate) fn is_straight(self) -> bool {
-        self == Self::Bc7
+fn check(shape: &ImageryShape) -> Result<()> {
+    let sound = shape.texels.iter().all(|n| (1..=MOST_TEXELS).contains(n))
+        && shape.levels > 0
+        && shape.texel_m.iter().all(|m| m.is_finite() && *m > 0.0)
+        && shape.origin_m.iter().all(|m| m.is_finite());
+    if sound {
+        Ok(())
+    } else {
+        Err(RenderError::Usage(
+            "an image needs 1 to 2^29 texels each way, a level, a finite place and texels of some size",
+        ))
     }
 }
 
 impl Capabilities {
     /// Formats that [`crate::Renderer::set_imagery`] takes on this device, the smallest first. Where blocks are not among them the caller
     /// decodes them.
-    pub fn imagery_formats(&self) -> &'static [ImageryFormat] {
+    pub fn imagery_formats(&self) -> &'static [TileFormat] {
         if self.texture_compression_bc {
-            &[ImageryFormat::Bc1, ImageryFormat::Bc7, ImageryFormat::Rgba8]
+            &[TileFormat::Bc1, TileFormat::Bc7, TileFormat::Rgba8]
         } else {
-            &[ImageryFormat::Rgba8]
+            &[TileFormat::Rgba8]
         }
-    }
-}
-
-/// An image on the terrain.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ImageryShape {
-    /// How tiles are stored.
-    pub format: ImageryFormat,
-    /// Texels of level 0 east and north; 1 to 2^29.
-    pub texels: [u32; 2],
-    /// Levels there are, at least 1. Those past the first that is one tile are not asked for.
-    pub levels: u32,
-    /// South-west corner of the south-westernmost texel, metres east and north of the terrain's south-west sample.
-    pub origin_m: [f64; 2],
-    /// Metres a texel of level 0, east and north; above 0.
-    pub texel_m: [f64; 2],
-}
-
-impl ImageryShape {
-    fn check(&self) -> Result<()> {
-        let sound = self.texels.iter().all(|n| (1..=1 << 29).contains(n))
-            && self.levels > 0
-            && self.texel_m.iter().all(|m| m.is_finite() && *m > 0.0)
-            && self.origin_m.iter().all(|m| m.is_finite());
-        if sound {
-            Ok(())
-        } else {
-            Err(RenderError::Usage(
-                "an image needs 1 to 2^29 texels each way, a level, a finite place and texels of some size",
-            ))
-        }
-    }
-
-    /// All tiles it has.
-    pub fn pyramid(&self) -> Pyramid {
-        Pyramid::of_cells(self.texels, IMAGE_TILE_INNER, self.levels)
     }
 }
 
@@ -146,6 +93,8 @@ pub struct ImageryStats {
 #[derive(Debug)]
 pub(crate) struct Imagery {
     pub shape: ImageryShape,
+    /// How the device holds its tiles, whatever the shape's own format.
+    pub format: TileFormat,
     pub pool: TilePool,
     raster: Raster,
     wanted: WantedTiles,
@@ -157,17 +106,18 @@ impl Imagery {
     pub(crate) fn new(
         device: &wgpu::Device,
         terrain: &TerrainShape,
-        shape: ImageryShape,
+        shape: &ImageryShape,
+        format: TileFormat,
         pool_bytes: u64,
     ) -> Result<Self> {
-        shape.check()?;
-        if shape.format.is_compressed() && !device.features().contains(wgpu::Features::TEXTURE_COMPRESSION_BC)
-        {
+        check(shape)?;
+        let takes_blocks = device.features().contains(wgpu::Features::TEXTURE_COMPRESSION_BC);
+        if format != TileFormat::Rgba8 && !takes_blocks {
             return Err(RenderError::Usage(
                 "this device takes no BC textures; decode the image's tiles to RGBA8 (Capabilities::imagery_formats)",
             ));
         }
-        let pyramid = shape.pyramid();
+        let pyramid = Pyramid::of_image(shape);
         let [east, north] = pyramid.across(0).map(u32::next_power_of_two);
         if east.max(north) > device.limits().max_texture_dimension_2d {
             return Err(RenderError::Usage(
@@ -182,14 +132,15 @@ impl Imagery {
             ));
         }
         let coarsest = pyramid.roots().count();
-        let pool = TilePool::new(device, pyramid, shape.format.layout(), pool_bytes);
+        let pool = TilePool::new(device, pyramid, layout_of(format), pool_bytes);
         if coarsest > pool.residency.capacity() as usize {
             return Err(RenderError::Usage(
                 "the image's coarsest level alone does not fit the pool; give it more levels, or more memory",
             ));
         }
         Ok(Self {
-            shape,
+            shape: *shape,
+            format,
             pool,
             raster: Raster {
                 origin_m: shape.origin_m,
@@ -204,7 +155,12 @@ impl Imagery {
         })
     }
 
-    pub(crate) fn want(&mut self, view: &FrameView) -> &[TileId] {
+    /// Whether the device gets colours that are not multiplied by alpha.
+    pub(crate) fn is_straight(&self) -> bool {
+        self.format == TileFormat::Bc7
+    }
+
+    pub(crate) fn want(&mut self, view: &View) -> &[TileId] {
         let absent = &self.absent;
         let wanted =
             self.wanted.find_on(&self.pool.pyramid, &self.raster, view, |tile| !absent.contains(&tile));
@@ -212,7 +168,7 @@ impl Imagery {
         self.pool.residency.missing()
     }
 
-    pub(crate) fn want_ahead(&mut self, view: &FrameView) -> &[TileId] {
+    pub(crate) fn want_ahead(&mut self, view: &View) -> &[TileId] {
         let absent = &self.absent;
         let wanted =
             self.wanted_ahead.find_on(&self.pool.pyramid, &self.raster, view, |tile| !absent.contains(&tile));
@@ -221,9 +177,9 @@ impl Imagery {
     }
 
     pub(crate) fn give(&mut self, queue: &wgpu::Queue, tile: TileId, bytes: &[u8]) -> Result<u64> {
-        match self.shape.format {
-            ImageryFormat::Rgba8 => self.pool.upload(queue, tile, &multiplied(bytes)),
-            ImageryFormat::Bc1 | ImageryFormat::Bc7 => self.pool.upload(queue, tile, bytes),
+        match self.format {
+            TileFormat::Rgba8 => self.pool.upload(queue, tile, &multiplied(bytes)),
+            TileFormat::Bc1 | TileFormat::Bc7 => self.pool.upload(queue, tile, bytes),
         }
     }
 
@@ -311,7 +267,7 @@ mod tests {
     use crate::tiles::Residency;
 
     const SHAPE: ImageryShape = ImageryShape {
-        format: ImageryFormat::Bc1,
+        format: TileFormat::Bc1,
         texels: [16_384, 16_384],
         levels: 7,
         origin_m: [0.0; 2],
@@ -329,8 +285,9 @@ mod tests {
 
     #[test]
     fn tiles_have_the_bytes_of_their_format() {
-        let bytes = [ImageryFormat::Bc1, ImageryFormat::Bc7, ImageryFormat::Rgba8].map(|f| f.tile_bytes());
-        assert_eq!(bytes, [131_072, 262_144, 1_048_576]);
+        for format in [TileFormat::Bc1, TileFormat::Bc7, TileFormat::Rgba8] {
+            assert_eq!(layout_of(format).layer_bytes(), format.tile_bytes() as u64);
+        }
     }
 
     /// The pool of 64 MiB over an image of 16,384 x 16,384 texels, in a flight at 90 m/s with a turn, eight tiles a frame at 60 frames a second.
@@ -343,7 +300,7 @@ mod tests {
             height_range_m: [0.0, 900.0],
             flattest: 1.0,
         };
-        let pyramid = SHAPE.pyramid();
+        let pyramid = Pyramid::of_image(&SHAPE);
         let mut pool = Residency::new(&pyramid, 512);
         let mut wanted = WantedTiles::default();
         let (mut most_wanted, mut uploads, mut lacking, mut times_us) = (0, 0, 0, Vec::new());
@@ -353,7 +310,7 @@ mod tests {
             let course = 0.02 * time_s;
             let eye = DVec3::new(3000.0 + 90.0 * time_s, 8000.0 + 900.0 * course.sin(), 1300.0);
             let ahead = DVec3::new(course.cos(), course.sin(), -0.35);
-            let view = FrameView::look_at(eye, eye + ahead, [1920, 1080]);
+            let view = View::look_at(eye, eye + ahead, [1920, 1080].into());
             let start = Instant::now();
             pool.want(wanted.find_on(&pyramid, &raster, &view, |_| true));
             times_us.push(start.elapsed().as_secs_f64() * 1e6);

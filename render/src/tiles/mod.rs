@@ -15,15 +15,12 @@ mod residency;
 mod wanted;
 
 pub(crate) use gradient::GRADIENT_FORMAT;
-pub use gradient::{HEIGHTS_PER_TILE, TILE_BORDER, pack_gradients};
+pub use gradient::{HEIGHTS_PER_TILE, TILE_BORDER, pack_gradients, tile_lines};
 pub(crate) use imagery::Imagery;
-pub use imagery::{
-    IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, ImageTileId, ImageryFormat, ImageryShape,
-    ImageryStats,
-};
+pub use imagery::ImageryStats;
 pub use pool::TileStats;
 pub(crate) use pool::{TileLayout, TilePool};
-pub use pyramid::{Pyramid, TILE_CELLS, TileId};
+pub use pyramid::{Pyramid, TILE_CELLS};
 pub use residency::{Placement, Residency};
 pub(crate) use wanted::Raster;
 pub use wanted::WantedTiles;

@@ -3,8 +3,9 @@
 //! Knows bytes a texel block, not their meaning. An upload is one texture write and one or two texels of the
 //! page table; nothing else moves.
 
-use super::{Pyramid, Residency, TileId};
+use super::{Pyramid, Residency};
 use crate::error::{RenderError, Result};
+use terrasoar_layout::imagery::TileId;
 
 /// How a content kind is laid out in a layer.
 #[derive(Debug, Clone, Copy)]

@@ -1,41 +1,9 @@
 //! Which tiles there are: plain arithmetic on levels and positions.
 
+use terrasoar_layout::imagery::{INNER_TEXELS, ImageryShape, TileId};
+
 /// Cells a side of a tile of slopes, at its own level. A power of two.
 pub const TILE_CELLS: u32 = 128;
-
-/// A tile of the pyramid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct TileId {
-    /// 0 the finest; a cell is 2^level samples wide.
-    pub level: u32,
-    /// Tiles from the west.
-    pub x: u32,
-    /// Tiles from the south.
-    pub y: u32,
-}
-
-impl TileId {
-    /// Samples (of an image: finest texels) along one side of a cell.
-    pub fn cell_samples(self) -> u32 {
-        1 << self.level
-    }
-
-    /// Column and row of the south-west sample of a tile of slopes.
-    pub fn first_sample(self) -> [u32; 2] {
-        [self.x, self.y].map(|t| t.saturating_mul(TILE_CELLS << self.level))
-    }
-
-    /// The tile of the next coarser level that covers this one.
-    pub fn parent(self) -> Self {
-        Self { level: self.level + 1, x: self.x / 2, y: self.y / 2 }
-    }
-}
-
-impl std::fmt::Display for TileId {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}/{}/{}", self.level, self.x, self.y)
-    }
-}
 
 /// All tiles over a terrain, or over an image on it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,6 +17,11 @@ impl Pyramid {
     /// The pyramid of slopes over so many samples east and north, up to one tile over everything.
     pub fn over(samples: [u32; 2]) -> Self {
         Self::of_cells(samples.map(|n| n.saturating_sub(1)), TILE_CELLS, u32::MAX)
+    }
+
+    /// The pyramid of an image: as many levels as it has, or fewer where one tile covers everything before.
+    pub fn of_image(shape: &ImageryShape) -> Self {
+        Self::of_cells(shape.texels, INNER_TEXELS, shape.levels)
     }
 
     /// A pyramid over so many cells east and north at level 0, in tiles of `tile_cells` a side: `most_levels` levels, or fewer

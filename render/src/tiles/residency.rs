@@ -8,7 +8,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::{Pyramid, TileId};
+use super::Pyramid;
+use terrasoar_layout::imagery::TileId;
 
 #[derive(Debug, Clone, Copy)]
 struct Held {

@@ -6,8 +6,10 @@
 
 use glam::DVec3;
 
-use super::{Pyramid, TileId};
-use crate::view::{FrameView, TerrainShape};
+use super::Pyramid;
+use crate::view::TerrainShape;
+use terrasoar::view::View;
+use terrasoar_layout::imagery::TileId;
 
 /// The flattest line of sight for which level ground still gets finer tiles along the line; the shader says the same.
 const FLATTEST: f64 = 0.15;
@@ -58,7 +60,7 @@ pub struct WantedTiles {
 
 impl WantedTiles {
     /// The tiles of slopes that `view` wants, coarse before fine and near before far.
-    pub fn find(&mut self, pyramid: &Pyramid, terrain: &TerrainShape, view: &FrameView) -> &[TileId] {
+    pub fn find(&mut self, pyramid: &Pyramid, terrain: &TerrainShape, view: &View) -> &[TileId] {
         self.find_on(pyramid, &terrain.into(), view, |_| true)
     }
 
@@ -72,7 +74,7 @@ impl WantedTiles {
         &mut self,
         pyramid: &Pyramid,
         raster: &Raster,
-        view: &FrameView,
+        view: &View,
         exists: impl Fn(TileId) -> bool,
     ) -> &[TileId] {
         self.found.clear();
@@ -100,7 +102,7 @@ impl WantedTiles {
 struct Search<'a, E> {
     pyramid: &'a Pyramid,
     raster: &'a Raster,
-    view: &'a FrameView,
+    view: &'a View,
     side_normals: [DVec3; 4],
     pixels_per_radian: f64,
     exists: E,
@@ -155,7 +157,7 @@ mod tests {
     fn coarse_first_parents_always_and_fine_only_near() {
         let pyramid = Pyramid::over(TERRAIN.samples);
         let eye = DVec3::new(100_000.0, 100_000.0, 2500.0);
-        let view = FrameView::look_at(eye, eye + DVec3::new(1000.0, 3000.0, -900.0), [800, 600]);
+        let view = View::look_at(eye, eye + DVec3::new(1000.0, 3000.0, -900.0), [800, 600].into());
         let mut wanted = WantedTiles::default();
         let tiles = wanted.find(&pyramid, &TERRAIN, &view).to_vec();
         assert_eq!(tiles[0], pyramid.root());
@@ -171,7 +173,7 @@ mod tests {
     fn a_point_has_the_tile_that_it_needs() {
         let pyramid = Pyramid::over(TERRAIN.samples);
         let eye = DVec3::new(50_000.0, 60_000.0, 3000.0);
-        let view = FrameView::look_at(eye, eye + DVec3::new(3000.0, 1000.0, -700.0), [640, 480]);
+        let view = View::look_at(eye, eye + DVec3::new(3000.0, 1000.0, -700.0), [640, 480].into());
         let tiles = WantedTiles::default().find(&pyramid, &TERRAIN, &view).to_vec();
         for i in 0..2000_u32 {
             let at = DVec3::new(

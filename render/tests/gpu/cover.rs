@@ -1,7 +1,7 @@
 //! No background shows through a terrain that covers the picture: not at any frame of a flight, however vertices move.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Gpu, Look};
+use terrasoar_render::{Gpu, Look, View};
 
 use crate::support::landscape::hills;
 use crate::support::refiner::Square;
@@ -27,9 +27,8 @@ fn flight(gpu: &Gpu, morph: bool, exaggeration: f64) -> Outcome {
         let t = f64::from(frame);
         let eye = DVec3::new(1600.0 + 90.0 * t, 1900.0 + 60.0 * t, 1250.0 * exaggeration + 10.0 * t);
         let ahead = DVec3::new(0.35 * (0.4 * t).sin(), 0.35 * (0.4 * t).cos(), -1.0);
-        let mut view = FrameView::look_at(eye, eye + ahead, [240, 180]);
-        let (sin, cos) = (0.7 * t).sin_cos();
-        (view.right, view.up) = (view.right * cos - view.up * sin, view.right * sin + view.up * cos);
+        let mut view = View::look_at(eye, eye + ahead, [240, 180].into());
+        view.roll_rad = 0.7 * t;
         view.vertical_fov_rad = if frame % 3 == 2 { 0.15 } else { 0.6 };
         view.vertical_exaggeration = exaggeration;
         view.tolerance_px = 3.0;
@@ -46,7 +45,7 @@ fn half_empty(gpu: &Gpu) -> Outcome {
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
     let mut scene = Scene::new(gpu, &square);
     let eye = DVec3::new(640.0, 640.0, 1500.0);
-    let view = FrameView::look_at(eye, eye - DVec3::Z, [120, 90]);
+    let view = View::look_at(eye, eye - DVec3::Z, [120, 90].into());
     let mut mesh = square.down_to(0);
     mesh.triangles.truncate(mesh.triangles.len() / 2);
     scene.show(&mesh);

@@ -1,7 +1,7 @@
 //! The device itself: repeatable, timed, lost and made anew.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Gpu, Look, RenderError, RendererOptions, wgpu};
+use terrasoar_render::{Gpu, Look, RenderError, RendererOptions, View, wgpu};
 
 use crate::support::landscape::hills;
 use crate::support::picture::Picture;
@@ -17,8 +17,8 @@ pub fn tests() -> Vec<(&'static str, Test)> {
     ]
 }
 
-fn view() -> FrameView {
-    FrameView::look_at(DVec3::new(300.0, -400.0, 1300.0), DVec3::new(1400.0, 1400.0, 400.0), [200, 150])
+fn view() -> View {
+    View::look_at(DVec3::new(300.0, -400.0, 1300.0), DVec3::new(1400.0, 1400.0, 400.0), [200, 150].into())
 }
 
 fn picture(gpu: &Gpu, square: &Square) -> Picture {

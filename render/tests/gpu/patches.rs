@@ -1,7 +1,7 @@
 //! The mesh on the device: patches, growth, draws, and what they cost.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Gpu, Look, MeshPatch, RenderError, RendererOptions};
+use terrasoar_render::{Gpu, Look, MeshPatch, RenderError, RendererOptions, View};
 
 use crate::support::landscape::hills;
 use crate::support::refiner::Square;
@@ -19,9 +19,9 @@ pub fn tests() -> Vec<(&'static str, Test)> {
     ]
 }
 
-fn over(t: f64) -> FrameView {
+fn over(t: f64) -> View {
     let eye = DVec3::new(400.0 + 25.0 * t, 300.0 + 15.0 * t, 1400.0);
-    let mut view = FrameView::look_at(eye, eye + DVec3::new(1.0, 1.2, -0.5), [200, 150]);
+    let mut view = View::look_at(eye, eye + DVec3::new(1.0, 1.2, -0.5), [200, 150].into());
     view.tolerance_px = 3.0;
     view
 }

@@ -1,7 +1,7 @@
 //! Things are where they should be: far from the origin, at every depth, and while they move.
 
 use glam::DVec3;
-use terrasoar_render::{Frame, FrameView, Gpu, Haze, Look};
+use terrasoar_render::{Frame, Gpu, Haze, Look, View};
 
 use crate::support::landscape::hills;
 use crate::support::refiner::Square;
@@ -35,7 +35,7 @@ fn far_away(gpu: &Gpu) -> Outcome {
                 0.0,
             );
             let eye = start + offset;
-            let mut view = FrameView::look_at(eye, eye + DVec3::new(0.5, 1.0, -0.25), [200, 150]);
+            let mut view = View::look_at(eye, eye + DVec3::new(0.5, 1.0, -0.25), [200, 150].into());
             view.tolerance_px = 2.0;
             let mut scene = Scene::new(gpu, square);
             scene.show(&square.refine(&view));
@@ -58,7 +58,8 @@ fn plane(gpu: &Gpu) -> Outcome {
     let mut scene = Scene::new(gpu, &square);
     for exaggeration in [1.0, 2.0] {
         let eye = DVec3::new(1500.0, 300.0, 2300.0 * exaggeration);
-        let mut view = FrameView::look_at(eye, DVec3::new(1700.0, 1700.0, 900.0 * exaggeration), [160, 120]);
+        let mut view =
+            View::look_at(eye, DVec3::new(1700.0, 1700.0, 900.0 * exaggeration), [160, 120].into());
         view.vertical_exaggeration = exaggeration;
         scene.show(&square.refine(&view));
         scene.draw(&view, &Look::default());
@@ -85,7 +86,7 @@ fn ray_cast(gpu: &Gpu) -> Outcome {
     let square = Square::new(8, [0, 0], [20.0, 20.0], hills);
     let mut scene = Scene::new(gpu, &square);
     let eye = DVec3::new(2000.0, 500.0, 1400.0);
-    let mut view = FrameView::look_at(eye, DVec3::new(2500.0, 2600.0, 500.0), [200, 150]);
+    let mut view = View::look_at(eye, DVec3::new(2500.0, 2600.0, 500.0), [200, 150].into());
     view.tolerance_px = 0.25;
     scene.show(&square.refine(&view));
     scene.draw(&view, &Look { morph: false, ..Look::default() });
@@ -103,12 +104,13 @@ fn ray_cast(gpu: &Gpu) -> Outcome {
 }
 
 /// Pixel centre's ray, of length 1 along the line of sight.
-fn ray(view: &FrameView, x: u32, y: u32) -> DVec3 {
+fn ray(view: &View, x: u32, y: u32) -> DVec3 {
     let [tan_x, tan_y] = view.half_tangents();
-    let [width, height] = view.viewport_px.map(f64::from);
+    let [width, height] = view.viewport.size_px().map(f64::from);
     let right = 2.0 * (f64::from(x) + 0.5) / width - 1.0;
     let up = 1.0 - 2.0 * (f64::from(y) + 0.5) / height;
-    view.forward + view.right * right * tan_x + view.up * up * tan_y
+    let [to_right, to_top, forward] = view.axes();
+    forward + to_right * right * tan_x + to_top * up * tan_y
 }
 
 /// First place where a ray is below the bilinear surface.
@@ -145,7 +147,7 @@ fn pops(gpu: &Gpu) -> Outcome {
     let square = Square::new(7, [0, 0], [20.0, 20.0], hills);
     // Straight down, so that nothing hides anything.
     let fixed = DVec3::new(1280.0, 1280.0, 4000.0);
-    let view = FrameView::look_at(fixed, fixed - DVec3::Z, [150, 150]);
+    let view = View::look_at(fixed, fixed - DVec3::Z, [150, 150].into());
     let [mut with, mut without] = [0.0_f64; 2];
     for (morph, largest) in [(true, &mut with), (false, &mut without)] {
         let mut scene = Scene::new(gpu, &square);
@@ -176,7 +178,7 @@ fn settled(gpu: &Gpu) -> Outcome {
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.down_to(0));
     let eye = DVec3::new(640.0, 640.0, 1500.0);
-    let mut view = FrameView::look_at(eye, eye - DVec3::Z, [120, 90]);
+    let mut view = View::look_at(eye, eye - DVec3::Z, [120, 90].into());
     view.tolerance_px = 1e-6;
     let pictures = [true, false].map(|morph| scene.draw(&view, &Look { morph, ..Look::default() }));
     ensure(pictures[0] == pictures[1], || "pictures differ".to_owned())
@@ -186,7 +188,7 @@ fn settled(gpu: &Gpu) -> Outcome {
 fn tolerance(gpu: &Gpu) -> Outcome {
     let square = Square::new(8, [0, 0], [20.0, 20.0], hills);
     let eye = DVec3::new(2560.0, 2560.0, 5000.0);
-    let mut view = FrameView::look_at(eye, eye - DVec3::Z, [200, 150]);
+    let mut view = View::look_at(eye, eye - DVec3::Z, [200, 150].into());
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.down_to(0));
     scene.draw(&view, &Look { morph: false, ..Look::default() });

@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    Frame, FrameView, Gpu, HEIGHTS_PER_TILE, Look, Offscreen, RenderError, RendererOptions, Surface, TileId,
-    wgpu,
+    Frame, Gpu, HEIGHTS_PER_TILE, Look, Offscreen, RenderError, RendererOptions, Surface, TileId, View, wgpu,
 };
 
 use crate::support::landscape::hills;
@@ -22,9 +21,9 @@ pub fn tests() -> Vec<(&'static str, Test)> {
     ]
 }
 
-fn down() -> FrameView {
+fn down() -> View {
     let eye = DVec3::new(2560.0, 2560.0, 5200.0);
-    FrameView::look_at(eye, eye - DVec3::Z, [240, 180])
+    View::look_at(eye, eye - DVec3::Z, [240, 180].into())
 }
 
 fn grey() -> Look {
@@ -106,8 +105,11 @@ fn wrong_tiles(gpu: &Gpu) -> Outcome {
 /// A target that encodes sRGB itself and one that does not get the same bytes.
 fn formats(gpu: &Gpu) -> Outcome {
     let square = Square::new(7, [0, 0], [20.0, 20.0], hills);
-    let view =
-        FrameView::look_at(DVec3::new(1280.0, -900.0, 1700.0), DVec3::new(1280.0, 1280.0, 400.0), [120, 90]);
+    let view = View::look_at(
+        DVec3::new(1280.0, -900.0, 1700.0),
+        DVec3::new(1280.0, 1280.0, 400.0),
+        [120, 90].into(),
+    );
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.refine(&view));
     let encoded = scene.draw(&view, &Look::default());
@@ -135,8 +137,11 @@ fn formats(gpu: &Gpu) -> Outcome {
 
 fn samples(gpu: &Gpu) -> Outcome {
     let square = Square::new(7, [0, 0], [20.0, 20.0], hills);
-    let view =
-        FrameView::look_at(DVec3::new(1280.0, -900.0, 1700.0), DVec3::new(1280.0, 1280.0, 400.0), [120, 90]);
+    let view = View::look_at(
+        DVec3::new(1280.0, -900.0, 1700.0),
+        DVec3::new(1280.0, 1280.0, 400.0),
+        [120, 90].into(),
+    );
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.refine(&view));
     scene.give_tiles(&view);

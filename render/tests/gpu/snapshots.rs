@@ -1,7 +1,7 @@
 //! Kept pictures, one a look and some of what else is to be seen.
 
 use glam::DVec3;
-use terrasoar_render::{Contours, FrameView, Gpu, LOOKS, Look, Sun, ramps::RAMPS};
+use terrasoar_render::{Contours, Gpu, LOOKS, Look, Sun, View, ramps::RAMPS};
 
 use crate::Outcome;
 use crate::support::image::{Image, drape, give};
@@ -23,7 +23,7 @@ pub fn names() -> impl Iterator<Item = String> {
 pub fn check(gpu: &Gpu, name: &str) -> Outcome {
     let square = Square::new(8, [0, 0], [20.0, 20.0], hills);
     let eye = DVec3::new(600.0, 200.0, 1500.0);
-    let mut view = FrameView::look_at(eye, DVec3::new(2800.0, 3600.0, 500.0), SIZE_PX);
+    let mut view = View::look_at(eye, DVec3::new(2800.0, 3600.0, 500.0), SIZE_PX.into());
     view.tolerance_px = 2.0;
     let mut look = Look::default();
     if let Some(known) = name.strip_prefix("look-").and_then(Look::named) {
@@ -35,39 +35,38 @@ pub fn check(gpu: &Gpu, name: &str) -> Outcome {
     match name {
         "sunset" => {
             look.sun = Sun { azimuth_rad: 0.75, elevation_rad: 0.09, ..Sun::default() };
-            view = FrameView::look_at(eye, DVec3::new(2800.0, 3600.0, 1350.0), SIZE_PX);
+            view = View::look_at(eye, DVec3::new(2800.0, 3600.0, 1350.0), SIZE_PX.into());
         }
         "mesh-normals" => look.tile_normals = false,
         "walls" => {
             walls = true;
-            view = FrameView::look_at(
+            view = View::look_at(
                 DVec3::new(-3600.0, -4200.0, 4300.0),
                 DVec3::new(2560.0, 2560.0, 0.0),
-                SIZE_PX,
+                SIZE_PX.into(),
             );
         }
         "roll" => {
-            let (sin, cos) = 0.6_f64.sin_cos();
-            (view.right, view.up) = (view.right * cos - view.up * sin, view.right * sin + view.up * cos);
+            view.roll_rad = 0.6;
             view.vertical_exaggeration = 1.6;
             view.eye_m.z = 2200.0;
         }
         "photo-map" => {
             look = Look { imagery: 0.6, contours: Some(Contours::default()), ..look };
-            view = FrameView::look_at(
+            view = View::look_at(
                 DVec3::new(2560.0, 2559.0, 6800.0),
                 DVec3::new(2560.0, 2560.0, 0.0),
-                SIZE_PX,
+                SIZE_PX.into(),
             );
         }
         "smooth-edges" => look.multisample = true,
         "chart" => {
             look.contours = Some(Contours { interval_m: 50.0, ..Contours::default() });
             look.rock = 0.0;
-            view = FrameView::look_at(
+            view = View::look_at(
                 DVec3::new(2560.0, 2560.0, 6800.0),
                 DVec3::new(2560.0, 2560.0, 0.0),
-                SIZE_PX,
+                SIZE_PX.into(),
             );
         }
         _ => {}
@@ -75,7 +74,7 @@ pub fn check(gpu: &Gpu, name: &str) -> Outcome {
     // A larger picture to look at: TERRASOAR_LOOK=4 makes pictures of four times the size in the temporary folder.
     let larger = std::env::var("TERRASOAR_LOOK").ok().and_then(|v| v.parse::<u32>().ok());
     if let Some(times) = larger {
-        view.viewport_px = SIZE_PX.map(|s| s * times);
+        view.viewport = SIZE_PX.map(|s| s * times).into();
     }
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.refine(&view));
@@ -97,7 +96,7 @@ pub fn check(gpu: &Gpu, name: &str) -> Outcome {
 }
 
 /// Edges of the mesh along the square's border: those of the triangles with two corners on one side.
-fn border(square: &Square, view: &FrameView) -> Vec<[u32; 2]> {
+fn border(square: &Square, view: &View) -> Vec<[u32; 2]> {
     let last = square.side - 1;
     let side_of = |slot: u32| {
         let [x, y] = [slot % square.side, slot / square.side];

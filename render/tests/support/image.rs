@@ -1,9 +1,7 @@
 //! Images by formula, their tiles as they are or in blocks, and what a filter must make of them.
 
-use terrasoar_render::{
-    FrameView, IMAGE_TILE_BORDER, IMAGE_TILE_INNER, IMAGE_TILE_TEXELS, ImageTileId, ImageryFormat,
-    ImageryShape, Renderer, TerrainShape,
-};
+use terrasoar_layout::imagery::{BORDER_TEXELS, INNER_TEXELS, ImageryShape, TILE_TEXELS, TileFormat, TileId};
+use terrasoar_render::{Renderer, TerrainShape, View};
 
 use super::scene::Scene;
 
@@ -60,7 +58,7 @@ impl Image {
     pub fn shape_over(terrain: &TerrainShape, texel_m: f64) -> ImageryShape {
         let extent = |i: usize| f64::from(terrain.samples[i] - 1) * terrain.spacing_m[i];
         ImageryShape {
-            format: ImageryFormat::Rgba8,
+            format: TileFormat::Rgba8,
             texels: [0, 1].map(|i| (extent(i) / texel_m).ceil() as u32),
             levels: 32,
             origin_m: [0.0; 2],
@@ -75,12 +73,12 @@ impl Image {
     }
 
     /// The bytes of a tile in the shape's format.
-    pub fn tile(&self, id: ImageTileId) -> Vec<u8> {
-        let first = |t: u32| i64::from(t * IMAGE_TILE_INNER) - i64::from(IMAGE_TILE_BORDER);
+    pub fn tile(&self, id: TileId) -> Vec<u8> {
+        let first = |t: u32| i64::from(t * INNER_TEXELS) - i64::from(BORDER_TEXELS);
         let [x0, y0] = [first(id.x), first(id.y)];
-        let side = i64::from(IMAGE_TILE_TEXELS);
+        let side = i64::from(TILE_TEXELS);
         let texel = |x, y| self.texel(id.level, x0 + x, y0 + y);
-        if self.shape.format == ImageryFormat::Rgba8 {
+        if self.shape.format == TileFormat::Rgba8 {
             return (0..side * side).flat_map(|n| texel(n % side, n / side)).collect();
         }
         let blocks = side / 4;
@@ -89,7 +87,7 @@ impl Image {
                 let [x, y] = [4 * (n % blocks), 4 * (n / blocks)];
                 let block = std::array::from_fn(|i| texel(x + i as i64 % 4, y + i as i64 / 4));
                 match self.shape.format {
-                    ImageryFormat::Bc7 => encode_bc7(block).to_vec(),
+                    TileFormat::Bc7 => encode_bc7(block).to_vec(),
                     _ => encode_bc1(block).to_vec(),
                 }
             })
@@ -164,16 +162,16 @@ fn encode_bc7(texels: [Texel; 16]) -> [u8; 16] {
 /// Puts an image on the terrain, in a pool of so many tiles.
 pub fn drape(scene: &mut Scene<'_>, image: &Image, tiles: u64) {
     let bytes = tiles * image.shape.format.tile_bytes() as u64;
-    scene.renderer.set_imagery(Some(image.shape), bytes).unwrap();
+    scene.renderer.set_imagery(&image.shape, image.shape.format, bytes).unwrap();
 }
 
 /// Gives the tiles that the view wants and lacks, at most so many, except some. Returns how many were taken.
 pub fn give(
     renderer: &mut Renderer,
     image: &Image,
-    view: &FrameView,
+    view: &View,
     most: usize,
-    except: impl Fn(ImageTileId) -> bool,
+    except: impl Fn(TileId) -> bool,
 ) -> usize {
     let wanted = renderer.want_imagery(view, usize::MAX).to_vec();
     let asked = wanted.into_iter().filter(|t| !except(*t)).take(most);

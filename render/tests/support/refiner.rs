@@ -4,7 +4,7 @@
 //! eye and a mesh at another have slots in common, as a caller's have.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, MeshVertex, TerrainShape};
+use terrasoar_render::{MeshVertex, TerrainShape, View};
 
 /// All vertices of a square, and what refinement needs to know of them.
 pub struct Square {
@@ -104,7 +104,7 @@ impl Square {
     }
 
     /// Whether a vertex is in the mesh of a view.
-    pub fn active(&self, slot: u32, view: &FrameView) -> bool {
+    pub fn active(&self, slot: u32, view: &View) -> bool {
         let g = view.vertical_exaggeration;
         let v = &self.vertices[slot as usize];
         let place = self.place(slot) * DVec3::new(1.0, 1.0, g);
@@ -113,7 +113,7 @@ impl Square {
     }
 
     /// The mesh of a view, not culled.
-    pub fn refine(&self, view: &FrameView) -> Mesh {
+    pub fn refine(&self, view: &View) -> Mesh {
         self.refine_where(|slot, _| self.active(slot, view))
     }
 

@@ -1,8 +1,8 @@
 //! A device, a renderer and a picture in one: what most tests need.
 
 use terrasoar_render::{
-    DrawStats, Frame, FrameView, Gpu, HEIGHTS_PER_TILE, Look, MeshPatch, Offscreen, Renderer,
-    RendererOptions, TILE_CELLS, TileId, UploadStats, read_depth_m,
+    DrawStats, Frame, Gpu, HEIGHTS_PER_TILE, Look, MeshPatch, Offscreen, Renderer, RendererOptions,
+    TILE_CELLS, TileId, UploadStats, View, read_depth_m,
 };
 
 use super::picture::Picture;
@@ -43,7 +43,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Gives all tiles that the view wants, until it wants no more.
-    pub fn give_tiles(&mut self, view: &FrameView) {
+    pub fn give_tiles(&mut self, view: &View) {
         loop {
             let wanted = self.renderer.want_tiles(view, 8).to_vec();
             if wanted.is_empty() {
@@ -55,16 +55,16 @@ impl<'a> Scene<'a> {
         }
     }
 
-    pub fn draw(&mut self, view: &FrameView, look: &Look) -> Picture {
+    pub fn draw(&mut self, view: &View, look: &Look) -> Picture {
         self.draw_counted(view, look).0
     }
 
-    pub fn draw_counted(&mut self, view: &FrameView, look: &Look) -> (Picture, DrawStats) {
+    pub fn draw_counted(&mut self, view: &View, look: &Look) -> (Picture, DrawStats) {
         self.draw_frame(Frame { view, refined_for: None, look })
     }
 
     pub fn draw_frame(&mut self, frame: Frame<'_>) -> (Picture, DrawStats) {
-        let size_px = frame.view.viewport_px;
+        let size_px = frame.view.viewport.size_px();
         let picture = Offscreen::new(&self.gpu.device, size_px).unwrap();
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let stats = self.renderer.render(&mut encoder, picture.target(), frame).unwrap();
@@ -83,8 +83,8 @@ impl<'a> Scene<'a> {
 /// Heights of a tile, samples as they are.
 pub fn heights_of(square: &Square, tile: TileId) -> Vec<f32> {
     let side = i64::from(TILE_CELLS) + 3;
-    let [x0, y0] = tile.first_sample().map(i64::from);
-    let cell = i64::from(tile.cell_samples());
+    let [x0, y0] = [tile.x, tile.y].map(|t| i64::from(t * TILE_CELLS << tile.level));
+    let cell = 1_i64 << tile.level;
     let heights: Vec<f32> = (0..side * side)
         .map(|n| {
             let at = |first: i64, i: i64, corner: u32| first + (i - 1) * cell - i64::from(corner);

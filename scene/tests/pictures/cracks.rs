@@ -2,11 +2,10 @@
 
 use super::rig::{Rig, view};
 use super::{Outcome, Test, ensure};
+use terrasoar::ground::PictureEngine;
 use terrasoar::refine::Culling;
 use terrasoar::view::View;
 use terrasoar_render::{Gpu, Look};
-use terrasoar_scene::mapped::PictureEngine;
-use terrasoar_scene::scene::SceneOptions;
 
 pub const TESTS: &[Test] = &[
     ("cracks::none_along_a_flight", along_a_flight),
@@ -16,6 +15,10 @@ pub const TESTS: &[Test] = &[
 
 const SIZE_PX: [u32; 2] = [400, 300];
 const FRAMES: u32 = 14;
+
+/// How the mesh is made.
+type Made = (PictureEngine, Culling);
+const PLAIN: Made = (PictureEngine::Kinetic, Culling::Vertices);
 
 /// A frame of a flight that descends, turns, rolls and zooms, and never sees beyond the terrain: its highest line of sight is 12 degrees down.
 fn frame(i: u32) -> View {
@@ -28,13 +31,13 @@ fn frame(i: u32) -> View {
     view(eye_km, [70.0 * t, -13.0 - reach_deg - 20.0 * t, roll_deg], fov_deg, SIZE_PX)
 }
 
-fn check(gpu: &Gpu, options: SceneOptions, exaggeration: f64, tolerance_px: f64) -> Outcome {
-    let mut rig = Rig::new(gpu, options, SIZE_PX);
+fn check(gpu: &Gpu, (engine, culling): Made, exaggeration: f64, tolerance_px: f64) -> Outcome {
+    let mut rig = Rig::new(gpu, engine, culling, SIZE_PX);
     for i in 0..FRAMES {
         let mut view = View { tolerance_px, vertical_exaggeration: exaggeration, ..frame(i) };
         // The ground comes nearer by as much as it grows; the eye keeps its height above it.
         view.eye_m.z += 4400.0 * (exaggeration - 1.0);
-        rig.scene.update(&view);
+        rig.ground.update(&view);
         for morph in [true, false] {
             rig.draw(&view, &Look { morph, ..Look::default() });
             let holes = rig.depth_m().iter().filter(|d| d.is_infinite()).count();
@@ -47,20 +50,20 @@ fn check(gpu: &Gpu, options: SceneOptions, exaggeration: f64, tolerance_px: f64)
 fn along_a_flight(gpu: &Gpu) -> Outcome {
     // That sky is seen where there is some.
     let level = view([80.0, 70.0, 6.0], [0.0, 0.0, 0.0], 40.0, SIZE_PX);
-    let mut rig = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    let mut rig = Rig::plain(gpu, SIZE_PX);
     rig.shoot(&level, &Look::default());
     let sky = rig.depth_m().iter().filter(|d| d.is_infinite()).count();
     ensure(sky > 40_000, || format!("only {sky} pixels of sky in a level view"))?;
-    check(gpu, SceneOptions::default(), 1.0, 1.0)?;
+    check(gpu, PLAIN, 1.0, 1.0)?;
     // Large triangles move farthest.
-    check(gpu, SceneOptions::default(), 1.0, 12.0)?;
-    check(gpu, SceneOptions { engine: PictureEngine::Soar, ..SceneOptions::default() }, 1.0, 4.0)
+    check(gpu, PLAIN, 1.0, 12.0)?;
+    check(gpu, (PictureEngine::Soar, Culling::Vertices), 1.0, 4.0)
 }
 
 fn clusters(gpu: &Gpu) -> Outcome {
-    check(gpu, SceneOptions { culling: Culling::Clusters, ..SceneOptions::default() }, 1.0, 4.0)
+    check(gpu, (PictureEngine::Kinetic, Culling::Clusters), 1.0, 4.0)
 }
 
 fn exaggerated(gpu: &Gpu) -> Outcome {
-    check(gpu, SceneOptions::default(), 2.5, 2.0)
+    check(gpu, PLAIN, 2.5, 2.0)
 }

@@ -7,7 +7,6 @@ use terrasoar::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::with_records;
 use terrasoar_render::{Gpu, Look};
-use terrasoar_scene::scene::SceneOptions;
 
 pub const TESTS: &[Test] = &[("depth::agrees_with_the_dem", agrees_with_the_dem)];
 
@@ -81,7 +80,7 @@ impl Dem {
 /// A ray whose length along the line of sight is 1, through a place in the picture in pixels.
 fn ray(view: &View, [x, y]: [f64; 2]) -> DVec3 {
     let [right, up, forward] = view.axes();
-    let tan_y = (0.5 * view.vertical_fov_rad).tan();
+    let [_, tan_y] = view.half_tangents();
     let per_px = 2.0 * tan_y / f64::from(SIZE_PX[1]);
     let [half_x, half_y] = SIZE_PX.map(|s| 0.5 * f64::from(s));
     forward + right * ((x - half_x) * per_px) + up * ((half_y - y) * per_px)
@@ -91,7 +90,7 @@ fn ray(view: &View, [x, y]: [f64; 2]) -> DVec3 {
 /// mountains, it lies between those of the rays half a pixel around, of which there may be few.
 fn agrees_with_the_dem(gpu: &Gpu) -> Outcome {
     let dem = Dem::of_puget_sound();
-    let mut rig = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    let mut rig = Rig::plain(gpu, SIZE_PX);
     let mut random = 1_u64;
     let mut next = |below: u32| {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

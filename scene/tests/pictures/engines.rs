@@ -2,11 +2,10 @@
 
 use super::rig::{Rig, view};
 use super::{Outcome, Test, ensure};
+use terrasoar::ground::PictureEngine;
 use terrasoar::refine::Culling;
 use terrasoar::view::View;
 use terrasoar_render::{Gpu, LOOKS, Look};
-use terrasoar_scene::mapped::PictureEngine;
-use terrasoar_scene::scene::SceneOptions;
 
 pub const TESTS: &[Test] = &[
     ("engines::kinetic_looks_as_soar", kinetic_looks_as_soar),
@@ -40,9 +39,8 @@ fn same(a: &[u8], b: &[u8], of: impl Fn() -> String) -> Outcome {
 }
 
 fn against_soar(gpu: &Gpu, culling: Culling) -> Outcome {
-    let mut kinetic = Rig::new(gpu, SceneOptions { culling, ..SceneOptions::default() }, SIZE_PX);
-    let options = SceneOptions { engine: PictureEngine::Soar, culling, ..SceneOptions::default() };
-    let mut soar = Rig::new(gpu, options, SIZE_PX);
+    let mut kinetic = Rig::new(gpu, PictureEngine::Kinetic, culling, SIZE_PX);
+    let mut soar = Rig::new(gpu, PictureEngine::Soar, culling, SIZE_PX);
     for i in 0..10 {
         let view = frame(i);
         let (name, _) = LOOKS[i as usize % LOOKS.len()];
@@ -62,9 +60,9 @@ fn clusters_look_as_soar(gpu: &Gpu) -> Outcome {
 }
 
 fn streamed_looks_as_mapped(gpu: &Gpu) -> Outcome {
-    let mut mapped = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    let mut mapped = Rig::plain(gpu, SIZE_PX);
     // Less than the file has, so that pages are given up on the way.
-    let mut streamed = Rig::streamed(gpu, SceneOptions::default(), SIZE_PX, 3 << 20);
+    let mut streamed = Rig::streamed(gpu, SIZE_PX, 3 << 20);
     let look = Look::default();
     for i in [0, 1, 2, 3, 20, 0, 25, 9] {
         let view = frame(i);
@@ -75,18 +73,17 @@ fn streamed_looks_as_mapped(gpu: &Gpu) -> Outcome {
 }
 
 fn unseen_updates(gpu: &Gpu) -> Outcome {
-    let [mut always, mut now_and_then, mut once] =
-        [(); 3].map(|()| Rig::new(gpu, SceneOptions::default(), SIZE_PX));
+    let [mut always, mut now_and_then, mut once] = [(); 3].map(|()| Rig::plain(gpu, SIZE_PX));
     let look = Look::default();
     let mut pictures = [Vec::new(), Vec::new(), Vec::new()];
     for i in 0..10 {
         let view = frame(i);
         pictures[0] = always.shoot(&view, &look);
-        now_and_then.scene.update(&view);
+        now_and_then.ground.update(&view);
         if i == 2 || i == 9 {
             pictures[1] = now_and_then.draw(&view, &look);
         }
-        once.scene.update(&view);
+        once.ground.update(&view);
     }
     pictures[2] = once.draw(&frame(9), &look);
     same(&pictures[0], &pictures[1], || "seen twice".into())?;
@@ -95,7 +92,7 @@ fn unseen_updates(gpu: &Gpu) -> Outcome {
 
 fn new_device(gpu: &Gpu) -> Outcome {
     let other = Gpu::headless_blocking().map_err(|e| e.to_string())?;
-    let mut rig = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    let mut rig = Rig::plain(gpu, SIZE_PX);
     let look = Look::default();
     for i in 0..4 {
         rig.shoot(&frame(i), &look);
@@ -105,7 +102,7 @@ fn new_device(gpu: &Gpu) -> Outcome {
     same(&before, &rig.draw(&frame(3), &look), || "the frame that was lost".into())?;
     // Changes go on from there.
     let after = rig.shoot(&frame(4), &look);
-    let mut fresh = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+    let mut fresh = Rig::plain(gpu, SIZE_PX);
     same(&after, &fresh.shoot(&frame(4), &look), || "the frame after".into())
 }
 
@@ -126,24 +123,21 @@ fn differs_at_the_rim_alone(a: &[u8], b: &[u8]) -> Outcome {
 
 /// The way of culling changes in flight, over the pages that are there.
 fn other_culling(gpu: &Gpu) -> Outcome {
-    let mut streamed = Rig::streamed(gpu, SceneOptions::default(), SIZE_PX, 3 << 20);
+    let mut streamed = Rig::streamed(gpu, SIZE_PX, 3 << 20);
     let look = Look::default();
     for (i, culling) in (0..).zip([Culling::Clusters, Culling::Vertices, Culling::Clusters]) {
         streamed.shoot_settled(&frame(i), &look);
-        let changed = streamed.scene.set_culling(culling, gpu).map_err(|e| e.to_string())?;
-        ensure(changed, || "a window's scene can".into())?;
+        ensure(streamed.ground.set_culling(culling), || "streamed ground can".into())?;
         // The two ways draw another mesh out of sight, and so where sight ends: nowhere else do their pictures differ.
-        let mut other = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
+        let mut other = Rig::plain(gpu, SIZE_PX);
         let [a, b] = [streamed.shoot_settled(&frame(i), &look), other.shoot(&frame(i), &look)];
         differs_at_the_rim_alone(&a, &b).map_err(|why| format!("{culling:?}: {why}"))?;
-        let mut fresh = Rig::new(gpu, SceneOptions { culling, ..SceneOptions::default() }, SIZE_PX);
+        let mut fresh = Rig::new(gpu, PictureEngine::Kinetic, culling, SIZE_PX);
         let [a, b] = [streamed.shoot_settled(&frame(i), &look), fresh.shoot(&frame(i), &look)];
         same(&a, &b, || format!("the same frame, {culling:?}"))?;
         let [a, b] = [streamed.shoot_settled(&frame(i + 5), &look), fresh.shoot(&frame(i + 5), &look)];
         same(&a, &b, || format!("another frame, {culling:?}"))?;
     }
-    let mut fresh = Rig::new(gpu, SceneOptions::default(), SIZE_PX);
-    ensure(!fresh.scene.set_culling(Culling::Clusters, gpu).map_err(|e| e.to_string())?, || {
-        "others cannot".into()
-    })
+    let mut fresh = Rig::plain(gpu, SIZE_PX);
+    ensure(!fresh.ground.set_culling(Culling::Clusters), || "others cannot".into())
 }

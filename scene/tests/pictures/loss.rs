@@ -4,7 +4,7 @@ use super::paint::{Window, burn, from_above, land};
 use super::{Outcome, Test, ensure};
 use terrasoar_layout::edit::EditSession;
 use terrasoar_layout::imagery::TileFormat;
-use terrasoar_render::{Capabilities, DeviceWatch, Gpu, ImageryFormat, wgpu};
+use terrasoar_render::{Capabilities, DeviceWatch, Gpu, wgpu};
 
 pub const TESTS: &[Test] = &[
     ("loss::a_device_without_compressed_textures_takes_over_and_gives_back", less_and_more),
@@ -54,8 +54,8 @@ fn most(a: &[u8], b: &[u8]) -> u8 {
     a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
 }
 
-fn format(window: &Window<'_>) -> Option<ImageryFormat> {
-    window.scene.renderer().imagery().map(|shape| shape.format)
+fn format(window: &Window<'_>) -> Option<TileFormat> {
+    window.scene.renderer().imagery_format()
 }
 
 fn less_and_more(gpu: &Gpu) -> Outcome {
@@ -66,18 +66,18 @@ fn less_and_more(gpu: &Gpu) -> Outcome {
     let view = from_above();
     let mut window = Window::open(&rich, &path)?;
     let before = window.settled(&view)?;
-    ensure(format(&window) == Some(ImageryFormat::Bc1), || "blocks are sent as they are".into())?;
+    ensure(format(&window) == Some(TileFormat::Bc1), || "blocks are sent as they are".into())?;
     lose(&rich);
     window.move_to(&poor)?;
     let decoded = window.settled(&view)?;
-    ensure(format(&window) == Some(ImageryFormat::Rgba8), || "texels are sent".into())?;
+    ensure(format(&window) == Some(TileFormat::Rgba8), || "texels are sent".into())?;
     let off = most(&before, &decoded);
     ensure(off <= DECODERS_DIFFER_BY, || format!("the picture is off by {off}"))?;
     let fresh = Window::open(&poor, &path)?.settled(&view)?;
     ensure(decoded == fresh, || "a scene made on that device shows another picture".into())?;
     window.move_to(&again)?;
     ensure(window.settled(&view)? == before, || "the first picture does not come back".into())?;
-    ensure(format(&window) == Some(ImageryFormat::Bc1), || "blocks are sent again".into())
+    ensure(format(&window) == Some(TileFormat::Bc1), || "blocks are sent again".into())
 }
 
 /// Frames before the loss have left lists to be read, and some of that has come.

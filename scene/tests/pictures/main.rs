@@ -7,6 +7,7 @@ mod cracks;
 mod depth;
 mod engines;
 mod loss;
+mod own_pass;
 mod paint;
 mod rig;
 
@@ -35,8 +36,9 @@ fn main() -> ExitCode {
             None
         }
     };
-    let reads_depth = |name: &str| ["cracks::", "depth::"].iter().any(|part| name.starts_with(part));
-    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, loss::TESTS, paint::TESTS]
+    let reads_depth =
+        |name: &str| ["cracks::", "depth::", "own_pass::things"].iter().any(|part| name.starts_with(part));
+    let trials = [cracks::TESTS, depth::TESTS, engines::TESTS, loss::TESTS, own_pass::TESTS, paint::TESTS]
         .concat()
         .into_iter()
         .map(|(name, test): Test| {

@@ -4,6 +4,7 @@ use super::rig::view;
 use super::{Outcome, Test, ensure};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use terrasoar::ground::{Ground, StreamOptions};
 use terrasoar::view::View;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
@@ -44,7 +45,8 @@ pub fn land(folder: &tempfile::TempDir, format: Option<TileFormat>) -> Result<st
 /// A window's scene, and a picture to draw to.
 pub struct Window<'a> {
     gpu: &'a Gpu,
-    pub scene: Scene<'a>,
+    ground: Ground<'static>,
+    pub scene: Scene,
     offscreen: Offscreen,
     look: Look,
     watch: PictureWatch,
@@ -54,10 +56,12 @@ impl<'a> Window<'a> {
     pub fn open(gpu: &'a Gpu, path: &std::path::Path) -> Result<Self, String> {
         let terrain = Arc::new(Terrain::open_unmapped(path).map_err(|e| e.to_string())?);
         let options = SceneOptions { tiles: TileService::AFrame(8), ..SceneOptions::default() };
-        let scene = Scene::streamed(&terrain, 64 << 20, gpu, options).map_err(|e| e.to_string())?;
+        let ground = Ground::streamed(terrain, &StreamOptions::default()).map_err(|e| e.to_string())?;
+        let scene = Scene::new(&ground, gpu, options).map_err(|e| e.to_string())?;
         let offscreen = Offscreen::new(&gpu.device, SIZE_PX).map_err(|e| e.to_string())?;
         Ok(Self {
             gpu,
+            ground,
             scene,
             offscreen,
             look: Look { imagery: 1.0, ..Look::default() },
@@ -81,8 +85,9 @@ impl<'a> Window<'a> {
     }
 
     pub fn frame(&mut self, view: &View) -> Vec<u8> {
-        self.scene.update(view);
+        self.ground.update(view);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.scene.sync(&mut self.ground, &mut encoder, view, &self.look).unwrap();
         self.scene.draw(&mut encoder, self.offscreen.target(), view, &self.look, None).unwrap();
         self.gpu.queue.submit([encoder.finish()]);
         self.offscreen.read_rgba(&self.gpu.device, &self.gpu.queue).unwrap()
@@ -94,6 +99,7 @@ impl<'a> Window<'a> {
             let picture = self.frame(view);
             let is_complete = self.scene.renderer().imagery_stats().missing == 0
                 && self.scene.tile_stats().missing == 0
+                && !self.ground.is_waiting()
                 && !self.scene.is_waiting();
             if is_complete && self.frame(view) == picture {
                 return Ok(picture);

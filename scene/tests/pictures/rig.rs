@@ -4,6 +4,8 @@ use glam::DVec3;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
+use terrasoar::ground::{Ground, PictureEngine, StreamOptions};
+use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::progress::Silent;
@@ -38,32 +40,40 @@ fn built() -> &'static (tempfile::TempDir, Terrain) {
 /// A scene on a device, with a picture to draw to.
 pub struct Rig<'a> {
     gpu: &'a Gpu,
-    pub scene: Scene<'a>,
+    pub ground: Ground<'static>,
+    pub scene: Scene,
     offscreen: Offscreen,
 }
 
 impl<'a> Rig<'a> {
-    pub fn new(gpu: &'a Gpu, options: SceneOptions, size_px: [u32; 2]) -> Self {
-        let scene = Scene::new(puget_sound(), gpu, options).unwrap();
-        Self { gpu, scene, offscreen: Offscreen::new(&gpu.device, size_px).unwrap() }
+    /// Over the mapped file.
+    pub fn new(gpu: &'a Gpu, engine: PictureEngine, culling: Culling, size_px: [u32; 2]) -> Self {
+        Self::over(gpu, Ground::mapped(puget_sound(), engine, culling).unwrap(), size_px)
+    }
+
+    /// The kinetic engine over the mapped file.
+    pub fn plain(gpu: &'a Gpu, size_px: [u32; 2]) -> Self {
+        Self::new(gpu, PictureEngine::Kinetic, Culling::Vertices, size_px)
+    }
+
+    pub fn over(gpu: &'a Gpu, ground: Ground<'static>, size_px: [u32; 2]) -> Self {
+        let scene = Scene::new(&ground, gpu, SceneOptions::default()).unwrap();
+        Self { gpu, ground, scene, offscreen: Offscreen::new(&gpu.device, size_px).unwrap() }
     }
 
     /// Over pages that are read into `cache_bytes`.
-    pub fn streamed(gpu: &'a Gpu, options: SceneOptions, size_px: [u32; 2], cache_bytes: u64) -> Self {
-        let scene = Scene::streamed(&puget_sound_unmapped(), cache_bytes, gpu, options).unwrap();
-        Self { gpu, scene, offscreen: Offscreen::new(&gpu.device, size_px).unwrap() }
+    pub fn streamed(gpu: &'a Gpu, size_px: [u32; 2], cache_bytes: u64) -> Self {
+        let options = StreamOptions::default().cache_bytes(cache_bytes);
+        Self::over(gpu, Ground::streamed(puget_sound_unmapped(), &options).unwrap(), size_px)
     }
 
     /// Refines for a view and draws it until all that it needs has come.
     pub fn shoot_settled(&mut self, view: &View, look: &Look) -> Vec<u8> {
         let begun = Instant::now();
         loop {
-            let refined = self.scene.update(view);
+            let refined = self.ground.update(view);
             let picture = self.draw(view, look);
-            if refined.work.late == 0
-                && self.scene.tile_stats().missing == 0
-                && !self.scene.feed().is_waiting()
-            {
+            if refined.work.late == 0 && self.scene.tile_stats().missing == 0 && !self.ground.is_waiting() {
                 return picture;
             }
             assert!(begun.elapsed() < Duration::from_secs(60), "what is missing does not come");
@@ -72,13 +82,14 @@ impl<'a> Rig<'a> {
 
     /// Refines for a view and draws it; four bytes a pixel.
     pub fn shoot(&mut self, view: &View, look: &Look) -> Vec<u8> {
-        self.scene.update(view);
+        self.ground.update(view);
         self.draw(view, look)
     }
 
     /// Draws the mesh as it is.
     pub fn draw(&mut self, view: &View, look: &Look) -> Vec<u8> {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.scene.sync(&mut self.ground, &mut encoder, view, look).unwrap();
         self.scene.draw(&mut encoder, self.offscreen.target(), view, look, None).unwrap();
         self.gpu.queue.submit([encoder.finish()]);
         let rgba = self.offscreen.read_rgba(&self.gpu.device, &self.gpu.queue).unwrap();

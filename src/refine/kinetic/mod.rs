@@ -23,7 +23,7 @@ mod time;
 pub use frame::ahead::Want;
 pub use frame::budget::Budget;
 pub use mesh::bounds::Bounds;
-pub use mesh::patch::{NO_LEVEL, Patch, PatchVertex};
+pub use mesh::patch::{MeshVertex, Patch};
 
 use super::change::GroundChange;
 use super::{Culling, Engine, Phase, Probe, Work};
@@ -191,22 +191,22 @@ impl<S: RecordStore> Kinetic<S> {
             + (self.over.capacity() + self.waiting.capacity()) * size_of::<Entry>()
             + self.ahead.as_ref().map_or(0, |ahead| ahead.bytes())
             + self.wants.capacity() * size_of::<Want>()
-            + self.patch.vertices.capacity() * size_of::<(u32, PatchVertex)>()
+            + self.patch.vertices.capacity() * size_of::<(u32, MeshVertex)>()
             + self.edits.bytes()
             + self.patch.triangles.capacity() * size_of::<(u32, [u32; 3])>()
             + self.patch.draws.capacity() * size_of::<std::ops::Range<u32>>()
     }
 
-    fn patch_vertex(&self, point: GridPoint, vertex: &Vertex, ends: [u32; 2]) -> PatchVertex {
+    fn patch_vertex(&self, point: GridPoint, vertex: &Vertex, ends: [u32; 2]) -> MeshVertex {
         let folded = self.records.grid().fold(point);
-        PatchVertex {
+        MeshVertex {
             x: folded.x(),
             y: folded.y(),
             height_m: vertex.height_m as f32,
             error_m: vertex.error_m as f32,
             radius_m: vertex.radius_m as f32,
             ends,
-            flags: if self.records.grid().is_corner(point) { NO_LEVEL } else { level_of(point) },
+            flags: if self.records.grid().is_corner(point) { MeshVertex::NO_LEVEL } else { level_of(point) },
         }
     }
 

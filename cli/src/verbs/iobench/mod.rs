@@ -237,7 +237,7 @@ fn bench_of(args: &Args, block_m: f64, standing: Standing, runs: Vec<IoRun>) -> 
         terrain: name(&args.file),
         flight: name(&args.flight),
         tolerance_px: quality.tolerance_px,
-        viewport_px: [quality.viewport.width_px, quality.viewport.height_px],
+        viewport_px: quality.viewport.size_px(),
         page_bytes: PAGE_BYTES as u64,
         cache_mib: args.cache,
         disk_pages_per_frame: args.disk_pages,

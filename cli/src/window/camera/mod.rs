@@ -67,9 +67,8 @@ impl Camera {
 
     /// Unit vector through a place of the picture, given in parts of its width and height from the top left.
     pub(crate) fn ray(&self, at: [f64; 2], viewport: Viewport) -> DVec3 {
-        let [right, up, forward] = self.axes();
-        let tan_y = (0.5 * self.vertical_fov_deg.to_radians()).tan();
-        let tan_x = tan_y * f64::from(viewport.width_px) / f64::from(viewport.height_px);
+        let view = self.view(viewport, 1.0, 1.0);
+        let ([right, up, forward], [tan_x, tan_y]) = (view.axes(), view.half_tangents());
         (forward + right * (2.0 * at[0] - 1.0) * tan_x + up * (1.0 - 2.0 * at[1]) * tan_y).normalize()
     }
 

@@ -30,7 +30,7 @@ impl Viewer {
             Action::Follow => {
                 let (rig, exaggeration) = (&mut self.rig, self.settings.exaggeration);
                 let before = rig.follow_m;
-                rig.toggle_follow(&self.stage.ground(), exaggeration);
+                rig.toggle_follow(&self.stage.heights(), exaggeration);
                 if before.is_none() && self.rig.follow_m.is_none() {
                     self.news("There is no ground below to keep a height above.");
                 }
@@ -151,7 +151,7 @@ impl Viewer {
             Ok(stage) => {
                 self.end_recording();
                 self.take_stage(stage);
-                self.tools = ToolBox::new(self.stage.ground().extent_m());
+                self.tools = ToolBox::new(self.stage.heights().extent_m());
                 self.rig = sight::start(&self.stage, &self.screen, &self.window, &self.settings);
                 self.player = None;
                 self.name_terrain();
@@ -191,7 +191,7 @@ impl Viewer {
                 "{text:?} is no place: give metres east and north of the south-west corner, such as 1500, 820.5"
             ));
         };
-        let [wide, high] = self.stage.ground().extent_m();
+        let [wide, high] = self.stage.heights().extent_m();
         if !((0.0..=wide).contains(&east) && (0.0..=high).contains(&north)) {
             return self.trouble(format!(
                 "{east}, {north} lies outside the terrain, which extends from 0, 0 to {wide:.0}, {high:.0} metres"
@@ -199,7 +199,7 @@ impl Viewer {
         }
         let exaggeration = self.settings.exaggeration;
         let at = glam::DVec3::new(east, north, 0.0);
-        let below_m = ground_below_m(&self.stage.ground(), at, exaggeration);
+        let below_m = ground_below_m(&self.stage.heights(), at, exaggeration);
         self.pause();
         self.rig.go_to(at.with_z(below_m.unwrap_or_default()), 0.04 * wide.max(high));
     }

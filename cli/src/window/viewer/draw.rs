@@ -7,9 +7,9 @@ use crate::window::overlay::{Layer, Overlay};
 use anyhow::Result;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use terrasoar::ground::Refined;
 use terrasoar::view::View;
 use terrasoar_render::{Offscreen, RenderError, Target, wgpu};
-use terrasoar_scene::feed::Refined;
 use terrasoar_scene::scene::Drawn;
 
 impl Viewer {
@@ -41,7 +41,7 @@ impl Viewer {
         let view = self.view();
         let refined = match self.frozen {
             Some(_) => None,
-            None => Some(self.stage.scene.update(&view)),
+            None => Some(self.stage.update(&view)),
         };
         let update = before.elapsed();
         // A device that went while nothing was drawn says so when it is asked.
@@ -62,9 +62,9 @@ impl Viewer {
         self.window.pre_present_notify();
         self.screen.gpu.queue.present(picture);
         self.screen.gpu.watch.check()?;
-        let waiting = self.stage.scene.is_waiting();
+        let waiting = self.stage.is_waiting();
         self.unsettled = waiting || (drawn.tiles_missing > 0 && drawn.tiles[0] > 0);
-        while let Some(error) = self.stage.scene.take_error() {
+        while let Some(error) = self.stage.take_error() {
             self.trouble(format!("{error}; the ground stays coarse there"));
         }
         self.count(refined, drawn, update, passed.unwrap_or_else(|| begun.elapsed()));
@@ -74,7 +74,7 @@ impl Viewer {
     fn draw(&mut self, encoder: &mut wgpu::CommandEncoder, target: Target<'_>, view: &View) -> Result<Drawn> {
         let look = self.settings.look();
         let frozen = self.frozen;
-        Ok(self.stage.scene.draw(encoder, target, view, &look, frozen.as_ref())?)
+        self.stage.draw(encoder, target, view, &look, frozen.as_ref())
     }
 
     fn count(&mut self, refined: Option<Refined>, drawn: Drawn, update: Duration, frame: Duration) {

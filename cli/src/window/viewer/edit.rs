@@ -109,7 +109,7 @@ impl Viewer {
         if edits.is_empty() {
             return true;
         }
-        if self.stage.scene.feed().held_pages() >= MOST_HELD {
+        if self.stage.ground.held_pages() >= MOST_HELD {
             self.end_work();
             self.trouble(UNSAVED);
             return false;
@@ -147,7 +147,7 @@ impl Viewer {
         self.touched = true;
         // The picture is another one once this is drawn.
         self.said.retain(|(name, _)| *name != "at-rest");
-        if let Err(error) = self.stage.scene.ground_changed(ground) {
+        if let Err(error) = self.stage.ground.take_edits(ground) {
             self.trouble(error.to_string());
         }
         self.follow_picture(picture);
@@ -193,7 +193,7 @@ impl Viewer {
                 self.news(if back { "There is nothing to undo." } else { "There is nothing to redo." });
             }
             News::Saved { places, picture } => {
-                self.stage.scene.committed(&places);
+                self.stage.ground.relocate(&places);
                 match picture {
                     Ok(picture) => self.follow_picture(picture),
                     Err(error) => self.trouble(error.to_string()),
@@ -271,7 +271,7 @@ impl Viewer {
         let Some(mut rain) = self.rain.take() else { return };
         let ahead = self.ahead_m();
         let reach_m = 0.4 * ahead.distance(self.rig.camera.eye_m);
-        let [wide, high] = self.stage.ground().extent_m();
+        let [wide, high] = self.stage.heights().extent_m();
         let [west, south] = [ahead.x, ahead.y].map(|m| m - reach_m);
         let [east, north] = [ahead.x, ahead.y].map(|m| m + reach_m);
         let craters = RainOfCraters {
@@ -313,7 +313,7 @@ impl Viewer {
     /// The ring on the ground within which the tool works, in points of the window; pieces of it that can be seen.
     pub(super) fn ring(&self) -> Vec<[f32; 2]> {
         let (Some(hit), true) = (self.under, self.tools.tool != Tool::Look) else { return Vec::new() };
-        let ground = self.stage.ground();
+        let ground = self.stage.heights();
         let scale = 1.0 / self.window.scale_factor();
         let around = (0..=RING_POINTS).filter_map(|i| {
             let (sin, cos) = (i as f64 / RING_POINTS as f64 * std::f64::consts::TAU).sin_cos();

@@ -12,7 +12,7 @@ impl Viewer {
         let before = self.settings.clone();
         let (mut settings, mut wishes) = (self.settings.clone(), Vec::new());
         let adapter = self.screen.gpu.capabilities.adapter.clone();
-        let extent_m = self.stage.ground().extent_m();
+        let extent_m = self.stage.heights().extent_m();
         let job = self.job.as_ref().map(|job| {
             let (stage, part) = job.progress();
             (
@@ -61,10 +61,10 @@ impl Viewer {
         let now = self.settings.exaggeration;
         if now != before.exaggeration {
             let rig = &mut self.rig;
-            rig.exaggerate(&self.stage.ground(), before.exaggeration, now);
+            rig.exaggerate(&self.stage.heights(), before.exaggeration, now);
         }
         if self.settings.culling != before.culling {
-            if let Err(error) = self.stage.set_culling(self.settings.culling(), &self.screen.gpu) {
+            if let Err(error) = self.stage.set_culling(self.settings.culling()) {
                 self.settings.culling.clone_from(&before.culling);
                 self.trouble(format!("{error:#}"));
             }

@@ -28,7 +28,7 @@ impl Viewer {
         let viewport = self.viewport();
         let at = [x / f64::from(viewport.width_px), y / f64::from(viewport.height_px)];
         let camera = self.rig.camera;
-        let ground = self.stage.ground();
+        let ground = self.stage.heights();
         pick::cast(
             &ground,
             ground.spacing_m(),
@@ -55,7 +55,7 @@ impl Viewer {
         match self.pick(Some([0.5 * width, 0.5 * height])) {
             Some(hit) => hit.at_m,
             None => {
-                let [east_m, north_m] = self.stage.ground().extent_m();
+                let [east_m, north_m] = self.stage.heights().extent_m();
                 self.rig.camera.eye_m + self.rig.camera.axes()[2] * 0.25 * east_m.max(north_m)
             }
         }
@@ -70,7 +70,7 @@ impl Viewer {
 /// A rig that sees the whole terrain.
 pub(super) fn start(stage: &Stage, screen: &Screen, window: &Window, settings: &Settings) -> Rig {
     let camera = overview_beside_panel(stage, screen, window, settings);
-    Rig::new(camera, &stage.ground())
+    Rig::new(camera, &stage.heights())
 }
 
 /// The overview in what the panel leaves of the window.
@@ -82,9 +82,9 @@ fn overview_beside_panel(stage: &Stage, screen: &Screen, window: &Window, settin
     let beside = Viewport { width_px: (0.94 * (f64::from(width_px) - panel_px)) as u32, height_px };
     let mut view = overview(stage.terrain(), settings.exaggeration, FOV_DEG, beside);
     // The eye steps aside by half the panel, as wide as that is in the middle of the terrain.
-    let [east_m, north_m] = stage.ground().extent_m();
+    let [east_m, north_m] = stage.heights().extent_m();
     let away_m = view.eye_m.distance(glam::DVec3::new(0.5 * east_m, 0.5 * north_m, 0.0));
-    let m_a_px = 2.0 * away_m * (0.5 * view.vertical_fov_rad).tan() / f64::from(height_px);
+    let m_a_px = 2.0 * away_m * view.half_tangents()[1] / f64::from(height_px);
     view.eye_m -= view.axes()[0] * (0.5 * panel_px * m_a_px);
     Camera::from(&view)
 }

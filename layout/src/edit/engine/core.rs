@@ -13,11 +13,12 @@ use crate::bound::Rules;
 use crate::edit::operations::window::{HeightWindow, SampleRect};
 use crate::edit::{Changes, Edit};
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, Page};
+use crate::file::bytes::Page;
 use crate::file::entries::Entry;
 use crate::file::header::Header;
 use crate::grid::GridPoint;
 use crate::grid::record::{RecordCodec, RecordKind, Vertex};
+use crate::read::store::page_of;
 use crate::read::terrain::Terrain;
 use std::sync::Arc;
 
@@ -190,12 +191,11 @@ impl<C: RecordCodec> Core<C> {
 
     /// Vertices and pages that the batch wrote to, as far as they are not as they were.
     fn tell(&mut self, changes: &mut Changes) {
-        let per_page = (PAGE_BYTES / C::BYTES) as u64;
         let written = self.pages.overwritten();
         let mut tell = |Overwritten { point, slot, old }: &Overwritten<C::Raw>| {
             if self.pages.raw_if_held(*slot) != Some(*old) {
                 changes.vertices.push(*point);
-                let page = slot / per_page;
+                let page = page_of::<C>(*slot);
                 if changes.pages.last() != Some(&page) {
                     changes.pages.push(page);
                 }

@@ -13,7 +13,7 @@ use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::RecordCodec;
 use crate::read::prefetch::prefetch;
-use crate::read::store::page_shift;
+use crate::read::store::{byte_in_page, page_of, records_per_page};
 use crate::read::terrain::Terrain;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -61,9 +61,6 @@ pub(crate) struct Pages<C: RecordCodec> {
 }
 
 impl<C: RecordCodec> Pages<C> {
-    /// Binary logarithm of the records a page.
-    const SHIFT: u32 = page_shift::<C>();
-
     pub(crate) fn new(terrain: Arc<Terrain>) -> Self {
         let count = terrain.entries().len();
         Self {
@@ -89,15 +86,15 @@ impl<C: RecordCodec> Pages<C> {
     /// The record of a slot; inert if its page cannot be read, which [`Pages::check`] tells.
     #[inline(always)]
     pub(crate) fn raw(&mut self, slot: u64) -> C::Raw {
-        let within = Self::within(slot);
-        C::read(&self.page_of(slot)[within..within + C::BYTES])
+        let within = byte_in_page::<C>(slot);
+        C::read(&self.page_at(slot)[within..within + C::BYTES])
     }
 
     /// The record of a slot whose page is here.
     #[inline(always)]
     pub(crate) fn raw_if_held(&self, slot: u64) -> Option<C::Raw> {
-        let page = self.held[(slot >> Self::SHIFT) as usize].as_ref()?;
-        let within = Self::within(slot);
+        let page = self.held[page_of::<C>(slot) as usize].as_ref()?;
+        let within = byte_in_page::<C>(slot);
         Some(C::read(&page[within..within + C::BYTES]))
     }
 
@@ -107,24 +104,18 @@ impl<C: RecordCodec> Pages<C> {
         self.raw(slot_of(self.k, p))
     }
 
-    /// Byte of a slot in its page.
-    #[inline(always)]
-    fn within(slot: u64) -> usize {
-        (slot as usize & ((1 << Self::SHIFT) - 1)) * C::BYTES
-    }
-
     /// Asks memory for the record of a slot, if its page is here.
     #[inline(always)]
     pub(crate) fn prefetch(&self, slot: u64) {
-        if let Some(Some(page)) = self.held.get((slot >> Self::SHIFT) as usize) {
-            prefetch(&page[..], Self::within(slot));
+        if let Some(Some(page)) = self.held.get(page_of::<C>(slot) as usize) {
+            prefetch(&page[..], byte_in_page::<C>(slot));
         }
     }
 
     #[inline(always)]
-    fn page_of(&mut self, slot: u64) -> &mut Page {
+    fn page_at(&mut self, slot: u64) -> &mut Page {
         let Self { terrain, held, clean, failure, moved, .. } = self;
-        let logical = slot >> Self::SHIFT;
+        let logical = page_of::<C>(slot);
         held[logical as usize].get_or_insert_with(|| {
             *clean += 1;
             load(terrain, moved.get(&logical), logical, failure)
@@ -143,7 +134,7 @@ impl<C: RecordCodec> Pages<C> {
             self.held[at] = Some(page);
             self.clean += 1;
         }
-        Ok(&*self.page_of(logical << Self::SHIFT))
+        Ok(&*self.page_at(logical * records_per_page::<C>()))
     }
 
     /// What a page holds at another place in the file.
@@ -162,17 +153,17 @@ impl<C: RecordCodec> Pages<C> {
 
     /// Overwrites a record.
     pub(crate) fn write(&mut self, point: GridPoint, slot: u64, raw: C::Raw) {
-        let (logical, within) = ((slot >> Self::SHIFT) as usize, Self::within(slot));
-        let page = self.page_of(slot);
+        let (logical, within) = (page_of::<C>(slot) as usize, byte_in_page::<C>(slot));
+        let page = self.page_at(slot);
         let place = &mut page[within..within + C::BYTES];
         let old = C::read(place);
         if self.flags[logical] & UNCOMMITTED == 0 {
-            let committed = Box::new(*self.page_of(slot));
+            let committed = Box::new(*self.page_at(slot));
             self.uncommitted.push((logical as u64, committed));
             self.clean -= usize::from(self.flags[logical] & TAKEN == 0);
             self.flags[logical] |= EDITED | UNCOMMITTED;
         }
-        C::write(raw, &mut self.page_of(slot)[within..within + C::BYTES]);
+        C::write(raw, &mut self.page_at(slot)[within..within + C::BYTES]);
         self.log.push(Overwritten { point, slot, old });
     }
 
@@ -222,8 +213,8 @@ impl<C: RecordCodec> Pages<C> {
     /// Ends a batch that is not.
     pub(crate) fn take_back(&mut self) {
         while let Some(Overwritten { slot, old, .. }) = self.log.pop() {
-            let within = Self::within(slot);
-            C::write(old, &mut self.page_of(slot)[within..within + C::BYTES]);
+            let within = byte_in_page::<C>(slot);
+            C::write(old, &mut self.page_at(slot)[within..within + C::BYTES]);
         }
         // Pages that this batch alone wrote to are as they were: there is nothing to commit of them.
         for (logical, _) in self.uncommitted.drain(self.kept..) {

@@ -86,6 +86,6 @@ impl PaintedSection {
         let place = ImageryPlace { offset: u64::from(first_page) * PAGE, bytes: bytes.len() as u64 };
         // Tiles of two states of a file of nonsense may lie over one another.
         check_uses(painter.files.terrain.source(), place, &section, &entries, place.end())?;
-        Ok(Some(Self { place, bytes, imagery: Imagery::of(section, entries) }))
+        Ok(Some(Self { place, bytes, imagery: current.with(section, entries) }))
     }
 }

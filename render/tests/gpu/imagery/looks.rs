@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 use terrasoar_render::{
-    Contours, DeviceWatch, FrameView, Gpu, Haze, ImageryFormat, ImageryShape, Look, Sun, Surface, Wireframe,
-    wgpu,
+    Contours, DeviceWatch, Gpu, Haze, ImageryShape, Look, Sun, Surface, TileFormat, View, Wireframe, wgpu,
 };
 
 use super::{SIZE_PX, bare, chart, down, level_ground, pixel, show_all};
@@ -38,7 +37,7 @@ fn transparent(gpu: &Gpu) -> Outcome {
     let image =
         Image::new(shape, |level, x, _| if (x << level) < 1080 { [60, 60, 200, 255] } else { [0; 4] });
     drape(&mut scene, &image, 64);
-    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 2400.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    let view = View::look_at(DVec3::new(640.0, 640.0, 2400.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX.into());
     show_all(&mut scene, &image, &view);
     scene.give_tiles(&view);
     let look = Look { haze: Haze::Off, morph: false, ..Look::default() };
@@ -46,15 +45,14 @@ fn transparent(gpu: &Gpu) -> Outcome {
     let photo = scene.draw(&view, &Look { imagery: 1.0, ..look });
     let half = scene.draw(&view, &Look { imagery: 0.5, ..look });
     let depth = scene.depth_m();
-    let [tan_x, tan_y] = view.half_tangents();
+    let ([right, up, forward], [tan_x, tan_y]) = (view.axes(), view.half_tangents());
     let [mut inside, mut outside] = [0, 0];
     for (i, depth_m) in (0..).zip(&depth) {
         let (x, y) = (i % SIZE_PX[0], i / SIZE_PX[0]);
         let across = |p: u32, n: u32, tan: f64| tan * (2.0 * (f64::from(p) + 0.5) / f64::from(n) - 1.0);
         let at = view.eye_m
             + f64::from(*depth_m)
-                * (view.forward + view.right * across(x, SIZE_PX[0], tan_x)
-                    - view.up * across(y, SIZE_PX[1], tan_y));
+                * (forward + right * across(x, SIZE_PX[0], tan_x) - up * across(y, SIZE_PX[1], tan_y));
         let [a, b, c] = [&tint, &photo, &half].map(|p| pixel(p, x, y));
         let margin_m = 30.0;
         let [east, north] = [at.x - 100.0, at.y - 100.0];
@@ -91,7 +89,7 @@ fn half_transparent(gpu: &Gpu) -> Outcome {
     let look = Look { tint_range_m: Some([0.0, 9000.0]), rock: 0.0, ..bare() };
     let tint = scene.draw(&view, &Look { imagery: 0.0, ..look });
     let colour = [151, 75, 201, 129];
-    for format in gpu.capabilities.imagery_formats().iter().filter(|f| **f != ImageryFormat::Bc1) {
+    for format in gpu.capabilities.imagery_formats().iter().filter(|f| **f != TileFormat::Bc1) {
         let shape = ImageryShape { format: *format, ..Image::shape_over(&square.terrain, 1.0) };
         let image = Image::new(shape, move |_, _, _| colour);
         drape(&mut scene, &image, 16);
@@ -116,7 +114,8 @@ fn half_transparent(gpu: &Gpu) -> Outcome {
 fn blocks(gpu: &Gpu) -> Outcome {
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
     let mut scene = Scene::new(gpu, &square);
-    let view = FrameView::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX);
+    let view =
+        View::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX.into());
     scene.show(&square.refine(&view));
     scene.give_tiles(&view);
     let texel = |_: u32, x: i64, y: i64| {
@@ -132,7 +131,7 @@ fn blocks(gpu: &Gpu) -> Outcome {
     let shape = Image::shape_over(&square.terrain, 1.5);
     let look = Look { imagery: 1.0, ..Look::default() };
     let mut pictures = Vec::new();
-    for format in [ImageryFormat::Bc1, ImageryFormat::Rgba8] {
+    for format in [TileFormat::Bc1, TileFormat::Rgba8] {
         let image = Image::new(ImageryShape { format, ..shape }, texel);
         drape(&mut scene, &image, 32);
         show_all(&mut scene, &image, &view);
@@ -147,7 +146,7 @@ fn blocks(gpu: &Gpu) -> Outcome {
         let [i, j] = [x.div_euclid(4), y.div_euclid(4)];
         [(i * 37 % 200) as u8 | 1, (j * 53 % 200) as u8 | 1, ((i + j) * 11 % 200) as u8 | 1, 255]
     };
-    let [seven, raw] = [ImageryFormat::Bc7, ImageryFormat::Rgba8].map(|format| {
+    let [seven, raw] = [TileFormat::Bc7, TileFormat::Rgba8].map(|format| {
         let image = Image::new(ImageryShape { format, ..shape }, plain);
         drape(&mut scene, &image, 32);
         show_all(&mut scene, &image, &view);
@@ -172,9 +171,10 @@ fn without_blocks(gpu: &Gpu) -> Outcome {
     let (device, queue) = pollster::block_on(request).map_err(|e| e.to_string())?;
     let watch = DeviceWatch::install(&device);
     let plain = Gpu { adapter, device, queue, capabilities, watch };
-    ensure(plain.capabilities.imagery_formats() == [ImageryFormat::Rgba8], || "it takes blocks".into())?;
+    ensure(plain.capabilities.imagery_formats() == [TileFormat::Rgba8], || "it takes blocks".into())?;
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
-    let view = FrameView::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX);
+    let view =
+        View::look_at(DVec3::new(300.0, 100.0, 900.0), DVec3::new(700.0, 900.0, 500.0), SIZE_PX.into());
     let image = chart(Image::shape_over(&square.terrain, 4.0));
     let pictures = [gpu, &plain].map(|gpu| {
         let mut scene = Scene::new(gpu, &square);
@@ -187,8 +187,8 @@ fn without_blocks(gpu: &Gpu) -> Outcome {
         format!("they differ by {}", pictures[0].difference(&pictures[1]))
     })?;
     let mut scene = Scene::new(&plain, &square);
-    for format in [ImageryFormat::Bc1, ImageryFormat::Bc7] {
-        let refused = scene.renderer.set_imagery(Some(ImageryShape { format, ..image.shape }), 1 << 22);
+    for format in [TileFormat::Bc1, TileFormat::Bc7] {
+        let refused = scene.renderer.set_imagery(&image.shape, format, 1 << 22);
         ensure(refused.is_err_and(|e| e.to_string().contains("RGBA8")), || format!("{format:?} is taken"))?;
     }
     Ok(())
@@ -220,7 +220,7 @@ fn light(gpu: &Gpu) -> Outcome {
     scene.show(&square.down_to(0));
     let image = grey(Image::shape_over(&square.terrain, 2.0));
     drape(&mut scene, &image, 16);
-    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    let view = View::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX.into());
     show_all(&mut scene, &image, &view);
     scene.give_tiles(&view);
     for azimuth_deg in [0.0_f32, 120.0, 250.0] {
@@ -250,7 +250,7 @@ fn lines(gpu: &Gpu) -> Outcome {
     scene.show(&square.down_to(0));
     let image = Image::new(Image::shape_over(&square.terrain, 1.0), |_, _, _| [150, 140, 130, 255]);
     drape(&mut scene, &image, 16);
-    let view = FrameView::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX);
+    let view = View::look_at(DVec3::new(640.0, 640.0, 1500.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX.into());
     show_all(&mut scene, &image, &view);
     let look = bare();
     let plain = scene.draw(&view, &look);

@@ -5,7 +5,7 @@ mod places;
 mod streaming;
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Haze, ImageryShape, Look};
+use terrasoar_render::{Haze, ImageryShape, Look, View};
 
 use crate::Test;
 use crate::support::image::{Image, give};
@@ -25,9 +25,9 @@ fn level_ground() -> Square {
 }
 
 /// Straight down from so many metres above the level ground.
-fn down(east_m: f64, north_m: f64, above_m: f64) -> FrameView {
+fn down(east_m: f64, north_m: f64, above_m: f64) -> View {
     let eye = DVec3::new(east_m, north_m, 100.0 + above_m);
-    FrameView { vertical_fov_rad: 0.5, ..FrameView::look_at(eye, eye - DVec3::Z, SIZE_PX) }
+    View { vertical_fov_rad: 0.5, ..View::look_at(eye, eye - DVec3::Z, SIZE_PX.into()) }
 }
 
 /// The image's own colours.
@@ -35,7 +35,7 @@ fn bare() -> Look {
     Look { imagery: 1.0, shading: 0.0, haze: Haze::Off, morph: false, ..Look::default() }
 }
 
-fn show_all(scene: &mut Scene<'_>, image: &Image, view: &FrameView) {
+fn show_all(scene: &mut Scene<'_>, image: &Image, view: &View) {
     while give(&mut scene.renderer, image, view, usize::MAX, |_| false) > 0 {}
 }
 

@@ -1,7 +1,7 @@
 //! Texels are where they belong, to a fraction of their size, in every level and from every side.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Gpu, ImageryFormat, ImageryShape};
+use terrasoar_render::{Gpu, ImageryShape, TileFormat, View};
 
 use super::{SIZE_PX, bare, chart, down, level_ground, pixel, show_all};
 use crate::support::image::{Image, drape, encoded, linear_of};
@@ -22,12 +22,13 @@ pub fn tests() -> Vec<(&'static str, Test)> {
 }
 
 /// Where the line of sight through the middle of a pixel meets the level ground, and from how far.
-fn ground_of(view: &FrameView, x: u32, y: u32) -> (DVec3, f64) {
+fn ground_of(view: &View, x: u32, y: u32) -> (DVec3, f64) {
     let [tan_x, tan_y] = view.half_tangents();
-    let [wide, high] = view.viewport_px.map(f64::from);
-    let ray = view.forward
-        + view.right * (tan_x * (2.0 * (f64::from(x) + 0.5) / wide - 1.0))
-        + view.up * (tan_y * (1.0 - 2.0 * (f64::from(y) + 0.5) / high));
+    let [wide, high] = view.viewport.size_px().map(f64::from);
+    let [right, up, forward] = view.axes();
+    let ray = forward
+        + right * (tan_x * (2.0 * (f64::from(x) + 0.5) / wide - 1.0))
+        + up * (tan_y * (1.0 - 2.0 * (f64::from(y) + 0.5) / high));
     let at = view.eye_m + ray * ((100.0 - view.eye_m.z) / ray.z);
     (at, at.distance(view.eye_m))
 }
@@ -39,7 +40,7 @@ fn checkerboard(gpu: &Gpu) -> Outcome {
     scene.show(&square.down_to(0));
     let texel_m = [0.73, 0.61];
     let image = chart(ImageryShape {
-        format: ImageryFormat::Rgba8,
+        format: TileFormat::Rgba8,
         texels: [1100, 1301],
         levels: 9,
         origin_m: [210.3, -40.7],
@@ -89,7 +90,7 @@ fn between_levels(gpu: &Gpu) -> Outcome {
 }
 
 /// Largest difference from a picture of the level ground computed here, its texels moved by `moved` for comparison.
-fn off(picture: &Picture, view: &FrameView, image: &Image, moved: [f64; 2]) -> f64 {
+fn off(picture: &Picture, view: &View, image: &Image, moved: [f64; 2]) -> f64 {
     let shape = &image.shape;
     let texel_m = (shape.texel_m[0] * shape.texel_m[1]).sqrt();
     let mut most = 0.0_f64;
@@ -120,7 +121,7 @@ fn seams(gpu: &Gpu) -> Outcome {
     let look = bare();
     let middle = 3.0 * 504.0 * 0.4;
     let eye = DVec3::new(middle - 30.0, middle - 260.0, 160.0);
-    let aslant = FrameView::look_at(eye, DVec3::new(middle, middle, 100.0), SIZE_PX);
+    let aslant = View::look_at(eye, DVec3::new(middle, middle, 100.0), SIZE_PX.into());
     for (name, view) in [
         ("near", down(middle, middle, 40.0)),
         ("two levels", down(middle, middle, 300.0)),
@@ -154,7 +155,7 @@ fn far_away(gpu: &Gpu) -> Outcome {
         let square = Square::new(6, corner, [16.0, 16.0], hills);
         let start = DVec3::new(f64::from(corner[0]) * 16.0, f64::from(corner[1]) * 16.0, 0.0);
         let image = chart(ImageryShape {
-            format: ImageryFormat::Rgba8,
+            format: TileFormat::Rgba8,
             texels: [1024, 1024],
             levels: 9,
             origin_m: [start.x + 64.0, start.y + 32.0],
@@ -165,7 +166,7 @@ fn far_away(gpu: &Gpu) -> Outcome {
         drape(&mut scene, &image, 16);
         [0.0, 1.0 / 256.0, 0.5].map(|further_m| {
             let eye = start + DVec3::new(400.0 + further_m, 300.0, 900.0);
-            let view = FrameView::look_at(eye, eye + DVec3::new(0.125, 0.25, -0.5), SIZE_PX);
+            let view = View::look_at(eye, eye + DVec3::new(0.125, 0.25, -0.5), SIZE_PX.into());
             show_all(&mut scene, &image, &view);
             scene.draw(&view, &bare())
         })
@@ -182,7 +183,7 @@ fn anisotropy(gpu: &Gpu) -> Outcome {
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.down_to(0));
     let eye = DVec3::new(2560.0, 60.0, 170.0);
-    let view = FrameView::look_at(eye, eye + DVec3::new(0.0, 400.0, -70.0), SIZE_PX);
+    let view = View::look_at(eye, eye + DVec3::new(0.0, 400.0, -70.0), SIZE_PX.into());
     // At 400 m a texel is a pixel wide, and a pixel six texels long.
     let texel_m = 400.0 / view.pixels_per_radian();
     let shape = Image::shape_over(&square.terrain, texel_m);

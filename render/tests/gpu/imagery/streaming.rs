@@ -1,7 +1,7 @@
 //! What is asked for, what is kept, and what stands in for what has not come.
 
 use glam::DVec3;
-use terrasoar_render::{FrameView, Gpu, ImageTileId, ImageryShape, RenderError};
+use terrasoar_render::{Gpu, ImageryShape, Pyramid, RenderError, TileId, View};
 
 use super::{SIZE_PX, bare, down, level_ground, show_all};
 use crate::support::image::{Image, Texel, drape, give};
@@ -58,7 +58,7 @@ fn ancestors(gpu: &Gpu) -> Outcome {
     scene.show(&square.down_to(0));
     let image = painted(Image::shape_over(&square.terrain, 0.5));
     drape(&mut scene, &image, 64);
-    let root = image.shape.pyramid().root();
+    let root = Pyramid::of_image(&image.shape).root();
     // Around the meeting point of four of the finest tiles.
     let view = down(504.0, 504.0, 80.0);
     let all = (SIZE_PX[0] * SIZE_PX[1]) as usize;
@@ -73,7 +73,7 @@ fn ancestors(gpu: &Gpu) -> Outcome {
     let stats = scene.renderer.imagery_stats();
     ensure(stats.resident == 1 && stats.most_levels_off == root.level, || format!("{stats:?}"))?;
 
-    let withheld = ImageTileId { level: 0, x: 2, y: 1 };
+    let withheld = TileId { level: 0, x: 2, y: 1 };
     while give(&mut scene.renderer, &image, &view, usize::MAX, |t| t == withheld) > 0 {}
     let stats = scene.renderer.imagery_stats();
     ensure(stats.missing == 1 && stats.most_levels_off == 1 && stats.ideal_share < 1.0, || {
@@ -103,9 +103,9 @@ fn needed(gpu: &Gpu) -> Outcome {
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.down_to(0));
     let image = painted(Image::shape_over(&square.terrain, 0.5));
-    let pyramid = image.shape.pyramid();
+    let pyramid = Pyramid::of_image(&image.shape);
     let mut uneven =
-        FrameView::look_at(DVec3::new(300.0, 200.0, 1100.0), DVec3::new(1300.0, 1700.0, 500.0), SIZE_PX);
+        View::look_at(DVec3::new(300.0, 200.0, 1100.0), DVec3::new(1300.0, 1700.0, 500.0), SIZE_PX.into());
     for exaggeration in [1.0, 1.7] {
         uneven.vertical_exaggeration = exaggeration;
         uneven.eye_m.z *= exaggeration;
@@ -116,7 +116,7 @@ fn needed(gpu: &Gpu) -> Outcome {
         let asked_for = scene.draw(&uneven, &bare());
         for level in 0..pyramid.levels() {
             let [east, north] = pyramid.across(level);
-            for tile in (0..east * north).map(|i| ImageTileId { level, x: i % east, y: i / east }) {
+            for tile in (0..east * north).map(|i| TileId { level, x: i % east, y: i / east }) {
                 scene.renderer.give_imagery(tile, &image.tile(tile)).map_err(|e| e.to_string())?;
             }
         }
@@ -208,7 +208,7 @@ fn ahead(gpu: &Gpu) -> Outcome {
         drape(&mut scene, &image, 48);
         show_all(&mut scene, &image, &view(0));
         // What is asked for comes eight frames later.
-        let mut coming: Vec<(u32, ImageTileId)> = Vec::new();
+        let mut coming: Vec<(u32, TileId)> = Vec::new();
         for frame in 1..70 {
             let renderer = &mut scene.renderer;
             let mut asked = renderer.want_imagery(&view(frame), 4).to_vec();
@@ -243,8 +243,8 @@ fn absent(gpu: &Gpu) -> Outcome {
     let image = painted(Image::shape_over(&square.terrain, 0.5));
     drape(&mut scene, &image, 64);
     let view = down(504.0, 504.0, 400.0);
-    let pyramid = image.shape.pyramid();
-    let gone = ImageTileId { level: 1, x: 0, y: 0 };
+    let pyramid = Pyramid::of_image(&image.shape);
+    let gone = TileId { level: 1, x: 0, y: 0 };
     let mut asked = 0;
     loop {
         let wanted = scene.renderer.want_imagery(&view, 8).to_vec();
@@ -288,10 +288,10 @@ fn changed(gpu: &Gpu) -> Outcome {
     show_all(&mut scene, &before, &view);
     let unchanged = scene.draw(&view, &bare());
     let stats = scene.renderer.imagery_stats();
-    let tile = ImageTileId { level: 0, x: 2, y: 1 };
-    let elsewhere = ImageTileId { level: 0, x: 0, y: 0 };
-    let mut tiles: Vec<_> = (0..shape.pyramid().levels())
-        .map(|level| ImageTileId { level, x: tile.x >> level, y: tile.y >> level })
+    let tile = TileId { level: 0, x: 2, y: 1 };
+    let elsewhere = TileId { level: 0, x: 0, y: 0 };
+    let mut tiles: Vec<_> = (0..Pyramid::of_image(&shape).levels())
+        .map(|level| TileId { level, x: tile.x >> level, y: tile.y >> level })
         .collect();
     tiles.push(elsewhere);
     scene.renderer.change_imagery(&tiles);
@@ -325,7 +325,7 @@ fn changed(gpu: &Gpu) -> Outcome {
 fn wrong_use(gpu: &Gpu) -> Outcome {
     let square = level_ground();
     let mut scene = Scene::new(gpu, &square);
-    let tile = ImageTileId { level: 0, x: 0, y: 0 };
+    let tile = TileId { level: 0, x: 0, y: 0 };
     let renderer = &mut scene.renderer;
     let none = renderer.give_imagery(tile, &[]);
     ensure(matches!(none, Err(RenderError::Usage(_))), || format!("{none:?}"))?;
@@ -343,16 +343,16 @@ fn wrong_use(gpu: &Gpu) -> Outcome {
         // A coarsest level of many tiles in a pool of one.
         ImageryShape { levels: 1, ..shape },
     ] {
-        let refused = renderer.set_imagery(Some(wrong), 1);
+        let refused = renderer.set_imagery(&wrong, wrong.format, 1);
         ensure(matches!(refused, Err(RenderError::Usage(_))), || format!("{wrong:?}: {refused:?}"))?;
     }
-    renderer.set_imagery(Some(shape), 1).map_err(|e| e.to_string())?;
+    renderer.set_imagery(&shape, shape.format, 1).map_err(|e| e.to_string())?;
     let short = renderer.give_imagery(tile, &[0; 7]);
     ensure(matches!(short, Err(RenderError::TileSize { .. })), || format!("{short:?}"))?;
-    let nowhere = ImageTileId { level: 0, x: 99, y: 0 };
+    let nowhere = TileId { level: 0, x: 99, y: 0 };
     let outside = renderer.set_imagery_absent(nowhere);
     ensure(matches!(outside, Err(RenderError::NoSuchTile { .. })), || format!("{outside:?}"))?;
-    renderer.set_imagery(None, 0).map_err(|e| e.to_string())?;
+    renderer.clear_imagery();
     ensure(renderer.imagery().is_none() && renderer.imagery_stats() == Default::default(), || {
         "the image is still there".into()
     })

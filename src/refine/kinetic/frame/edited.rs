@@ -15,11 +15,10 @@ use crate::refine::kinetic::time::certificate::{clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::kinetic::{Kinetic, root_label};
 use std::ops::Range;
-use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::prefetch::prefetch;
-use terrasoar_layout::read::store::{RawOf, RecordStore};
+use terrasoar_layout::read::store::{RawOf, RecordStore, byte_in_page};
 
 /// Lists below this length are left as they are.
 const SHORT: usize = 4096;
@@ -108,7 +107,7 @@ impl<S: RecordStore> Kinetic<S> {
             return raw;
         }
         let page = (change.page)(S::page_of(slot))?;
-        let at = (slot as usize % (PAGE_BYTES / S::Codec::BYTES)) * S::Codec::BYTES;
+        let at = byte_in_page::<S::Codec>(slot);
         Some(S::Codec::read(&page[at..]))
     }
 

@@ -2,34 +2,37 @@
 
 use std::ops::Range;
 
-/// The level of vertices that have none.
-pub const NO_LEVEL: u32 = 255;
-
-/// A vertex as the GPU holds it: 32 bytes.
+/// One vertex of the mesh, as a device holds it: 32 bytes, these fields in this order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)]
-pub struct PatchVertex {
-    /// Column, counted east; padding is folded onto the data.
+pub struct MeshVertex {
+    /// Grid column, eastward; padding is folded onto the data. At most 2^24.
     pub x: u32,
-    /// Row, counted north.
+    /// Grid row, northward. At most 2^24.
     pub y: u32,
-    /// Height in metres.
+    /// Height in metres, before exaggeration.
     pub height_m: f32,
-    /// Saturated error in metres.
+    /// Saturated error in metres, before exaggeration; at least 0, may be infinite.
     pub error_m: f32,
     /// Nested-sphere radius in metres.
     pub radius_m: f32,
-    /// Slots of the ends of the edge that the vertex splits; its own for the corners and the centre.
+    /// Vertex slots of the two ends of the edge that this vertex splits: where it comes from when it appears. Its own slot, twice, for
+    /// corners and the centre. Both hold vertices whenever this one is drawn.
     pub ends: [u32; 2],
-    /// The vertex's level, from 0 for the finest; [`NO_LEVEL`] for the corners of the square.
+    /// Bits 0 to 7: level, 0 the finest, [`MeshVertex::NO_LEVEL`] for corners of the square. Other bits are reserved, 0.
     pub flags: u32,
+}
+
+impl MeshVertex {
+    /// Level of a vertex that splits no edge.
+    pub const NO_LEVEL: u32 = 255;
 }
 
 /// The change of one frame. Applied in order to the meshes of all frames before, it gives this frame's.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Patch {
     /// Vertex slots and what they hold from now on. A slot may occur twice; the later one counts.
-    pub vertices: Vec<(u32, PatchVertex)>,
+    pub vertices: Vec<(u32, MeshVertex)>,
     /// Triangle slots and the vertex slots of their corners, counter-clockwise from above, apex first; three equal ones draw nothing.
     pub triangles: Vec<(u32, [u32; 3])>,
     /// Ranges of triangle slots to draw in this frame. A slot that was never sent holds three equal corners.
@@ -39,7 +42,7 @@ pub struct Patch {
 impl Patch {
     /// Bytes of vertices and indices that a GPU receives.
     pub fn bytes(&self) -> u64 {
-        (self.vertices.len() * size_of::<PatchVertex>() + self.triangles.len() * size_of::<[u32; 3]>()) as u64
+        (self.vertices.len() * size_of::<MeshVertex>() + self.triangles.len() * size_of::<[u32; 3]>()) as u64
     }
 
     pub(crate) fn clear(&mut self) {

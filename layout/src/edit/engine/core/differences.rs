@@ -2,10 +2,11 @@
 
 use super::Core;
 use crate::edit::{Changes, SampleRect};
-use crate::file::bytes::{PAGE_BYTES, Page};
+use crate::file::bytes::Page;
 use crate::grid::order::point_of;
 use crate::grid::record::RecordCodec;
 use crate::grid::{Grid, GridPoint};
+use crate::read::store::records_per_page;
 use std::collections::BTreeMap;
 
 impl<C: RecordCodec> Core<C> {
@@ -22,7 +23,7 @@ impl<C: RecordCodec> Core<C> {
     /// Notes the vertices of a page whose records are others than they were in `old`.
     pub(super) fn note_differences(&self, logical: u64, old: &Page, changes: &mut Changes) {
         let Some(new) = self.pages.edited(logical) else { return };
-        let (k, per_page) = (self.rules.grid.k(), (PAGE_BYTES / C::BYTES) as u64);
+        let (k, per_page) = (self.rules.grid.k(), records_per_page::<C>());
         let before = changes.vertices.len();
         let records = old.chunks_exact(C::BYTES).zip(new.chunks_exact(C::BYTES));
         for (i, _) in records.enumerate().filter(|(_, (old, new))| old != new) {

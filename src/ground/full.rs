@@ -2,20 +2,20 @@
 //!
 //! Vertices are numbered in the order of their grid points, so equal meshes give equal patches. Cost: the whole mesh, and a sort of its vertices.
 
-use super::feed::{Feed, Refined, tile_heights_m};
-use terrasoar::mesh::{Triangle, is_drawn, with_apex_first};
-use terrasoar::refine::kinetic::{NO_LEVEL, Patch, PatchVertex};
-use terrasoar::refine::soar::Soar;
-use terrasoar::refine::{Culling, Engine, Unobserved, Work};
-use terrasoar::stream::height_at;
-use terrasoar::view::View;
+use super::engine::{MeshEngine, Refined};
+use super::samples::{HeightTile, tile_of};
+use crate::mesh::{Triangle, is_drawn, with_apex_first};
+use crate::refine::kinetic::{Budget, MeshVertex, Patch};
+use crate::refine::soar::Soar;
+use crate::refine::{Culling, Engine, Unobserved, Work};
+use crate::stream::{HeightAt, height_at};
+use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::records::Records;
-use terrasoar_render::TileId;
 
 /// SOAR and its mesh.
-pub struct FullMesh<'a, C: RecordCodec> {
+pub(super) struct FullMesh<'a, C: RecordCodec> {
     engine: Soar<Records<'a, C>>,
     records: Records<'a, C>,
     patch: Patch,
@@ -23,11 +23,11 @@ pub struct FullMesh<'a, C: RecordCodec> {
 
 impl<'a, C: RecordCodec> FullMesh<'a, C> {
     /// Over `records`, culled as `culling` says.
-    pub fn new(records: Records<'a, C>, culling: Culling) -> Self {
+    pub(super) fn new(records: Records<'a, C>, culling: Culling) -> Self {
         Self { engine: Soar::new(records.clone(), culling), records, patch: Patch::default() }
     }
 
-    fn vertex(&self, point: GridPoint, slot: u32, slot_of: impl Fn(GridPoint) -> Option<u32>) -> PatchVertex {
+    fn vertex(&self, point: GridPoint, slot: u32, slot_of: impl Fn(GridPoint) -> Option<u32>) -> MeshVertex {
         let grid = self.records.grid();
         let (vertex, folded, middle) =
             (self.records.vertex_at(point), grid.fold(point), grid.side_steps() / 2);
@@ -35,19 +35,19 @@ impl<'a, C: RecordCodec> FullMesh<'a, C> {
         let own = grid.is_corner(point) || point == GridPoint::new(middle, middle);
         let ends =
             if own { [slot; 2] } else { grid.edge_ends(point).map(|end| slot_of(end).unwrap_or(slot)) };
-        PatchVertex {
+        MeshVertex {
             x: folded.x(),
             y: folded.y(),
             height_m: vertex.height_m as f32,
             error_m: vertex.error_m as f32,
             radius_m: vertex.radius_m as f32,
             ends,
-            flags: if grid.is_corner(point) { NO_LEVEL } else { grid.level(point) },
+            flags: if grid.is_corner(point) { MeshVertex::NO_LEVEL } else { grid.level(point) },
         }
     }
 }
 
-impl<C: RecordCodec> Feed for FullMesh<'_, C> {
+impl<C: RecordCodec> MeshEngine for FullMesh<'_, C> {
     fn update(&mut self, view: &View) -> Refined {
         let tests = self.engine.update(view, &mut Unobserved);
         let mut triangles: Vec<Triangle> = Vec::new();
@@ -84,8 +84,12 @@ impl<C: RecordCodec> Feed for FullMesh<'_, C> {
         self.patch.clone()
     }
 
-    fn heights_m(&mut self, tile: TileId, heights_m: &mut Vec<f32>) -> bool {
-        tile_heights_m(&self.records, tile, heights_m);
+    fn set_budget(&mut self, _: Budget) -> bool {
+        false
+    }
+
+    fn heights_m(&mut self, tile: HeightTile, heights_m: &mut Vec<f32>) -> bool {
+        tile_of(&self.records, tile, heights_m);
         true
     }
 
@@ -93,7 +97,7 @@ impl<C: RecordCodec> Feed for FullMesh<'_, C> {
         self.records.height_range_m()
     }
 
-    fn ground_m(&self, east_m: f64, north_m: f64) -> Option<f64> {
-        height_at(&self.records, east_m, north_m).height_m
+    fn height_at(&self, east_m: f64, north_m: f64) -> HeightAt {
+        height_at(&self.records, east_m, north_m)
     }
 }

@@ -1,0 +1,298 @@
+//! Ground under a moving eye: a terrain, the engine that refines its mesh, and its edits, as one thing.
+//!
+//! A frame is [`Ground::update`]. Whoever keeps a copy of the mesh, on a graphics device for example, asks for [`Ground::change_since`] the step that the copy is at, and gets what
+//! is missing: the patch of one update, or the whole mesh where more was missed. So a copy cannot fall behind unnoticed. Heights are asked for by [`Ground::height_at`] and never wait.
+//!
+//! Invariants: whatever the engine, the mesh of a view is the same once its pages are at hand; edits are seen by the next update. Cost: the engine's own, and a call through a table a
+//! frame.
+
+mod editing;
+mod engine;
+mod full;
+mod mapped;
+mod options;
+mod samples;
+mod streamed;
+mod ticket;
+
+pub use engine::Refined;
+pub use mapped::PictureEngine;
+pub use options::StreamOptions;
+pub use samples::HeightTile;
+pub use ticket::{CommitFailed, CommitTicket, Saved};
+
+use crate::refine::Culling;
+use crate::refine::kinetic::{Budget, Patch};
+use crate::stream::{GroundPatch, HeightAt};
+use crate::view::View;
+use editing::Editing;
+use engine::MeshEngine;
+use glam::DVec3;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use terrasoar_layout::LayoutError;
+use terrasoar_layout::edit::SampleRect;
+use terrasoar_layout::file::entries::Entry;
+use terrasoar_layout::read::terrain::Terrain;
+
+/// Ground that is flown over.
+pub struct Ground<'t> {
+    engine: Box<dyn MeshEngine + 't>,
+    terrain: Opened<'t>,
+    step: MeshStep,
+    /// Views of the last two updates.
+    views: [Option<View>; 2],
+    /// The right to edit, from the first edit on.
+    editing: Option<Box<Editing>>,
+    /// Generation of the file that is shown while nobody edits.
+    seen_generation: u32,
+    /// Rectangles of samples whose heights changed, the newest last, and how many there were before these.
+    edited: VecDeque<SampleRect>,
+    edited_before: u64,
+    errors: VecDeque<LayoutError>,
+}
+
+/// The terrain under it.
+enum Opened<'t> {
+    Mapped(&'t Terrain),
+    Streamed(Arc<Terrain>),
+}
+
+/// The state of one ground's mesh after one update.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct MeshStep {
+    /// Number of the mesh in this process: of the ground, anew whenever its mesh begins anew.
+    mesh: u64,
+    /// Updates of it.
+    updates: u64,
+}
+
+/// What a copy of the mesh lacks.
+#[derive(Debug)]
+pub enum MeshChange<'g> {
+    /// Nothing.
+    Same,
+    /// This, to be applied to the copy.
+    Patch(&'g Patch),
+    /// All: this is to be applied to an empty mesh.
+    Whole(Patch),
+}
+
+/// Rectangles of edits remembered for those who ask what changed.
+const EDITED_KEPT: usize = 1024;
+
+impl<'t> Ground<'t> {
+    /// Ground whose pages are read into memory of a fixed size, and that can be edited.
+    ///
+    /// # Errors
+    /// The first page cannot be read, or the system gives no thread.
+    pub fn streamed(terrain: Arc<Terrain>, options: &StreamOptions) -> Result<Ground<'static>, LayoutError> {
+        let engine = streamed::streamed(&terrain, options)?;
+        Ok(Ground::new(engine, Opened::Streamed(terrain)))
+    }
+
+    /// Ground whose records are all in memory or mapped; `None` if the terrain's source lends no bytes.
+    pub fn mapped(terrain: &'t Terrain, engine: PictureEngine, culling: Culling) -> Option<Self> {
+        Some(Self::new(mapped::mapped(terrain, engine, culling)?, Opened::Mapped(terrain)))
+    }
+
+    fn new(engine: Box<dyn MeshEngine + 't>, terrain: Opened<'t>) -> Self {
+        let opened: &Terrain = match &terrain {
+            Opened::Mapped(terrain) => terrain,
+            Opened::Streamed(terrain) => terrain,
+        };
+        let seen_generation = opened.header().generation;
+        Self {
+            engine,
+            terrain,
+            seen_generation,
+            step: MeshStep::first(),
+            views: [None; 2],
+            editing: None,
+            edited: VecDeque::new(),
+            edited_before: 0,
+            errors: VecDeque::new(),
+        }
+    }
+
+    /// The terrain as it was opened; edits since then are not in it.
+    pub fn terrain(&self) -> &Terrain {
+        match &self.terrain {
+            Opened::Mapped(terrain) => terrain,
+            Opened::Streamed(terrain) => terrain,
+        }
+    }
+
+    /// The terrain to read from with others, if it is not mapped.
+    pub fn shared_terrain(&self) -> Option<&Arc<Terrain>> {
+        match &self.terrain {
+            Opened::Mapped(_) => None,
+            Opened::Streamed(terrain) => Some(terrain),
+        }
+    }
+
+    /// Brings the mesh to a view with what is at hand. Streamed ground waits for nothing but its first view.
+    pub fn update(&mut self, view: &View) -> Refined {
+        self.settle();
+        let refined = self.engine.update(view);
+        self.step.updates += 1;
+        self.views = [self.views[1], Some(*view)];
+        refined
+    }
+
+    /// The view of the last update.
+    pub fn view(&self) -> Option<&View> {
+        self.views[1].as_ref()
+    }
+
+    /// The views of the last two updates, the older one first: they tell where the eye is going.
+    pub fn last_views(&self) -> [Option<View>; 2] {
+        self.views
+    }
+
+    /// The state of the mesh.
+    pub fn step(&self) -> MeshStep {
+        self.step
+    }
+
+    /// What a copy of the mesh lacks that was complete at step `seen`; of none if there is no copy.
+    pub fn change_since(&self, seen: Option<MeshStep>) -> MeshChange<'_> {
+        match seen {
+            Some(seen) if seen == self.step => MeshChange::Same,
+            Some(seen) if seen.mesh == self.step.mesh && seen.updates + 1 == self.step.updates => {
+                MeshChange::Patch(self.engine.patch())
+            }
+            _ => MeshChange::Whole(self.engine.whole()),
+        }
+    }
+
+    /// Calls `visit` with the corners of every triangle of the mesh, counter-clockwise from above, in metres east, north and up of the south-west
+    /// sample, heights not exaggerated. Takes a copy of the mesh.
+    pub fn for_each_triangle(&self, visit: &mut dyn FnMut([DVec3; 3])) {
+        let whole = self.engine.whole();
+        let [dx, dy] = self.terrain().grid().spacing_m();
+        let slots = whole.vertices.iter().map(|(slot, _)| *slot as usize + 1).max().unwrap_or(0);
+        let mut places = vec![DVec3::NAN; slots];
+        for (slot, v) in &whole.vertices {
+            places[*slot as usize] =
+                DVec3::new(f64::from(v.x) * dx, f64::from(v.y) * dy, f64::from(v.height_m));
+        }
+        for (_, [a, b, c]) in whole.triangles.iter().filter(|(_, [a, b, _])| a != b) {
+            visit([a, b, c].map(|slot| places[*slot as usize]));
+        }
+    }
+
+    /// Height of the ground, edits included, at a place in metres east and north of the south-west sample, from what is at hand.
+    pub fn height_at(&self, east_m: f64, north_m: f64) -> HeightAt {
+        self.engine.height_at(east_m, north_m)
+    }
+
+    /// Asks for what the exact height at a place needs; it is at hand some updates later.
+    pub fn want_height(&mut self, east_m: f64, north_m: f64) {
+        self.engine.want_height(east_m, north_m);
+    }
+
+    /// Heights of a tile of samples, voids not a number, rows from the south; replaces what `heights_m` held. `false` if they are not at hand yet: then they have been asked for.
+    pub fn tile_heights_m(&mut self, tile: HeightTile, heights_m: &mut Vec<f32>) -> bool {
+        self.engine.heights_m(tile, heights_m)
+    }
+
+    /// Lowest and highest height in metres, edits included.
+    pub fn height_range_m(&self) -> [f64; 2] {
+        self.engine.height_range_m()
+    }
+
+    /// Metres from the first to the last sample, east and north.
+    pub fn extent_m(&self) -> [f64; 2] {
+        self.terrain().grid().extent_m()
+    }
+
+    /// Bounds what one update may do from now on. Whether the engine can be bounded.
+    pub fn set_budget(&mut self, budget: Budget) -> bool {
+        self.engine.set_budget(budget)
+    }
+
+    /// Culls in another way from now on; the next update begins a mesh anew, and edits stay. Whether it can: only streamed ground does.
+    pub fn set_culling(&mut self, culling: Culling) -> bool {
+        let can = self.engine.set_culling(culling);
+        if can {
+            self.step = MeshStep::first();
+        }
+        can
+    }
+
+    /// Takes over edits that another made of this ground's file, in memory so far: the next update shows them. Whether it can: only streamed ground does.
+    ///
+    /// # Errors
+    /// Edits of another terrain.
+    pub fn take_edits(&mut self, patch: GroundPatch) -> Result<bool, LayoutError> {
+        let samples = patch.samples.clone();
+        let can = self.engine.take_edits(patch)?;
+        if can {
+            self.edited.extend(samples);
+            while self.edited.len() > EDITED_KEPT {
+                self.edited.pop_front();
+                self.edited_before += 1;
+            }
+        }
+        Ok(can)
+    }
+
+    /// Rectangles of samples whose heights changed since so many of them had been told, and how many there are now. `None` instead of them where too many
+    /// were missed: anything may have changed then.
+    pub fn edited_since(&self, told: u64) -> (Option<Vec<SampleRect>>, u64) {
+        let now = self.edited_before + self.edited.len() as u64;
+        let missed = now.saturating_sub(told) as usize;
+        let rects = (told >= self.edited_before && told <= now)
+            .then(|| self.edited.iter().skip(self.edited.len() - missed).copied().collect());
+        (rects, now)
+    }
+
+    /// Takes notice that edits are in the file: these pages lie there now, as they were told last.
+    pub fn relocate(&mut self, places: &[(u64, Entry)]) {
+        self.engine.relocate(places);
+    }
+
+    /// Edited pages kept in memory, for they are not in the file yet.
+    pub fn held_pages(&self) -> usize {
+        self.engine.held_pages()
+    }
+
+    /// Whether what the last view needs is still on its way.
+    pub fn is_waiting(&self) -> bool {
+        self.engine.is_waiting()
+    }
+
+    /// Whether the mesh lacks pages, those that cannot be read included.
+    pub fn lacks_pages(&self) -> bool {
+        self.engine.lacks_pages()
+    }
+
+    /// What could not be read or written and nobody has heard of yet. Where a page cannot be read the ground stays coarse; edits that could not be written are part of the next commit.
+    pub fn take_error(&mut self) -> Option<LayoutError> {
+        self.errors.pop_front().or_else(|| self.engine.take_error())
+    }
+}
+
+impl MeshStep {
+    /// Whether both are of one mesh, so that slots mean the same in both.
+    pub fn is_of_same_mesh(self, other: Self) -> bool {
+        self.mesh == other.mesh
+    }
+
+    /// The step before the first update of a mesh of its own number.
+    fn first() -> Self {
+        static MESHES: AtomicU64 = AtomicU64::new(0);
+        Self { mesh: MESHES.fetch_add(1, Ordering::Relaxed), updates: 0 }
+    }
+}
+
+impl std::fmt::Debug for Ground<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Ground")
+            .field("terrain", self.terrain())
+            .field("step", &self.step)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,115 @@
+//! Opening a terrain file: to be streamed, or mapped as a whole.
+//!
+//! [`Terrain`] reads what it needs and maps nothing: a file of any size, on any storage, and one that can be edited while it is flown over. [`MappedTerrain`] lends all
+//! records at once, for the engines that want them all and for measuring, and asks something of whoever else has the file.
+
+use crate::ground::{Ground, PictureEngine, StreamOptions};
+use crate::refine::Culling;
+use std::path::Path;
+use std::sync::Arc;
+use terrasoar_layout::LayoutError;
+use terrasoar_layout::grid::Grid;
+use terrasoar_layout::read::terrain::Terrain as TerrainFile;
+
+/// A terrain file that is read, never mapped. Clones share it.
+#[derive(Debug, Clone)]
+pub struct Terrain {
+    file: Arc<TerrainFile>,
+}
+
+impl Terrain {
+    /// Opens the terrain file at `path`. Reads its header and directory, 8 bytes a page of 4 KiB.
+    ///
+    /// # Errors
+    /// Not a terrain file, another version, truncated or damaged; I/O.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, LayoutError> {
+        Ok(Self { file: Arc::new(TerrainFile::open_unmapped(path.as_ref())?) })
+    }
+
+    /// Opens the terrain file `base` with the edits in the file `overlay`. Edits go to the overlay then.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`] of either; an overlay of another terrain, or of another state of this one.
+    pub fn open_with_overlay(base: impl AsRef<Path>, overlay: impl AsRef<Path>) -> Result<Self, LayoutError> {
+        let file = TerrainFile::open_with_overlay_unmapped(base.as_ref(), overlay.as_ref())?;
+        Ok(Self { file: Arc::new(file) })
+    }
+
+    /// Ground to fly over: pages are read by threads into memory of a fixed size.
+    ///
+    /// # Errors
+    /// The first page cannot be read; the system gives no thread; the file was edited since it was opened, which must be opened again.
+    pub fn stream(&self, options: StreamOptions) -> Result<Ground<'static>, LayoutError> {
+        Ground::streamed(Arc::clone(&self.file), &options)
+    }
+
+    /// Height in metres at a place in metres east and north of the south-west sample, read from the file as it was opened; bilinear between four samples.
+    /// `None` outside the data and at voids. [`Ground::height_at`] is far faster, and knows of edits.
+    ///
+    /// # Errors
+    /// Damage and I/O.
+    pub fn height_m(&self, east_m: f64, north_m: f64) -> Result<Option<f64>, LayoutError> {
+        self.file.height_m(east_m, north_m)
+    }
+
+    /// Samples and spacing.
+    pub fn grid(&self) -> &Grid {
+        self.file.grid()
+    }
+
+    /// Metres from the first to the last sample, east and north.
+    pub fn extent_m(&self) -> [f64; 2] {
+        self.grid().extent_m()
+    }
+
+    /// Lowest and highest height in metres.
+    pub fn height_range_m(&self) -> [f64; 2] {
+        self.file.header().height_range_m
+    }
+
+    /// The file beneath, with all that it says.
+    pub fn file(&self) -> &Arc<TerrainFile> {
+        &self.file
+    }
+}
+
+impl From<Arc<TerrainFile>> for Terrain {
+    fn from(file: Arc<TerrainFile>) -> Self {
+        Self { file }
+    }
+}
+
+/// A terrain file that is mapped, so that all its records are at hand.
+///
+/// **While it is open nobody may truncate the file**: on Unix the system then ends the program with the signal SIGBUS at the next touch of what is gone. Programs of this
+/// project only append to terrain files and replace them under their name, which does no harm; so does copying a new file over the name with `mv`, but not
+/// with `cp`. A failing disk has the same effect. Where that cannot be promised, [`Terrain`] is the one to take: it has words for all of it.
+#[derive(Debug)]
+pub struct MappedTerrain {
+    file: TerrainFile,
+}
+
+impl MappedTerrain {
+    /// Checks the file at `path` by plain reads, then maps it.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, LayoutError> {
+        Ok(Self { file: TerrainFile::open(path.as_ref())? })
+    }
+
+    /// Ground to fly over with all records at hand: no page is ever late. It cannot be edited.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] if the file lends no bytes, which one that was opened here always does.
+    pub fn ground(&self, engine: PictureEngine, culling: Culling) -> Result<Ground<'_>, LayoutError> {
+        Ground::mapped(&self.file, engine, culling).ok_or_else(|| {
+            LayoutError::Usage(format!("{}: it is not in memory as a whole", self.file.path().display()))
+        })
+    }
+
+    /// The file beneath, with all that it says: for [`replay`](crate::flyover::replay), for example.
+    pub fn file(&self) -> &TerrainFile {
+        &self.file
+    }
+}
