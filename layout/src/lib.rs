@@ -2,7 +2,10 @@
 //!
 //! The way data takes: `terrasoar_import` turns a DEM into a [`dem::DemSource`]; [`build`] computes what refinement needs and writes
 //! the file that FORMAT.md specifies; [`terrain`](read::terrain) opens it. This crate knows bytes and knows no camera.
+#![cfg_attr(not(feature = "files"), allow(dead_code, unused_imports, reason = "what writes files uses it"))]
+
 mod bound;
+#[cfg(feature = "files")]
 pub mod build;
 pub mod dem;
 pub mod edit;
@@ -10,15 +13,19 @@ pub mod error;
 pub mod file;
 pub mod grid;
 pub mod imagery;
+pub mod mix;
 mod numbers;
 pub mod printable;
 pub mod progress;
+#[cfg(feature = "files")]
 pub(crate) mod publish;
 pub mod read;
 pub mod remedy;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
+#[cfg(feature = "files")]
 pub mod unfinished;
+#[cfg(feature = "files")]
 pub mod verify;
 pub mod words;
 

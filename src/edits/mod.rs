@@ -2,6 +2,7 @@
 //!
 //! A script is a text file (`EDITS.md` beside this source specifies it) or is generated ([`rain`]). It knows no terrain: what an edit does is in
 //! `terrasoar_layout::edit`. **A script holds no clock and no chance: the same script over the same terrain gives the same ground.** Cost: some 120 bytes an edit.
+#![cfg(feature = "files")]
 
 mod error;
 mod format;

@@ -16,6 +16,7 @@ use glam::DVec3;
 pub use error::FlightError;
 pub use format::{MAX_FRAMES, VERSION};
 pub use reader::FlightReader;
+#[cfg(feature = "files")]
 pub use writer::FlightWriter;
 
 /// One frame of a flight, in the units of the flight file.

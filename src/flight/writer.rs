@@ -1,6 +1,7 @@
 //! Writes a flight file frame by frame, and refuses what the format could not hold.
 //!
 //! What is written reads back bit for bit. [`Flight::write`] replaces the file only once it is complete.
+#![cfg(feature = "files")]
 
 use super::format::{
     FIELDS, MAGIC, MAX_FRAMES, MAX_NOTES, UNITS, VERSION, excerpt, fault_in, note_line, push_frame, values,

@@ -2,6 +2,7 @@
 //!
 //! A replay makes two passes. The first times the updates and looks at nothing else; the second counts tests, pages and triangles through a probe and
 //! compares each frame with the one before. Everything but the times is the same in every replay.
+#![cfg(feature = "files")]
 
 mod edits;
 mod mesh;

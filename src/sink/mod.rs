@@ -2,6 +2,7 @@
 //!
 //! **Nothing is seen before it is complete.** A file goes through [`AtomicFile`](terrasoar_layout::file::atomic::AtomicFile); a folder's files wait in one file without a
 //! name until all of them are there; only streams, such as standard output, pipes and devices, get what is written at once.
+#![cfg(feature = "files")]
 
 mod file;
 mod folder;

@@ -29,7 +29,11 @@ use edited::EditedPages;
 use lead::Lead;
 use requests::Requests;
 use std::collections::{HashMap, VecDeque};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+#[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+use std::time::Instant;
+#[cfg(all(target_family = "wasm", target_os = "unknown"))]
+use web_time::Instant;
 use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::bytes::Page;

@@ -138,7 +138,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
 }
 
 /// Draws the flight's middle frame; gives a PNG file and a caption, or says why there is none. A report without a picture is a report.
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 fn middle_frame(args: &Args, terrain: &Terrain, flight: &Flight) -> Result<(Vec<u8>, String), String> {
     let frame = flight.frames.len() / 2;
     let drawn = super::picture::draw_frame(terrain, flight, frame, args.quality.quality());
@@ -146,9 +146,9 @@ fn middle_frame(args: &Args, terrain: &Terrain, flight: &Flight) -> Result<(Vec<
     Ok((file, format!("Frame {frame} of {}, drawn by {drawn_by}.", flight.frames.len())))
 }
 
-#[cfg(not(feature = "view"))]
+#[cfg(not(feature = "pictures"))]
 fn middle_frame(_: &Args, _: &Terrain, _: &Flight) -> Result<(Vec<u8>, String), String> {
-    Err("this program was built without the feature view".into())
+    Err("this program was built without the feature pictures".into())
 }
 
 fn name(path: &Path) -> String {

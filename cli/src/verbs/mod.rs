@@ -16,25 +16,25 @@ mod info;
 mod iobench;
 mod mesh;
 mod mesh_file;
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 mod movie;
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 mod movie_file;
 mod output;
 mod outputs;
 mod parse;
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
 mod progress;
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 mod quiet;
 mod remedy;
 mod replay;
 #[cfg(unix)]
 mod signals;
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 mod snapshot;
 mod sweep;
 mod synth;
@@ -44,7 +44,9 @@ mod verify;
 mod view;
 
 #[cfg(not(feature = "view"))]
-use pictureless::{movie, snapshot, view};
+use pictureless::view;
+#[cfg(not(feature = "pictures"))]
+use pictureless::{movie, snapshot};
 
 use clap::{Parser, Subcommand};
 use std::borrow::Cow;
@@ -149,7 +151,7 @@ pub(crate) fn run() -> ExitCode {
 
 fn carry_out() -> ExitCode {
     let verb = Typed::try_parse().unwrap_or_else(|error| refuse(&error)).verb;
-    #[cfg(feature = "view")]
+    #[cfg(feature = "pictures")]
     if matches!(verb, Verb::Compare(_) | Verb::Snapshot(_) | Verb::Movie(_) | Verb::View(_)) {
         quiet::begin();
     }

@@ -7,7 +7,7 @@ const NO_ADAPTER: [(&str, &str); 3] =
     [("WGPU_BACKEND", "vulkan"), ("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent")];
 
 #[test]
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 fn without_an_adapter_it_says_what_to_install() {
     let bench = Bench::with_flight();
     let snapshot = ["snapshot", "land.iqt", "-o", "a.png"];
@@ -29,16 +29,23 @@ fn a_report_without_a_picture_is_a_report() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert!(!bench.path("r/flight.png").exists());
     let page = std::fs::read_to_string(bench.path("r/report.html")).unwrap();
-    let why = if cfg!(feature = "view") { "mesa-vulkan-drivers" } else { "without the feature view" };
+    let why = if cfg!(feature = "pictures") { "mesa-vulkan-drivers" } else { "without the feature pictures" };
     assert!(page.contains(why), "{page}");
 }
 
 #[test]
-#[cfg(not(feature = "view"))]
+#[cfg(not(feature = "pictures"))]
 fn without_the_feature_the_verbs_say_so() {
     let bench = Bench::new();
     for verb in ["snapshot", "movie"] {
         let message = bench.bad(1, &[verb, "a.iqt", "--style", "relief", "-o", "a.png"]);
-        assert!(message.contains("feature view"), "{message}");
+        assert!(message.contains("feature pictures"), "{message}");
     }
+}
+
+#[test]
+#[cfg(not(feature = "view"))]
+fn without_a_window_the_verb_says_so() {
+    let message = Bench::new().bad(1, &["view", "a.iqt", "--style", "relief"]);
+    assert!(message.contains("without a window") && message.contains("feature view"), "{message}");
 }

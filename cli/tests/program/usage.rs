@@ -6,8 +6,8 @@ const VERBS: [&str; 17] = [
     "build", "drape", "edit", "crater", "undo", "redo", "history", "compact", "info", "verify", "height",
     "synth", "flight", "replay", "compare", "iobench", "mesh",
 ];
-/// Verbs of the feature `view`.
-const DRAWING: &[&str] = if cfg!(feature = "view") { &["snapshot", "movie"] } else { &[] };
+/// Verbs of the feature `pictures`.
+const DRAWING: &[&str] = if cfg!(feature = "pictures") { &["snapshot", "movie"] } else { &[] };
 
 #[test]
 fn every_verb_has_help_with_an_example() {
@@ -62,7 +62,7 @@ fn wrong_command_lines_end_with_2() {
 }
 
 #[test]
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 fn pictures_that_make_no_sense_end_with_2() {
     let bench = Bench::with_terrain();
     let wrong: [&[&str]; 18] = [

@@ -10,9 +10,9 @@ use std::io::BufRead;
 
 use flate2::{Decompress, FlushDecompress, Status};
 use weezl::{BitOrder, LzwStatus};
-use zstd::stream::raw::{DParameter, InBuffer, Operation, OutBuffer};
 
 use super::chunks::Compression;
+use super::zstd_codec;
 use super::zstd_frame;
 
 /// Why a chunk does not unpack.
@@ -30,7 +30,7 @@ impl From<std::io::Error> for Failure {
     }
 }
 
-fn damaged(words: &str) -> Failure {
+pub(super) fn damaged(words: &str) -> Failure {
     Failure::Damaged(words.to_owned())
 }
 
@@ -44,7 +44,7 @@ enum State {
     Copy,
     Deflate(Box<Decompress>),
     Lzw(Box<weezl::decode::Decoder>),
-    Zstd(Box<zstd::stream::raw::Decoder<'static>>),
+    Zstd(Box<zstd_codec::Stream>),
     PackBits(Run),
 }
 
@@ -72,11 +72,7 @@ impl<R: BufRead> Unpacker<R> {
                     .with_yield_on_full_buffer(true)
                     .build(),
             )),
-            Compression::Zstd => {
-                let mut decoder = zstd::stream::raw::Decoder::new()?;
-                decoder.set_parameter(DParameter::WindowLogMax(window.max(1).ilog2().clamp(10, 27)))?;
-                State::Zstd(Box::new(decoder))
-            }
+            Compression::Zstd => State::Zstd(Box::new(zstd_codec::Stream::new(window)?)),
             Compression::PackBits => State::PackBits(Run::Count),
         };
         Ok(Self { input, state })
@@ -101,8 +97,9 @@ impl<R: BufRead> Unpacker<R> {
 
     /// One step of the codec: bytes read and written, and whether the stream has ended.
     fn step(&mut self, unpacked: &mut [u8]) -> Result<(usize, usize, bool), Failure> {
-        let packed = self.input.fill_buf()?;
-        match &mut self.state {
+        let Self { input, state } = self;
+        let packed = input.fill_buf()?;
+        match state {
             State::Copy => {
                 let count = packed.len().min(unpacked.len());
                 unpacked[..count].copy_from_slice(&packed[..count]);
@@ -127,12 +124,8 @@ impl<R: BufRead> Unpacker<R> {
                     Err(_) => Err(damaged("its LZW stream is damaged")),
                 }
             }
-            State::Zstd(decoder) => {
-                let (mut input, mut output) = (InBuffer::around(packed), OutBuffer::around(unpacked));
-                // At a frame's end the next one begins.
-                decoder.run(&mut input, &mut output).map_err(|_| damaged("its ZSTD stream is damaged"))?;
-                Ok((input.pos(), output.pos(), false))
-            }
+            // It takes from the input itself.
+            State::Zstd(stream) => Ok((0, stream.fill(input, unpacked)?, false)),
             State::PackBits(run) => {
                 let (read, written) = pack_bits(run, packed, unpacked);
                 Ok((read, written, false))

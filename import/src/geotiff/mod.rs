@@ -24,6 +24,14 @@ mod raw;
 mod span;
 mod tags;
 mod zstd_frame;
+#[cfg(feature = "zstd")]
+mod zstd_library;
+#[cfg(any(test, not(feature = "zstd")))]
+mod zstd_plain;
+#[cfg(feature = "zstd")]
+use zstd_library as zstd_codec;
+#[cfg(not(feature = "zstd"))]
+use zstd_plain as zstd_codec;
 
 use std::path::{Path, PathBuf};
 

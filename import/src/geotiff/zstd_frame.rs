@@ -4,6 +4,8 @@
 //! the largest of their level, up to 128 MiB, for a chunk of a few KiB. So a short chunk whose window is larger than itself is unpacked at once, where no window
 //! is needed ([`unpack_whole`]); a long one has the window that it asks for, which counts against the memory allowed.
 
+use super::zstd_codec;
+
 /// Bytes at the begin of a chunk that tell its window.
 pub(super) const HEAD_BYTES: usize = 18;
 
@@ -37,13 +39,7 @@ pub(super) fn window(head: &[u8]) -> Option<u64> {
 
 /// Unpacks the first frame of `packed` without a window, into `unpacked`, which has room for all of it and needs `wanted` bytes.
 pub(super) fn unpack_whole(packed: &[u8], unpacked: &mut [u8], wanted: usize) -> Result<(), String> {
-    let damaged = || "its ZSTD stream is damaged".to_owned();
-    // Writers may leave something behind the frame.
-    let length = zstd::zstd_safe::find_frame_compressed_size(packed).map_err(|_| damaged())?;
-    let frame = packed.get(..length).ok_or_else(damaged)?;
-    let got = zstd::bulk::Decompressor::new()
-        .and_then(|mut decoder| decoder.decompress_to_buffer(frame, unpacked))
-        .map_err(|_| damaged())?;
+    let got = zstd_codec::unpack_frame(packed, unpacked).ok_or_else(|| "its ZSTD stream is damaged".to_owned())?;
     if got < wanted {
         return Err(format!("it ends {} bytes too early", wanted - got));
     }
@@ -52,7 +48,7 @@ pub(super) fn unpack_whole(packed: &[u8], unpacked: &mut [u8], wanted: usize) ->
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::super::zstd_frame::{unpack_whole, window};
     use std::io::Write;
 
     /// As writers of TIFF make them: the level's window, and nothing of the length.

@@ -142,7 +142,10 @@ fn path_of(file: &File) -> PathBuf {
     #[cfg(target_os = "linux")]
     return PathBuf::from(format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(file)));
     #[cfg(not(target_os = "linux"))]
-    PathBuf::new()
+    {
+        let _ = file;
+        PathBuf::new()
+    }
 }
 
 #[cfg(unix)]

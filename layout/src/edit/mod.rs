@@ -10,8 +10,10 @@
 
 mod engine;
 pub(crate) mod operations;
+#[cfg(feature = "files")]
 mod session;
 
+#[cfg(feature = "files")]
 pub use engine::foresight::{Foresight, holds_heights};
 pub use operations::area::Area;
 pub use operations::brush::{Brush, BrushAction, Falloff};
@@ -20,10 +22,15 @@ pub use operations::crater::Crater;
 pub use operations::edit::Edit;
 pub use operations::stamp::{Stamp, StampMode};
 pub use operations::window::{HeightWindow, SampleRect};
+#[cfg(feature = "files")]
 pub use session::commit::CommitJob;
+#[cfg(feature = "files")]
 pub use session::compact::{Compacted, compact};
+#[cfg(feature = "files")]
 pub use session::picture::Repainted;
+#[cfg(feature = "files")]
 pub use session::widen::widen;
+#[cfg(feature = "files")]
 pub use session::{Committed, EditSession, HistoryEntry, history};
 
 use crate::error::LayoutError;

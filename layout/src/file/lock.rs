@@ -4,8 +4,8 @@
 //! one byte far behind any file's end. **The lock belongs to the open file:** it ends with the process, however that ends, and leaves nothing behind; in a process that goes on it is given back by name,
 //! for a program that is being started at that moment has copies of all open files for a while. Nothing is made beside the file. Whoever replaces a file by a new one takes part: it asks for the same byte, shared with others who replace.
 //!
-//! Linux and macOS lock the byte (open file description locks). On Windows a writer opens the file so that nobody else can open it for writing. On other systems, and on
-//! file systems without locks, nobody is kept out.
+//! Linux and macOS lock the byte (open file description locks). On Windows a writer opens the file so that nobody else can open it for writing, and whoever replaces it so that nobody can
+//! who is not replacing it too. On other systems, and on file systems without locks, nobody is kept out.
 
 use crate::error::LayoutError;
 use std::fs::File;
@@ -88,9 +88,13 @@ pub(super) struct ReplaceLock {
 impl ReplaceLock {
     /// Of whatever regular file `path` names; of nothing where there is none, or none that may be read.
     pub(super) fn take(path: &Path) -> Result<Self, LayoutError> {
-        let is_file = std::fs::symlink_metadata(path).is_ok_and(|meta| meta.is_file());
-        let Some(file) = is_file.then(|| system::open_for_reading(path).ok()).flatten() else {
+        if !std::fs::symlink_metadata(path).is_ok_and(|meta| meta.is_file()) {
             return Ok(Self { _locked: None });
+        }
+        let file = match system::open_for_reading(path) {
+            Ok(file) => file,
+            Err(e) if system::is_taken(&e) => return Err(taken(path)),
+            Err(_) => return Ok(Self { _locked: None }),
         };
         if !system::lock(&file, system::Kind::Shared) {
             return Err(taken(path));
@@ -122,11 +126,13 @@ pub(crate) fn is_named(file: &File, path: &Path) -> bool {
             _ => false,
         }
     }
-    // Elsewhere an open file cannot be replaced, and its other names are not looked for.
     #[cfg(not(unix))]
     {
-        let _ = file;
-        path.exists()
+        let place = |file| same_file::Handle::from_file(file);
+        match (file.try_clone().and_then(place), same_file::Handle::from_path(path)) {
+            (Ok(ours), Ok(named)) => ours == named,
+            _ => false,
+        }
     }
 }
 
@@ -239,8 +245,9 @@ mod system {
         File::options().read(true).write(true).share_mode(OTHERS_READ).open(path)
     }
 
+    /// Not while anybody has it open for writing, nor does anybody get it for writing then.
     pub(super) fn open_for_reading(path: &Path) -> Result<File> {
-        File::open(path)
+        File::options().read(true).share_mode(OTHERS_READ).open(path)
     }
 
     pub(super) fn is_taken(error: &Error) -> bool {
@@ -365,7 +372,7 @@ mod tests {
         drop(ReplaceLock::take(&target).unwrap());
         std::fs::write(&target, "x").unwrap();
         let [one, two] = [0, 1].map(|_| ReplaceLock::take(&target).unwrap());
-        if cfg!(any(target_os = "linux", target_vendor = "apple")) {
+        if cfg!(any(target_os = "linux", target_vendor = "apple", windows)) {
             is_told(&target);
             drop((one, two));
             let writer = WriteLock::take(&target).unwrap();

@@ -10,18 +10,26 @@
 //! * `publish`: a terrain file that does not open is not published; `seen`: nor is one put in the place of a terrain that was edited meanwhile.
 //! * `opening`: pipes are not waited for.
 
+#[cfg(feature = "files")]
 pub mod atomic;
 pub mod bytes;
+#[cfg(feature = "files")]
 pub(crate) mod directory;
+#[cfg(feature = "files")]
 pub mod disk;
 pub mod entries;
 pub mod header;
 pub(crate) mod journal;
+#[cfg(feature = "files")]
 pub(crate) mod lock;
+#[cfg(feature = "files")]
 pub mod opening;
+#[cfg(feature = "files")]
 pub(crate) mod overlay;
+#[cfg(feature = "files")]
 mod seen;
 pub(crate) mod slots;
 pub mod source;
 pub(crate) mod structure;
+#[cfg(feature = "files")]
 pub(crate) mod tail;

@@ -4,6 +4,7 @@
 
 pub mod edited;
 pub mod kinds;
+#[cfg(feature = "files")]
 pub(crate) mod layers;
 pub mod loader;
 pub mod pool;

@@ -2,7 +2,7 @@
 
 /// Asks for the cache line that element `index` of `slice` begins in. An index past the end asks for nothing.
 #[inline(always)]
-#[expect(unsafe_code, reason = "the hint is a bare instruction")]
+#[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "the hint is a bare instruction"))]
 pub fn prefetch<T>(slice: &[T], index: usize) {
     #[cfg(target_arch = "x86_64")]
     if let Some(element) = slice.get(index) {

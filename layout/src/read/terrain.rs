@@ -10,8 +10,12 @@ use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::journal::Commit;
-use crate::file::source::{MapSource, PreadSource, Source};
-use crate::file::structure::{read_directory, read_growing, read_structure};
+#[cfg(feature = "files")]
+use crate::file::source::{MapSource, PreadSource};
+use crate::file::source::Source;
+#[cfg(feature = "files")]
+use crate::file::structure::read_growing;
+use crate::file::structure::{read_directory, read_structure};
 use crate::grid::order::slot_of;
 use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
 use crate::grid::{Grid, GridPoint};
@@ -44,6 +48,7 @@ impl Terrain {
     ///
     /// # Errors
     /// As FORMAT.md, section 6: not a terrain file, another version, truncated or damaged; or I/O.
+    #[cfg(feature = "files")]
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
         let (file, header, entries) = open_settled(path)?;
         Ok(Self::of(Box::new(MapSource::map(file)?), header, entries))
@@ -53,6 +58,7 @@ impl Terrain {
     ///
     /// # Errors
     /// As [`Terrain::open`].
+    #[cfg(feature = "files")]
     pub fn open_unmapped(path: &Path) -> Result<Self, LayoutError> {
         let (file, header, entries) = open_settled(path)?;
         Ok(Self::of(Box::new(file), header, entries))
@@ -62,6 +68,7 @@ impl Terrain {
     ///
     /// # Errors
     /// As [`Terrain::open`]; a damaged journal.
+    #[cfg(feature = "files")]
     pub fn open_original(path: &Path) -> Result<Self, LayoutError> {
         Self::open(path)?.into_original()
     }
@@ -176,10 +183,10 @@ impl Terrain {
         if checksum(page) == entry.checksum {
             return Ok(());
         }
-        Err(LayoutError::damaged(
+        Err(LayoutError::damaged_terrain(
             self.path(),
             format!("record page {logical_page} (file page {})", entry.page),
-            "the checksum does not match; restore a copy of the file or build it again",
+            "the checksum does not match",
         ))
     }
 
@@ -247,6 +254,7 @@ impl Terrain {
 }
 
 /// Opens and checks a file that others may append to at this moment.
+#[cfg(feature = "files")]
 fn open_settled(path: &Path) -> Result<(PreadSource, Header, Vec<Entry>), LayoutError> {
     let mut file = PreadSource::open(path)?;
     let (header, entries) = read_growing(&mut file)?;

@@ -24,10 +24,10 @@ pub(in crate::verbs) enum Kind {
     /// Triangles.
     Mesh,
     /// A picture.
-    #[cfg_attr(not(feature = "view"), allow(dead_code, reason = "pictures need the feature"))]
+    #[cfg_attr(not(feature = "pictures"), allow(dead_code, reason = "pictures need the feature"))]
     Picture,
     /// A film.
-    #[cfg_attr(not(feature = "view"), allow(dead_code, reason = "films need the feature"))]
+    #[cfg_attr(not(feature = "pictures"), allow(dead_code, reason = "films need the feature"))]
     Film,
     /// A part of a report.
     Report(ReportFile),

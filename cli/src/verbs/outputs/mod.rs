@@ -7,7 +7,7 @@
 mod kind;
 mod there;
 
-#[cfg(feature = "view")]
+#[cfg(feature = "pictures")]
 pub(super) use kind::FILM_NOTE;
 pub(super) use kind::{Kind, MESH_NOTE};
 
@@ -68,7 +68,7 @@ impl Force {
     }
 
     /// Whether everything may be replaced.
-    #[cfg(feature = "view")]
+    #[cfg(feature = "pictures")]
     pub(super) fn is_given(self) -> bool {
         self.force
     }

@@ -2,6 +2,7 @@
 
 pub(crate) mod core;
 pub(crate) mod farthest;
+#[cfg(feature = "files")]
 pub(crate) mod foresight;
 pub(crate) mod midway;
 pub(crate) mod near;

@@ -34,6 +34,8 @@ pub fn widen(
     let header = rebuild_into(disk, &terrain, &file, Some(room), memory_mib, progress)?;
     let slots = Slots { current: header.to_page(), current_slot: 0, header };
     copy_imagery(disk, &file, slots, &terrain)?;
+    // Windows replaces no file that is mapped.
+    drop(terrain);
     progress.stage("syncing", 0);
     publish_terrain(disk, file, Some(&lock))
 }

@@ -7,7 +7,7 @@
 
 use super::{PreadSource, Source};
 use crate::error::LayoutError;
-use memmap2::{Advice, Mmap, MmapOptions};
+use memmap2::{Mmap, MmapOptions};
 use std::path::Path;
 
 /// A memory-mapped terrain file.
@@ -40,8 +40,9 @@ impl MapSource {
         // behaviour of ours beyond what the operating system itself does.
         let map = unsafe { MmapOptions::new().len(length).map(file.file()) }
             .map_err(|e| LayoutError::io(file.path(), "cannot map the file into memory", e))?;
-        // Advice is only that: a kernel without it still reads correctly.
-        let _ = map.advise(Advice::Random);
+        // Advice is only that: a kernel without it still reads correctly, and Windows takes none for maps.
+        #[cfg(unix)]
+        let _ = map.advise(memmap2::Advice::Random);
         Ok(Self { file, map })
     }
 }

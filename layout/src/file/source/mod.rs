@@ -4,23 +4,29 @@
 //! A source's length is fixed when it is opened. A source may lend its bytes as one slice (a map, memory); the refinement's hot path
 //! needs that, everything else reads.
 
+#[cfg(feature = "files")]
 mod layered;
+#[cfg(feature = "files")]
 mod map;
 mod memory;
+#[cfg(feature = "files")]
 mod pread;
 #[cfg(any(test, feature = "testing"))]
 mod testing;
-#[cfg(target_os = "linux")]
+#[cfg(all(feature = "files", target_os = "linux"))]
 mod uring;
 
+#[cfg(feature = "files")]
 pub(crate) use layered::{LayeredSource, split_of};
+#[cfg(feature = "files")]
 pub use map::{MapSource, resident_bytes};
 pub use memory::MemorySource;
+#[cfg(feature = "files")]
 pub use pread::PreadSource;
 #[cfg(any(test, feature = "testing"))]
 pub use testing::{CountingSource, FailingSource, Fault, HostileSource, Hostility};
 
-#[cfg(target_os = "linux")]
+#[cfg(all(feature = "files", target_os = "linux"))]
 pub use uring::UringSource;
 
 use crate::error::LayoutError;

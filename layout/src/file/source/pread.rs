@@ -17,7 +17,8 @@ pub struct PreadSource {
 }
 
 impl PreadSource {
-    /// Opens the file at `path` and takes a shared advisory lock on it, where the file system has locks.
+    /// Opens the file at `path` and takes a shared advisory lock on it, where the file system has locks. Windows has none that are advisory: a lock of
+    /// a reader's would keep every commit from being written, so that there none is taken.
     ///
     /// # Errors
     /// [`LayoutError::Io`] if it cannot be opened or someone is writing to it; [`LayoutError::NotThisFormat`] for what is not a regular file.
@@ -38,6 +39,7 @@ impl PreadSource {
                 "this is not a regular file; name a terrain file (.iqt)",
             ));
         }
+        #[cfg(not(windows))]
         match file.try_lock_shared() {
             Ok(()) => {}
             Err(std::fs::TryLockError::WouldBlock) => {

@@ -10,6 +10,7 @@ use super::Painter;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, checksum};
 use crate::file::header::ImageryPlace;
+#[cfg(feature = "files")]
 use rayon::prelude::*;
 
 const PAGE: u64 = PAGE_BYTES as u64;
@@ -43,7 +44,10 @@ impl PaintedSection {
             };
             TileEntry { page: 0, bytes: bytes.len() as u32, checksum: checksum(bytes), average }
         };
+        #[cfg(feature = "files")]
         let made: Vec<TileEntry> = ids.par_iter().map(entry).collect();
+        #[cfg(not(feature = "files"))]
+        let made: Vec<TileEntry> = ids.iter().map(entry).collect();
         let mut entries = current.entries().to_vec();
         let directory_bytes = (entries.len() * TILE_ENTRY_BYTES).next_multiple_of(PAGE_BYTES);
         let mut bytes = vec![0; PAGE_BYTES + directory_bytes];

@@ -1,6 +1,10 @@
 //! How much a frame may do: a number of tests, a time, or both.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
+#[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+use std::time::Instant;
+#[cfg(all(target_family = "wasm", target_os = "unknown"))]
+use web_time::Instant;
 
 /// Bounds of a frame's work; none by default.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -11,11 +11,13 @@ use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::{Phase, Probe};
+#[cfg(feature = "files")]
 use rayon::prelude::*;
 use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::read::store::RecordStore;
 
 /// From so many tests on they are shared among threads.
+#[cfg(feature = "files")]
 const PARALLEL: usize = 4096;
 /// How many splits or merges ahead memory is asked for what: see [`Kinetic::fetch`].
 const FETCH_AHEAD: [(u32, usize); 3] = [(2, 6), (1, 4), (0, 2)];
@@ -52,7 +54,12 @@ impl<S: RecordStore> Kinetic<S> {
             let vertex = self.records.decode(raw, level_of(point));
             (raw, judge.word(&judge.metric().sight(self.records.grid().position_m(point), &vertex)))
         };
-        if nodes.len() >= PARALLEL && rayon::current_num_threads() > 1 {
+        #[cfg(feature = "files")]
+        let parallel = nodes.len() >= PARALLEL && rayon::current_num_threads() > 1;
+        #[cfg(not(feature = "files"))]
+        let parallel = false;
+        if parallel {
+            #[cfg(feature = "files")]
             nodes.par_iter().with_min_len(PARALLEL / 8).map(verdict).collect_into_vec(&mut verdicts);
         } else {
             verdicts.clear();
