@@ -12,8 +12,8 @@ use terrasoar::{Crater, Edit, Error, Ground, MappedTerrain, StreamOptions, Terra
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::EditSession;
+use terrasoar_layout::mix::Random;
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::testing::Random;
 
 const SPACING_M: f64 = 10.0;
 const SIDE: u32 = 257;
