@@ -11,6 +11,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use terrasoar_import::open_image;
+use terrasoar_layout::file::atomic::folder_of;
 use terrasoar_layout::imagery::{
     BORDER_TEXELS, DrapeOptions, INNER_TEXELS, ImageSource, Imagery, TILE_TEXELS, TileFormat, TileId,
     decode_tile, drape,
@@ -54,9 +55,7 @@ fn main() -> Result<(), Failure> {
 }
 
 fn measure(terrain: &Path, picture: &dyn ImageSource, format: TileFormat) -> Result<(), Failure> {
-    let folder = tempfile::tempdir_in(
-        terrain.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")),
-    )?;
+    let folder = tempfile::tempdir_in(folder_of(terrain))?;
     let copy = folder.path().join("copy.iqt");
     std::fs::copy(terrain, &copy)?;
     let images = vec![open_image(picture.path())?];

@@ -17,6 +17,7 @@ use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::imagery::{
     DrapeOptions, ImageSource, Imagery, MemoryImage, Paint, Painter, Scorch, drape,
 };
+use terrasoar_layout::mix::mixed_32;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -54,7 +55,7 @@ fn main() -> Result<(), Failure> {
     let (mut first, mut again, mut commits) = (Vec::new(), Vec::new(), Vec::new());
     let mut tiles = 0;
     for i in 0..scorches {
-        let part = |seed: u32| f64::from(hash(i ^ hash(seed)) >> 8) / f64::from(1 << 24);
+        let part = |seed: u32| f64::from(mixed_32(i ^ mixed_32(seed)) >> 8) / f64::from(1 << 24);
         let centre_m = [0, 1].map(|axis| {
             let texels = f64::from(shape.texels[axis]);
             let at = TEXELS + part(axis as u32) * (texels - 2.0 * TEXELS);
@@ -95,17 +96,11 @@ fn line(what: &str, mut times_us: Vec<f64>) {
     println!("| {what} | {:.0} | {:.0} | {:.0} |", at(0.5), at(0.99), at(1.0));
 }
 
-fn hash(value: u32) -> u32 {
-    let value = (value ^ value >> 16).wrapping_mul(0x7feb_352d);
-    let value = (value ^ value >> 15).wrapping_mul(0x846c_a68b);
-    value ^ value >> 16
-}
-
 fn made(path: PathBuf) -> Result<PathBuf, Failure> {
     let dem = MemoryDem::from_fn([257, 257], SampleType::I16, |x, y| f64::from(x * y % 97));
     build(&dem, &path, &BuildOptions { spacing_m: Some([16.0; 2]), ..BuildOptions::default() }, &Silent)?;
     let picture = MemoryImage::from_fn([4096, 4096], |x, y| {
-        let grain = (hash(x ^ hash(y)) >> 28) as u8;
+        let grain = (mixed_32(x ^ mixed_32(y)) >> 28) as u8;
         [90 + (x / 40 % 60) as u8 + grain, 100 + (y / 50 % 60) as u8 + grain, 60 + grain, 255]
     });
     let pictures: Vec<Box<dyn ImageSource>> = vec![Box::new(picture)];

@@ -5,6 +5,7 @@
 //! section 1).
 
 use terrasoar_layout::grid::{Grid, GridPoint};
+use terrasoar_layout::mix::Random;
 use terrasoar_layout::read::store::RecordStore;
 
 /// A triangle's corners in counter-clockwise order seen from above.
@@ -33,11 +34,7 @@ impl TriangleKey {
     /// A well-mixed hash of the key; sums of these identify sets.
     #[inline]
     pub fn hash(self) -> u64 {
-        // The finaliser of splitmix64.
-        let mut h = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        h = (h ^ h >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        h = (h ^ h >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        h ^ h >> 31
+        Random::new(self.0).bits()
     }
 }
 

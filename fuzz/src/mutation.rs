@@ -1,6 +1,6 @@
 //! Mutations that repeat: what tests do to seeds where no fuzzer is.
 
-use terrasoar_layout::testing::Random;
+use terrasoar_layout::mix::Random;
 
 const WORDS: &[&str] = &[
     "0",

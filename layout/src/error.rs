@@ -95,6 +95,11 @@ impl LayoutError {
         Self::Damaged { path: path.to_owned(), place: place.into(), problem: problem.into() }
     }
 
+    /// As [`LayoutError::damaged`], of a terrain file: says what to do.
+    pub(crate) fn damaged_terrain(path: &Path, place: String, problem: impl std::fmt::Display) -> Self {
+        Self::damaged(path, place, format!("{problem}; restore a copy of the file or build it again"))
+    }
+
     /// Something sound but not supported.
     pub fn unsupported(path: &Path, problem: impl Into<String>) -> Self {
         Self::Unsupported { path: path.to_owned(), problem: problem.into(), remedy: None }

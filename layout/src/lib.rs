@@ -55,6 +55,7 @@ pub mod error;
 pub mod file;
 pub mod grid;
 pub mod imagery;
+pub mod mix;
 mod numbers;
 pub mod printable;
 pub mod progress;

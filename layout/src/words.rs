@@ -15,6 +15,22 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
+/// Digits of a whole number with the thousands set apart by commas.
+///
+/// ```
+/// assert_eq!(terrasoar_layout::words::thousands("1234567"), "1,234,567");
+/// ```
+pub fn thousands(digits: &str) -> String {
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
 /// At most `most` characters of `text`, without those that do something rather than show something.
 pub fn harmless(text: &str, most: usize) -> String {
     text.chars().filter(|c| is_harmless(*c)).take(most).collect()

@@ -5,7 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::imagery::Imagery;
-use terrasoar_layout::testing::{Counts, Mutation, Random, Sealed, Seed, exercise, reseal, seeds};
+use terrasoar_layout::mix::Random;
+use terrasoar_layout::testing::{Counts, Mutation, Sealed, Seed, exercise, reseal, seeds};
 
 /// A recipe of one to four mutations; three in four settle the counts.
 fn recipe(random: &mut Random) -> Vec<u8> {

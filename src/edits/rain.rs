@@ -4,6 +4,7 @@
 
 use super::{Batch, Script};
 use terrasoar_layout::edit::{Crater, Edit};
+use terrasoar_layout::mix::Random;
 
 /// What rains.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,19 +27,20 @@ impl Rain {
     /// The craters, in the order they fall.
     pub fn craters(&self) -> impl Iterator<Item = Crater> + use<> {
         let rain = *self;
-        let mut chance = Chance(rain.seed);
+        let mut chance = Random::new(rain.seed);
+        let between = |chance: &mut Random, low: f64, high: f64| low + (high - low) * chance.unit();
         (0..rain.count).map(move |_| {
             let [west, south, east, north] = rain.extent_m;
-            let centre_m = [chance.between(west, east), chance.between(south, north)];
+            let centre_m = [between(&mut chance, west, east), between(&mut chance, south, north)];
             let size = chance.unit();
             let radius_m = rain.radius_m[0] + (rain.radius_m[1] - rain.radius_m[0]) * (size * size);
-            let depth_m = radius_m * chance.between(rain.depth_ratio[0], rain.depth_ratio[1]);
+            let depth_m = radius_m * between(&mut chance, rain.depth_ratio[0], rain.depth_ratio[1]);
             Crater {
                 // To the centimetre, so that a script stays readable.
                 centre_m: centre_m.map(rounded),
                 radius_m: rounded(radius_m).clamp(rain.radius_m[0], rain.radius_m[1].max(rain.radius_m[0])),
                 depth_m: rounded(depth_m),
-                direction_deg: rounded(chance.between(0.0, 360.0)),
+                direction_deg: rounded(between(&mut chance, 0.0, 360.0)),
             }
         })
     }
@@ -60,28 +62,6 @@ impl Rain {
 
 fn rounded(value: f64) -> f64 {
     (value * 100.0).round() / 100.0
-}
-
-/// SplitMix64 (Steele, Lea & Flood 2014).
-struct Chance(u64);
-
-impl Chance {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// At least 0, below 1.
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use terrasoar_layout::LayoutError;
+use terrasoar_layout::file::atomic::folder_of;
+use terrasoar_layout::file::disk::sync_folder;
 use terrasoar_layout::unfinished;
 
 /// Takes the files of a folder.
@@ -86,7 +88,7 @@ fn publish_new(folder: &Path, spool: &mut File, files: &[(String, u64)]) -> Resu
     // Folders above it that are missing come into being with it, by one call.
     let top = folder.ancestors().take_while(|above| !above.as_os_str().is_empty() && !above.exists()).last();
     let top = top.unwrap_or(folder);
-    let parent = top.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let parent = folder_of(top);
     let (guard, hidden) = unfinished::make(|| {
         let hidden = hidden_in(parent, top)?;
         Ok((hidden.path().to_owned(), hidden))
@@ -130,11 +132,6 @@ fn copy(spool: &mut File, bytes: u64, to: &mut impl Write) -> io::Result<()> {
         all if all == bytes => Ok(()),
         _ => Err(io::ErrorKind::UnexpectedEof.into()),
     }
-}
-
-/// Brings the names in a folder to the disk, where the system can.
-fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
 /// Counts what goes through.

@@ -32,8 +32,6 @@ use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
 use std::time::Instant;
-#[cfg(all(target_family = "wasm", target_os = "unknown"))]
-use web_time::Instant;
 use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::bytes::Page;
@@ -42,6 +40,8 @@ use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::loader::Outcome;
 use terrasoar_layout::read::pool::PagePool;
 use terrasoar_layout::read::store::RecordStore;
+#[cfg(all(target_family = "wasm", target_os = "unknown"))]
+use web_time::Instant;
 
 /// Pages put into the pool in one frame at most: two megabytes are copied in a fraction of a millisecond.
 const INSTALLS_A_FRAME: usize = 512;

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use std::io::{self, Write};
 use terrasoar_layout::printable;
+use terrasoar_layout::words::thousands;
 
 /// What fails when standard output does.
 const TO_STDOUT: &str = "cannot write to standard output";
@@ -79,15 +80,7 @@ pub(super) fn columns(rows: &[Vec<String>]) -> String {
 
 /// A whole number with its thousands set apart.
 pub(super) fn grouped(value: u64) -> String {
-    let digits = value.to_string();
-    let mut text = String::with_capacity(digits.len() * 4 / 3);
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
+    thousands(&value.to_string())
 }
 
 /// A number of at most `digits` decimals, without zeros at its end.

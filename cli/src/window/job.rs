@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::file::atomic::folder_of;
 use terrasoar_layout::file::header::SpacingOrigin;
 use terrasoar_layout::progress::Progress;
 
@@ -113,7 +114,7 @@ fn make(input: &Path, progress: &Meter) -> Result<Built, String> {
 /// Where the terrain file goes: beside the input, or where files may go in any case.
 fn output_for(input: &Path) -> PathBuf {
     let beside = input.with_extension("iqt");
-    let folder = beside.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(&beside);
     let writable = tempfile::tempfile_in(folder).is_ok();
     if writable && !beside.exists() {
         return beside;

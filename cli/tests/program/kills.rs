@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use terrasoar_layout::edit::history;
 use terrasoar_layout::imagery::Imagery;
+use terrasoar_layout::mix::Random;
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_layout::testing::Random;
 use terrasoar_layout::verify::verify;
 
 /// Kills where nothing else is said.

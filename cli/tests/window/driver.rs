@@ -56,9 +56,14 @@ impl Display {
 
     /// The program with what it needs to know of this display. Settings are those of the display's own user.
     pub fn program(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_terrasoar"));
+        let mut command = self.in_display(Command::new(env!("CARGO_BIN_EXE_terrasoar")));
+        command.args(arguments);
         command
-            .args(arguments)
+    }
+
+    /// A program with what it needs to know of this display.
+    pub fn in_display(&self, mut command: Command) -> Command {
+        command
             .current_dir(self.folder.path())
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")

@@ -39,7 +39,8 @@ pub(super) fn window(head: &[u8]) -> Option<u64> {
 
 /// Unpacks the first frame of `packed` without a window, into `unpacked`, which has room for all of it and needs `wanted` bytes.
 pub(super) fn unpack_whole(packed: &[u8], unpacked: &mut [u8], wanted: usize) -> Result<(), String> {
-    let got = zstd_codec::unpack_frame(packed, unpacked).ok_or_else(|| "its ZSTD stream is damaged".to_owned())?;
+    let got =
+        zstd_codec::unpack_frame(packed, unpacked).ok_or_else(|| "its ZSTD stream is damaged".to_owned())?;
     if got < wanted {
         return Err(format!("it ends {} bytes too early", wanted - got));
     }

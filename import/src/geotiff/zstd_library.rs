@@ -21,9 +21,12 @@ impl Stream {
     /// Takes from `input` and puts into `unpacked`; gives the bytes written, none where the input has ended.
     pub(super) fn fill(&mut self, input: &mut impl BufRead, unpacked: &mut [u8]) -> Result<usize, Failure> {
         loop {
-            let (mut packed, mut unpacked) = (InBuffer::around(input.fill_buf()?), OutBuffer::around(&mut *unpacked));
+            let (mut packed, mut unpacked) =
+                (InBuffer::around(input.fill_buf()?), OutBuffer::around(&mut *unpacked));
             // At a frame's end the next one begins.
-            self.decoder.run(&mut packed, &mut unpacked).map_err(|_| damaged("its ZSTD stream is damaged"))?;
+            self.decoder
+                .run(&mut packed, &mut unpacked)
+                .map_err(|_| damaged("its ZSTD stream is damaged"))?;
             let (read, written) = (packed.pos(), unpacked.pos());
             input.consume(read);
             if written > 0 || read == 0 {

@@ -1,5 +1,7 @@
 //! Numbers as people read them: thousands apart, no more digits than they carry.
 
+use terrasoar_layout::words::thousands;
+
 /// `value` with `decimals` digits after the point and the thousands set apart by commas.
 pub(super) fn grouped(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
@@ -11,12 +13,7 @@ pub(super) fn grouped(value: f64, decimals: usize) -> String {
     if value < 0.0 && plain.bytes().any(|b| b.is_ascii_digit() && b != b'0') {
         text.push('-');
     }
-    for (i, digit) in whole.chars().enumerate() {
-        if i > 0 && (whole.len() - i) % 3 == 0 {
-            text.push(',');
-        }
-        text.push(digit);
-    }
+    text.push_str(&thousands(whole));
     if !fraction.is_empty() {
         text.push('.');
         text.push_str(fraction);

@@ -14,10 +14,11 @@ use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::mix::Random;
 use terrasoar_layout::read::kinds::ByKind;
 use terrasoar_layout::read::loader::Loader;
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_layout::testing::{Counts, Random, reseal, seeds};
+use terrasoar_layout::testing::{Counts, reseal, seeds};
 
 /// Longest that all uses of one small file may take.
 const PATIENCE: Duration = Duration::from_secs(20);

@@ -9,6 +9,7 @@ use crate::bound::range;
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
 use crate::error::LayoutError;
 use crate::error::is_full;
+use crate::file::atomic::folder_of;
 use crate::file::disk::Disk;
 use crate::remedy::Remedy;
 use std::fs::File;
@@ -107,8 +108,7 @@ impl<'a> Spool<'a> {
         let storage = if bytes <= memory_bytes {
             Storage::Memory(RwLock::new(vec![0; crate::file::bytes::to_usize(bytes)?]))
         } else {
-            let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            let file = tempfile::tempfile_in(folder)
+            let file = tempfile::tempfile_in(folder_of(target))
                 .and_then(|file| disk.set_len(&file, bytes).map(|()| file))
                 .map_err(|e| failed(target, "cannot create a temporary file beside it", e))?;
             Storage::File(file)

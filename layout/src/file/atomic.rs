@@ -53,7 +53,7 @@ enum Replaced<'l> {
 }
 
 /// The folder a file lies in; the current one for a bare name.
-fn folder_of(path: &Path) -> &Path {
+pub fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

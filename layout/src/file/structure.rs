@@ -70,7 +70,11 @@ pub(crate) fn read_root(source: &dyn Source, header: &Header) -> Result<Vec<Entr
     let mut root = vec![0; root_bytes];
     source.read_at(u64::from(header.root_page) * PAGE_BYTES as u64, &mut root)?;
     if checksum(&root) != header.root_checksum {
-        return Err(damaged(source, "directory root".into(), "the checksum does not match"));
+        return Err(LayoutError::damaged_terrain(
+            source.path(),
+            "directory root".into(),
+            "the checksum does not match",
+        ));
     }
     Ok((0..header.root_entries() as usize).map(|i| Entry::read(&root, i)).collect())
 }
@@ -89,18 +93,26 @@ pub(crate) fn read_leaf(
     let page_bytes = PAGE_BYTES as u64;
     let in_file = |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * page_bytes <= header.file_bytes;
     if !in_file(here.page) {
-        return Err(damaged(source, format!("directory leaf {i}"), "it lies outside the file"));
+        return Err(LayoutError::damaged_terrain(
+            source.path(),
+            format!("directory leaf {i}"),
+            "it lies outside the file",
+        ));
     }
     let mut leaf = [0; PAGE_BYTES];
     source.read_at(u64::from(here.page) * page_bytes, &mut leaf)?;
     if checksum(&leaf) != here.checksum {
-        return Err(damaged(source, format!("directory leaf {i}"), "the checksum does not match"));
+        return Err(LayoutError::damaged_terrain(
+            source.path(),
+            format!("directory leaf {i}"),
+            "the checksum does not match",
+        ));
     }
     for (j, place) in entries.iter_mut().enumerate() {
         *place = Entry::read(&leaf, j);
         if place.is_present() && !in_file(place.page) {
             let place = format!("directory entry of record page {}", i * ENTRIES_PER_LEAF + j);
-            return Err(damaged(source, place, "the page lies outside the file"));
+            return Err(LayoutError::damaged_terrain(source.path(), place, "the page lies outside the file"));
         }
     }
     Ok(())
@@ -139,24 +151,19 @@ pub(crate) fn read_directory_beside(
     }
     if stored != header.stored_pages {
         let problem = "it holds another number of pages than the header says";
-        return Err(damaged(source, "directory".into(), problem));
+        return Err(LayoutError::damaged_terrain(source.path(), "directory".into(), problem));
     }
     Ok((root, entries))
-}
-
-fn damaged(source: &dyn Source, place: String, problem: &str) -> LayoutError {
-    let problem = format!("{problem}; restore a copy of the file or build it again");
-    LayoutError::damaged(source.path(), place, problem)
 }
 
 fn check_inert_page(source: &dyn Source, header: &Header) -> Result<(), LayoutError> {
     let mut page = Box::new([0; PAGE_BYTES]);
     source.read_at(u64::from(INERT_PAGE) * PAGE_BYTES as u64, &mut page[..])?;
     if page[..] != inert_page(header.record_kind)[..] {
-        return Err(LayoutError::damaged(
+        return Err(LayoutError::damaged_terrain(
             source.path(),
-            "inert page",
-            "it holds something else; restore a copy of the file or build it again",
+            "inert page".into(),
+            "it holds something else",
         ));
     }
     Ok(())

@@ -10,9 +10,9 @@ use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::journal::Commit;
+use crate::file::source::Source;
 #[cfg(feature = "files")]
 use crate::file::source::{MapSource, PreadSource};
-use crate::file::source::Source;
 #[cfg(feature = "files")]
 use crate::file::structure::read_growing;
 use crate::file::structure::{read_directory, read_structure};
@@ -183,10 +183,10 @@ impl Terrain {
         if checksum(page) == entry.checksum {
             return Ok(());
         }
-        Err(LayoutError::damaged(
+        Err(LayoutError::damaged_terrain(
             self.path(),
             format!("record page {logical_page} (file page {})", entry.page),
-            "the checksum does not match; restore a copy of the file or build it again",
+            "the checksum does not match",
         ))
     }
 

@@ -6,7 +6,6 @@
 //! | [`Mutation`] | one change of a part that matters, told by eight bytes |
 //! | [`Sealed`] | a terrain file, and perhaps an overlay over it, mutated and sealed by a recipe of mutations |
 //! | [`seeds`] | small sound files to begin with |
-//! | [`Random`] | numbers that repeat for a seed |
 //! | [`exercise`] | everything that this crate does with a file |
 //!
 //! Invariant: mutating and sealing never panic or take long, whatever the bytes; equal recipes give equal files. Cost: a few checksums of the file.
@@ -15,14 +14,12 @@ mod exercise;
 mod image;
 mod mutation;
 mod parts;
-mod random;
 mod seal;
 mod sealed;
 mod seeds;
 
 pub use exercise::exercise;
 pub use mutation::Mutation;
-pub use random::Random;
 pub use seal::{Counts, reseal, reseal_overlay};
 pub use sealed::Sealed;
 pub use seeds::{Seed, seeds};

@@ -5,7 +5,7 @@
 //! was synced after it was given; of later ones the first few may have arrived, in their order. That a file was synced says nothing of its name.
 
 use super::{Disk, SystemDisk};
-use crate::testing::Random;
+use crate::mix::Random;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::Result;

@@ -137,6 +137,14 @@ impl Disk for SystemDisk {
     }
 }
 
+/// Brings the names in a folder to the disk, where the system can.
+///
+/// # Errors
+/// The system's. Systems and file systems that sync no folders do not say so.
+pub fn sync_folder(folder: &Path) -> Result<()> {
+    SystemDisk.sync_folder(folder)
+}
+
 /// Writes all of `bytes` at `offset`.
 pub fn write_at(file: &File, bytes: &[u8], offset: u64) -> Result<()> {
     SystemDisk.write_at(file, bytes, offset)

@@ -92,10 +92,14 @@ impl PageUses {
         root: &[Entry],
     ) -> Result<(), LayoutError> {
         let taken = self.take(header.root_page.into(), root_pages(header));
-        taken.map_err(|problem| damaged(source, "directory root".into(), problem))?;
+        taken.map_err(|problem| {
+            LayoutError::damaged_terrain(source.path(), "directory root".into(), problem)
+        })?;
         for (i, leaf) in root.iter().enumerate().filter(|(_, leaf)| leaf.is_present()) {
             let taken = self.take(leaf.page.into(), 1);
-            taken.map_err(|problem| damaged(source, format!("directory leaf {i}"), problem))?;
+            taken.map_err(|problem| {
+                LayoutError::damaged_terrain(source.path(), format!("directory leaf {i}"), problem)
+            })?;
         }
         Ok(())
     }
@@ -109,7 +113,8 @@ impl PageUses {
     ) -> Result<(), LayoutError> {
         for (i, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.is_present()) {
             let place = || format!("directory entry of record page {}", first + i);
-            self.take(entry.page.into(), 1).map_err(|problem| damaged(source, place(), problem))?;
+            self.take(entry.page.into(), 1)
+                .map_err(|problem| LayoutError::damaged_terrain(source.path(), place(), problem))?;
         }
         Ok(())
     }
@@ -118,11 +123,6 @@ impl PageUses {
 /// Pages of the root, the last one begun perhaps.
 fn root_pages(header: &Header) -> u64 {
     (header.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE)
-}
-
-fn damaged(source: &dyn Source, place: String, problem: String) -> LayoutError {
-    let problem = format!("{problem}; restore a copy of the file or build it again");
-    LayoutError::damaged(source.path(), place, problem)
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@
 //! between. Lumps move that edge, grain spares single texels in part. Rays turn with the direction and all differs from scorch to scorch, for hashes begin
 //! with its centre; the same scorch is always the same.
 
+use crate::mix::mixed_32;
+
 /// Rays of ejecta all around.
 const RAYS: u32 = 28;
 /// Lumps along a radius.
@@ -34,14 +36,14 @@ impl Burn {
         // The last bits of a sine differ from machine to machine.
         let ahead = [east, north].map(|v| (v * 65536.0).round() / 65536.0);
         let millimetres = scorch.centre_m.map(|m| (m * 1000.0).round() as i64 as u32);
-        let seed = hash(hash(millimetres[0]) ^ millimetres[1]);
+        let seed = mixed_32(mixed_32(millimetres[0]) ^ millimetres[1]);
         Self {
             centre_m: scorch.centre_m,
             radius_m: scorch.radius_m,
             ahead,
             most: scorch.strength * (1.0 - LEFT),
             seed,
-            rays: std::array::from_fn(|ray| part(hash(seed ^ ray as u32))),
+            rays: std::array::from_fn(|ray| part(mixed_32(seed ^ ray as u32))),
         }
     }
 
@@ -61,7 +63,7 @@ impl Burn {
         let lump = self.lump([east, north].map(|m| m / self.radius_m * LUMPS));
         let s = (u / reach * (0.8 + 0.4 * lump)).max(u);
         let t = ((1.0 - s) / (1.0 - CORE)).clamp(0.0, 1.0);
-        let grain = part(hash(self.seed ^ hash(x as u32) ^ (y as u32).wrapping_mul(0x9e37_79b1)));
+        let grain = part(mixed_32(self.seed ^ mixed_32(x as u32) ^ (y as u32).wrapping_mul(0x9e37_79b1)));
         let burnt = self.most * t * t * (3.0 - 2.0 * t) * (1.0 - GRAIN * grain);
         (burnt * f64::from(WHOLE)) as u32
     }
@@ -89,7 +91,7 @@ impl Burn {
             let t = v - v.floor();
             t * t * (3.0 - 2.0 * t)
         });
-        let corner = |x: u32, y: u32| part(hash(self.seed ^ hash(x) ^ y.wrapping_mul(0x85eb_ca77)));
+        let corner = |x: u32, y: u32| part(mixed_32(self.seed ^ mixed_32(x) ^ y.wrapping_mul(0x85eb_ca77)));
         let row = |y: u32| {
             let [a, b] = [corner(x, y), corner(x.wrapping_add(1), y)];
             a + (b - a) * s
@@ -97,13 +99,6 @@ impl Burn {
         let [south, north] = [row(y), row(y.wrapping_add(1))];
         south + (north - south) * t
     }
-}
-
-#[inline(always)]
-fn hash(value: u32) -> u32 {
-    let value = (value ^ value >> 16).wrapping_mul(0x7feb_352d);
-    let value = (value ^ value >> 15).wrapping_mul(0x846c_a68b);
-    value ^ value >> 16
 }
 
 #[inline(always)]

@@ -1,0 +1,77 @@
+//! The examples run, and say what they are to say.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::dem::{MemoryDem, SampleType};
+use terrasoar_layout::progress::Silent;
+
+/// An example's program. It is there where all tests are built; where this one was built alone it is built now.
+fn built(name: &str) -> PathBuf {
+    let here = std::env::current_exe().unwrap();
+    let profile = here.parent().unwrap().parent().unwrap();
+    let example = profile.join("examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    if !example.exists() {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["build", "--offline", "-p", "terrasoar", "--example", name]);
+        assert!(cargo.current_dir(env!("CARGO_MANIFEST_DIR")).status().unwrap().success());
+    }
+    example
+}
+
+fn run(name: &str, terrain: &Path) -> String {
+    let Output { status, stdout, stderr } = Command::new(built(name)).arg(terrain).output().unwrap();
+    assert!(status.success(), "{name}: {}", String::from_utf8_lossy(&stderr));
+    assert!(stderr.is_empty(), "{name}: {}", String::from_utf8_lossy(&stderr));
+    String::from_utf8(stdout).unwrap()
+}
+
+fn terrain() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("land.iqt");
+    let hill = |x: u32, y: u32| 500.0 + 300.0 * (f64::from(x) / 40.0).sin() * (f64::from(y) / 30.0).cos();
+    let dem =
+        MemoryDem::from_fn([513, 513], SampleType::I16, |x, y| hill(x, y).round() + f64::from((x ^ y) % 7));
+    build(&dem, &path, &BuildOptions { spacing_m: Some([30.0; 2]), ..Default::default() }, &Silent).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn a_replay_draws_the_same_with_three_engines() {
+    let (_folder, path) = terrain();
+    let said = run("replay", &path);
+    let triangles: Vec<&str> = said.lines().map(|line| line.split_whitespace().nth(1).unwrap()).collect();
+    assert_eq!(triangles.len(), 3, "{said}");
+    assert!(triangles[0].parse::<f64>().unwrap() > 1000.0, "{said}");
+    assert!(triangles.iter().all(|n| *n == triangles[0]), "{said}");
+}
+
+#[test]
+fn a_million_heights_are_those_of_the_file() {
+    let (_folder, path) = terrain();
+    let said = run("heights", &path);
+    assert!(said.starts_with("1000000 of 1000000 places have ground, "), "{said}");
+    // The mean of the samples is that of the surface between them, but for the rim.
+    let mean: f64 = said.split("ground, ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let terrain = terrasoar::Terrain::open(&path).unwrap();
+    let at = |i: u32, j: u32| terrain.height_m(f64::from(i) * 120.0, f64::from(j) * 120.0).unwrap().unwrap();
+    let sum: f64 = (0..128).flat_map(|j| (0..128).map(move |i| at(i, j))).sum();
+    assert!((mean - sum / (128.0 * 128.0)).abs() < 10.0, "{mean} against {}", sum / (128.0 * 128.0));
+}
+
+#[test]
+fn edits_while_flying_are_made_saved_and_taken_back() {
+    let (_folder, path) = terrain();
+    let heights = || {
+        let terrain = terrasoar::Terrain::open(&path).unwrap();
+        (0..64)
+            .map(|i| terrain.height_m(f64::from(i) * 240.0, f64::from(i) * 200.0).unwrap())
+            .collect::<Vec<_>>()
+    };
+    let before = heights();
+    let said = run("edit", &path);
+    assert!(said.contains(" craters in ") && said.contains("all on the disk"), "{said}");
+    assert!(said.lines().filter(|line| line.contains("now Some(")).count() > 5, "{said}");
+    assert!(!said.ends_with("0 commits taken back\n"), "{said}");
+    assert_eq!(heights(), before);
+}
