@@ -4,8 +4,34 @@
 //! comparisons of engines and of reading as CSV, JSON, plots and a page. The engine knows nothing of it.
 //!
 //! ```
-//! use terrasoar::flight::FlightFrame;
-//! use terrasoar_lab::iobench::{LayoutKind, layouts};
+//! use terrasoar::flyover::EngineKind;
+//! use terrasoar::refine::Culling;
+//! use terrasoar::{MappedTerrain, View};
+//! use terrasoar_lab::iobench::{CountOptions, LayoutKind, Prefetch, Reader, count};
+//! # use terrasoar_layout::{build::{BuildOptions, build}, dem::{MemoryDem, SampleType}, progress::Silent};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("alps.iqt");
+//! # let dem = MemoryDem::from_fn([257, 257], SampleType::I16, |x, y| f64::from((x * 7) ^ (y * 5)));
+//! # build(&dem, &path, &BuildOptions::default().spacing_m([30.0, 30.0]), &Silent)?;
+//! let terrain = MappedTerrain::open(&path)?;
+//! let views = [0.0, 50.0, 100.0].map(|north| View::new([3800.0, 500.0 + north, 900.0], 0.0, -20.0));
+//! let options = CountOptions {
+//!     layouts: vec![LayoutKind::Ours, LayoutKind::Row],
+//!     preloads: vec![Prefetch::None],
+//!     cache_pages: 1024,
+//!     disk_pages: 128,
+//!     block_m: 1000.0,
+//!     trace: false,
+//! };
+//! let runs =
+//!     count(terrain.file(), &views, Culling::Vertices, Reader::Engine(EngineKind::Kinetic), &options, &mut |_| {})?;
+//! for run in &runs {
+//!     println!("{}: {} pages for the first view", run.layout.name(), run.frames[0].pages);
+//! }
+//! # assert!(runs[0].frames[0].pages < runs[1].frames[0].pages);
+//! # Ok(())
+//! # }
 //! ```
 //!
 //! | to | there is |
