@@ -60,7 +60,7 @@ fn measure(terrain: &Path, picture: &dyn ImageSource, format: TileFormat) -> Res
     std::fs::copy(terrain, &copy)?;
     let images = vec![open_image(picture.path())?];
     let start = Instant::now();
-    let done = drape(&copy, &images, &DrapeOptions { format, ..DrapeOptions::default() }, &Silent)?;
+    let done = drape(&copy, &images, &DrapeOptions::default().format(format), &Silent)?;
     let seconds = start.elapsed().as_secs_f64();
     let peak_mib = peak_memory_mib();
     let raw = 3.0 * f64::from(done.shape.texels[0]) * f64::from(done.shape.texels[1]);

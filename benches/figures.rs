@@ -79,11 +79,9 @@ fn build_and_report(error: &str) -> Result<(), Failure> {
     let paths: Vec<PathBuf> = std::env::args_os().skip(1).map(Into::into).collect();
     let [dem, out] = &paths[..] else { return Err("two paths expected".into()) };
     let spacing_m = std::env::var("TERRASOAR_FIGURES_SPACING")?.parse::<f64>().ok();
-    let options = BuildOptions {
-        error: if error == "step" { ErrorKind::Step } else { ErrorKind::Bounded },
-        spacing_m: spacing_m.map(|s| [s, s]),
-        ..Default::default()
-    };
+    let options = BuildOptions::default()
+        .error(if error == "step" { ErrorKind::Step } else { ErrorKind::Bounded })
+        .spacing_m(spacing_m.map(|s| [s, s]));
     build(&*terrasoar_import::open(std::slice::from_ref(dem))?, out, &options, &Silent)?;
     if let Ok(status) = std::fs::read_to_string("/proc/self/status")
         && let Some(line) = status.lines().find(|l| l.starts_with("VmHWM"))
@@ -94,7 +92,7 @@ fn build_and_report(error: &str) -> Result<(), Failure> {
 }
 
 fn quality(tolerance_px: f64) -> Quality {
-    Quality { tolerance_px, ..Default::default() }
+    Quality::default().tolerance_px(tolerance_px)
 }
 
 fn flight(
@@ -142,7 +140,7 @@ fn main() -> Result<(), Failure> {
     let synthesised = |size: u32| -> Result<PathBuf, Failure> {
         let out = path(&format!("synth-{size}.tif"));
         let spacing_m = EXTENT_M / f64::from(size - 1);
-        write(&SynthOptions { size, seed: 1, spacing_m }, &out, &|_| {})?;
+        write(&SynthOptions::default().size(size).seed(1).spacing_m(spacing_m), &out, &|_| {})?;
         Ok(out)
     };
     println!("## Build, 512 MiB, {} threads\n", rayon::current_num_threads());

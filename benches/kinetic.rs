@@ -87,7 +87,7 @@ fn straight(
     percent: f64,
     tolerance_px: f64,
 ) -> Result<(Vec<FlightFrame>, f64), Failure> {
-    let quality = Quality { tolerance_px, ..Default::default() };
+    let quality = Quality::default().tolerance_px(tolerance_px);
     let plan = FlightPlan::new(FlightKind::Straight, frames, 1.0);
     let solution = incoherence::solve(&TerrainGround::new(terrain), &plan, percent, |pairs| {
         mean_incoherence_percent(terrain, pairs, quality)

@@ -98,7 +98,7 @@ fn line(what: &str, mut times_us: Vec<f64>) {
 
 fn made(path: PathBuf) -> Result<PathBuf, Failure> {
     let dem = MemoryDem::from_fn([257, 257], SampleType::I16, |x, y| f64::from(x * y % 97));
-    build(&dem, &path, &BuildOptions { spacing_m: Some([16.0; 2]), ..BuildOptions::default() }, &Silent)?;
+    build(&dem, &path, &BuildOptions::default().spacing_m([16.0; 2]), &Silent)?;
     let picture = MemoryImage::from_fn([4096, 4096], |x, y| {
         let grain = (mixed_32(x ^ mixed_32(y)) >> 28) as u8;
         [90 + (x / 40 % 60) as u8 + grain, 100 + (y / 50 % 60) as u8 + grain, 60 + grain, 255]

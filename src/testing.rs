@@ -15,7 +15,7 @@ fn terrain(samples: [u32; 2]) -> Terrain {
     });
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.iqt");
-    let options = BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() };
+    let options = BuildOptions::default().spacing_m([10.0, 12.0]);
     build(&dem, &path, &options, &Silent).unwrap();
     let bytes = std::fs::read(path).unwrap();
     Terrain::from_source(Box::new(MemorySource::new("memory", bytes))).unwrap()

@@ -34,11 +34,7 @@ fn terrain(samples: [u32; 2], seed: u64, holes: bool) -> Arc<Terrain> {
 /// Ground without room, of records that need none.
 fn exact_terrain(samples: [u32; 2], seed: u64) -> Arc<Terrain> {
     let dem = MemoryDem::from_fn(samples, SampleType::F32, |x, y| rugged(seed, x, y) / 7.0);
-    let options = BuildOptions {
-        spacing_m: Some([10.0, 12.0]),
-        record: Some(RecordKind::Exact8),
-        ..Default::default()
-    };
+    let options = BuildOptions::default().spacing_m([10.0, 12.0]).record(RecordKind::Exact8);
     Arc::new(terrain_of(&dem, &options))
 }
 
@@ -73,7 +69,7 @@ fn fly(terrain: &Arc<Terrain>, views: &[View], edits: &[(usize, Vec<Edit>)], cul
         let mut smart = Smart::new(store(), culling);
         let mut kinetic = Kinetic::new(store(), culling);
         let mut hasty = Kinetic::new(store(), culling);
-        hasty.set_budget(Budget { tests: Some(60), time: None });
+        hasty.set_budget(Budget::default().tests(60));
         let (mut mirror, mut hasty_mirror) = (Mirror::default(), Mirror::default());
         for (i, view) in views.iter().enumerate() {
             for (_, edits) in edits.iter().filter(|(frame, _)| *frame == i) {
@@ -193,7 +189,7 @@ fn replays_bomb_alike() {
     };
     let batches: Vec<TimedBatch> =
         (3..18).map(|frame| TimedBatch { frame, edits: vec![crater(frame), crater(frame + 1)] }).collect();
-    let quality = Quality { viewport: VIEWPORT, tolerance_px: 2.0, ..Quality::default() };
+    let quality = Quality::default().viewport(VIEWPORT).tolerance_px(2.0);
     let replay = |kind, batches: &[TimedBatch]| {
         replay_edited(&terrain, &frames, quality, kind, batches, &mut |_| {}).unwrap()
     };

@@ -36,8 +36,7 @@ fn terrain_at(path: &Path) {
         (1, 0) => 4000.0,
         _ => rugged(3, x, y),
     });
-    build(&dem, path, &BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() }, &Silent)
-        .unwrap();
+    build(&dem, path, &BuildOptions::default().spacing_m([10.0, 12.0]), &Silent).unwrap();
 }
 
 fn craters(batch: u32) -> Vec<Edit> {

@@ -32,7 +32,7 @@ fn terrain() -> (tempfile::TempDir, PathBuf) {
     let hill = |x: u32, y: u32| 500.0 + 300.0 * (f64::from(x) / 40.0).sin() * (f64::from(y) / 30.0).cos();
     let dem =
         MemoryDem::from_fn([513, 513], SampleType::I16, |x, y| hill(x, y).round() + f64::from((x ^ y) % 7));
-    build(&dem, &path, &BuildOptions { spacing_m: Some([30.0; 2]), ..Default::default() }, &Silent).unwrap();
+    build(&dem, &path, &BuildOptions::default().spacing_m([30.0; 2]), &Silent).unwrap();
     (folder, path)
 }
 

@@ -22,8 +22,7 @@ fn land() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("land.iqt");
     let dem = MemoryDem::from_fn([SIDE; 2], SampleType::I16, |x, y| rugged(3, x, y));
-    build(&dem, &path, &BuildOptions { spacing_m: Some([SPACING_M; 2]), ..Default::default() }, &Silent)
-        .unwrap();
+    build(&dem, &path, &BuildOptions::default().spacing_m([SPACING_M; 2]), &Silent).unwrap();
     (folder, path)
 }
 

@@ -75,7 +75,7 @@ fn a_budget_of_tests_keeps_the_mesh_conforming() {
         let terrain = rugged_terrain(samples, 6, holes);
         for tests in [16, 100, 700] {
             for culling in Culling::ALL {
-                let budget = Budget { tests: Some(tests), time: None };
+                let budget = Budget::default().tests(tests);
                 fly_with(budget, &terrain, &views(path(&terrain, 40), 1.0), culling);
             }
         }
@@ -86,7 +86,7 @@ fn a_budget_of_tests_keeps_the_mesh_conforming() {
 fn a_budget_of_time_keeps_the_mesh_conforming() {
     let terrain = rugged_terrain([129, 129], 7, false);
     for microseconds in [0, 5, 50] {
-        let budget = Budget { tests: None, time: Some(Duration::from_micros(microseconds)) };
+        let budget = Budget::default().time(Duration::from_micros(microseconds));
         let flown = views(path(&terrain, 30), 1.0);
         if microseconds > 0 {
             fly_with(budget, &terrain, &flown, Culling::Vertices);
@@ -119,7 +119,7 @@ proptest! {
         let flown = views(flown, 1.0);
         with_records!(terrain.records().unwrap(), records => {
             let mut kinetic = Kinetic::new(records.clone(), Culling::Vertices);
-            kinetic.set_budget(Budget { tests: Some(tests), time: None });
+            kinetic.set_budget(Budget::default().tests(tests));
             for view in &flown {
                 kinetic.update(view, &mut Unobserved);
                 check_conforming(&records, &triangles(&kinetic));

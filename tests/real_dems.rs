@@ -51,7 +51,7 @@ fn fly(terrain: &Terrain, tolerance_px: f64) {
 
 #[test]
 fn puget_sound() {
-    let options = BuildOptions { spacing_m: Some([160.0; 2]), z_scale: 0.1, ..Default::default() };
+    let options = BuildOptions::default().spacing_m([160.0; 2]).z_scale(0.1);
     let (_folder, terrain) = built("puget_sound_1025.png", &options);
     for tolerance_px in [0.5, 1.0, 4.0] {
         fly(&terrain, tolerance_px);

@@ -21,7 +21,7 @@ fn bombard(dem: &str, spacing_m: Option<[f64; 2]>, z_scale: f64) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.iqt");
     let dem = terrasoar_import::open(&[Path::new("tests/data").join(dem)]).unwrap();
-    build(&*dem, &path, &BuildOptions { spacing_m, z_scale, ..Default::default() }, &Silent).unwrap();
+    build(&*dem, &path, &BuildOptions::default().spacing_m(spacing_m).z_scale(z_scale), &Silent).unwrap();
     let [low, high] = Terrain::open(&path).unwrap().header().height_range_m;
     let room = HeightRoom { lowest_m: low - 2000.0, highest_m: high + 2000.0 };
     widen(&SystemDisk, &path, room, 512, &Silent).unwrap();

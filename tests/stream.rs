@@ -22,7 +22,7 @@ use terrasoar_layout::with_records;
 /// A terrain of some 1,700 pages.
 fn large_terrain() -> Arc<Terrain> {
     let dem = MemoryDem::from_fn([1025; 2], SampleType::I16, |x, y| rugged(9, x, y));
-    Arc::new(terrain_of(&dem, &BuildOptions { spacing_m: Some([10.0, 10.0]), ..Default::default() }))
+    Arc::new(terrain_of(&dem, &BuildOptions::default().spacing_m([10.0, 10.0])))
 }
 
 /// Straight ahead, and a turn at the end.

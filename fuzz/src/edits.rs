@@ -102,11 +102,7 @@ fn does(batches: &[LoadedBatch], folder: &Path) {
 fn replays(batches: &[LoadedBatch], folder: &Path) {
     let terrain = Arc::new(open(&folder.join("land.iqt")));
     let frames = crate::fly::frames_over(&terrain);
-    let quality = Quality {
-        viewport: Viewport { width_px: 64, height_px: 48 },
-        tolerance_px: 4.0,
-        ..Quality::default()
-    };
+    let quality = Quality::default().viewport(Viewport { width_px: 64, height_px: 48 }).tolerance_px(4.0);
     let batches = timed(batches, &frames);
     let fly = |engine| replay_edited(&terrain, &frames, quality, engine, &batches, &mut |_| {});
     match (fly(EngineKind::Soar), fly(EngineKind::Kinetic)) {

@@ -70,7 +70,7 @@ fn refines(terrain: &Terrain, views: &[View], culling: Culling, is_sound: bool) 
         let mut smart = Smart::new(records.clone(), culling);
         let mut kinetic = Kinetic::new(records.clone(), culling);
         let mut hurried = Kinetic::new(records.clone(), culling);
-        hurried.set_budget(Budget { tests: Some(20), time: None });
+        hurried.set_budget(Budget::default().tests(20));
         let mut naive = is_small.then(|| Naive::new(records.clone(), culling));
         for view in views {
             soar.update(view, &mut Unobserved);
@@ -107,14 +107,13 @@ fn streams(terrain: &Arc<Terrain>, views: &[View]) {
 
 /// What the reads of a flight touch.
 fn counts(terrain: &Terrain, views: &[View]) {
-    let options = CountOptions {
-        layouts: LayoutKind::ALL.to_vec(),
-        preloads: vec![Prefetch::None, Prefetch::Frustum],
-        cache_pages: 3,
-        disk_pages: 2,
-        block_m: 50.0,
-        trace: true,
-    };
+    let options = CountOptions::default()
+        .layouts(LayoutKind::ALL.to_vec())
+        .preloads(vec![Prefetch::None, Prefetch::Frustum])
+        .cache_pages(3)
+        .disk_pages(2)
+        .block_m(50.0)
+        .trace(true);
     for reader in [Reader::Engine(EngineKind::Kinetic), Reader::Mesh] {
         crate::words::told(count(terrain, views, Culling::Clusters, reader, &options, &mut |_| {}));
     }

@@ -54,7 +54,7 @@ pub(crate) fn reads_and_drapes(image: Box<dyn ImageSource>, folder: &Path) {
     for (extent, format) in
         [(None, TileFormat::Bc1), (Some(Extent::Metres([50.0, 60.0, 400.0, 300.0])), TileFormat::Rgba8)]
     {
-        let options = DrapeOptions { format, extent, memory_mib: MEMORY_MIB };
+        let options = DrapeOptions::default().format(format).extent(extent).memory_mib(MEMORY_MIB);
         let is_draped = drapes(&images, &options, folder);
         assert!(!is_draped || whole, "a picture was draped that cannot be read");
     }

@@ -46,7 +46,7 @@ pub(crate) fn body(data: &[u8]) {
 /// What is built opens and is sound; what is not built leaves nothing.
 fn builds(dem: &dyn DemSource, folder: &Path) {
     let out = folder.join("out.iqt");
-    let options = BuildOptions { memory_mib: 48, ..BuildOptions::default() };
+    let options = BuildOptions::default().memory_mib(48);
     match build(dem, &out, &options, &Silent) {
         Ok(header) => {
             let terrain =

@@ -26,7 +26,7 @@ pub(crate) static PLAIN: LazyLock<Vec<u8>> = LazyLock::new(|| {
     };
     let folder = crate::scratch::folder();
     let path = folder.path().join("plain.iqt");
-    let options = BuildOptions { memory_mib: 48, ..BuildOptions::default() };
+    let options = BuildOptions::default().memory_mib(48);
     build(&dem, &path, &options, &Silent)
         .unwrap_or_else(|error| panic!("a sound terrain is not built: {error}"));
     std::fs::read(&path).unwrap_or_else(|error| panic!("{error}"))

@@ -179,7 +179,7 @@ fn turns(trial: &Trial, session: &mut EditSession, is_sound: bool) {
 /// Another picture over it.
 fn drapes(trial: &Trial) {
     let image = MemoryImage::from_fn([30, 20], |x, y| [x as u8, y as u8, 7, 255]);
-    let options = DrapeOptions { format: TileFormat::Rgba8, ..DrapeOptions::default() };
+    let options = DrapeOptions::default().format(TileFormat::Rgba8);
     told(drape(&trial.base, &[Box::new(image)], &options, &Silent));
     trial.still_opens("draping");
 }

@@ -43,6 +43,7 @@ const TASK_ROWS: usize = 16;
 
 /// What to make.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct SynthOptions {
     /// Samples along each side: 2^k + 1, from 3 to 65,537.
     pub size: u32,
@@ -56,6 +57,23 @@ impl Default for SynthOptions {
     /// 1,025 samples a side at 20 m, seed 0.
     fn default() -> Self {
         Self { size: 1025, seed: 0, spacing_m: 20.0 }
+    }
+}
+
+impl SynthOptions {
+    /// These options with so many samples along each side.
+    pub fn size(self, size: u32) -> Self {
+        Self { size, ..self }
+    }
+
+    /// These options with another landscape.
+    pub fn seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// These options with so many metres between samples.
+    pub fn spacing_m(self, spacing_m: f64) -> Self {
+        Self { spacing_m, ..self }
     }
 }
 

@@ -57,7 +57,7 @@ fn dem() -> MemoryDem {
 }
 
 fn options(memory_mib: u64) -> BuildOptions {
-    BuildOptions { memory_mib, spacing_m: Some([20.0, 25.0]), ..Default::default() }
+    BuildOptions::default().memory_mib(memory_mib).spacing_m([20.0, 25.0])
 }
 
 #[test]
@@ -223,7 +223,7 @@ fn subjects(folder: &Path) -> BTreeMap<&'static str, Vec<PathBuf>> {
     let [bt_path, hgt, png] = ["small.bt", "N10E010.hgt", "small.png"].map(|name| folder.join(name));
     std::fs::write(&bt_path, bt).unwrap();
     write_hgt(&hgt, 40, |col, row| (col * row) as i16);
-    let options = terrasoar_import::synth::SynthOptions { size: 33, seed: 3, spacing_m: 30.0 };
+    let options = terrasoar_import::synth::SynthOptions::default().size(33).seed(3).spacing_m(30.0);
     terrasoar_import::synth::write(&options, &png, &|_| ()).unwrap();
     let tiffs = [
         "int16-strips",

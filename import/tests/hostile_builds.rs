@@ -73,8 +73,8 @@ fn metadata(scale: &str, offset: &str) -> Vec<Tag> {
 
 #[test]
 fn numbers_that_no_header_holds_are_refused_before_a_sample_is_read() {
-    let stated = BuildOptions { spacing_m: Some([10.0; 2]), ..BuildOptions::default() };
-    let scaled = BuildOptions { z_scale: 1e13, ..stated.clone() };
+    let stated = BuildOptions::default().spacing_m([10.0; 2]);
+    let scaled = stated.clone().z_scale(1e13);
     for (other, options, words) in [
         (body(1e13), &stated, "radius of 1e13 m"),
         (body(f64::MAX), &stated, "e308 m"),
@@ -109,11 +109,7 @@ fn heights_that_no_header_holds_are_refused_when_they_are_read() {
         dem.info_mut().height_offset_m = offset_m;
         dem
     };
-    let exact = BuildOptions {
-        spacing_m: Some([10.0; 2]),
-        record: Some(RecordKind::Exact16),
-        ..BuildOptions::default()
-    };
+    let exact = BuildOptions::default().spacing_m([10.0; 2]).record(RecordKind::Exact16);
     // Heights near zero over a base that is too far away.
     let (error, read) = built(&far(1e13, -1e13), &exact).unwrap_err();
     assert!(error.to_string().contains("heights from 1"), "{error}");
@@ -143,7 +139,7 @@ fn whatever_numbers_a_source_has_the_file_opens_or_there_is_none() {
                     _ => info.georeference.pixel_to_crs = Some([0.0, number, 0.0, 0.0, number, -5.0]),
                 }
                 for record in [None, Some(RecordKind::Compact), Some(RecordKind::Exact16)] {
-                    let options = BuildOptions { record, ..BuildOptions::default() };
+                    let options = BuildOptions::default().record(record);
                     made += u32::from(built(&dem, &options).is_ok());
                 }
             }
@@ -172,7 +168,7 @@ fn memory_that_reading_takes_is_asked_for_in_words() {
     let path = folder.path().join("a.tif");
     std::fs::write(&path, one_strip([1024, 10 * 1024], ZSTD, &encoder.finish().unwrap())).unwrap();
     let dem = terrasoar_import::open(&[path]).unwrap();
-    let with = |memory_mib| built(&*dem, &BuildOptions { memory_mib, ..BuildOptions::default() });
+    let with = |memory_mib| built(&*dem, &BuildOptions::default().memory_mib(memory_mib));
     let (error, read) = with(64).unwrap_err();
     let Some(Remedy::Memory { enough_mib: Some(enough) }) = error.remedy() else { panic!("{error}") };
     assert!((130..200).contains(&enough) && error.to_string().contains(&enough.to_string()), "{error}");
@@ -191,7 +187,7 @@ fn a_bomb_of_one_strip_is_built_within_its_budget() {
     std::fs::write(&path, one_strip([side; 2], DEFLATE, &packed(DEFLATE, &rows))).unwrap();
     drop(rows);
     let dem = terrasoar_import::open(&[path]).unwrap();
-    let options = BuildOptions { memory_mib: 48, ..BuildOptions::default() };
+    let options = BuildOptions::default().memory_mib(48);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let out = folder.path().join("a.iqt");
     let (done, bytes) = peak(|| pool.install(|| build(&*dem, &out, &options, &Silent)));

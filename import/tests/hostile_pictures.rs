@@ -48,7 +48,7 @@ impl Bench {
     /// Drapes the picture on two threads; also gives the memory that took.
     fn drape(&self, image: &Path, memory_mib: u64) -> (Result<Draped, LayoutError>, usize) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-        let options = DrapeOptions { memory_mib, ..DrapeOptions::default() };
+        let options = DrapeOptions::default().memory_mib(memory_mib);
         peak(|| {
             pool.install(|| {
                 let images = [open_image(image)?];

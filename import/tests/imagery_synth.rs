@@ -15,9 +15,9 @@ use terrasoar_layout::read::terrain::Terrain;
 /// A terrain of 513 x 513 samples, and its picture of so many texels a sample.
 fn land(folder: &Path, texels_a_sample: u32) -> [std::path::PathBuf; 2] {
     let [dem, iqt, picture] = ["a.tif", "a.iqt", "x.tif"].map(|name| folder.join(name));
-    write(&SynthOptions { size: 513, seed: 3, spacing_m: 40.0 }, &dem, &|_| {}).unwrap();
+    write(&SynthOptions::default().size(513).seed(3).spacing_m(40.0), &dem, &|_| {}).unwrap();
     build(&*terrasoar_import::open(&[dem]).unwrap(), &iqt, &BuildOptions::default(), &Silent).unwrap();
-    let options = ColourOptions { seed: 5, texels_a_sample };
+    let options = ColourOptions::default().seed(5).texels_a_sample(texels_a_sample);
     let texels = write_colour(&Terrain::open(&iqt).unwrap(), &options, &picture, &|_| {}).unwrap();
     assert_eq!(texels, [512 * texels_a_sample; 2]);
     [iqt, picture]
@@ -38,7 +38,7 @@ fn pictures_lie_on_their_terrain_and_survive_compression() {
         [(1, TileFormat::Bc1, 40.0), (3, TileFormat::Bc1, 40.0), (2, TileFormat::Bc7, 46.0)]
     {
         let [iqt, picture] = land(folder.path(), texels_a_sample);
-        let options = DrapeOptions { format, ..DrapeOptions::default() };
+        let options = DrapeOptions::default().format(format);
         let done = match drape(&iqt, &[open_image(&picture).unwrap()], &options, &Silent) {
             Err(error) if format == TileFormat::Bc7 && error.to_string().contains("no encoder") => continue,
             done => done.unwrap(),
@@ -97,11 +97,11 @@ fn pictures_are_the_same_for_any_threads_and_follow_seed_and_ground() {
         }
     }
     assert!(sea > 50 && land > 500, "{sea} {land}");
-    let options = ColourOptions { seed: 6, ..ColourOptions::default() };
+    let options = ColourOptions::default().seed(6);
     write_colour(&terrain, &options, &picture, &|_| {}).unwrap();
     assert!(std::fs::read(&picture).unwrap() != files[0]);
     for wrong in [0, 65] {
-        let options = ColourOptions { texels_a_sample: wrong, ..ColourOptions::default() };
+        let options = ColourOptions::default().texels_a_sample(wrong);
         assert!(write_colour(&terrain, &options, &picture, &|_| {}).is_err());
     }
 }

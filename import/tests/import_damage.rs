@@ -92,7 +92,7 @@ fn subjects(folder: &Path) -> Vec<PathBuf> {
     bt.truncate(256 + 40 * 30 * 2);
     std::fs::write(folder.join("small.bt"), bt).unwrap();
     write_hgt(&folder.join("N10E010.hgt"), 40, |col, row| (col * row) as i16);
-    let options = terrasoar_import::synth::SynthOptions { size: 65, seed: 3, spacing_m: 30.0 };
+    let options = terrasoar_import::synth::SynthOptions::default().size(65).seed(3).spacing_m(30.0);
     terrasoar_import::synth::write(&options, &folder.join("small.png"), &|_| ()).unwrap();
     terrasoar_import::synth::write(&options, &folder.join("small.tif"), &|_| ()).unwrap();
     paths.extend(["small.bt", "N10E010.hgt", "small.png", "small.tif"].map(|name| folder.join(name)));

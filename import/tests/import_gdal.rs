@@ -98,7 +98,7 @@ fn synthetic_terrain() {
     let folder = tempdir().unwrap();
     for name in ["t.tif", "t.png"] {
         let path = folder.path().join(name);
-        synth::write(&SynthOptions { size: 1025, ..SynthOptions::default() }, &path, &|_| ()).unwrap();
+        synth::write(&SynthOptions::default().size(1025), &path, &|_| ()).unwrap();
         agrees(&path);
     }
 }

@@ -20,7 +20,7 @@ fn made(folder: &Path, name: &str, options: &SynthOptions) -> Grid {
 #[test]
 fn png_and_geotiff_say_the_same() {
     let folder = tempdir().unwrap();
-    let options = SynthOptions { size: 257, seed: 5, spacing_m: 640.0 };
+    let options = SynthOptions::default().size(257).seed(5).spacing_m(640.0);
     let tiff = made(folder.path(), "t.tif", &options);
     let png = made(folder.path(), "t.png", &options);
     assert!(tiff.samples == png.samples);
@@ -38,7 +38,7 @@ fn png_and_geotiff_say_the_same() {
 #[test]
 fn threads_do_not_matter() {
     let folder = tempdir().unwrap();
-    let options = SynthOptions { size: 2049, seed: 9, spacing_m: 20.0 };
+    let options = SynthOptions::default().size(2049).seed(9).spacing_m(20.0);
     let files = [1, 3].map(|threads| {
         let path = folder.path().join(format!("{threads}.tif"));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -56,7 +56,7 @@ fn resolution_changes_detail_only() {
         made(
             folder.path(),
             "t.tif",
-            &SynthOptions { size, seed: 2, spacing_m: extent_m / f64::from(size - 1) },
+            &SynthOptions::default().size(size).seed(2).spacing_m(extent_m / f64::from(size - 1)),
         )
     };
     let (coarse, fine) = (of(129), of(2049));
@@ -68,7 +68,7 @@ fn resolution_changes_detail_only() {
     }
     let mean_m = difference / (129.0 * 129.0);
     assert!(mean_m < 15.0, "the landscapes differ by {mean_m} m");
-    let seeds = made(folder.path(), "u.tif", &SynthOptions { size: 129, seed: 3, spacing_m: 1280.0 });
+    let seeds = made(folder.path(), "u.tif", &SynthOptions::default().size(129).seed(3).spacing_m(1280.0));
     assert!(seeds.samples != coarse.samples);
 }
 
@@ -76,7 +76,7 @@ fn resolution_changes_detail_only() {
 fn progress_ends_at_the_last_row() {
     let folder = tempdir().unwrap();
     let told = Mutex::new(Vec::new());
-    let options = SynthOptions { size: 513, ..SynthOptions::default() };
+    let options = SynthOptions::default().size(513);
     synth::write(&options, &folder.path().join("t.tif"), &|rows| told.lock().unwrap().push(rows)).unwrap();
     let told = told.into_inner().unwrap();
     assert!(told.is_sorted());
@@ -87,7 +87,7 @@ fn progress_ends_at_the_last_row() {
 fn mistakes_are_explained() {
     let folder = tempdir().unwrap();
     let fails = |size: u32, spacing_m: f64, name: &str| {
-        let options = SynthOptions { size, seed: 0, spacing_m };
+        let options = SynthOptions::default().size(size).seed(0).spacing_m(spacing_m);
         synth::write(&options, &folder.path().join(name), &|_| ()).unwrap_err().to_string()
     };
     assert!(fails(1000, 20.0, "t.tif").contains("take 1025"));

@@ -29,7 +29,7 @@ fn ground(k: u32) -> Terrain {
         }
         height + 4.0 * common::noise(7, x, y)
     });
-    terrain_of(&dem, &BuildOptions { spacing_m: Some([20.0; 2]), ..Default::default() })
+    terrain_of(&dem, &BuildOptions::default().spacing_m([20.0; 2]))
 }
 
 /// 2,049 x 2,049 samples.
@@ -48,14 +48,13 @@ fn views(frames: &[FlightFrame], quality: Quality) -> Vec<View> {
 }
 
 fn options() -> CountOptions {
-    CountOptions {
-        layouts: LayoutKind::ALL.to_vec(),
-        preloads: vec![Prefetch::None, Prefetch::Frustum],
-        cache_pages: 1 << 15,
-        disk_pages: 128,
-        block_m: 1000.0,
-        trace: false,
-    }
+    CountOptions::default()
+        .layouts(LayoutKind::ALL.to_vec())
+        .preloads(vec![Prefetch::None, Prefetch::Frustum])
+        .cache_pages(1 << 15)
+        .disk_pages(128)
+        .block_m(1000.0)
+        .trace(false)
 }
 
 fn fly(terrain: &Terrain, frames: &[FlightFrame], reader: Reader, options: &CountOptions) -> Vec<Run> {
@@ -78,7 +77,7 @@ fn counts_repeat_and_agree_with_replay() {
     let frames = flight(&terrain, 20, 25.0);
     for culling in Culling::ALL {
         for engine in ENGINES {
-            let quality = Quality { culling, ..Default::default() };
+            let quality = Quality::default().culling(culling);
             let (views, reader) = (views(&frames, quality), Reader::Engine(engine));
             let run = || count(&terrain, &views, culling, reader, &options(), &mut |_| {}).unwrap();
             let runs = run();
@@ -99,7 +98,7 @@ fn what_is_counted_is_consistent() {
     let terrain = ground(8);
     let frames = flight(&terrain, 12, 25.0);
     for reader in ENGINES.map(Reader::Engine).into_iter().chain([Reader::Mesh]) {
-        let options = CountOptions { trace: true, cache_pages: 40, disk_pages: 5, ..options() };
+        let options = options().trace(true).cache_pages(40).disk_pages(5);
         for run in fly(&terrain, &frames, reader, &options) {
             assert_eq!(run.trace.is_some(), run.preload == Prefetch::None);
             for (i, f) in run.frames.iter().enumerate() {
@@ -151,7 +150,7 @@ fn layouts_and_engines_keep_their_distance() {
 fn preloading_by_frustum_leaves_less_to_real_time() {
     let frames = flight(&LARGE, 40, 60.0);
     let layouts = vec![LayoutKind::Row, LayoutKind::Soar, LayoutKind::Ours];
-    let options = CountOptions { layouts: layouts.clone(), ..options() };
+    let options = options().layouts(layouts.clone());
     for reader in [EngineKind::Soar, EngineKind::Kinetic].map(Reader::Engine) {
         let runs = fly(&LARGE, &frames, reader, &options);
         for layout in layouts.clone() {
@@ -170,7 +169,7 @@ fn a_larger_cache_never_misses_more() {
     let frames = flight(&terrain, 30, 40.0);
     let there_and_back: Vec<FlightFrame> = frames.iter().chain(frames.iter().rev()).copied().collect();
     let late = |cache_pages| {
-        let options = CountOptions { cache_pages, preloads: vec![Prefetch::None], ..options() };
+        let options = options().cache_pages(cache_pages).preloads(vec![Prefetch::None]);
         let runs = fly(&terrain, &there_and_back, Reader::Mesh, &options);
         find(&runs, LayoutKind::Soar, Prefetch::None).late_pages
     };
@@ -182,7 +181,7 @@ fn a_larger_cache_never_misses_more() {
 #[test]
 fn deadlines_are_refused() {
     let terrain = ground(5);
-    let options = CountOptions { preloads: vec![Prefetch::Deadline], ..options() };
+    let options = options().preloads(vec![Prefetch::Deadline]);
     for engine in ENGINES {
         let error = count(&terrain, &[], Culling::Vertices, Reader::Engine(engine), &options, &mut |_| {})
             .unwrap_err();

@@ -141,7 +141,7 @@ fn every_shape_keeps_its_promises() {
     for samples in [[33, 33], [17, 9], [20, 33], [33, 18], [25, 27], [2, 2], [3, 2], [2, 40], [64, 65]] {
         for error in [ErrorKind::Bounded, ErrorKind::Step] {
             let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| rugged(7, x, y));
-            let options = BuildOptions { error, spacing_m: Some([10.0, 13.5]), ..Default::default() };
+            let options = BuildOptions::default().error(error).spacing_m([10.0, 13.5]);
             let terrain = terrain_of(&dem, &options);
             assert_eq!(terrain.header().record_kind, RecordKind::Compact);
             check(&dem, &terrain, 1e-9);
@@ -169,11 +169,7 @@ fn voids_are_masked_and_do_not_spread() {
             } else {
                 dem
             };
-            check(
-                &dem,
-                &terrain_of(&dem, &BuildOptions { spacing_m: Some([5.0, 5.0]), ..Default::default() }),
-                1e-9,
-            );
+            check(&dem, &terrain_of(&dem, &BuildOptions::default().spacing_m([5.0, 5.0])), 1e-9);
         }
     }
 }
@@ -207,7 +203,7 @@ fn floats_of_even_steps_stay_compact_and_forced_compact_rounds() {
     assert_eq!(terrain.header().scale.height_step_m, 0.1);
     check(&dem, &terrain, 1e-4);
     let dem = MemoryDem::from_fn([33, 30], SampleType::F64, |x, y| rugged(1, x, y) * 1.000_1);
-    let options = BuildOptions { record: Some(RecordKind::Compact), ..Default::default() };
+    let options = BuildOptions::default().record(RecordKind::Compact);
     let terrain = terrain_of(&dem, &options);
     assert!(terrain.header().heights_rounded);
     check(&dem, &terrain, terrain.header().scale.height_step_m * 0.500_001);
@@ -221,7 +217,7 @@ fn cliffs_spikes_and_flats_fit_the_records() {
     for shape in [&cliff as &dyn Fn(u32, u32) -> f64, &spike, &flat] {
         for spacing in [0.01, 1.0, 1000.0] {
             let dem = MemoryDem::from_fn([33, 33], SampleType::I32, shape);
-            let options = BuildOptions { spacing_m: Some([spacing, spacing * 3.0]), ..Default::default() };
+            let options = BuildOptions::default().spacing_m([spacing, spacing * 3.0]);
             let terrain = terrain_of(&dem, &options);
             assert_eq!(terrain.header().record_kind, RecordKind::Compact);
             check(&dem, &terrain, 1e-9);
@@ -243,11 +239,9 @@ fn tiles_threads_and_memory_do_not_show() {
         for largest_tile in [2, 4, 16, 64, 128] {
             for threads in [1, 3] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                let options = BuildOptions {
-                    largest_tile,
-                    memory_mib: if threads == 1 { 48 } else { 2048 },
-                    ..Default::default()
-                };
+                let options = BuildOptions::default()
+                    .largest_tile(largest_tile)
+                    .memory_mib(if threads == 1 { 48 } else { 2048 });
                 let bytes = pool.install(|| build_bytes(&dem, &options)).unwrap();
                 assert!(bytes == base, "tile {largest_tile}, {threads} threads");
             }
@@ -265,13 +259,7 @@ proptest! {
         let dem = MemoryDem::from_fn([wide, high], SampleType::I16, |x, y| {
             if noise(seed + 1, x, y) < void_share && (x, y) != (0, 0) { f64::NAN } else { rugged(seed, x, y) }
         });
-        let options = BuildOptions {
-            largest_tile: 1 << tile,
-            spacing_m: Some([spacing, spacing * 1.3]),
-            record: exact.then_some(RecordKind::Exact8),
-            error: if step { ErrorKind::Step } else { ErrorKind::Bounded },
-            ..Default::default()
-        };
+        let options = BuildOptions::default().largest_tile(1 << tile).spacing_m([spacing, spacing * 1.3]).record(exact.then_some(RecordKind::Exact8)).error(if step { ErrorKind::Step } else { ErrorKind::Bounded });
         check(&dem, &terrain_of(&dem, &options), 1e-9);
     }
 }

@@ -30,7 +30,7 @@ fn dem() -> MemoryDem {
 }
 
 fn options(record: Option<RecordKind>) -> BuildOptions {
-    BuildOptions { record, spacing_m: Some([20.0, 25.0]), ..Default::default() }
+    BuildOptions::default().record(record).spacing_m([20.0, 25.0])
 }
 
 fn file(record: Option<RecordKind>) -> Vec<u8> {

@@ -20,7 +20,7 @@ fn terrain(sample_type: SampleType, record: Option<RecordKind>) -> Arc<Terrain> 
     let dem = MemoryDem::from_fn(SAMPLES, sample_type, |x, y| {
         if (x * y) % 31 == 5 { f64::NAN } else { f64::from((x * 7 + y * 13) % 100) }
     });
-    let options = BuildOptions { spacing_m: Some([10.0; 2]), record, ..BuildOptions::default() };
+    let options = BuildOptions::default().spacing_m([10.0; 2]).record(record);
     Arc::new(open_bytes(build_bytes(&dem, &options).unwrap()).unwrap())
 }
 

@@ -31,8 +31,7 @@ fn drape_over(path: &Path, seed: u32) {
     let image =
         MemoryImage::from_fn(SIZE, |x, y| [(x / 3) as u8, (4 * y) as u8, (x + seed * y) as u8 / 2 + 60, 255]);
     let extent = Some(Extent::Metres([0.0, 0.0, 1200.0, 80.0]));
-    draped(path, image, &DrapeOptions { format: TileFormat::Bc1, extent, ..DrapeOptions::default() })
-        .unwrap();
+    draped(path, image, &DrapeOptions::default().format(TileFormat::Bc1).extent(extent)).unwrap();
 }
 
 /// A crater and its scorch.

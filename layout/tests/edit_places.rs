@@ -29,7 +29,7 @@ fn terrain_in(folder: &tempfile::TempDir) -> PathBuf {
     let dem = MemoryDem::from_fn([150, 120], SampleType::I16, |x, y| {
         f64::from((x * 7 + y * 13) % 100 + x / 3 + y / 2)
     });
-    build(&dem, &path, &BuildOptions { spacing_m: Some([10.0; 2]), ..Default::default() }, &Silent).unwrap();
+    build(&dem, &path, &BuildOptions::default().spacing_m([10.0; 2]), &Silent).unwrap();
     path
 }
 

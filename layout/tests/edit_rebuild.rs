@@ -160,7 +160,7 @@ fn apply(bench: &mut Bench, stroke: Stroke) -> Changes {
 }
 
 fn options(record: Option<RecordKind>, error: ErrorKind, spacing: [f64; 2]) -> BuildOptions {
-    BuildOptions { record, error, spacing_m: Some(spacing), ..BuildOptions::default() }
+    BuildOptions::default().record(record).error(error).spacing_m(spacing)
 }
 
 proptest! {

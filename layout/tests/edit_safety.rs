@@ -320,7 +320,7 @@ mod names {
                 let room = HeightRoom { lowest_m: -900.0, highest_m: 0.0 };
                 let image = MemoryImage::from_fn([60, 50], |x, y| [x as u8, y as u8, 7, 255]);
                 let dem = MemoryDem::from_fn([9, 9], SampleType::I16, |x, y| f64::from(x + y));
-                let options = BuildOptions { spacing_m: Some([10.0; 2]), ..BuildOptions::default() };
+                let options = BuildOptions::default().spacing_m([10.0; 2]);
                 let errors = [
                     EditSession::open(second).map(drop),
                     compact(&SystemDisk, second, None, second, &Silent).map(drop),

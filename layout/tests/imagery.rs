@@ -160,7 +160,7 @@ fn blocks_have_no_seam_beyond_their_own_error() {
     };
     for format in [TileFormat::Bc1, TileFormat::Bc7] {
         land(&path);
-        let options = DrapeOptions { format, ..DrapeOptions::default() };
+        let options = DrapeOptions::default().format(format);
         if draped(&path, MemoryImage::from_fn([1500, 1100], smooth), &options).is_err() {
             assert_eq!(format, TileFormat::Bc7, "only Bc7 may lack an encoder");
             continue;
@@ -205,7 +205,7 @@ fn imagery_decodes_by_hand() {
     land(&path);
     let old = std::fs::read(&path).unwrap();
     let colour = |x: u32, y: u32| [(10 * x) as u8, (20 * y) as u8, 7, 255];
-    let options = DrapeOptions { extent: Some(Extent::Metres([-10.0, 100.0, 95.0, 130.0])), ..raw() };
+    let options = raw().extent(Extent::Metres([-10.0, 100.0, 95.0, 130.0]));
     draped(&path, MemoryImage::from_fn([21, 10], colour), &options).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let u16_at = |at: usize| u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap());
@@ -283,7 +283,7 @@ fn georeferences_and_extents_lead_to_the_right_metre() {
         (done.place, done.shape.origin_m, done.shape.texel_m),
         (PlaceOrigin::Georeference, [100.0, 580.0], [2.0; 2])
     );
-    let stated = |extent| DrapeOptions { extent: Some(extent), ..raw() };
+    let stated = |extent| raw().extent(extent);
     let done =
         draped(&path, picture(None, None), &stated(Extent::Crs([1040.0, 4100.0, 1200.0, 4160.0]))).unwrap();
     assert_eq!(
@@ -307,7 +307,7 @@ fn georeferences_and_extents_lead_to_the_right_metre() {
     refused(picture(Some(upright), Some(25832)), &raw(), "gdalwarp -t_srs EPSG:32610");
     refused(picture(Some([9e6, 2.0, 0.0, 4699.0, 0.0, -2.0]), None), &raw(), "do not meet");
     refused(picture(None, None), &stated(Extent::Metres([0.0, 0.0, 1e-9, 1.0])), "out of range");
-    refused(picture(None, None), &DrapeOptions { memory_mib: 1, ..raw() }, "of memory");
+    refused(picture(None, None), &raw().memory_mib(1), "of memory");
     refused(MemoryImage::from_fn([700, 20], |_, _| [9, 9, 9, 0]), &raw(), "transparent throughout");
 }
 

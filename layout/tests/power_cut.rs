@@ -22,7 +22,7 @@ fn build_at(disk: &dyn Disk, path: &Path, tilt: u32) {
     let dem = MemoryDem::from_fn([110, 70], SampleType::I16, |x, y| {
         f64::from((x * 7 + y * 13) % 100 + tilt * x / 3 + y / 2)
     });
-    let options = BuildOptions { spacing_m: Some([10.0; 2]), ..BuildOptions::default() };
+    let options = BuildOptions::default().spacing_m([10.0; 2]);
     build_on(disk, &dem, path, &options, &Silent).unwrap();
 }
 

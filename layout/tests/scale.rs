@@ -68,7 +68,7 @@ fn walk(terrain: &Terrain, east: f64, north: f64) -> Vec<u64> {
 fn check(side: u32, path: &Path) -> Terrain {
     let dem = islands(side);
     let start = Instant::now();
-    let options = BuildOptions { spacing_m: Some([30.0, 20.0]), ..Default::default() };
+    let options = BuildOptions::default().spacing_m([30.0, 20.0]);
     let header = build(&dem, path, &options, &Silent).unwrap();
     let built = start.elapsed();
     let data = dem.samples();

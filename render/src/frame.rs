@@ -6,6 +6,7 @@ use terrasoar::view::View;
 
 /// What a renderer is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct RendererOptions {
     /// Device memory for normal tiles in bytes, 66,564 a tile. 64 MiB by default: a view of 1920 x 1080 pixels wants some hundred tiles, a thousand fit.
     pub tile_budget_bytes: u64,
@@ -18,6 +19,23 @@ pub struct RendererOptions {
 impl Default for RendererOptions {
     fn default() -> Self {
         Self { tile_budget_bytes: 64 << 20, multi_draw: false, timestamps: false }
+    }
+}
+
+impl RendererOptions {
+    /// These options with so many bytes of device memory for normal tiles.
+    pub fn tile_budget_bytes(self, tile_budget_bytes: u64) -> Self {
+        Self { tile_budget_bytes, ..self }
+    }
+
+    /// These options with many ranges drawn in one indirect call, or not.
+    pub fn multi_draw(self, multi_draw: bool) -> Self {
+        Self { multi_draw, ..self }
+    }
+
+    /// These options with frames timed on the device, or not.
+    pub fn timestamps(self, timestamps: bool) -> Self {
+        Self { timestamps, ..self }
     }
 }
 

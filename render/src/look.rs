@@ -20,6 +20,7 @@ pub enum Surface {
 
 /// The sun.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Sun {
     /// Direction in radians, clockwise from north.
     pub azimuth_rad: f32,
@@ -43,6 +44,28 @@ impl Default for Sun {
     }
 }
 
+impl Sun {
+    /// This sun with its light from another direction in radians, clockwise from north.
+    pub fn azimuth_rad(self, azimuth_rad: f32) -> Self {
+        Self { azimuth_rad, ..self }
+    }
+
+    /// This sun with another height above the horizon in radians.
+    pub fn elevation_rad(self, elevation_rad: f32) -> Self {
+        Self { elevation_rad, ..self }
+    }
+
+    /// This sun with light of another strength.
+    pub fn strength(self, strength: f32) -> Self {
+        Self { strength, ..self }
+    }
+
+    /// This sun with light of the sky of another strength.
+    pub fn ambient(self, ambient: f32) -> Self {
+        Self { ambient, ..self }
+    }
+}
+
 /// How far one sees.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Haze {
@@ -57,6 +80,7 @@ pub enum Haze {
 
 /// Contour lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Contours {
     /// Metres of height from line to line, above 0.
     pub interval_m: f32,
@@ -76,8 +100,36 @@ impl Default for Contours {
     }
 }
 
+impl Contours {
+    /// These contours with so many metres of height from line to line.
+    pub fn interval_m(self, interval_m: f32) -> Self {
+        Self { interval_m, ..self }
+    }
+
+    /// These contours with every so manieth line an index line.
+    pub fn index_every(self, index_every: u32) -> Self {
+        Self { index_every, ..self }
+    }
+
+    /// These contours with lines of so many pixels.
+    pub fn width_px(self, width_px: f32) -> Self {
+        Self { width_px, ..self }
+    }
+
+    /// These contours with lines of another colour, in linear light.
+    pub fn colour(self, colour: [f32; 3]) -> Self {
+        Self { colour, ..self }
+    }
+
+    /// These contours with lines that cover another share of the ground.
+    pub fn opacity(self, opacity: f32) -> Self {
+        Self { opacity, ..self }
+    }
+}
+
 /// Edges of the triangles.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Wireframe {
     /// Width in pixels.
     pub width_px: f32,
@@ -93,8 +145,26 @@ impl Default for Wireframe {
     }
 }
 
+impl Wireframe {
+    /// These edges with lines of so many pixels.
+    pub fn width_px(self, width_px: f32) -> Self {
+        Self { width_px, ..self }
+    }
+
+    /// These edges with lines of another colour, in linear light.
+    pub fn colour(self, colour: [f32; 3]) -> Self {
+        Self { colour, ..self }
+    }
+
+    /// These edges with lines that cover another share of the ground.
+    pub fn opacity(self, opacity: f32) -> Self {
+        Self { opacity, ..self }
+    }
+}
+
 /// Everything about how a frame looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Look {
     /// What the ground's colour says.
     pub surface: Surface,
@@ -144,6 +214,78 @@ impl Default for Look {
             tile_normals: true,
             multisample: false,
         }
+    }
+}
+
+impl Look {
+    /// This look with colours that say something else.
+    pub fn surface(self, surface: Surface) -> Self {
+        Self { surface, ..self }
+    }
+
+    /// This look with other colours of heights, slopes or errors.
+    pub fn ramp(self, ramp: &'static Ramp) -> Self {
+        Self { ramp, ..self }
+    }
+
+    /// This look with heights in metres for the ramp's two ends.
+    pub fn tint_range_m(self, tint_range_m: [f32; 2]) -> Self {
+        Self { tint_range_m: Some(tint_range_m), ..self }
+    }
+
+    /// This look with another share of rock on steep ground, 0 to 1.
+    pub fn rock(self, rock: f32) -> Self {
+        Self { rock, ..self }
+    }
+
+    /// This look with another share of the image in the ground's colour, 0 to 1.
+    pub fn imagery(self, imagery: f32) -> Self {
+        Self { imagery, ..self }
+    }
+
+    /// This look with another share of light and shade, 0 to 1.
+    pub fn shading(self, shading: f32) -> Self {
+        Self { shading, ..self }
+    }
+
+    /// This look with another sun.
+    pub fn sun(self, sun: Sun) -> Self {
+        Self { sun, ..self }
+    }
+
+    /// This look with other colours of the sky at the zenith and at the horizon, in linear light.
+    pub fn sky(self, sky: [[f32; 3]; 2]) -> Self {
+        Self { sky, ..self }
+    }
+
+    /// This look with another sight.
+    pub fn haze(self, haze: Haze) -> Self {
+        Self { haze, ..self }
+    }
+
+    /// This look with contour lines.
+    pub fn contours(self, contours: impl Into<Option<Contours>>) -> Self {
+        Self { contours: contours.into(), ..self }
+    }
+
+    /// This look with edges of the triangles.
+    pub fn wireframe(self, wireframe: impl Into<Option<Wireframe>>) -> Self {
+        Self { wireframe: wireframe.into(), ..self }
+    }
+
+    /// This look with vertices that move into place, or pop up.
+    pub fn morph(self, morph: bool) -> Self {
+        Self { morph, ..self }
+    }
+
+    /// This look with normals from tiles where there are any, or from triangles alone.
+    pub fn tile_normals(self, tile_normals: bool) -> Self {
+        Self { tile_normals, ..self }
+    }
+
+    /// This look with four samples a pixel at edges, or one.
+    pub fn multisample(self, multisample: bool) -> Self {
+        Self { multisample, ..self }
     }
 }
 

@@ -53,11 +53,7 @@ fn main() -> Result<(), Failure> {
     let terrain = Arc::new(Terrain::open_unmapped(terrain)?);
     let flight = Flight::read(flight)?;
     let gpu = Gpu::headless_blocking()?;
-    let options = SceneOptions {
-        tiles: TileService::AFrame(0),
-        imagery_bytes: pool_mib << 20,
-        ..SceneOptions::default()
-    };
+    let options = SceneOptions::default().tiles(TileService::AFrame(0)).imagery_bytes(pool_mib << 20);
     let mut ground = Ground::streamed(terrain, &StreamOptions::default().cache_mib(128))?;
     let mut scene = Scene::new(&ground, &gpu, options)?;
     if !scene.has_image() {

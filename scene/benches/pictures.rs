@@ -100,8 +100,7 @@ impl Figures {
 }
 
 fn costs(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) -> Result<(), Failure> {
-    let options =
-        SceneOptions { tiles: TileService::AFrame(TILES_A_FRAME), timestamps: true, ..Default::default() };
+    let options = SceneOptions::default().tiles(TileService::AFrame(TILES_A_FRAME)).timestamps(true);
     let mut ground = mapped(terrain)?;
     let mut scene = Scene::new(&ground, gpu, options)?;
     let offscreen = Offscreen::new(&gpu.device, size.size_px())?;
@@ -211,7 +210,7 @@ fn pops(terrain: &Terrain, gpu: &Gpu, flight: &[FlightFrame], size: Viewport) ->
     let mut changes = 0.0;
     for morph in [true, false] {
         // The haze hides little: what is measured is the ground.
-        let look = Look { morph, tile_normals: false, ..Look::named("hillshade").unwrap_or_default() };
+        let look = Look::named("hillshade").unwrap_or_default().morph(morph).tile_normals(false);
         let mut ground = mapped(terrain)?;
         let mut scene = Scene::new(&ground, gpu, SceneOptions::default())?;
         let offscreen = Offscreen::new(&gpu.device, small.size_px())?;

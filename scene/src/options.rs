@@ -6,6 +6,7 @@ use terrasoar_render::{RenderError, Renderer, UploadStats};
 
 /// How a scene is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct SceneOptions {
     /// Normal tiles given a frame.
     pub tiles: TileService,

@@ -81,8 +81,7 @@ mod tests {
         let dem = MemoryDem::from_fn([65, 33], SampleType::I16, |x, y| f64::from((x * 7) ^ (y * 5)));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("land.iqt");
-        build(&dem, &path, &BuildOptions { spacing_m: Some([30.0, 20.0]), ..Default::default() }, &Silent)
-            .unwrap();
+        build(&dem, &path, &BuildOptions::default().spacing_m([30.0, 20.0]), &Silent).unwrap();
         let terrain = Terrain::open(&path).unwrap();
         for (width_px, height_px) in [(1280, 720), (300, 900)] {
             let view = overview(&terrain, 2.0, FOV_DEG, Viewport { width_px, height_px });

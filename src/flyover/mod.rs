@@ -113,6 +113,7 @@ pub enum ReplayError {
 
 /// Picture and precision of a replay.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Quality {
     /// Size of the picture.
     pub viewport: Viewport,
@@ -135,6 +136,33 @@ impl Default for Quality {
             culling: Culling::default(),
             budget_tests: None,
         }
+    }
+}
+
+impl Quality {
+    /// This quality with a picture of another size.
+    pub fn viewport(self, viewport: Viewport) -> Self {
+        Self { viewport, ..self }
+    }
+
+    /// This quality with another tolerance in pixels.
+    pub fn tolerance_px(self, tolerance_px: f64) -> Self {
+        Self { tolerance_px, ..self }
+    }
+
+    /// This quality with heights multiplied by another number.
+    pub fn vertical_exaggeration(self, vertical_exaggeration: f64) -> Self {
+        Self { vertical_exaggeration, ..self }
+    }
+
+    /// This quality with another way of culling.
+    pub fn culling(self, culling: Culling) -> Self {
+        Self { culling, ..self }
+    }
+
+    /// This quality with so many vertex tests a frame at most.
+    pub fn budget_tests(self, budget_tests: u64) -> Self {
+        Self { budget_tests: Some(budget_tests), ..self }
     }
 }
 

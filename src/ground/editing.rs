@@ -225,8 +225,7 @@ mod tests {
             (128, 128) => 900.0,
             _ => f64::from(500 + (x * 7 + y * 3) % 90),
         });
-        build(&dem, &path, &BuildOptions { spacing_m: Some([10.0; 2]), ..Default::default() }, &Silent)
-            .unwrap();
+        build(&dem, &path, &BuildOptions::default().spacing_m([10.0; 2]), &Silent).unwrap();
         let crater = |x: f64| {
             Edit::Crater(Crater { centre_m: [x, 640.0], direction_deg: 0.0, radius_m: 50.0, depth_m: 15.0 })
         };

@@ -51,7 +51,7 @@ pub fn rugged_terrain(samples: [u32; 2], seed: u64, holes: bool) -> Terrain {
             || noise(seed, y, x) < 0.001;
         if holes && hole && (x, y) != (0, 0) { f64::NAN } else { rugged(seed, x, y) }
     });
-    terrain_of(&dem, &BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() })
+    terrain_of(&dem, &BuildOptions::default().spacing_m([10.0, 12.0]))
 }
 
 /// Rugged ground of compact records with room for edits below and above: two samples in a corner lie far off.
@@ -64,7 +64,7 @@ pub fn roomy_terrain(samples: [u32; 2], seed: u64, holes: bool) -> Terrain {
         }
         _ => rugged(seed, x, y),
     });
-    terrain_of(&dem, &BuildOptions { spacing_m: Some([10.0, 12.0]), ..Default::default() })
+    terrain_of(&dem, &BuildOptions::default().spacing_m([10.0, 12.0]))
 }
 
 /// Replaces pages of a store that an edit changed.

@@ -80,21 +80,19 @@ enum ErrorWord {
 
 impl Args {
     fn options(&self) -> BuildOptions {
-        BuildOptions {
-            spacing_m: self.spacing,
-            z_scale: self.z_scale,
-            memory_mib: self.memory,
-            record: self.record.map(|word| match word {
+        BuildOptions::default()
+            .spacing_m(self.spacing)
+            .z_scale(self.z_scale)
+            .memory_mib(self.memory)
+            .record(self.record.map(|word| match word {
                 RecordWord::Compact => RecordKind::Compact,
                 RecordWord::Exact => RecordKind::Exact8,
-            }),
-            error: match self.error {
+            }))
+            .error(match self.error {
                 ErrorWord::Bounded => ErrorKind::Bounded,
                 ErrorWord::Step => ErrorKind::Step,
-            },
-            nodata: self.nodata,
-            ..BuildOptions::default()
-        }
+            })
+            .nodata(self.nodata)
     }
 }
 

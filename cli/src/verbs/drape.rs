@@ -63,15 +63,14 @@ enum FormatWord {
 
 impl Args {
     fn options(&self) -> DrapeOptions {
-        DrapeOptions {
-            format: match self.format {
+        DrapeOptions::default()
+            .format(match self.format {
                 FormatWord::Bc1 => TileFormat::Bc1,
                 FormatWord::Bc7 => TileFormat::Bc7,
                 FormatWord::Raw => TileFormat::Rgba8,
-            },
-            extent: self.extent.map(Extent::Metres).or(self.extent_crs.map(Extent::Crs)),
-            memory_mib: self.memory,
-        }
+            })
+            .extent(self.extent.map(Extent::Metres).or(self.extent_crs.map(Extent::Crs)))
+            .memory_mib(self.memory)
     }
 }
 

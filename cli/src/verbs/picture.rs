@@ -12,7 +12,7 @@ use terrasoar::view::{View, Viewport};
 use terrasoar_lab::picture::encode;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
-use terrasoar_render::{Contours, LOOKS, Look, Sun};
+use terrasoar_render::{LOOKS, Look};
 use terrasoar_scene::scene::SceneError;
 use terrasoar_scene::studio::Studio;
 
@@ -75,15 +75,14 @@ impl PictureArgs {
         look.morph = self.morph;
         look.multisample = true;
         if let Some([azimuth_deg, elevation_deg]) = self.sun {
-            look.sun = Sun {
-                azimuth_rad: azimuth_deg.to_radians() as f32,
-                elevation_rad: elevation_deg.to_radians() as f32,
-                ..look.sun
-            };
+            look.sun = look
+                .sun
+                .azimuth_rad(azimuth_deg.to_radians() as f32)
+                .elevation_rad(elevation_deg.to_radians() as f32);
         }
         if let Some(metres) = self.contours {
             let lines = look.contours.unwrap_or_default();
-            look.contours = Some(Contours { interval_m: metres as f32, ..lines });
+            look.contours = Some(lines.interval_m(metres as f32));
         }
         look
     }
@@ -169,7 +168,7 @@ pub(super) fn draw_frame(
     for flown in &flight.frames[..=frame] {
         studio.fly(&view(flown));
     }
-    let look = Look { multisample: true, ..Look::default() };
+    let look = Look::default().multisample(true);
     let rgb = studio.picture(&view(asked), &look)?;
     Ok((png(&rgb, quality.viewport)?, studio.capabilities().adapter.clone()))
 }

@@ -73,13 +73,11 @@ pub(super) struct QualityArgs {
 
 impl QualityArgs {
     pub(super) fn quality(self) -> Quality {
-        Quality {
-            viewport: self.viewport,
-            tolerance_px: self.tolerance_px,
-            vertical_exaggeration: self.exaggeration,
-            culling: self.culling,
-            budget_tests: None,
-        }
+        Quality::default()
+            .viewport(self.viewport)
+            .tolerance_px(self.tolerance_px)
+            .vertical_exaggeration(self.exaggeration)
+            .culling(self.culling)
     }
 }
 
@@ -107,7 +105,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let flight = Flight::read(&args.flight)?;
     let progress = Meter::new("frames");
     let name = args.engine.name();
-    let quality = Quality { budget_tests: args.budget_tests, ..args.quality.quality() };
+    let mut quality = args.quality.quality();
+    quality.budget_tests = args.budget_tests;
     if quality.budget_tests.is_some() && args.engine != EngineKind::Kinetic {
         return Err(WrongUsage(format!(
             "--budget-tests is for the engine kinetic; {name} does all or nothing"

@@ -38,7 +38,7 @@ impl Sweep<'_> {
         let stretch = &frames[first..(first + FRAMES).min(frames.len())];
         let mut points = Vec::new();
         for tolerance_px in TOLERANCES_PX {
-            let quality = Quality { tolerance_px, ..self.quality };
+            let quality = self.quality.tolerance_px(tolerance_px);
             points.extend(self.points(tolerance_px, &format!("{tolerance_px} px"), stretch, quality)?);
         }
         Ok(points)

@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     args.force.file(&args.output, Kind::Synthetic, &[])?;
     let size = args.size.unwrap_or(1025);
-    let options = SynthOptions { size, seed, spacing_m: args.spacing };
+    let options = SynthOptions::default().size(size).seed(seed).spacing_m(args.spacing);
     let progress = Meter::new("rows");
     progress.begin("making terrain", size.into());
     write(&options, &args.output, &|rows| progress.set(rows))?;
@@ -69,7 +69,7 @@ fn colour(args: &Args, file: &Path, seed: u64) -> Result<()> {
     }
     args.force.file(&args.output, Kind::Synthetic, &[file])?;
     let terrain = terrain::open(file)?;
-    let options = ColourOptions { seed, texels_a_sample: args.texels };
+    let options = ColourOptions::default().seed(seed).texels_a_sample(args.texels);
     let progress = Meter::new("rows");
     let rows = u64::from(terrain.grid().samples()[1] - 1) * u64::from(args.texels);
     progress.begin("painting", rows);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use terrasoar::refine::Culling;
 use terrasoar::sink::FileSink;
 use terrasoar_render::ramps::Ramp;
-use terrasoar_render::{Capabilities, Contours, Haze, LOOKS, Look, Surface};
+use terrasoar_render::{Capabilities, Haze, LOOKS, Look, Surface};
 
 /// Everything that is remembered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -134,9 +134,8 @@ impl Settings {
         }
         look.sun.azimuth_rad = self.sun_azimuth_deg.to_radians();
         look.sun.elevation_rad = self.sun_elevation_deg.to_radians();
-        look.contours = self
-            .contours
-            .then(|| Contours { interval_m: self.contour_interval_m, ..style.contours.unwrap_or_default() });
+        look.contours =
+            self.contours.then(|| style.contours.unwrap_or_default().interval_m(self.contour_interval_m));
         look.wireframe = self.wireframe.then(|| style.wireframe.unwrap_or_default());
         look.morph = self.morph;
         look.haze = if self.haze { Haze::Auto } else { Haze::Off };

@@ -34,7 +34,7 @@ impl Stage {
     pub(crate) fn new(terrain: Terrain, gpu: &Gpu, culling: Culling, cache_bytes: u64) -> Result<Self> {
         let how = StreamOptions::default().culling(culling).cache_bytes(cache_bytes);
         let ground = Ground::streamed(Arc::new(terrain), &how)?;
-        let options = SceneOptions { tiles: TileService::AFrame(TILES_A_FRAME), ..Default::default() };
+        let options = SceneOptions::default().tiles(TileService::AFrame(TILES_A_FRAME));
         let scene = Scene::new(&ground, gpu, options)?;
         Ok(Self { ground, scene, culling, cache_bytes })
     }

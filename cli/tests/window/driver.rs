@@ -114,7 +114,7 @@ impl Display {
 fn make_terrain(path: &Path) -> Result<(), String> {
     let input = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/puget_sound_1025.png");
     let dem = terrasoar_import::open(&[input.into()]).map_err(|e| e.to_string())?;
-    let options = BuildOptions { spacing_m: Some([160.0; 2]), z_scale: 0.1, ..Default::default() };
+    let options = BuildOptions::default().spacing_m([160.0; 2]).z_scale(0.1);
     build(&*dem, path, &options, &Silent).map(drop).map_err(|e| e.to_string())
 }
 

@@ -145,7 +145,7 @@ pub fn ground_and_picture_changed_by_hand(display: &Display) -> Outcome {
         [150 + grain, 160 + grain, 110 + (x / 64 % 2 * 40) as u8, 255]
     });
     let pictures: Vec<Box<dyn ImageSource>> = vec![Box::new(picture_of_land)];
-    let options = DrapeOptions { format: TileFormat::Bc1, ..DrapeOptions::default() };
+    let options = DrapeOptions::default().format(TileFormat::Bc1);
     drape(&path, &pictures, &options, &Silent).map_err(|e| e.to_string())?;
     let imagery =
         || -> Result<_, String> { Ok(Terrain::open(&path).map_err(|e| e.to_string())?.header().imagery) };

@@ -23,6 +23,7 @@ const MAX_TEXELS: u64 = 1 << 22;
 
 /// How to colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ColourOptions {
     /// Which of the pictures.
     pub seed: u64,
@@ -33,6 +34,18 @@ pub struct ColourOptions {
 impl Default for ColourOptions {
     fn default() -> Self {
         Self { seed: 0, texels_a_sample: 1 }
+    }
+}
+
+impl ColourOptions {
+    /// These options with another picture.
+    pub fn seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// These options with so many texels along the distance of two samples.
+    pub fn texels_a_sample(self, texels_a_sample: u32) -> Self {
+        Self { texels_a_sample, ..self }
     }
 }
 

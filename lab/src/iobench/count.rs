@@ -27,6 +27,7 @@ const LINES_PER_UNIT: u64 = UNIT_BYTES / LINE_BYTES;
 
 /// What is counted, and with what means.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct CountOptions {
     /// Layouts to count under.
     pub layouts: Vec<LayoutKind>,
@@ -40,6 +41,52 @@ pub struct CountOptions {
     pub block_m: f64,
     /// Whether to keep the pages of every frame in the order they are first read, for replaying them.
     pub trace: bool,
+}
+
+impl Default for CountOptions {
+    /// All layouts, without preloading and by the frustum, a cache of 128 MiB and 128 pages a frame.
+    fn default() -> Self {
+        Self {
+            layouts: LayoutKind::ALL.to_vec(),
+            preloads: vec![Prefetch::None, Prefetch::Frustum],
+            cache_pages: 1 << 15,
+            disk_pages: 128,
+            block_m: 1000.0,
+            trace: false,
+        }
+    }
+}
+
+impl CountOptions {
+    /// These options with other layouts to count under.
+    pub fn layouts(self, layouts: Vec<LayoutKind>) -> Self {
+        Self { layouts, ..self }
+    }
+
+    /// These options with other ways of preloading.
+    pub fn preloads(self, preloads: Vec<Prefetch>) -> Self {
+        Self { preloads, ..self }
+    }
+
+    /// These options with so many pages that the cache holds.
+    pub fn cache_pages(self, cache_pages: usize) -> Self {
+        Self { cache_pages, ..self }
+    }
+
+    /// These options with so many pages that the disk delivers between two frames.
+    pub fn disk_pages(self, disk_pages: usize) -> Self {
+        Self { disk_pages, ..self }
+    }
+
+    /// These options with the frustum moved back so many metres for preloading.
+    pub fn block_m(self, block_m: f64) -> Self {
+        Self { block_m, ..self }
+    }
+
+    /// These options with the pages of every frame kept, or not.
+    pub fn trace(self, trace: bool) -> Self {
+        Self { trace, ..self }
+    }
 }
 
 /// Flies `views` with one reader and counts. `done` hears the number of frames finished.

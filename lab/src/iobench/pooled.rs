@@ -65,6 +65,7 @@ impl ReadBy {
 
 /// How a flight is flown.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct PoolOptions {
     /// Memory for pages.
     pub cache_bytes: u64,
@@ -78,6 +79,52 @@ pub struct PoolOptions {
     pub read_by: ReadBy,
     /// Frames a second; 0 flies as fast as frames are made, which leaves storage no time.
     pub frames_per_second: f64,
+}
+
+impl Default for PoolOptions {
+    /// 128 MiB, by threads, 60 frames a second.
+    fn default() -> Self {
+        Self {
+            cache_bytes: 128 << 20,
+            prefetch: Prefetch::default(),
+            culling: Culling::default(),
+            block_m: None,
+            read_by: ReadBy::default(),
+            frames_per_second: 60.0,
+        }
+    }
+}
+
+impl PoolOptions {
+    /// These options with so many bytes of memory for pages.
+    pub fn cache_bytes(self, cache_bytes: u64) -> Self {
+        Self { cache_bytes, ..self }
+    }
+
+    /// These options with another way of asking ahead.
+    pub fn prefetch(self, prefetch: Prefetch) -> Self {
+        Self { prefetch, ..self }
+    }
+
+    /// These options with another way of culling.
+    pub fn culling(self, culling: Culling) -> Self {
+        Self { culling, ..self }
+    }
+
+    /// These options with the frustum moved back so many metres for preloading.
+    pub fn block_m(self, block_m: impl Into<Option<f64>>) -> Self {
+        Self { block_m: block_m.into(), ..self }
+    }
+
+    /// These options with another reader.
+    pub fn read_by(self, read_by: ReadBy) -> Self {
+        Self { read_by, ..self }
+    }
+
+    /// These options with another pace.
+    pub fn frames_per_second(self, frames_per_second: f64) -> Self {
+        Self { frames_per_second, ..self }
+    }
 }
 
 /// A flight, cold and warm.

@@ -40,12 +40,10 @@ fn frames(terrain: &Terrain) -> Vec<FlightFrame> {
 }
 
 fn quality(culling: Culling, vertical_exaggeration: f64) -> Quality {
-    Quality {
-        viewport: Viewport { width_px: 160, height_px: 120 },
-        culling,
-        vertical_exaggeration,
-        ..Quality::default()
-    }
+    Quality::default()
+        .viewport(Viewport { width_px: 160, height_px: 120 })
+        .culling(culling)
+        .vertical_exaggeration(vertical_exaggeration)
 }
 
 /// Flies over the file at `path`, with the edits in `overlay` if there is one. Returns whether it opened.
@@ -90,14 +88,13 @@ pub fn fly(path: &Path, overlay: Option<&Path>) -> bool {
     let quality = quality(Culling::Vertices, 1.0);
     let views: Vec<View> =
         frames.iter().map(|frame| frame.view(quality.viewport, quality.tolerance_px)).collect();
-    let options = CountOptions {
-        layouts: LayoutKind::ALL.to_vec(),
-        preloads: vec![Prefetch::None, Prefetch::Frustum],
-        cache_pages: 4,
-        disk_pages: 2,
-        block_m: 10.0,
-        trace: false,
-    };
+    let options = CountOptions::default()
+        .layouts(LayoutKind::ALL.to_vec())
+        .preloads(vec![Prefetch::None, Prefetch::Frustum])
+        .cache_pages(4)
+        .disk_pages(2)
+        .block_m(10.0)
+        .trace(false);
     count(&terrain, &views, quality.culling, Reader::Engine(EngineKind::Soar), &options, &mut |_| {})
         .expect("a terrain in memory is counted over");
     stream(&terrain, &views);

@@ -11,6 +11,7 @@ mod band;
 mod gather;
 mod levels;
 mod memory;
+mod options;
 mod plan;
 mod rebuild;
 mod saturate;
@@ -35,7 +36,8 @@ use crate::remedy::Remedy;
 use crate::words::{harmless, number};
 use band::{Band, Fills, RowReader};
 use levels::{LevelShape, Levels};
-use memory::{LARGEST_TILE, MemoryPlan};
+use memory::MemoryPlan;
+pub use options::BuildOptions;
 use rayon::prelude::*;
 pub(crate) use rebuild::rebuild_into;
 pub use rebuild::{HeightRoom, rebuild};
@@ -50,39 +52,6 @@ use writer::{PageWriter, PlacedPages, page_queue, write_pages};
 
 /// Longest text in a header; it has room for 254 bytes.
 const MAX_TEXT_CHARS: usize = 254;
-
-/// What to build.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BuildOptions {
-    /// Spacing in metres (east, north) instead of what the DEM says.
-    pub spacing_m: Option<[f64; 2]>,
-    /// Factor on all heights; the default is 1.
-    pub z_scale: f64,
-    /// Memory budget in MiB; at least 48.
-    pub memory_mib: u64,
-    /// Record kind; `None` chooses the smallest that keeps every height exactly. Either exact kind stands for both.
-    pub record: Option<RecordKind>,
-    /// Kind of error to store.
-    pub error: ErrorKind,
-    /// Raw value that means "no data", beside what the DEM declares.
-    pub nodata: Option<f64>,
-    /// Largest side of a tile in steps, a power of two from 2 to 256. Smaller tiles save memory and cost time; the file is the same.
-    pub largest_tile: u32,
-}
-
-impl Default for BuildOptions {
-    fn default() -> Self {
-        Self {
-            spacing_m: None,
-            z_scale: 1.0,
-            memory_mib: 512,
-            record: None,
-            error: ErrorKind::Bounded,
-            nodata: None,
-            largest_tile: LARGEST_TILE,
-        }
-    }
-}
 
 /// Builds the terrain file `out` from `dem`, on the current rayon pool, and returns its header. `out` appears only when it is
 /// complete; whatever had the name is replaced then.

@@ -26,6 +26,7 @@ use std::path::Path;
 
 /// How to drape.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct DrapeOptions {
     /// How texels are stored; default BC1.
     pub format: TileFormat,
@@ -38,6 +39,23 @@ pub struct DrapeOptions {
 impl Default for DrapeOptions {
     fn default() -> Self {
         Self { format: TileFormat::Bc1, extent: None, memory_mib: 512 }
+    }
+}
+
+impl DrapeOptions {
+    /// These options with texels stored in another way.
+    pub fn format(self, format: TileFormat) -> Self {
+        Self { format, ..self }
+    }
+
+    /// These options with a place of the image, instead of what it says.
+    pub fn extent(self, extent: impl Into<Option<Extent>>) -> Self {
+        Self { extent: extent.into(), ..self }
+    }
+
+    /// These options with another most of memory in MiB.
+    pub fn memory_mib(self, memory_mib: u64) -> Self {
+        Self { memory_mib, ..self }
     }
 }
 

@@ -29,7 +29,7 @@ pub fn draped(path: &Path, image: MemoryImage, options: &DrapeOptions) -> Result
 }
 
 pub fn raw() -> DrapeOptions {
-    DrapeOptions { format: TileFormat::Rgba8, ..DrapeOptions::default() }
+    DrapeOptions::default().format(TileFormat::Rgba8)
 }
 
 /// Everything about the imagery of a file.

@@ -19,7 +19,7 @@ impl Bench {
         let dem = MemoryDem::from_fn([150, 120], SampleType::I16, |x, y| {
             f64::from((x * 7 + y * 13) % 100 + x / 3 + y / 2)
         });
-        let options = BuildOptions { spacing_m: Some([10.0; 2]), ..BuildOptions::default() };
+        let options = BuildOptions::default().spacing_m([10.0; 2]);
         build(&dem, &bench.terrain(), &options, &Silent).unwrap();
         bench
     }

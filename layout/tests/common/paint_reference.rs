@@ -16,7 +16,7 @@ pub fn file(format: TileFormat, image: MemoryImage, [wide, high]: [u32; 2]) -> O
     let path = folder.path().join("a.iqt");
     land(&path);
     let extent = Some(Extent::Metres([0.0, 0.0, f64::from(wide), f64::from(high)]));
-    let options = DrapeOptions { format, extent, ..DrapeOptions::default() };
+    let options = DrapeOptions::default().format(format).extent(extent);
     match draped(&path, image, &options) {
         Ok(_) => Some(std::fs::read(path).unwrap()),
         Err(error) => {

@@ -22,7 +22,7 @@ pub fn tests() -> Vec<(&'static str, Test)> {
 fn flight(gpu: &Gpu, morph: bool, exaggeration: f64) -> Outcome {
     let square = Square::new(8, [0, 0], [20.0, 20.0], hills);
     let mut scene = Scene::new(gpu, &square);
-    let look = Look { morph, ..Look::default() };
+    let look = Look::default().morph(morph);
     for frame in 0..16 {
         let t = f64::from(frame);
         let eye = DVec3::new(1600.0 + 90.0 * t, 1900.0 + 60.0 * t, 1250.0 * exaggeration + 10.0 * t);

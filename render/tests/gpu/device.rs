@@ -55,7 +55,7 @@ fn loss(gpu: &Gpu) -> Outcome {
 fn timed(gpu: &Gpu) -> Outcome {
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
     let view = view();
-    let mut scene = Scene::with(gpu, &square, RendererOptions { timestamps: true, ..Default::default() });
+    let mut scene = Scene::with(gpu, &square, RendererOptions::default().timestamps(true));
     scene.show(&square.refine(&view));
     let mut time_ms = None;
     for _ in 0..5 {

@@ -86,7 +86,7 @@ fn indirect(gpu: &Gpu) -> Outcome {
     let patch = MeshPatch { vertices: &square.entries(&mesh.slots), triangles: &triangles, draws: &draws };
     let view = over(0.0);
     let [direct, indirect] = [false, true].map(|multi_draw| {
-        let mut scene = Scene::with(gpu, &square, RendererOptions { multi_draw, ..Default::default() });
+        let mut scene = Scene::with(gpu, &square, RendererOptions::default().multi_draw(multi_draw));
         scene.apply(&patch);
         scene.draw_counted(&view, &Look::default())
     });

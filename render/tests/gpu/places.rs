@@ -22,7 +22,7 @@ pub fn tests() -> Vec<(&'static str, Test)> {
 /// Byte by byte, at eyes millimetres apart.
 fn far_away(gpu: &Gpu) -> Outcome {
     let spacing_m = [25.0, 16.0];
-    let look = Look { haze: Haze::Distance(50_000.0), ..Look::default() };
+    let look = Look::default().haze(Haze::Distance(50_000.0));
     let corner = [65_536 - 256, 65_536 - 256];
     let [near, far] = [[0, 0], corner].map(|corner| Square::new(8, corner, spacing_m, hills));
     for step in 0..4 {
@@ -89,7 +89,7 @@ fn ray_cast(gpu: &Gpu) -> Outcome {
     let mut view = View::look_at(eye, DVec3::new(2500.0, 2600.0, 500.0), [200, 150].into());
     view.tolerance_px = 0.25;
     scene.show(&square.refine(&view));
-    scene.draw(&view, &Look { morph: false, ..Look::default() });
+    scene.draw(&view, &Look::default().morph(false));
     let (mut compared, mut off) = (0, 0);
     for (i, depth) in scene.depth_m().iter().enumerate().filter(|(i, _)| i % 3 == 0) {
         let ray = ray(&view, i as u32 % 200, i as u32 / 200);
@@ -151,7 +151,7 @@ fn pops(gpu: &Gpu) -> Outcome {
     let [mut with, mut without] = [0.0_f64; 2];
     for (morph, largest) in [(true, &mut with), (false, &mut without)] {
         let mut scene = Scene::new(gpu, &square);
-        let look = Look { morph, tile_normals: false, ..Look::default() };
+        let look = Look::default().morph(morph).tile_normals(false);
         let mut before: Option<Vec<f32>> = None;
         for step in 0..24 {
             let mut moving = view;
@@ -180,7 +180,7 @@ fn settled(gpu: &Gpu) -> Outcome {
     let eye = DVec3::new(640.0, 640.0, 1500.0);
     let mut view = View::look_at(eye, eye - DVec3::Z, [120, 90].into());
     view.tolerance_px = 1e-6;
-    let pictures = [true, false].map(|morph| scene.draw(&view, &Look { morph, ..Look::default() }));
+    let pictures = [true, false].map(|morph| scene.draw(&view, &Look::default().morph(morph)));
     ensure(pictures[0] == pictures[1], || "pictures differ".to_owned())
 }
 
@@ -191,13 +191,13 @@ fn tolerance(gpu: &Gpu) -> Outcome {
     let mut view = View::look_at(eye, eye - DVec3::Z, [200, 150].into());
     let mut scene = Scene::new(gpu, &square);
     scene.show(&square.down_to(0));
-    scene.draw(&view, &Look { morph: false, ..Look::default() });
+    scene.draw(&view, &Look::default().morph(false));
     let exact = scene.depth_m();
     view.tolerance_px = 3.0;
     let mesh = square.refine(&view);
     scene.show(&mesh);
     let [still_px, moving_px] = [false, true].map(|morph| {
-        scene.draw(&view, &Look { morph, ..Look::default() });
+        scene.draw(&view, &Look::default().morph(morph));
         let depth = scene.depth_m();
         let off_px =
             depth.iter().zip(&exact).map(|(a, b)| f64::from((a - b).abs() / b) * view.pixels_per_radian());

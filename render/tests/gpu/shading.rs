@@ -27,7 +27,7 @@ fn down() -> View {
 }
 
 fn grey() -> Look {
-    Look { surface: Surface::Plain, morph: false, ..Look::default() }
+    Look::default().surface(Surface::Plain).morph(false)
 }
 
 fn steady(gpu: &Gpu) -> Outcome {
@@ -37,7 +37,7 @@ fn steady(gpu: &Gpu) -> Outcome {
     scene.give_tiles(&view);
     let [mut tiled, mut faceted] = [0.0; 2];
     for (tile_normals, difference) in [(true, &mut tiled), (false, &mut faceted)] {
-        let look = Look { tile_normals, ..grey() };
+        let look = grey().tile_normals(tile_normals);
         let [fine, coarse] = [0, 3].map(|level| {
             scene.show(&square.down_to(level));
             scene.draw(&view, &look)
@@ -60,13 +60,13 @@ fn fallback(gpu: &Gpu) -> Outcome {
         scene.draw(&view, &grey())
     };
     // Room for one tile, which must be the coarsest.
-    let mut scene = Scene::with(gpu, &square, RendererOptions { tile_budget_bytes: 1, ..Default::default() });
+    let mut scene = Scene::with(gpu, &square, RendererOptions::default().tile_budget_bytes(1));
     scene.show(&square.down_to(0));
     scene.give_tiles(&view);
     let stats = scene.renderer.tile_stats();
     ensure((stats.resident, stats.capacity, stats.uploads) == (1, 1, 1), || format!("{stats:?}"))?;
     let coarse = scene.draw(&view, &grey());
-    let bare = scene.draw(&view, &Look { tile_normals: false, ..grey() });
+    let bare = scene.draw(&view, &grey().tile_normals(false));
     let (from_whole, from_bare) = (coarse.difference(&whole), coarse.difference(&bare));
     ensure(from_whole > 1e-4 && from_whole < 0.08, || {
         format!("coarse and fine tiles differ by {from_whole}")
@@ -146,7 +146,7 @@ fn samples(gpu: &Gpu) -> Outcome {
     scene.show(&square.refine(&view));
     scene.give_tiles(&view);
     let [one, four] =
-        [false, true].map(|multisample| scene.draw(&view, &Look { multisample, ..Look::default() }));
+        [false, true].map(|multisample| scene.draw(&view, &Look::default().multisample(multisample)));
     let difference = one.difference(&four);
     ensure(difference > 0.0 && difference < 0.03, || format!("they differ by {difference}"))
 }

@@ -34,7 +34,7 @@ pub fn check(gpu: &Gpu, name: &str) -> Outcome {
     let mut walls = false;
     match name {
         "sunset" => {
-            look.sun = Sun { azimuth_rad: 0.75, elevation_rad: 0.09, ..Sun::default() };
+            look.sun = Sun::default().azimuth_rad(0.75).elevation_rad(0.09);
             view = View::look_at(eye, DVec3::new(2800.0, 3600.0, 1350.0), SIZE_PX.into());
         }
         "mesh-normals" => look.tile_normals = false,
@@ -52,7 +52,7 @@ pub fn check(gpu: &Gpu, name: &str) -> Outcome {
             view.eye_m.z = 2200.0;
         }
         "photo-map" => {
-            look = Look { imagery: 0.6, contours: Some(Contours::default()), ..look };
+            look = look.imagery(0.6).contours(Contours::default());
             view = View::look_at(
                 DVec3::new(2560.0, 2559.0, 6800.0),
                 DVec3::new(2560.0, 2560.0, 0.0),
@@ -61,7 +61,7 @@ pub fn check(gpu: &Gpu, name: &str) -> Outcome {
         }
         "smooth-edges" => look.multisample = true,
         "chart" => {
-            look.contours = Some(Contours { interval_m: 50.0, ..Contours::default() });
+            look.contours = Some(Contours::default().interval_m(50.0));
             look.rock = 0.0;
             view = View::look_at(
                 DVec3::new(2560.0, 2560.0, 6800.0),

@@ -39,7 +39,7 @@ fn check(gpu: &Gpu, (engine, culling): Made, exaggeration: f64, tolerance_px: f6
         view.eye_m.z += 4400.0 * (exaggeration - 1.0);
         rig.ground.update(&view);
         for morph in [true, false] {
-            rig.draw(&view, &Look { morph, ..Look::default() });
+            rig.draw(&view, &Look::default().morph(morph));
             let holes = rig.depth_m().iter().filter(|d| d.is_infinite()).count();
             ensure(holes == 0, || format!("frame {i}, morph {morph}: {holes} pixels show the sky"))?;
         }

@@ -102,7 +102,7 @@ fn agrees_with_the_dem(gpu: &Gpu) -> Outcome {
     ];
     for (number, view) in views.into_iter().enumerate() {
         let view = View { tolerance_px: 0.25, ..view };
-        rig.shoot(&view, &Look { morph: number == 1, ..Look::default() });
+        rig.shoot(&view, &Look::default().morph(number == 1));
         let depths = rig.depth_m();
         let mut at_silhouettes = 0;
         for _ in 0..PIXELS / 2 {

@@ -44,7 +44,7 @@ fn against_soar(gpu: &Gpu, culling: Culling) -> Outcome {
     for i in 0..10 {
         let view = frame(i);
         let (name, _) = LOOKS[i as usize % LOOKS.len()];
-        let look = Look { morph: i % 3 > 0, ..Look::named(name).unwrap() };
+        let look = Look::named(name).unwrap().morph(i % 3 > 0);
         let [a, b] = [kinetic.shoot(&view, &look), soar.shoot(&view, &look)];
         same(&a, &b, || format!("frame {i} in look {name}"))?;
     }

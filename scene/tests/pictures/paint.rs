@@ -28,7 +28,7 @@ pub const SIZE_PX: [u32; 2] = [320, 240];
 pub fn land(folder: &tempfile::TempDir, format: Option<TileFormat>) -> Result<std::path::PathBuf, String> {
     let path = folder.path().join("land.iqt");
     let dem = MemoryDem::from_fn([257, 257], SampleType::I16, |x, y| f64::from(x * y % 3));
-    let options = BuildOptions { spacing_m: Some([16.0; 2]), ..BuildOptions::default() };
+    let options = BuildOptions::default().spacing_m([16.0; 2]);
     build(&dem, &path, &options, &Silent).map_err(|e| e.to_string())?;
     if let Some(format) = format {
         let picture = MemoryImage::from_fn([2048, 2048], |x, y| {
@@ -36,7 +36,7 @@ pub fn land(folder: &tempfile::TempDir, format: Option<TileFormat>) -> Result<st
             [120 + grain as u8, 140 + (x / 64 % 2 * 40) as u8, 90 + (y / 64 % 2 * 60) as u8, 255]
         });
         let pictures: Vec<Box<dyn ImageSource>> = vec![Box::new(picture)];
-        drape(&path, &pictures, &DrapeOptions { format, ..DrapeOptions::default() }, &Silent)
+        drape(&path, &pictures, &DrapeOptions::default().format(format), &Silent)
             .map_err(|e| e.to_string())?;
     }
     Ok(path)
@@ -55,7 +55,7 @@ pub struct Window<'a> {
 impl<'a> Window<'a> {
     pub fn open(gpu: &'a Gpu, path: &std::path::Path) -> Result<Self, String> {
         let terrain = Arc::new(Terrain::open_unmapped(path).map_err(|e| e.to_string())?);
-        let options = SceneOptions { tiles: TileService::AFrame(8), ..SceneOptions::default() };
+        let options = SceneOptions::default().tiles(TileService::AFrame(8));
         let ground = Ground::streamed(terrain, &StreamOptions::default()).map_err(|e| e.to_string())?;
         let scene = Scene::new(&ground, gpu, options).map_err(|e| e.to_string())?;
         let offscreen = Offscreen::new(&gpu.device, SIZE_PX).map_err(|e| e.to_string())?;
@@ -64,7 +64,7 @@ impl<'a> Window<'a> {
             ground,
             scene,
             offscreen,
-            look: Look { imagery: 1.0, ..Look::default() },
+            look: Look::default().imagery(1.0),
             watch: PictureWatch::default(),
         })
     }

@@ -29,7 +29,7 @@ fn built() -> &'static (tempfile::TempDir, Terrain) {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("puget.iqt");
         let dem = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/puget_sound_1025.png");
-        let options = BuildOptions { spacing_m: Some([160.0; 2]), z_scale: 0.1, ..Default::default() };
+        let options = BuildOptions::default().spacing_m([160.0; 2]).z_scale(0.1);
         build(&*terrasoar_import::open(&[dem]).unwrap(), &file, &options, &Silent).unwrap();
         let terrain = Terrain::open(&file).unwrap();
         (folder, terrain)

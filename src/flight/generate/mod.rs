@@ -77,6 +77,7 @@ impl FromStr for FlightKind {
 
 /// What flight to make.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct FlightPlan {
     /// What the flight does.
     pub kind: FlightKind,
@@ -95,6 +96,16 @@ impl FlightPlan {
     /// A plan with the default turn rate and field of view.
     pub fn new(kind: FlightKind, frames: u64, speed_m_per_frame: f64) -> Self {
         Self { kind, frames, speed_m_per_frame, turn_rate_deg_per_frame: 0.5, vertical_fov_deg: 45.0 }
+    }
+
+    /// This plan with another rate of turn, in degrees of heading a frame.
+    pub fn turn_rate_deg_per_frame(self, turn_rate_deg_per_frame: f64) -> Self {
+        Self { turn_rate_deg_per_frame, ..self }
+    }
+
+    /// This plan with another vertical field of view in degrees.
+    pub fn vertical_fov_deg(self, vertical_fov_deg: f64) -> Self {
+        Self { vertical_fov_deg, ..self }
     }
 }
 

@@ -19,15 +19,14 @@ use terrasoar_layout::file::bytes::PAGE_BYTES;
 pub(super) fn counted(args: &Args, views: &[View], progress: &Meter) -> Result<(Vec<Run>, f64)> {
     let terrain = terrain::open(&args.file)?;
     let block_m = args.block.unwrap_or_else(|| ExtendedView::block_m(terrain.grid()));
-    let options = CountOptions {
-        layouts: args.layouts.clone(),
+    let options = CountOptions::default()
+        .layouts(args.layouts.clone())
         // What is counted has no deadlines; the mesh is what flights over the pool are measured by.
-        preloads: counted_preloads(args),
-        cache_pages: usize::try_from(args.cache * (1 << 20) / PAGE_BYTES as u64).unwrap_or(usize::MAX),
-        disk_pages: usize::try_from(args.disk_pages).unwrap_or(usize::MAX),
-        block_m,
-        trace: args.scratch.is_some(),
-    };
+        .preloads(counted_preloads(args))
+        .cache_pages(usize::try_from(args.cache * (1 << 20) / PAGE_BYTES as u64).unwrap_or(usize::MAX))
+        .disk_pages(usize::try_from(args.disk_pages).unwrap_or(usize::MAX))
+        .block_m(block_m)
+        .trace(args.scratch.is_some());
     let culling = args.quality.quality().culling;
     let mut runs = Vec::new();
     for reader in args.readers() {
@@ -60,14 +59,13 @@ pub(super) fn streamed(
     let mesh_pages: Vec<u64> = mesh.map_or(Vec::new(), |run| run.frames.iter().map(|f| f.pages).collect());
     let terrain = terrain::open(&args.file)?;
     let flight = |prefetch: &Prefetch| {
-        let options = PoolOptions {
-            cache_bytes: args.cache << 20,
-            prefetch: *prefetch,
-            culling: args.quality.quality().culling,
-            block_m: args.block,
-            read_by: args.reads,
-            frames_per_second: args.fps,
-        };
+        let options = PoolOptions::default()
+            .cache_bytes(args.cache << 20)
+            .prefetch(*prefetch)
+            .culling(args.quality.quality().culling)
+            .block_m(args.block)
+            .read_by(args.reads)
+            .frames_per_second(args.fps);
         progress.begin(format!("pool, {}", prefetch.name()), 2 * views.len() as u64);
         let pooled = standing
             .within(|| Ok(fly_pooled(&args.file, views, options, &mut |done| progress.set(done))?))?;

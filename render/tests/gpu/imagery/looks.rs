@@ -40,10 +40,10 @@ fn transparent(gpu: &Gpu) -> Outcome {
     let view = View::look_at(DVec3::new(640.0, 640.0, 2400.0), DVec3::new(640.0, 640.0, 0.0), SIZE_PX.into());
     show_all(&mut scene, &image, &view);
     scene.give_tiles(&view);
-    let look = Look { haze: Haze::Off, morph: false, ..Look::default() };
+    let look = Look::default().haze(Haze::Off).morph(false);
     let tint = scene.draw(&view, &look);
-    let photo = scene.draw(&view, &Look { imagery: 1.0, ..look });
-    let half = scene.draw(&view, &Look { imagery: 0.5, ..look });
+    let photo = scene.draw(&view, &look.imagery(1.0));
+    let half = scene.draw(&view, &look.imagery(0.5));
     let depth = scene.depth_m();
     let ([right, up, forward], [tan_x, tan_y]) = (view.axes(), view.half_tangents());
     let [mut inside, mut outside] = [0, 0];
@@ -86,8 +86,8 @@ fn half_transparent(gpu: &Gpu) -> Outcome {
     scene.show(&square.down_to(0));
     let view = down(640.0, 640.0, 1500.0);
     // A height whose colour is too dark for the shoulder.
-    let look = Look { tint_range_m: Some([0.0, 9000.0]), rock: 0.0, ..bare() };
-    let tint = scene.draw(&view, &Look { imagery: 0.0, ..look });
+    let look = bare().tint_range_m([0.0, 9000.0]).rock(0.0);
+    let tint = scene.draw(&view, &look.imagery(0.0));
     let colour = [151, 75, 201, 129];
     for format in gpu.capabilities.imagery_formats().iter().filter(|f| **f != TileFormat::Bc1) {
         let shape = ImageryShape { format: *format, ..Image::shape_over(&square.terrain, 1.0) };
@@ -129,7 +129,7 @@ fn blocks(gpu: &Gpu) -> Outcome {
         }
     };
     let shape = Image::shape_over(&square.terrain, 1.5);
-    let look = Look { imagery: 1.0, ..Look::default() };
+    let look = Look::default().imagery(1.0);
     let mut pictures = Vec::new();
     for format in [TileFormat::Bc1, TileFormat::Rgba8] {
         let image = Image::new(ImageryShape { format, ..shape }, texel);
@@ -181,7 +181,7 @@ fn without_blocks(gpu: &Gpu) -> Outcome {
         scene.show(&square.refine(&view));
         drape(&mut scene, &image, 32);
         show_all(&mut scene, &image, &view);
-        scene.draw(&view, &Look { imagery: 1.0, ..Look::default() })
+        scene.draw(&view, &Look::default().imagery(1.0))
     });
     ensure(pictures[0] == pictures[1], || {
         format!("they differ by {}", pictures[0].difference(&pictures[1]))
@@ -196,9 +196,9 @@ fn without_blocks(gpu: &Gpu) -> Outcome {
 
 /// Level ground is the photograph by day; hills have about half the contrast of bare ones, in whatever sun.
 fn light(gpu: &Gpu) -> Outcome {
-    let sun = |elevation_deg: f32| Sun { elevation_rad: elevation_deg.to_radians(), ..Sun::default() };
+    let sun = |elevation_deg: f32| Sun::default().elevation_rad(elevation_deg.to_radians());
     let grey = |shape| Image::new(shape, |_, _, _| [120, 120, 120, 255]);
-    let look = Look { shading: 1.0, surface: Surface::Plain, ..bare() };
+    let look = bare().shading(1.0).surface(Surface::Plain);
     let flat = level_ground();
     let mut scene = Scene::new(gpu, &flat);
     scene.show(&flat.down_to(0));
@@ -207,12 +207,12 @@ fn light(gpu: &Gpu) -> Outcome {
     let view = down(640.0, 640.0, 500.0);
     show_all(&mut scene, &image, &view);
     for elevation_deg in [35.0, 50.0, 85.0] {
-        let shown = pixel(&scene.draw(&view, &Look { sun: sun(elevation_deg), ..look }), 100, 90);
+        let shown = pixel(&scene.draw(&view, &look.sun(sun(elevation_deg))), 100, 90);
         ensure(shown[..3].iter().all(|c| c.abs_diff(120) <= 1), || {
             format!("level ground is {shown:?} under a sun at {elevation_deg} degrees")
         })?;
     }
-    let low = pixel(&scene.draw(&view, &Look { sun: sun(3.0), ..look }), 100, 90);
+    let low = pixel(&scene.draw(&view, &look.sun(sun(3.0))), 100, 90);
     ensure(low[0] < 100 && low[0] > 30, || format!("at sunset it is {low:?}"))?;
 
     let square = Square::new(6, [0, 0], [20.0, 20.0], hills);
@@ -224,10 +224,10 @@ fn light(gpu: &Gpu) -> Outcome {
     show_all(&mut scene, &image, &view);
     scene.give_tiles(&view);
     for azimuth_deg in [0.0_f32, 120.0, 250.0] {
-        let sun = Sun { azimuth_rad: azimuth_deg.to_radians(), ..Sun::default() };
+        let sun = Sun::default().azimuth_rad(azimuth_deg.to_radians());
         // Spread of the logarithm of light over the picture.
         let [bare, photo] = [0.0, 1.0].map(|imagery| {
-            let picture = scene.draw(&view, &Look { imagery, sun, ..look });
+            let picture = scene.draw(&view, &look.imagery(imagery).sun(sun));
             let logs: Vec<f64> = picture
                 .rgba
                 .chunks_exact(4)
@@ -254,13 +254,13 @@ fn lines(gpu: &Gpu) -> Outcome {
     show_all(&mut scene, &image, &view);
     let look = bare();
     let plain = scene.draw(&view, &look);
-    let unseen = Wireframe { opacity: 0.0, ..Wireframe::default() };
-    let edges = scene.draw(&view, &Look { wireframe: Some(unseen), ..look });
+    let unseen = Wireframe::default().opacity(0.0);
+    let edges = scene.draw(&view, &look.wireframe(unseen));
     ensure(edges.difference(&plain) < 0.001, || format!("unseen edges: {}", edges.difference(&plain)))?;
-    let black = Contours { colour: [0.0; 3], opacity: 1.0, interval_m: 40.0, ..Contours::default() };
+    let black = Contours::default().colour([0.0; 3]).opacity(1.0).interval_m(40.0);
     let contours = Some(black);
-    let on_image = scene.draw(&view, &Look { contours, ..look });
-    let on_tint = scene.draw(&view, &Look { contours, imagery: 0.0, ..look });
+    let on_image = scene.draw(&view, &look.contours(contours));
+    let on_tint = scene.draw(&view, &look.contours(contours).imagery(0.0));
     let dark = |p: &Picture| p.rgba.chunks_exact(4).filter(|p| p[..3].iter().all(|c| *c < 20)).count();
     let [on_image, on_tint, none] = [&on_image, &on_tint, &plain].map(dark);
     ensure(on_tint > 100 && on_image.abs_diff(on_tint) * 20 < on_tint && none == 0, || {

@@ -32,7 +32,7 @@ fn down(east_m: f64, north_m: f64, above_m: f64) -> View {
 
 /// The image's own colours.
 fn bare() -> Look {
-    Look { imagery: 1.0, shading: 0.0, haze: Haze::Off, morph: false, ..Look::default() }
+    Look::default().imagery(1.0).shading(0.0).haze(Haze::Off).morph(false)
 }
 
 fn show_all(scene: &mut Scene<'_>, image: &Image, view: &View) {

@@ -8,12 +8,25 @@ use web_time::Instant;
 
 /// Bounds of a frame's work; none by default.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Budget {
     /// Vertex tests of one frame. The last split may go beyond it by the tests of its children, at most 3.
     pub tests: Option<u64>,
     /// Time from the first test of one frame to its last split. Exceeded by no more than 256 tests or 32 splits, and by the merges, which always go
     /// through. Results then depend on the machine's speed, as nothing else here does.
     pub time: Option<Duration>,
+}
+
+impl Budget {
+    /// This budget with so many vertex tests a frame at most.
+    pub fn tests(self, tests: u64) -> Self {
+        Self { tests: Some(tests), ..self }
+    }
+
+    /// This budget with so much time a frame at most.
+    pub fn time(self, time: Duration) -> Self {
+        Self { time: Some(time), ..self }
+    }
 }
 
 /// Splits between two looks at the clock.

@@ -95,7 +95,7 @@ impl Land {
             (1, 0) => 4000.0,
             _ => f64::from((x * 7 + y * 13) % 50 + 300),
         });
-        let options = BuildOptions { spacing_m: Some([10.0; 2]), ..BuildOptions::default() };
+        let options = BuildOptions::default().spacing_m([10.0; 2]);
         build(&dem, &path, &options, &Silent).unwrap();
         Self { _folder: folder, path }
     }

@@ -171,7 +171,7 @@ fn paint_goes_with_the_ground_and_waits_for_no_frame() {
     let land = Land::new();
     let picture = MemoryImage::from_fn([512, 512], |x, y| [150, 160, (x / 8 * y / 8 % 90) as u8, 255]);
     let pictures: Vec<Box<dyn ImageSource>> = vec![Box::new(picture)];
-    let options = DrapeOptions { format: TileFormat::Rgba8, ..DrapeOptions::default() };
+    let options = DrapeOptions::default().format(TileFormat::Rgba8);
     drape(&land.path, &pictures, &options, &Silent).unwrap();
     let mut workshop = land.workshop_on(Arc::new(SystemDisk));
     while_frames_have_all_threads(|| {

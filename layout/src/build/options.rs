@@ -1,0 +1,76 @@
+//! What to build: plain values.
+
+use super::memory::LARGEST_TILE;
+use crate::file::header::ErrorKind;
+use crate::grid::record::RecordKind;
+
+/// What to build.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct BuildOptions {
+    /// Spacing in metres (east, north) instead of what the DEM says.
+    pub spacing_m: Option<[f64; 2]>,
+    /// Factor on all heights; the default is 1.
+    pub z_scale: f64,
+    /// Memory budget in MiB; at least 48.
+    pub memory_mib: u64,
+    /// Record kind; `None` chooses the smallest that keeps every height exactly. Either exact kind stands for both.
+    pub record: Option<RecordKind>,
+    /// Kind of error to store.
+    pub error: ErrorKind,
+    /// Raw value that means "no data", beside what the DEM declares.
+    pub nodata: Option<f64>,
+    /// Largest side of a tile in steps, a power of two from 2 to 256. Smaller tiles save memory and cost time; the file is the same.
+    pub largest_tile: u32,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self {
+            spacing_m: None,
+            z_scale: 1.0,
+            memory_mib: 512,
+            record: None,
+            error: ErrorKind::Bounded,
+            nodata: None,
+            largest_tile: LARGEST_TILE,
+        }
+    }
+}
+
+impl BuildOptions {
+    /// These options with a spacing in metres, east and north, instead of what the DEM says.
+    pub fn spacing_m(self, spacing_m: impl Into<Option<[f64; 2]>>) -> Self {
+        Self { spacing_m: spacing_m.into(), ..self }
+    }
+
+    /// These options with another factor on all heights.
+    pub fn z_scale(self, z_scale: f64) -> Self {
+        Self { z_scale, ..self }
+    }
+
+    /// These options with another memory budget in MiB.
+    pub fn memory_mib(self, memory_mib: u64) -> Self {
+        Self { memory_mib, ..self }
+    }
+
+    /// These options with this kind of records, instead of the smallest that keeps every height exactly.
+    pub fn record(self, record: impl Into<Option<RecordKind>>) -> Self {
+        Self { record: record.into(), ..self }
+    }
+
+    /// These options with another kind of error to store.
+    pub fn error(self, error: ErrorKind) -> Self {
+        Self { error, ..self }
+    }
+
+    /// These options with a raw value that means "no data", beside what the DEM declares.
+    pub fn nodata(self, nodata: impl Into<Option<f64>>) -> Self {
+        Self { nodata: nodata.into(), ..self }
+    }
+
+    /// These options with another largest side of a tile in steps.
+    pub fn largest_tile(self, largest_tile: u32) -> Self {
+        Self { largest_tile, ..self }
+    }
+}
