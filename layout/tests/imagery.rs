@@ -422,3 +422,18 @@ fn a_file_replaced_meanwhile_is_left_alone() {
     assert!(std::fs::read(&path).unwrap() == before);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
+
+/// Tiles of one file read through another would be a picture of other ground.
+#[test]
+fn an_image_is_read_of_the_terrain_that_it_was_opened_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.iqt");
+    land(&path);
+    draped(&path, MemoryImage::from_fn([61, 41], |x, y| [x as u8, y as u8, 90, 255]), &raw()).unwrap();
+    let Opened { terrain, imagery } = Opened::new(&path);
+    let (id, mut tile) = (TileId { level: 0, x: 0, y: 0 }, Vec::new());
+    assert!(imagery.read_tile(&terrain, id, &mut tile).unwrap());
+    let again = Terrain::open(&path).unwrap();
+    let said = imagery.read_tile(&again, id, &mut tile).unwrap_err().to_string();
+    assert!(said.contains("another terrain") && tile.is_empty(), "{said}");
+}

@@ -192,3 +192,77 @@ impl Drop for Editing {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::StreamOptions;
+    use crate::view::View;
+    use std::path::Path;
+    use std::sync::Arc;
+    use terrasoar_layout::build::{BuildOptions, build};
+    use terrasoar_layout::dem::{MemoryDem, SampleType};
+    use terrasoar_layout::edit::Crater;
+    use terrasoar_layout::file::disk::{FailingDisk, Failure};
+    use terrasoar_layout::progress::Silent;
+
+    fn ground_on(path: &Path, disk: FailingDisk) -> Ground<'static> {
+        let terrain = Arc::new(Terrain::open_unmapped(path).unwrap());
+        let mut ground = Ground::streamed(terrain, &StreamOptions::default()).unwrap();
+        let session = EditSession::open_on(Arc::new(disk), path).unwrap();
+        ground.editing = Some(Box::new(Editing { session, writing: None, path: path.to_owned() }));
+        ground
+    }
+
+    /// Whatever call fails: the ticket says so, the ground says so once, nothing is lost in memory, and the next commit has it all.
+    #[test]
+    fn a_commit_that_fails_is_told_and_part_of_the_next() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("land.iqt");
+        let dem = MemoryDem::from_fn([129; 2], SampleType::I16, |x, y| match (x, y) {
+            // Room for craters: records hold heights of the data's range.
+            (0, 0) => 300.0,
+            (128, 128) => 900.0,
+            _ => f64::from(500 + (x * 7 + y * 3) % 90),
+        });
+        build(&dem, &path, &BuildOptions::default().spacing_m([10.0; 2]), &Silent).unwrap();
+        let crater = |x: f64| {
+            Edit::Crater(Crater { centre_m: [x, 640.0], direction_deg: 0.0, radius_m: 50.0, depth_m: 15.0 })
+        };
+        let whole = std::fs::read(&path).unwrap();
+        let view = View::new([600.0, 100.0, 1500.0], 0.0, -40.0);
+        let mut failed = 0;
+        for call in 0..40 {
+            std::fs::write(&path, &whole).unwrap();
+            let mut ground = ground_on(&path, FailingDisk::new(call, Failure::Once));
+            ground.update(&view);
+            ground.edit(&[crater(400.0)]).unwrap();
+            let ticket = ground.commit("one").unwrap();
+            let outcome = ticket.wait();
+            ground.edit(&[crater(800.0)]).unwrap();
+            let again = ground.commit("two").unwrap();
+            let told = ground.take_error();
+            if let Err(error) = outcome {
+                failed += 1;
+                assert!(error.to_string().contains("land.iqt"), "{error}");
+                let told = told.unwrap().to_string();
+                assert!(told.contains("land.iqt") && told.contains("in memory"), "{told}");
+            } else {
+                assert!(told.is_none());
+            }
+            let is_saved = again.wait().is_ok();
+            ground.update(&view);
+            if !is_saved {
+                ground.commit("three").unwrap().wait().unwrap();
+            }
+            drop(ground);
+            let height_m =
+                |x: f64| Terrain::open_unmapped(&path).unwrap().height_m(x, 640.0).unwrap().unwrap();
+            let before = Terrain::open_original(&path).unwrap();
+            for x in [400.0, 800.0] {
+                assert!(height_m(x) < before.height_m(x, 640.0).unwrap().unwrap() - 10.0, "call {call}: {x}");
+            }
+        }
+        assert!(failed > 3, "{failed} commits failed");
+    }
+}
