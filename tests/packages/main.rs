@@ -138,7 +138,10 @@ fn packages_say_what_they_are() {
         assert!((1..=5).contains(&categories.len()), "{name}: {categories:?}");
         assert!(categories.iter().all(|category| CATEGORIES.contains(category)), "{name}: {categories:?}");
         let is_library = words(&package["targets"][0]["kind"]).contains(&"lib");
-        assert!(!is_library || package["metadata"]["docs"]["rs"].is_object(), "{name}: how docs.rs builds it");
+        assert!(
+            !is_library || package["metadata"]["docs"]["rs"].is_object(),
+            "{name}: how docs.rs builds it"
+        );
     }
 }
 
@@ -171,12 +174,17 @@ fn packages_bring_licences_and_nothing_foreign() {
         }
         for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
             let ours = fs::read(folder.join(licence)).unwrap();
-            assert!(ours == fs::read(root().join(licence)).unwrap(), "{name}: {licence} is another than the project's");
+            assert!(
+                ours == fs::read(root().join(licence)).unwrap(),
+                "{name}: {licence} is another than the project's"
+            );
         }
         for file in &files {
             let top = file.components().next().unwrap().as_os_str().to_string_lossy().into_owned();
-            let ending = file.extension().map_or(String::new(), |ending| ending.to_string_lossy().into_owned());
-            let is_foreign = FOREIGN_FOLDERS.contains(&top.as_str()) || FOREIGN_ENDINGS.contains(&ending.as_str());
+            let ending =
+                file.extension().map_or(String::new(), |ending| ending.to_string_lossy().into_owned());
+            let is_foreign =
+                FOREIGN_FOLDERS.contains(&top.as_str()) || FOREIGN_ENDINGS.contains(&ending.as_str());
             assert!(!is_foreign, "{name} would publish {}", file.display());
         }
         let bytes: u64 = files.iter().map(|file| fs::metadata(folder.join(file)).unwrap().len()).sum();
@@ -199,7 +207,11 @@ fn packages_lack_nothing_that_building_takes() {
             let text = fs::read_to_string(folder.join(source)).unwrap();
             for taken in taken_in(&text) {
                 let path = plain(&source.parent().unwrap().join(taken));
-                assert!(files.contains(&path), "{name}: {} takes in {taken}, which is not there", source.display());
+                assert!(
+                    files.contains(&path),
+                    "{name}: {} takes in {taken}, which is not there",
+                    source.display()
+                );
             }
         }
     }
