@@ -7,6 +7,7 @@
 /// Powers `2^(i / steps)` for `i` in 0..=255.
 #[derive(Debug, Clone)]
 pub struct OctaveTable {
+    steps: u32,
     /// 256 powers, then infinity three times, so that a search may look ahead.
     powers: [f64; 259],
     /// For each 64th of an octave, the first index whose power is not below it.
@@ -35,7 +36,7 @@ impl OctaveTable {
             let part = 1.0 + i as f64 / 64.0;
             powers.iter().position(|p| *p >= part).map_or(0, |index| index as u16)
         };
-        Self { powers, firsts: std::array::from_fn(first) }
+        Self { steps, powers, firsts: std::array::from_fn(first) }
     }
 
     /// `2^(index / steps)`.
