@@ -4,8 +4,8 @@
 //! one byte far behind any file's end. **The lock belongs to the open file:** it ends with the process, however that ends, and leaves nothing behind; in a process that goes on it is given back by name,
 //! for a program that is being started at that moment has copies of all open files for a while. Nothing is made beside the file. Whoever replaces a file by a new one takes part: it asks for the same byte, shared with others who replace.
 //!
-//! Linux and macOS lock the byte (open file description locks). On Windows a writer opens the file so that nobody else can open it for writing, and whoever replaces it so that nobody can
-//! who is not replacing it too. On other systems, and on file systems without locks, nobody is kept out.
+//! Linux locks the byte (an open file description lock). On Windows a writer opens the file so that nobody else can open it for writing, and whoever replaces it so that nobody can
+//! who is not replacing it too. On other systems, macOS among them, whose such lock no safe function has, and on file systems without locks, nobody is kept out.
 
 use crate::error::LayoutError;
 use std::fs::File;
@@ -184,7 +184,7 @@ mod system {
         byte::give_back(file);
     }
 
-    #[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
+    #[cfg(any(target_os = "linux", target_os = "android"))]
     mod byte {
         use super::{File, Kind};
         use nix::errno::Errno;
@@ -211,7 +211,7 @@ mod system {
         }
     }
 
-    #[cfg(not(any(target_os = "linux", target_os = "android", target_vendor = "apple")))]
+    #[cfg(not(any(target_os = "linux", target_os = "android")))]
     mod byte {
         use super::{File, Kind};
 
@@ -372,7 +372,7 @@ mod tests {
         drop(ReplaceLock::take(&target).unwrap());
         std::fs::write(&target, "x").unwrap();
         let [one, two] = [0, 1].map(|_| ReplaceLock::take(&target).unwrap());
-        if cfg!(any(target_os = "linux", target_vendor = "apple", windows)) {
+        if cfg!(any(target_os = "linux", windows)) {
             is_told(&target);
             drop((one, two));
             let writer = WriteLock::take(&target).unwrap();
