@@ -104,7 +104,7 @@ pub fn is_drawn(records: &impl RecordStore, triangle: Triangle) -> bool {
 }
 
 /// Calls `visit` with the triangles of a strip in counter-clockwise order. Vertices repeated to turn the strip make no triangle.
-pub fn for_each_in_strip(strip: impl Iterator<Item = GridPoint>, mut visit: impl FnMut(Triangle)) {
+pub(crate) fn for_each_in_strip(strip: impl Iterator<Item = GridPoint>, mut visit: impl FnMut(Triangle)) {
     let mut last: [Option<GridPoint>; 2] = [None; 2];
     let mut odd = true;
     for p in strip {

@@ -10,9 +10,9 @@ use crate::view::View;
 use terrasoar_layout::grid::record::Vertex;
 
 /// Number of side planes of the view pyramid.
-pub const PLANES: usize = 4;
+pub(crate) const PLANES: usize = 4;
 /// Mask of planes that a sphere may still cross: all of them.
-pub const ALL_PLANES: u8 = (1 << PLANES) - 1;
+pub(crate) const ALL_PLANES: u8 = (1 << PLANES) - 1;
 
 /// A view as the tests need it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +30,7 @@ pub struct Metric {
 /// A side plane of the view pyramid in single precision, moved outwards by more than the rounding of a test: a corner is beyond it if
 /// `normal . corner + offset` is above 0.
 #[derive(Debug, Clone, Copy)]
-pub struct BoxPlane {
+pub(crate) struct BoxPlane {
     /// Metres a unit of each axis, signed.
     pub normal: [f32; 3],
     /// Metres.
@@ -107,7 +107,7 @@ impl Metric {
     /// Tests a sphere against the planes of `mask`: `None` if it lies wholly outside one (culled), else the planes it still crosses. A sphere
     /// wholly inside a plane has all its descendants inside, which need not ask again.
     #[inline(always)]
-    pub fn cull(&self, sighting: &Sighting, mask: u8) -> Option<u8> {
+    pub(crate) fn cull(&self, sighting: &Sighting, mask: u8) -> Option<u8> {
         let mut crossing = mask;
         for i in 0..PLANES {
             if mask & 1 << i != 0 {
@@ -130,7 +130,7 @@ impl Metric {
     }
 
     /// The planes as boxes are tested against them: in grid steps east and north and metres of height, none of which exceeds `largest`.
-    pub fn box_planes(&self, spacing_m: [f64; 2], largest: f64) -> [BoxPlane; PLANES] {
+    pub(crate) fn box_planes(&self, spacing_m: [f64; 2], largest: f64) -> [BoxPlane; PLANES] {
         let factors = [spacing_m[0], spacing_m[1], self.exaggeration];
         self.normals.map(|n| {
             let normal = [0, 1, 2].map(|i| n[i] * factors[i]);
@@ -146,7 +146,7 @@ impl Metric {
 impl Sighting {
     /// Whether the vertex is near enough for its error to show: |P - p| < nu e + r.
     #[inline(always)]
-    pub fn is_selected(&self) -> bool {
+    pub(crate) fn is_selected(&self) -> bool {
         self.distance2 < self.reach_m * self.reach_m
     }
 
@@ -164,7 +164,7 @@ impl Sighting {
 
     /// Squared distance from the eye.
     #[inline(always)]
-    pub fn distance2(&self) -> f64 {
+    pub(crate) fn distance2(&self) -> f64 {
         self.distance2
     }
 
@@ -194,7 +194,7 @@ impl Sighting {
 
     /// A bound on twice the rounding error of the margins: a status cannot change while the exact margin exceeds it.
     #[inline(always)]
-    pub fn guard_m(&self) -> f64 {
+    pub(crate) fn guard_m(&self) -> f64 {
         const ULPS: f64 = 1.0 / (1u64 << 48) as f64;
         const LEAST_M: f64 = 1.0 / (1u64 << 30) as f64;
         (self.distance2.sqrt() + self.reach_m + self.radius_m) * ULPS + LEAST_M

@@ -29,12 +29,12 @@ pub enum SampleType {
 
 impl SampleType {
     /// Whether every value of the type is a whole number.
-    pub fn is_integer(self) -> bool {
+    pub(crate) fn is_integer(self) -> bool {
         !matches!(self, Self::F32 | Self::F64)
     }
 
     /// Whether every value of the type is exactly representable as `f32`.
-    pub fn fits_f32(self) -> bool {
+    pub(crate) fn fits_f32(self) -> bool {
         matches!(self, Self::U8 | Self::U16 | Self::I16 | Self::F32)
     }
 }

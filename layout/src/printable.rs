@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::fmt::Write;
 
 /// Whether a character may be shown as it is.
-pub fn is_harmless(c: char) -> bool {
+pub(crate) fn is_harmless(c: char) -> bool {
     // In order: soft hyphen, Arabic letter mark, Mongolian vowel separator, zero widths and directions, line and paragraph separators and overrides, word joiners and
     // isolates, byte order mark, interlinear marks, tags.
     !c.is_control()

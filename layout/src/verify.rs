@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use std::fmt;
 
 /// Problems that a report lists one by one.
-pub const LISTED_PROBLEMS: usize = 20;
+pub(crate) const LISTED_PROBLEMS: usize = 20;
 
 /// Pages that one task works through.
 const TASK_PAGES: usize = 64;

@@ -7,8 +7,8 @@ use std::ops::Range;
 use criterion::{BatchSize, BenchmarkId, Criterion};
 use glam::DVec3;
 use terrasoar_render::{
-    Frame, Gpu, ImageryShape, Look, MeshPatch, MeshVertex, Offscreen, Pyramid, Renderer, RendererOptions,
-    TerrainShape, View, WantedTiles,
+    Frame, Gpu, ImageryShape, Look, MeshPatch, MeshVertex, Offscreen, Renderer, RendererOptions,
+    TerrainShape, View,
 };
 
 const TERRAIN: TerrainShape =
@@ -21,11 +21,6 @@ fn view() -> View {
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
-    let pyramid = Pyramid::over(TERRAIN.samples);
-    let mut wanted = WantedTiles::default();
-    criterion.bench_function("wanted tiles, 1920 x 1080", |b| {
-        b.iter(|| wanted.find(black_box(&pyramid), &TERRAIN, &view()).len());
-    });
     match Gpu::headless_blocking() {
         Ok(gpu) => on_device(&mut criterion, &gpu),
         Err(error) => println!("without a device: {error}"),
@@ -36,6 +31,9 @@ fn main() {
 fn on_device(criterion: &mut Criterion, gpu: &Gpu) {
     let options = RendererOptions::from(&gpu.capabilities);
     let Ok(mut renderer) = Renderer::new(&gpu.device, &gpu.queue, TERRAIN, options) else { return };
+    criterion.bench_function("wanted tiles, 1920 x 1080", |b| {
+        b.iter(|| renderer.want_tiles(black_box(&view()), 8).len());
+    });
     let format = gpu.capabilities.imagery_formats()[0];
     let image = ImageryShape::new(format, [163_840, 163_840], [0.0; 2], [1.0; 2]);
     if renderer.set_imagery(&image, format, Renderer::IMAGERY_BYTES).is_ok() {

@@ -82,6 +82,7 @@ mod offscreen;
 mod pipelines;
 pub mod ramps;
 mod renderer;
+#[doc(hidden)]
 pub mod shaders;
 mod tiles;
 mod timing;
@@ -103,8 +104,7 @@ pub use terrasoar::view::{View, Viewport};
 /// Images and tiles as the terrain file has them. Slopes are in tiles named alike.
 pub use terrasoar_layout::imagery::{ImageryShape, TileFormat, TileId};
 pub use tiles::{
-    HEIGHTS_PER_TILE, ImageryStats, Placement, Pyramid, Residency, TILE_BORDER, TILE_CELLS, TileStats,
-    WantedTiles, pack_gradients, tile_lines,
+    HEIGHTS_PER_TILE, ImageryStats, Pyramid, TILE_CELLS, TileStats, height_tile, pack_gradients,
 };
 pub use view::TerrainShape;
 /// The graphics interface of the version that this crate's types are of.

@@ -89,7 +89,7 @@ impl Ramp {
     }
 
     /// Colour at a place from 0 to 1, linear light.
-    pub fn linear_at(&self, t: f32) -> [f32; 3] {
+    pub(crate) fn linear_at(&self, t: f32) -> [f32; 3] {
         let after = self.stops.partition_point(|(at, _)| *at <= t);
         let colour = |i: usize| self.stops.get(i).map_or(0, |s| s.1);
         if after == 0 || after == self.stops.len() {

@@ -24,7 +24,7 @@ pub struct TerrainShape {
 
 impl TerrainShape {
     /// Metres from the south-west to the north-east sample.
-    pub fn diagonal_m(&self) -> f64 {
+    pub(crate) fn diagonal_m(&self) -> f64 {
         let [east, north] = self.samples.map(|n| f64::from(n.saturating_sub(1)));
         (east * self.spacing_m[0]).hypot(north * self.spacing_m[1])
     }

@@ -4,7 +4,7 @@
 //! device: the caller brings these and says when a frame is drawn.
 
 mod border;
-pub mod drape;
+mod drape;
 pub mod frame;
 pub mod options;
 pub mod overview;

@@ -12,13 +12,14 @@
 //!
 //! Cost on the processor: a copy of what changed in the mesh, some 2 ms a tile.
 
+pub use super::drape::Served;
 pub use super::options::{Drawn, SceneError, SceneOptions, TileService};
 
 use super::border::border;
 use super::drape::Drape;
 use super::frame::SceneFrame;
 use super::repaint::{Picture, Repaint};
-use super::sight::{ahead, height_tile, shape};
+use super::sight::{ahead, shape};
 use std::ops::Range;
 use std::sync::Arc;
 use terrasoar::ground::{Ground, MeshChange, MeshStep};
@@ -29,7 +30,7 @@ use terrasoar_layout::edit::Edit;
 use terrasoar_layout::imagery::{Imagery, Paint, TileFormat, TileId};
 use terrasoar_render::{
     DrawStats, Frame, Gpu, Look, MeshPatch, PassFormat, RenderError, Renderer, RendererOptions, Target,
-    TerrainShape, TileStats, UploadStats, wgpu,
+    TerrainShape, TileStats, UploadStats, height_tile, wgpu,
 };
 
 /// Tiles that are asked for, for each that is given in a frame.

@@ -1,11 +1,9 @@
 //! Where a steady eye will be, and a terrain as the renderer takes it.
 
 use std::f64::consts::FRAC_PI_2;
-use terrasoar::ground::HeightTile;
 use terrasoar::view::View;
-use terrasoar_layout::imagery::TileId;
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::{TILE_BORDER, TILE_CELLS, TerrainShape};
+use terrasoar_render::TerrainShape;
 
 /// Frames ahead of the eye that tiles of the image are asked for.
 const FRAMES_AHEAD: f64 = 24.0;
@@ -29,11 +27,4 @@ pub fn shape(terrain: &Terrain) -> TerrainShape {
         samples: grid.samples(),
         height_range_m: terrain.header().height_range_m,
     }
-}
-
-/// The samples of a tile of slopes, its border included.
-pub(super) fn height_tile(tile: TileId) -> HeightTile {
-    let step = 1 << tile.level.min(31);
-    let first = |at: u32| (i64::from(at) * i64::from(TILE_CELLS) - i64::from(TILE_BORDER)) * i64::from(step);
-    HeightTile { south_west: [first(tile.x), first(tile.y)], step, side: TILE_CELLS + 1 + 2 * TILE_BORDER }
 }

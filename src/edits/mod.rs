@@ -18,7 +18,7 @@ mod writer;
 use terrasoar_layout::edit::{Edit, StampMode};
 
 pub use error::ScriptError;
-pub use format::{MAX_EDITS, VERSION};
+pub use format::MAX_EDITS;
 pub use load::{LoadedBatch, Loader, OpenDem};
 pub use timed::timed;
 

@@ -12,7 +12,7 @@ use super::{Flight, FlightFrame};
 /// Most trial speeds.
 pub const MAX_TRIALS: usize = 24;
 /// Most pairs of frames measured a trial.
-pub const MAX_PAIRS: usize = 24;
+pub(crate) const MAX_PAIRS: usize = 24;
 /// Relative deviation from the wanted incoherence at which the search ends.
 pub const TOLERANCE: f64 = 0.02;
 /// Relative deviation up to which the best speed found still is an answer.

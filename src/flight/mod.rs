@@ -14,7 +14,7 @@ use crate::view::{View, Viewport};
 use glam::DVec3;
 
 pub use error::FlightError;
-pub use format::{MAX_FRAMES, VERSION};
+pub use format::MAX_FRAMES;
 pub use reader::FlightReader;
 #[cfg(feature = "files")]
 pub use writer::FlightWriter;

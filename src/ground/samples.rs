@@ -21,14 +21,16 @@ impl HeightTile {
         self.side as usize * self.side as usize
     }
 
+    /// Columns (`axis` 0) or rows (1) of its samples in a terrain of so many samples, from the south-west.
+    pub fn lines(self, samples: [u32; 2], axis: usize) -> impl Iterator<Item = u32> + Clone {
+        let last = i64::from(samples[axis]) - 1;
+        let at = move |i: u32| self.south_west[axis] + i64::from(i) * i64::from(self.step);
+        (0..self.side).map(move |i| at(i).clamp(0, last) as u32)
+    }
+
     /// Its grid points in a terrain of so many samples, rows from the south, each from the west.
     pub(super) fn points(self, samples: [u32; 2]) -> impl Iterator<Item = GridPoint> {
-        let along = move |axis: usize| {
-            let last = i64::from(samples[axis]) - 1;
-            let at = move |i: u32| self.south_west[axis] + i64::from(i) * i64::from(self.step);
-            (0..self.side).map(move |i| at(i).clamp(0, last) as u32)
-        };
-        along(1).flat_map(move |y| along(0).map(move |x| GridPoint::new(x, y)))
+        self.lines(samples, 1).flat_map(move |y| self.lines(samples, 0).map(move |x| GridPoint::new(x, y)))
     }
 }
 

@@ -59,7 +59,7 @@ impl ExtendedView {
     }
 
     /// Pages that a refinement of this view lacks, as far as it can be told from what is at hand; sorted, into `pages`.
-    pub fn pages_away<S: RecordStore>(&self, store: &S, culling: Culling, pages: &mut Vec<u64>) {
+    pub(crate) fn pages_away<S: RecordStore>(&self, store: &S, culling: Culling, pages: &mut Vec<u64>) {
         pages.clear();
         self.walk(store, culling, &mut |slot, is_at_hand| {
             let page = S::page_of(slot);

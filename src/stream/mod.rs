@@ -180,7 +180,7 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
     }
 
     /// The engine, to be given a budget.
-    pub fn engine_mut(&mut self) -> &mut Kinetic<PagePool<C>> {
+    pub(crate) fn engine_mut(&mut self) -> &mut Kinetic<PagePool<C>> {
         &mut self.engine
     }
 
@@ -201,7 +201,7 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
     }
 
     /// Whether pages were asked for since the last update, which it knows nothing of yet.
-    pub fn has_wants(&self) -> bool {
+    pub(crate) fn has_wants(&self) -> bool {
         !self.wanted.is_empty()
     }
 

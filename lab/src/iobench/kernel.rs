@@ -27,12 +27,12 @@ pub fn read_bytes() -> Option<u64> {
 }
 
 /// Most memory this process has held since it began or since [`reset_peak_memory`], in bytes, touched pages of mapped files included.
-pub fn peak_memory_bytes() -> Option<u64> {
+pub(crate) fn peak_memory_bytes() -> Option<u64> {
     Some(1024 * parse_field(&proc_file("self/status")?, "VmHWM:")?)
 }
 
 /// Starts the peak anew from what is held now; whether that worked.
-pub fn reset_peak_memory() -> bool {
+pub(crate) fn reset_peak_memory() -> bool {
     cfg!(target_os = "linux") && std::fs::write("/proc/self/clear_refs", "5").is_ok()
 }
 
@@ -42,7 +42,7 @@ pub fn reset_peak_memory() -> bool {
 /// # Errors
 /// The file cannot be opened, or the system refuses.
 #[cfg(target_os = "linux")]
-pub fn forget_file(path: &Path) -> std::io::Result<bool> {
+pub(crate) fn forget_file(path: &Path) -> std::io::Result<bool> {
     let file = std::fs::File::open(path)?;
     rustix::fs::fadvise(&file, 0, None, rustix::fs::Advice::DontNeed)?;
     Ok(true)
@@ -53,7 +53,7 @@ pub fn forget_file(path: &Path) -> std::io::Result<bool> {
 /// # Errors
 /// None.
 #[cfg(not(target_os = "linux"))]
-pub fn forget_file(_: &Path) -> std::io::Result<bool> {
+pub(crate) fn forget_file(_: &Path) -> std::io::Result<bool> {
     Ok(false)
 }
 
@@ -62,7 +62,7 @@ pub fn forget_file(_: &Path) -> std::io::Result<bool> {
 /// # Errors
 /// The system refuses.
 #[cfg(target_os = "linux")]
-pub fn expect_random_reads(file: &std::fs::File) -> std::io::Result<()> {
+pub(crate) fn expect_random_reads(file: &std::fs::File) -> std::io::Result<()> {
     Ok(rustix::fs::fadvise(file, 0, None, rustix::fs::Advice::Random)?)
 }
 
@@ -71,7 +71,7 @@ pub fn expect_random_reads(file: &std::fs::File) -> std::io::Result<()> {
 /// # Errors
 /// None.
 #[cfg(not(target_os = "linux"))]
-pub fn expect_random_reads(_: &std::fs::File) -> std::io::Result<()> {
+pub(crate) fn expect_random_reads(_: &std::fs::File) -> std::io::Result<()> {
     Ok(())
 }
 
@@ -80,7 +80,7 @@ pub fn expect_random_reads(_: &std::fs::File) -> std::io::Result<()> {
 /// # Errors
 /// The folder cannot be looked at.
 #[cfg(target_os = "linux")]
-pub fn free_bytes(folder: &Path) -> std::io::Result<Option<u64>> {
+pub(crate) fn free_bytes(folder: &Path) -> std::io::Result<Option<u64>> {
     let stat = rustix::fs::statvfs(folder)?;
     Ok(Some(stat.f_bavail * stat.f_frsize))
 }
@@ -90,7 +90,7 @@ pub fn free_bytes(folder: &Path) -> std::io::Result<Option<u64>> {
 /// # Errors
 /// None.
 #[cfg(not(target_os = "linux"))]
-pub fn free_bytes(_: &Path) -> std::io::Result<Option<u64>> {
+pub(crate) fn free_bytes(_: &Path) -> std::io::Result<Option<u64>> {
     Ok(None)
 }
 

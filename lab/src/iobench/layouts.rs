@@ -18,13 +18,13 @@ use terrasoar_layout::grid::order::{point_of, slot_count, spread};
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Bytes of a record that holds what SOAR's does.
-pub const SOAR_RECORD_BYTES: u64 = 20;
+pub(crate) const SOAR_RECORD_BYTES: u64 = 20;
 
 /// Bytes a cache line.
 pub const LINE_BYTES: u64 = 64;
 
 /// Bytes of the larger unit that counts are given in: what one read of a disk may as well bring.
-pub const UNIT_BYTES: u64 = 65_536;
+pub(crate) const UNIT_BYTES: u64 = 65_536;
 
 /// The layouts, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -19,7 +19,7 @@ pub const MAGIC: [u8; 8] = *b"\x89IQT\r\n\x1a\n";
 /// The page that absent record pages read as.
 pub const INERT_PAGE: u32 = 2;
 /// Entries a directory leaf page.
-pub const LEAF_ENTRIES: u64 = 256;
+pub(crate) const LEAF_ENTRIES: u64 = 256;
 
 /// Which error bound the records hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,7 +142,7 @@ impl Header {
     }
 
     /// Entries of the directory root.
-    pub fn root_entries(&self) -> u64 {
+    pub(crate) fn root_entries(&self) -> u64 {
         self.record_pages().div_ceil(LEAF_ENTRIES)
     }
 

@@ -8,7 +8,7 @@
 //!
 //! Invariant: [`Grid::new`] is the only way in, so `k` is 1..=16 and both sample counts fit the square.
 
-pub mod octave;
+pub(crate) mod octave;
 pub mod order;
 pub mod record;
 
@@ -17,7 +17,7 @@ use crate::remedy::Remedy;
 use crate::words::number;
 
 /// Largest supported `k`: a square of 65,537 samples a side.
-pub const MAX_K: u32 = 16;
+pub(crate) const MAX_K: u32 = 16;
 
 /// A grid coordinate: column x (east) and row y (north), each at most 65,536.
 ///
@@ -171,7 +171,7 @@ impl Grid {
     }
 
     /// Metres from a vertex of `level` to its farthest child over flat ground; 0 at level 0.
-    pub fn child_distance_m(&self, level: u32) -> f64 {
+    pub(crate) fn child_distance_m(&self, level: u32) -> f64 {
         let step = f64::from(1u32 << (level / 2));
         let [dx, dy] = self.spacing_m;
         match level {
@@ -182,7 +182,7 @@ impl Grid {
     }
 
     /// Nested-sphere radius in metres of a vertex of `level` over flat ground.
-    pub fn flat_radius_m(&self, level: u32) -> f64 {
+    pub(crate) fn flat_radius_m(&self, level: u32) -> f64 {
         (0..=level).map(|l| self.child_distance_m(l)).sum()
     }
 

@@ -39,11 +39,6 @@ impl OctaveTable {
         Self { steps, powers, firsts: std::array::from_fn(first) }
     }
 
-    /// Entries an octave.
-    pub fn steps(&self) -> u32 {
-        self.steps
-    }
-
     /// `2^(index / steps)`.
     #[inline(always)]
     pub fn power(&self, index: u8) -> f64 {

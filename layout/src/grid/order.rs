@@ -73,7 +73,7 @@ const fn black_base(d: u32) -> u64 {
 }
 
 /// The slots of the vertices of `level` (see [`Grid::level`](crate::grid::Grid::level)), ghosts included.
-pub const fn level_slots(k: u32, level: u32) -> std::ops::Range<u64> {
+pub(crate) const fn level_slots(k: u32, level: u32) -> std::ops::Range<u64> {
     let d = k - 1 - level / 2;
     if level & 1 == 1 {
         white_base(d)..white_base(d) + (1 << (2 * d))

@@ -36,7 +36,7 @@ impl TileFormat {
     }
 
     /// Bytes of a block of 4 x 4 texels; of Rgba8, which has no blocks, as many texels.
-    pub const fn block_bytes(self) -> usize {
+    pub(crate) const fn block_bytes(self) -> usize {
         match self {
             Self::Bc1 => 8,
             Self::Bc7 => 16,

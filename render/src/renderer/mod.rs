@@ -261,7 +261,7 @@ impl Renderer {
     /// Notes that heights changed between two samples, both included: tiles of slopes that show them are wanted anew, and stay until the new ones come.
     pub fn change_heights(&mut self, south_west: [u32; 2], north_east: [u32; 2]) {
         let TilePool { pyramid, residency, .. } = &mut self.tiles;
-        for tile in pyramid.around(south_west, north_east, crate::TILE_BORDER) {
+        for tile in pyramid.around(south_west, north_east, crate::tiles::TILE_BORDER) {
             residency.outdate(tile);
         }
     }

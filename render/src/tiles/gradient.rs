@@ -7,10 +7,11 @@
 use super::{Pyramid, TILE_CELLS};
 use crate::error::{RenderError, Result};
 use crate::view::TerrainShape;
+use terrasoar::ground::HeightTile;
 use terrasoar_layout::imagery::TileId;
 
 /// Grid points beyond each side of a tile whose heights are needed for the slopes on its edge.
-pub const TILE_BORDER: u32 = 1;
+pub(crate) const TILE_BORDER: u32 = 1;
 
 /// Heights a tile is made from: `TILE_CELLS + 1` grid points a side and the border, squared.
 pub const HEIGHTS_PER_TILE: usize = (SIDE * SIDE) as usize;
@@ -19,21 +20,17 @@ const SIDE: u32 = TILE_CELLS + 1 + 2 * TILE_BORDER;
 
 pub(crate) const GRADIENT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg16Float;
 
-/// Columns (`axis` 0) or rows (1) of the grid that a tile and its border have heights at, from the south-west: where one lies outside a terrain of
-/// so many samples, the nearest inside.
-pub fn tile_lines(samples: [u32; 2], tile: TileId, axis: usize) -> impl Iterator<Item = u32> + Clone + use<> {
-    let place = [tile.x, tile.y][axis];
-    let first = i64::from(place).saturating_mul(i64::from(TILE_CELLS) << tile.level.min(31)).min(1 << 40);
-    let last = i64::from(samples[axis].saturating_sub(1));
-    let step = 1_i64 << tile.level.min(31);
-    let at = move |i: u32| first + (i64::from(i) - i64::from(TILE_BORDER)) * step;
-    (0..SIDE).map(move |i| at(i).clamp(0, last) as u32)
+/// The samples that a tile of slopes is made from, its border included.
+pub fn height_tile(tile: TileId) -> HeightTile {
+    let step = 1 << tile.level.min(31);
+    let first = |at: u32| (i64::from(at) * i64::from(TILE_CELLS) - i64::from(TILE_BORDER)) * i64::from(step);
+    HeightTile { south_west: [first(tile.x), first(tile.y)], step, side: SIDE }
 }
 
 /// Turns heights into the bytes of a tile.
 ///
 /// `heights_m` holds [`HEIGHTS_PER_TILE`] heights in metres before exaggeration, row by row from the south-west, where the tile's columns and rows
-/// ([`tile_lines`]) cross. Heights that are not finite (voids) count as level with
+/// ([`height_tile`]) cross. Heights that are not finite (voids) count as level with
 /// their neighbours. Averages over a cell make calmer pictures than plain samples on coarse levels; either will do.
 ///
 /// # Errors
@@ -50,7 +47,7 @@ pub fn pack_gradients(terrain: &TerrainShape, tile: TileId, heights_m: &[f32]) -
             got: heights_m.len(),
         });
     }
-    let lines = [0, 1].map(|axis| tile_lines(terrain.samples, tile, axis).collect::<Vec<u32>>());
+    let lines = [0, 1].map(|axis| height_tile(tile).lines(terrain.samples, axis).collect::<Vec<u32>>());
     // Repeated samples beyond the edge of the data make differences over one cell, not two.
     let run = |axis: usize, i: u32| {
         let [before, after] = [i - 1, i + 1].map(|i| lines[axis][i as usize]);

@@ -15,12 +15,13 @@ mod residency;
 mod wanted;
 
 pub(crate) use gradient::GRADIENT_FORMAT;
-pub use gradient::{HEIGHTS_PER_TILE, TILE_BORDER, pack_gradients, tile_lines};
+pub(crate) use gradient::TILE_BORDER;
+pub use gradient::{HEIGHTS_PER_TILE, height_tile, pack_gradients};
 pub(crate) use imagery::Imagery;
 pub use imagery::ImageryStats;
 pub use pool::TileStats;
 pub(crate) use pool::{TileLayout, TilePool};
 pub use pyramid::{Pyramid, TILE_CELLS};
-pub use residency::{Placement, Residency};
+pub(crate) use residency::Residency;
 pub(crate) use wanted::Raster;
-pub use wanted::WantedTiles;
+pub(crate) use wanted::WantedTiles;

@@ -26,7 +26,7 @@ impl Pyramid {
 
     /// A pyramid over so many cells east and north at level 0, in tiles of `tile_cells` a side: `most_levels` levels, or fewer
     /// where one tile covers everything before.
-    pub fn of_cells(cells: [u32; 2], tile_cells: u32, most_levels: u32) -> Self {
+    pub(crate) fn of_cells(cells: [u32; 2], tile_cells: u32, most_levels: u32) -> Self {
         let tile_cells = tile_cells.max(1);
         let mut tiles = Vec::new();
         for level in 0..most_levels.clamp(1, 32) {
@@ -38,11 +38,6 @@ impl Pyramid {
             }
         }
         Self { tile_cells, tiles }
-    }
-
-    /// Cells a side of a tile, at its own level.
-    pub fn tile_cells(&self) -> u32 {
-        self.tile_cells
     }
 
     /// The tiles of all levels that show a sample between two, both included, or have it in their border of so many cells.

@@ -22,7 +22,7 @@ type Moment = u64;
 
 /// Assignment of tiles to layers of a pool.
 #[derive(Debug, Clone)]
-pub struct Residency {
+pub(crate) struct Residency {
     coarsest: u32,
     capacity: u32,
     layers: Vec<Option<Held>>,
@@ -39,7 +39,7 @@ pub struct Residency {
 
 /// Where a new tile goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Placement {
+pub(crate) struct Placement {
     /// Layer to fill.
     pub layer: u32,
     /// Tile that was there.

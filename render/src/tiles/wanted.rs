@@ -53,7 +53,7 @@ pub(crate) fn needed_level(distance_m: f64, steepness: f64, raster: &Raster, pix
 
 /// Finds the wanted tiles of a view; keeps its arrays from frame to frame.
 #[derive(Debug, Clone, Default)]
-pub struct WantedTiles {
+pub(crate) struct WantedTiles {
     found: Vec<(TileId, f64)>,
     tiles: Vec<TileId>,
 }

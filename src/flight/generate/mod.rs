@@ -17,7 +17,7 @@ use super::{Flight, FlightFrame};
 use std::str::FromStr;
 
 /// Frames a second of the times written into generated flights.
-pub const FRAMES_PER_SECOND: f64 = 30.0;
+pub(crate) const FRAMES_PER_SECOND: f64 = 30.0;
 
 /// The ground that a flight is made over.
 pub trait Ground {

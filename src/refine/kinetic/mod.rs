@@ -20,7 +20,7 @@ mod frame;
 mod mesh;
 mod time;
 
-pub use frame::ahead::Want;
+pub(crate) use frame::ahead::Want;
 pub use frame::budget::Budget;
 pub use mesh::bounds::Bounds;
 pub use mesh::patch::{MeshVertex, Patch};
@@ -142,7 +142,7 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Looks `frames` ahead for pages from now on, for stores that are not complete: see [`Kinetic::wants`]. To be called before the first frame, and again
     /// whenever the lead changes. Without it only what the mesh lacks already is wanted.
-    pub fn look_ahead(&mut self, frames: f32) {
+    pub(crate) fn look_ahead(&mut self, frames: f32) {
         match &mut self.ahead {
             Some(ahead) => ahead.set_lead(frames),
             None => self.ahead = Some(Box::new(Ahead::new(frames))),
@@ -150,7 +150,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Clusters that the mesh lacks or will need, in no order and some more than once. What is away is wanted again every few frames.
-    pub fn wants(&self) -> &[Want] {
+    pub(crate) fn wants(&self) -> &[Want] {
         &self.wants
     }
 

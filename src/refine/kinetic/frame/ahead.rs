@@ -40,7 +40,7 @@ const AGAIN: u64 = 8;
 
 /// A page that the mesh lacks or will need.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Want {
+pub(crate) struct Want {
     /// Logical page.
     pub page: u64,
     /// Frames until it is needed if the eye keeps its pace and course, 0 or more.
