@@ -29,11 +29,31 @@ need_cargo() {
     command -v cargo >/dev/null || fail "Rust is missing; install it from https://rustup.rs and run this again"
 }
 
+need_linker() {
+    command -v cc >/dev/null && return
+    apt_install "a C compiler links every program" gcc libc6-dev ||
+        fail "there is no C compiler (cc), which links programs; install gcc and the C library's headers and run this again"
+}
+
 need_c_compiler() {
     command -v cc >/dev/null && command -v c++ >/dev/null && return
     apt_install "a C compiler builds the zstd library, which GeoTIFF needs, and links every program; the encoder of pictures needs the C++ library" \
         gcc g++ libc6-dev ||
         fail "there is no C compiler (cc) or no C++ library (g++ has it); install gcc, g++ and the C library's headers and run this again"
+}
+
+# has_target TARGET WHY: whether Rust's library is here for another system, fetching it through rustup if need be.
+has_target() {
+    [ -d "$(rustc --print sysroot)/lib/rustlib/$1/lib" ] && return
+    command -v rustup >/dev/null || return 1
+    say "fetching Rust's library for $1 through rustup: $2"
+    timeout 120 rustup target add "$1" >/dev/null 2>&1
+}
+
+# fetch_for TARGET: what Cargo.lock names for another system, if it is not here yet; fails without a network.
+fetch_for() {
+    cargo fetch --locked --offline --target "$1" >/dev/null 2>&1 ||
+        CARGO_NET_OFFLINE=false timeout 120 cargo fetch --locked --target "$1" >/dev/null 2>&1
 }
 
 # need_component NAME WHY

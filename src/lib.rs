@@ -42,6 +42,8 @@
 //! Based on: P. Lindstrom and V. Pascucci, "Terrain simplification simplified: a general framework for view-dependent out-of-core visualization", IEEE TVCG 8(3), 2002; X. Bao,
 //! R. Pajarola and M. Shafae, "SMART: an efficient technique for massive terrain visualization from out-of-core", VMV 2004.
 
+#![cfg_attr(not(feature = "files"), allow(dead_code, unused_imports, reason = "what writes files uses it"))]
+
 pub mod edits;
 pub mod flight;
 pub mod flyover;
@@ -58,7 +60,9 @@ pub mod terrain;
 pub mod testing;
 pub mod view;
 
-pub use ground::{CommitTicket, Ground, StreamOptions};
+#[cfg(feature = "files")]
+pub use ground::CommitTicket;
+pub use ground::{Ground, StreamOptions};
 pub use terrain::{MappedTerrain, Terrain};
 pub use terrasoar_layout::LayoutError as Error;
 pub use terrasoar_layout::edit::{Area, Brush, Crater, Edit};

@@ -5,9 +5,11 @@
 
 use crate::ground::{Ground, PictureEngine, StreamOptions};
 use crate::refine::Culling;
+#[cfg(feature = "files")]
 use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
+use terrasoar_layout::file::source::{MemorySource, Source};
 use terrasoar_layout::grid::Grid;
 use terrasoar_layout::read::terrain::Terrain as TerrainFile;
 
@@ -22,6 +24,7 @@ impl Terrain {
     ///
     /// # Errors
     /// Not a terrain file, another version, truncated or damaged; I/O.
+    #[cfg(feature = "files")]
     pub fn open(path: impl AsRef<Path>) -> Result<Self, LayoutError> {
         Ok(Self { file: Arc::new(TerrainFile::open_unmapped(path.as_ref())?) })
     }
@@ -30,9 +33,18 @@ impl Terrain {
     ///
     /// # Errors
     /// As [`Terrain::open`] of either; an overlay of another terrain, or of another state of this one.
+    #[cfg(feature = "files")]
     pub fn open_with_overlay(base: impl AsRef<Path>, overlay: impl AsRef<Path>) -> Result<Self, LayoutError> {
         let file = TerrainFile::open_with_overlay_unmapped(base.as_ref(), overlay.as_ref())?;
         Ok(Self { file: Arc::new(file) })
+    }
+
+    /// Opens a terrain file that comes from anywhere: from memory or a network, for example.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn from_source(source: Box<dyn Source>) -> Result<Self, LayoutError> {
+        Ok(Self { file: Arc::new(TerrainFile::from_source(source)?) })
     }
 
     /// Ground to fly over: pages are read by threads into memory of a fixed size.
@@ -94,8 +106,17 @@ impl MappedTerrain {
     ///
     /// # Errors
     /// As [`Terrain::open`].
+    #[cfg(feature = "files")]
     pub fn open(path: impl AsRef<Path>) -> Result<Self, LayoutError> {
         Ok(Self { file: TerrainFile::open(path.as_ref())? })
+    }
+
+    /// A terrain file whose `bytes` are in memory, called `name` in messages. Nobody else has them, so that nothing is asked of anybody.
+    ///
+    /// # Errors
+    /// As [`Terrain::open`].
+    pub fn from_bytes(name: &str, bytes: Vec<u8>) -> Result<Self, LayoutError> {
+        Ok(Self { file: TerrainFile::from_source(Box::new(MemorySource::new(name, bytes)))? })
     }
 
     /// Ground to fly over with all records at hand: no page is ever late. It cannot be edited.

@@ -1,6 +1,20 @@
 //! Every foreign format: readers of elevation data, each of which turns one format into a [`DemSource`], and of pictures
 //! ([`open_image`]); and [`synth`], which makes up terrain and pictures of it.
 //!
+//! ```
+//! use terrasoar_import::synth::{SynthOptions, write};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("made-up.tif");
+//! write(&SynthOptions { size: 65, ..Default::default() }, &path, &|_| {})?;
+//! let dem = terrasoar_import::open_file(&path)?;
+//! assert_eq!(dem.info().samples_wide, 65);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! What comes out is for `terrasoar_layout::build`, and for `terrasoar_layout::imagery::drape`.
+//!
 //! [`open`] looks at a file's first bytes, never at its name, and hands it to the one reader that
 //! knows them; only `.hgt` tiles have no signature and are known by extension and size. Opening
 //! reads headers, streaming reads samples. Nothing in a file is trusted: every size it declares is
@@ -85,3 +99,8 @@ fn open_mosaic(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
     }
     Ok(Box::new(hgt::HgtDem::open(paths)?))
 }
+
+/// The program in README.md, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,7 +1,49 @@
 //! The Terrasoar terrain file: elevation data in, error bounds and nested spheres computed, pages out, and a reader of it.
 //!
-//! The way data takes: `terrasoar_import` turns a DEM into a [`dem::DemSource`]; [`build`] computes what refinement needs and writes
-//! the file that FORMAT.md specifies; [`terrain`](read::terrain) opens it. This crate knows bytes and knows no camera.
+//! A terrain file has everything that a view-dependent refinement asks of a vertex in four bytes: height, error bound, radius, in an order in which
+//! a view's vertices lie on few pages of 4 KiB. This crate knows bytes and knows no camera; package `terrasoar` flies.
+//!
+//! # Building and reading
+//!
+//! ```
+//! # #[cfg(feature = "files")]
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! use terrasoar_layout::build::{BuildOptions, build};
+//! use terrasoar_layout::dem::{MemoryDem, SampleType};
+//! use terrasoar_layout::progress::Silent;
+//! use terrasoar_layout::read::terrain::Terrain;
+//!
+//! let dem = MemoryDem::from_fn([65, 65], SampleType::I16, |x, y| f64::from(x * y / 8));
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("slope.iqt");
+//! let header = build(&dem, &path, &BuildOptions::default().spacing_m([30.0, 30.0]), &Silent)?;
+//! assert_eq!(header.grid.samples(), [65, 65]);
+//!
+//! let terrain = Terrain::open(&path)?;
+//! assert_eq!(terrain.height_m(30.0 * 64.0, 30.0 * 64.0)?, Some(512.0));
+//! assert_eq!(terrain.height_m(-1.0, 0.0)?, None, "outside");
+//! # Ok(())
+//! # }
+//! # #[cfg(not(feature = "files"))]
+//! # fn main() {}
+//! ```
+//!
+//! Without the feature `files` nothing of the system is asked for: a terrain is opened by [`Terrain::from_source`](read::terrain::Terrain::from_source) from
+//! [bytes in memory](file::source::MemorySource) or whatever else is a [`Source`](file::source::Source), on any target.
+//!
+//! # The way through the modules
+//!
+//! | to | there is |
+//! |---|---|
+//! | hand elevation data over | [`dem`]: a [`DemSource`](dem::DemSource), which package `terrasoar-import` makes of files |
+//! | make a terrain file | `build` |
+//! | open one, and get from a place to a height or a record | [`read`]: [`terrain`](read::terrain), mapped [`records`](read::records), a [`pool`](read::pool) of pages, and the [`loader`](read::loader) whose threads fill it |
+//! | know where a vertex lies in the file | [`grid`] |
+//! | put a picture on the ground, and read its tiles | [`imagery`] |
+//! | change heights, undo, commit | [`edit`] |
+//! | find out whether a file is sound | `verify` |
+//! | know the bytes | [`file`](mod@file), and FORMAT.md, which is exact |
+//! | say what is wrong, in words | [`LayoutError`], [`Remedy`], [`words`] |
 #![cfg_attr(not(feature = "files"), allow(dead_code, unused_imports, reason = "what writes files uses it"))]
 
 mod bound;
@@ -31,3 +73,8 @@ pub mod words;
 
 pub use error::LayoutError;
 pub use remedy::Remedy;
+
+/// The program in README.md, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

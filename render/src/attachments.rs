@@ -1,6 +1,6 @@
 //! Depth and, where edges are smoothed, the samples: textures that go with a target of some size.
 
-use crate::pipelines::DEPTH_FORMAT;
+use crate::frame::DEPTH_FORMAT;
 
 /// Textures of one size, format and sample count.
 #[derive(Debug)]

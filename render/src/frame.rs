@@ -4,6 +4,9 @@ use crate::gpu::Capabilities;
 use crate::look::Look;
 use terrasoar::view::View;
 
+/// Depth of the picture: 32-bit float, reversed, so that precision is even in the logarithm of distance.
+pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
 /// What a renderer is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -73,7 +76,7 @@ pub struct PassFormat {
 impl PassFormat {
     /// A pass with one sample a pixel and 32-bit depth that is reversed, as this crate's own are.
     pub fn new(colour: wgpu::TextureFormat) -> Self {
-        let depth = crate::pipelines::DEPTH_FORMAT;
+        let depth = DEPTH_FORMAT;
         Self { colour, depth, depth_range: DepthRange::Reversed, samples: 1 }
     }
 

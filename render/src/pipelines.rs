@@ -4,9 +4,6 @@ use crate::frame::PassFormat;
 use crate::look::{Look, Surface};
 use crate::shaders;
 
-/// Depth of the picture: 32-bit float, reversed, so that precision is even in the logarithm of distance.
-pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-
 /// What every pipeline binds.
 pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, visibility, ty| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None };

@@ -1,5 +1,15 @@
 //! Where the engine meets the renderer: all that is seen of a terrain goes through [`scene`].
 //!
+//! | to | there is |
+//! |---|---|
+//! | draw ground that is flown over, into a pass and a depth buffer of its own or of yours | [`scene`] |
+//! | take pictures without a window | [`studio`] |
+//! | choose how much memory and work it may take | [`options`] |
+//! | see a terrain as a whole, or look from a place | [`overview`] |
+//! | show pictures on the ground, and what edits change of them | [`drape`], [`repaint`] |
+//!
+//! The repository's `examples/window` is a program of its own: a window, ground that streams, and a cube that stands on it.
+//!
 //! The engine knows no pixels and the renderer no terrain file; nothing but this module knows both. It owns no window and no
 //! device: the caller brings these and says when a frame is drawn.
 

@@ -183,7 +183,6 @@ pub enum FlightError {
 
 impl FlightError {
     /// What went wrong where a flight was to go.
-    #[cfg(feature = "files")]
     pub(super) fn of_output(error: LayoutError) -> Self {
         match error {
             LayoutError::Io { path, source, .. } => Self::Write { path, source },

@@ -87,7 +87,6 @@ fn is_note_name(name: &str) -> bool {
 }
 
 /// The line for a note, if it would read back as the same note.
-#[cfg(feature = "files")]
 pub(super) fn note_line(name: &str, value: &str) -> Option<String> {
     let line = format!("# {name}: {value}");
     let one_line = line.len() <= MAX_LINE_BYTES && !line.contains(['\n', '\r']);
@@ -95,7 +94,6 @@ pub(super) fn note_line(name: &str, value: &str) -> Option<String> {
 }
 
 /// Appends a frame's line without its end: shortest digits that read back the same.
-#[cfg(feature = "files")]
 pub(super) fn push_frame(line: &mut String, values: &[f64; 8]) -> fmt::Result {
     for (i, value) in values.iter().enumerate() {
         if i > 0 {
@@ -107,7 +105,6 @@ pub(super) fn push_frame(line: &mut String, values: &[f64; 8]) -> fmt::Result {
 }
 
 /// Appends a number: shortest digits that read back the same.
-#[cfg(feature = "files")]
 pub(crate) fn push_number(line: &mut String, value: f64) -> fmt::Result {
     let magnitude = value.abs();
     if magnitude == 0.0 || (1e-6..1e15).contains(&magnitude) {

@@ -6,6 +6,7 @@
 //! Invariants: whatever the engine, the mesh of a view is the same once its pages are at hand; edits are seen by the next update. Cost: the engine's own, and a call through a table a
 //! frame.
 
+#[cfg(feature = "files")]
 mod editing;
 mod engine;
 mod full;
@@ -13,18 +14,21 @@ mod mapped;
 mod options;
 mod samples;
 mod streamed;
+#[cfg(feature = "files")]
 mod ticket;
 
 pub use engine::Refined;
 pub use mapped::PictureEngine;
 pub use options::StreamOptions;
 pub use samples::HeightTile;
+#[cfg(feature = "files")]
 pub use ticket::{CommitFailed, CommitTicket, Saved};
 
 use crate::refine::Culling;
 use crate::refine::kinetic::{Budget, Patch};
 use crate::stream::{GroundPatch, HeightAt};
 use crate::view::View;
+#[cfg(feature = "files")]
 use editing::Editing;
 use engine::MeshEngine;
 use glam::DVec3;
@@ -44,6 +48,7 @@ pub struct Ground<'t> {
     /// Views of the last two updates.
     views: [Option<View>; 2],
     /// The right to edit, from the first edit on.
+    #[cfg(feature = "files")]
     editing: Option<Box<Editing>>,
     /// Generation of the file that is shown while nobody edits.
     seen_generation: u32,
@@ -109,6 +114,7 @@ impl<'t> Ground<'t> {
             seen_generation,
             step: MeshStep::first(),
             views: [None; 2],
+            #[cfg(feature = "files")]
             editing: None,
             edited: VecDeque::new(),
             edited_before: 0,
@@ -134,6 +140,7 @@ impl<'t> Ground<'t> {
 
     /// Brings the mesh to a view with what is at hand. Streamed ground waits for nothing but its first view.
     pub fn update(&mut self, view: &View) -> Refined {
+        #[cfg(feature = "files")]
         self.settle();
         let refined = self.engine.update(view);
         self.step.updates += 1;

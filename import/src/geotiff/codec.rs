@@ -12,27 +12,9 @@ use flate2::{Decompress, FlushDecompress, Status};
 use weezl::{BitOrder, LzwStatus};
 
 use super::chunks::Compression;
+use super::failure::{Failure, damaged};
 use super::zstd_codec;
 use super::zstd_frame;
-
-/// Why a chunk does not unpack.
-#[derive(Debug)]
-pub(super) enum Failure {
-    /// The packed bytes cannot be read.
-    Io(std::io::Error),
-    /// They are wrong, as the words say.
-    Damaged(String),
-}
-
-impl From<std::io::Error> for Failure {
-    fn from(error: std::io::Error) -> Self {
-        Self::Io(error)
-    }
-}
-
-pub(super) fn damaged(words: &str) -> Failure {
-    Failure::Damaged(words.to_owned())
-}
 
 /// A chunk on its way from `input`, which ends where the chunk does.
 pub(super) struct Unpacker<R> {

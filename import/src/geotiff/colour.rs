@@ -7,7 +7,7 @@
 //! are not applied.
 
 use super::colour_table::{Packing, Paint, Table};
-use super::{codec, geokeys, predictor, tags};
+use super::{codec, failure, geokeys, predictor, tags};
 use crate::guard::guard;
 use crate::input;
 use crate::jpeg_frame::JpegFrame;
@@ -192,8 +192,8 @@ impl TiffImage {
                     let whole = table.grid.chunk_width as usize * table.grid.chunk_height as usize * pixel;
                     codec::unpack(*compression, &scratch.packed, &mut scratch.bytes, whole).map_err(
                         |failure| match failure {
-                            codec::Failure::Damaged(problem) => damaged(problem),
-                            codec::Failure::Io(source) => {
+                            failure::Failure::Damaged(problem) => damaged(problem),
+                            failure::Failure::Io(source) => {
                                 LayoutError::io(&self.path, "cannot read the TIFF file", source)
                             }
                         },

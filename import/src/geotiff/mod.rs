@@ -15,6 +15,7 @@ mod codec;
 mod colour;
 mod colour_table;
 mod convert;
+mod failure;
 mod geokeys;
 mod listing;
 mod metadata;

@@ -3,7 +3,7 @@
 use std::io::BufRead;
 use zstd::stream::raw::{DParameter, Decoder, InBuffer, Operation, OutBuffer};
 
-use super::codec::{Failure, damaged};
+use super::failure::{Failure, damaged};
 
 /// A stream of frames on its way.
 pub(super) struct Stream {

@@ -6,7 +6,7 @@ use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 use std::io::{self, BufRead, Read};
 
-use super::codec::{Failure, damaged};
+use super::failure::{Failure, damaged};
 
 /// A stream of frames on its way.
 pub(super) struct Stream {

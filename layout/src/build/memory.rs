@@ -2,7 +2,7 @@
 //!
 //! An account of what grows with the terrain, somewhat on the safe side; `benches/runs` has what was measured.
 
-use super::BuildOptions;
+use super::options::{BuildOptions, LARGEST_TILE};
 use crate::dem::SampleType;
 use crate::error::LayoutError;
 use crate::grid::Grid;
@@ -13,8 +13,6 @@ use crate::remedy::Remedy;
 const MIB: u64 = 1 << 20;
 /// Memory kept aside for decoders, threads and the program itself.
 const RESERVED_BYTES: u64 = 24 * MIB;
-/// Largest tile: beyond this a tile no longer fits a core's cache.
-pub(super) const LARGEST_TILE: u32 = 256;
 
 /// How the budget is spent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

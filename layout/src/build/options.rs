@@ -1,8 +1,10 @@
 //! What to build: plain values.
 
-use super::memory::LARGEST_TILE;
 use crate::file::header::ErrorKind;
 use crate::grid::record::RecordKind;
+
+/// Largest tile: beyond this a tile no longer fits a core's cache.
+pub(super) const LARGEST_TILE: u32 = 256;
 
 /// What to build.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use super::pool::PagePool;
 use super::records::{Records, Slices};
 use super::terrain::Terrain;
 use crate::error::LayoutError;
-use crate::grid::record::{Compact, Exact8, Exact16, RecordKind};
+use crate::grid::record::{AnyCodec, Compact, Exact8, Exact16};
 
 /// One thing for whichever kind of records a terrain has.
 #[derive(Debug, Clone)]
@@ -42,10 +42,10 @@ impl Terrain {
             first: self.source().bytes()?,
             behind: self.source().bytes_behind().unwrap_or_default(),
         };
-        Some(match self.codec() {
-            ByKind::Compact(codec) => ByKind::Compact(Records::new(self, bytes, codec)),
-            ByKind::Exact8(codec) => ByKind::Exact8(Records::new(self, bytes, codec)),
-            ByKind::Exact16(codec) => ByKind::Exact16(Records::new(self, bytes, codec)),
+        Some(match self.codec().clone() {
+            AnyCodec::Compact(codec) => ByKind::Compact(Records::new(self, bytes, codec)),
+            AnyCodec::Exact8(codec) => ByKind::Exact8(Records::new(self, bytes, codec)),
+            AnyCodec::Exact16(codec) => ByKind::Exact16(Records::new(self, bytes, codec)),
         })
     }
 
@@ -54,19 +54,10 @@ impl Terrain {
     /// # Errors
     /// As [`PagePool::new`].
     pub fn pool(&self, cache_bytes: u64) -> Result<AnyPool, LayoutError> {
-        Ok(match self.codec() {
-            ByKind::Compact(codec) => ByKind::Compact(PagePool::new(self, self.shape(codec), cache_bytes)?),
-            ByKind::Exact8(codec) => ByKind::Exact8(PagePool::new(self, self.shape(codec), cache_bytes)?),
-            ByKind::Exact16(codec) => ByKind::Exact16(PagePool::new(self, self.shape(codec), cache_bytes)?),
+        Ok(match self.codec().clone() {
+            AnyCodec::Compact(codec) => ByKind::Compact(PagePool::new(self, self.shape(codec), cache_bytes)?),
+            AnyCodec::Exact8(codec) => ByKind::Exact8(PagePool::new(self, self.shape(codec), cache_bytes)?),
+            AnyCodec::Exact16(codec) => ByKind::Exact16(PagePool::new(self, self.shape(codec), cache_bytes)?),
         })
-    }
-
-    fn codec(&self) -> ByKind<Compact, Exact8, Exact16> {
-        let (grid, scale) = (self.grid(), &self.header().scale);
-        match self.header().record_kind {
-            RecordKind::Compact => ByKind::Compact(Compact::new(grid, scale)),
-            RecordKind::Exact8 => ByKind::Exact8(Exact8::new(grid, scale)),
-            RecordKind::Exact16 => ByKind::Exact16(Exact16::new(grid, scale)),
-        }
     }
 }

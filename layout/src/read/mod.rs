@@ -3,6 +3,7 @@
 //! Engines are written for [`store`], which is all of these.
 
 pub mod edited;
+pub mod heights;
 pub mod kinds;
 #[cfg(feature = "files")]
 pub(crate) mod layers;

@@ -17,7 +17,7 @@ use crate::file::source::{MapSource, PreadSource};
 use crate::file::structure::read_growing;
 use crate::file::structure::{read_directory, read_structure};
 use crate::grid::order::slot_of;
-use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, Vertex};
+use crate::grid::record::{AnyCodec, Vertex};
 use crate::grid::{Grid, GridPoint};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -30,6 +30,7 @@ pub struct Terrain {
     entries: Vec<Entry>,
     /// Page of each logical page, counted from the inert page, which absent ones read as. Made when records are first asked for.
     pages: OnceLock<Vec<u32>>,
+    codec: OnceLock<Box<AnyCodec>>,
     /// Which opened terrain of this process it is.
     instance: u64,
 }
@@ -88,7 +89,7 @@ impl Terrain {
     pub(crate) fn of(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Self {
         static INSTANCES: AtomicU64 = AtomicU64::new(0);
         let instance = INSTANCES.fetch_add(1, Ordering::Relaxed);
-        Self { source, header, entries, pages: OnceLock::new(), instance }
+        Self { source, header, entries, pages: OnceLock::new(), codec: OnceLock::new(), instance }
     }
 
     /// Opens any source.
@@ -208,43 +209,15 @@ impl Terrain {
         let page = self.checked_page(slot / per_page)?;
         let at = (slot % per_page) as usize * self.header.record_kind.bytes();
         let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };
-        let (grid, scale) = (self.grid(), &self.header.scale);
-        Ok(match self.header.record_kind {
-            RecordKind::Compact => Compact::new(grid, scale).decode(Compact::read(&page[at..]), level),
-            RecordKind::Exact8 => Exact8::new(grid, scale).decode(Exact8::read(&page[at..]), level),
-            RecordKind::Exact16 => Exact16::new(grid, scale).decode(Exact16::read(&page[at..]), level),
-        })
+        Ok(self.codec().decode(&page[at..], level))
     }
 
-    /// Height in metres at a horizontal position in metres east and north of the south-west sample, interpolated
-    /// bilinearly between the four samples around it. `Ok(None)` outside the data or where one of them is void.
-    ///
-    /// # Errors
-    /// As [`Terrain::checked_page`].
-    pub fn height_m(&self, east_m: f64, north_m: f64) -> Result<Option<f64>, LayoutError> {
-        let [dx, dy] = self.grid().spacing_m();
-        let [wide, high] = self.grid().samples();
-        let (gx, gy) = (snap(east_m / dx), snap(north_m / dy));
-        let (last_x, last_y) = (f64::from(wide - 1), f64::from(high - 1));
-        if !((0.0..=last_x).contains(&gx) && (0.0..=last_y).contains(&gy)) {
-            return Ok(None);
-        }
-        let (x0, y0) = (gx.floor() as u32, gy.floor() as u32);
-        let (fx, fy) = (gx - f64::from(x0), gy - f64::from(y0));
-        let mut height = 0.0;
-        for (x, wx) in [(x0, 1.0 - fx), (x0 + 1, fx)] {
-            for (y, wy) in [(y0, 1.0 - fy), (y0 + 1, fy)] {
-                // A sample without weight may lie outside or be void.
-                if wx * wy > 0.0 {
-                    let vertex = self.checked_vertex(GridPoint::new(x, y))?;
-                    if vertex.class.is_void() {
-                        return Ok(None);
-                    }
-                    height += vertex.height_m * wx * wy;
-                }
-            }
-        }
-        Ok(Some(height))
+    /// From bytes to a vertex. Its tables are made when they are first asked for.
+    pub(crate) fn codec(&self) -> &AnyCodec {
+        self.codec.get_or_init(|| {
+            let Header { grid, scale, record_kind, .. } = &self.header;
+            Box::new(AnyCodec::new(*record_kind, grid, scale))
+        })
     }
 
     pub(crate) fn shape<C>(&self, codec: C) -> RecordShape<C> {
@@ -259,10 +232,4 @@ fn open_settled(path: &Path) -> Result<(PreadSource, Header, Vec<Entry>), Layout
     let mut file = PreadSource::open(path)?;
     let (header, entries) = read_growing(&mut file)?;
     Ok((file, header, entries))
-}
-
-/// Positions a hair off a sample, from spacings that are not exact in binary, mean the sample.
-fn snap(v: f64) -> f64 {
-    let near = v.round();
-    if (v - near).abs() < 1e-9 * near.abs().max(1.0) { near } else { v }
 }

@@ -4,9 +4,11 @@
 //! numbers holds for the records. A codec is a few kilobytes of tables and is copied into whoever decodes.
 //! Cost: about two table lookups a vertex for compact records.
 
+mod any;
 mod compact;
 mod exact;
 
+pub(crate) use any::AnyCodec;
 pub use compact::Compact;
 pub use exact::{Exact8, Exact16};
 

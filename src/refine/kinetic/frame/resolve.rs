@@ -17,7 +17,6 @@ use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::read::store::RecordStore;
 
 /// From so many tests on they are shared among threads.
-#[cfg(feature = "files")]
 const PARALLEL: usize = 4096;
 /// How many splits or merges ahead memory is asked for what: see [`Kinetic::fetch`].
 const FETCH_AHEAD: [(u32, usize); 3] = [(2, 6), (1, 4), (0, 2)];

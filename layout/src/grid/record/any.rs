@@ -1,0 +1,31 @@
+//! The codec of a file, of whichever kind.
+
+use super::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, Vertex};
+use crate::grid::Grid;
+
+/// One of the three codecs.
+#[derive(Debug, Clone)]
+pub(crate) enum AnyCodec {
+    Compact(Compact),
+    Exact8(Exact8),
+    Exact16(Exact16),
+}
+
+impl AnyCodec {
+    pub(crate) fn new(kind: RecordKind, grid: &Grid, scale: &RecordScale) -> Self {
+        match kind {
+            RecordKind::Compact => Self::Compact(Compact::new(grid, scale)),
+            RecordKind::Exact8 => Self::Exact8(Exact8::new(grid, scale)),
+            RecordKind::Exact16 => Self::Exact16(Exact16::new(grid, scale)),
+        }
+    }
+
+    /// The vertex whose record begins `bytes`, of a level (0 for corners).
+    pub(crate) fn decode(&self, bytes: &[u8], level: u32) -> Vertex {
+        match self {
+            Self::Compact(codec) => codec.decode(Compact::read(bytes), level),
+            Self::Exact8(codec) => codec.decode(Exact8::read(bytes), level),
+            Self::Exact16(codec) => codec.decode(Exact16::read(bytes), level),
+        }
+    }
+}

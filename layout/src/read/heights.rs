@@ -1,0 +1,201 @@
+//! Heights at places: bilinear between the four samples around, of checked pages, few of which are kept.
+//!
+//! A place needs up to four pages, for neighbours of different levels lie apart. [`Heights`] keeps pages by number, so places that come near each other cost a page once. [`heights_m`] puts any
+//! number of places into such an order first and shares them out to threads. Cost: some tens of nanoseconds a sample whose page is kept; else a read of 4 KiB and its checksum.
+
+use super::terrain::Terrain;
+use crate::error::LayoutError;
+use crate::file::bytes::{PAGE_BYTES, Page};
+use crate::grid::GridPoint;
+use crate::grid::order::slot_of;
+use crate::grid::record::Vertex;
+
+/// Pages kept by default: 4 MiB.
+const PAGES: usize = 1024;
+
+/// Heights of one terrain.
+#[derive(Debug)]
+pub struct Heights<'t> {
+    terrain: &'t Terrain,
+    /// A page by its number modulo their count, a power of two.
+    kept: Vec<Option<(u64, Box<Page>)>>,
+}
+
+impl<'t> Heights<'t> {
+    /// Heights of `terrain`, with 4 MiB for pages.
+    pub fn new(terrain: &'t Terrain) -> Self {
+        Self::with_pages(terrain, PAGES)
+    }
+
+    /// As [`Heights::new`], with room for so many pages of 4 KiB, rounded up to a power of two.
+    pub fn with_pages(terrain: &'t Terrain, pages: usize) -> Self {
+        let needed = pages.min(terrain.entries().len()).max(1).next_power_of_two();
+        Self { terrain, kept: (0..needed).map(|_| None).collect() }
+    }
+
+    /// Height in metres at a place in metres east and north of the south-west sample, interpolated bilinearly between the four samples around
+    /// it. `Ok(None)` outside the data or where one of them is void.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`].
+    pub fn height_m(&mut self, east_m: f64, north_m: f64) -> Result<Option<f64>, LayoutError> {
+        let Some(([x0, y0], [fx, fy])) = cell(self.terrain, [east_m, north_m]) else { return Ok(None) };
+        let mut height = 0.0;
+        for (x, wx) in [(x0, 1.0 - fx), (x0 + 1, fx)] {
+            for (y, wy) in [(y0, 1.0 - fy), (y0 + 1, fy)] {
+                // A sample without weight may lie outside or be void.
+                if wx * wy > 0.0 {
+                    let vertex = self.vertex(GridPoint::new(x, y))?;
+                    if vertex.class.is_void() {
+                        return Ok(None);
+                    }
+                    height += vertex.height_m * wx * wy;
+                }
+            }
+        }
+        Ok(Some(height))
+    }
+
+    /// The vertex at a grid point of the square.
+    fn vertex(&mut self, p: GridPoint) -> Result<Vertex, LayoutError> {
+        let (terrain, grid) = (self.terrain, self.terrain.grid());
+        let slot = slot_of(grid.k(), p);
+        let per_page = terrain.header().records_per_page();
+        let (logical, at) = (slot / per_page, (slot % per_page) as usize * (PAGE_BYTES / per_page as usize));
+        let place = logical as usize & (self.kept.len() - 1);
+        let page = match &mut self.kept[place] {
+            Some((kept, page)) if *kept == logical => page,
+            other => &mut other.insert((logical, terrain.checked_page(logical)?)).1,
+        };
+        let level = if grid.is_corner(p) { 0 } else { grid.level(p) };
+        Ok(terrain.codec().decode(&page[at..], level))
+    }
+}
+
+/// South-west sample of the cell around a place in metres, and the place within the cell; none outside the data.
+fn cell(terrain: &Terrain, place_m: [f64; 2]) -> Option<([u32; 2], [f64; 2])> {
+    let (spacing_m, samples) = (terrain.grid().spacing_m(), terrain.grid().samples());
+    let at = [0, 1].map(|axis| snap(place_m[axis] / spacing_m[axis]));
+    let is_inside = |axis: usize| (0.0..=f64::from(samples[axis] - 1)).contains(&at[axis]);
+    (is_inside(0) && is_inside(1)).then(|| (at.map(|v| v.floor() as u32), at.map(|v| v - v.floor())))
+}
+
+/// Places a hair off a sample, from spacings that are not exact in binary, mean the sample.
+fn snap(v: f64) -> f64 {
+    let near = v.round();
+    if (v - near).abs() < 1e-9 * near.abs().max(1.0) { near } else { v }
+}
+
+impl Terrain {
+    /// Height in metres at one place, as [`Heights::height_m`] gives it for many: this reads its pages anew.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`].
+    pub fn height_m(&self, east_m: f64, north_m: f64) -> Result<Option<f64>, LayoutError> {
+        Heights::with_pages(self, 4).height_m(east_m, north_m)
+    }
+}
+
+/// Heights at many places, in metres east and north of the south-west sample, in the order of the places: as [`Heights::height_m`] gives them. Reads on
+/// the current rayon pool, with at most `memory_bytes` for pages, and 12 bytes a place.
+///
+/// # Errors
+/// As [`Terrain::checked_page`].
+#[cfg(feature = "files")]
+pub fn heights_m(
+    terrain: &Terrain,
+    places_m: &[[f64; 2]],
+    memory_bytes: u64,
+) -> Result<Vec<Option<f64>>, LayoutError> {
+    use rayon::prelude::*;
+    // Neighbours come one after the other: places by the bits of their cell, column and row in turn.
+    let order_of =
+        |place_m: &[f64; 2]| cell(terrain, *place_m).map_or(u64::MAX, |([x, y], _)| interleaved(x, y));
+    let mut order: Vec<(u64, u32)> =
+        places_m.par_iter().map(order_of).zip((0..places_m.len() as u32).into_par_iter()).collect();
+    order.par_sort_unstable();
+    let threads = rayon::current_num_threads();
+    let pages = (memory_bytes / PAGE_BYTES as u64 / threads as u64).try_into().unwrap_or(usize::MAX);
+    let share = order.len().div_ceil(4 * threads).max(1);
+    let found: Vec<Vec<Option<f64>>> = order
+        .par_chunks(share)
+        .map(|share| {
+            let mut heights = Heights::with_pages(terrain, pages);
+            let places = share.iter().map(|(_, i)| places_m[*i as usize]);
+            places.map(|[east_m, north_m]| heights.height_m(east_m, north_m)).collect()
+        })
+        .collect::<Result<_, LayoutError>>()?;
+    let mut heights = vec![None; places_m.len()];
+    order.iter().zip(found.iter().flatten()).for_each(|((_, i), height)| heights[*i as usize] = *height);
+    Ok(heights)
+}
+
+/// The bits of two numbers in turn.
+#[cfg(feature = "files")]
+fn interleaved(x: u32, y: u32) -> u64 {
+    let spread = |v: u32| {
+        let mut v = u64::from(v);
+        for (shift, mask) in [
+            (16, 0x0000_ffff_0000_ffff),
+            (8, 0x00ff_00ff_00ff_00ff),
+            (4, 0x0f0f_0f0f_0f0f_0f0f),
+            (2, 0x3333_3333_3333_3333),
+            (1, 0x5555_5555_5555_5555_u64),
+        ] {
+            v = (v | v << shift) & mask;
+        }
+        v
+    };
+    spread(x) | spread(y) << 1
+}
+
+#[cfg(all(test, feature = "files"))]
+mod tests {
+    use super::*;
+    use crate::build::{BuildOptions, build};
+    use crate::dem::{MemoryDem, SampleType};
+    use crate::mix::Random;
+    use crate::progress::Silent;
+
+    /// Whatever the order, the threads and the memory: each height is that of its place alone, and that is the mean of the samples around.
+    #[test]
+    fn many_heights_are_those_of_each() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.iqt");
+        let sample = |x: u32, y: u32| {
+            if x / 20 == 3 && y > 90 { f64::NAN } else { f64::from(x * 31 % 97 + y * 17 % 89) }
+        };
+        for kind in [SampleType::I16, SampleType::F32, SampleType::F64] {
+            let dem = MemoryDem::from_fn([150, 120], kind, sample);
+            build(&dem, &path, &BuildOptions::default().spacing_m([10.0, 7.0]), &Silent).unwrap();
+            let terrain = Terrain::open_unmapped(&path).unwrap();
+            let mut random = Random::new(4);
+            let mut at = |extent: f64| (random.below(1_000_000) as f64 / 1e6 * 1.1 - 0.05) * extent;
+            let mut places: Vec<[f64; 2]> = (0..5000).map(|_| [at(1490.0), at(833.0)]).collect();
+            places.extend([[0.0, 0.0], [1490.0, 833.0], [1490.0, 0.0], [f64::NAN, 3.0], [640.0, 700.0]]);
+            let many = heights_m(&terrain, &places, 0).unwrap();
+            assert!(many == heights_m(&terrain, &places, 1 << 30).unwrap());
+            let mut kept = Heights::new(&terrain);
+            for ([x, y], height) in places.iter().zip(&many) {
+                assert_eq!(*height, terrain.height_m(*x, *y).unwrap());
+                assert_eq!(*height, kept.height_m(*x, *y).unwrap());
+                let (gx, gy) = (x / 10.0, y / 7.0);
+                let is_inside = (0.0..=149.0).contains(&gx) && (0.0..=119.0).contains(&gy);
+                let (i, j) = (gx.floor().min(148.0), gy.floor().min(118.0));
+                let (fx, fy) = (gx - i, gy - j);
+                let s = |u: f64, v: f64| sample((i + u) as u32, (j + v) as u32);
+                let mean = s(0.0, 0.0) * (1.0 - fx) * (1.0 - fy)
+                    + s(1.0, 0.0) * fx * (1.0 - fy)
+                    + s(0.0, 1.0) * (1.0 - fx) * fy
+                    + s(1.0, 1.0) * fx * fy;
+                match height {
+                    Some(height) => {
+                        assert!(is_inside && (height - mean).abs() < 1e-6, "{x}, {y}: {height}, {mean}")
+                    }
+                    None => assert!(!is_inside || mean.is_nan(), "{x}, {y}"),
+                }
+            }
+            assert!(many.iter().flatten().count() > 3000 && many.iter().any(Option::is_none));
+        }
+    }
+}
