@@ -4,7 +4,7 @@
 //! Tiles at the right and lower edge are stored whole, strips at the lower edge only as far as the image. Nothing is held but the shape: places stay in the file
 //! ([`super::listing`]).
 
-use super::listing::{Listing, Places};
+use super::listing::{Listing, Place, Places};
 use super::tags::{self, Directory, TiffFile};
 use std::fs::File;
 use std::path::Path;
@@ -69,11 +69,9 @@ impl ChunkGrid {
             (tags::STRIP_OFFSETS, tags::STRIP_BYTE_COUNTS)
         };
         let listed = [file.count(directory, offsets), file.count(directory, counts)];
-        let columns = (file.column(directory, offsets)?, file.column(directory, counts)?);
-        let listing = match columns {
-            (Some(offsets), Some(counts)) => Listing::new(offsets, counts).filter(|l| l.count() == wanted),
-            _ => None,
-        };
+        let (offsets, counts) = (file.column(directory, offsets)?, file.column(directory, counts)?);
+        let listing = offsets.and_then(|offsets| Listing::new(offsets, counts, file.bytes()));
+        let listing = listing.filter(|listing| listing.count() == wanted);
         let Some(listing) = listing else {
             return Err(file.damaged(format!(
                 "{wanted} chunks make up the image, but {} places and {} lengths are listed; fetch the file again",
@@ -94,6 +92,12 @@ impl ChunkGrid {
     /// Number of chunks, cut ones counted apart.
     pub(super) fn count(&self) -> u64 {
         u64::from(self.across) * u64::from(self.height.div_ceil(self.chunk_height))
+    }
+
+    /// Says how many bytes a chunk unpacks to at most: that bounds how long one can be whose length the file does not state. What is worth packing becomes no longer by it, but for
+    /// a head and a sum.
+    pub(super) fn set_decoded_bytes(&mut self, decoded: u64) {
+        self.listing.set_unstated_bytes(decoded.saturating_mul(2).saturating_add(64));
     }
 
     /// What reads places of chunks from `file`.
@@ -129,7 +133,7 @@ impl ChunkGrid {
         let mut stored = Stored::default();
         let (mut packed_bytes, mut unpacked_bytes) = (0u64, 0u64);
         let mut next = 0;
-        while let Some((chunk, at, packed)) = places.next(next)? {
+        while let Some(Place { chunk, at, length: packed, is_stated }) = places.next(next)? {
             next = chunk + 1;
             let samples = unpacked(chunk);
             let length = if is_raw { samples } else { packed };
@@ -138,7 +142,9 @@ impl ChunkGrid {
             stored.longest = stored.longest.max(length);
             let Window { width, height, .. } = self.window(chunk);
             stored.samples += u64::from(width) * u64::from(height);
-            packed_bytes = packed_bytes.saturating_add(length);
+            if is_raw || is_stated {
+                packed_bytes = packed_bytes.saturating_add(length);
+            }
             unpacked_bytes = unpacked_bytes.saturating_add(samples);
         }
         // Equal chunks may be stored once; but then they are short. All of them long and in one place would make a small file endless.

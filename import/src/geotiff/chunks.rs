@@ -120,6 +120,7 @@ impl Chunks {
             largest_window: 0,
             stored_samples: 0,
         };
+        this.grid.set_decoded_bytes(this.decoded_bytes());
         this.check_places(file)?;
         Ok(this)
     }

@@ -134,6 +134,7 @@ impl Table {
             differences: predictor == 2 && !is_raw,
             notes,
         };
+        table.grid.set_decoded_bytes(table.chunk_bytes());
         table.longest = table.check(file)?;
         if is_raw {
             table.cut();

@@ -42,6 +42,12 @@ pub(crate) fn claimed(number: u16, kind: u16, count: u64, at: u64) -> Tag {
     Tag { number, kind, count, values: Values::At(at) }
 }
 
+impl Tag {
+    pub(crate) fn number(&self) -> u16 {
+        self.number
+    }
+}
+
 /// Where the data lie that a file is given.
 pub(crate) const DATA_AT: u32 = 16;
 
