@@ -7,12 +7,15 @@
 //! once and pushed once.
 
 use crate::error::LayoutError;
+use crate::remedy::Remedy;
 
 /// Storage type of the samples of a DEM, as its file declares it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SampleType {
     /// Unsigned 8-bit integers.
     U8,
+    /// Signed 8-bit integers.
+    I8,
     /// Unsigned 16-bit integers.
     U16,
     /// Signed 16-bit integers.
@@ -21,6 +24,12 @@ pub enum SampleType {
     U32,
     /// Signed 32-bit integers.
     I32,
+    /// Unsigned 64-bit integers; beyond 2^53 they arrive as the nearest double.
+    U64,
+    /// Signed 64-bit integers; beyond 2^53 they arrive as the nearest double.
+    I64,
+    /// IEEE half precision.
+    F16,
     /// IEEE single precision.
     F32,
     /// IEEE double precision.
@@ -30,12 +39,12 @@ pub enum SampleType {
 impl SampleType {
     /// Whether every value of the type is a whole number.
     pub fn is_integer(self) -> bool {
-        !matches!(self, Self::F32 | Self::F64)
+        !matches!(self, Self::F16 | Self::F32 | Self::F64)
     }
 
     /// Whether every value of the type is exactly representable as `f32`.
     pub fn fits_f32(self) -> bool {
-        matches!(self, Self::U8 | Self::U16 | Self::I16 | Self::F32)
+        matches!(self, Self::U8 | Self::I8 | Self::U16 | Self::I16 | Self::F16 | Self::F32)
     }
 }
 
@@ -69,6 +78,29 @@ pub struct Georeference {
     pub pixel_to_crs: Option<[f64; 6]>,
     /// Radius of the body's equator in metres when the file names one other than the Earth's.
     pub body_radius_m: Option<f64>,
+}
+
+/// What may make the ground wrong, in words for the person who asked for it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// What was seen, and what was assumed.
+    pub words: String,
+    /// What to ask for if that is wrong, and with which value: `(Remedy::Nodata, "-9999")`.
+    pub mended_by: Option<(Remedy, String)>,
+}
+
+impl Warning {
+    /// A warning that nothing on the command line mends.
+    pub fn new(words: impl Into<String>) -> Self {
+        Self { words: words.into(), mended_by: None }
+    }
+
+    /// The warning, and what mends it.
+    #[must_use]
+    pub fn mended_by(mut self, remedy: Remedy, value: impl Into<String>) -> Self {
+        self.mended_by = Some((remedy, value.into()));
+        self
+    }
 }
 
 /// What a DEM file says about itself.

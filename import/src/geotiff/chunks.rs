@@ -58,6 +58,8 @@ pub(super) enum Predictor {
 pub(super) struct Chunks {
     pub(super) grid: ChunkGrid,
     pub(super) sample_type: SampleType,
+    /// Samples of a pixel that lie side by side.
+    pub(super) bands: u64,
     pub(super) big_endian: bool,
     pub(super) compression: Compression,
     pub(super) predictor: Predictor,
@@ -67,6 +69,8 @@ pub(super) struct Chunks {
     pub(super) stored_samples: u64,
 }
 
+/// Bands of an image, at most.
+const MAX_BANDS: u64 = 4096;
 /// Longest row of a chunk: what is unpacked at once at least.
 const MAX_ROW_BYTES: u64 = 64 << 20;
 
@@ -80,17 +84,20 @@ impl Chunks {
             return Err(LayoutError::unsupported(file.path(), problem));
         }
         let bands = file.number(directory, tags::SAMPLES_PER_PIXEL)?.unwrap_or(1);
-        let photometric = file.number(directory, tags::PHOTOMETRIC)?.unwrap_or(1);
-        if bands != 1 || photometric > 1 {
-            let what = match photometric {
-                3 => "a palette picture".to_owned(),
-                2 | 5 | 6 | 8 => "a colour picture".to_owned(),
-                _ => format!("an image of {bands} bands"),
-            };
+        if !(1..=MAX_BANDS).contains(&bands) {
             return Err(LayoutError::unsupported(
                 file.path(),
                 format!(
-                    "this is {what}, and heights are one grey band; if one of its bands holds them, extract it: \
+                    "an image of {bands} bands is not read, and of up to {MAX_BANDS} is; extract the one with the heights: \
+                     gdal_translate -b 1 INPUT output.tif"
+                ),
+            ));
+        }
+        if bands > 1 && file.number(directory, tags::PLANAR_CONFIGURATION)? == Some(2) {
+            return Err(LayoutError::unsupported(
+                file.path(),
+                format!(
+                    "its {bands} bands lie one after the other, which is not read; extract the one with the heights: \
                      gdal_translate -b 1 INPUT output.tif"
                 ),
             ));
@@ -102,7 +109,7 @@ impl Chunks {
             _ if compression == Compression::None => Predictor::None,
             (1, _) => Predictor::None,
             (2, _) => Predictor::Horizontal,
-            (3, SampleType::F32 | SampleType::F64) => Predictor::Floating,
+            (3, SampleType::F16 | SampleType::F32 | SampleType::F64) => Predictor::Floating,
             _ => {
                 return Err(file.damaged(format!(
                     "predictor {predictor} is unknown or does not go with its samples; fetch the file again, or write \
@@ -114,6 +121,7 @@ impl Chunks {
         let mut this = Self {
             grid,
             sample_type,
+            bands,
             big_endian: file.is_big_endian(),
             compression,
             predictor,
@@ -183,38 +191,47 @@ impl Chunks {
     /// Bytes of a sample in the file.
     pub(super) fn sample_bytes(&self) -> u64 {
         match self.sample_type {
-            SampleType::U8 => 1,
-            SampleType::U16 | SampleType::I16 => 2,
+            SampleType::U8 | SampleType::I8 => 1,
+            SampleType::U16 | SampleType::I16 | SampleType::F16 => 2,
             SampleType::U32 | SampleType::I32 | SampleType::F32 => 4,
-            SampleType::F64 => 8,
+            SampleType::U64 | SampleType::I64 | SampleType::F64 => 8,
         }
+    }
+
+    /// Bytes of the samples that lie side by side for a pixel.
+    pub(super) fn pixel_bytes(&self) -> u64 {
+        self.bands * self.sample_bytes()
     }
 
     /// Bytes of a row of a chunk.
     pub(super) fn stride(&self) -> u64 {
-        u64::from(self.grid.chunk_width) * self.sample_bytes()
+        u64::from(self.grid.chunk_width) * self.pixel_bytes()
     }
 
     /// Bytes of a whole chunk when unpacked.
     pub(super) fn decoded_bytes(&self) -> u64 {
         (u64::from(self.grid.chunk_width) * u64::from(self.grid.chunk_height))
-            .saturating_mul(self.sample_bytes())
+            .saturating_mul(self.pixel_bytes())
     }
 
     /// Bytes that must be unpacked for the samples of a chunk that lie in the image.
     pub(super) fn stored_bytes(&self, chunk: u64) -> u64 {
         let rows = u64::from(self.grid.window(chunk).height);
-        (u64::from(self.grid.chunk_width) * rows).saturating_mul(self.sample_bytes())
+        (u64::from(self.grid.chunk_width) * rows).saturating_mul(self.pixel_bytes())
     }
 
     /// "tiles of 512 x 512 uint16".
     pub(super) fn describe(&self) -> String {
         let kind = match self.sample_type {
             SampleType::U8 => "uint8",
+            SampleType::I8 => "int8",
             SampleType::U16 => "uint16",
             SampleType::I16 => "int16",
             SampleType::U32 => "uint32",
             SampleType::I32 => "int32",
+            SampleType::U64 => "uint64",
+            SampleType::I64 => "int64",
+            SampleType::F16 => "float16",
             SampleType::F32 => "float32",
             SampleType::F64 => "float64",
         };
@@ -228,10 +245,14 @@ fn sample_type(file: &mut TiffFile, directory: &Directory) -> Result<SampleType,
     let format = file.number(directory, tags::SAMPLE_FORMAT)?.unwrap_or(1);
     Ok(match (format, bits) {
         (1, 8) => SampleType::U8,
+        (2, 8) => SampleType::I8,
         (1, 16) => SampleType::U16,
         (2, 16) => SampleType::I16,
         (1, 32) => SampleType::U32,
         (2, 32) => SampleType::I32,
+        (1, 64) => SampleType::U64,
+        (2, 64) => SampleType::I64,
+        (3, 16) => SampleType::F16,
         (3, 32) => SampleType::F32,
         (3, 64) => SampleType::F64,
         _ => {
@@ -245,7 +266,7 @@ fn sample_type(file: &mut TiffFile, directory: &Directory) -> Result<SampleType,
             return Err(LayoutError::unsupported(
                 file.path(),
                 format!(
-                    "{bits}-bit {kind} samples are not read (uint8, int16, uint16, int32, uint32, float32 and float64 are); \
+                    "{bits}-bit {kind} samples are not read (whole numbers of 8, 16, 32 and 64 bits and real ones of 16, 32 and 64 are); \
                      convert them: gdal_translate -ot Float32 INPUT output.tif"
                 ),
             ));

@@ -8,6 +8,7 @@
 
 use super::colour_table::{Packing, Paint, Table};
 use super::{codec, geokeys, predictor, tags};
+use crate::crs::georeference;
 use crate::guard::guard;
 use crate::input;
 use crate::jpeg_frame::JpegFrame;
@@ -39,7 +40,8 @@ impl TiffImage {
         let mut file = tags::TiffFile::open(path)?;
         let directory = file.first_full_image()?;
         let table = Table::read(&mut file, &directory)?;
-        let (georeference, _) = geokeys::read(&mut file, &directory)?;
+        let place = geokeys::read(&mut file, &directory)?;
+        let georeference = georeference(&place.crs, place.map);
         let info = ImageInfo {
             texels: [table.grid.width, table.grid.height],
             georeference,
@@ -200,7 +202,7 @@ impl TiffImage {
                     )?;
                     if table.differences {
                         let stride = table.grid.chunk_width as usize * pixel;
-                        predictor::horizontal_bands(
+                        predictor::horizontal(
                             &mut scratch.bytes,
                             stride,
                             table.bands as usize,

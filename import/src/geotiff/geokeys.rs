@@ -6,7 +6,7 @@
 //! contradictory leaves the field empty: a DEM without a place can still be flown over.
 
 use super::tags::{self, Directory, TiffFile};
-use terrasoar_layout::dem::{Georeference, HorizontalUnit};
+use crate::reader::{CrsSaid, Declared, HorizontalSize, Said, VerticalUnit};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::words::harmless;
 
@@ -16,14 +16,14 @@ const CITATION: u16 = 1026;
 const GEOGRAPHIC_TYPE: u16 = 2048;
 const GEOGRAPHIC_CITATION: u16 = 2049;
 const ANGULAR_UNITS: u16 = 2054;
+const ANGULAR_UNIT_SIZE: u16 = 2055;
 const SEMI_MAJOR_AXIS: u16 = 2057;
 const PROJECTED_TYPE: u16 = 3072;
 const PROJECTED_CITATION: u16 = 3073;
 const LINEAR_UNITS: u16 = 3076;
+const LINEAR_UNIT_SIZE: u16 = 3077;
+const VERTICAL_TYPE: u16 = 4096;
 const VERTICAL_UNITS: u16 = 4099;
-
-/// Semi-major axes of the Earth's ellipsoids in use, with room to spare.
-const EARTH_RADII_M: std::ops::RangeInclusive<f64> = 6_370_000.0..=6_385_000.0;
 
 /// Keys looked at, and the directory's head; there are not a hundred in the standard.
 const MAX_KEYS: u64 = 1024;
@@ -33,9 +33,38 @@ const MAX_PLACE: u64 = 1 << 16;
 /// Longest name kept.
 const MAX_NAME_CHARS: usize = 200;
 
-/// The georeference, and the metres of a vertical unit.
-pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<(Georeference, f64), LayoutError> {
+/// What tags and keys say of the place.
+#[derive(Debug)]
+pub(super) struct Place {
+    /// From sample centres to coordinates.
+    pub(super) map: Option<[f64; 6]>,
+    pub(super) crs: CrsSaid,
+    /// EPSG's code of the vertical unit.
+    pub(super) vertical_unit: Option<u16>,
+}
+
+/// Reads tags and keys.
+pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<Place, LayoutError> {
     let keys = Keys::read(file, directory)?;
+    Ok(Place {
+        map: transform(file, directory, keys.short(RASTER_TYPE) == Some(2))?,
+        crs: system(&keys),
+        vertical_unit: keys.short(VERTICAL_UNITS).filter(|code| !matches!(code, 0 | 32767)),
+    })
+}
+
+impl Place {
+    /// Takes what is said of heights into `declared`.
+    pub(super) fn declare(self, declared: &mut Declared) {
+        declared.place = self.map.map(|map| Said::new(map, "the GeoTIFF tags"));
+        declared.crs = self.crs;
+        declared.value.unit =
+            self.vertical_unit.map(|code| Said::new(VerticalUnit::Code(code.into()), "key VerticalUnits"));
+    }
+}
+
+/// What the keys say of the reference system.
+fn system(keys: &Keys) -> CrsSaid {
     let projected = keys.code(PROJECTED_TYPE);
     let geographic = keys.code(GEOGRAPHIC_TYPE);
     let model = keys.short(MODEL_TYPE).unwrap_or(match (projected, geographic) {
@@ -43,48 +72,67 @@ pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<(Georef
         (None, Some(_)) => 2,
         (None, None) => 0,
     });
-    let (epsg, unit) = match model {
-        1 => (projected, linear_unit(keys.short(LINEAR_UNITS), projected)),
-        2 => {
-            let degrees = matches!(keys.short(ANGULAR_UNITS), None | Some(9102));
-            (geographic, if degrees { HorizontalUnit::Degree } else { HorizontalUnit::Unknown })
-        }
-        _ => (None, HorizontalUnit::Unknown),
+    let (code, by) = match model {
+        1 => (projected, "key ProjectedCSType"),
+        2 => (geographic, "key GeographicType"),
+        _ => (None, ""),
     };
     let names = if model == 2 {
         [GEOGRAPHIC_CITATION, CITATION, PROJECTED_CITATION]
     } else {
         [PROJECTED_CITATION, CITATION, GEOGRAPHIC_CITATION]
     };
-    let radius = keys.real(SEMI_MAJOR_AXIS).filter(|radius| radius.is_finite() && *radius > 0.0);
-    let georeference = Georeference {
-        epsg,
-        crs_name: names.iter().find_map(|key| keys.text(*key)).unwrap_or_default(),
+    let size = |key| keys.real(key).filter(|size| size.is_finite() && *size > 0.0);
+    let unit = match model {
+        2 => match keys.short(ANGULAR_UNITS) {
+            Some(32767) => size(ANGULAR_UNIT_SIZE)
+                .map(|size| Said::new(HorizontalSize::Radians(size), "key GeogAngularUnitSize")),
+            Some(code) => {
+                angular(code).map(|size| Said::new(HorizontalSize::Radians(size), "key GeogAngularUnits"))
+            }
+            None => None,
+        },
+        _ => match keys.short(LINEAR_UNITS) {
+            Some(32767) => size(LINEAR_UNIT_SIZE)
+                .map(|size| Said::new(HorizontalSize::Metres(size), "key ProjLinearUnitSize")),
+            Some(code) => {
+                linear(code).map(|size| Said::new(HorizontalSize::Metres(size), "key ProjLinearUnits"))
+            }
+            None => None,
+        },
+    };
+    CrsSaid {
+        text: None,
+        code: code.map(|code| Said::new(code, by)),
+        vertical_code: keys.code(VERTICAL_TYPE).map(|code| Said::new(code, "key VerticalCSType")),
+        name: names.iter().find_map(|key| keys.text(*key)).unwrap_or_default(),
         unit,
-        pixel_to_crs: transform(file, directory, keys.short(RASTER_TYPE) == Some(2))?,
-        body_radius_m: radius.filter(|radius| !EARTH_RADII_M.contains(radius)),
-    };
-    let vertical_unit_m = match keys.short(VERTICAL_UNITS) {
-        Some(9002) => 0.3048,
-        Some(9003) => 1200.0 / 3937.0,
-        _ => 1.0,
-    };
-    Ok((georeference, vertical_unit_m))
+        radius_m: size(SEMI_MAJOR_AXIS),
+        is_local: false,
+    }
 }
 
-/// The unit by its code; without one, of the EPSG families that are metric throughout.
-fn linear_unit(code: Option<u16>, epsg: Option<u32>) -> HorizontalUnit {
-    match (code, epsg) {
-        (Some(9001), _) => HorizontalUnit::Metre,
-        (Some(9002), _) => HorizontalUnit::Foot,
-        (Some(9003), _) => HorizontalUnit::UsSurveyFoot,
-        (Some(_), _) => HorizontalUnit::Unknown,
-        (
-            None,
-            Some(32601..=32660 | 32701..=32760 | 26901..=26923 | 26701..=26722 | 25828..=25838 | 3857 | 3395),
-        ) => HorizontalUnit::Metre,
-        (None, _) => HorizontalUnit::Unknown,
-    }
+/// Metres of EPSG's codes of units of length.
+fn linear(code: u16) -> Option<f64> {
+    Some(match code {
+        9001 => 1.0,
+        9002 => 0.3048,
+        9003 => 1200.0 / 3937.0,
+        9036 => 1000.0,
+        _ => return None,
+    })
+}
+
+/// Radians of EPSG's codes of angular units.
+fn angular(code: u16) -> Option<f64> {
+    Some(match code {
+        9101 => 1.0,
+        9102 => 1f64.to_radians(),
+        9103 => (1.0 / 60.0f64).to_radians(),
+        9104 => (1.0 / 3600.0f64).to_radians(),
+        9105 | 9106 => std::f64::consts::PI / 200.0,
+        _ => return None,
+    })
 }
 
 /// The map from sample centres to the ground.

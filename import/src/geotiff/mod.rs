@@ -9,6 +9,7 @@
 //! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
 //! are not inverted for "white is zero" files. Masks in images of their own are not applied.
 
+mod bands;
 mod chunk_grid;
 mod chunks;
 mod codec;
@@ -29,66 +30,73 @@ use std::path::{Path, PathBuf};
 
 use chunks::Chunks;
 pub(crate) use colour::TiffImage;
-use convert::Void;
+use convert::Convert;
 use tags::TiffFile;
-use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
+use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
 
 use super::WINDOW_SAMPLES;
+use crate::options::OpenOptions;
+use crate::reader::{Declared, Reader, Said};
 
 /// Longest text of the void value: a number.
 const MAX_NODATA_BYTES: u64 = 256;
 /// Longest metadata; those of a DEM are a few KiB.
 const MAX_METADATA_BYTES: u64 = 4 << 20;
 
-/// A GeoTIFF with one band of heights.
+/// A GeoTIFF with a band of heights.
 #[derive(Debug)]
 pub(super) struct TiffDem {
     path: PathBuf,
-    info: DemInfo,
+    declared: Declared,
     chunks: Chunks,
-    void: Void,
+    convert: Convert,
 }
 
 impl TiffDem {
     /// Reads the directory of the first full-resolution image.
-    pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
+    pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Self, LayoutError> {
         let mut file = TiffFile::open(path)?;
         let directory = file.first_full_image()?;
         let chunks = Chunks::read(&mut file, &directory)?;
+        let xml = file.text(&directory, tags::GDAL_METADATA, MAX_METADATA_BYTES)?.unwrap_or_default();
+        let bands = bands::of(&mut file, &directory, &chunks, &metadata::names(&xml), options)?;
+        let samples = [chunks.grid.width, chunks.grid.height];
+        let sample_type = bands::sample_type(&bands.pick, chunks.sample_type);
+        let format = format!(
+            "{}{}, {}, {}",
+            if file.is_big() { "BigTIFF" } else { "TIFF" },
+            if directory.has_georeference() { " with georeference" } else { "" },
+            chunks.describe(),
+            chunks.compression.name()
+        );
+        let mut declared = Declared::new(samples, sample_type, format);
+        geokeys::read(&mut file, &directory)?.declare(&mut declared);
+        metadata::heights(&xml, bands.described, &mut declared.value);
         let nodata = file.text(&directory, tags::GDAL_NODATA, MAX_NODATA_BYTES)?;
-        let void = Void::parse(path, nodata.as_deref(), chunks.sample_type)?;
-        if !void.absent().is_nan() {
+        let nodata = nodata.filter(|text| !text.trim().is_empty());
+        declared.value.nodata.extend(nodata.map(|text| Said::new(text, "tag GDAL_NODATA")));
+        let is_void = !declared.value.nodata.is_empty() || !options.nodata.is_empty();
+        if !is_void {
             let advice = "the others would all be heights of 0, for it declares no void value; if they are voids, say so: \
                           gdal_edit.py -a_nodata -9999 FILE";
             chunks.grid.check_sparse(&file, chunks.stored_samples, advice)?;
         }
-        let (georeference, vertical_unit_m) = geokeys::read(&mut file, &directory)?;
-        let bands = file.text(&directory, tags::GDAL_METADATA, MAX_METADATA_BYTES)?.unwrap_or_default();
-        let heights = metadata::heights(&bands);
-        let unit_m = heights.unit_m.unwrap_or(vertical_unit_m);
-        let info = DemInfo {
-            samples_wide: chunks.grid.width,
-            samples_high: chunks.grid.height,
+        let convert = Convert {
             sample_type: chunks.sample_type,
-            height_scale: heights.scale * unit_m,
-            height_offset_m: heights.offset * unit_m,
-            georeference,
-            format: format!(
-                "{}{}, {}, {}",
-                if file.is_big() { "BigTIFF" } else { "TIFF" },
-                if directory.has_georeference() { " with georeference" } else { "" },
-                chunks.describe(),
-                chunks.compression.name()
-            ),
+            big_endian: chunks.big_endian,
+            bands: chunks.bands as usize,
+            pick: bands.pick,
+            alpha: bands.alpha,
+            absent: if is_void { f64::NAN } else { 0.0 },
         };
-        Ok(Self { path: path.to_owned(), info, chunks, void })
+        Ok(Self { path: path.to_owned(), declared, chunks, convert })
     }
 }
 
-impl DemSource for TiffDem {
-    fn info(&self) -> &DemInfo {
-        &self.info
+impl Reader for TiffDem {
+    fn declared(&self) -> &Declared {
+        &self.declared
     }
 
     fn memory_bytes(&self) -> u64 {
@@ -97,9 +105,9 @@ impl DemSource for TiffDem {
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
         if self.chunks.is_raw() {
-            raw::stream(&self.path, &self.chunks, &self.void, sink)
+            raw::stream(&self.path, &self.chunks, &self.convert, sink)
         } else {
-            packed::stream(&self.path, &self.chunks, &self.void, sink)
+            packed::stream(&self.path, &self.chunks, &self.convert, sink)
         }
     }
 }

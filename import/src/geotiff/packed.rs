@@ -12,7 +12,7 @@ use super::super::parallel::each_task;
 use super::super::{WINDOW_SAMPLES, input};
 use super::chunks::{Chunks, Compression, Predictor};
 use super::codec::{Failure, Unpacker};
-use super::convert::Void;
+use super::convert::Convert;
 use super::span::{LARGEST_WHOLE, Span};
 use super::zstd_frame;
 use super::{parts, predictor, put_constant};
@@ -52,7 +52,7 @@ impl Chunks {
 pub(super) fn stream(
     path: &Path,
     chunks: &Chunks,
-    void: &Void,
+    convert: &Convert,
     sink: &dyn SampleSink,
 ) -> Result<(), LayoutError> {
     let file = input::open(path, "cannot open the TIFF file")?;
@@ -72,8 +72,8 @@ pub(super) fn stream(
     each_task(chunks.grid.count(), workers, open, |worker, chunk| {
         let window = chunks.grid.window(chunk);
         match chunks.grid.place(chunk, &mut worker.places)? {
-            Some(place) => worker.push(chunk, window, place, void, sink),
-            None => put_constant(sink, window, void.absent()),
+            Some(place) => worker.push(chunk, window, place, convert, sink),
+            None => put_constant(sink, window, convert.absent),
         }
     })
 }
@@ -97,7 +97,7 @@ impl Worker<'_> {
         chunk: u64,
         window: Window,
         (at, length): (u64, u64),
-        void: &Void,
+        convert: &Convert,
         sink: &dyn SampleSink,
     ) -> Result<(), LayoutError> {
         let (path, chunks) = (self.path, self.chunks);
@@ -118,7 +118,7 @@ impl Worker<'_> {
         let guarded = |decode: &mut dyn FnMut() -> Result<(), Failure>| {
             guard(path, || chunks.grid.name(chunk), || decode().map_err(failed))
         };
-        let (size, stride) = (chunks.sample_bytes(), chunks.stride() as usize);
+        let (size, stride, bands) = (chunks.sample_bytes(), chunks.stride() as usize, chunks.bands as usize);
         let mut span = Span { file: self.file, at, left: length };
         let is_whole =
             chunks.compression == Compression::Zstd && self.whole_is_needed(span).map_err(failed)?;
@@ -137,16 +137,23 @@ impl Worker<'_> {
             match chunks.predictor {
                 Predictor::None => {}
                 Predictor::Horizontal => {
-                    predictor::horizontal(&mut self.bytes, stride, size, chunks.big_endian);
+                    predictor::horizontal(&mut self.bytes, stride, bands, size, chunks.big_endian);
                 }
                 Predictor::Floating => {
-                    predictor::floating(&mut self.bytes, stride, size, chunks.big_endian, &mut self.row);
+                    predictor::floating(
+                        &mut self.bytes,
+                        stride,
+                        bands,
+                        size,
+                        chunks.big_endian,
+                        &mut self.row,
+                    );
                 }
             }
             self.samples.clear();
-            let row_bytes = (u64::from(window.width) * size) as usize;
+            let row_bytes = (u64::from(window.width) * chunks.pixel_bytes()) as usize;
             for row in self.bytes.chunks_exact(stride) {
-                void.append(chunks.sample_type, chunks.big_endian, &row[..row_bytes], &mut self.samples);
+                convert.append(&row[..row_bytes], &mut self.samples);
             }
             sink.put(part, &self.samples)?;
         }

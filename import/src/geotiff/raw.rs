@@ -11,7 +11,7 @@ use std::path::Path;
 use super::super::input;
 use super::super::parallel::each_task;
 use super::chunks::Chunks;
-use super::convert::Void;
+use super::convert::Convert;
 use super::listing::Places;
 use super::{put_constant, rows_at_once};
 use terrasoar_layout::dem::{SampleSink, Window};
@@ -32,7 +32,7 @@ struct Worker<'a> {
 pub(super) fn stream(
     path: &Path,
     chunks: &Chunks,
-    void: &Void,
+    convert: &Convert,
     sink: &dyn SampleSink,
 ) -> Result<(), LayoutError> {
     let file = input::open(path, "cannot open the TIFF file")?;
@@ -52,7 +52,7 @@ pub(super) fn stream(
         }
         let window = Window { row: whole.row + first, height: band_rows.min(whole.height - first), ..whole };
         let Some((at, _)) = grid.place(chunk, &mut worker.places)? else {
-            return put_constant(sink, window, void.absent());
+            return put_constant(sink, window, convert.absent);
         };
         worker.read(chunks, at + u64::from(first) * chunks.stride(), window).map_err(
             |source| match source.kind() {
@@ -65,10 +65,10 @@ pub(super) fn stream(
             },
         )?;
         worker.samples.clear();
-        let row_bytes = (u64::from(window.width) * chunks.sample_bytes()) as usize;
+        let row_bytes = (u64::from(window.width) * chunks.pixel_bytes()) as usize;
         let pitch = worker.bytes.len() / window.height as usize;
         for row in worker.bytes.chunks_exact(pitch) {
-            void.append(chunks.sample_type, chunks.big_endian, &row[..row_bytes], &mut worker.samples);
+            convert.append(&row[..row_bytes], &mut worker.samples);
         }
         sink.put(window, &worker.samples)
     })
@@ -78,7 +78,7 @@ impl Worker<'_> {
     /// Reads the rows of `window`, the first of which lies at `at`: as they lie in the file, or only what is in the image where much is not.
     fn read(&mut self, chunks: &Chunks, at: u64, window: Window) -> std::io::Result<()> {
         let stride = chunks.stride();
-        let row_bytes = u64::from(window.width) * chunks.sample_bytes();
+        let row_bytes = u64::from(window.width) * chunks.pixel_bytes();
         let rows = u64::from(window.height);
         if stride == row_bytes || stride * rows <= LARGEST_READ {
             self.bytes.resize((stride * rows) as usize, 0);

@@ -2,7 +2,7 @@
 
 use super::spool::{CANDIDATE_STEPS, SampleStats, Spool};
 use crate::bound::{larger, largest_difference};
-use crate::dem::{DemInfo, SampleType};
+use crate::dem::DemInfo;
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::grid::record::{RecordKind, RecordScale};
@@ -88,7 +88,7 @@ pub(super) fn check_heights(
     let range_m = stats.range.map(|raw| code.metres(code.code(raw)));
     if range_m.iter().any(|h| h.is_nan() || h.abs() > 1e9) || code.step_m.is_nan() || code.step_m <= 0.0 {
         let [low, high] = stats.range.map(number);
-        let (hint, remedy) = if info.sample_type == SampleType::F32 || info.sample_type == SampleType::F64 {
+        let (hint, remedy) = if !info.sample_type.is_integer() {
             ("is a no-data value not declared? name it", Remedy::Nodata)
         } else {
             ("check the factor on heights", Remedy::HeightFactor)
