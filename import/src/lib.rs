@@ -6,6 +6,7 @@
 //! reads headers, streaming reads samples. Nothing in a file is trusted: every size it declares is
 //! held against the length of the file before memory is taken for it.
 
+mod beside;
 mod bt;
 mod crs;
 mod geotiff;
@@ -14,15 +15,18 @@ mod hgt;
 mod identify;
 pub(crate) mod input;
 pub(crate) mod jpeg_frame;
+mod mask;
 mod opened;
 mod options;
 mod parallel;
 pub(crate) mod picture;
+mod placement;
 mod png;
 pub(crate) mod png_stream;
 mod reader;
 pub mod synth;
 mod value;
+mod warp;
 
 use std::path::{Path, PathBuf};
 
@@ -35,7 +39,7 @@ pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
-pub use options::{Direction, OpenOptions};
+pub use options::{Direction, OpenOptions, Resampling};
 pub use picture::open_image;
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 
@@ -63,7 +67,8 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
 pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn DemSource>, LayoutError> {
     let reader = reader_of(paths, options)?;
     let path = paths.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
-    Ok(Box::new(opened::OpenedDem::new(path, reader, options)?))
+    let beside = beside::Beside::of(paths, &*reader);
+    Ok(Box::new(opened::OpenedDem::new(path, reader, beside, options)?))
 }
 
 /// The reader that knows the format.

@@ -36,11 +36,14 @@ pub(super) fn unpack(chunks: &Chunks, blob: &[u8], rows: u32) -> Result<Vec<u8>,
     // Where the last band is alpha it may be the mask of the others.
     let mask_is_band = u64::from(depth) + 1 == bands;
     if !is_alike || !(mask_is_band || u64::from(depth) == bands) {
-        return Err(Failure::Damaged(format!("its LERC is of {width} x {height} samples, and it should not be")));
+        return Err(Failure::Damaged(format!(
+            "its LERC is of {width} x {height} samples, and it should not be"
+        )));
     }
     let decoded = lerc_reader::decode_first(blob).map_err(|_| damaged("its LERC is damaged"))?;
     let depth = depth as usize;
-    let bytes = samples(&decoded, depth, chunks).ok_or_else(|| damaged("its LERC is of another type of samples"))?;
+    let bytes =
+        samples(&decoded, depth, chunks).ok_or_else(|| damaged("its LERC is of another type of samples"))?;
     if !mask_is_band {
         return Ok(bytes);
     }
@@ -78,11 +81,13 @@ fn samples(decoded: &Decoded, depth: usize, chunks: &Chunks) -> Option<Vec<u8>> 
         (PixelData::I32(values), SampleType::I32) => bytes!(values, big),
         (PixelData::U32(values), SampleType::U32) => bytes!(values, big),
         (PixelData::F32(values), SampleType::F32) => {
-            let seen = values.iter().enumerate().map(|(at, value)| if hidden(at) { f32::NAN } else { *value });
+            let seen =
+                values.iter().enumerate().map(|(at, value)| if hidden(at) { f32::NAN } else { *value });
             bytes!(seen.collect::<Vec<_>>(), big)
         }
         (PixelData::F64(values), SampleType::F64) => {
-            let seen = values.iter().enumerate().map(|(at, value)| if hidden(at) { f64::NAN } else { *value });
+            let seen =
+                values.iter().enumerate().map(|(at, value)| if hidden(at) { f64::NAN } else { *value });
             bytes!(seen.collect::<Vec<_>>(), big)
         }
         _ => return None,
