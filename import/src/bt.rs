@@ -31,9 +31,9 @@ use std::path::{Path, PathBuf};
 use super::WINDOW_SAMPLES;
 use super::input;
 use super::parallel::each_task;
-use terrasoar_layout::dem::{
-    DemInfo, DemSource, Georeference, HorizontalUnit, SampleSink, SampleType, Window,
-};
+use crate::reader::{CrsSaid, Declared, HorizontalSize, Reader, Said};
+use crate::value::US_SURVEY_FOOT_M;
+use terrasoar_layout::dem::{SampleSink, SampleType, Window};
 use terrasoar_layout::error::LayoutError;
 
 const HEADER_BYTES: u64 = 256;
@@ -47,7 +47,7 @@ const BLOCK_ROWS: u32 = (WINDOW_SAMPLES / BLOCK_COLUMNS as u64) as u32;
 #[derive(Debug)]
 pub(super) struct BtDem {
     path: PathBuf,
-    info: DemInfo,
+    declared: Declared,
 }
 
 impl BtDem {
@@ -65,22 +65,22 @@ impl BtDem {
             ));
         }
         file.read_exact(&mut header).map_err(cannot_read)?;
-        let info = parse(path, &Header(&header), file_bytes)?;
-        Ok(Self { path: path.to_owned(), info })
+        let declared = parse(path, &Header(&header), file_bytes)?;
+        Ok(Self { path: path.to_owned(), declared })
     }
 
     fn sample_bytes(&self) -> u64 {
-        if self.info.sample_type == SampleType::I16 { 2 } else { 4 }
+        if self.declared.sample_type == SampleType::I16 { 2 } else { 4 }
     }
 }
 
-impl DemSource for BtDem {
-    fn info(&self) -> &DemInfo {
-        &self.info
+impl Reader for BtDem {
+    fn declared(&self) -> &Declared {
+        &self.declared
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        let (wide, high) = (self.info.samples_wide, self.info.samples_high);
+        let [wide, high] = self.declared.samples;
         let blocks_down = u64::from(high.div_ceil(BLOCK_ROWS));
         let blocks = u64::from(wide.div_ceil(BLOCK_COLUMNS)) * blocks_down;
         let open = || Ok((input::open(&self.path, "cannot open the BT file")?, Vec::new(), Vec::new()));
@@ -110,11 +110,11 @@ impl BtDem {
         bytes.resize(height * size as usize, 0);
         samples.resize(width * height, 0.0);
         // In the file a column starts in the south: the window's first sample is its last row.
-        let from_south = self.info.samples_high - window.row - window.height;
+        let from_south = self.declared.samples[1] - window.row - window.height;
         for across in 0..width {
             let column = u64::from(window.col) + across as u64;
             let at =
-                HEADER_BYTES + (column * u64::from(self.info.samples_high) + u64::from(from_south)) * size;
+                HEADER_BYTES + (column * u64::from(self.declared.samples[1]) + u64::from(from_south)) * size;
             let read = file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes));
             read.map_err(|source| match source.kind() {
                 std::io::ErrorKind::UnexpectedEof => LayoutError::damaged(
@@ -126,7 +126,7 @@ impl BtDem {
             })?;
             let put =
                 |(up, value): (usize, f64)| samples[(height - 1 - up) * width + across] = void_or(value);
-            match self.info.sample_type {
+            match self.declared.sample_type {
                 SampleType::I16 => each_i16(bytes).enumerate().for_each(put),
                 SampleType::F32 => {
                     each_word(bytes).map(|word| f64::from(f32::from_le_bytes(word))).enumerate().for_each(put)
@@ -174,7 +174,7 @@ impl Header<'_> {
     }
 }
 
-fn parse(path: &Path, header: &Header<'_>, file_bytes: u64) -> Result<DemInfo, LayoutError> {
+fn parse(path: &Path, header: &Header<'_>, file_bytes: u64) -> Result<Declared, LayoutError> {
     let damaged = |problem: String| LayoutError::damaged(path, "header", problem);
     let version = match &header.bytes::<3>(7) {
         b"1.0" => 0,
@@ -227,25 +227,17 @@ fn parse(path: &Path, header: &Header<'_>, file_bytes: u64) -> Result<DemInfo, L
     if !scale.is_finite() || scale < 0.0 {
         return Err(damaged(format!("a vertical scale of {scale} makes no height; it is metres a unit")));
     }
-    Ok(DemInfo {
-        samples_wide,
-        samples_high,
-        sample_type,
-        height_scale: if scale == 0.0 { 1.0 } else { f64::from(scale) },
-        height_offset_m: 0.0,
-        georeference: georeference(header, version, samples_wide, samples_high),
-        format: format!("VTP BT 1.{version}"),
-    })
+    let format = format!("VTP BT 1.{version}");
+    let mut declared = Declared::new([samples_wide, samples_high], sample_type, format);
+    if scale != 0.0 {
+        declared.value.scale = Some(Said::new(f64::from(scale), "the header's vertical scale"));
+    }
+    declared.place = place(header, version, [samples_wide, samples_high]);
+    declared.crs = system(header, version);
+    Ok(declared)
 }
 
-fn georeference(header: &Header<'_>, version: u8, wide: u32, high: u32) -> Georeference {
-    let unit = match (version, header.i16(22)) {
-        (_, 0) => HorizontalUnit::Degree,
-        (_, 1) => HorizontalUnit::Metre,
-        (3, 2) => HorizontalUnit::Foot,
-        (3, 3) => HorizontalUnit::UsSurveyFoot,
-        _ => HorizontalUnit::Unknown,
-    };
+fn place(header: &Header<'_>, version: u8, [wide, high]: [u32; 2]) -> Option<Said<[f64; 6]>> {
     let [left, right, bottom, top] = match version {
         0 => [26, 30, 34, 38].map(|at| f64::from(header.f32(at))),
         _ => [28, 36, 44, 52].map(|at| header.f64(at)),
@@ -253,18 +245,30 @@ fn georeference(header: &Header<'_>, version: u8, wide: u32, high: u32) -> Geore
     let across = (right - left) / f64::from(wide);
     let down = (top - bottom) / f64::from(high);
     let known = [left, top, across, down].iter().all(|value| value.is_finite()) && across > 0.0 && down > 0.0;
-    let (epsg, crs_name) = reference_system(unit, header.i16(24), (version > 0).then(|| header.i16(26)));
-    Georeference {
-        epsg,
-        crs_name,
-        unit,
-        pixel_to_crs: known.then(|| [left + 0.5 * across, across, 0.0, top - 0.5 * down, 0.0, -down]),
-        body_radius_m: None,
+    known.then(|| {
+        Said::new([left + 0.5 * across, across, 0.0, top - 0.5 * down, 0.0, -down], "the header's extents")
+    })
+}
+
+fn system(header: &Header<'_>, version: u8) -> CrsSaid {
+    let unit = match (version, header.i16(22)) {
+        (_, 0) => Some(HorizontalSize::Radians(1f64.to_radians())),
+        (_, 1) => Some(HorizontalSize::Metres(1.0)),
+        (3, 2) => Some(HorizontalSize::Metres(0.3048)),
+        (3, 3) => Some(HorizontalSize::Metres(US_SURVEY_FOOT_M)),
+        _ => None,
+    };
+    let (epsg, name) = reference_system(unit, header.i16(24), (version > 0).then(|| header.i16(26)));
+    CrsSaid {
+        code: epsg.map(|code| Said::new(code, "the header's zone and datum")),
+        name,
+        unit: unit.map(|unit| Said::new(unit, "the header's unit")),
+        ..CrsSaid::default()
     }
 }
 
 /// EPSG code and name of what the header's zone and datum say, where one exists.
-fn reference_system(unit: HorizontalUnit, zone: i16, datum: Option<i16>) -> (Option<u32>, String) {
+fn reference_system(unit: Option<HorizontalSize>, zone: i16, datum: Option<i16>) -> (Option<u32>, String) {
     // EPSG's datum codes, and the older USGS numbers of the first versions.
     let (name, geographic, north, south, zones) = match datum {
         Some(6326 | 23) => ("WGS 84", 4326, 32600, Some(32700), 1..=60),
@@ -273,11 +277,11 @@ fn reference_system(unit: HorizontalUnit, zone: i16, datum: Option<i16>) -> (Opt
         Some(6258) => ("ETRS89", 4258, 25800, None, 28..=38),
         _ => return (None, String::new()),
     };
-    if unit == HorizontalUnit::Degree {
+    if matches!(unit, Some(HorizontalSize::Radians(_))) {
         return (Some(geographic), name.into());
     }
     let number = zone.unsigned_abs();
-    if unit != HorizontalUnit::Metre || !(1..=60).contains(&number) {
+    if unit != Some(HorizontalSize::Metres(1.0)) || !(1..=60).contains(&number) {
         return (None, String::new());
     }
     let base = if zone > 0 { Some(north) } else { south };

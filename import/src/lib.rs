@@ -20,22 +20,32 @@
 //! reads headers, streaming reads samples. Nothing in a file is trusted: every size it declares is
 //! held against the length of the file before memory is taken for it.
 
+mod beside;
 mod bt;
+mod crs;
 mod geotiff;
 mod guard;
 mod hgt;
 mod identify;
 pub(crate) mod input;
 pub(crate) mod jpeg_frame;
+mod mask;
+mod opened;
+mod options;
 mod parallel;
 pub(crate) mod picture;
+mod placement;
 mod png;
 pub(crate) mod png_stream;
+mod reader;
 pub mod synth;
+mod value;
+mod warp;
 
 use std::path::{Path, PathBuf};
 
 use identify::Format;
+use reader::Reader;
 use terrasoar_layout::dem::DemSource;
 use terrasoar_layout::error::LayoutError;
 
@@ -43,6 +53,7 @@ pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
+pub use options::{Direction, OpenOptions, Resampling};
 pub use picture::open_image;
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 
@@ -60,13 +71,29 @@ const WINDOW_SAMPLES: u64 = 1 << 16;
 /// [`LayoutError::NotThisFormat`] for a file of none of these formats, saying what it is where that
 /// can be told; [`LayoutError::Unsupported`] and [`LayoutError::Damaged`] from the reader.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
+    open_with(paths, &OpenOptions::default())
+}
+
+/// As [`open`], with what a person knows and the file does not say.
+///
+/// # Errors
+/// As [`open`]; [`LayoutError::Usage`] for options that do not go with the data.
+pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn DemSource>, LayoutError> {
+    let reader = reader_of(paths, options)?;
+    let path = paths.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
+    let beside = beside::Beside::of(paths, &*reader);
+    Ok(Box::new(opened::OpenedDem::new(path, reader, beside, options)?))
+}
+
+/// The reader that knows the format.
+fn reader_of(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
     let [path] = paths else {
         return open_mosaic(paths);
     };
     Ok(match identify::identify(path)? {
         Format::Png => Box::new(png::PngDem::open(path)?),
         Format::Bt => Box::new(bt::BtDem::open(path)?),
-        Format::Tiff => Box::new(geotiff::TiffDem::open(path)?),
+        Format::Tiff => Box::new(geotiff::TiffDem::open(path, options)?),
         Format::Hgt => Box::new(hgt::HgtDem::open(paths)?),
     })
 }
@@ -80,7 +107,7 @@ pub fn open_file(path: &Path) -> Result<Box<dyn DemSource>, LayoutError> {
 }
 
 /// Several files make one data set only if every one is an `.hgt` tile, whose name says where it lies.
-fn open_mosaic(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
+fn open_mosaic(paths: &[PathBuf]) -> Result<Box<dyn Reader>, LayoutError> {
     if paths.is_empty() {
         return Err(LayoutError::Usage(
             "no elevation file was named; name one, or several .hgt tiles".into(),

@@ -12,9 +12,8 @@ use ::png::{BitDepth, ColorType, Transformations};
 use super::WINDOW_SAMPLES;
 use super::guard::guard;
 use super::png_stream::{self, PngRows, Texts, decoding_error};
-use terrasoar_layout::dem::{
-    DemInfo, DemSource, Georeference, HorizontalUnit, SampleSink, SampleType, Window,
-};
+use crate::reader::{CrsSaid, Declared, HorizontalSize, Reader, Said};
+use terrasoar_layout::dem::{SampleSink, SampleType, Window};
 use terrasoar_layout::error::LayoutError;
 
 /// Keyword of the text chunk with the distance between samples in metres.
@@ -26,8 +25,7 @@ pub(crate) const HEIGHT_SCALE_KEY: &str = "Terrasoar:height_scale_m";
 #[derive(Debug)]
 pub(super) struct PngDem {
     path: PathBuf,
-    info: DemInfo,
-    void: Option<f64>,
+    declared: Declared,
 }
 
 impl PngDem {
@@ -62,50 +60,41 @@ impl PngDem {
             text.and_then(|chunk| chunk.text.trim().parse::<f64>().ok())
                 .filter(|value| value.is_finite() && *value > 0.0)
         };
-        let georeference = match number(SPACING_KEY) {
-            Some(spacing_m) => Georeference {
-                crs_name: "local metres".into(),
-                unit: HorizontalUnit::Metre,
-                pixel_to_crs: Some([
-                    0.0,
-                    spacing_m,
-                    0.0,
-                    f64::from(header.height - 1) * spacing_m,
-                    0.0,
-                    -spacing_m,
-                ]),
-                ..Georeference::default()
-            },
-            None => Georeference::default(),
-        };
+        let format = if sample_type == SampleType::U16 { "16-bit PNG" } else { "8-bit PNG" };
+        let mut declared = Declared::new([header.width, header.height], sample_type, format);
+        if let Some(spacing_m) = number(SPACING_KEY) {
+            let north = f64::from(header.height - 1) * spacing_m;
+            let by = format!("the text {SPACING_KEY}");
+            declared.place = Some(Said::new([0.0, spacing_m, 0.0, north, 0.0, -spacing_m], by.clone()));
+            declared.crs = CrsSaid {
+                name: "local metres".into(),
+                unit: Some(Said::new(HorizontalSize::Metres(1.0), by)),
+                is_local: true,
+                ..CrsSaid::default()
+            };
+        }
+        let scale = number(HEIGHT_SCALE_KEY);
+        declared.value.scale = scale.map(|scale| Said::new(scale, format!("the text {HEIGHT_SCALE_KEY}")));
         let void = header.trns.as_deref().and_then(|bytes| match *bytes {
-            [high, low] if sample_type == SampleType::U16 => Some(f64::from(u16::from_be_bytes([high, low]))),
-            [_, low] => Some(f64::from(low)),
+            [high, low] if sample_type == SampleType::U16 => Some(u16::from_be_bytes([high, low])),
+            [_, low] => Some(low.into()),
             _ => None,
         });
-        let info = DemInfo {
-            samples_wide: header.width,
-            samples_high: header.height,
-            sample_type,
-            height_scale: number(HEIGHT_SCALE_KEY).unwrap_or(1.0),
-            height_offset_m: 0.0,
-            georeference,
-            format: if sample_type == SampleType::U16 { "16-bit PNG" } else { "8-bit PNG" }.into(),
-        };
-        Ok(Self { path: path.to_owned(), info, void })
+        declared.value.nodata.extend(void.map(|value| Said::new(value.to_string(), "the transparent grey")));
+        Ok(Self { path: path.to_owned(), declared })
     }
 }
 
-impl DemSource for PngDem {
-    fn info(&self) -> &DemInfo {
-        &self.info
+impl Reader for PngDem {
+    fn declared(&self) -> &Declared {
+        &self.declared
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
         let mut reader = png_stream::open(&self.path, Transformations::IDENTITY, Texts::PassedOver)?;
-        let width = u64::from(self.info.samples_wide);
+        let width = u64::from(self.declared.samples[0]);
         let header = reader.info();
-        if (header.width, header.height) != (self.info.samples_wide, self.info.samples_high) {
+        if [header.width, header.height] != self.declared.samples {
             return Err(LayoutError::damaged(
                 &self.path,
                 "header",
@@ -115,11 +104,14 @@ impl DemSource for PngDem {
         let rows_at_once = (WINDOW_SAMPLES / width).max(1);
         let mut samples: Vec<f64> = Vec::new();
         let mut first_row = 0;
-        for row in 0..self.info.samples_high {
+        for row in 0..self.declared.samples[1] {
             self.append_row(&mut reader, row, &mut samples)?;
             let height = row - first_row + 1;
-            if u64::from(height) == rows_at_once || row + 1 == self.info.samples_high {
-                sink.put(Window { col: 0, row: first_row, width: self.info.samples_wide, height }, &samples)?;
+            if u64::from(height) == rows_at_once || row + 1 == self.declared.samples[1] {
+                sink.put(
+                    Window { col: 0, row: first_row, width: self.declared.samples[0], height },
+                    &samples,
+                )?;
                 samples.clear();
                 first_row = row + 1;
             }
@@ -130,7 +122,7 @@ impl DemSource for PngDem {
 
 impl PngDem {
     fn append_row(&self, reader: &mut PngRows, row: u32, samples: &mut Vec<f64>) -> Result<(), LayoutError> {
-        let place = || format!("row {row} of {}", self.info.samples_high);
+        let place = || format!("row {row} of {}", self.declared.samples[1]);
         guard(&self.path, place, || {
             let decoded = reader.next_row().map_err(|error| decoding_error(&self.path, place(), error))?;
             let Some(decoded) = decoded else {
@@ -140,19 +132,16 @@ impl PngDem {
                     "the image data ends early; fetch the file again",
                 ));
             };
-            let to_sample = |value: f64| if Some(value) == self.void { f64::NAN } else { value };
-            match self.info.sample_type {
+            match self.declared.sample_type {
                 SampleType::U16 => {
                     let pairs = decoded.data().chunks_exact(2);
-                    samples.extend(
-                        pairs.map(|pair| to_sample(f64::from(u16::from_be_bytes([pair[0], pair[1]])))),
-                    );
+                    samples.extend(pairs.map(|pair| f64::from(u16::from_be_bytes([pair[0], pair[1]]))));
                 }
-                _ => samples.extend(decoded.data().iter().map(|&byte| to_sample(f64::from(byte)))),
+                _ => samples.extend(decoded.data().iter().map(|&byte| f64::from(byte))),
             }
             Ok(())
         })?;
-        let expected = u64::from(self.info.samples_wide);
+        let expected = u64::from(self.declared.samples[0]);
         if !(samples.len() as u64).is_multiple_of(expected) {
             return Err(LayoutError::damaged(
                 &self.path,

@@ -11,6 +11,22 @@ pub enum Remedy {
     Spacing,
     /// The raw value that means "no data": [`BuildOptions::nodata`](crate::build::BuildOptions::nodata).
     Nodata,
+    /// The unit of heights, stated when elevation data is opened.
+    HeightUnit,
+    /// Which way heights are counted, stated when elevation data is opened.
+    Direction,
+    /// Which band of several holds the heights.
+    Band,
+    /// How heights are packed into colours.
+    Decode,
+    /// The reference system, stated when elevation data is opened.
+    ReferenceSystem,
+    /// The shape of a file that does not tell it.
+    RawShape,
+    /// The distance between samples when elevation data is brought into another system.
+    Resolution,
+    /// Elevation data brought into another reference system while it is read.
+    Reproject,
     /// Another factor on heights: [`BuildOptions::z_scale`](crate::build::BuildOptions::z_scale).
     HeightFactor,
     /// More memory, in `memory_mib` of the options.

@@ -7,7 +7,9 @@
 //! are not applied.
 
 use super::colour_table::{Packing, Paint, Table};
+use super::span::turn_bits;
 use super::{codec, failure, geokeys, predictor, tags};
+use crate::crs::of_picture;
 use crate::guard::guard;
 use crate::input;
 use crate::jpeg_frame::JpegFrame;
@@ -39,7 +41,8 @@ impl TiffImage {
         let mut file = tags::TiffFile::open(path)?;
         let directory = file.first_full_image()?;
         let table = Table::read(&mut file, &directory)?;
-        let (georeference, _) = geokeys::read(&mut file, &directory)?;
+        let place = geokeys::read(&mut file, &directory)?;
+        let georeference = of_picture(&place.crs, place.map);
         let info = ImageInfo {
             texels: [table.grid.width, table.grid.height],
             georeference,
@@ -169,6 +172,7 @@ impl TiffImage {
             ),
             _ => LayoutError::io(&self.path, "cannot read the TIFF file", e),
         })?;
+        turn_bits(&mut scratch.packed, table.is_reversed);
         let damaged = |problem: String| {
             LayoutError::damaged(
                 &self.path,
@@ -200,7 +204,7 @@ impl TiffImage {
                     )?;
                     if table.differences {
                         let stride = table.grid.chunk_width as usize * pixel;
-                        predictor::horizontal_bands(
+                        predictor::horizontal(
                             &mut scratch.bytes,
                             stride,
                             table.bands as usize,

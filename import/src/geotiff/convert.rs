@@ -1,106 +1,105 @@
-//! Bytes of samples into `f64`, voids into NaN.
+//! Bytes of pixels into raw numbers: one band of them, or heights packed into three.
 //!
-//! The void value is text in the file; it is converted to the sample type before it is compared, as
-//! the writer of the samples did. A void value that the type cannot hold marks nothing. Writers differ in
-//! the last digits of "the lowest float": any real below -3.39e38 (or above 3.39e38) is void if the
-//! declared value is. Infinities and NaN are void always. Cost: one pass.
+//! Where a band of alpha is 0 the sample is void. What a file declares to mean "no data" passes as it is; it is compared behind the seam, for every
+//! format alike. Cost: one pass.
 
-use std::path::Path;
-
+use half::f16;
 use terrasoar_layout::dem::SampleType;
-use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::words::harmless;
 
-/// Beyond this, a real void value is meant as the type's extreme.
-const EXTREME: f64 = 3.39e38;
+use super::stored::Stored;
+use crate::value::Decode;
 
-/// What marks a sample as void.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Void {
-    /// The value, converted to the sample type; `None` if none is declared or none can match.
-    value: Option<f64>,
-    declared: bool,
+/// What makes a number of a pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Pick {
+    /// The sample of a band, counted from 0.
+    Band(usize),
+    /// A height from the first three.
+    Decode(Decode),
 }
 
-impl Void {
-    /// Parses the text of the tag, if there is one.
-    pub(super) fn parse(
-        path: &Path,
-        text: Option<&str>,
-        sample_type: SampleType,
-    ) -> Result<Self, LayoutError> {
-        let Some(text) = text.map(str::trim).filter(|text| !text.is_empty()) else {
-            return Ok(Self { value: None, declared: false });
-        };
-        // What C's strtod and its users write for a NaN: nan, -nan, nan(0x7ff8), 1.#QNAN.
-        let lower = text.to_ascii_lowercase();
-        if lower.contains("nan") || lower.contains("1.#ind") {
-            return Ok(Self { value: None, declared: true });
-        }
-        let Ok(value) = text.parse::<f64>() else {
-            let shown = harmless(text, 40);
-            return Err(LayoutError::damaged(
-                path,
-                "tag GDAL_NODATA",
-                format!(
-                    "the void value \"{shown}\" is no number; set it again: gdal_edit.py -a_nodata -9999 FILE"
-                ),
-            ));
-        };
-        let value = match sample_type {
-            SampleType::F32 if value.abs() < EXTREME => f64::from(value as f32),
-            _ => value,
-        };
-        Ok(Self { value: Some(value), declared: true })
-    }
-
+/// How the bytes of a chunk's rows become numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Convert {
+    pub(super) sample_type: SampleType,
+    /// How samples are stored that no machine has.
+    pub(super) odd: Option<Stored>,
+    pub(super) big_endian: bool,
+    /// Samples of a pixel that lie side by side.
+    pub(super) bands: usize,
+    pub(super) pick: Pick,
+    /// Band of alpha, counted from 0.
+    pub(super) alpha: Option<usize>,
     /// What stands in for a chunk that the file left out.
-    pub(super) fn absent(self) -> f64 {
-        if self.declared { f64::NAN } else { 0.0 }
+    pub(super) absent: f64,
+}
+
+impl Convert {
+    /// Appends the first `pixels` of a row.
+    pub(super) fn append_row(&self, row: &[u8], pixels: usize, samples: &mut Vec<f64>) {
+        match self.odd {
+            Some(stored) => self.pixels(stored.odd(row, self.big_endian, pixels * self.bands), samples),
+            None => self.append(row, samples),
+        }
     }
 
-    /// Appends the samples in `bytes`, which are of `sample_type` and in the byte order told.
-    pub(super) fn append(
-        self,
-        sample_type: SampleType,
-        big_endian: bool,
-        bytes: &[u8],
-        samples: &mut Vec<f64>,
-    ) {
-        match sample_type {
-            SampleType::U8 => self.integers(bytes.iter().map(|byte| f64::from(*byte)), samples),
+    /// Appends the pixels in `bytes`, which are whole ones.
+    fn append(&self, bytes: &[u8], samples: &mut Vec<f64>) {
+        let big = self.big_endian;
+        match self.sample_type {
+            SampleType::U8 => self.pixels(bytes.iter().map(|byte| f64::from(*byte)), samples),
+            SampleType::I8 => self.pixels(bytes.iter().map(|byte| f64::from(*byte as i8)), samples),
             SampleType::U16 => {
-                self.integers(words(bytes, big_endian).map(|w| f64::from(u16::from_ne_bytes(w))), samples)
+                self.pixels(words(bytes, big).map(|w| f64::from(u16::from_ne_bytes(w))), samples)
             }
             SampleType::I16 => {
-                self.integers(words(bytes, big_endian).map(|w| f64::from(i16::from_ne_bytes(w))), samples)
+                self.pixels(words(bytes, big).map(|w| f64::from(i16::from_ne_bytes(w))), samples)
+            }
+            SampleType::F16 => {
+                self.pixels(words(bytes, big).map(|w| f64::from(f16::from_ne_bytes(w))), samples)
             }
             SampleType::U32 => {
-                self.integers(words(bytes, big_endian).map(|w| f64::from(u32::from_ne_bytes(w))), samples)
+                self.pixels(words(bytes, big).map(|w| f64::from(u32::from_ne_bytes(w))), samples)
             }
             SampleType::I32 => {
-                self.integers(words(bytes, big_endian).map(|w| f64::from(i32::from_ne_bytes(w))), samples)
+                self.pixels(words(bytes, big).map(|w| f64::from(i32::from_ne_bytes(w))), samples)
             }
             SampleType::F32 => {
-                self.reals(words(bytes, big_endian).map(|w| f64::from(f32::from_ne_bytes(w))), samples)
+                self.pixels(words(bytes, big).map(|w| f64::from(f32::from_ne_bytes(w))), samples)
             }
-            SampleType::F64 => self.reals(words(bytes, big_endian).map(f64::from_ne_bytes), samples),
+            SampleType::U64 => self.pixels(words(bytes, big).map(|w| u64::from_ne_bytes(w) as f64), samples),
+            SampleType::I64 => self.pixels(words(bytes, big).map(|w| i64::from_ne_bytes(w) as f64), samples),
+            SampleType::F64 => self.pixels(words(bytes, big).map(f64::from_ne_bytes), samples),
         }
     }
 
-    fn integers(self, values: impl Iterator<Item = f64>, samples: &mut Vec<f64>) {
-        match self.value {
-            Some(void) => samples.extend(values.map(|value| if value == void { f64::NAN } else { value })),
-            None => samples.extend(values),
+    fn pixels(&self, mut values: impl Iterator<Item = f64>, samples: &mut Vec<f64>) {
+        if let (1, Pick::Band(_)) = (self.bands, &self.pick) {
+            samples.extend(values);
+            return;
         }
-    }
-
-    fn reals(self, values: impl Iterator<Item = f64>, samples: &mut Vec<f64>) {
-        let void = self.value.unwrap_or(f64::NAN);
-        let lowest = if void <= -EXTREME { -EXTREME } else { f64::NEG_INFINITY };
-        let highest = if void >= EXTREME { EXTREME } else { f64::INFINITY };
-        let sound = |value: f64| value != void && value > lowest && value < highest;
-        samples.extend(values.map(|value| if sound(value) { value } else { f64::NAN }));
+        let mut colours = [0.0; 3];
+        let mut place = 0;
+        let (mut picked, mut seen) = (0.0, true);
+        // One value after the other: pixels of any number of bands, without a copy of them.
+        while let Some(value) = values.next() {
+            match &self.pick {
+                Pick::Band(band) if *band == place => picked = value,
+                Pick::Decode(_) if place < 3 => colours[place] = value,
+                _ => {}
+            }
+            if self.alpha == Some(place) {
+                seen = value != 0.0;
+            }
+            place += 1;
+            if place == self.bands {
+                if let Pick::Decode(decode) = &self.pick {
+                    picked = decode.height(colours);
+                }
+                samples.push(if seen { picked } else { f64::NAN });
+                (place, seen) = (0, true);
+            }
+        }
     }
 }
 
@@ -121,25 +120,62 @@ fn words<const N: usize>(bytes: &[u8], big_endian: bool) -> impl Iterator<Item =
 mod tests {
     use super::*;
 
-    fn converted(text: &str, sample_type: SampleType, bytes: &[u8]) -> Vec<f64> {
+    fn converted(sample_type: SampleType, big_endian: bool, bytes: &[u8]) -> Vec<f64> {
+        let convert = Convert {
+            sample_type,
+            odd: None,
+            big_endian,
+            bands: 1,
+            pick: Pick::Band(0),
+            alpha: None,
+            absent: 0.0,
+        };
         let mut samples = Vec::new();
-        let void = Void::parse(Path::new("t.tif"), Some(text), sample_type).unwrap();
-        void.append(sample_type, false, bytes, &mut samples);
+        convert.append(bytes, &mut samples);
         samples
     }
 
     #[test]
-    fn void_is_compared_in_the_sample_type() {
-        let third = (1.0f32 / 3.0).to_le_bytes();
-        assert!(converted("0.3333333333333333", SampleType::F32, &third)[0].is_nan());
-        for text in ["-3.4e38", "-3.40282346638529e+38", "-3.4028234663852886e+38"] {
-            assert!(converted(text, SampleType::F32, &f32::MIN.to_le_bytes())[0].is_nan(), "{text}");
+    fn every_type_in_either_byte_order() {
+        for (sample_type, little, value) in [
+            (SampleType::U8, vec![200], 200.0),
+            (SampleType::I8, vec![200], -56.0),
+            (SampleType::U16, 40_000u16.to_le_bytes().to_vec(), 40_000.0),
+            (SampleType::I16, (-9999i16).to_le_bytes().to_vec(), -9999.0),
+            (SampleType::U32, 4_000_000_000u32.to_le_bytes().to_vec(), 4e9),
+            (SampleType::I32, i32::MIN.to_le_bytes().to_vec(), -2_147_483_648.0),
+            (SampleType::U64, (1u64 << 53).to_le_bytes().to_vec(), 9_007_199_254_740_992.0),
+            (SampleType::I64, (-5i64).to_le_bytes().to_vec(), -5.0),
+            // 1.5 in half precision: sign 0, exponent 15, fraction 1/2.
+            (SampleType::F16, 0x3e00u16.to_le_bytes().to_vec(), 1.5),
+            (SampleType::F32, 1.25f32.to_le_bytes().to_vec(), 1.25),
+            (SampleType::F64, 1e300f64.to_le_bytes().to_vec(), 1e300),
+        ] {
+            assert_eq!(converted(sample_type, false, &little), [value], "{sample_type:?}");
+            let big: Vec<u8> = little.into_iter().rev().collect();
+            assert_eq!(converted(sample_type, true, &big), [value], "{sample_type:?}");
         }
-        assert_eq!(converted("-3.4e38", SampleType::F32, &(-1e38f32).to_le_bytes())[0], f64::from(-1e38f32));
-        assert!(converted("nan", SampleType::F64, &f64::NAN.to_le_bytes())[0].is_nan());
-        assert!(converted("-9999", SampleType::F32, &f32::NEG_INFINITY.to_le_bytes())[0].is_nan());
-        assert!(converted(" -9999.0 ", SampleType::I16, &(-9999i16).to_le_bytes())[0].is_nan());
-        assert_eq!(converted("-32768", SampleType::U16, &[0, 128])[0], 32768.0);
-        assert!(Void::parse(Path::new("t.tif"), Some("none"), SampleType::I16).is_err());
+    }
+
+    #[test]
+    fn a_band_is_picked_and_alpha_makes_voids() {
+        let mut convert = Convert {
+            sample_type: SampleType::U8,
+            odd: None,
+            big_endian: false,
+            bands: 3,
+            pick: Pick::Band(1),
+            alpha: Some(2),
+            absent: 0.0,
+        };
+        let mut samples = Vec::new();
+        convert.append(&[1, 2, 255, 3, 4, 0, 5, 6, 1], &mut samples);
+        assert!(samples[0] == 2.0 && samples[1].is_nan() && samples[2] == 6.0 && samples.len() == 3);
+        convert.bands = 4;
+        convert.alpha = Some(3);
+        convert.pick = Pick::Decode(Decode::parse("mapbox").unwrap());
+        samples.clear();
+        convert.append(&[1, 134, 160, 255, 0, 0, 0, 0], &mut samples);
+        assert!(samples[0].abs() < 1e-9 && samples[1].is_nan(), "{samples:?}");
     }
 }

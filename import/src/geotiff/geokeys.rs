@@ -5,10 +5,14 @@
 //! returned starts at sample centres either way. Keys name the reference system. What is missing or
 //! contradictory leaves the field empty: a DEM without a place can still be flown over.
 
+use super::projection;
 use super::tags::{self, Directory, TiffFile};
-use terrasoar_layout::dem::{Georeference, HorizontalUnit};
+use crate::crs::unit_of_code;
+use crate::reader::{CrsSaid, Declared, HorizontalSize, Said, VerticalUnit};
+use terrasoar_layout::dem::Warning;
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::words::harmless;
+use terrasoar_layout::remedy::Remedy;
+use terrasoar_layout::words::{harmless, number};
 
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
@@ -16,14 +20,14 @@ const CITATION: u16 = 1026;
 const GEOGRAPHIC_TYPE: u16 = 2048;
 const GEOGRAPHIC_CITATION: u16 = 2049;
 const ANGULAR_UNITS: u16 = 2054;
+const ANGULAR_UNIT_SIZE: u16 = 2055;
 const SEMI_MAJOR_AXIS: u16 = 2057;
 const PROJECTED_TYPE: u16 = 3072;
 const PROJECTED_CITATION: u16 = 3073;
 const LINEAR_UNITS: u16 = 3076;
+const LINEAR_UNIT_SIZE: u16 = 3077;
+const VERTICAL_TYPE: u16 = 4096;
 const VERTICAL_UNITS: u16 = 4099;
-
-/// Semi-major axes of the Earth's ellipsoids in use, with room to spare.
-const EARTH_RADII_M: std::ops::RangeInclusive<f64> = 6_370_000.0..=6_385_000.0;
 
 /// Keys looked at, and the directory's head; there are not a hundred in the standard.
 const MAX_KEYS: u64 = 1024;
@@ -33,9 +37,84 @@ const MAX_PLACE: u64 = 1 << 16;
 /// Longest name kept.
 const MAX_NAME_CHARS: usize = 200;
 
-/// The georeference, and the metres of a vertical unit.
-pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<(Georeference, f64), LayoutError> {
+/// What tags and keys say of the place.
+#[derive(Debug)]
+pub(super) struct Place {
+    /// From sample centres to coordinates.
+    pub(super) map: Option<[f64; 6]>,
+    pub(super) crs: CrsSaid,
+    /// EPSG's code of the vertical unit.
+    pub(super) vertical_unit: Option<u16>,
+    /// Scale and offset of heights that the tags of the place give.
+    pub(super) scale_z: Option<[f64; 2]>,
+}
+
+/// Reads tags and keys.
+pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<Place, LayoutError> {
     let keys = Keys::read(file, directory)?;
+    Ok(Place {
+        map: transform(file, directory, keys.short(RASTER_TYPE) == Some(2))?,
+        crs: system(&keys),
+        vertical_unit: keys.short(VERTICAL_UNITS).filter(|code| !matches!(code, 0 | 32767)),
+        scale_z: scale_z(file, directory)?,
+    })
+}
+
+/// What the tags of the place say of heights, where it is not what all writers put there.
+fn scale_z(file: &mut TiffFile, directory: &Directory) -> Result<Option<[f64; 2]>, LayoutError> {
+    let scale = file.reals(directory, tags::MODEL_PIXEL_SCALE, 3)?.and_then(|scale| scale.get(2).copied());
+    let tie = file.reals(directory, tags::MODEL_TIEPOINT, 6)?.and_then(|tie| tie.get(5).copied());
+    let (scale, offset) = (scale.unwrap_or(0.0), tie.unwrap_or(0.0));
+    let is_usual = (scale == 0.0 || scale == 1.0) && offset == 0.0;
+    Ok((!is_usual && scale.is_finite() && offset.is_finite()).then_some([scale, offset]))
+}
+
+impl Place {
+    /// Takes what is said of heights into `declared`.
+    pub(super) fn declare(self, declared: &mut Declared) {
+        declared.place = self.map.map(|map| Said::new(map, "the GeoTIFF tags"));
+        declared.crs = self.crs;
+        if let Some([scale, offset]) = self.scale_z {
+            let words = format!(
+                "the tags of its place give heights a scale of {} and an offset of {}, which GDAL and others pass over, and so was done here",
+                number(scale),
+                number(offset)
+            );
+            declared.warnings.push(match scale {
+                0.0 => Warning::new(words),
+                _ => Warning::new(words).mended_by(Remedy::HeightFactor, number(scale)),
+            });
+        }
+        declared.value.unit =
+            self.vertical_unit.map(|code| Said::new(VerticalUnit::Code(code.into()), "key VerticalUnits"));
+    }
+}
+
+/// ESRI's text in a citation: "ESRI PE String = PROJCS[...]".
+fn esri_text(citation: &str) -> Option<String> {
+    let (_, text) = citation.split_once("ESRI PE String")?;
+    let text = text.trim_start_matches([' ', '=']).trim_end_matches(['|', '\0']).trim();
+    text.contains('[').then(|| text.to_owned())
+}
+
+/// The name in a citation that says more: "PCS Name = x|Unit = y", "x|ESRI PE String = ...", ESRI's lists of facts.
+fn short_name(citation: &str) -> String {
+    let parts = citation.split('|').map(str::trim).filter(|part| !part.is_empty());
+    let mut named = None;
+    let mut first = None;
+    for part in parts {
+        match part.split_once('=') {
+            Some((key, value)) if key.trim().ends_with("Name") => named = named.or(Some(value.trim())),
+            Some(_) => {}
+            None => first = first.or(Some(part)),
+        }
+    }
+    let name = named.or(first).unwrap_or("");
+    if name.eq_ignore_ascii_case("unknown") { String::new() } else { name.to_owned() }
+}
+
+/// What the keys say of the reference system.
+fn system(keys: &Keys) -> CrsSaid {
     let projected = keys.code(PROJECTED_TYPE);
     let geographic = keys.code(GEOGRAPHIC_TYPE);
     let model = keys.short(MODEL_TYPE).unwrap_or(match (projected, geographic) {
@@ -43,47 +122,59 @@ pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<(Georef
         (None, Some(_)) => 2,
         (None, None) => 0,
     });
-    let (epsg, unit) = match model {
-        1 => (projected, linear_unit(keys.short(LINEAR_UNITS), projected)),
-        2 => {
-            let degrees = matches!(keys.short(ANGULAR_UNITS), None | Some(9102));
-            (geographic, if degrees { HorizontalUnit::Degree } else { HorizontalUnit::Unknown })
-        }
-        _ => (None, HorizontalUnit::Unknown),
+    let (code, code_by) = match model {
+        1 => (projected, "key ProjectedCSType"),
+        2 => (geographic, "key GeographicType"),
+        _ => (None, ""),
     };
     let names = if model == 2 {
         [GEOGRAPHIC_CITATION, CITATION, PROJECTED_CITATION]
     } else {
         [PROJECTED_CITATION, CITATION, GEOGRAPHIC_CITATION]
     };
-    let radius = keys.real(SEMI_MAJOR_AXIS).filter(|radius| radius.is_finite() && *radius > 0.0);
-    let georeference = Georeference {
-        epsg,
-        crs_name: names.iter().find_map(|key| keys.text(*key)).unwrap_or_default(),
-        unit,
-        pixel_to_crs: transform(file, directory, keys.short(RASTER_TYPE) == Some(2))?,
-        body_radius_m: radius.filter(|radius| !EARTH_RADII_M.contains(radius)),
+    let size = |key| keys.real(key).filter(|size| size.is_finite() && *size > 0.0);
+    let (code_key, size_key, is_angle) = match model {
+        2 => (ANGULAR_UNITS, ANGULAR_UNIT_SIZE, true),
+        _ => (LINEAR_UNITS, LINEAR_UNIT_SIZE, false),
     };
-    let vertical_unit_m = match keys.short(VERTICAL_UNITS) {
-        Some(9002) => 0.3048,
-        Some(9003) => 1200.0 / 3937.0,
-        _ => 1.0,
+    let by = if is_angle { "key GeogAngularUnits" } else { "key ProjLinearUnits" };
+    let unit = match keys.short(code_key) {
+        // A unit of the file's own has its size.
+        Some(32767) => size(size_key).map(|size| match is_angle {
+            true => HorizontalSize::Radians(size),
+            false => HorizontalSize::Metres(size),
+        }),
+        // GDAL's reading of the degree with minutes and seconds as digits is the plain degree.
+        Some(9108) if is_angle => Some(HorizontalSize::Radians(1f64.to_radians())),
+        Some(code) => unit_of_code(code.into())
+            .map(|(_, size)| size)
+            .filter(|size| matches!(size, HorizontalSize::Radians(_)) == is_angle),
+        None => None,
     };
-    Ok((georeference, vertical_unit_m))
-}
-
-/// The unit by its code; without one, of the EPSG families that are metric throughout.
-fn linear_unit(code: Option<u16>, epsg: Option<u32>) -> HorizontalUnit {
-    match (code, epsg) {
-        (Some(9001), _) => HorizontalUnit::Metre,
-        (Some(9002), _) => HorizontalUnit::Foot,
-        (Some(9003), _) => HorizontalUnit::UsSurveyFoot,
-        (Some(_), _) => HorizontalUnit::Unknown,
-        (
-            None,
-            Some(32601..=32660 | 32701..=32760 | 26901..=26923 | 26701..=26722 | 25828..=25838 | 3857 | 3395),
-        ) => HorizontalUnit::Metre,
-        (None, _) => HorizontalUnit::Unknown,
+    let citations = [CITATION, PROJECTED_CITATION, GEOGRAPHIC_CITATION];
+    let esri = citations.iter().find_map(|key| esri_text(&keys.whole_text(*key)?));
+    let own = || {
+        let metres = match unit {
+            Some(HorizontalSize::Metres(metres)) => metres,
+            _ => 1.0,
+        };
+        (model == 1).then(|| projection::proj(keys, metres)).flatten()
+    };
+    let text = match code {
+        Some(_) => None,
+        None => esri
+            .map(|text| Said::new(text, "ESRI's text in a citation"))
+            .or_else(|| own().map(|text| Said::new(text, "keys of the projection"))),
+    };
+    let name = names.iter().find_map(|key| keys.text(*key)).map(|name| short_name(&name)).unwrap_or_default();
+    CrsSaid {
+        text,
+        code: code.map(|code| Said::new(code, code_by)),
+        vertical_code: keys.code(VERTICAL_TYPE).map(|code| Said::new(code, "key VerticalCSType")),
+        name,
+        unit: unit.map(|unit| Said::new(unit, by)),
+        radius_m: size(SEMI_MAJOR_AXIS),
+        is_local: false,
     }
 }
 
@@ -112,7 +203,7 @@ fn transform(
 }
 
 /// The key directory: triples of a key, where its value is, and the value or its place there.
-struct Keys {
+pub(super) struct Keys {
     directory: Vec<u64>,
     reals: Vec<f64>,
     texts: String,
@@ -134,22 +225,28 @@ impl Keys {
         Some((entry[1], usize::try_from(entry[2]).ok()?, entry[3]))
     }
 
-    fn short(&self, key: u16) -> Option<u16> {
+    pub(super) fn short(&self, key: u16) -> Option<u16> {
         self.entry(key).filter(|entry| entry.0 == 0).and_then(|entry| u16::try_from(entry.2).ok())
     }
 
     /// A code of EPSG; 0 and 32767 stand for undefined and user-defined.
-    fn code(&self, key: u16) -> Option<u32> {
+    pub(super) fn code(&self, key: u16) -> Option<u32> {
         self.short(key).filter(|code| !matches!(code, 0 | 32767)).map(u32::from)
     }
 
-    fn real(&self, key: u16) -> Option<f64> {
+    pub(super) fn real(&self, key: u16) -> Option<f64> {
         let (tag, _, at) = self.entry(key)?;
         let at = usize::try_from(at).ok()?;
         (tag == u64::from(tags::GEO_DOUBLE_PARAMS)).then(|| self.reals.get(at).copied()).flatten()
     }
 
     fn text(&self, key: u16) -> Option<String> {
+        let shown = harmless(&self.whole_text(key)?, MAX_NAME_CHARS);
+        (!shown.is_empty()).then_some(shown)
+    }
+
+    /// A text in full, which may hold a whole reference system.
+    fn whole_text(&self, key: u16) -> Option<String> {
         let (tag, count, at) = self.entry(key)?;
         let at = usize::try_from(at).ok()?;
         if tag != u64::from(tags::GEO_ASCII_PARAMS) {
@@ -157,8 +254,6 @@ impl Keys {
         }
         let bytes = self.texts.as_bytes().get(at..at.checked_add(count)?.min(self.texts.len()))?;
         let text = String::from_utf8_lossy(bytes);
-        let text = text.trim_end_matches(['|', '\0']).trim();
-        let shown = harmless(text, MAX_NAME_CHARS);
-        (!shown.is_empty()).then_some(shown)
+        Some(text.trim_end_matches(['|', '\0']).trim().to_owned())
     }
 }

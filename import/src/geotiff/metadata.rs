@@ -1,37 +1,56 @@
-//! Scale, offset and unit of band 0 in the metadata GDAL keeps in tag 42112.
+//! Scale, offset, unit and name of bands in the metadata GDAL keeps in tag 42112.
 //!
 //! The tag is a little XML, always of the shape
 //! `<Item name="SCALE" sample="0" role="scale">0.1</Item>`; only items with a role are looked at.
 //! Cost: one pass over the text.
 
-/// What a raw value is in metres: `(value * scale + offset) * unit_m`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Heights {
-    pub(super) scale: f64,
-    pub(super) offset: f64,
-    /// Metres a unit, if the file names it.
-    pub(super) unit_m: Option<f64>,
+use crate::reader::{Said, ValueSaid, VerticalUnit};
+
+/// Bands whose names are kept.
+const MOST_NAMES: usize = 4096;
+
+/// One item that has a role.
+struct Item<'x> {
+    band: usize,
+    role: &'x str,
+    text: String,
 }
 
-/// Reads the items of band 0; what is absent or no number keeps its default.
-pub(super) fn heights(xml: &str) -> Heights {
-    let mut heights = Heights { scale: 1.0, offset: 0.0, unit_m: None };
-    for item in xml.split("<Item").skip(1) {
-        let Some((attributes, rest)) = item.split_once('>') else { continue };
-        let Some((text, _)) = rest.split_once("</Item") else { continue };
-        let text = text.trim();
-        let number = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        if attribute(attributes, "sample").is_some_and(|band| band != "0") {
-            continue;
-        }
-        match (attribute(attributes, "role"), number) {
-            (Some("scale"), Some(scale)) if scale != 0.0 => heights.scale = scale,
-            (Some("offset"), Some(offset)) => heights.offset = offset,
-            (Some("unittype"), _) => heights.unit_m = unit_m(text),
+fn items(xml: &str) -> impl Iterator<Item = Item<'_>> {
+    xml.split("<Item").skip(1).filter_map(|item| {
+        let (attributes, rest) = item.split_once('>')?;
+        let (text, _) = rest.split_once("</Item")?;
+        let band = attribute(attributes, "sample").unwrap_or("0").parse().ok()?;
+        Some(Item { band, role: attribute(attributes, "role")?, text: plain(text.trim()) })
+    })
+}
+
+/// Takes what is said of `band`, counted from 0; what is absent or no number stays as it is.
+pub(super) fn heights(xml: &str, band: usize, value: &mut ValueSaid) {
+    let by = "GDAL's metadata";
+    for item in items(xml).filter(|item| item.band == band) {
+        let number = item.text.parse::<f64>().ok().filter(|value| value.is_finite());
+        match (item.role, number) {
+            ("scale", Some(scale)) if scale != 0.0 => value.scale = Some(Said::new(scale, by)),
+            ("offset", Some(offset)) => value.offset = Some(Said::new(offset, by)),
+            ("unittype", _) if !item.text.is_empty() => {
+                value.unit = Some(Said::new(VerticalUnit::Name(item.text), by));
+            }
             _ => {}
         }
     }
-    heights
+}
+
+/// The names of bands, as far as they have some.
+pub(super) fn names(xml: &str) -> Vec<Option<String>> {
+    let mut names = Vec::new();
+    for item in items(xml).filter(|item| item.role == "description" && item.band < MOST_NAMES) {
+        if names.len() <= item.band {
+            names.resize(item.band + 1, None);
+        }
+        names[item.band] = Some(item.text);
+    }
+    names
 }
 
 fn attribute<'a>(attributes: &'a str, name: &str) -> Option<&'a str> {
@@ -39,17 +58,10 @@ fn attribute<'a>(attributes: &'a str, name: &str) -> Option<&'a str> {
     rest.split_once('"').map(|(value, _)| value)
 }
 
-/// Metres in a unit by the names in use.
-fn unit_m(name: &str) -> Option<f64> {
-    match name.to_ascii_lowercase().as_str() {
-        "m" | "metre" | "meter" | "metres" | "meters" => Some(1.0),
-        "ft" | "foot" | "feet" => Some(0.3048),
-        "sft" | "us survey foot" | "us-ft" | "ftus" => Some(1200.0 / 3937.0),
-        "cm" => Some(0.01),
-        "dm" => Some(0.1),
-        "km" => Some(1000.0),
-        _ => None,
-    }
+/// Text without XML's escapes.
+fn plain(text: &str) -> String {
+    let named = text.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"").replace("&apos;", "'");
+    named.replace("&amp;", "&")
 }
 
 #[cfg(test)]
@@ -57,23 +69,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn roles_of_band_0_count() {
+    fn roles_of_the_band_count() {
         let xml = r#"<GDALMetadata>
             <Item name="scale">7</Item>
             <Item name="OFFSET" sample="0" role="offset">-10000</Item>
-            <Item name="SCALE" sample="0" role="scale">0.5</Item>
+            <Item name="SCALE" sample="0" role="scale">-0.5</Item>
             <Item name="SCALE" sample="1" role="scale">3</Item>
-            <Item name="UNITTYPE" sample="0" role="unittype">ft</Item>
+            <Item name="UNITTYPE" sample="0" role="unittype">Clarke&apos;s foot</Item>
+            <Item name="DESCRIPTION" sample="1" role="description">a &amp; b</Item>
         </GDALMetadata>"#;
-        assert_eq!(heights(xml), Heights { scale: 0.5, offset: -10000.0, unit_m: Some(0.3048) });
-        let plain = Heights { scale: 1.0, offset: 0.0, unit_m: None };
+        let of = |xml: &str, band| {
+            let mut value = ValueSaid::default();
+            heights(xml, band, &mut value);
+            value
+        };
+        let first = of(xml, 0);
+        assert_eq!((first.scale.unwrap().value, first.offset.unwrap().value), (-0.5, -10000.0));
+        assert_eq!(first.unit.unwrap().value, VerticalUnit::Name("Clarke's foot".into()));
+        assert_eq!(of(xml, 1).scale.unwrap().value, 3.0);
+        assert_eq!(names(xml), [None, Some("a & b".to_owned())]);
         for damaged in [
             "",
             "<Item",
             "<Item role=\"scale\" sample=\"0\">",
             "<Item sample=\"0\" role=\"scale\">nan</Item>",
+            "<Item sample=\"0\" role=\"scale\">0</Item>",
         ] {
-            assert_eq!(heights(damaged), plain, "{damaged}");
+            assert_eq!(of(damaged, 0), ValueSaid::default(), "{damaged}");
         }
     }
 }

@@ -1,14 +1,18 @@
 //! GeoTIFF, BigTIFF and cloud-optimised ones, one chunk (strip or tile) at a time.
 //!
 //! [`tags`] reads the directory and holds every declared size against the file, [`chunks`] makes the
-//! table of chunks of it, [`geokeys`] and [`metadata`] say where the grid lies and what a unit is.
+//! table of chunks of the one that [`images`] chooses, [`geokeys`] and [`metadata`] say where the grid lies and what a unit is.
 //! Chunks are read piecewise, however large: uncompressed ones by [`raw`], compressed ones by
-//! [`packed`] with [`codec`] and [`predictor`]. [`convert`] turns bytes into samples. Of a file with
-//! several images the first full-resolution one is read. Memory: some rows a worker, whatever the file declares.
+//! [`packed`] with [`rows`], [`codec`], [`lerc`] and [`predictor`]. [`stored`] and [`convert`] turn bytes into samples, [`planes`] joins bands that lie apart.
+//! Memory: some rows a worker, whatever the file declares; of LERC a chunk.
+//!
+//! This is our own code, for no crate does all of it: tiff-reader 0.10 reads every fixture here and holds each chunk as a whole, so that a file of one strip takes
+//! the memory of the terrain, and refuses files that state no lengths of chunks; tiff 0.11.3 refuses sound LZW tiles that GDAL writes and inverts "white is zero".
 //!
 //! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
-//! are not inverted for "white is zero" files. Masks in images of their own are not applied.
+//! are not inverted for "white is zero" files.
 
+mod bands;
 mod chunk_grid;
 mod chunks;
 mod codec;
@@ -17,12 +21,18 @@ mod colour_table;
 mod convert;
 mod failure;
 mod geokeys;
+mod images;
+mod lerc;
 mod listing;
 mod metadata;
 mod packed;
+mod planes;
 mod predictor;
+mod projection;
 mod raw;
+mod rows;
 mod span;
+mod stored;
 mod tags;
 mod zstd_frame;
 #[cfg(feature = "zstd")]
@@ -38,78 +48,146 @@ use std::path::{Path, PathBuf};
 
 use chunks::Chunks;
 pub(crate) use colour::TiffImage;
-use convert::Void;
+use convert::{Convert, Pick};
+use planes::Planes;
 use tags::TiffFile;
-use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
+use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
 
 use super::WINDOW_SAMPLES;
+use crate::options::OpenOptions;
+use crate::reader::{Declared, Reader, Said};
 
 /// Longest text of the void value: a number.
 const MAX_NODATA_BYTES: u64 = 256;
 /// Longest metadata; those of a DEM are a few KiB.
 const MAX_METADATA_BYTES: u64 = 4 << 20;
 
-/// A GeoTIFF with one band of heights.
+/// A GeoTIFF with a band of heights.
 #[derive(Debug)]
 pub(super) struct TiffDem {
     path: PathBuf,
-    info: DemInfo,
+    declared: Declared,
     chunks: Chunks,
-    void: Void,
+    planes: Planes,
+    convert: Convert,
+    mask: Option<TiffMask>,
+}
+
+/// An image of which 0 means that another has nothing to say there.
+#[derive(Debug)]
+pub(crate) struct TiffMask {
+    path: PathBuf,
+    declared: Declared,
+    chunks: Chunks,
+    convert: Convert,
+}
+
+impl TiffMask {
+    /// The first full-resolution image of a file beside the masked one.
+    pub(crate) fn open(path: &Path) -> Result<Self, LayoutError> {
+        let mut file = TiffFile::open(path)?;
+        let directory = file.first_full_image()?;
+        Self::of(&mut file, &directory)
+    }
+
+    fn of(file: &mut TiffFile, directory: &tags::Directory) -> Result<Self, LayoutError> {
+        let chunks = Chunks::read(file, directory)?;
+        let samples = [chunks.grid.width, chunks.grid.height];
+        let convert = Convert {
+            sample_type: chunks.sample_type,
+            odd: (!chunks.stored.is_plain()).then_some(chunks.stored),
+            big_endian: chunks.big_endian,
+            bands: chunks.side_by_side() as usize,
+            pick: Pick::Band(0),
+            alpha: None,
+            absent: 0.0,
+        };
+        let declared = Declared::new(samples, chunks.sample_type, "mask");
+        Ok(Self { path: file.path().to_owned(), declared, chunks, convert })
+    }
+}
+
+impl Reader for TiffMask {
+    fn declared(&self) -> &Declared {
+        &self.declared
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.chunks.memory_bytes(&Planes::one())
+    }
+
+    fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let stream = if self.chunks.is_raw() { raw::stream } else { packed::stream };
+        stream(&self.path, &self.chunks, &Planes::one(), &self.convert, sink)
+    }
 }
 
 impl TiffDem {
     /// Reads the directory of the first full-resolution image.
-    pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
+    pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Self, LayoutError> {
         let mut file = TiffFile::open(path)?;
         let directory = file.first_full_image()?;
         let chunks = Chunks::read(&mut file, &directory)?;
+        let xml = file.text(&directory, tags::GDAL_METADATA, MAX_METADATA_BYTES)?.unwrap_or_default();
+        let bands = bands::of(&mut file, &directory, &chunks, &metadata::names(&xml), options)?;
+        let samples = [chunks.grid.width, chunks.grid.height];
+        let sample_type = bands::sample_type(&bands.pick, chunks.sample_type);
+        let format = format!(
+            "{}{}, {}, {}",
+            if file.is_big() { "BigTIFF" } else { "TIFF" },
+            if directory.has_georeference() { " with georeference" } else { "" },
+            chunks.describe(),
+            chunks.compression.name()
+        );
+        let mut declared = Declared::new(samples, sample_type, format);
+        declared.band_number = bands.described as u32 + 1;
+        geokeys::read(&mut file, &directory)?.declare(&mut declared);
+        metadata::heights(&xml, bands.described, &mut declared.value);
         let nodata = file.text(&directory, tags::GDAL_NODATA, MAX_NODATA_BYTES)?;
-        let void = Void::parse(path, nodata.as_deref(), chunks.sample_type)?;
-        if !void.absent().is_nan() {
+        let nodata = nodata.filter(|text| !text.trim().is_empty());
+        declared.value.nodata.extend(nodata.map(|text| Said::new(text, "tag GDAL_NODATA")));
+        let is_void = !declared.value.nodata.is_empty() || !options.nodata.is_empty();
+        if !is_void {
             let advice = "the others would all be heights of 0, for it declares no void value; if they are voids, say so: \
                           gdal_edit.py -a_nodata -9999 FILE";
             chunks.grid.check_sparse(&file, chunks.stored_samples, advice)?;
         }
-        let (georeference, vertical_unit_m) = geokeys::read(&mut file, &directory)?;
-        let bands = file.text(&directory, tags::GDAL_METADATA, MAX_METADATA_BYTES)?.unwrap_or_default();
-        let heights = metadata::heights(&bands);
-        let unit_m = heights.unit_m.unwrap_or(vertical_unit_m);
-        let info = DemInfo {
-            samples_wide: chunks.grid.width,
-            samples_high: chunks.grid.height,
+        let planes = if chunks.is_planar { Planes::of(&bands) } else { Planes::one() };
+        let (pick, alpha) = if chunks.is_planar { (Pick::Band(0), None) } else { (bands.pick, bands.alpha) };
+        let convert = Convert {
             sample_type: chunks.sample_type,
-            height_scale: heights.scale * unit_m,
-            height_offset_m: heights.offset * unit_m,
-            georeference,
-            format: format!(
-                "{}{}, {}, {}",
-                if file.is_big() { "BigTIFF" } else { "TIFF" },
-                if directory.has_georeference() { " with georeference" } else { "" },
-                chunks.describe(),
-                chunks.compression.name()
-            ),
+            odd: (!chunks.stored.is_plain()).then_some(chunks.stored),
+            big_endian: chunks.big_endian,
+            bands: chunks.side_by_side() as usize,
+            pick,
+            alpha,
+            absent: if is_void { f64::NAN } else { 0.0 },
         };
-        Ok(Self { path: path.to_owned(), info, chunks, void })
+        let mask = match file.mask_of(samples)? {
+            Some(directory) => Some(TiffMask::of(&mut file, &directory)?),
+            None => None,
+        };
+        Ok(Self { path: path.to_owned(), declared, chunks, planes, convert, mask })
     }
 }
 
-impl DemSource for TiffDem {
-    fn info(&self) -> &DemInfo {
-        &self.info
+impl Reader for TiffDem {
+    fn declared(&self) -> &Declared {
+        &self.declared
+    }
+
+    fn mask(&self) -> Option<&dyn Reader> {
+        self.mask.as_ref().map(|mask| mask as &dyn Reader)
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.chunks.memory_bytes()
+        self.chunks.memory_bytes(&self.planes)
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        if self.chunks.is_raw() {
-            raw::stream(&self.path, &self.chunks, &self.void, sink)
-        } else {
-            packed::stream(&self.path, &self.chunks, &self.void, sink)
-        }
+        let stream = if self.chunks.is_raw() { raw::stream } else { packed::stream };
+        stream(&self.path, &self.chunks, &self.planes, &self.convert, sink)
     }
 }
 

@@ -10,14 +10,15 @@ mod name;
 
 use std::path::{Path, PathBuf};
 
+use crate::reader::{CrsSaid, Declared, Reader, Said};
 use mosaic::Mosaic;
-use terrasoar_layout::dem::{DemInfo, DemSource, Georeference, HorizontalUnit, SampleSink, SampleType};
+use terrasoar_layout::dem::{SampleSink, SampleType};
 use terrasoar_layout::error::LayoutError;
 
 /// One or several `.hgt` tiles.
 #[derive(Debug)]
 pub(super) struct HgtDem {
-    info: DemInfo,
+    declared: Declared,
     mosaic: Mosaic,
 }
 
@@ -41,36 +42,26 @@ impl HgtDem {
     pub(super) fn open(paths: &[PathBuf]) -> Result<Self, LayoutError> {
         let mosaic = Mosaic::place(paths)?;
         let step = 1.0 / f64::from(mosaic.side - 1);
-        let (crs_name, pixel_to_crs) = match mosaic.north_west {
-            Some((north, west)) => ("WGS 84".into(), Some([west, step, 0.0, north, 0.0, -step])),
+        let format = match paths.len() {
+            1 => format!("SRTM .hgt, {0} x {0}", mosaic.side),
+            tiles => format!("mosaic of {tiles} SRTM .hgt tiles, {0} x {0} each", mosaic.side),
+        };
+        let mut declared = Declared::new([mosaic.samples_wide, mosaic.samples_high], SampleType::I16, format);
+        declared.crs = CrsSaid { code: Some(Said::new(4326, "the format .hgt")), ..CrsSaid::default() };
+        match mosaic.north_west {
+            Some((north, west)) => {
+                declared.place = Some(Said::new([west, step, 0.0, north, 0.0, -step], "the file's name"));
+            }
             // The tile is a degree wide wherever it is, but how many metres that is depends on its latitude.
-            None => ("WGS 84, one degree square at an unknown place".into(), None),
-        };
-        let info = DemInfo {
-            samples_wide: mosaic.samples_wide,
-            samples_high: mosaic.samples_high,
-            sample_type: SampleType::I16,
-            height_scale: 1.0,
-            height_offset_m: 0.0,
-            georeference: Georeference {
-                epsg: Some(4326),
-                crs_name,
-                unit: HorizontalUnit::Degree,
-                pixel_to_crs,
-                body_radius_m: None,
-            },
-            format: match paths.len() {
-                1 => format!("SRTM .hgt, {0} x {0}", mosaic.side),
-                tiles => format!("mosaic of {tiles} SRTM .hgt tiles, {0} x {0} each", mosaic.side),
-            },
-        };
-        Ok(Self { info, mosaic })
+            None => declared.crs.name = "WGS 84, one degree square at an unknown place".into(),
+        }
+        Ok(Self { declared, mosaic })
     }
 }
 
-impl DemSource for HgtDem {
-    fn info(&self) -> &DemInfo {
-        &self.info
+impl Reader for HgtDem {
+    fn declared(&self) -> &Declared {
+        &self.declared
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {

@@ -12,7 +12,7 @@ pub(super) const LARGEST_TILE: u32 = 256;
 pub struct BuildOptions {
     /// Spacing in metres (east, north) instead of what the DEM says.
     pub spacing_m: Option<[f64; 2]>,
-    /// Factor on all heights; the default is 1.
+    /// Factor on all heights, below 0 where raw numbers are depths; the default is 1.
     pub z_scale: f64,
     /// Memory budget in MiB; at least 48.
     pub memory_mib: u64,
