@@ -53,7 +53,7 @@ const SIGNED: &[Format] = &[
     },
     Format {
         name: "Esri ASCII grid",
-        is: |look| ascii_grid::is_ascii_grid(&look.head),
+        is: |look| ascii_grid::is_ascii_grid(&look.head) && !look.is_called("hdr"),
         open: |path, _| boxed(ascii_grid::AsciiGrid::open(path)),
     },
 ];
