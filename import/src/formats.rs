@@ -5,7 +5,7 @@
 use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
-use crate::{OpenOptions, ascii_grid, bt, geotiff, hgt, labelled, png, pnm, raw, xyz};
+use crate::{OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz};
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
 
@@ -35,6 +35,21 @@ const SIGNED: &[Format] = &[
         name: "TIFF",
         is: |look| identify::is_tiff(&look.head),
         open: |path, options| boxed(geotiff::TiffDem::open(path, options)),
+    },
+    Format {
+        name: "netCDF",
+        is: |look| netcdf::is_netcdf(&look.head),
+        open: |path, options| boxed(netcdf::NetcdfDem::open(path, options)),
+    },
+    Format {
+        name: "DTED",
+        is: |look| dted::is_dted(&look.head),
+        open: |path, _| boxed(dted::DtedDem::open(path)),
+    },
+    Format {
+        name: "USGS DEM",
+        is: |look| usgs_dem::is_usgs_dem(&look.head),
+        open: |path, _| boxed(usgs_dem::UsgsDem::open(path)),
     },
     Format {
         name: "Netpbm",
@@ -79,7 +94,7 @@ const NAMED: &[Format] = &[
 ];
 
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))

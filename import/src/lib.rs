@@ -9,6 +9,7 @@
 mod ascii_grid;
 mod bt;
 mod crs;
+mod dted;
 mod formats;
 mod geotiff;
 mod guard;
@@ -17,6 +18,7 @@ mod identify;
 pub(crate) mod input;
 pub(crate) mod jpeg_frame;
 mod labelled;
+mod netcdf;
 mod opened;
 mod options;
 mod parallel;
@@ -30,6 +32,7 @@ mod reader;
 mod strangers;
 pub mod synth;
 mod text;
+mod usgs_dem;
 mod value;
 mod xyz;
 

@@ -4,7 +4,7 @@
 //! Tiles at the right and lower edge are stored whole, strips at the lower edge only as far as the image. Nothing is held but the shape: places stay in the file
 //! ([`super::listing`]).
 
-use super::listing::{Listing, Places};
+use super::listing::{Listing, Place, Places};
 use super::tags::{self, Directory, TiffFile};
 use std::fs::File;
 use std::path::Path;
@@ -25,6 +25,8 @@ pub(super) struct ChunkGrid {
     pub(super) chunk_height: u32,
     pub(super) tiled: bool,
     pub(super) across: u32,
+    /// Images of the same shape that are listed one after the other, one for each band.
+    planes: u64,
     listing: Listing,
     /// Chunks that one in the file was cut into, one below the other.
     cuts: u32,
@@ -42,11 +44,12 @@ pub(super) struct Stored {
 }
 
 impl ChunkGrid {
-    /// Reads the table of the image `directory`, and checks that it is as long as the image's size asks for.
+    /// Reads the table of the image `directory`, and checks that it is as long as the image's size and its `planes` ask for.
     pub(super) fn read(
         file: &mut TiffFile,
         directory: &Directory,
         [width, height]: [u32; 2],
+        planes: u64,
     ) -> Result<Self, LayoutError> {
         let tiled = file.number(directory, tags::TILE_WIDTH)?.is_some();
         let (chunk_width, chunk_height) = if tiled {
@@ -62,25 +65,24 @@ impl ChunkGrid {
             return Err(file.damaged("a strip or tile without samples is declared; write the file again"));
         }
         let across = width.div_ceil(chunk_width);
-        let wanted = u64::from(across) * u64::from(height.div_ceil(chunk_height));
+        let one = u64::from(across) * u64::from(height.div_ceil(chunk_height));
+        let wanted = one.saturating_mul(planes);
         let (offsets, counts) = if tiled {
             (tags::TILE_OFFSETS, tags::TILE_BYTE_COUNTS)
         } else {
             (tags::STRIP_OFFSETS, tags::STRIP_BYTE_COUNTS)
         };
         let listed = [file.count(directory, offsets), file.count(directory, counts)];
-        let columns = (file.column(directory, offsets)?, file.column(directory, counts)?);
-        let listing = match columns {
-            (Some(offsets), Some(counts)) => Listing::new(offsets, counts).filter(|l| l.count() == wanted),
-            _ => None,
-        };
+        let (offsets, counts) = (file.column(directory, offsets)?, file.column(directory, counts)?);
+        let listing = offsets.and_then(|offsets| Listing::new(offsets, counts, file.bytes()));
+        let listing = listing.filter(|listing| listing.count() == wanted);
         let Some(listing) = listing else {
             return Err(file.damaged(format!(
                 "{wanted} chunks make up the image, but {} places and {} lengths are listed; fetch the file again",
                 listed[0], listed[1]
             )));
         };
-        Ok(Self { width, height, chunk_width, chunk_height, tiled, across, listing, cuts: 1, row_bytes: 0 })
+        Ok(Self { width, height, chunk_width, chunk_height, tiled, across, planes, listing, cuts: 1, row_bytes: 0 })
     }
 
     /// Cuts chunks that are not compressed, of `row_bytes` a row, into such of `rows` rows, which their height is a multiple of unless there is but one
@@ -91,9 +93,25 @@ impl ChunkGrid {
         self.chunk_height = rows;
     }
 
-    /// Number of chunks, cut ones counted apart.
+    /// Offset and packed length of a chunk of the plane told; `None` if the file left it out. No chunk of an image of several planes is cut.
+    pub(super) fn place_of(
+        &self,
+        plane: u64,
+        chunk: u64,
+        places: &mut Places<'_>,
+    ) -> Result<Option<(u64, u64)>, LayoutError> {
+        self.place(plane * self.count() + chunk, places)
+    }
+
+    /// Number of chunks of a plane, cut ones counted apart.
     pub(super) fn count(&self) -> u64 {
         u64::from(self.across) * u64::from(self.height.div_ceil(self.chunk_height))
+    }
+
+    /// Says how many bytes a chunk unpacks to at most: that bounds how long one can be whose length the file does not state. What is worth packing becomes no longer by it, but for
+    /// a head and a sum.
+    pub(super) fn set_decoded_bytes(&mut self, decoded: u64) {
+        self.listing.set_unstated_bytes(decoded.saturating_mul(2).saturating_add(64));
     }
 
     /// What reads places of chunks from `file`.
@@ -129,7 +147,7 @@ impl ChunkGrid {
         let mut stored = Stored::default();
         let (mut packed_bytes, mut unpacked_bytes) = (0u64, 0u64);
         let mut next = 0;
-        while let Some((chunk, at, packed)) = places.next(next)? {
+        while let Some(Place { chunk, at, length: packed, is_stated }) = places.next(next)? {
             next = chunk + 1;
             let samples = unpacked(chunk);
             let length = if is_raw { samples } else { packed };
@@ -138,9 +156,13 @@ impl ChunkGrid {
             stored.longest = stored.longest.max(length);
             let Window { width, height, .. } = self.window(chunk);
             stored.samples += u64::from(width) * u64::from(height);
-            packed_bytes = packed_bytes.saturating_add(length);
+            if is_raw || is_stated {
+                packed_bytes = packed_bytes.saturating_add(length);
+            }
             unpacked_bytes = unpacked_bytes.saturating_add(samples);
         }
+        // As if all planes were stored alike.
+        stored.samples /= self.planes;
         // Equal chunks may be stored once; but then they are short. All of them long and in one place would make a small file endless.
         if packed_bytes > file.bytes().max(unpacked_bytes.saturating_mul(2)) {
             return Err(file.damaged(format!(
@@ -163,8 +185,9 @@ impl ChunkGrid {
         Err(LayoutError::unsupported(file.path(), problem))
     }
 
-    /// The part of the image a chunk covers.
+    /// The part of the image a chunk of any plane covers.
     pub(super) fn window(&self, chunk: u64) -> Window {
+        let chunk = chunk % self.count();
         // Both fit: there are `across` chunks in a row and the image's sides are 32-bit.
         let col = (chunk % u64::from(self.across)) as u32 * self.chunk_width;
         let row = (chunk / u64::from(self.across)) as u32 * self.chunk_height;
@@ -178,7 +201,7 @@ impl ChunkGrid {
 
     /// Name of a chunk in messages.
     pub(super) fn name(&self, chunk: u64) -> String {
-        format!("{} {chunk} of {}", if self.tiled { "tile" } else { "strip" }, self.count())
+        format!("{} {chunk} of {}", if self.tiled { "tile" } else { "strip" }, self.planes * self.count())
     }
 
     /// Refuses a chunk that lies at `at` and does not end in the file.

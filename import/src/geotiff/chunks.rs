@@ -2,7 +2,9 @@
 //! read here.
 
 use super::chunk_grid::{ChunkGrid, side};
+use super::lerc;
 use super::span::{LARGEST_WHOLE, Span};
+use super::stored::{MAX_BANDS, Stored};
 use super::tags::{self, Directory, TiffFile};
 use super::zstd_frame;
 use std::io::Read;
@@ -17,6 +19,15 @@ pub(super) enum Compression {
     Deflate,
     PackBits,
     Zstd,
+    Lerc(Lerc),
+}
+
+/// How a blob of LERC is packed once more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lerc {
+    Plain,
+    Deflate,
+    Zstd,
 }
 
 impl Compression {
@@ -27,6 +38,9 @@ impl Compression {
             Self::Deflate => "DEFLATE",
             Self::PackBits => "PackBits",
             Self::Zstd => "ZSTD",
+            Self::Lerc(Lerc::Plain) => "LERC",
+            Self::Lerc(Lerc::Deflate) => "LERC and DEFLATE",
+            Self::Lerc(Lerc::Zstd) => "LERC and ZSTD",
         }
     }
 
@@ -41,6 +55,8 @@ impl Compression {
             Self::Lzw => 4096,
             // A block of 128 KiB of one byte takes four bytes.
             Self::Zstd => 32768,
+            // One value takes a head, however many samples have it.
+            Self::Lerc(_) => u64::MAX,
         }
     }
 }
@@ -58,9 +74,14 @@ pub(super) enum Predictor {
 pub(super) struct Chunks {
     pub(super) grid: ChunkGrid,
     pub(super) sample_type: SampleType,
-    /// Samples of a pixel that lie side by side.
+    pub(super) stored: Stored,
+    /// Samples of a pixel.
     pub(super) bands: u64,
+    /// Whether the bands lie one after the other, not side by side.
+    pub(super) is_planar: bool,
     pub(super) big_endian: bool,
+    /// Whether the bits of each byte stand the other way round (FillOrder 2).
+    pub(super) is_reversed: bool,
     pub(super) compression: Compression,
     pub(super) predictor: Predictor,
     /// Largest window that long chunks of ZSTD ask for.
@@ -69,8 +90,6 @@ pub(super) struct Chunks {
     pub(super) stored_samples: u64,
 }
 
-/// Bands of an image, at most.
-const MAX_BANDS: u64 = 4096;
 /// Longest row of a chunk: what is unpacked at once at least.
 const MAX_ROW_BYTES: u64 = 64 << 20;
 
@@ -93,23 +112,15 @@ impl Chunks {
                 ),
             ));
         }
-        if bands > 1 && file.number(directory, tags::PLANAR_CONFIGURATION)? == Some(2) {
-            return Err(LayoutError::unsupported(
-                file.path(),
-                format!(
-                    "its {bands} bands lie one after the other, which is not read; extract the one with the heights: \
-                     gdal_translate -b 1 INPUT output.tif"
-                ),
-            ));
-        }
-        let sample_type = sample_type(file, directory)?;
+        let is_planar = bands > 1 && file.number(directory, tags::PLANAR_CONFIGURATION)? == Some(2);
+        let stored = Stored::read(file, directory)?;
         let compression = compression_of(file, directory)?;
         let predictor = file.number(directory, tags::PREDICTOR)?.unwrap_or(1);
-        let predictor = match (predictor, sample_type) {
-            _ if compression == Compression::None => Predictor::None,
-            (1, _) => Predictor::None,
-            (2, _) => Predictor::Horizontal,
-            (3, SampleType::F16 | SampleType::F32 | SampleType::F64) => Predictor::Floating,
+        let predictor = match predictor {
+            _ if matches!(compression, Compression::None | Compression::Lerc(_)) => Predictor::None,
+            1 => Predictor::None,
+            2 if stored.is_plain() => Predictor::Horizontal,
+            3 if stored.is_real() => Predictor::Floating,
             _ => {
                 return Err(file.damaged(format!(
                     "predictor {predictor} is unknown or does not go with its samples; fetch the file again, or write \
@@ -117,24 +128,31 @@ impl Chunks {
                 )));
             }
         };
-        let grid = ChunkGrid::read(file, directory, [width, height])?;
+        let planes = if is_planar { bands } else { 1 };
+        let grid = ChunkGrid::read(file, directory, [width, height], planes)?;
         let mut this = Self {
             grid,
-            sample_type,
+            sample_type: stored.sample_type(),
+            stored,
             bands,
+            is_planar,
             big_endian: file.is_big_endian(),
+            is_reversed: file.number(directory, tags::FILL_ORDER)? == Some(2),
             compression,
             predictor,
             largest_window: 0,
             stored_samples: 0,
         };
+        this.grid.set_decoded_bytes(this.decoded_bytes());
         this.check_places(file)?;
         Ok(this)
     }
 
     /// Every chunk lies in the file, and is long enough for what it is to become.
     fn check_places(&mut self, file: &TiffFile) -> Result<(), LayoutError> {
-        if !self.is_raw() && self.stride() > MAX_ROW_BYTES {
+        // Of a raw row only what lies in the image is read, and one band of that is what any format has.
+        let row_bytes = if self.is_raw() { self.row_bytes(self.grid.width) } else { self.stride() };
+        if (!self.is_raw() || self.side_by_side() > 1) && row_bytes > MAX_ROW_BYTES {
             return Err(LayoutError::unsupported(
                 file.path(),
                 format!(
@@ -142,8 +160,20 @@ impl Chunks {
                      gdal_translate -co TILED=YES -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER INPUT output.tif",
                     self.grid.kind(),
                     self.grid.chunk_width,
-                    self.stride() >> 20,
+                    row_bytes >> 20,
                     MAX_ROW_BYTES >> 20
+                ),
+            ));
+        }
+        if matches!(self.compression, Compression::Lerc(_)) && self.decoded_bytes() > lerc::MOST_BYTES {
+            return Err(LayoutError::unsupported(
+                file.path(),
+                format!(
+                    "its {} of LERC unpack to {} MiB each, more than the {} MiB allowed; write it again in tiles: \
+                     gdal_translate -co TILED=YES -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER INPUT output.tif",
+                    self.grid.kind(),
+                    self.decoded_bytes() >> 20,
+                    lerc::MOST_BYTES >> 20
                 ),
             ));
         }
@@ -157,7 +187,8 @@ impl Chunks {
             |chunk, at, packed| {
                 if asks_for_window {
                     let mut head = [0; zstd_frame::HEAD_BYTES];
-                    let mut span = Span { file: file.file(), at, left: packed };
+                    let is_reversed = self.is_reversed;
+                    let mut span = Span { file: file.file(), at, left: packed, is_reversed };
                     let read = span.read(&mut head);
                     let length = read.map_err(|source| {
                         LayoutError::io(file.path(), "cannot read the TIFF file", source)
@@ -187,90 +218,37 @@ impl Chunks {
         self.compression == Compression::None
     }
 
-    /// Bytes of a sample in the file.
-    pub(super) fn sample_bytes(&self) -> u64 {
-        match self.sample_type {
-            SampleType::U8 | SampleType::I8 => 1,
-            SampleType::U16 | SampleType::I16 | SampleType::F16 => 2,
-            SampleType::U32 | SampleType::I32 | SampleType::F32 => 4,
-            SampleType::U64 | SampleType::I64 | SampleType::F64 => 8,
-        }
+    /// Samples of a pixel that lie side by side.
+    pub(super) fn side_by_side(&self) -> u64 {
+        if self.is_planar { 1 } else { self.bands }
     }
 
-    /// Bytes of the samples that lie side by side for a pixel.
-    pub(super) fn pixel_bytes(&self) -> u64 {
-        self.bands * self.sample_bytes()
+    /// Bytes of the first `width` pixels of a row.
+    pub(super) fn row_bytes(&self, width: u32) -> u64 {
+        // At most 2^31 pixels of 4096 samples of 64 bits.
+        (u64::from(width) * self.side_by_side() * self.stored.bits()).div_ceil(8)
     }
 
     /// Bytes of a row of a chunk.
     pub(super) fn stride(&self) -> u64 {
-        u64::from(self.grid.chunk_width) * self.pixel_bytes()
+        self.row_bytes(self.grid.chunk_width)
     }
 
     /// Bytes of a whole chunk when unpacked.
     pub(super) fn decoded_bytes(&self) -> u64 {
-        (u64::from(self.grid.chunk_width) * u64::from(self.grid.chunk_height))
-            .saturating_mul(self.pixel_bytes())
+        self.stride().saturating_mul(u64::from(self.grid.chunk_height))
     }
 
     /// Bytes that must be unpacked for the samples of a chunk that lie in the image.
     pub(super) fn stored_bytes(&self, chunk: u64) -> u64 {
-        let rows = u64::from(self.grid.window(chunk).height);
-        (u64::from(self.grid.chunk_width) * rows).saturating_mul(self.pixel_bytes())
+        self.stride().saturating_mul(u64::from(self.grid.window(chunk).height))
     }
 
     /// "tiles of 512 x 512 uint16".
     pub(super) fn describe(&self) -> String {
-        let kind = match self.sample_type {
-            SampleType::U8 => "uint8",
-            SampleType::I8 => "int8",
-            SampleType::U16 => "uint16",
-            SampleType::I16 => "int16",
-            SampleType::U32 => "uint32",
-            SampleType::I32 => "int32",
-            SampleType::U64 => "uint64",
-            SampleType::I64 => "int64",
-            SampleType::F16 => "float16",
-            SampleType::F32 => "float32",
-            SampleType::F64 => "float64",
-        };
         let ChunkGrid { chunk_width, chunk_height, .. } = self.grid;
-        format!("{} of {chunk_width} x {chunk_height} {kind}", self.grid.kind())
+        format!("{} of {chunk_width} x {chunk_height} {}", self.grid.kind(), self.stored.name())
     }
-}
-
-fn sample_type(file: &mut TiffFile, directory: &Directory) -> Result<SampleType, LayoutError> {
-    let bits = file.number(directory, tags::BITS_PER_SAMPLE)?.unwrap_or(1);
-    let format = file.number(directory, tags::SAMPLE_FORMAT)?.unwrap_or(1);
-    Ok(match (format, bits) {
-        (1, 8) => SampleType::U8,
-        (2, 8) => SampleType::I8,
-        (1, 16) => SampleType::U16,
-        (2, 16) => SampleType::I16,
-        (1, 32) => SampleType::U32,
-        (2, 32) => SampleType::I32,
-        (1, 64) => SampleType::U64,
-        (2, 64) => SampleType::I64,
-        (3, 16) => SampleType::F16,
-        (3, 32) => SampleType::F32,
-        (3, 64) => SampleType::F64,
-        _ => {
-            let kind = match format {
-                1 => "unsigned",
-                2 => "signed",
-                3 => "floating-point",
-                5 | 6 => "complex",
-                _ => "untyped",
-            };
-            return Err(LayoutError::unsupported(
-                file.path(),
-                format!(
-                    "{bits}-bit {kind} samples are not read (whole numbers of 8, 16, 32 and 64 bits and real ones of 16, 32 and 64 are); \
-                     convert them: gdal_translate -ot Float32 INPUT output.tif"
-                ),
-            ));
-        }
-    })
 }
 
 pub(super) fn compression_of(file: &mut TiffFile, directory: &Directory) -> Result<Compression, LayoutError> {
@@ -281,10 +259,23 @@ pub(super) fn compression_of(file: &mut TiffFile, directory: &Directory) -> Resu
         8 | 32946 => return Ok(Compression::Deflate),
         32773 => return Ok(Compression::PackBits),
         50000 => return Ok(Compression::Zstd),
+        34887 => {
+            // Version of LERC, and how its blobs are packed.
+            let parameters = file.numbers(directory, tags::LERC_PARAMETERS, 2)?.unwrap_or_default();
+            match parameters.get(1) {
+                None | Some(0) => return Ok(Compression::Lerc(Lerc::Plain)),
+                Some(1) => return Ok(Compression::Lerc(Lerc::Deflate)),
+                Some(2) => return Ok(Compression::Lerc(Lerc::Zstd)),
+                Some(_) => "LERC packed in an unknown way",
+            }
+        }
         2..=4 => "CCITT fax",
         6 | 7 => "JPEG",
         34712 => "JPEG 2000",
-        34887 => "LERC",
+        32809 => "ThunderScan",
+        34661 => "JBIG",
+        34676 | 34677 => "SGI LogLuv",
+        34892 => "lossy JPEG",
         34925 => "LZMA",
         50001 => "WebP",
         50002 | 52546 => "JPEG XL",

@@ -78,6 +78,7 @@ impl<R: BufRead> Unpacker<R> {
                 State::Zstd(Box::new(decoder))
             }
             Compression::PackBits => State::PackBits(Run::Count),
+            Compression::Lerc(_) => return Err(damaged("LERC is not unpacked piece by piece")),
         };
         Ok(Self { input, state })
     }
@@ -97,6 +98,24 @@ impl<R: BufRead> Unpacker<R> {
             }
         }
         Ok(())
+    }
+
+    /// All that is left, `most` bytes of it at most.
+    pub(super) fn rest(&mut self, most: usize) -> Result<Vec<u8>, Failure> {
+        let mut unpacked = Vec::new();
+        loop {
+            let written = unpacked.len();
+            if written == most {
+                return Err(damaged("it is longer than its samples can be"));
+            }
+            unpacked.resize(most.min((2 * written).max(1 << 16)), 0);
+            let (read, wrote, ended) = self.step(&mut unpacked[written..])?;
+            self.input.consume(read);
+            unpacked.truncate(written + wrote);
+            if ended || (wrote == 0 && read == 0) {
+                return Ok(unpacked);
+            }
+        }
     }
 
     /// One step of the codec: bytes read and written, and whether the stream has ended.

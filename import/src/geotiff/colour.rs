@@ -7,6 +7,7 @@
 //! are not applied.
 
 use super::colour_table::{Packing, Paint, Table};
+use super::span::turn_bits;
 use super::{codec, geokeys, predictor, tags};
 use crate::crs::georeference;
 use crate::guard::guard;
@@ -171,6 +172,7 @@ impl TiffImage {
             ),
             _ => LayoutError::io(&self.path, "cannot read the TIFF file", e),
         })?;
+        turn_bits(&mut scratch.packed, table.is_reversed);
         let damaged = |problem: String| {
             LayoutError::damaged(
                 &self.path,

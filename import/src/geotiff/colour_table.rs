@@ -50,6 +50,8 @@ pub(super) struct Table {
     /// 1, or 2 of which the upper one is taken.
     pub(super) sample_bytes: u64,
     pub(super) big_endian: bool,
+    /// Whether the bits of each byte stand the other way round (FillOrder 2); never so of JPEG.
+    pub(super) is_reversed: bool,
     pub(super) paint: Paint,
     /// Channel of alpha.
     alpha: Option<usize>,
@@ -105,7 +107,16 @@ impl Table {
             let tables = file.bytes_of(directory, tags::JPEG_TABLES, MAX_TABLE_BYTES)?;
             Packing::Jpeg { tables: tables.unwrap_or_default() }
         } else {
-            Packing::Bytes(compression_of(file, directory)?)
+            match compression_of(file, directory)? {
+                Compression::Lerc(_) => {
+                    return Err(unsupported(
+                        file,
+                        "its chunks are LERC, which is read of heights and not of pictures; convert it: gdal_translate -co TILED=YES \
+                         -co COMPRESS=DEFLATE INPUT output.tif",
+                    ));
+                }
+                compression => Packing::Bytes(compression),
+            }
         };
         let predictor = file.number(directory, tags::PREDICTOR)?.unwrap_or(1);
         let is_raw = matches!(packing, Packing::Bytes(Compression::None));
@@ -116,7 +127,7 @@ impl Table {
         }
         let void = file.text(directory, tags::GDAL_NODATA, super::MAX_NODATA_BYTES)?;
         let void = void.and_then(|text| text.trim().parse::<f64>().ok());
-        let grid = ChunkGrid::read(file, directory, [width, height])?;
+        let grid = ChunkGrid::read(file, directory, [width, height], 1)?;
         if grid.count() > u64::from(u32::MAX) {
             return Err(file.damaged("it has more chunks than a picture can have; fetch the file again"));
         }
@@ -127,6 +138,7 @@ impl Table {
             bands,
             sample_bytes,
             big_endian: file.is_big_endian(),
+            is_reversed: code != 7 && file.number(directory, tags::FILL_ORDER)? == Some(2),
             paint,
             alpha,
             void: void.filter(|v| v.fract() == 0.0 && (0.0..=65535.0).contains(v)).map(|v| v as u16),
@@ -134,6 +146,7 @@ impl Table {
             differences: predictor == 2 && !is_raw,
             notes,
         };
+        table.grid.set_decoded_bytes(table.chunk_bytes());
         table.longest = table.check(file)?;
         if is_raw {
             table.cut();

@@ -6,6 +6,7 @@
 use half::f16;
 use terrasoar_layout::dem::SampleType;
 
+use super::stored::Stored;
 use crate::value::Decode;
 
 /// What makes a number of a pixel.
@@ -21,6 +22,8 @@ pub(super) enum Pick {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Convert {
     pub(super) sample_type: SampleType,
+    /// How samples are stored that no machine has.
+    pub(super) odd: Option<Stored>,
     pub(super) big_endian: bool,
     /// Samples of a pixel that lie side by side.
     pub(super) bands: usize,
@@ -32,8 +35,16 @@ pub(super) struct Convert {
 }
 
 impl Convert {
+    /// Appends the first `pixels` of a row.
+    pub(super) fn append_row(&self, row: &[u8], pixels: usize, samples: &mut Vec<f64>) {
+        match self.odd {
+            Some(stored) => self.pixels(stored.odd(row, self.big_endian, pixels * self.bands), samples),
+            None => self.append(row, samples),
+        }
+    }
+
     /// Appends the pixels in `bytes`, which are whole ones.
-    pub(super) fn append(&self, bytes: &[u8], samples: &mut Vec<f64>) {
+    fn append(&self, bytes: &[u8], samples: &mut Vec<f64>) {
         let big = self.big_endian;
         match self.sample_type {
             SampleType::U8 => self.pixels(bytes.iter().map(|byte| f64::from(*byte)), samples),
@@ -111,7 +122,7 @@ mod tests {
 
     fn converted(sample_type: SampleType, big_endian: bool, bytes: &[u8]) -> Vec<f64> {
         let convert =
-            Convert { sample_type, big_endian, bands: 1, pick: Pick::Band(0), alpha: None, absent: 0.0 };
+            Convert { sample_type, odd: None, big_endian, bands: 1, pick: Pick::Band(0), alpha: None, absent: 0.0 };
         let mut samples = Vec::new();
         convert.append(bytes, &mut samples);
         samples
@@ -143,6 +154,7 @@ mod tests {
     fn a_band_is_picked_and_alpha_makes_voids() {
         let mut convert = Convert {
             sample_type: SampleType::U8,
+            odd: None,
             big_endian: false,
             bands: 3,
             pick: Pick::Band(1),

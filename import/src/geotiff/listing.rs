@@ -50,13 +50,42 @@ impl Column {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Listing {
     offsets: Column,
-    lengths: Column,
+    /// Nothing where the file states no lengths at all.
+    lengths: Option<Column>,
+    file_bytes: u64,
+    /// Length of a chunk whose length is not stated, unless the file ends before.
+    unstated_bytes: u64,
+}
+
+/// A chunk that the file has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) chunk: u64,
+    pub(super) at: u64,
+    /// Packed length; where the file states none, one that reaches over the chunk.
+    pub(super) length: u64,
+    pub(super) is_stated: bool,
 }
 
 impl Listing {
-    /// Both lists, if they are of one length.
-    pub(super) fn new(offsets: Column, lengths: Column) -> Option<Self> {
-        (offsets.count == lengths.count).then_some(Self { offsets, lengths })
+    /// Both lists, if they are of one length, of a file of `file_bytes`.
+    pub(super) fn new(offsets: Column, lengths: Option<Column>, file_bytes: u64) -> Option<Self> {
+        let is_whole = lengths.is_none_or(|lengths| lengths.count == offsets.count);
+        is_whole.then_some(Self { offsets, lengths, file_bytes, unstated_bytes: u64::MAX })
+    }
+
+    /// Says how long a chunk can be at most whose length is not stated: a codec stops where it has what it was asked for.
+    pub(super) fn set_unstated_bytes(&mut self, bytes: u64) {
+        self.unstated_bytes = bytes;
+    }
+
+    /// The place that an offset and a length stand for. A chunk that was left out has no offset; a length of 0 beside an offset says only that
+    /// the writer did not know better.
+    fn place(&self, chunk: u64, offset: u64, length: u64) -> Option<Place> {
+        let is_stated = length != 0;
+        let unstated = || self.file_bytes.saturating_sub(offset).min(self.unstated_bytes);
+        let length = if is_stated { length } else { unstated() };
+        (offset != 0).then_some(Place { chunk, at: offset, length, is_stated })
     }
 
     /// Number of chunks listed.
@@ -87,25 +116,26 @@ impl<'f> Places<'f> {
         if chunk < self.first || chunk - self.first >= self.offsets.len() as u64 {
             self.turn_to(chunk)?;
         }
-        let at = (chunk - self.first) as usize;
-        let place = self.offsets.get(at).copied().zip(self.lengths.get(at).copied());
-        Ok(place.filter(|(offset, length)| *offset != 0 && *length != 0))
+        Ok(self.at_hand(chunk).map(|place| (place.at, place.length)))
     }
 
-    /// The first chunk from `chunk` on that the file has, with its offset and packed length.
-    pub(super) fn next(&mut self, mut chunk: u64) -> Result<Option<(u64, u64, u64)>, LayoutError> {
+    /// The place of a chunk that is at hand.
+    fn at_hand(&self, chunk: u64) -> Option<Place> {
+        let at = (chunk - self.first) as usize;
+        let offset = *self.offsets.get(at)?;
+        self.listing.place(chunk, offset, self.lengths.get(at).copied().unwrap_or(0))
+    }
+
+    /// The first chunk from `chunk` on that the file has.
+    pub(super) fn next(&mut self, mut chunk: u64) -> Result<Option<Place>, LayoutError> {
         while chunk < self.listing.count() {
             // Brings it to hand.
             self.get(chunk)?;
-            let at = (chunk - self.first) as usize;
-            let mut rest = self.offsets[at..].iter().zip(&self.lengths[at..]);
-            match rest.position(|(offset, length)| *offset != 0 && *length != 0) {
-                Some(skipped) => {
-                    let at = at + skipped;
-                    return Ok(Some((self.first + at as u64, self.offsets[at], self.lengths[at])));
-                }
-                None => chunk = self.first + self.offsets.len() as u64,
+            let end = self.first + self.offsets.len() as u64;
+            if let Some(place) = (chunk..end).find_map(|chunk| self.at_hand(chunk)) {
+                return Ok(Some(place));
             }
+            chunk = end;
         }
         Ok(None)
     }
@@ -116,10 +146,14 @@ impl<'f> Places<'f> {
         self.offsets.clear();
         self.lengths.clear();
         let count = BLOCK.min(self.listing.count().saturating_sub(self.first));
-        let Listing { offsets, lengths } = self.listing;
+        let Listing { offsets, lengths, .. } = self.listing;
+        let of_lengths = |numbers: &mut Vec<u64>| match lengths {
+            Some(lengths) => lengths.read(self.file, self.first, count, numbers),
+            None => Ok(()),
+        };
         offsets
             .read(self.file, self.first, count, &mut self.offsets)
-            .and_then(|()| lengths.read(self.file, self.first, count, &mut self.lengths))
+            .and_then(|()| of_lengths(&mut self.lengths))
             .map_err(|source| match source.kind() {
                 ErrorKind::UnexpectedEof => LayoutError::damaged(
                     self.path,
@@ -154,19 +188,22 @@ mod tests {
             file.write_all(&(chunk as u16 % 7).to_be_bytes()).unwrap();
         }
         let column = |value_bytes, at| Column { count, value_bytes, big_endian: true, inline: None, at };
-        let listing = Listing::new(column(4, 8), column(2, 8 + 4 * count)).unwrap();
+        let mut listing = Listing::new(column(4, 8), Some(column(2, 8 + 4 * count)), 1000).unwrap();
+        listing.set_unstated_bytes(500);
         let mut places = Places::new(Path::new("t.tif"), &file, listing);
         for chunk in [0, 1, BLOCK, BLOCK - 1, count - 1, 8] {
-            let length = chunk % 7;
-            assert_eq!(places.get(chunk).unwrap(), (length != 0).then_some((100 + chunk, length)), "{chunk}");
+            // No length of 0: as much as a chunk can be, or as there is.
+            let unstated = 900u64.saturating_sub(chunk).min(500);
+            let length = if chunk % 7 == 0 { unstated } else { chunk % 7 };
+            assert_eq!(places.get(chunk).unwrap(), Some((100 + chunk, length)), "{chunk}");
         }
         assert_eq!(places.get(count).unwrap(), None);
         let mut next = 0;
-        while let Some((chunk, offset, length)) = places.next(next).unwrap() {
-            assert_eq!((chunk, offset, length), (next + u64::from(next % 7 == 0), 100 + chunk, chunk % 7));
+        while let Some(Place { chunk, at, is_stated, .. }) = places.next(next).unwrap() {
+            assert_eq!((chunk, at, is_stated), (next, 100 + chunk, chunk % 7 != 0));
             next = chunk + 1;
         }
-        assert!(next + 7 > count, "{next} of {count}");
+        assert_eq!(next, count);
         file.set_len(100).unwrap();
         let mut places = Places::new(Path::new("t.tif"), &file, listing);
         assert!(places.get(BLOCK).unwrap_err().to_string().contains("cut short"));
@@ -181,11 +218,14 @@ mod tests {
             inline: Some(values),
             at: 0,
         };
-        let listing =
-            Listing::new(column([9, 0, 0, 0, 8, 1, 0, 0]), column([5, 0, 0, 0, 6, 0, 0, 0])).unwrap();
+        let offsets = column([9, 0, 0, 0, 8, 1, 0, 0]);
+        let listing = Listing::new(offsets, Some(column([5, 0, 0, 0, 6, 0, 0, 0])), 1000).unwrap();
         let file = tempfile::tempfile().unwrap();
         let mut places = Places::new(Path::new("t.tif"), &file, listing);
         assert_eq!([0, 1].map(|chunk| places.get(chunk).unwrap().unwrap()), [(9, 5), (264, 6)]);
-        assert!(Listing::new(column([0; 8]), Column { count: 3, ..column([0; 8]) }).is_none());
+        let listing = Listing::new(column([9, 0, 0, 0, 0, 0, 0, 0]), None, 1000).unwrap();
+        let mut places = Places::new(Path::new("t.tif"), &file, listing);
+        assert_eq!([0, 1].map(|chunk| places.get(chunk).unwrap()), [Some((9, 991)), None]);
+        assert!(Listing::new(offsets, Some(Column { count: 3, ..offsets }), 1000).is_none());
     }
 }

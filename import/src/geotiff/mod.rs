@@ -1,10 +1,13 @@
 //! GeoTIFF, BigTIFF and cloud-optimised ones, one chunk (strip or tile) at a time.
 //!
 //! [`tags`] reads the directory and holds every declared size against the file, [`chunks`] makes the
-//! table of chunks of it, [`geokeys`] and [`metadata`] say where the grid lies and what a unit is.
+//! table of chunks of the one that [`images`] chooses, [`geokeys`] and [`metadata`] say where the grid lies and what a unit is.
 //! Chunks are read piecewise, however large: uncompressed ones by [`raw`], compressed ones by
-//! [`packed`] with [`codec`] and [`predictor`]. [`convert`] turns bytes into samples. Of a file with
-//! several images the first full-resolution one is read. Memory: some rows a worker, whatever the file declares.
+//! [`packed`] with [`rows`], [`codec`], [`lerc`] and [`predictor`]. [`stored`] and [`convert`] turn bytes into samples, [`planes`] joins bands that lie apart.
+//! Memory: some rows a worker, whatever the file declares; of LERC a chunk.
+//!
+//! This is our own code, for no crate does all of it: tiff-reader 0.10 reads every fixture here and holds each chunk as a whole, so that a file of one strip takes
+//! the memory of the terrain, and refuses files that state no lengths of chunks; tiff 0.11.3 refuses sound LZW tiles that GDAL writes and inverts "white is zero".
 //!
 //! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
 //! are not inverted for "white is zero" files. Masks in images of their own are not applied.
@@ -17,12 +20,17 @@ mod colour;
 mod colour_table;
 mod convert;
 mod geokeys;
+mod images;
+mod lerc;
 mod listing;
 mod metadata;
 mod packed;
+mod planes;
 mod predictor;
 mod raw;
+mod rows;
 mod span;
+mod stored;
 mod tags;
 mod zstd_frame;
 
@@ -30,7 +38,8 @@ use std::path::{Path, PathBuf};
 
 use chunks::Chunks;
 pub(crate) use colour::TiffImage;
-use convert::Convert;
+use convert::{Convert, Pick};
+use planes::Planes;
 use tags::TiffFile;
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
@@ -50,6 +59,7 @@ pub(super) struct TiffDem {
     path: PathBuf,
     declared: Declared,
     chunks: Chunks,
+    planes: Planes,
     convert: Convert,
 }
 
@@ -82,15 +92,18 @@ impl TiffDem {
                           gdal_edit.py -a_nodata -9999 FILE";
             chunks.grid.check_sparse(&file, chunks.stored_samples, advice)?;
         }
+        let planes = if chunks.is_planar { Planes::of(&bands) } else { Planes::one() };
+        let (pick, alpha) = if chunks.is_planar { (Pick::Band(0), None) } else { (bands.pick, bands.alpha) };
         let convert = Convert {
             sample_type: chunks.sample_type,
+            odd: (!chunks.stored.is_plain()).then_some(chunks.stored),
             big_endian: chunks.big_endian,
-            bands: chunks.bands as usize,
-            pick: bands.pick,
-            alpha: bands.alpha,
+            bands: chunks.side_by_side() as usize,
+            pick,
+            alpha,
             absent: if is_void { f64::NAN } else { 0.0 },
         };
-        Ok(Self { path: path.to_owned(), declared, chunks, convert })
+        Ok(Self { path: path.to_owned(), declared, chunks, planes, convert })
     }
 }
 
@@ -100,15 +113,12 @@ impl Reader for TiffDem {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.chunks.memory_bytes()
+        self.chunks.memory_bytes(&self.planes)
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        if self.chunks.is_raw() {
-            raw::stream(&self.path, &self.chunks, &self.convert, sink)
-        } else {
-            packed::stream(&self.path, &self.chunks, &self.convert, sink)
-        }
+        let stream = if self.chunks.is_raw() { raw::stream } else { packed::stream };
+        stream(&self.path, &self.chunks, &self.planes, &self.convert, sink)
     }
 }
 

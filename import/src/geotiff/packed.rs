@@ -1,21 +1,24 @@
 //! Reads compressed chunks, each by one worker, some rows at a time.
 //!
 //! What a worker holds is a window of rows, not the chunk: a file of one huge strip takes no more memory than a tiled one. So many workers read as find room in
-//! [`BUDGET_BYTES`]; only rows of more than a megabyte and large windows of ZSTD take more, which [`Chunks::memory_bytes`] tells.
+//! [`BUDGET_BYTES`]; only rows of more than a megabyte, large windows of ZSTD and chunks of LERC take more, which [`Chunks::memory_bytes`] tells. Bands that lie one after the other
+//! are read in step.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Read};
+use std::io::ErrorKind;
 use std::path::Path;
 
 use super::super::guard::guard;
 use super::super::parallel::each_task;
 use super::super::{WINDOW_SAMPLES, input};
 use super::chunks::{Chunks, Compression, Predictor};
-use super::codec::{Failure, Unpacker};
+use super::codec::Failure;
 use super::convert::Convert;
-use super::span::{LARGEST_WHOLE, Span};
-use super::zstd_frame;
-use super::{parts, predictor, put_constant};
+use super::listing::Places;
+use super::planes::Planes;
+use super::rows::{INPUT_BYTES, Rows};
+use super::span::LARGEST_WHOLE;
+use super::{parts, put_constant};
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
 
@@ -23,28 +26,33 @@ use terrasoar_layout::error::LayoutError;
 pub(super) const BUDGET_BYTES: u64 = 16 << 20;
 /// Bytes unpacked at once, unless a row has more.
 const PART_BYTES: u64 = 1 << 18;
-/// Packed bytes read at once.
-const INPUT_BYTES: u64 = 1 << 16;
 /// State of a codec, without ZSTD's window.
 const CODEC_BYTES: u64 = 1 << 18;
+
 impl Chunks {
     /// Memory that a worker takes.
-    fn worker_bytes(&self) -> u64 {
+    fn worker_bytes(&self, planes: &Planes) -> u64 {
         let stride = self.stride();
         let samples = WINDOW_SAMPLES.max(u64::from(self.grid.width.min(self.grid.chunk_width)));
-        let zstd = match self.compression {
+        let codec = match self.compression {
             // As long packed as unpacked, or a window of at most twice the length.
             Compression::Zstd if self.decoded_bytes() <= LARGEST_WHOLE => 3 * self.decoded_bytes(),
             Compression::Zstd => self.largest_window,
+            // The blob, its samples and mask, and their bytes.
+            Compression::Lerc(_) => 6 * self.decoded_bytes(),
             _ => 0,
         };
-        let rows = PART_BYTES.max(stride) + if self.predictor == Predictor::Floating { stride } else { 0 };
-        rows + 8 * samples + INPUT_BYTES + CODEC_BYTES + zstd
+        let scratch = if self.predictor == Predictor::Floating { stride } else { 0 };
+        let plane = scratch + 8 * samples + INPUT_BYTES + CODEC_BYTES + codec;
+        let count = planes.numbers.len() as u64;
+        // What is made of several planes is kept beside them.
+        let joined = if count > 1 { 8 * samples } else { 0 };
+        PART_BYTES.max(stride) + joined + plane.saturating_mul(count)
     }
 
     /// Memory that reading takes beyond [`BUDGET_BYTES`].
-    pub(super) fn memory_bytes(&self) -> u64 {
-        if self.is_raw() { 0 } else { self.worker_bytes().saturating_sub(BUDGET_BYTES) }
+    pub(super) fn memory_bytes(&self, planes: &Planes) -> u64 {
+        if self.is_raw() { 0 } else { self.worker_bytes(planes).saturating_sub(BUDGET_BYTES) }
     }
 }
 
@@ -52,151 +60,121 @@ impl Chunks {
 pub(super) fn stream(
     path: &Path,
     chunks: &Chunks,
+    planes: &Planes,
     convert: &Convert,
     sink: &dyn SampleSink,
 ) -> Result<(), LayoutError> {
     let file = input::open(path, "cannot open the TIFF file")?;
-    let workers = usize::try_from(BUDGET_BYTES / chunks.worker_bytes()).unwrap_or(usize::MAX).max(1);
+    let workers = usize::try_from(BUDGET_BYTES / chunks.worker_bytes(planes)).unwrap_or(usize::MAX).max(1);
     let open = || {
         Ok(Worker {
             path,
             chunks,
+            planes,
+            convert,
             file: &file,
             places: chunks.grid.places(path, &file),
-            whole: Vec::new(),
             bytes: Vec::new(),
-            row: Vec::new(),
+            apart: vec![Vec::new(); planes.numbers.len()],
             samples: Vec::new(),
         })
     };
-    each_task(chunks.grid.count(), workers, open, |worker, chunk| {
-        let window = chunks.grid.window(chunk);
-        match chunks.grid.place(chunk, &mut worker.places)? {
-            Some(place) => worker.push(chunk, window, place, convert, sink),
-            None => put_constant(sink, window, convert.absent),
-        }
-    })
+    each_task(chunks.grid.count(), workers, open, |worker, chunk| worker.push(chunk, sink))
 }
 
 struct Worker<'a> {
     path: &'a Path,
     chunks: &'a Chunks,
+    planes: &'a Planes,
+    convert: &'a Convert,
     file: &'a File,
-    places: super::listing::Places<'a>,
-    /// A chunk unpacked as a whole.
-    whole: Vec<u8>,
+    places: Places<'a>,
     bytes: Vec<u8>,
-    row: Vec<u8>,
+    /// Samples of each plane.
+    apart: Vec<Vec<f64>>,
     samples: Vec<f64>,
 }
 
-impl Worker<'_> {
-    /// Pushes the samples of a chunk that lies at `at` and is `length` bytes long.
-    fn push(
-        &mut self,
-        chunk: u64,
-        window: Window,
-        (at, length): (u64, u64),
-        convert: &Convert,
-        sink: &dyn SampleSink,
-    ) -> Result<(), LayoutError> {
-        let (path, chunks) = (self.path, self.chunks);
-        let failed = |failure| match failure {
-            Failure::Damaged(problem) => LayoutError::damaged(
-                path,
-                chunks.grid.name(chunk),
-                format!("{problem}; fetch or write the file again"),
-            ),
-            Failure::Io(source) if source.kind() == ErrorKind::UnexpectedEof => LayoutError::damaged(
-                path,
-                chunks.grid.name(chunk),
-                "the file was cut short while it was read; start again",
-            ),
-            Failure::Io(source) => LayoutError::io(path, "cannot read the TIFF file", source),
-        };
-        // The codecs are others' work: a panic in one is damage in this chunk.
-        let guarded = |decode: &mut dyn FnMut() -> Result<(), Failure>| {
-            guard(path, || chunks.grid.name(chunk), || decode().map_err(failed))
-        };
-        let (size, stride, bands) = (chunks.sample_bytes(), chunks.stride() as usize, chunks.bands as usize);
-        let mut span = Span { file: self.file, at, left: length };
-        let is_whole =
-            chunks.compression == Compression::Zstd && self.whole_is_needed(span).map_err(failed)?;
-        if is_whole {
-            guarded(&mut || unpack_whole(&mut span, chunks, chunk, &mut self.whole))?;
+impl<'a> Worker<'a> {
+    /// Pushes the samples of a chunk.
+    fn push(&mut self, chunk: u64, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let (chunks, planes) = (self.chunks, self.planes);
+        let window = chunks.grid.window(chunk);
+        let mut open = Vec::with_capacity(planes.numbers.len());
+        for plane in &planes.numbers {
+            let number = plane * chunks.grid.count() + chunk;
+            let place = chunks.grid.place_of(*plane, chunk, &mut self.places)?;
+            let file = self.file;
+            let rows = place.map(|place| {
+                guarded(self.path, chunks, number, || Rows::open(file, chunks, number, place))
+            });
+            open.push((number, rows.transpose()?));
         }
-        let (compression, packed): (_, Box<dyn BufRead + '_>) = if is_whole {
-            (Compression::None, Box::new(&self.whole[..]))
-        } else {
-            (chunks.compression, Box::new(BufReader::with_capacity(INPUT_BYTES.min(length) as usize, span)))
-        };
-        let mut unpacker = Unpacker::new(compression, packed, chunks.window_allowed()).map_err(failed)?;
-        for part in parts(window, part_rows(window.width, stride as u64)) {
-            self.bytes.resize(stride * part.height as usize, 0);
-            guarded(&mut || unpacker.fill(&mut self.bytes))?;
-            match chunks.predictor {
-                Predictor::None => {}
-                Predictor::Horizontal => {
-                    predictor::horizontal(&mut self.bytes, stride, bands, size, chunks.big_endian);
-                }
-                Predictor::Floating => {
-                    predictor::floating(
-                        &mut self.bytes,
-                        stride,
-                        bands,
-                        size,
-                        chunks.big_endian,
-                        &mut self.row,
-                    );
-                }
+        if open.iter().all(|(_, rows)| rows.is_none()) {
+            return put_constant(sink, window, self.convert.absent);
+        }
+        let stride = chunks.stride();
+        for part in parts(window, part_rows(window.width, stride)) {
+            for (at, (number, rows)) in open.iter_mut().enumerate() {
+                self.read(at, *number, rows.as_mut(), part)?;
             }
-            self.samples.clear();
-            let row_bytes = (u64::from(window.width) * chunks.pixel_bytes()) as usize;
-            for row in self.bytes.chunks_exact(stride) {
-                convert.append(&row[..row_bytes], &mut self.samples);
+            if let [only] = &self.apart[..] {
+                sink.put(part, only)?;
+            } else {
+                planes.join(&self.apart, &mut self.samples);
+                sink.put(part, &self.samples)?;
             }
-            sink.put(part, &self.samples)?;
         }
         Ok(())
     }
 
-    /// Whether the chunk's window is larger than it may be, and the chunk short.
-    fn whole_is_needed(&self, mut span: Span<'_>) -> Result<bool, Failure> {
-        let mut head = [0; zstd_frame::HEAD_BYTES];
-        let length = span.read(&mut head)?;
-        let window = zstd_frame::window(&head[..length]).unwrap_or(0);
-        Ok(window > self.chunks.window_allowed() && self.chunks.decoded_bytes() <= LARGEST_WHOLE)
-    }
-}
-
-impl Chunks {
-    /// Largest window that a stream may ask for.
-    fn window_allowed(&self) -> u64 {
-        let unpacked = self.decoded_bytes();
-        if unpacked <= LARGEST_WHOLE {
-            unpacked.next_power_of_two().max(1 << 17)
-        } else {
-            self.largest_window
+    /// Reads the next rows of a plane, those of `part`.
+    fn read(
+        &mut self,
+        plane: usize,
+        chunk: u64,
+        rows: Option<&mut Rows<'a>>,
+        part: Window,
+    ) -> Result<(), LayoutError> {
+        let (chunks, pixels) = (self.chunks, part.width as usize);
+        let samples = &mut self.apart[plane];
+        samples.clear();
+        let Some(rows) = rows else {
+            samples.resize(pixels * part.height as usize, self.convert.absent);
+            return Ok(());
+        };
+        let stride = chunks.stride() as usize;
+        self.bytes.resize(stride * part.height as usize, 0);
+        guarded(self.path, chunks, chunk, || rows.fill(&mut self.bytes))?;
+        let row_bytes = chunks.row_bytes(part.width) as usize;
+        for row in self.bytes.chunks_exact(stride) {
+            self.convert.append_row(&row[..row_bytes], pixels, samples);
         }
+        Ok(())
     }
 }
 
-/// Unpacks a chunk of ZSTD into `whole`.
-fn unpack_whole(
-    span: &mut Span<'_>,
+/// Does what may fail in a chunk. The codecs are others' work: a panic in one is damage in this chunk.
+fn guarded<T>(
+    path: &Path,
     chunks: &Chunks,
     chunk: u64,
-    whole: &mut Vec<u8>,
-) -> Result<(), Failure> {
-    let unpacked = chunks.decoded_bytes();
-    // Nothing that is worth packing becomes longer by it.
-    if span.left > 2 * unpacked {
-        return Err(Failure::Damaged("it is much longer packed than unpacked".into()));
-    }
-    let mut packed = vec![0; span.left as usize];
-    span.read_exact(&mut packed)?;
-    whole.resize(unpacked as usize, 0);
-    zstd_frame::unpack_whole(&packed, whole, chunks.stored_bytes(chunk) as usize).map_err(Failure::Damaged)
+    decode: impl FnOnce() -> Result<T, Failure>,
+) -> Result<T, LayoutError> {
+    let failed = |failure| match failure {
+        Failure::Damaged(problem) => LayoutError::damaged(
+            path,
+            chunks.grid.name(chunk),
+            format!("{problem}; fetch or write the file again"),
+        ),
+        Failure::Io(source) if source.kind() == ErrorKind::UnexpectedEof => LayoutError::damaged(
+            path,
+            chunks.grid.name(chunk),
+            "the file was cut short while it was read; start again",
+        ),
+        Failure::Io(source) => LayoutError::io(path, "cannot read the TIFF file", source),
+    };
+    guard(path, || chunks.grid.name(chunk), || decode().map_err(failed))
 }
 
 /// Rows of a chunk that are unpacked at once, at least 1.

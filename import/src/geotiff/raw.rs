@@ -13,6 +13,8 @@ use super::super::parallel::each_task;
 use super::chunks::Chunks;
 use super::convert::Convert;
 use super::listing::Places;
+use super::planes::Planes;
+use super::span::turn_bits;
 use super::{put_constant, rows_at_once};
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
@@ -22,9 +24,13 @@ use terrasoar_layout::file::disk::read_at;
 const LARGEST_READ: u64 = 4 << 20;
 
 struct Worker<'a> {
+    path: &'a Path,
+    chunks: &'a Chunks,
     file: &'a File,
     places: Places<'a>,
     bytes: Vec<u8>,
+    /// Samples of each plane.
+    apart: Vec<Vec<f64>>,
     samples: Vec<f64>,
 }
 
@@ -32,15 +38,26 @@ struct Worker<'a> {
 pub(super) fn stream(
     path: &Path,
     chunks: &Chunks,
+    planes: &Planes,
     convert: &Convert,
     sink: &dyn SampleSink,
 ) -> Result<(), LayoutError> {
     let file = input::open(path, "cannot open the TIFF file")?;
     let grid = &chunks.grid;
-    let band_rows = rows_at_once(grid.chunk_width.min(grid.width)).min(grid.chunk_height);
+    let width = grid.chunk_width.min(grid.width);
+    let rows = u32::try_from(LARGEST_READ / chunks.row_bytes(width).max(1)).unwrap_or(u32::MAX).max(1);
+    let band_rows = rows_at_once(width).min(grid.chunk_height).min(rows);
     let bands = u64::from(grid.chunk_height.min(grid.height).div_ceil(band_rows));
     let open = || {
-        Ok(Worker { file: &file, places: grid.places(path, &file), bytes: Vec::new(), samples: Vec::new() })
+        Ok(Worker {
+            path,
+            chunks,
+            file: &file,
+            places: grid.places(path, &file),
+            bytes: Vec::new(),
+            apart: vec![Vec::new(); planes.numbers.len()],
+            samples: Vec::new(),
+        })
     };
     each_task(grid.count() * bands, usize::MAX, open, |worker, task| {
         let (chunk, band) = (task / bands, task % bands);
@@ -51,34 +68,64 @@ pub(super) fn stream(
             return Ok(());
         }
         let window = Window { row: whole.row + first, height: band_rows.min(whole.height - first), ..whole };
-        let Some((at, _)) = grid.place(chunk, &mut worker.places)? else {
-            return put_constant(sink, window, convert.absent);
-        };
-        worker.read(chunks, at + u64::from(first) * chunks.stride(), window).map_err(
-            |source| match source.kind() {
-                ErrorKind::UnexpectedEof => LayoutError::damaged(
-                    path,
-                    grid.name(chunk),
-                    "the file was cut short while it was read; start again",
-                ),
-                _ => LayoutError::io(path, "cannot read the TIFF file", source),
-            },
-        )?;
-        worker.samples.clear();
-        let row_bytes = (u64::from(window.width) * chunks.pixel_bytes()) as usize;
-        let pitch = worker.bytes.len() / window.height as usize;
-        for row in worker.bytes.chunks_exact(pitch) {
-            convert.append(&row[..row_bytes], &mut worker.samples);
+        let mut is_there = false;
+        for (at, plane) in planes.numbers.iter().enumerate() {
+            is_there |= worker.read(at, [*plane, chunk], first, window, convert)?;
         }
+        if !is_there {
+            return put_constant(sink, window, convert.absent);
+        }
+        if let [only] = &worker.apart[..] {
+            return sink.put(window, only);
+        }
+        planes.join(&worker.apart, &mut worker.samples);
         sink.put(window, &worker.samples)
     })
 }
 
 impl Worker<'_> {
+    /// Reads the rows of `window`, which begin at row `first` of a chunk, of a plane. Gives whether the file has the chunk.
+    fn read(
+        &mut self,
+        at: usize,
+        [plane, chunk]: [u64; 2],
+        first: u32,
+        window: Window,
+        convert: &Convert,
+    ) -> Result<bool, LayoutError> {
+        let (chunks, pixels) = (self.chunks, window.width as usize);
+        let place = chunks.grid.place_of(plane, chunk, &mut self.places)?;
+        let samples = &mut self.apart[at];
+        samples.clear();
+        let Some((place, _)) = place else {
+            // Nobody looks at the samples of the only plane.
+            if self.apart.len() > 1 {
+                self.apart[at].resize(pixels * window.height as usize, convert.absent);
+            }
+            return Ok(false);
+        };
+        let from = place + u64::from(first) * chunks.stride();
+        self.read_bytes(from, window).map_err(|source| match source.kind() {
+            ErrorKind::UnexpectedEof => LayoutError::damaged(
+                self.path,
+                chunks.grid.name(plane * chunks.grid.count() + chunk),
+                "the file was cut short while it was read; start again",
+            ),
+            _ => LayoutError::io(self.path, "cannot read the TIFF file", source),
+        })?;
+        turn_bits(&mut self.bytes, chunks.is_reversed);
+        let row_bytes = chunks.row_bytes(window.width) as usize;
+        let pitch = self.bytes.len() / window.height as usize;
+        for row in self.bytes.chunks_exact(pitch) {
+            convert.append_row(&row[..row_bytes], pixels, &mut self.apart[at]);
+        }
+        Ok(true)
+    }
+
     /// Reads the rows of `window`, the first of which lies at `at`: as they lie in the file, or only what is in the image where much is not.
-    fn read(&mut self, chunks: &Chunks, at: u64, window: Window) -> std::io::Result<()> {
-        let stride = chunks.stride();
-        let row_bytes = u64::from(window.width) * chunks.pixel_bytes();
+    fn read_bytes(&mut self, at: u64, window: Window) -> std::io::Result<()> {
+        let stride = self.chunks.stride();
+        let row_bytes = self.chunks.row_bytes(window.width);
         let rows = u64::from(window.height);
         if stride == row_bytes || stride * rows <= LARGEST_READ {
             self.bytes.resize((stride * rows) as usize, 0);

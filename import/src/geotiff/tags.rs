@@ -5,7 +5,7 @@
 //! share their values: so whoever reads values says how many of them mean anything, and no more are read. The one list that grows with the image,
 //! that of its chunks, stays in the file ([`super::listing`]). Cost: one small read a directory, one read a value.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -16,11 +16,13 @@ use super::listing::whole_number;
 use terrasoar_layout::error::LayoutError;
 
 pub(super) const NEW_SUBFILE_TYPE: u16 = 254;
+pub(super) const SUBFILE_TYPE: u16 = 255;
 pub(super) const IMAGE_WIDTH: u16 = 256;
 pub(super) const IMAGE_LENGTH: u16 = 257;
 pub(super) const BITS_PER_SAMPLE: u16 = 258;
 pub(super) const COMPRESSION: u16 = 259;
 pub(super) const PHOTOMETRIC: u16 = 262;
+pub(super) const FILL_ORDER: u16 = 266;
 pub(super) const STRIP_OFFSETS: u16 = 273;
 pub(super) const SAMPLES_PER_PIXEL: u16 = 277;
 pub(super) const ROWS_PER_STRIP: u16 = 278;
@@ -32,6 +34,7 @@ pub(super) const TILE_WIDTH: u16 = 322;
 pub(super) const TILE_LENGTH: u16 = 323;
 pub(super) const TILE_OFFSETS: u16 = 324;
 pub(super) const TILE_BYTE_COUNTS: u16 = 325;
+pub(super) const SUB_IFDS: u16 = 330;
 pub(super) const EXTRA_SAMPLES: u16 = 338;
 pub(super) const SAMPLE_FORMAT: u16 = 339;
 pub(super) const JPEG_TABLES: u16 = 347;
@@ -43,15 +46,18 @@ pub(super) const GEO_DOUBLE_PARAMS: u16 = 34736;
 pub(super) const GEO_ASCII_PARAMS: u16 = 34737;
 pub(super) const GDAL_METADATA: u16 = 42112;
 pub(super) const GDAL_NODATA: u16 = 42113;
+pub(super) const LERC_PARAMETERS: u16 = 50674;
 
 /// The tags that mean something here; what others hold is never looked at.
-const KNOWN: [u16; 28] = [
+const KNOWN: [u16; 32] = [
     NEW_SUBFILE_TYPE,
+    SUBFILE_TYPE,
     IMAGE_WIDTH,
     IMAGE_LENGTH,
     BITS_PER_SAMPLE,
     COMPRESSION,
     PHOTOMETRIC,
+    FILL_ORDER,
     STRIP_OFFSETS,
     SAMPLES_PER_PIXEL,
     ROWS_PER_STRIP,
@@ -63,6 +69,7 @@ const KNOWN: [u16; 28] = [
     TILE_LENGTH,
     TILE_OFFSETS,
     TILE_BYTE_COUNTS,
+    SUB_IFDS,
     EXTRA_SAMPLES,
     SAMPLE_FORMAT,
     JPEG_TABLES,
@@ -74,12 +81,11 @@ const KNOWN: [u16; 28] = [
     GEO_ASCII_PARAMS,
     GDAL_METADATA,
     GDAL_NODATA,
+    LERC_PARAMETERS,
 ];
 
-/// Directories looked at, at most: a full pyramid has a few dozen.
-const MAX_DIRECTORIES: usize = 1024;
 /// Tags of all directories together, at most: a directory has some twenty.
-const MAX_TAGS: u64 = 1 << 18;
+pub(super) const MAX_TAGS: u64 = 1 << 18;
 
 /// An open TIFF file.
 #[derive(Debug)]
@@ -158,38 +164,27 @@ impl TiffFile {
         LayoutError::damaged(&self.path, "tag directory", problem)
     }
 
-    /// The first image that is neither an overview (bit 0 of its kind) nor a mask (bit 2).
-    pub(super) fn first_full_image(&mut self) -> Result<Directory, LayoutError> {
-        let mut at = if self.big {
-            let head = self.read_at(0, 16, "header")?;
-            if self.u16(&head[4..]) != 8 {
-                return Err(
-                    self.damaged("a BigTIFF has 8-byte offsets, this file declares others; write it again")
-                );
-            }
-            self.u64(&head[8..])
-        } else {
+    /// Where the first directory lies.
+    pub(super) fn first_directory(&mut self) -> Result<u64, LayoutError> {
+        if !self.big {
             let head = self.read_at(0, 8, "header")?;
-            u64::from(self.u32(&head[4..]))
-        };
-        let mut seen = HashSet::new();
-        let mut tags_left = MAX_TAGS;
-        for _ in 0..MAX_DIRECTORIES {
-            if at == 0 || !seen.insert(at) {
-                break;
-            }
-            let (directory, next) = self.directory(at, &mut tags_left)?;
-            let kind = self.number(&directory, NEW_SUBFILE_TYPE)?.unwrap_or(0);
-            if kind & 0b101 == 0 {
-                return Ok(directory);
-            }
-            at = next;
+            return Ok(u64::from(self.u32(&head[4..])));
         }
-        Err(self.damaged("the file has no full-resolution image; write it again with gdal_translate"))
+        let head = self.read_at(0, 16, "header")?;
+        if self.u16(&head[4..]) != 8 {
+            return Err(
+                self.damaged("a BigTIFF has 8-byte offsets, this file declares others; write it again")
+            );
+        }
+        Ok(self.u64(&head[8..]))
     }
 
     /// Reads the directory at `at`, which may have `tags_left` tags; also gives the place of the next.
-    fn directory(&mut self, at: u64, tags_left: &mut u64) -> Result<(Directory, u64), LayoutError> {
+    pub(super) fn directory(
+        &mut self,
+        at: u64,
+        tags_left: &mut u64,
+    ) -> Result<(Directory, u64), LayoutError> {
         let (count_bytes, entry_bytes, next_bytes, inline) =
             if self.big { (8, 20, 8, 8) } else { (2, 12, 4, 4) };
         let count = self.read_at(at, count_bytes, "tag directory")?;

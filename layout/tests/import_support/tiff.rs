@@ -42,6 +42,12 @@ pub(crate) fn claimed(number: u16, kind: u16, count: u64, at: u64) -> Tag {
     Tag { number, kind, count, values: Values::At(at) }
 }
 
+impl Tag {
+    pub(crate) fn number(&self) -> u16 {
+        self.number
+    }
+}
+
 /// Where the data lie that a file is given.
 pub(crate) const DATA_AT: u32 = 16;
 
@@ -55,8 +61,26 @@ pub(crate) fn tiff(is_big: bool, mut tags: Vec<Tag>, data: &[u8]) -> Vec<u8> {
     bytes.extend_from_slice(data);
     bytes.resize(bytes.len().next_multiple_of(8), 0);
     let inline = if is_big { 8 } else { 4 };
+    let entries = entries(&mut bytes, &tags, inline);
+    let directory = bytes.len() as u64;
+    if is_big {
+        bytes.extend_from_slice(&(tags.len() as u64).to_le_bytes());
+        bytes[..8].copy_from_slice(b"II\x2b\0\x08\0\0\0");
+        bytes[8..16].copy_from_slice(&directory.to_le_bytes());
+    } else {
+        bytes.extend_from_slice(&(tags.len() as u16).to_le_bytes());
+        bytes[..4].copy_from_slice(b"II\x2a\0");
+        bytes[4..8].copy_from_slice(&(directory as u32).to_le_bytes());
+    }
+    bytes.extend_from_slice(&entries);
+    bytes.extend_from_slice(&[0; 8][..inline]);
+    bytes
+}
+
+/// The entries of a directory; values that do not fit in it are appended to `bytes`.
+fn entries(bytes: &mut Vec<u8>, tags: &[Tag], inline: usize) -> Vec<u8> {
     let mut entries = Vec::new();
-    for tag in &tags {
+    for tag in tags {
         let mut value = match &tag.values {
             Values::Here(values) if values.len() <= inline => values.clone(),
             Values::Here(values) => {
@@ -73,19 +97,21 @@ pub(crate) fn tiff(is_big: bool, mut tags: Vec<Tag>, data: &[u8]) -> Vec<u8> {
         entries.extend_from_slice(&tag.count.to_le_bytes()[..inline]);
         entries.extend_from_slice(&value);
     }
-    let directory = bytes.len() as u64;
-    if is_big {
-        bytes.extend_from_slice(&(tags.len() as u64).to_le_bytes());
-        bytes[..8].copy_from_slice(b"II\x2b\0\x08\0\0\0");
-        bytes[8..16].copy_from_slice(&directory.to_le_bytes());
-    } else {
-        bytes.extend_from_slice(&(tags.len() as u16).to_le_bytes());
-        bytes[..4].copy_from_slice(b"II\x2a\0");
-        bytes[4..8].copy_from_slice(&(directory as u32).to_le_bytes());
-    }
-    bytes.extend_from_slice(&entries);
-    bytes.extend_from_slice(&[0; 8][..inline]);
-    bytes
+    entries
+}
+
+/// Appends a directory to a little-endian classic file, with the place of the next one, and gives its own.
+pub(crate) fn append(file: &mut Vec<u8>, tags: &[Tag], next: u32) -> u32 {
+    let mut tags = tags.to_vec();
+    tags.reverse();
+    tags.sort_by_key(|tag| tag.number);
+    tags.dedup_by_key(|tag| tag.number);
+    let entries = entries(file, &tags, 4);
+    let at = file.len() as u32;
+    file.extend_from_slice(&(tags.len() as u16).to_le_bytes());
+    file.extend_from_slice(&entries);
+    file.extend_from_slice(&next.to_le_bytes());
+    at
 }
 
 /// Compression codes.
