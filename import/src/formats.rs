@@ -5,7 +5,9 @@
 use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
-use crate::{OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz};
+use crate::{
+    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz,
+};
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
 

@@ -179,11 +179,15 @@ fn packed_tiles_that_lie_are_told() {
     longer[at..].copy_from_slice(&(2 * 34 * 34u32).to_le_bytes());
     assert!(lie("N01E001.hgt.gz", &longer).contains("packed heights"));
     longer[at..].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert!(lie("N01E001.hgt.gz", &longer).contains("more than any tile"));
+    assert!(lie("N01E001.hgt.gz", &longer).contains("more than can be packed"));
+    let mut padded = vec![0; 5 << 20];
+    padded[..longer.len()].copy_from_slice(&longer);
+    padded.extend(u32::MAX.to_le_bytes());
+    assert!(lie("N01E001.hgt.gz", &padded).contains("more than any tile"));
     longer[at..].copy_from_slice(&7u32.to_le_bytes());
     assert!(lie("N01E001.hgt.gz", &longer).contains("no tile"));
     let said = lie("N01E001.hgt.gz", &packed[..packed.len() / 2]);
-    assert!(said.contains("no tile") || said.contains("more than any tile"), "{said}");
+    assert!(said.contains("no tile") || said.contains("more than"), "{said}");
     let twice = [packed.clone(), packed].concat();
     assert!(lie("N01E001.hgt.gz", &twice).contains("packed heights"));
     let archive = zipped(&[("N01E001.hgt", &bytes, true)]);
