@@ -1,7 +1,8 @@
 //! USGS DEM, the text of the Digital Elevation Model standards of 1987 to 1998, and CDED, which follows them.
 //!
 //! Records of fixed columns, written by Fortran: A says what there is, a B for each profile from west to east, a C may follow. A profile begins at its own height above the south, so columns of
-//! a sheet that lies askew in its projection are of different lengths; what they leave free is void. Files have an A of 1024 bytes, older ones one of 864 or 893, and some end each record with
+//! a sheet that lies askew in its projection are of different lengths; what they leave free is void. (GDAL counts rows from whole multiples of the spacing, which real sheets keep; here they
+//! lie where the profiles say.) Files have an A of 1024 bytes, older ones one of 864 or 893, and some end each record with
 //! a line feed; so numbers are read one after the other, wherever records end. One thread reads the text, a block of profiles at a time.
 
 use crate::WINDOW_SAMPLES;
@@ -71,11 +72,11 @@ impl UsgsDem {
                 [text.whole(), text.whole(), text.whole(), text.whole()].map(|number| number.ok().flatten());
             if let [Some(1), Some(0 | 1), Some(1..), Some(1)] = first {
                 let reals = [text.real(), text.real(), text.real()].map(|number| number.ok().flatten());
-                begin = reals[0].zip(reals[2]).map(|(west, datum)| (at, west, datum));
+                begin = reals[0].zip(reals[1]).zip(reals[2]).map(|((west, south), datum)| (at, west, south, datum));
                 break;
             }
         }
-        let Some((begin, first_west, datum)) = begin else {
+        let Some((begin, west, first_south, datum)) = begin else {
             return Err(head.damaged("no profile follows the A record".into()));
         };
         let corners: Vec<f64> =
@@ -84,13 +85,11 @@ impl UsgsDem {
         let highest =
             |first: usize| corners[first..].iter().step_by(2).copied().fold(f64::NEG_INFINITY, f64::max);
         let is_geographic = head.whole("reference system", 156, 6)? == 0;
-        let (west, south, north) = if is_geographic {
-            (lowest(0), lowest(1), highest(1))
-        } else {
-            // Corners are those of the sheet, samples those of the grid around it.
-            (first_west, (lowest(1) / steps[1]).floor() * steps[1], (highest(1) / steps[1]).ceil() * steps[1])
-        };
-        let rows = ((north - south) / steps[1] + 1.5).floor();
+        // Corners are those of the sheet, samples those of the grid around it: as far apart from the first profile's begin as makes whole steps.
+        let steps_to = |north: f64| (north - first_south) / steps[1];
+        let south = first_south + (steps_to(lowest(1)) + 1e-6).floor() * steps[1];
+        let north = first_south + (steps_to(highest(1)) - 1e-6).ceil() * steps[1];
+        let rows = ((north - south) / steps[1] + 1.0).round();
         let is_side = |side: f64| (2.0..=MOST_ROWS).contains(&side);
         let samples = rows * profiles as f64;
         if !is_side(rows) || !is_side(profiles as f64) || samples > (bytes * MOST_SAMPLES_PER_BYTE) as f64 {
@@ -103,6 +102,7 @@ impl UsgsDem {
         let sample_type = if is_whole { SampleType::I32 } else { SampleType::F64 };
         let mut declared = Declared::new([profiles as u32, rows as u32], sample_type, "USGS DEM");
         declared.place = Some(Said::new([west, steps[0], 0.0, south, 0.0, steps[1]], "record A"));
+        declared.value.scale = (scale != 1.0).then(|| Said::new(scale, "record A"));
         head.declare(is_geographic, &mut declared)?;
         Ok(Self { path: path.to_owned(), declared, begin, south, up: steps[1], scale })
     }

@@ -111,8 +111,10 @@ pub(super) fn read(
                 return Err(LayoutError::unsupported(
                     path,
                     format!(
-                        "the coordinates in variable \"{shown}\" are not evenly apart: number {at} is {value}, and {wanted} would be; make a regular grid of \
-                         it, for example with: gdalwarp -t_srs EPSG:4326 INPUT output.tif"
+                        "the coordinates in variable \"{shown}\" are not evenly apart: number {at} is {}, and {} would be; make a regular grid of \
+                         it, for example with: gdalwarp -t_srs EPSG:4326 INPUT output.tif",
+                        short(value),
+                        short(wanted)
                     ),
                 ));
             }
@@ -120,4 +122,10 @@ pub(super) fn read(
     }
     let unit = text(attributes, "units").and_then(|name| unit(&name));
     Ok(Axis { first, step, unit, name: variable.name().to_owned() })
+}
+
+/// A number in a few characters.
+fn short(number: f64) -> String {
+    let is_handy = number == 0.0 || (1e-4..1e9).contains(&number.abs());
+    if is_handy { ((number * 1e6).round() / 1e6).to_string() } else { format!("{number:.3e}") }
 }
