@@ -56,14 +56,17 @@ impl DtedDem {
         let cannot_read = |source| LayoutError::io(path, "cannot read the DTED file", source);
         let file = input::open(path, "cannot open the DTED file")?;
         let bytes = file.metadata().map_err(cannot_read)?.len();
-        let mut head = vec![0; (80 * MOST_LABELS + HEAD_BYTES).min(usize::try_from(bytes).unwrap_or(usize::MAX))];
+        let mut head =
+            vec![0; (80 * MOST_LABELS + HEAD_BYTES).min(usize::try_from(bytes).unwrap_or(usize::MAX))];
         read_at(&file, &mut head, 0).map_err(cannot_read)?;
         let begin = labels(&head).unwrap_or(0) * 80;
         let Some(heads) = head.get(begin..begin + HEAD_BYTES) else {
             return Err(LayoutError::damaged(
                 path,
                 "header",
-                format!("{bytes} bytes are less than the heads of a DTED file; it is cut short: fetch it again"),
+                format!(
+                    "{bytes} bytes are less than the heads of a DTED file; it is cut short: fetch it again"
+                ),
             ));
         };
         let declared = declared(path, heads)?;
@@ -84,7 +87,8 @@ impl DtedDem {
         }
         let absent = this.lines.iter().filter(|line| line.is_none()).count();
         if absent > 0 {
-            let words = format!("{absent} of its {} lines of longitude are left out and void", this.lines.len());
+            let words =
+                format!("{absent} of its {} lines of longitude are left out and void", this.lines.len());
             this.declared.notes.push(words);
         }
         Ok(this)
@@ -97,7 +101,13 @@ fn record_bytes(samples: u32) -> u64 {
 }
 
 /// Where the lines lie: one after the other, or by the number each bears where some are missing.
-fn lines(path: &Path, file: &File, declared: &Declared, begin: u64, bytes: u64) -> Result<Vec<Option<u64>>, LayoutError> {
+fn lines(
+    path: &Path,
+    file: &File,
+    declared: &Declared,
+    begin: u64,
+    bytes: u64,
+) -> Result<Vec<Option<u64>>, LayoutError> {
     let [columns, rows] = declared.samples;
     let record = record_bytes(rows);
     let whole = bytes.saturating_sub(begin) / record;
@@ -122,7 +132,8 @@ fn lines(path: &Path, file: &File, declared: &Declared, begin: u64, bytes: u64) 
     let mut head = [0; 8];
     for number in 0..whole {
         let at = begin + number * record;
-        read_at(file, &mut head, at).map_err(|source| LayoutError::io(path, "cannot read the DTED file", source))?;
+        read_at(file, &mut head, at)
+            .map_err(|source| LayoutError::io(path, "cannot read the DTED file", source))?;
         let column = usize::from(u16::from_be_bytes([head[4], head[5]]));
         match lines.get_mut(column) {
             Some(line @ None) if head[0] == MARK => *line = Some(at),
@@ -186,7 +197,8 @@ impl Reader for DtedDem {
 impl DtedDem {
     /// Reads and checks the record of a line.
     fn read(&self, file: &File, at: u64, line: usize, bytes: &mut [u8]) -> Result<(), LayoutError> {
-        let damaged = |problem: &str| LayoutError::damaged(&self.path, format!("line of longitude {line}"), problem);
+        let damaged =
+            |problem: &str| LayoutError::damaged(&self.path, format!("line of longitude {line}"), problem);
         read_at(file, bytes, at).map_err(|source| match source.kind() {
             ErrorKind::UnexpectedEof => damaged("the file was cut short while it was read; start again"),
             _ => LayoutError::io(&self.path, "cannot read the DTED file", source),
@@ -203,9 +215,14 @@ impl DtedDem {
 
 /// What the heads say.
 fn declared(path: &Path, heads: &[u8]) -> Result<Declared, LayoutError> {
-    let text = |from: usize, length: usize| String::from_utf8_lossy(&heads[from..from + length]).trim().to_owned();
+    let text =
+        |from: usize, length: usize| String::from_utf8_lossy(&heads[from..from + length]).trim().to_owned();
     let damaged = |what: &str, shown: String| {
-        LayoutError::damaged(path, "header", format!("its {what} is \"{}\"; fetch the file again", harmless(&shown, 20)))
+        LayoutError::damaged(
+            path,
+            "header",
+            format!("its {what} is \"{}\"; fetch the file again", harmless(&shown, 20)),
+        )
     };
     let number = |what: &str, from: usize, length: usize| {
         text(from, length).parse::<u32>().map_err(|_| damaged(what, text(from, length)))

@@ -5,7 +5,9 @@
 use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
-use crate::{OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz};
+use crate::{
+    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz,
+};
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
 
@@ -68,7 +70,7 @@ const SIGNED: &[Format] = &[
     },
     Format {
         name: "Esri ASCII grid",
-        is: |look| ascii_grid::is_ascii_grid(&look.head),
+        is: |look| ascii_grid::is_ascii_grid(&look.head) && !look.is_called("hdr"),
         open: |path, _| boxed(ascii_grid::AsciiGrid::open(path)),
     },
 ];

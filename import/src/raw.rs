@@ -65,10 +65,10 @@ impl RawDem {
     /// The file in the shape that a person states.
     pub(crate) fn stated(path: &Path, shape: &str) -> Result<Self, LayoutError> {
         let Shape { samples, kind } = Shape::parse(shape)?;
-        let mut raw = Self::with_shape(path, samples, kind)?;
         let length = file_length(path)?;
-        let used = u64::from(samples[0]) * u64::from(samples[1]) * kind.bytes();
-        if used != length {
+        // Two sides of 32 bits and 8 bytes do not fit into 64.
+        let used = u128::from(samples[0]) * u128::from(samples[1]) * u128::from(kind.bytes());
+        if used != u128::from(length) {
             return Err(LayoutError::Usage(format!(
                 "{}: {} x {} samples of {} bytes are {used} bytes and the file has {length}{}; state the shape that it has",
                 path.display(),
@@ -79,6 +79,7 @@ impl RawDem {
             ))
             .mended_by(Remedy::RawShape));
         }
+        let mut raw = Self::with_shape(path, samples, kind)?;
         raw.declared
             .notes
             .push("the first sample is taken as the north-western one, as heightmaps are stored".into());
@@ -117,8 +118,7 @@ impl RawDem {
 
     fn with_shape(path: &Path, samples: [u32; 2], kind: Kind) -> Result<Self, LayoutError> {
         let steps = [kind.bytes(), kind.bytes() * u64::from(samples[0])];
-        let plain = Plain::checked(path, samples, kind, 0, steps)
-            .map_err(|error| error.mended_by(Remedy::RawShape))?;
+        let plain = Plain::checked(path, samples, kind, 0, steps)?;
         let declared =
             Declared::new(samples, kind.sample_type, format!("heightmap without a header, {kind}"));
         Ok(Self { plain, declared })

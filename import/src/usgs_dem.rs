@@ -60,13 +60,16 @@ impl UsgsDem {
         let steps = [head.real("spacing", 816, 12)?, head.real("spacing", 828, 12)?];
         let scale = head.real("resolution of heights", 840, 12)?;
         if !steps.iter().chain([&scale]).all(|step| step.is_finite() && *step > 0.0) {
-            return Err(head.damaged(format!("a spacing of {} x {} x {scale} makes no grid", steps[0], steps[1])));
+            return Err(
+                head.damaged(format!("a spacing of {} x {} x {scale} makes no grid", steps[0], steps[1]))
+            );
         }
         let mut begin = None;
         for at in BEGINS {
             let mut text = Text::open(&file, at).map_err(cannot_read)?;
             // A number of a profile and a column, then its heights and their columns.
-            let first = [text.whole(), text.whole(), text.whole(), text.whole()].map(|number| number.ok().flatten());
+            let first =
+                [text.whole(), text.whole(), text.whole(), text.whole()].map(|number| number.ok().flatten());
             if let [Some(1), Some(0 | 1), Some(1..), Some(1)] = first {
                 let reals = [text.real(), text.real(), text.real()].map(|number| number.ok().flatten());
                 begin = reals[0].zip(reals[1]).zip(reals[2]).map(|((west, south), datum)| (at, west, south, datum));
@@ -76,9 +79,11 @@ impl UsgsDem {
         let Some((begin, west, first_south, datum)) = begin else {
             return Err(head.damaged("no profile follows the A record".into()));
         };
-        let corners: Vec<f64> = (0..8).map(|at| head.real("corner", 546 + 24 * at, 24)).collect::<Result<_, _>>()?;
+        let corners: Vec<f64> =
+            (0..8).map(|at| head.real("corner", 546 + 24 * at, 24)).collect::<Result<_, _>>()?;
         let lowest = |first: usize| corners[first..].iter().step_by(2).copied().fold(f64::INFINITY, f64::min);
-        let highest = |first: usize| corners[first..].iter().step_by(2).copied().fold(f64::NEG_INFINITY, f64::max);
+        let highest =
+            |first: usize| corners[first..].iter().step_by(2).copied().fold(f64::NEG_INFINITY, f64::max);
         let is_geographic = head.whole("reference system", 156, 6)? == 0;
         // Corners are those of the sheet, samples those of the grid around it: as far apart from the first profile's begin as makes whole steps.
         let steps_to = |north: f64| (north - first_south) / steps[1];
@@ -155,7 +160,8 @@ impl Head<'_> {
             let zone = self.whole("zone", 162, 6).unwrap_or(0);
             if system == 1 && zones.contains(&zone.abs()) {
                 let south = if zone < 0 && datum == 3 { 100 } else { 0 };
-                declared.crs.code = (zone > 0 || datum == 3).then(|| Said::new(utm + zone.unsigned_abs() as u32 + south, "record A"));
+                declared.crs.code = (zone > 0 || datum == 3)
+                    .then(|| Said::new(utm + zone.unsigned_abs() as u32 + south, "record A"));
             } else if system == 2 {
                 declared.crs.name = format!("State plane zone {zone}");
             }
@@ -229,7 +235,9 @@ impl Text {
         while let Some(byte) = self.peek()?.filter(|_| text.len() < 24) {
             let after_exponent = matches!(text.as_bytes().last(), Some(b'D' | b'd' | b'E' | b'e'));
             let is_sign = matches!(byte, b'+' | b'-');
-            let belongs = byte.is_ascii_digit() || matches!(byte, b'.' | b'D' | b'd' | b'E' | b'e') || (is_sign && (text.is_empty() || after_exponent));
+            let belongs = byte.is_ascii_digit()
+                || matches!(byte, b'.' | b'D' | b'd' | b'E' | b'e')
+                || (is_sign && (text.is_empty() || after_exponent));
             if !belongs {
                 break;
             }
@@ -272,15 +280,35 @@ impl Reader for UsgsDem {
 
 impl UsgsDem {
     /// Reads a profile into a column of `samples`, which are `width` wide.
-    fn profile(&self, text: &mut Text, number: u32, across: usize, width: usize, samples: &mut [f64]) -> Result<(), LayoutError> {
-        let damaged = |problem: &str| LayoutError::damaged(&self.path, format!("profile {}", number + 1), format!("{problem}; fetch the file again"));
+    fn profile(
+        &self,
+        text: &mut Text,
+        number: u32,
+        across: usize,
+        width: usize,
+        samples: &mut [f64],
+    ) -> Result<(), LayoutError> {
+        let damaged = |problem: &str| {
+            LayoutError::damaged(
+                &self.path,
+                format!("profile {}", number + 1),
+                format!("{problem}; fetch the file again"),
+            )
+        };
         let read = |value: std::io::Result<Option<f64>>| {
-            let value = value.map_err(|source| LayoutError::io(&self.path, "cannot read the USGS DEM file", source))?;
+            let value = value
+                .map_err(|source| LayoutError::io(&self.path, "cannot read the USGS DEM file", source))?;
             value.ok_or_else(|| damaged("it ends before what it declares, or holds no numbers"))
         };
         let whole = |text: &mut Text| read(text.whole().map(|number| number.map(|number| number as f64)));
         let [_, _, count, across_count] = [whole(text)?, whole(text)?, whole(text)?, whole(text)?];
-        let [_, south, datum, _, _] = [read(text.real())?, read(text.real())?, read(text.real())?, read(text.real())?, read(text.real())?];
+        let [_, south, datum, _, _] = [
+            read(text.real())?,
+            read(text.real())?,
+            read(text.real())?,
+            read(text.real())?,
+            read(text.real())?,
+        ];
         let rows = self.declared.samples[1];
         let first = ((south - self.south) / self.up + 0.5).floor();
         if across_count != 1.0 || !(0.0..=MOST_ROWS).contains(&count) || first.abs() > MOST_ROWS {
@@ -292,7 +320,8 @@ impl UsgsDem {
                 && row < rows
             {
                 let is_void = value == VOID as f64;
-                samples[row as usize * width + across] = if is_void { f64::NAN } else { value + datum / self.scale };
+                samples[row as usize * width + across] =
+                    if is_void { f64::NAN } else { value + datum / self.scale };
             }
         }
         Ok(())
@@ -313,6 +342,9 @@ mod tests {
         assert_eq!(whole, [Some(1), Some(-32767), Some(-32767), Some(12)]);
         let reals: Vec<_> = (0..4).map(|_| text.real().unwrap()).collect();
         assert_eq!(reals, [Some(5.0), Some(-25.0), Some(1.5), None]);
-        assert_eq!([real("0.1D+03"), real(""), real("x"), real("1E999")], [Some(100.0), Some(0.0), None, None]);
+        assert_eq!(
+            [real("0.1D+03"), real(""), real("x"), real("1E999")],
+            [Some(100.0), Some(0.0), None, None]
+        );
     }
 }

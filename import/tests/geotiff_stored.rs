@@ -24,7 +24,9 @@ fn height(col: u32, row: u32) -> f64 {
 
 /// The rows `rows` as 16-bit numbers.
 fn bytes(rows: std::ops::Range<u32>) -> Vec<u8> {
-    rows.flat_map(|row| (0..SIDE[0]).map(move |col| height(col, row) as u16)).flat_map(u16::to_le_bytes).collect()
+    rows.flat_map(|row| (0..SIDE[0]).map(move |col| height(col, row) as u16))
+        .flat_map(u16::to_le_bytes)
+        .collect()
 }
 
 fn opened(bytes: &[u8]) -> Result<Grid, LayoutError> {
@@ -70,7 +72,8 @@ fn lengths_that_are_0_or_missing_hide_no_heights() {
     for compression in [RAW, DEFLATE, LZW, ZSTD, PACK_BITS] {
         let (data, tags, lengths) = strips(compression);
         let zeros: Vec<u32> = vec![0; lengths.len()];
-        let some: Vec<u32> = lengths.iter().enumerate().map(|(i, length)| if i == 1 { 0 } else { *length }).collect();
+        let some: Vec<u32> =
+            lengths.iter().enumerate().map(|(i, length)| if i == 1 { 0 } else { *length }).collect();
         let all = [
             tags.iter().cloned().chain([longs(279, &zeros)]).collect(),
             tags.iter().cloned().chain([longs(279, &some)]).collect(),
@@ -154,11 +157,29 @@ fn bands_that_lie_one_after_the_other_are_read_by_number() {
 #[test]
 fn samples_of_any_width_are_read() {
     // Width, format, and how a height is written.
-    for (width, format) in [(1u16, 1u16), (4, 1), (11, 1), (12, 1), (12, 2), (17, 2), (31, 1), (40, 1), (64, 1), (64, 2), (8, 2), (16, 3), (64, 3)] {
+    for (width, format) in [
+        (1u16, 1u16),
+        (4, 1),
+        (11, 1),
+        (12, 1),
+        (12, 2),
+        (17, 2),
+        (31, 1),
+        (40, 1),
+        (64, 1),
+        (64, 2),
+        (8, 2),
+        (16, 3),
+        (64, 3),
+    ] {
         let most = if width < 11 { 1u64 << width } else { 2000 };
         let value = |col: u32, row: u32| {
             let plain = height(col, row) as u64 % most;
-            if format == 2 { plain as f64 - if width < 11 { (most / 2) as f64 } else { 100.0 } } else { plain as f64 }
+            if format == 2 {
+                plain as f64 - if width < 11 { (most / 2) as f64 } else { 100.0 }
+            } else {
+                plain as f64
+            }
         };
         let bits = |value: f64| match (format, width) {
             (3, 16) => u64::from(half(value)),
@@ -172,7 +193,11 @@ fn samples_of_any_width_are_read() {
                 let stored = bits(value(col, row));
                 for bit in 0..u32::from(width) {
                     // Whole bytes stand in the file's order, all else without gaps from the top.
-                    let from = if width.is_multiple_of(8) && width != 40 { (bit / 8) * 8 + 7 - bit % 8 } else { u32::from(width) - 1 - bit };
+                    let from = if width.is_multiple_of(8) && width != 40 {
+                        (bit / 8) * 8 + 7 - bit % 8
+                    } else {
+                        u32::from(width) - 1 - bit
+                    };
                     let at = (col * u32::from(width) + bit) as usize;
                     line[at / 8] |= ((stored >> from & 1) as u8) << (7 - at % 8);
                 }
@@ -205,7 +230,8 @@ fn directories(first: &[Tag], next: [u32; 3], branch: bool) -> Vec<u8> {
     let data = bytes(0..SIDE[1]);
     let mut file = b"II\x2a\0\0\0\0\0\0\0\0\0\0\0\0\0".to_vec();
     file.extend(&data);
-    let thumbnail: Vec<Tag> = heights([4, 4], RAW, 4, &[DATA_AT], &[32]).into_iter().chain(first.iter().cloned()).collect();
+    let thumbnail: Vec<Tag> =
+        heights([4, 4], RAW, 4, &[DATA_AT], &[32]).into_iter().chain(first.iter().cloned()).collect();
     let whole = heights(SIDE, RAW, SIDE[1], &[DATA_AT], &[data.len() as u32]);
     let third = tiff::append(&mut file, &whole, next[2]);
     let second = tiff::append(&mut file, &thumbnail, if next[1] == 1 { third } else { next[1] });

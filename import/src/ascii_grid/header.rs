@@ -50,7 +50,14 @@ pub(crate) fn is_ascii_grid(head: &[u8]) -> bool {
     let first = words(head).next().unwrap_or_default().to_ascii_lowercase();
     matches!(
         first.as_slice(),
-        b"ncols" | b"nrows" | b"xllcorner" | b"yllcorner" | b"xllcenter" | b"yllcenter" | b"cellsize"
+        b"ncols"
+            | b"nrows"
+            | b"xllcorner"
+            | b"yllcorner"
+            | b"xllcenter"
+            | b"yllcenter"
+            | b"cellsize"
+            | b"nodata_value"
     )
 }
 
@@ -61,7 +68,9 @@ impl Header {
         let mut at = if text.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         loop {
             let (key, after_key) = word_from(text, at);
-            let is_number = number(key).is_some();
+            // "nan" is a sample, and so is meant what begins with a digit, whatever follows.
+            let is_number = number(key).is_some()
+                || key.first().is_some_and(|byte| byte.is_ascii_digit() || b"+-.,*".contains(byte));
             if key.is_empty() || (is_number && found.columns.is_some() && found.rows.is_some()) {
                 break;
             }

@@ -82,7 +82,18 @@ impl ChunkGrid {
                 listed[0], listed[1]
             )));
         };
-        Ok(Self { width, height, chunk_width, chunk_height, tiled, across, planes, listing, cuts: 1, row_bytes: 0 })
+        Ok(Self {
+            width,
+            height,
+            chunk_width,
+            chunk_height,
+            tiled,
+            across,
+            planes,
+            listing,
+            cuts: 1,
+            row_bytes: 0,
+        })
     }
 
     /// Cuts chunks that are not compressed, of `row_bytes` a row, into such of `rows` rows, which their height is a multiple of unless there is but one

@@ -121,8 +121,15 @@ mod tests {
     use super::*;
 
     fn converted(sample_type: SampleType, big_endian: bool, bytes: &[u8]) -> Vec<f64> {
-        let convert =
-            Convert { sample_type, odd: None, big_endian, bands: 1, pick: Pick::Band(0), alpha: None, absent: 0.0 };
+        let convert = Convert {
+            sample_type,
+            odd: None,
+            big_endian,
+            bands: 1,
+            pick: Pick::Band(0),
+            alpha: None,
+            absent: 0.0,
+        };
         let mut samples = Vec::new();
         convert.append(bytes, &mut samples);
         samples

@@ -36,11 +36,14 @@ pub(super) fn unpack(chunks: &Chunks, blob: &[u8], rows: u32) -> Result<Vec<u8>,
     // Where the last band is alpha it may be the mask of the others.
     let mask_is_band = u64::from(depth) + 1 == bands;
     if !is_alike || !(mask_is_band || u64::from(depth) == bands) {
-        return Err(Failure::Damaged(format!("its LERC is of {width} x {height} samples, and it should not be")));
+        return Err(Failure::Damaged(format!(
+            "its LERC is of {width} x {height} samples, and it should not be"
+        )));
     }
     let decoded = lerc_reader::decode_first(blob).map_err(|_| damaged("its LERC is damaged"))?;
     let depth = depth as usize;
-    let bytes = samples(&decoded, depth, chunks).ok_or_else(|| damaged("its LERC is of another type of samples"))?;
+    let bytes =
+        samples(&decoded, depth, chunks).ok_or_else(|| damaged("its LERC is of another type of samples"))?;
     if !mask_is_band {
         return Ok(bytes);
     }

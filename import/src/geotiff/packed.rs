@@ -105,9 +105,8 @@ impl<'a> Worker<'a> {
             let number = plane * chunks.grid.count() + chunk;
             let place = chunks.grid.place_of(*plane, chunk, &mut self.places)?;
             let file = self.file;
-            let rows = place.map(|place| {
-                guarded(self.path, chunks, number, || Rows::open(file, chunks, number, place))
-            });
+            let rows = place
+                .map(|place| guarded(self.path, chunks, number, || Rows::open(file, chunks, number, place)));
             open.push((number, rows.transpose()?));
         }
         if open.iter().all(|(_, rows)| rows.is_none()) {

@@ -59,7 +59,8 @@ mod tests {
         let planes = Planes::of(&Bands { pick: decode, alpha: Some(3), described: 0 });
         assert_eq!(planes.numbers, [0, 1, 2, 3]);
         let mut samples = vec![7.0];
-        planes.join(&[vec![1.0, 1.0], vec![134.0, 134.0], vec![160.0, 161.0], vec![0.0, 255.0]], &mut samples);
+        planes
+            .join(&[vec![1.0, 1.0], vec![134.0, 134.0], vec![160.0, 161.0], vec![0.0, 255.0]], &mut samples);
         assert!(samples.len() == 2 && samples[0].is_nan() && (samples[1] - 0.1).abs() < 1e-9, "{samples:?}");
         let planes = Planes::of(&Bands { pick: Pick::Band(2), alpha: None, described: 2 });
         assert_eq!(planes.numbers, [2]);

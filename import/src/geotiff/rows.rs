@@ -32,7 +32,9 @@ impl<'f> Rows<'f> {
         let mut span = Span { file, at, left: length, is_reversed: chunks.is_reversed };
         let whole = match chunks.compression {
             Compression::Lerc(packing) => Some(unpack_lerc(span, packing, chunks, chunk)?),
-            Compression::Zstd if chunks.whole_is_needed(span)? => Some(unpack_zstd(&mut span, chunks, chunk)?),
+            Compression::Zstd if chunks.whole_is_needed(span)? => {
+                Some(unpack_zstd(&mut span, chunks, chunk)?)
+            }
             _ => None,
         };
         let (compression, packed): (_, Box<dyn BufRead>) = match whole {
@@ -99,7 +101,8 @@ fn unpack_zstd(span: &mut Span<'_>, chunks: &Chunks, chunk: u64) -> Result<Vec<u
     let unpacked = chunks.decoded_bytes();
     let packed = packed(span, unpacked)?;
     let mut whole = vec![0; unpacked as usize];
-    zstd_frame::unpack_whole(&packed, &mut whole, chunks.stored_bytes(chunk) as usize).map_err(Failure::Damaged)?;
+    zstd_frame::unpack_whole(&packed, &mut whole, chunks.stored_bytes(chunk) as usize)
+        .map_err(Failure::Damaged)?;
     Ok(whole)
 }
 

@@ -164,7 +164,8 @@ mod tests {
     fn numbers_of_any_width_come_back() {
         for width in 1..=64u32 {
             let top = 1u128 << width;
-            let values: Vec<u64> = (0..20u128).map(|i| (i * i * 0x9e37_79b9_7f4a_7c15 % top) as u64).collect();
+            let values: Vec<u64> =
+                (0..20u128).map(|i| (i * i * 0x9e37_79b9_7f4a_7c15 % top) as u64).collect();
             let mut row = vec![0u8; (20 * width as usize).div_ceil(8)];
             for (number, value) in values.iter().enumerate() {
                 for bit in 0..width as usize {
@@ -178,8 +179,14 @@ mod tests {
             let stored = Stored { kind: Kind::Signed, bits: width };
             if width > 1 && width != 24 {
                 let half = 1i128 << (width - 1);
-                let wanted = values.iter().map(|v| (if i128::from(*v) < half { i128::from(*v) } else { i128::from(*v) - 2 * half }) as f64);
-                assert_eq!(stored.odd(&row, true, 20).collect::<Vec<_>>(), wanted.collect::<Vec<_>>(), "{width}");
+                let wanted = values.iter().map(|v| {
+                    (if i128::from(*v) < half { i128::from(*v) } else { i128::from(*v) - 2 * half }) as f64
+                });
+                assert_eq!(
+                    stored.odd(&row, true, 20).collect::<Vec<_>>(),
+                    wanted.collect::<Vec<_>>(),
+                    "{width}"
+                );
             }
         }
     }

@@ -13,7 +13,7 @@ mod unpacked;
 
 use std::path::PathBuf;
 
-use crate::reader::{CrsSaid, Declared, Reader, Said};
+use crate::reader::{CrsSaid, Declared, HorizontalSize, Reader, Said};
 pub(crate) use folder::tiles_in;
 use mosaic::Mosaic;
 use terrasoar_layout::dem::{SampleSink, SampleType};
@@ -43,7 +43,11 @@ impl HgtDem {
             tiles => format!("mosaic of {tiles} SRTM .hgt tiles, {wide} x {high} each"),
         };
         let mut declared = Declared::new([mosaic.samples_wide, mosaic.samples_high], SampleType::I16, format);
-        declared.crs = CrsSaid { code: Some(Said::new(4326, "the format .hgt")), ..CrsSaid::default() };
+        declared.crs = CrsSaid {
+            code: Some(Said::new(4326, "the format .hgt")),
+            unit: Some(Said::new(HorizontalSize::Radians(1f64.to_radians()), "the format .hgt")),
+            ..CrsSaid::default()
+        };
         match mosaic.north_west {
             Some((north, west)) => {
                 let [across, down] = [wide, high].map(|side| 1.0 / f64::from(side - 1));

@@ -19,6 +19,8 @@ use zip::ZipArchive;
 
 /// Largest tile that is unpacked: a third of an arc-second.
 const MOST_BYTES: u64 = 2 * 10_801 * 10_801;
+/// What DEFLATE makes shorter at most: 258 bytes of two bits.
+const MOST_RATIO: u64 = 1032;
 /// Entries of an archive, and bytes of its directory, that are looked through.
 const MOST_ENTRIES: u16 = 4096;
 const MOST_DIRECTORY: u32 = 1 << 20;
@@ -59,7 +61,13 @@ impl Tile {
         let length = file.metadata().map_err(failed)?.len();
         let mut magic = Vec::new();
         file.by_ref().take(4).read_to_end(&mut magic).map_err(failed)?;
-        let tile = |packing: Packing, bytes: u64| {
+        let tile = |packing: Packing, bytes: u64, packed: u64| {
+            if bytes / MOST_RATIO > packed.min(length) {
+                let problem = format!(
+                    "the tile in it is said to have {bytes} bytes, more than can be packed into so few; fetch it again"
+                );
+                return Err(LayoutError::damaged(path, "packed heights", problem));
+            }
             if packing != Packing::Plain && bytes > MOST_BYTES {
                 let problem = format!(
                     "the tile in it is said to have {bytes} bytes, more than any tile; unpack it and name what comes out"
@@ -82,7 +90,7 @@ impl Tile {
                 let entry = archive
                     .by_index_raw(number)
                     .map_err(|error| damaged_archive(path, &error.to_string()))?;
-                tile(Packing::Zip(number, name), entry.size())
+                tile(Packing::Zip(number, name), entry.size(), entry.compressed_size())
             });
             return sizes.collect();
         }
@@ -90,9 +98,9 @@ impl Tile {
             // At the end stands the length, modulo 2^32, of what was packed last; more than one piece is found out when it is unpacked.
             let mut last = [0; 4];
             file.seek(SeekFrom::End(-4)).and_then(|_| file.read_exact(&mut last)).map_err(failed)?;
-            return Ok(vec![tile(Packing::Gzip, u64::from(u32::from_le_bytes(last)))?]);
+            return Ok(vec![tile(Packing::Gzip, u64::from(u32::from_le_bytes(last)), length)?]);
         }
-        Ok(vec![tile(Packing::Plain, length)?])
+        Ok(vec![tile(Packing::Plain, length, length)?])
     }
 
     /// Its south-western corner by its name, latitude and longitude in whole degrees.
@@ -147,7 +155,8 @@ impl Tile {
 
     fn all_from(&self, mut stream: impl Read) -> Result<Vec<u8>, LayoutError> {
         let wanted = self.bytes();
-        let mut bytes = Vec::new();
+        // At most MOST_BYTES, and no more than the packed bytes may become.
+        let mut bytes = Vec::with_capacity(usize::try_from(wanted + 1).unwrap_or(0));
         let read = stream.by_ref().take(wanted + 1).read_to_end(&mut bytes);
         read.map_err(|source| match source.raw_os_error() {
             Some(_) => LayoutError::io(&self.path, "cannot read the .hgt tile", source),

@@ -32,7 +32,9 @@ pub(super) fn exact(attributes: &[NcAttribute], name: &str) -> Vec<String> {
         Some(NcAttrValue::Bytes(values)) => all(values),
         Some(NcAttrValue::Shorts(values)) => all(values),
         Some(NcAttrValue::Ints(values)) => all(values),
-        Some(NcAttrValue::Floats(values)) => values.iter().map(|value| f64::from(*value).to_string()).collect(),
+        Some(NcAttrValue::Floats(values)) => {
+            values.iter().map(|value| f64::from(*value).to_string()).collect()
+        }
         Some(NcAttrValue::Doubles(values)) => all(values),
         Some(NcAttrValue::UBytes(values)) => all(values),
         Some(NcAttrValue::UShorts(values)) => all(values),
@@ -62,7 +64,10 @@ pub(super) fn unit(name: &str) -> Option<Unit> {
     let name = name.to_ascii_lowercase();
     Some(match name.as_str() {
         "degree" | "degrees" | "deg" => Unit::Degrees,
-        _ if ["degree_", "degrees_", "degreen", "degreee", "degreesn", "degreese"].iter().any(|start| name.starts_with(start)) => {
+        _ if ["degree_", "degrees_", "degreen", "degreee", "degreesn", "degreese"]
+            .iter()
+            .any(|start| name.starts_with(start)) =>
+        {
             Unit::Degrees
         }
         "km" | "kilometer" | "kilometre" | "kilometers" | "kilometres" => Unit::Metres(1000.0),

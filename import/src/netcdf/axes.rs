@@ -37,19 +37,49 @@ pub(super) fn way(name: &str, coordinates: Option<&NcVariable>) -> Option<Way> {
     said.into_iter().flatten().find_map(|word| {
         let word = word.to_ascii_lowercase();
         match word.as_str() {
-            "x" | "longitude" | "lon" | "long" | "projection_x_coordinate" | "grid_longitude" | "easting" | "eastings"
-            | "nx" | "ncols" => Some(Way::East),
-            "y" | "latitude" | "lat" | "projection_y_coordinate" | "grid_latitude" | "northing" | "northings" | "ny"
+            "x"
+            | "longitude"
+            | "lon"
+            | "long"
+            | "projection_x_coordinate"
+            | "grid_longitude"
+            | "easting"
+            | "eastings"
+            | "nx"
+            | "ncols" => Some(Way::East),
+            "y"
+            | "latitude"
+            | "lat"
+            | "projection_y_coordinate"
+            | "grid_latitude"
+            | "northing"
+            | "northings"
+            | "ny"
             | "nrows" => Some(Way::North),
-            _ if ["degree_e", "degrees_e", "degreee", "degreese"].iter().any(|start| word.starts_with(start)) => Some(Way::East),
-            _ if ["degree_n", "degrees_n", "degreen", "degreesn"].iter().any(|start| word.starts_with(start)) => Some(Way::North),
+            _ if ["degree_e", "degrees_e", "degreee", "degreese"]
+                .iter()
+                .any(|start| word.starts_with(start)) =>
+            {
+                Some(Way::East)
+            }
+            _ if ["degree_n", "degrees_n", "degreen", "degreesn"]
+                .iter()
+                .any(|start| word.starts_with(start)) =>
+            {
+                Some(Way::North)
+            }
             _ => None,
         }
     })
 }
 
 /// Reads the coordinates in the variable at `place` of the file.
-pub(super) fn read(path: &Path, file: &NcFile, place: &str, variable: &NcVariable) -> Result<Axis, LayoutError> {
+pub(super) fn read(
+    path: &Path,
+    file: &NcFile,
+    place: &str,
+    variable: &NcVariable,
+) -> Result<Axis, LayoutError> {
     let count = variable.shape().first().copied().unwrap_or(0);
     let attributes = variable.attributes();
     let scale = number(attributes, "scale_factor").unwrap_or(1.0);
@@ -57,14 +87,17 @@ pub(super) fn read(path: &Path, file: &NcFile, place: &str, variable: &NcVariabl
     let shown = harmless(variable.name(), 40);
     let damaged = |problem: String| LayoutError::damaged(path, format!("variable \"{shown}\""), problem);
     let block = |from: u64, to: u64| {
-        let selection = NcSliceInfo { selections: vec![NcSliceInfoElem::Slice { start: from, end: to, step: 1 }] };
+        let selection =
+            NcSliceInfo { selections: vec![NcSliceInfoElem::Slice { start: from, end: to, step: 1 }] };
         guarded(path, &format!("variable \"{shown}\""), || file.read_variable_slice_as_f64(place, &selection))
     };
     let ends = |at: u64| Ok(block(at, at + 1)?.first().map_or(f64::NAN, |value| value * scale + offset));
     let (first, last) = (ends(0)?, ends(count.saturating_sub(1))?);
     let step = (last - first) / (count.max(2) - 1) as f64;
     if !first.is_finite() || !step.is_finite() || step == 0.0 {
-        return Err(damaged("its coordinates are not numbers that grow or fall; write the file again".into()));
+        return Err(damaged(
+            "its coordinates are not numbers that grow or fall; write the file again".into(),
+        ));
     }
     // Singles tell degrees to some 1e-5 of them.
     let tolerance = step.abs() * 0.01 + first.abs().max(last.abs()) * 2.0 * f64::from(f32::EPSILON);

@@ -64,8 +64,16 @@ fn collect<'f>(group: &'f NcGroup, place: &str, depth: usize, grids: &mut Vec<Gr
         let shape = variable.shape();
         let is_number = matches!(
             variable.dtype(),
-            NcType::Byte | NcType::Short | NcType::Int | NcType::Float | NcType::Double | NcType::UByte | NcType::UShort | NcType::UInt
-                | NcType::Int64 | NcType::UInt64
+            NcType::Byte
+                | NcType::Short
+                | NcType::Int
+                | NcType::Float
+                | NcType::Double
+                | NcType::UByte
+                | NcType::UShort
+                | NcType::UInt
+                | NcType::Int64
+                | NcType::UInt64
         );
         let is_flat = has_old_shape && variable.name() == "z" && shape.len() == 1;
         let is_grid = shape.len() >= 2 && shape[shape.len() - 2..].iter().all(|size| *size >= 2);
@@ -76,7 +84,12 @@ fn collect<'f>(group: &'f NcGroup, place: &str, depth: usize, grids: &mut Vec<Gr
     }
     if depth < DEEPEST {
         for inner in &group.groups {
-            collect(inner, &format!("{place}{}/", inner.name.rsplit('/').next().unwrap_or("")), depth + 1, grids);
+            collect(
+                inner,
+                &format!("{place}{}/", inner.name.rsplit('/').next().unwrap_or("")),
+                depth + 1,
+                grids,
+            );
         }
     }
 }
@@ -85,10 +98,15 @@ fn collect<'f>(group: &'f NcGroup, place: &str, depth: usize, grids: &mut Vec<Gr
 fn is_auxiliary(group: &NcGroup, variable: &NcVariable) -> bool {
     let name = variable.name();
     let says = |attribute: &str, other: &NcVariable| {
-        text(other.attributes(), attribute).is_some_and(|words| words.split_whitespace().any(|word| word == name))
+        text(other.attributes(), attribute)
+            .is_some_and(|words| words.split_whitespace().any(|word| word == name))
     };
     let others = || group.variables.iter().filter(|other| other.name() != name);
-    others().any(|other| ["bounds", "coordinates", "ancillary_variables", "climatology"].iter().any(|attribute| says(attribute, other)))
+    others().any(|other| {
+        ["bounds", "coordinates", "ancillary_variables", "climatology"]
+            .iter()
+            .any(|attribute| says(attribute, other))
+    })
 }
 
 /// Standard names of heights and depths (CF).
@@ -109,8 +127,26 @@ const STANDARD_NAMES: [&str; 13] = [
 ];
 /// Names of variables of heights.
 const NAMES: [&str; 20] = [
-    "elevation", "elev", "z", "band1", "topo", "topography", "dem", "height", "heights", "altitude", "bathymetry", "bathy", "depth", "hgt", "orog",
-    "orography", "surface", "bedrock", "bed", "rose",
+    "elevation",
+    "elev",
+    "z",
+    "band1",
+    "topo",
+    "topography",
+    "dem",
+    "height",
+    "heights",
+    "altitude",
+    "bathymetry",
+    "bathy",
+    "depth",
+    "hgt",
+    "orog",
+    "orography",
+    "surface",
+    "bedrock",
+    "bed",
+    "rose",
 ];
 
 /// Whether it calls itself an elevation.
@@ -121,7 +157,11 @@ fn is_named(grid: &Grid<'_>) -> bool {
 }
 
 /// The grid and layer that `asked` means, or the only ones there can be.
-pub(super) fn choose<'f>(path: &Path, grids: &[Grid<'f>], asked: Option<&str>) -> Result<Chosen<'f>, LayoutError> {
+pub(super) fn choose<'f>(
+    path: &Path,
+    grids: &[Grid<'f>],
+    asked: Option<&str>,
+) -> Result<Chosen<'f>, LayoutError> {
     if grids.is_empty() {
         return Err(LayoutError::unsupported(
             path,
@@ -147,7 +187,11 @@ pub(super) fn choose<'f>(path: &Path, grids: &[Grid<'f>], asked: Option<&str>) -
     };
     match grid.layers() {
         1 => Ok(Chosen { grid: grid.clone(), layer: 0 }),
-        0 => Err(LayoutError::damaged(path, format!("variable \"{}\"", harmless(&grid.place, 40)), "it holds nothing yet; fetch the file again")),
+        0 => Err(LayoutError::damaged(
+            path,
+            format!("variable \"{}\"", harmless(&grid.place, 40)),
+            "it holds nothing yet; fetch the file again",
+        )),
         layers => {
             let problem = format!("its heights are in {layers} layers, {}; say which one", grid.shown());
             Err(LayoutError::unsupported(path, problem).mended_by(Remedy::Band))

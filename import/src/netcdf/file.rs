@@ -43,7 +43,8 @@ impl Storage for Bytes {
             return Err(Error::UnexpectedEof { offset, needed, available });
         }
         if let Some(left) = &self.left {
-            let is_within = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(needed));
+            let is_within =
+                left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(needed));
             if needed > MOST_AT_ONCE || is_within.is_err() {
                 return Err(Error::ResourceLimit("metadata".into()));
             }
@@ -106,7 +107,9 @@ fn in_words(path: &Path, place: &str, error: netcdf_reader::Error) -> LayoutErro
     match error {
         Error::Io(source) => io(path, place, source),
         Error::UnexpectedEof { .. } => cut_short(path, place),
-        Error::UnsupportedFeature(_) | Error::UnsupportedVersion(_) => not_read(path, "it uses a part of netCDF"),
+        Error::UnsupportedFeature(_) | Error::UnsupportedVersion(_) => {
+            not_read(path, "it uses a part of netCDF")
+        }
         Error::Hdf5(error) => hdf5_in_words(path, place, error),
         _ => damaged(path, place),
     }
@@ -146,13 +149,19 @@ fn io(path: &Path, place: &str, source: std::io::Error) -> LayoutError {
 }
 
 fn cut_short(path: &Path, place: &str) -> LayoutError {
-    LayoutError::damaged(path, place, "the file ends before what it declares; it is cut short: fetch it again")
+    LayoutError::damaged(
+        path,
+        place,
+        "the file ends before what it declares; it is cut short: fetch it again",
+    )
 }
 
 fn not_read(path: &Path, what: &str) -> LayoutError {
     LayoutError::unsupported(
         path,
-        format!("{what} that is not read; convert it: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE INPUT output.tif"),
+        format!(
+            "{what} that is not read; convert it: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE INPUT output.tif"
+        ),
     )
 }
 

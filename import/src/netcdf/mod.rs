@@ -29,7 +29,9 @@ const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// Whether a file begins so: classic of any version, or HDF5.
 pub(crate) fn is_netcdf(head: &[u8]) -> bool {
-    [&b"CDF\x01"[..], b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n"].iter().any(|magic| head.starts_with(magic))
+    [&b"CDF\x01"[..], b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n"]
+        .iter()
+        .any(|magic| head.starts_with(magic))
 }
 
 /// A netCDF file with a grid of heights.
@@ -94,11 +96,14 @@ impl About<'_> {
     fn grid(&self) -> Result<(Declared, Shape), LayoutError> {
         let dimensions = self.grid.variable.dimensions();
         let [rows, columns] = &dimensions[dimensions.len() - 2..] else { return Err(self.too_large()) };
-        let coordinates = [rows, columns].map(|dimension| self.beside(&dimension.name).filter(|(_, v)| v.ndim() == 1));
-        let ways = [0, 1].map(|at| axes::way(&[rows, columns][at].name, coordinates[at].as_ref().map(|(_, v)| *v)));
+        let coordinates =
+            [rows, columns].map(|dimension| self.beside(&dimension.name).filter(|(_, v)| v.ndim() == 1));
+        let ways =
+            [0, 1].map(|at| axes::way(&[rows, columns][at].name, coordinates[at].as_ref().map(|(_, v)| *v)));
         let is_transposed = ways == [Some(Way::East), Some(Way::North)]
             || matches!(ways, [Some(Way::East), None] | [None, Some(Way::North)]);
-        let sizes = [columns.size, rows.size].map(|size| u32::try_from(size).ok().filter(|size| *size <= i32::MAX as u32));
+        let sizes = [columns.size, rows.size]
+            .map(|size| u32::try_from(size).ok().filter(|size| *size <= i32::MAX as u32));
         let [Some(columns), Some(rows)] = sizes else { return Err(self.too_large()) };
         let samples = if is_transposed { [rows, columns] } else { [columns, rows] };
         let shape = Shape { samples, is_transposed };
@@ -122,7 +127,9 @@ impl About<'_> {
     /// Refuses a grid whose places are listed sample by sample.
     fn places_apart(&self) -> Result<(), LayoutError> {
         let Some(names) = text(self.grid.variable.attributes(), "coordinates") else { return Ok(()) };
-        let two = |name: &str| self.beside(name).is_some_and(|(_, v)| v.ndim() == 2 && axes::way("", Some(v)).is_some());
+        let two = |name: &str| {
+            self.beside(name).is_some_and(|(_, v)| v.ndim() == 2 && axes::way("", Some(v)).is_some())
+        };
         if names.split_whitespace().filter(|name| two(name)).count() < 2 {
             return Ok(());
         }
@@ -178,7 +185,8 @@ impl About<'_> {
             Ok(values.as_slice().and_then(|values| <[f64; 2]>::try_from(values).ok()))
         };
         let damaged = |problem: &str| LayoutError::damaged(self.path, "variable \"dimension\"", problem);
-        let sides = two("dimension")?.ok_or_else(|| damaged("it does not hold columns and rows; fetch the file again"))?;
+        let sides = two("dimension")?
+            .ok_or_else(|| damaged("it does not hold columns and rows; fetch the file again"))?;
         let is_side = |side: f64| side.fract() == 0.0 && (2.0..=f64::from(i32::MAX)).contains(&side);
         let listed = self.grid.variable.shape()[0];
         if !sides.iter().all(|side| is_side(*side)) || sides[0] * sides[1] != listed as f64 {
@@ -186,7 +194,8 @@ impl About<'_> {
         }
         // Checked just above.
         let samples = sides.map(|side| side as u32);
-        let mut declared = Declared::new(samples, self.sample_type(), format!("{} (GMT before 4)", self.format()));
+        let mut declared =
+            Declared::new(samples, self.sample_type(), format!("{} (GMT before 4)", self.format()));
         if let (Some([west, east]), Some([south, north])) = (two("x_range")?, two("y_range")?) {
             let attributes = self.grid.variable.attributes();
             let is_area = number(attributes, "node_offset") == Some(1.0);
@@ -197,7 +206,10 @@ impl About<'_> {
             if map.iter().all(|value| value.is_finite()) && across > 0.0 && down > 0.0 {
                 declared.place = Some(Said::new(map, "variables \"x_range\" and \"y_range\""));
             }
-            let unit = self.beside("x_range").and_then(|(_, v)| text(v.attributes(), "units")).and_then(|name| attributes::unit(&name));
+            let unit = self
+                .beside("x_range")
+                .and_then(|(_, v)| text(v.attributes(), "units"))
+                .and_then(|name| attributes::unit(&name));
             if unit == Some(Unit::Degrees) {
                 let size = HorizontalSize::Radians(1f64.to_radians());
                 declared.crs.unit = Some(Said::new(size, "units of variable \"x_range\""));

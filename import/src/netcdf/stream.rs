@@ -75,10 +75,13 @@ impl Source {
     /// The windows that are read, as columns and rows of each; the last ones of a row or column are cut.
     fn window(&self) -> [u32; 2] {
         let [columns, rows] = self.stored;
-        let fit = |width: u32| u32::try_from(WINDOW_SAMPLES / u64::from(width.max(1))).unwrap_or(u32::MAX).max(1);
+        let fit =
+            |width: u32| u32::try_from(WINDOW_SAMPLES / u64::from(width.max(1))).unwrap_or(u32::MAX).max(1);
         match self.chunk {
             None => [columns, fit(columns).min(rows)],
-            Some(([wide, high], _)) if u64::from(wide) * u64::from(high) > LARGEST_WINDOW => [wide, fit(wide).min(high)],
+            Some(([wide, high], _)) if u64::from(wide) * u64::from(high) > LARGEST_WINDOW => {
+                [wide, fit(wide).min(high)]
+            }
             // As many chunks side by side as make a window.
             Some(([wide, high], _)) => {
                 let across = u64::from(wide) * (WINDOW_SAMPLES / (u64::from(wide) * u64::from(high))).max(1);
@@ -125,25 +128,41 @@ impl Source {
         let bands = u64::from(tall.div_ceil(high));
         let across = u64::from(columns.div_ceil(wide));
         let tasks = across * u64::from(rows.div_ceil(tall)) * bands;
-        let workers = if self.is_kept() { 1 } else { usize::try_from(BUDGET_BYTES / self.worker_bytes().max(1)).unwrap_or(1) };
-        each_task(tasks, workers.max(1), || Ok(Vec::new()), |samples, task| {
-            let (chunk, band) = (task / bands, (task % bands) as u32);
-            // Both lie in the grid, whose sides are 31-bit.
-            let (col, first) = ((chunk % across) as u32 * wide, (chunk / across) as u32 * tall);
-            let row = first + band * high;
-            let end = (first + tall).min(rows);
-            if row >= end {
-                return Ok(());
-            }
-            let window = Window { col, row, width: wide.min(columns - col), height: high.min(end - row) };
-            self.read(path, &file, window, samples)?;
-            let handed = Window { col: window.row, row: window.col, width: window.height, height: window.width };
-            sink.put(if self.is_transposed { handed } else { window }, samples)
-        })
+        let workers = if self.is_kept() {
+            1
+        } else {
+            usize::try_from(BUDGET_BYTES / self.worker_bytes().max(1)).unwrap_or(1)
+        };
+        each_task(
+            tasks,
+            workers.max(1),
+            || Ok(Vec::new()),
+            |samples, task| {
+                let (chunk, band) = (task / bands, (task % bands) as u32);
+                // Both lie in the grid, whose sides are 31-bit.
+                let (col, first) = ((chunk % across) as u32 * wide, (chunk / across) as u32 * tall);
+                let row = first + band * high;
+                let end = (first + tall).min(rows);
+                if row >= end {
+                    return Ok(());
+                }
+                let window = Window { col, row, width: wide.min(columns - col), height: high.min(end - row) };
+                self.read(path, &file, window, samples)?;
+                let handed =
+                    Window { col: window.row, row: window.col, width: window.height, height: window.width };
+                sink.put(if self.is_transposed { handed } else { window }, samples)
+            },
+        )
     }
 
     /// Reads a window as it lies in the variable.
-    fn read(&self, path: &Path, file: &NcFile, window: Window, samples: &mut Vec<f64>) -> Result<(), LayoutError> {
+    fn read(
+        &self,
+        path: &Path,
+        file: &NcFile,
+        window: Window,
+        samples: &mut Vec<f64>,
+    ) -> Result<(), LayoutError> {
         let slice = |start: u64, count: u64| NcSliceInfoElem::Slice { start, end: start + count, step: 1 };
         let Window { col, row, width, height } = window;
         let selections = if self.is_flat {
@@ -157,15 +176,22 @@ impl Source {
         let name = format!("variable \"{}\", row {row}", harmless(&self.place, 40));
         let selection = NcSliceInfo { selections };
         let read = file::guarded(path, &name, || file.read_variable_slice_as_f64(&self.place, &selection))?;
-        let values = read.as_slice().filter(|values| values.len() as u64 == u64::from(width) * u64::from(height));
+        let values =
+            read.as_slice().filter(|values| values.len() as u64 == u64::from(width) * u64::from(height));
         let Some(values) = values else {
-            return Err(LayoutError::damaged(path, name, "its structure is damaged; fetch or write the file again"));
+            return Err(LayoutError::damaged(
+                path,
+                name,
+                "its structure is damaged; fetch or write the file again",
+            ));
         };
         let meant = |value: f64| if value < 0.0 { value + self.wrap } else { value };
         samples.clear();
         if self.is_transposed {
             let (width, height) = (width as usize, height as usize);
-            samples.extend((0..width).flat_map(|col| (0..height).map(move |row| meant(values[row * width + col]))));
+            samples.extend(
+                (0..width).flat_map(|col| (0..height).map(move |row| meant(values[row * width + col]))),
+            );
         } else {
             samples.extend(values.iter().map(|value| meant(*value)));
         }
@@ -187,12 +213,16 @@ fn chunk(
         return Ok(None);
     }
     let place_shown = format!("variable \"{}\"", harmless(place, 40));
-    let sides = guard(path, || place_shown.clone(), || {
-        let options = hdf5_reader::OpenOptions::default().with_chunk_cache_bytes(0);
-        let file = hdf5_reader::Hdf5File::from_storage_with_options(storage, options);
-        let sides = file.and_then(|file| file.dataset(place)).map(|dataset| dataset.chunks());
-        sides.map_err(|error| file::hdf5_in_words(path, &place_shown, error))
-    })?;
+    let sides = guard(
+        path,
+        || place_shown.clone(),
+        || {
+            let options = hdf5_reader::OpenOptions::default().with_chunk_cache_bytes(0);
+            let file = hdf5_reader::Hdf5File::from_storage_with_options(storage, options);
+            let sides = file.and_then(|file| file.dataset(place)).map(|dataset| dataset.chunks());
+            sides.map_err(|error| file::hdf5_in_words(path, &place_shown, error))
+        },
+    )?;
     let Some(sides) = sides else { return Ok(None) };
     let bytes = sides.iter().fold(sample_bytes, |bytes, side| bytes.saturating_mul(u64::from(*side)));
     let sides = match sides[..] {

@@ -29,7 +29,8 @@ fn proj(attributes: &[NcAttribute]) -> Option<String> {
     let or = |name: &str, default: f64| of(name).unwrap_or(default);
     let parallels = numbers(attributes, "standard_parallel");
     let shift = format!("+x_0={} +y_0={}", or("false_easting", 0.0), or("false_northing", 0.0));
-    let [central, origin] = [or("longitude_of_central_meridian", 0.0), or("latitude_of_projection_origin", 0.0)];
+    let [central, origin] =
+        [or("longitude_of_central_meridian", 0.0), or("latitude_of_projection_origin", 0.0)];
     let centre = of("longitude_of_projection_origin").unwrap_or(central);
     let scale = of("scale_factor_at_central_meridian").or_else(|| of("scale_factor_at_projection_origin"));
     let body = format!(
@@ -44,32 +45,44 @@ fn proj(attributes: &[NcAttribute]) -> Option<String> {
             },
             "lambert_conformal_conic" => match parallels[..] {
                 [one] => format!("lcc +lat_1={one} +lat_0={origin} +lon_0={central} {shift}"),
-                [one, two] => format!("lcc +lat_1={one} +lat_2={two} +lat_0={origin} +lon_0={central} {shift}"),
+                [one, two] =>
+                    format!("lcc +lat_1={one} +lat_2={two} +lat_0={origin} +lon_0={central} {shift}"),
                 _ => return None,
             },
             "albers_conical_equal_area" => match parallels[..] {
                 [one] => format!("aea +lat_1={one} +lat_2={one} +lat_0={origin} +lon_0={central} {shift}"),
-                [one, two] => format!("aea +lat_1={one} +lat_2={two} +lat_0={origin} +lon_0={central} {shift}"),
+                [one, two] =>
+                    format!("aea +lat_1={one} +lat_2={two} +lat_0={origin} +lon_0={central} {shift}"),
                 _ => return None,
             },
             "lambert_azimuthal_equal_area" => format!("laea +lat_0={origin} +lon_0={centre} {shift}"),
             "polar_stereographic" => {
-                let pole = or("latitude_of_projection_origin", if parallels.first().is_some_and(|p| *p < 0.0) { -90.0 } else { 90.0 });
+                let pole = or(
+                    "latitude_of_projection_origin",
+                    if parallels.first().is_some_and(|p| *p < 0.0) { -90.0 } else { 90.0 },
+                );
                 let meridian = of("straight_vertical_longitude_from_pole").unwrap_or(centre);
                 match (parallels.first(), scale) {
-                    (Some(parallel), _) => format!("stere +lat_0={pole} +lat_ts={parallel} +lon_0={meridian} {shift}"),
-                    (None, scale) => format!("stere +lat_0={pole} +lon_0={meridian} +k={} {shift}", scale.unwrap_or(1.0)),
+                    (Some(parallel), _) => {
+                        format!("stere +lat_0={pole} +lat_ts={parallel} +lon_0={meridian} {shift}")
+                    }
+                    (None, scale) => {
+                        format!("stere +lat_0={pole} +lon_0={meridian} +k={} {shift}", scale.unwrap_or(1.0))
+                    }
                 }
             }
             _ => return None,
         }
     );
-    let ellipsoid = match (of("earth_radius"), of("semi_major_axis"), of("inverse_flattening"), of("semi_minor_axis")) {
-        (Some(radius), ..) => format!("+R={radius}"),
-        (None, Some(major), Some(flattening), _) if flattening > 0.0 => format!("+a={major} +rf={flattening}"),
-        (None, Some(major), _, Some(minor)) => format!("+a={major} +b={minor}"),
-        (None, Some(major), ..) => format!("+R={major}"),
-        _ => "+datum=WGS84".to_owned(),
-    };
+    let ellipsoid =
+        match (of("earth_radius"), of("semi_major_axis"), of("inverse_flattening"), of("semi_minor_axis")) {
+            (Some(radius), ..) => format!("+R={radius}"),
+            (None, Some(major), Some(flattening), _) if flattening > 0.0 => {
+                format!("+a={major} +rf={flattening}")
+            }
+            (None, Some(major), _, Some(minor)) => format!("+a={major} +b={minor}"),
+            (None, Some(major), ..) => format!("+R={major}"),
+            _ => "+datum=WGS84".to_owned(),
+        };
     Some(format!("{body} {ellipsoid} +no_defs"))
 }

@@ -121,7 +121,7 @@ mod tests {
         let header = parsed(b"P5\n# made by\n 3 # wide\n2\n65535\n\0\x01").unwrap();
         assert_eq!(
             (header.class, header.samples, header.largest, header.data_at),
-            (Class::Bytes, [3, 2], 65535.0, 32)
+            (Class::Bytes, [3, 2], 65535.0, 31)
         );
         assert_eq!(parsed(b"Pf 3 2 -1.0\n").unwrap().class, Class::Real { is_big: false });
         assert_eq!(parsed(b"P2 3 2 255").unwrap().data_at, 10);
