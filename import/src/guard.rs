@@ -38,6 +38,14 @@ pub(crate) fn guard<T>(
     })
 }
 
+/// Runs `decode`; a panic in it is nothing.
+pub(crate) fn quiet<T>(decode: impl FnOnce() -> T) -> Option<T> {
+    GUARDS.set(GUARDS.get() + 1);
+    let decoded = catch_unwind(AssertUnwindSafe(decode));
+    GUARDS.set(GUARDS.get() - 1);
+    decoded.ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

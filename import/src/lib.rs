@@ -7,6 +7,7 @@
 //! held against the length of the file before memory is taken for it.
 
 mod ascii_grid;
+mod beside;
 mod bt;
 mod crs;
 mod dted;
@@ -21,11 +22,13 @@ pub(crate) mod input;
 pub(crate) mod jpeg_frame;
 mod labelled;
 mod netcdf;
+mod mask;
 mod opened;
 mod options;
 mod parallel;
 pub(crate) mod picture;
 mod plain;
+mod placement;
 mod png;
 pub(crate) mod png_stream;
 mod pnm;
@@ -37,6 +40,7 @@ mod text;
 mod usgs_dem;
 mod value;
 mod xyz;
+mod warp;
 
 use std::path::{Path, PathBuf};
 
@@ -47,7 +51,7 @@ pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
-pub use options::{Direction, OpenOptions};
+pub use options::{Direction, OpenOptions, Resampling};
 pub use picture::open_image;
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 
@@ -75,7 +79,8 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
 pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn DemSource>, LayoutError> {
     let reader = formats::open(paths, options)?;
     let path = paths.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
-    Ok(Box::new(opened::OpenedDem::new(path, reader, options)?))
+    let beside = beside::Beside::of(paths, &*reader);
+    Ok(Box::new(opened::OpenedDem::new(path, reader, beside, options)?))
 }
 
 /// As [`open`], of one file.

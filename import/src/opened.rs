@@ -1,53 +1,118 @@
 //! From what a file says to a DEM that can be built: the one layer between every reader and the build.
 //!
-//! What a reader declares is turned into metres, north and voids here, once for all formats.
+//! Statements become a reference system, metres, north and voids here, once for all formats. Samples pass through: voids become NaN, then rows and columns are turned north-up.
+//! Cost: a copy of each window where there are voids to look for or rows to turn.
 
-use crate::crs::georeference;
-use crate::options::{Direction, OpenOptions};
-use crate::reader::{Reader, VerticalUnit};
-use crate::value::{US_SURVEY_FOOT_M, Voids, unit_m};
+use crate::beside::Beside;
+use crate::crs::{self, Kind, System};
+use crate::mask::Masking;
+use crate::options::OpenOptions;
+use crate::placement::{Lie, Spacing, Turn, Turning, spacing, turned_by};
+use crate::reader::{Declared, Reader};
+use crate::value::{Heights, Suspicion, Voids, heights};
+use crate::warp::Warp;
 use std::path::Path;
-use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
+use terrasoar_layout::dem::{About, DemInfo, DemSource, SampleSink, UnitOf, Warning, Window};
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::remedy::Remedy;
+use terrasoar_layout::words::harmless;
+
+/// Longest text of a system that is kept.
+const MAX_CRS_CHARS: usize = 16_000;
 
 /// A data set as the build wants it.
 pub(crate) struct OpenedDem {
     reader: Box<dyn Reader>,
     info: DemInfo,
     voids: Voids,
+    mask: Option<Masking>,
+    turn: Turn,
+    warp: Option<Warp>,
+    suspicion: Suspicion,
+    /// Warnings of what was declared.
+    warnings: Vec<Warning>,
+    /// Whether samples are heights on the Earth whose unit is known.
+    is_earth: bool,
+    unit_is_known: bool,
+    z_scale: f64,
 }
 
 impl OpenedDem {
     pub(crate) fn new(
         path: &Path,
         reader: Box<dyn Reader>,
+        beside: Beside,
         options: &OpenOptions,
     ) -> Result<Self, LayoutError> {
-        let declared = reader.declared();
+        let mut declared = reader.declared().clone();
+        let mask = beside.complete(&mut declared, options)?;
+        let mut warnings = declared.warnings.clone();
+        let mut system = crs::resolve(&declared.crs, options.crs.as_deref(), &mut warnings)?;
         let voids = Voids::new(path, &declared.value.nodata, &options.nodata, declared.sample_type)?;
-        let value = &declared.value;
-        let unit = value.unit.as_ref().and_then(|unit| match &unit.value {
-            VerticalUnit::Name(name) => unit_m(name),
-            VerticalUnit::Metres(metres) => Some(*metres),
-            VerticalUnit::Code(9002) => Some(0.3048),
-            VerticalUnit::Code(9003) => Some(US_SURVEY_FOOT_M),
-            VerticalUnit::Code(_) => None,
-        });
-        let sign = match options.positive.or(value.direction.as_ref().map(|said| said.value)) {
-            Some(Direction::Down) => -1.0,
-            Some(Direction::Up) | None => 1.0,
+        let heights = heights(&declared.value, &system, options, options.decode.is_some(), &mut warnings)?;
+
+        let file_map = declared.place.as_ref().map(|place| place.value);
+        let lie = match file_map {
+            Some(map) if !options.as_stored => Lie::of(&map, system.signs, declared.samples),
+            _ => Lie::Along(Turn::default()),
         };
-        let metres = sign * unit.unwrap_or(1.0);
-        let info = DemInfo {
-            samples_wide: declared.samples[0],
-            samples_high: declared.samples[1],
-            sample_type: declared.sample_type,
-            height_scale: value.scale.as_ref().map_or(1.0, |said| said.value) * metres,
-            height_offset_m: value.offset.as_ref().map_or(0.0, |said| said.value) * metres,
-            georeference: georeference(&declared.crs, declared.place.as_ref().map(|place| place.value)),
-            format: declared.format.clone(),
+        let turn = match lie {
+            Lie::Along(turn) => turn,
+            Lie::Across => Turn::default(),
         };
-        Ok(Self { reader, info, voids })
+        let mut samples = turn.samples(declared.samples);
+        let mut map = file_map.map(|map| turn.map(map, declared.samples));
+        let mut notes = declared.notes.clone();
+        if !turn.is_none() {
+            notes.push(turn.words().to_owned());
+        }
+        let is_stated = options.spacing_is_stated || options.reproject.is_some();
+        // What the unit of coordinates is may have to be guessed, and is needed before a warp.
+        let mut found = spacing(path, &mut system, map, samples, is_stated, &mut warnings)?;
+        let mut sample_type = declared.sample_type;
+        let warp =
+            Warp::plan(path, &system, map, samples, declared.sample_type, lie == Lie::Across, options)?;
+        if let Some(warp) = &warp {
+            if lie == Lie::Across && options.reproject.is_none() {
+                warnings.push(Warning::new(format!(
+                    "the grid is turned by {:.2} degrees against north; it was resampled north-up, {}",
+                    turned_by(&file_map.unwrap_or_default(), system.signs),
+                    warp.method()
+                )));
+            }
+            (samples, map, sample_type) = (warp.samples(), Some(warp.map()), warp.sample_type());
+            notes.push(warp.words());
+            if let Some(target) = warp.system() {
+                system = System { vertical: system.vertical.clone(), ..target.clone() };
+            }
+            found = spacing(path, &mut system, map, samples, options.spacing_is_stated, &mut warnings)?;
+        }
+        let is_earth = system.radius_m.is_none_or(crs::is_earth) && system.kind != Kind::Local;
+        let info = describe(&declared, &system, &heights, &found, map, samples, sample_type, &voids, notes);
+        Ok(Self {
+            reader,
+            info,
+            voids,
+            mask,
+            turn,
+            warp,
+            suspicion: Suspicion::new(),
+            warnings,
+            is_earth,
+            unit_is_known: heights.unit_is_known,
+            z_scale: options.z_scale.unwrap_or(1.0),
+        })
+    }
+
+    /// Raw samples in north-up order, as far as that is exact.
+    fn stream_turned(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let turning = Turning { turn: self.turn, samples: self.reader.declared().samples, sink };
+        let sink: &dyn SampleSink = if self.turn.is_none() { sink } else { &turning };
+        let voiding = Voiding { voids: &self.voids, suspicion: &self.suspicion, sink };
+        match &self.mask {
+            None => self.reader.stream(&voiding),
+            Some(mask) => mask.stream(&*self.reader, &voiding),
+        }
     }
 }
 
@@ -56,28 +121,122 @@ impl DemSource for OpenedDem {
         &self.info
     }
 
+    fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = self.warnings.clone();
+        let [scale_m, offset_m] =
+            [self.info.height_scale, self.info.height_offset_m].map(|m| m * self.z_scale);
+        let unit_is_known = self.unit_is_known || self.z_scale != 1.0;
+        warnings.extend(self.suspicion.warnings(scale_m, offset_m, self.is_earth, unit_is_known));
+        for value in self.voids.unmatched() {
+            warnings.push(
+                Warning::new(format!(
+                    "no sample is {}, which was named as \"no data\"",
+                    harmless(&value, 40)
+                ))
+                .mended_by(Remedy::Nodata, "VALUE"),
+            );
+        }
+        warnings
+    }
+
     fn memory_bytes(&self) -> u64 {
-        self.reader.memory_bytes()
+        let warp = self.warp.as_ref().map_or(0, Warp::memory_bytes);
+        let mask = self.mask.as_ref().map_or(0, Masking::memory_bytes);
+        self.reader.memory_bytes() + warp + mask
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        if self.voids.is_idle() {
-            return self.reader.stream(sink);
+        match &self.warp {
+            None => self.stream_turned(sink),
+            Some(warp) => warp.stream(&|store| self.stream_turned(store), sink),
         }
-        self.reader.stream(&Voiding { voids: &self.voids, sink })
+    }
+}
+
+/// What is said of the data set once all is known.
+#[allow(clippy::too_many_arguments, reason = "each is a part of what was found, and they meet here alone")]
+fn describe(
+    declared: &Declared,
+    system: &System,
+    heights: &Heights,
+    found: &Spacing,
+    map: Option<[f64; 6]>,
+    samples: [u32; 2],
+    sample_type: terrasoar_layout::dem::SampleType,
+    voids: &Voids,
+    notes: Vec<String>,
+) -> DemInfo {
+    let mut georeference = crs::georeference(system, map);
+    georeference.spacing_m = found.metres;
+    georeference.centre_latitude_deg = found.latitude_deg;
+    let mut origins = Vec::new();
+    let mut say = |what: &str, words: String| {
+        if !words.is_empty() {
+            origins.push((what.to_owned(), words));
+        }
+    };
+    say("place", declared.place.as_ref().map(|place| format!("from {}", place.by)).unwrap_or_default());
+    say("reference system", if system.by.is_empty() { String::new() } else { format!("from {}", system.by) });
+    say("spacing", found.words.clone());
+    say("heights", heights.words.clone());
+    let void_texts: Vec<String> = voids.texts().map(|text| harmless(text, 40)).collect();
+    let by: Vec<&str> = declared.value.nodata.iter().map(|said| said.by.as_str()).collect();
+    if !void_texts.is_empty() {
+        let by = if by.is_empty() { "as typed".to_owned() } else { format!("from {}", by.join(", ")) };
+        say("no data", format!("{} {by}", void_texts.join(", ")));
+    }
+    for note in notes {
+        say("note", note);
+    }
+    let vertical = system.vertical.as_ref();
+    let about = About {
+        crs_text: if system.text.chars().count() <= MAX_CRS_CHARS {
+            system.text.clone()
+        } else {
+            String::new()
+        },
+        horizontal_unit: system.unit.as_ref().map(|unit| match unit.size {
+            crate::reader::HorizontalSize::Metres(size) => {
+                UnitOf { name: unit.name.clone(), size, is_angle: false }
+            }
+            crate::reader::HorizontalSize::Radians(size) => {
+                UnitOf { name: unit.name.clone(), size, is_angle: true }
+            }
+        }),
+        vertical_name: vertical.map(|vertical| vertical.name.clone()).unwrap_or_default(),
+        vertical_epsg: vertical.and_then(|vertical| vertical.code),
+        vertical_unit: Some(heights.unit.clone()),
+        origins,
+        warnings: Vec::new(),
+    };
+    DemInfo {
+        samples_wide: samples[0],
+        samples_high: samples[1],
+        sample_type,
+        height_scale: heights.scale_m,
+        height_offset_m: heights.offset_m,
+        georeference,
+        format: declared.format.clone(),
+        about,
     }
 }
 
 /// Passes samples on with voids as NaN.
 struct Voiding<'a> {
     voids: &'a Voids,
+    suspicion: &'a Suspicion,
     sink: &'a dyn SampleSink,
 }
 
 impl SampleSink for Voiding<'_> {
     fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
+        if self.voids.is_idle() {
+            self.suspicion.look(samples);
+            return self.sink.put(window, samples);
+        }
         let mut samples = samples.to_vec();
         self.voids.apply(&mut samples);
+        self.suspicion.look(&samples);
         self.sink.put(window, &samples)
     }
 

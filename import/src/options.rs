@@ -11,6 +11,38 @@ pub enum Direction {
     Down,
 }
 
+/// How new samples are made of old ones. Kernels are GDAL's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Resampling {
+    /// The nearest sample.
+    Nearest,
+    /// The four around, by distance.
+    #[default]
+    Bilinear,
+    /// 16 samples, a cubic convolution (Keys, a = -1/2).
+    Cubic,
+    /// 36 samples, a windowed sine.
+    Lanczos,
+    /// The mean of all samples under the new one.
+    Average,
+}
+
+impl Resampling {
+    /// Every way, in the order they are named.
+    pub const ALL: [Self; 5] = [Self::Nearest, Self::Bilinear, Self::Cubic, Self::Lanczos, Self::Average];
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nearest => "nearest",
+            Self::Bilinear => "bilinear",
+            Self::Cubic => "cubic",
+            Self::Lanczos => "lanczos",
+            Self::Average => "average",
+        }
+    }
+}
+
 /// How to read elevation data.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OpenOptions {
@@ -29,6 +61,20 @@ pub struct OpenOptions {
     pub crs: Option<String>,
     /// Unit of heights instead of the file's, by name or code or metres a unit: "ft", "ftUS", "dm", "0.1".
     pub height_unit: Option<String>,
+    /// Whether the distance between samples is stated elsewhere, so that nothing needs to be asked about it.
+    pub spacing_is_stated: bool,
+    /// The factor on heights that is applied later, for judging them.
+    pub z_scale: Option<f64>,
+    /// The system to bring the data into: "EPSG:n", "utm" (the zone of the centre), "auto" (UTM, or polar stereographic near the poles), WKT or PROJ.
+    pub reproject: Option<String>,
+    /// Distance between samples in metres, or units of the new system, when reprojecting; without it that of the data.
+    pub resolution: Option<f64>,
+    /// How new samples are made of old ones; without it bilinear.
+    pub resampling: Option<Resampling>,
+    /// Memory in MiB that opening and reading may plan with; without it 512.
+    pub memory_mib: Option<u64>,
+    /// Folder for temporary files; without it the system's.
+    pub scratch: Option<std::path::PathBuf>,
     /// Whether samples stay in the rows and columns of the file, where they would be turned north-up.
     pub as_stored: bool,
 }

@@ -78,6 +78,47 @@ pub struct Georeference {
     pub pixel_to_crs: Option<[f64; 6]>,
     /// Radius of the body's equator in metres when the file names one other than the Earth's.
     pub body_radius_m: Option<f64>,
+    /// Metres between samples on the ground, along columns and along rows, at the centre; `None` to have them follow from `unit` and `pixel_to_crs`.
+    pub spacing_m: Option<[f64; 2]>,
+    /// Latitude of the centre in degrees, where `spacing_m` was converted from angles.
+    pub centre_latitude_deg: Option<f64>,
+}
+
+/// A unit of coordinates or heights.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct UnitOf {
+    /// Its name in words.
+    pub name: String,
+    /// Metres a unit, or radians where `is_angle`.
+    pub size: f64,
+    /// Whether it measures angles.
+    pub is_angle: bool,
+}
+
+/// What a terrain file keeps of a DEM in words: for people, and for programs that bring coordinates into other systems.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct About {
+    /// The reference system in full, as WKT or a PROJ string; empty if unknown.
+    pub crs_text: String,
+    /// Unit of the coordinates.
+    pub horizontal_unit: Option<UnitOf>,
+    /// What heights are measured from: "NAVD88 height"; empty if unknown.
+    pub vertical_name: String,
+    /// EPSG code of the vertical system.
+    pub vertical_epsg: Option<u32>,
+    /// Unit in which the file gives heights.
+    pub vertical_unit: Option<UnitOf>,
+    /// What was found where: `("heights", "band 1, unit ft, from GDAL's metadata")`.
+    pub origins: Vec<(String, String)>,
+    /// What may make the ground wrong, in words.
+    pub warnings: Vec<String>,
+}
+
+impl About {
+    /// Whether nothing is said.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// What may make the ground wrong, in words for the person who asked for it.
@@ -112,7 +153,7 @@ pub struct DemInfo {
     pub samples_high: u32,
     /// Storage type of the samples.
     pub sample_type: SampleType,
-    /// Metres of height a raw unit.
+    /// Metres of height a raw unit; below 0 where raw numbers count downward.
     pub height_scale: f64,
     /// Metres of height at raw value 0.
     pub height_offset_m: f64,
@@ -120,6 +161,8 @@ pub struct DemInfo {
     pub georeference: Georeference,
     /// Name of the format in words, for messages: "16-bit PNG", "VTP BT 1.3".
     pub format: String,
+    /// What is kept of it in words.
+    pub about: About,
 }
 
 /// A rectangle of samples in source order: row 0 northernmost, column 0 westernmost.
@@ -160,6 +203,11 @@ pub trait DemSource: Sync {
     /// What the data set says about itself.
     fn info(&self) -> &DemInfo;
 
+    /// What was seen that may make the ground wrong. Complete once [`stream`](DemSource::stream) has ended well.
+    fn warnings(&self) -> Vec<Warning> {
+        Vec::new()
+    }
+
     /// Memory in bytes that [`stream`](DemSource::stream) takes beyond a megabyte or two a thread.
     fn memory_bytes(&self) -> u64 {
         0
@@ -198,6 +246,7 @@ impl MemoryDem {
             height_offset_m: 0.0,
             georeference: Georeference::default(),
             format: "memory".into(),
+            about: About::default(),
         };
         let points = (0..samples_high).flat_map(|y| (0..samples_wide).map(move |x| (x, y)));
         Self { info, samples: points.map(|(x, y)| sample(x, y)).collect() }

@@ -23,6 +23,8 @@ pub enum Remedy {
     ReferenceSystem,
     /// The shape of a file that does not tell it.
     RawShape,
+    /// The distance between samples when elevation data is brought into another system.
+    Resolution,
     /// Elevation data brought into another reference system while it is read.
     Reproject,
     /// Another factor on heights: [`BuildOptions::z_scale`](crate::build::BuildOptions::z_scale).

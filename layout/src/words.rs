@@ -6,7 +6,7 @@
 use crate::printable::is_harmless;
 
 /// A number as people read it: with its power of ten where it would be long.
-pub(crate) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     let size = value.abs();
     if value.is_finite() && size != 0.0 && !(1e-5..1e10).contains(&size) {
         format!("{value:e}")

@@ -25,7 +25,7 @@ fn dem() -> MemoryDem {
         crs_name: "WGS 84 / UTM zone 10N".into(),
         unit: HorizontalUnit::Metre,
         pixel_to_crs: Some([500_000.0, 10.0, 0.0, 4_000_060.0, 0.0, -20.0]),
-        body_radius_m: None,
+        ..Georeference::default()
     };
     dem
 }

@@ -3,11 +3,12 @@
 use super::output::{complain, grouped, print};
 use super::outputs::{Force, Kind};
 use super::progress::{Meter, short};
-use super::{parse, terrain};
+use super::{parse, remedy, terrain};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use terrasoar_import::{Direction, OpenOptions, Resampling};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::file::header::{ErrorKind, Header, SpacingOrigin};
 use terrasoar_layout::grid::record::RecordKind;
@@ -24,12 +25,14 @@ Examples:
   terrasoar build N46E007.hgt N46E008.hgt -o valais.iqt
   terrasoar build puget.png --spacing 160 --z-scale 0.1 -o puget.iqt
   terrasoar build huge.tif --memory 2048 -o huge.iqt
+  terrasoar build world.tif --reproject utm --resolution 30 -o metric.iqt
 
 Room on the output's disk: some 4 bytes a sample for the file (8 or 16 with exact records), and while building another 4 (8 where single
 precision does not hold the samples), unless --memory holds them. Voids take none.
 
 A DEM in degrees gets the spacing in metres that degrees have at its centre; `terrasoar info` says so. PNG says nothing about spacing:
-state it, or it is taken to be 1 m.")]
+state it, or it is taken to be 1 m. What else the data does not say can be stated: its reference system, its unit of heights, which numbers mean \"no data\".
+What looks wrong is said aloud, with the flag to type.")]
 pub(super) struct Args {
     /// Elevation data: one file, or several .hgt tiles that border each other
     #[arg(required = true, value_name = "IN")]
@@ -42,8 +45,8 @@ pub(super) struct Args {
     /// Metres between samples, one number or east,north, instead of what the DEM says
     #[arg(long, value_name = "M|MX,MY", value_parser = parse::spacing_m)]
     spacing: Option<[f64; 2]>,
-    /// Factor on all heights, such as 0.1 where a raw unit is a decimetre
-    #[arg(long, value_name = "S", default_value = "1", value_parser = parse::positive)]
+    /// Factor on all heights, such as 0.1 where a raw unit is a decimetre, or -1 where depths are counted
+    #[arg(long, value_name = "S", default_value = "1", value_parser = parse::not_zero, allow_negative_numbers = true)]
     z_scale: f64,
     /// Memory to use at most, in MiB
     #[arg(long, value_name = "MIB", default_value_t = 512, value_parser = clap::value_parser!(u64).range(48..=1 << 24))]
@@ -57,9 +60,66 @@ pub(super) struct Args {
     /// Threads to use; all cores without it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Raw value that means "no data", beside what the DEM declares
-    #[arg(long, value_name = "VALUE", value_parser = parse::finite, allow_negative_numbers = true)]
-    nodata: Option<f64>,
+    /// Raw value that means "no data", beside what the DEM declares; several with commas between, or the flag several times
+    #[arg(long, value_name = "VALUE", value_parser = parse::raw_value, allow_hyphen_values = true, value_delimiter = ',')]
+    nodata: Vec<String>,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+/// What the elevation data does not say, or says wrongly.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "What the elevation data does not say")]
+struct Reading {
+    /// Reference system instead of the DEM's: EPSG:n, EPSG:n+m with heights, WKT, a PROJ string, or local for a site in metres
+    #[arg(long, value_name = "SYSTEM")]
+    crs: Option<String>,
+    /// Unit of heights instead of the DEM's: m, ft, ftUS, dm, cm, fathom, or its metres, such as 0.1
+    #[arg(long, value_name = "UNIT")]
+    height_unit: Option<String>,
+    /// Whether numbers grow upward, as heights do, or downward, as depths do
+    #[arg(long, value_name = "WAY")]
+    positive: Option<Way>,
+    /// Band or variable with the heights: its number from 1 on, or its name
+    #[arg(long, value_name = "BAND")]
+    band: Option<String>,
+    /// How heights are packed into colours: mapbox (Terrain-RGB), terrarium, or factors R,G,B,BASE
+    #[arg(long, value_name = "PACKING", allow_hyphen_values = true)]
+    decode: Option<String>,
+    /// Shape of a file without a header: width x height : type, such as 1025x1025:u16le
+    #[arg(long, value_name = "WxH:TYPE")]
+    raw: Option<String>,
+    /// Bring the data into another system: EPSG:n, utm (the zone of the centre), auto, WKT or a PROJ string
+    #[arg(long, value_name = "SYSTEM")]
+    reproject: Option<String>,
+    /// Metres between the new samples; without it those of the data
+    #[arg(long, value_name = "M", value_parser = parse::positive, requires = "reproject")]
+    resolution: Option<f64>,
+    /// How new samples are made of old ones, where they are brought elsewhere or turned north-up
+    #[arg(long, value_name = "KERNEL")]
+    resampling: Option<KernelWord>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Way {
+    /// Heights
+    Up,
+    /// Depths
+    Down,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum KernelWord {
+    /// The nearest sample
+    Nearest,
+    /// The four around
+    Bilinear,
+    /// The sixteen around, cubic convolution
+    Cubic,
+    /// The thirty-six around, a windowed sine
+    Lanczos,
+    /// The mean of what lies under the new sample
+    Average,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -92,8 +152,38 @@ impl Args {
                 ErrorWord::Bounded => ErrorKind::Bounded,
                 ErrorWord::Step => ErrorKind::Step,
             },
-            nodata: self.nodata,
             ..BuildOptions::default()
+        }
+    }
+
+    fn opening(&self) -> OpenOptions {
+        let reading = &self.reading;
+        let folder = self.output.parent().filter(|folder| !folder.as_os_str().is_empty());
+        OpenOptions {
+            band: reading.band.clone(),
+            decode: reading.decode.clone(),
+            nodata: self.nodata.clone(),
+            raw: reading.raw.clone(),
+            positive: reading.positive.map(|way| match way {
+                Way::Up => Direction::Up,
+                Way::Down => Direction::Down,
+            }),
+            crs: reading.crs.clone(),
+            height_unit: reading.height_unit.clone(),
+            spacing_is_stated: self.spacing.is_some(),
+            z_scale: Some(self.z_scale),
+            reproject: reading.reproject.clone(),
+            resolution: reading.resolution,
+            resampling: reading.resampling.map(|word| match word {
+                KernelWord::Nearest => Resampling::Nearest,
+                KernelWord::Bilinear => Resampling::Bilinear,
+                KernelWord::Cubic => Resampling::Cubic,
+                KernelWord::Lanczos => Resampling::Lanczos,
+                KernelWord::Average => Resampling::Average,
+            }),
+            memory_mib: Some(self.memory),
+            scratch: Some(folder.unwrap_or(Path::new(".")).to_owned()),
+            ..OpenOptions::default()
         }
     }
 }
@@ -107,11 +197,13 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let pool = pool.build().context("cannot start the threads; give fewer with --threads")?;
     let start = Instant::now();
-    let header = pool.install(|| {
-        let dem = terrasoar_import::open(&args.inputs)?;
-        build(&*dem, &args.output, &args.options(), &Meter::new("samples"))
+    let (header, warnings) = pool.install(|| {
+        let dem = terrasoar_import::open_with(&args.inputs, &args.opening())?;
+        let built = build(&*dem, &args.output, &args.options(), &Meter::new("samples"));
+        built.map(|header| (header, dem.warnings()))
     })?;
     let seconds = start.elapsed().as_secs_f64();
+    warnings.iter().for_each(|warning| complain(&remedy::warned(warning)));
     warn_about_spacing(&header);
     print(&summary(&args.output, &header, seconds))
 }

@@ -41,6 +41,17 @@ struct Info {
     nodata_samples: u64,
     crs: Option<String>,
     epsg: Option<u32>,
+    /// The system in full: WKT or a PROJ string.
+    crs_wkt: Option<String>,
+    horizontal_unit: Option<String>,
+    /// What heights are measured from.
+    vertical_crs: Option<String>,
+    vertical_epsg: Option<u32>,
+    /// Unit in which the DEM gives heights; those here are metres.
+    vertical_unit: Option<String>,
+    /// What was found where.
+    origins: Vec<[String; 2]>,
+    warnings: Vec<String>,
     /// Samples east and north of the south-west one to coordinates: x = m0 + m1 x + m2 y, y = m3 + m4 x + m5 y.
     sample_to_crs: Option<[f64; 6]>,
     record: &'static str,
@@ -121,6 +132,13 @@ impl Info {
             nodata_samples: header.nodata_samples,
             crs: terrain::crs(header),
             epsg: header.epsg,
+            crs_wkt: Some(header.about.crs_text.clone()).filter(|text| !text.is_empty()),
+            horizontal_unit: terrain::horizontal_unit(header),
+            vertical_crs: Some(header.about.vertical_name.clone()).filter(|name| !name.is_empty()),
+            vertical_epsg: header.about.vertical_epsg,
+            vertical_unit: header.about.vertical_unit.as_ref().map(terrain::unit),
+            origins: header.about.origins.iter().map(|(what, words)| [what.clone(), words.clone()]).collect(),
+            warnings: header.about.warnings.clone(),
             sample_to_crs: header.sample_to_crs,
             record: header.record_kind.name(),
             record_bytes: header.record_kind.bytes(),
@@ -155,6 +173,8 @@ impl Info {
             ("height step", format!("{} m{rounded}", decimal(self.height_step_m, 6))),
             ("no data", format!("{} samples", grouped(self.nodata_samples))),
             ("reference system", self.crs.clone().unwrap_or_else(|| "unknown".into())),
+            ("coordinates in", self.horizontal_unit.clone().unwrap_or_else(|| "unknown units".into())),
+            ("heights were in", self.vertical_unit.clone().unwrap_or_else(|| "metres, or so assumed".into())),
             ("records", format!("{}, {} bytes each", self.record, self.record_bytes)),
             ("error", self.error.to_owned()),
             ("pages", format!("{} of {} stored", grouped(self.pages), grouped(self.logical_pages))),
@@ -194,6 +214,12 @@ impl Info {
                 ),
             ]);
         }
+        if let Some(vertical) = &self.vertical_crs {
+            let code = self.vertical_epsg.map(|code| format!(" (EPSG:{code})")).unwrap_or_default();
+            rows.push(("heights above", format!("{vertical}{code}")));
+        }
+        rows.extend(self.origins.iter().map(|[what, words]| ("found", format!("{what}: {words}"))));
+        rows.extend(self.warnings.iter().map(|words| ("warning", words.clone())));
         if self.unused_bytes > 0 {
             rows.push(("unused", format!("{} bytes that nothing leads to", grouped(self.unused_bytes))));
         }

@@ -19,6 +19,20 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("it must be above 0".into()) })
 }
 
+/// A number other than 0.
+pub(super) fn not_zero(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v != 0.0 { Ok(v) } else { Err("it must not be 0".into()) })
+}
+
+/// A number in any notation, or nan, kept as it was typed: what it is depends on the type of the samples.
+pub(super) fn raw_value(text: &str) -> Result<String, String> {
+    let text = text.trim();
+    if text.eq_ignore_ascii_case("nan") || text.parse::<f64>().is_ok_and(f64::is_finite) {
+        return Ok(text.to_owned());
+    }
+    Err(format!("`{text}` is neither a number nor nan"))
+}
+
 /// A number that is 0 or more.
 pub(super) fn not_negative(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("it must not be negative".into()) })

@@ -6,6 +6,7 @@
 use super::{Typed, message};
 use clap::CommandFactory;
 use terrasoar_lab::iobench::IoBenchError;
+use terrasoar_layout::dem::Warning;
 use terrasoar_layout::{LayoutError, Remedy};
 
 /// The error's words, and the flag that would mend it in brackets.
@@ -22,6 +23,19 @@ fn remedy_of(cause: &(dyn std::error::Error + 'static)) -> Option<Remedy> {
     of_layout.or_else(|| cause.downcast_ref::<IoBenchError>().and_then(IoBenchError::remedy))
 }
 
+/// A warning's words, and what to type against it in brackets.
+pub(super) fn warned(warning: &Warning) -> String {
+    let typed = warning.mended_by.as_ref().and_then(|(remedy, value)| {
+        let typed = flag(*remedy, &flags_of_this_verb())?;
+        let name = typed.split(' ').next()?.to_owned();
+        Some(if value.is_empty() { typed } else { format!("{name} {value}") })
+    });
+    match typed {
+        Some(typed) => format!("warning: {} ({typed})", warning.words),
+        None => format!("warning: {}", warning.words),
+    }
+}
+
 /// What to type for a remedy, if it is one of the flags `known`.
 fn flag(remedy: Remedy, known: &[String]) -> Option<String> {
     let (name, value) = match remedy {
@@ -35,6 +49,14 @@ fn flag(remedy: Remedy, known: &[String]) -> Option<String> {
         Remedy::TileFormat => ("format", "FORMAT".into()),
         Remedy::Overlay => ("overlay", "FILE.iqo".into()),
         Remedy::ScratchFolder => ("scratch", "FOLDER".into()),
+        Remedy::HeightUnit => ("height-unit", "UNIT".into()),
+        Remedy::Direction => ("positive", "down".into()),
+        Remedy::Band => ("band", "BAND".into()),
+        Remedy::Decode => ("decode", "PACKING".into()),
+        Remedy::ReferenceSystem => ("crs", "SYSTEM".into()),
+        Remedy::RawShape => ("raw", "SHAPE".into()),
+        Remedy::Reproject => ("reproject", "SYSTEM".into()),
+        Remedy::Resolution => ("resolution", "M".into()),
         // One that this program does not know yet has no flag either.
         _ => return None,
     };
@@ -73,6 +95,14 @@ mod tests {
             ("build", Remedy::Spacing, "--spacing M"),
             ("build", Remedy::Nodata, "--nodata VALUE"),
             ("build", Remedy::HeightFactor, "--z-scale S"),
+            ("build", Remedy::HeightUnit, "--height-unit UNIT"),
+            ("build", Remedy::Direction, "--positive down"),
+            ("build", Remedy::Band, "--band BAND"),
+            ("build", Remedy::Decode, "--decode PACKING"),
+            ("build", Remedy::ReferenceSystem, "--crs SYSTEM"),
+            ("build", Remedy::RawShape, "--raw SHAPE"),
+            ("build", Remedy::Reproject, "--reproject SYSTEM"),
+            ("build", Remedy::Resolution, "--resolution M"),
             ("build", Remedy::Memory { enough_mib: Some(470) }, "--memory 470"),
             ("drape", Remedy::Memory { enough_mib: None }, "--memory MIB"),
             ("drape", Remedy::Image, "--image IMG"),

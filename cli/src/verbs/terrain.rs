@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use std::path::{Path, PathBuf};
+use terrasoar_layout::dem::{HorizontalUnit, UnitOf};
 use terrasoar_layout::file::header::{Header, SpacingOrigin};
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -62,6 +63,29 @@ pub(super) fn spacing_origin(header: &Header) -> String {
 pub(super) fn spacing(header: &Header) -> String {
     let [east, north] = header.grid.spacing_m().map(|m| decimal(m, 4));
     if east == north { format!("{east} m") } else { format!("{east} x {north} m") }
+}
+
+/// A unit with its size: "US survey foot (0.30480061 m)".
+pub(super) fn unit(unit: &UnitOf) -> String {
+    let name = if unit.name.is_empty() { "unit" } else { unit.name.as_str() };
+    let is_plain = if unit.is_angle { unit.size == 1f64.to_radians() } else { unit.size == 1.0 };
+    match (is_plain, unit.is_angle) {
+        (true, _) => name.to_owned(),
+        (false, true) => format!("{name} ({} degrees)", decimal(unit.size.to_degrees(), 8)),
+        (false, false) => format!("{name} ({} m)", decimal(unit.size, 8)),
+    }
+}
+
+/// The unit of coordinates, if known.
+pub(super) fn horizontal_unit(header: &Header) -> Option<String> {
+    let by_code = match header.crs_unit {
+        HorizontalUnit::Unknown => None,
+        HorizontalUnit::Metre => Some("metre"),
+        HorizontalUnit::Degree => Some("degree"),
+        HorizontalUnit::Foot => Some("foot (0.3048 m)"),
+        HorizontalUnit::UsSurveyFoot => Some("US survey foot (0.30480061 m)"),
+    };
+    header.about.horizontal_unit.as_ref().map(unit).or_else(|| by_code.map(str::to_owned))
 }
 
 /// Name and code of the reference system, if known.

@@ -1,26 +1,59 @@
-//! Reference systems: from what a file says to units, names and codes.
+//! Reference systems: from what a file says to units, names, codes, and the ground.
+//!
+//! [`resolve`] turns statements into a [`System`]; [`Ground`] brings coordinates of one to longitude and latitude and back.
 
-use crate::reader::{CrsSaid, HorizontalSize};
+mod from_proj;
+mod from_wkt;
+mod ground;
+mod keywords;
+mod registry;
+mod resolve;
+mod system;
+mod wkt;
+
+pub(crate) use from_proj::unit_name as unit_in_words;
+pub(crate) use ground::{Ground, is_earth};
+pub(crate) use keywords::Keywords;
+pub(crate) use registry::unit as unit_of_code;
+pub(crate) use resolve::by_text;
+pub(crate) use resolve::resolve;
+pub(crate) use system::{Kind, System, Unit, exact_metres};
+
+use crate::reader::CrsSaid;
+pub(crate) use crate::reader::HorizontalSize;
 use crate::value::US_SURVEY_FOOT_M;
 use terrasoar_layout::dem::{Georeference, HorizontalUnit};
 
-/// Semi-major axes of the Earth's ellipsoids in use, with room to spare.
-const EARTH_RADII_M: std::ops::RangeInclusive<f64> = 6_370_000.0..=6_385_000.0;
+/// Longest text of a system that is read.
+pub(crate) const MAX_TEXT_BYTES: u64 = wkt::MAX_BYTES as u64;
+/// Longest name kept.
+const MAX_NAME_CHARS: usize = 200;
 
-/// The georeference that is kept of a place and a system.
-pub(crate) fn georeference(said: &CrsSaid, place: Option<[f64; 6]>) -> Georeference {
-    let unit = match said.unit.as_ref().map(|unit| unit.value) {
-        Some(HorizontalSize::Radians(_)) => HorizontalUnit::Degree,
+/// The unit by which terrain files know it.
+pub(crate) fn horizontal_unit(system: &System) -> HorizontalUnit {
+    match system.unit.as_ref().map(|unit| unit.size) {
+        Some(HorizontalSize::Radians(size)) if size == 1f64.to_radians() => HorizontalUnit::Degree,
         Some(HorizontalSize::Metres(1.0)) => HorizontalUnit::Metre,
         Some(HorizontalSize::Metres(0.3048)) => HorizontalUnit::Foot,
         Some(HorizontalSize::Metres(US_SURVEY_FOOT_M)) => HorizontalUnit::UsSurveyFoot,
         _ => HorizontalUnit::Unknown,
-    };
-    Georeference {
-        epsg: said.code.as_ref().map(|code| code.value),
-        crs_name: said.name.clone(),
-        unit,
-        pixel_to_crs: place,
-        body_radius_m: said.radius_m.filter(|radius| !EARTH_RADII_M.contains(radius)),
     }
+}
+
+/// The georeference of a map in a system, without a spacing.
+pub(crate) fn georeference(system: &System, map: Option<[f64; 6]>) -> Georeference {
+    Georeference {
+        epsg: system.code,
+        crs_name: terrasoar_layout::words::harmless(&system.name, MAX_NAME_CHARS),
+        unit: horizontal_unit(system),
+        pixel_to_crs: map,
+        body_radius_m: system.radius_m.filter(|radius| !is_earth(*radius)),
+        ..Georeference::default()
+    }
+}
+
+/// The georeference of a picture.
+pub(crate) fn of_picture(said: &CrsSaid, map: Option<[f64; 6]>) -> Georeference {
+    let system = resolve(said, None, &mut Vec::new()).unwrap_or_else(|_| System::unknown());
+    georeference(&system, map)
 }

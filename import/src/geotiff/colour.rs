@@ -9,7 +9,7 @@
 use super::colour_table::{Packing, Paint, Table};
 use super::span::turn_bits;
 use super::{codec, geokeys, predictor, tags};
-use crate::crs::georeference;
+use crate::crs::of_picture;
 use crate::guard::guard;
 use crate::input;
 use crate::jpeg_frame::JpegFrame;
@@ -42,7 +42,7 @@ impl TiffImage {
         let directory = file.first_full_image()?;
         let table = Table::read(&mut file, &directory)?;
         let place = geokeys::read(&mut file, &directory)?;
-        let georeference = georeference(&place.crs, place.map);
+        let georeference = of_picture(&place.crs, place.map);
         let info = ImageInfo {
             texels: [table.grid.width, table.grid.height],
             georeference,

@@ -5,10 +5,14 @@
 //! returned starts at sample centres either way. Keys name the reference system. What is missing or
 //! contradictory leaves the field empty: a DEM without a place can still be flown over.
 
+use super::projection;
 use super::tags::{self, Directory, TiffFile};
+use crate::crs::unit_of_code;
 use crate::reader::{CrsSaid, Declared, HorizontalSize, Said, VerticalUnit};
+use terrasoar_layout::dem::Warning;
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::words::harmless;
+use terrasoar_layout::remedy::Remedy;
+use terrasoar_layout::words::{harmless, number};
 
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
@@ -41,6 +45,8 @@ pub(super) struct Place {
     pub(super) crs: CrsSaid,
     /// EPSG's code of the vertical unit.
     pub(super) vertical_unit: Option<u16>,
+    /// Scale and offset of heights that the tags of the place give.
+    pub(super) scale_z: Option<[f64; 2]>,
 }
 
 /// Reads tags and keys.
@@ -50,7 +56,17 @@ pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<Place, 
         map: transform(file, directory, keys.short(RASTER_TYPE) == Some(2))?,
         crs: system(&keys),
         vertical_unit: keys.short(VERTICAL_UNITS).filter(|code| !matches!(code, 0 | 32767)),
+        scale_z: scale_z(file, directory)?,
     })
+}
+
+/// What the tags of the place say of heights, where it is not what all writers put there.
+fn scale_z(file: &mut TiffFile, directory: &Directory) -> Result<Option<[f64; 2]>, LayoutError> {
+    let scale = file.reals(directory, tags::MODEL_PIXEL_SCALE, 3)?.and_then(|scale| scale.get(2).copied());
+    let tie = file.reals(directory, tags::MODEL_TIEPOINT, 6)?.and_then(|tie| tie.get(5).copied());
+    let (scale, offset) = (scale.unwrap_or(0.0), tie.unwrap_or(0.0));
+    let is_usual = (scale == 0.0 || scale == 1.0) && offset == 0.0;
+    Ok((!is_usual && scale.is_finite() && offset.is_finite()).then_some([scale, offset]))
 }
 
 impl Place {
@@ -58,9 +74,43 @@ impl Place {
     pub(super) fn declare(self, declared: &mut Declared) {
         declared.place = self.map.map(|map| Said::new(map, "the GeoTIFF tags"));
         declared.crs = self.crs;
+        if let Some([scale, offset]) = self.scale_z {
+            let words = format!(
+                "the tags of its place give heights a scale of {} and an offset of {}, which GDAL and others pass over, and so was done here",
+                number(scale),
+                number(offset)
+            );
+            declared.warnings.push(match scale {
+                0.0 => Warning::new(words),
+                _ => Warning::new(words).mended_by(Remedy::HeightFactor, number(scale)),
+            });
+        }
         declared.value.unit =
             self.vertical_unit.map(|code| Said::new(VerticalUnit::Code(code.into()), "key VerticalUnits"));
     }
+}
+
+/// ESRI's text in a citation: "ESRI PE String = PROJCS[...]".
+fn esri_text(citation: &str) -> Option<String> {
+    let (_, text) = citation.split_once("ESRI PE String")?;
+    let text = text.trim_start_matches([' ', '=']).trim_end_matches(['|', '\0']).trim();
+    text.contains('[').then(|| text.to_owned())
+}
+
+/// The name in a citation that says more: "PCS Name = x|Unit = y", "x|ESRI PE String = ...", ESRI's lists of facts.
+fn short_name(citation: &str) -> String {
+    let parts = citation.split('|').map(str::trim).filter(|part| !part.is_empty());
+    let mut named = None;
+    let mut first = None;
+    for part in parts {
+        match part.split_once('=') {
+            Some((key, value)) if key.trim().ends_with("Name") => named = named.or(Some(value.trim())),
+            Some(_) => {}
+            None => first = first.or(Some(part)),
+        }
+    }
+    let name = named.or(first).unwrap_or("");
+    if name.eq_ignore_ascii_case("unknown") { String::new() } else { name.to_owned() }
 }
 
 /// What the keys say of the reference system.
@@ -72,7 +122,7 @@ fn system(keys: &Keys) -> CrsSaid {
         (None, Some(_)) => 2,
         (None, None) => 0,
     });
-    let (code, by) = match model {
+    let (code, code_by) = match model {
         1 => (projected, "key ProjectedCSType"),
         2 => (geographic, "key GeographicType"),
         _ => (None, ""),
@@ -83,56 +133,49 @@ fn system(keys: &Keys) -> CrsSaid {
         [PROJECTED_CITATION, CITATION, GEOGRAPHIC_CITATION]
     };
     let size = |key| keys.real(key).filter(|size| size.is_finite() && *size > 0.0);
-    let unit = match model {
-        2 => match keys.short(ANGULAR_UNITS) {
-            Some(32767) => size(ANGULAR_UNIT_SIZE)
-                .map(|size| Said::new(HorizontalSize::Radians(size), "key GeogAngularUnitSize")),
-            Some(code) => {
-                angular(code).map(|size| Said::new(HorizontalSize::Radians(size), "key GeogAngularUnits"))
-            }
-            None => None,
-        },
-        _ => match keys.short(LINEAR_UNITS) {
-            Some(32767) => size(LINEAR_UNIT_SIZE)
-                .map(|size| Said::new(HorizontalSize::Metres(size), "key ProjLinearUnitSize")),
-            Some(code) => {
-                linear(code).map(|size| Said::new(HorizontalSize::Metres(size), "key ProjLinearUnits"))
-            }
-            None => None,
-        },
+    let (code_key, size_key, is_angle) = match model {
+        2 => (ANGULAR_UNITS, ANGULAR_UNIT_SIZE, true),
+        _ => (LINEAR_UNITS, LINEAR_UNIT_SIZE, false),
     };
+    let by = if is_angle { "key GeogAngularUnits" } else { "key ProjLinearUnits" };
+    let unit = match keys.short(code_key) {
+        // A unit of the file's own has its size.
+        Some(32767) => size(size_key).map(|size| match is_angle {
+            true => HorizontalSize::Radians(size),
+            false => HorizontalSize::Metres(size),
+        }),
+        // GDAL's reading of the degree with minutes and seconds as digits is the plain degree.
+        Some(9108) if is_angle => Some(HorizontalSize::Radians(1f64.to_radians())),
+        Some(code) => unit_of_code(code.into())
+            .map(|(_, size)| size)
+            .filter(|size| matches!(size, HorizontalSize::Radians(_)) == is_angle),
+        None => None,
+    };
+    let citations = [CITATION, PROJECTED_CITATION, GEOGRAPHIC_CITATION];
+    let esri = citations.iter().find_map(|key| esri_text(&keys.whole_text(*key)?));
+    let own = || {
+        let metres = match unit {
+            Some(HorizontalSize::Metres(metres)) => metres,
+            _ => 1.0,
+        };
+        (model == 1).then(|| projection::proj(keys, metres)).flatten()
+    };
+    let text = match code {
+        Some(_) => None,
+        None => esri
+            .map(|text| Said::new(text, "ESRI's text in a citation"))
+            .or_else(|| own().map(|text| Said::new(text, "keys of the projection"))),
+    };
+    let name = names.iter().find_map(|key| keys.text(*key)).map(|name| short_name(&name)).unwrap_or_default();
     CrsSaid {
-        text: None,
-        code: code.map(|code| Said::new(code, by)),
+        text,
+        code: code.map(|code| Said::new(code, code_by)),
         vertical_code: keys.code(VERTICAL_TYPE).map(|code| Said::new(code, "key VerticalCSType")),
-        name: names.iter().find_map(|key| keys.text(*key)).unwrap_or_default(),
-        unit,
+        name,
+        unit: unit.map(|unit| Said::new(unit, by)),
         radius_m: size(SEMI_MAJOR_AXIS),
         is_local: false,
     }
-}
-
-/// Metres of EPSG's codes of units of length.
-fn linear(code: u16) -> Option<f64> {
-    Some(match code {
-        9001 => 1.0,
-        9002 => 0.3048,
-        9003 => 1200.0 / 3937.0,
-        9036 => 1000.0,
-        _ => return None,
-    })
-}
-
-/// Radians of EPSG's codes of angular units.
-fn angular(code: u16) -> Option<f64> {
-    Some(match code {
-        9101 => 1.0,
-        9102 => 1f64.to_radians(),
-        9103 => (1.0 / 60.0f64).to_radians(),
-        9104 => (1.0 / 3600.0f64).to_radians(),
-        9105 | 9106 => std::f64::consts::PI / 200.0,
-        _ => return None,
-    })
 }
 
 /// The map from sample centres to the ground.
@@ -160,7 +203,7 @@ fn transform(
 }
 
 /// The key directory: triples of a key, where its value is, and the value or its place there.
-struct Keys {
+pub(super) struct Keys {
     directory: Vec<u64>,
     reals: Vec<f64>,
     texts: String,
@@ -182,22 +225,28 @@ impl Keys {
         Some((entry[1], usize::try_from(entry[2]).ok()?, entry[3]))
     }
 
-    fn short(&self, key: u16) -> Option<u16> {
+    pub(super) fn short(&self, key: u16) -> Option<u16> {
         self.entry(key).filter(|entry| entry.0 == 0).and_then(|entry| u16::try_from(entry.2).ok())
     }
 
     /// A code of EPSG; 0 and 32767 stand for undefined and user-defined.
-    fn code(&self, key: u16) -> Option<u32> {
+    pub(super) fn code(&self, key: u16) -> Option<u32> {
         self.short(key).filter(|code| !matches!(code, 0 | 32767)).map(u32::from)
     }
 
-    fn real(&self, key: u16) -> Option<f64> {
+    pub(super) fn real(&self, key: u16) -> Option<f64> {
         let (tag, _, at) = self.entry(key)?;
         let at = usize::try_from(at).ok()?;
         (tag == u64::from(tags::GEO_DOUBLE_PARAMS)).then(|| self.reals.get(at).copied()).flatten()
     }
 
     fn text(&self, key: u16) -> Option<String> {
+        let shown = harmless(&self.whole_text(key)?, MAX_NAME_CHARS);
+        (!shown.is_empty()).then_some(shown)
+    }
+
+    /// A text in full, which may hold a whole reference system.
+    fn whole_text(&self, key: u16) -> Option<String> {
         let (tag, count, at) = self.entry(key)?;
         let at = usize::try_from(at).ok()?;
         if tag != u64::from(tags::GEO_ASCII_PARAMS) {
@@ -205,8 +254,6 @@ impl Keys {
         }
         let bytes = self.texts.as_bytes().get(at..at.checked_add(count)?.min(self.texts.len()))?;
         let text = String::from_utf8_lossy(bytes);
-        let text = text.trim_end_matches(['|', '\0']).trim();
-        let shown = harmless(text, MAX_NAME_CHARS);
-        (!shown.is_empty()).then_some(shown)
+        Some(text.trim_end_matches(['|', '\0']).trim().to_owned())
     }
 }

@@ -28,7 +28,6 @@ impl TiffFile {
     }
 
     /// The directory of the mask of an image of `size`, if there is one: 0 where the image has nothing to say, of one bit or one byte a sample.
-    #[allow(dead_code, reason = "what masks make void is decided behind the seam")]
     pub(super) fn mask_of(&mut self, [width, height]: [u32; 2]) -> Result<Option<Directory>, LayoutError> {
         self.find(&mut |file, directory, kind| {
             let size = [tags::IMAGE_WIDTH, tags::IMAGE_LENGTH].map(|tag| file.number(directory, tag));

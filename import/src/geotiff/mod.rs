@@ -10,7 +10,7 @@
 //! the memory of the terrain, and refuses files that state no lengths of chunks; tiff 0.11.3 refuses sound LZW tiles that GDAL writes and inverts "white is zero".
 //!
 //! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
-//! are not inverted for "white is zero" files. Masks in images of their own are not applied.
+//! are not inverted for "white is zero" files.
 
 mod bands;
 mod chunk_grid;
@@ -27,6 +27,7 @@ mod metadata;
 mod packed;
 mod planes;
 mod predictor;
+mod projection;
 mod raw;
 mod rows;
 mod span;
@@ -61,6 +62,56 @@ pub(super) struct TiffDem {
     chunks: Chunks,
     planes: Planes,
     convert: Convert,
+    mask: Option<TiffMask>,
+}
+
+/// An image of which 0 means that another has nothing to say there.
+#[derive(Debug)]
+pub(crate) struct TiffMask {
+    path: PathBuf,
+    declared: Declared,
+    chunks: Chunks,
+    convert: Convert,
+}
+
+impl TiffMask {
+    /// The first full-resolution image of a file beside the masked one.
+    pub(crate) fn open(path: &Path) -> Result<Self, LayoutError> {
+        let mut file = TiffFile::open(path)?;
+        let directory = file.first_full_image()?;
+        Self::of(&mut file, &directory)
+    }
+
+    fn of(file: &mut TiffFile, directory: &tags::Directory) -> Result<Self, LayoutError> {
+        let chunks = Chunks::read(file, directory)?;
+        let samples = [chunks.grid.width, chunks.grid.height];
+        let convert = Convert {
+            sample_type: chunks.sample_type,
+            odd: (!chunks.stored.is_plain()).then_some(chunks.stored),
+            big_endian: chunks.big_endian,
+            bands: chunks.side_by_side() as usize,
+            pick: Pick::Band(0),
+            alpha: None,
+            absent: 0.0,
+        };
+        let declared = Declared::new(samples, chunks.sample_type, "mask");
+        Ok(Self { path: file.path().to_owned(), declared, chunks, convert })
+    }
+}
+
+impl Reader for TiffMask {
+    fn declared(&self) -> &Declared {
+        &self.declared
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.chunks.memory_bytes(&Planes::one())
+    }
+
+    fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let stream = if self.chunks.is_raw() { raw::stream } else { packed::stream };
+        stream(&self.path, &self.chunks, &Planes::one(), &self.convert, sink)
+    }
 }
 
 impl TiffDem {
@@ -81,6 +132,7 @@ impl TiffDem {
             chunks.compression.name()
         );
         let mut declared = Declared::new(samples, sample_type, format);
+        declared.band_number = bands.described as u32 + 1;
         geokeys::read(&mut file, &directory)?.declare(&mut declared);
         metadata::heights(&xml, bands.described, &mut declared.value);
         let nodata = file.text(&directory, tags::GDAL_NODATA, MAX_NODATA_BYTES)?;
@@ -103,13 +155,21 @@ impl TiffDem {
             alpha,
             absent: if is_void { f64::NAN } else { 0.0 },
         };
-        Ok(Self { path: path.to_owned(), declared, chunks, planes, convert })
+        let mask = match file.mask_of(samples)? {
+            Some(directory) => Some(TiffMask::of(&mut file, &directory)?),
+            None => None,
+        };
+        Ok(Self { path: path.to_owned(), declared, chunks, planes, convert, mask })
     }
 }
 
 impl Reader for TiffDem {
     fn declared(&self) -> &Declared {
         &self.declared
+    }
+
+    fn mask(&self) -> Option<&dyn Reader> {
+        self.mask.as_ref().map(|mask| mask as &dyn Reader)
     }
 
     fn memory_bytes(&self) -> u64 {

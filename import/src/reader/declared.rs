@@ -29,6 +29,8 @@ pub(crate) struct Declared {
     pub(crate) sample_type: SampleType,
     /// Name of the format in words, for messages: "16-bit PNG".
     pub(crate) format: String,
+    /// Which of the file's bands this is, counted from 1; for what stands beside the file.
+    pub(crate) band_number: u32,
     /// Affine map from *sample centres* (column, row, both counted from 0 in the order of the file) to coordinates of the reference system:
     /// `x = m[0] + m[1]*col + m[2]*row`, `y = m[3] + m[4]*col + m[5]*row`, x east (or longitude), y north (or latitude). Any signs, any turn.
     pub(crate) place: Option<Said<[f64; 6]>>,
@@ -49,6 +51,7 @@ impl Declared {
             samples,
             sample_type,
             format: format.into(),
+            band_number: 1,
             place: None,
             crs: CrsSaid::default(),
             value: ValueSaid::default(),

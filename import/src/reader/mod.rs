@@ -16,6 +16,11 @@ pub(crate) trait Reader: Send + Sync {
     /// What the file says.
     fn declared(&self) -> &Declared;
 
+    /// A mask of the same columns and rows, of which 0 means that the sample is void.
+    fn mask(&self) -> Option<&dyn Reader> {
+        None
+    }
+
     /// Memory in bytes that [`stream`](Reader::stream) takes beyond a megabyte or two a thread.
     fn memory_bytes(&self) -> u64 {
         0

@@ -51,12 +51,15 @@ use writer::{PageWriter, PlacedPages, page_queue, write_pages};
 /// Longest text in a header; it has room for 254 bytes.
 const MAX_TEXT_CHARS: usize = 254;
 
+/// Longest warning that is kept.
+const MAX_WARNING_CHARS: usize = 500;
+
 /// What to build.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuildOptions {
     /// Spacing in metres (east, north) instead of what the DEM says.
     pub spacing_m: Option<[f64; 2]>,
-    /// Factor on all heights; the default is 1.
+    /// Factor on all heights, below 0 where raw numbers are depths; the default is 1.
     pub z_scale: f64,
     /// Memory budget in MiB; at least 48.
     pub memory_mib: u64,
@@ -110,9 +113,9 @@ pub fn build_on(
     progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
     let info = dem.info();
-    if !(options.z_scale.is_finite() && options.z_scale > 0.0) {
+    if !(options.z_scale.is_finite() && options.z_scale != 0.0) {
         return Err(LayoutError::Usage(format!(
-            "the factor on heights is a positive number, not {}",
+            "the factor on heights is a number other than 0, not {}",
             number(options.z_scale)
         ))
         .mended_by(Remedy::HeightFactor));
@@ -131,6 +134,10 @@ pub fn build_on(
     progress.stage("reading", samples);
     let spool = Spool::new(disk, info, options.nodata, out, memory.spool_bytes, &advance)?;
     dem.stream(&spool)?;
+    header
+        .about
+        .warnings
+        .extend(dem.warnings().into_iter().map(|warning| harmless(&warning.words, MAX_WARNING_CHARS)));
     let stats = spool.stats();
     if stats.voids == samples {
         return Err(LayoutError::Usage("the elevation model has no heights: every sample is void".into()));
@@ -165,7 +172,7 @@ fn first_header(
 ) -> Header {
     let info = dem.info();
     let is_whole = info.sample_type.is_integer();
-    let height_step_m = if is_whole { info.height_scale * options.z_scale } else { 1.0 };
+    let height_step_m = if is_whole { (info.height_scale * options.z_scale).abs() } else { 1.0 };
     Header {
         grid,
         record_kind: RecordKind::Compact,
@@ -194,6 +201,7 @@ fn first_header(
         body_radius_m: info.georeference.body_radius_m.filter(|radius| *radius != 0.0),
         crs_name: harmless(&info.georeference.crs_name, MAX_TEXT_CHARS),
         source: harmless(&info.format, MAX_TEXT_CHARS),
+        about: info.about.clone(),
     }
 }
 
@@ -243,7 +251,8 @@ impl Work<'_> {
         let grid = header.grid;
         let [wide, high] = grid.samples();
         let plan = plan::Plan::new(&grid, header.records_per_page())?;
-        let lowest = self.code.code(self.spool.stats().range[0]);
+        let ends = self.spool.stats().range.map(|raw| self.code.code(raw));
+        let lowest = ends[0].min(ends[1]);
         let mut state = State {
             grid,
             tile: self.tile,

@@ -5,7 +5,7 @@
 use super::spool::Spool;
 use super::survey::HeightCode;
 use super::{BuildOptions, MemoryPlan, Work};
-use crate::dem::{DemInfo, DemSource, Georeference, SampleSink, SampleType, Window};
+use crate::dem::{About, DemInfo, DemSource, Georeference, SampleSink, SampleType, Window};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::disk::Disk;
@@ -125,6 +125,7 @@ fn rebuild_kind<C: RecordCodec>(
         height_offset_m: old.scale.height_base_m,
         georeference: Georeference::default(),
         format: old.source.clone(),
+        about: About::default(),
     };
     let samples = u64::from(wide) * u64::from(high);
     let options = BuildOptions { memory_mib, ..BuildOptions::default() };

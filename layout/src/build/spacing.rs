@@ -20,6 +20,12 @@ pub(super) fn resolve(
         return Ok((spacing, SpacingOrigin::User));
     }
     let reference = &info.georeference;
+    if let Some(spacing) = reference.spacing_m {
+        let origin = reference
+            .centre_latitude_deg
+            .map(|centre_latitude_deg| SpacingOrigin::Degrees { centre_latitude_deg });
+        return Ok((spacing, origin.unwrap_or(SpacingOrigin::Dem)));
+    }
     let Some(map) = reference.pixel_to_crs else { return Ok(([1.0; 2], SpacingOrigin::Assumed)) };
     let step = [map[1].hypot(map[4]), map[2].hypot(map[5])];
     let metres = |unit_m: f64| Ok((step.map(|s| s * unit_m), SpacingOrigin::Dem));
@@ -100,6 +106,7 @@ mod tests {
             height_offset_m: 0.0,
             georeference: Georeference { unit, pixel_to_crs: Some(map), ..Default::default() },
             format: String::new(),
+            about: Default::default(),
         }
     }
 

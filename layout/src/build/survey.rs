@@ -53,6 +53,13 @@ impl HeightCode {
             (None, None) => (exact_kind, 0.0, 1.0, false),
         };
         let scale_m = info.height_scale * z_scale;
+        // Where raw numbers count downward, codes are counted from the other end, and go up as heights do.
+        let (raw_base, raw_step) = match (scale_m < 0.0, kind) {
+            (false, _) => (raw_base, raw_step),
+            (true, RecordKind::Compact) if rounds => (high, -raw_step),
+            (true, RecordKind::Compact) => ((high / raw_step).round() * raw_step, -raw_step),
+            (true, _) => (0.0, -1.0),
+        };
         Self {
             kind,
             raw_base,
@@ -68,8 +75,8 @@ impl HeightCode {
     pub(super) fn code(&self, raw: f64) -> f64 {
         match self.kind {
             RecordKind::Compact => round_whole((raw - self.raw_base) / self.raw_step),
-            RecordKind::Exact8 => f64::from(raw as f32),
-            RecordKind::Exact16 => raw,
+            RecordKind::Exact8 => f64::from((raw * self.raw_step) as f32),
+            RecordKind::Exact16 => raw * self.raw_step,
         }
     }
 
@@ -86,6 +93,7 @@ pub(super) fn check_heights(
     stats: &SampleStats,
 ) -> Result<[f64; 2], LayoutError> {
     let range_m = stats.range.map(|raw| code.metres(code.code(raw)));
+    let range_m = if code.raw_step < 0.0 { [range_m[1], range_m[0]] } else { range_m };
     if range_m.iter().any(|h| h.is_nan() || h.abs() > 1e9) || code.step_m.is_nan() || code.step_m <= 0.0 {
         let [low, high] = stats.range.map(number);
         let (hint, remedy) = if !info.sample_type.is_integer() {

@@ -2,11 +2,12 @@
 //!
 //! Invariant: a [`Header`] that [`Header::parse`] returned has every field in range and consistent with the others.
 
+mod about;
 mod fields;
 mod numbers;
 
 use super::bytes::{PAGE_BYTES, Page, checksum, get_u16, put_f64, put_text, put_u16, put_u32, put_u64};
-use crate::dem::HorizontalUnit;
+use crate::dem::{About, HorizontalUnit};
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::grid::order::slot_count;
@@ -128,6 +129,8 @@ pub struct Header {
     pub crs_name: String,
     /// Format of the DEM.
     pub source: String,
+    /// What else is kept of it in words.
+    pub about: About,
 }
 
 impl Header {
@@ -152,7 +155,11 @@ impl Header {
         let p = &mut page[..];
         p[..8].copy_from_slice(&MAGIC);
         put_u16(p, 0x008, 1);
-        let minor = if self.history.is_some() { 2 } else { u16::from(self.imagery.is_some()) };
+        let minor = match (self.about.is_empty(), &self.history, self.imagery) {
+            (false, ..) => 3,
+            (true, Some(_), _) => 2,
+            (true, None, imagery) => u16::from(imagery.is_some()),
+        };
         put_u16(p, 0x00a, minor);
         put_u32(p, 0x00c, PAGE_BYTES as u32);
         p[0x010] = self.grid.k() as u8;
@@ -211,6 +218,7 @@ impl Header {
         put_u32(p, 0x0ec, self.history.map_or(0, |history| history.tip_page));
         put_text(p, 0x200, &self.crs_name);
         put_text(p, 0x300, &self.source);
+        about::put(p, &self.about);
         seal(&mut page);
         page
     }

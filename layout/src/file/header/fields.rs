@@ -2,6 +2,7 @@
 //!
 //! Invariant: no field is believed before the checksum holds, and none that contradicts another.
 
+use super::about;
 use super::{ErrorKind, Header, History, INERT_PAGE, ImageryPlace, SpacingOrigin};
 use crate::dem::HorizontalUnit;
 use crate::error::LayoutError;
@@ -165,6 +166,7 @@ impl Fields<'_> {
             body_radius_m: Some(get_f64(p, 0x0e0)).filter(|r| *r != 0.0),
             crs_name: self.text(0x200, "crs_name")?,
             source: self.text(0x300, "source")?,
+            about: about::get(p).ok_or_else(|| self.damaged("the field about is not what it should be"))?,
         })
     }
 

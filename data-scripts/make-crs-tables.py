@@ -1,0 +1,58 @@
+#!/usr/bin/env python3
+"""Makes import/src/crs/registry/*.txt: systems of the EPSG dataset that crate crs-definitions lacks, from PROJ's copy of it.
+
+Needs PROJ's proj.db and gdalsrsinfo. Usage: make-crs-tables.py PROJ_DB CRS_DEFINITIONS_DEFS_RS FOLDER
+"""
+import re
+import sqlite3
+import subprocess
+import sys
+
+proj_db, defs, folder = sys.argv[1:]
+known = {int(code) for code in re.findall(r"^EPSG_(\d+)\|", open(defs).read(), re.M)}
+db = sqlite3.connect(proj_db)
+
+
+def write(name, head, lines):
+    with open(f"{folder}/{name}", "w") as out:
+        out.write(head + "\n")
+        out.writelines(line + "\n" for line in lines)
+
+
+axis = (
+    "join axis a on a.coordinate_system_auth_name = v.coordinate_system_auth_name "
+    "and a.coordinate_system_code = v.coordinate_system_code "
+    "join unit_of_measure u on u.auth_name = a.uom_auth_name and u.code = a.uom_code "
+)
+rows = db.execute(
+    f"select v.code, v.name, u.name, u.conv_factor, a.orientation from vertical_crs v {axis} where v.auth_name = 'EPSG' order by cast(v.code as int)"
+)
+write("vertical.txt", "# code|name|unit|metres|direction", [f"{c}|{n}|{u}|{repr(f)}|{o}" for c, n, u, f, o in rows])
+
+rows = db.execute(
+    "select code, horiz_crs_code, vertical_crs_code, name from compound_crs "
+    "where auth_name = 'EPSG' and horiz_crs_auth_name = 'EPSG' and vertical_crs_auth_name = 'EPSG' order by cast(code as int)"
+)
+write("compound.txt", "# code|horizontal|vertical|name", ["|".join(map(str, row)) for row in rows])
+
+rows = db.execute(
+    "select code, name, type, conv_factor from unit_of_measure where auth_name = 'EPSG' and type in ('length', 'angle') "
+    "and conv_factor > 0 order by cast(code as int)"
+)
+write("units.txt", "# code|name|type|metres or radians", [f"{c}|{n}|{t}|{repr(f)}" for c, n, t, f in rows])
+
+lines = []
+systems = list(db.execute("select code, name, 'p' from projected_crs where auth_name = 'EPSG'")) + list(
+    db.execute("select code, name, 'g' from geodetic_crs where auth_name = 'EPSG' and type <> 'geocentric'")
+)
+for code, name, kind in sorted(systems, key=lambda row: int(row[0])):
+    if int(code) in known:
+        continue
+    said = subprocess.run(["gdalsrsinfo", "-o", "proj4", f"EPSG:{code}"], capture_output=True, text=True)
+    proj = said.stdout.strip()
+    wkt = subprocess.run(["gdalsrsinfo", "-o", "wkt2", "--single-line", f"EPSG:{code}"], capture_output=True, text=True).stdout
+    word = "LENGTHUNIT" if kind == "p" else "ANGLEUNIT"
+    units = re.findall(word + r'\["([^"]*)",([0-9.eE+-]+)', wkt)
+    if units:
+        lines.append(f"{code}|{name}|{kind}|{units[-1][0]}|{units[-1][1]}|{proj}")
+write("missing.txt", "# code|name|kind|unit|metres or radians|PROJ string", lines)

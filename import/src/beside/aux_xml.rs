@@ -1,0 +1,114 @@
+//! GDAL's `.aux.xml` beside a file (PAM): place, reference system, and for each band "no data", scale, offset, unit and name.
+//!
+//! The text is read by crate `roxmltree`; what is no such text says nothing. Cost: one pass.
+
+use crate::reader::{Declared, Said, VerticalUnit};
+use roxmltree::{Document, Node};
+
+/// Longest text read; histograms of many bands take some hundred KB.
+pub(super) const MAX_BYTES: u64 = 8 << 20;
+
+/// What is said of one band.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Band {
+    nodata: Option<String>,
+    scale: Option<f64>,
+    offset: Option<f64>,
+    unit: Option<String>,
+}
+
+/// What the file says.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Aux {
+    /// From corners of samples to coordinates.
+    corners: Option<[f64; 6]>,
+    system: Option<String>,
+    bands: Vec<(u32, Band)>,
+}
+
+fn text_of(node: Node<'_, '_>, name: &str) -> Option<String> {
+    let found = node.children().find(|child| child.has_tag_name(name))?;
+    found.text().map(|text| text.trim().to_owned()).filter(|text| !text.is_empty())
+}
+
+fn number_of(node: Node<'_, '_>, name: &str) -> Option<f64> {
+    text_of(node, name)?.parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+impl Aux {
+    /// Reads the text.
+    pub(super) fn parse(text: &str) -> Self {
+        let Ok(document) = Document::parse(text.trim_start_matches('\u{feff}')) else {
+            return Self::default();
+        };
+        let root = document.root_element();
+        if !root.has_tag_name("PAMDataset") {
+            return Self::default();
+        }
+        let corners = text_of(root, "GeoTransform").and_then(|text| {
+            let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
+            let map = <[f64; 6]>::try_from(numbers?).ok()?;
+            (map.iter().all(|value| value.is_finite()) && map[1] * map[5] != map[2] * map[4]).then_some(map)
+        });
+        let bands = root.children().filter(|child| child.has_tag_name("PAMRasterBand")).map(|band| {
+            let number = band.attribute("band").and_then(|number| number.parse().ok()).unwrap_or(1);
+            let said = Band {
+                nodata: text_of(band, "NoDataValue"),
+                scale: number_of(band, "Scale").filter(|scale| *scale != 0.0),
+                offset: number_of(band, "Offset"),
+                unit: text_of(band, "UnitType"),
+            };
+            (number, said)
+        });
+        Self { corners, system: text_of(root, "SRS"), bands: bands.collect() }
+    }
+
+    /// Adds it to what the file itself says, and wins.
+    pub(super) fn apply(self, name: &str, declared: &mut Declared) {
+        if let Some([x, a, b, y, d, e]) = self.corners {
+            declared.place = Some(Said::new([x + 0.5 * (a + b), a, b, y + 0.5 * (d + e), d, e], name));
+        }
+        if let Some(system) = self.system {
+            declared.crs.text = Some(Said::new(system, name));
+            declared.crs.code = None;
+            declared.crs.vertical_code = None;
+            declared.crs.unit = None;
+        }
+        let wanted = declared.band_number;
+        let Some((_, band)) = self.bands.into_iter().find(|(number, _)| *number == wanted) else { return };
+        let value = &mut declared.value;
+        if let Some(text) = band.nodata {
+            value.nodata = vec![Said::new(text, name)];
+        }
+        if let Some(scale) = band.scale {
+            value.scale = Some(Said::new(scale, name));
+        }
+        if let Some(offset) = band.offset {
+            value.offset = Some(Said::new(offset, name));
+        }
+        if let Some(unit) = band.unit {
+            value.unit = Some(Said::new(VerticalUnit::Name(unit), name));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_are_told_apart_and_nonsense_says_nothing() {
+        let text = "<PAMDataset><SRS dataAxisToSRSAxisMapping=\"1,2\">LOCAL_CS[&quot;x&quot;]</SRS><GeoTransform> 5.0e2, 10, 0, 9.0e2, 0, -10</GeoTransform>\
+                    <PAMRasterBand band=\"1\"><NoDataValue le_hex_equiv=\"00\">-9.99900000000000E+03</NoDataValue><Scale>0.1</Scale><Offset>500</Offset>\
+                    <UnitType>ft</UnitType></PAMRasterBand><PAMRasterBand band=\"2\"><Scale>7</Scale></PAMRasterBand></PAMDataset>";
+        let aux = Aux::parse(text);
+        assert_eq!(aux.corners, Some([500.0, 10.0, 0.0, 900.0, 0.0, -10.0]));
+        assert_eq!(aux.system.as_deref(), Some("LOCAL_CS[\"x\"]"));
+        assert_eq!(aux.bands.len(), 2);
+        assert_eq!(aux.bands[0].1.nodata.as_deref(), Some("-9.99900000000000E+03"));
+        assert_eq!(aux.bands[1].1.scale, Some(7.0));
+        for nonsense in ["", "<", "<VRTDataset/>", "<PAMDataset>"] {
+            assert_eq!(Aux::parse(nonsense), Aux::default(), "{nonsense}");
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! From a tree of well-known text to a [`System`]: names, codes, units, axes, the ellipsoid; projections by crate `proj4wkt`.
+
+use super::registry;
+use super::system::{Kind, System, Unit, Vertical, exact_metres, exact_radians};
+use super::wkt::{self, Node};
+use crate::guard::quiet;
+use crate::reader::HorizontalSize;
+
+const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
+const GEOGRAPHIC: [&str; 5] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS"];
+const GEOCENTRIC: [&str; 1] = ["GEOCCS"];
+const LOCAL: [&str; 3] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS"];
+const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
+const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
+const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
+
+/// The system that a text describes; `None` if it is no such text or says nothing of the horizontal.
+pub(super) fn system(text: &str) -> Option<System> {
+    let nodes = wkt::parse(text)?;
+    let mut system = horizontal_of(&nodes)?;
+    if let Some(vertical) = nodes.iter().find_map(vertical_of) {
+        system.vertical = Some(vertical);
+    }
+    system.text = text.trim_start_matches('\u{feff}').trim().to_owned();
+    Some(system)
+}
+
+fn horizontal_of(nodes: &[Node]) -> Option<System> {
+    nodes.iter().find_map(|node| horizontal(node, 0))
+}
+
+/// The horizontal system in a node: itself, the first part of a compound one, or what a bound one binds.
+fn horizontal(node: &Node, depth: u32) -> Option<System> {
+    let key = node.key.as_str();
+    if depth > 4 {
+        return None;
+    }
+    if COMPOUND.contains(&key) || key == "BOUNDCRS" || key == "SOURCECRS" {
+        return node.values.iter().find_map(|value| match value {
+            wkt::Value::Node(child) => horizontal(child, depth + 1),
+            _ => None,
+        });
+    }
+    let kind = match key {
+        _ if PROJECTED.contains(&key) => Kind::Projected,
+        _ if GEOGRAPHIC.contains(&key) => Kind::Geographic,
+        _ if LOCAL.contains(&key) => Kind::Local,
+        _ => return None,
+    };
+    let mut system = System::unknown();
+    system.kind = kind;
+    system.name = plain_name(node.text(0).unwrap_or(""));
+    system.code = code(node);
+    system.unit = unit(node, kind);
+    let spheroid = node.find(&["SPHEROID", "ELLIPSOID"]);
+    let length = |spheroid: &Node| {
+        spheroid.child(&["LENGTHUNIT", "UNIT"]).and_then(|unit| unit.number(1)).unwrap_or(1.0)
+    };
+    system.radius_m =
+        spheroid.and_then(|found| Some(found.number(1)? * length(found))).filter(|radius| *radius > 0.0);
+    system.signs = signs(node);
+    if kind != Kind::Local {
+        system.proj = projection(node, system.code);
+    }
+    if kind == Kind::Geographic {
+        system.vertical = ellipsoidal(node);
+    }
+    Some(system)
+}
+
+/// Names of ESRI's have underscores for spaces, and some begin with the kind.
+fn plain_name(name: &str) -> String {
+    let name = name.trim();
+    if name.contains(' ') { name.to_owned() } else { name.replace('_', " ") }
+}
+
+/// The EPSG code of a node itself.
+fn code(node: &Node) -> Option<u32> {
+    let id = node.children(&["AUTHORITY", "ID"]).last()?;
+    let is_epsg = id.text(0).is_some_and(|name| name.eq_ignore_ascii_case("EPSG"));
+    let number = id.number(1).filter(|number| number.fract() == 0.0 && (1.0..1e9).contains(number))?;
+    is_epsg.then_some(number as u32)
+}
+
+/// The unit of the axes: of the node itself, or of its first axis.
+fn unit(node: &Node, kind: Kind) -> Option<Unit> {
+    let own =
+        node.children(&UNITS).last().or_else(|| node.child(&["AXIS"]).and_then(|axis| axis.child(&UNITS)));
+    let of_base = || (kind == Kind::Geographic).then(|| node.find(&["ANGLEUNIT"])).flatten();
+    let found = own.or_else(of_base)?;
+    let size = found.number(1).filter(|size| *size > 0.0)?;
+    let name = found.text(0).unwrap_or("").to_owned();
+    let size = match kind {
+        Kind::Geographic => HorizontalSize::Radians(exact_radians(size)),
+        _ => HorizontalSize::Metres(exact_metres(size)),
+    };
+    Some(Unit { name, size })
+}
+
+/// Whether the axis of eastings points west and that of northings south.
+fn signs(node: &Node) -> [f64; 2] {
+    let mut signs = [1.0; 2];
+    for axis in node.children(&["AXIS"]) {
+        let direction = axis.values.iter().rev().find_map(|value| match value {
+            wkt::Value::Node(word) if word.values.is_empty() => Some(word.key.as_str()),
+            _ => None,
+        });
+        // Both axes of a polar projection point north, or south, from the pole: no turn is meant.
+        let along_meridian = axis.child(&["MERIDIAN"]).is_some();
+        match direction {
+            Some("WEST") => signs[0] = -1.0,
+            Some("SOUTH") if !along_meridian => signs[1] = -1.0,
+            _ => {}
+        }
+    }
+    let axes: Vec<&Node> = node.children(&["AXIS"]).collect();
+    let both = |word: &str| {
+        axes.len() >= 2
+            && axes
+                .iter()
+                .take(2)
+                .all(|axis| axis.values.iter().any(|v| matches!(v, wkt::Value::Node(n) if n.key == word)))
+    };
+    if both("SOUTH") || both("NORTH") { [1.0; 2] } else { signs }
+}
+
+/// How the system is projected: by its code, or by its own parameters.
+fn projection(node: &Node, code: Option<u32>) -> Option<String> {
+    match code.and_then(registry::horizontal) {
+        Some(registry::Horizontal::Text { proj, .. } | registry::Horizontal::Parts { proj, .. })
+            if !proj.is_empty() =>
+        {
+            return Some(proj.to_owned());
+        }
+        _ => {}
+    }
+    // Another's parser on a stranger's text.
+    quiet(|| proj4wkt::wkt_to_projstring(&written(node)).ok())
+        .flatten()
+        .filter(|proj| proj.contains("+proj="))
+}
+
+/// The node as text again, for a parser that wants one system and nothing around it.
+fn written(node: &Node) -> String {
+    let values: Vec<String> = node
+        .values
+        .iter()
+        .map(|value| match value {
+            wkt::Value::Text(text) => format!("\"{}\"", text.replace('"', "")),
+            wkt::Value::Number(number) => number.to_string(),
+            wkt::Value::Node(node) if node.values.is_empty() => node.key.clone(),
+            wkt::Value::Node(node) => written(node),
+        })
+        .collect();
+    format!("{}[{}]", node.key, values.join(","))
+}
+
+/// The vertical system in a node.
+fn vertical_of(node: &Node) -> Option<Vertical> {
+    let found = node.find(&VERTICAL)?;
+    let code = code(found);
+    let entry = code.and_then(registry::vertical);
+    let unit = found
+        .children(&["UNIT", "LENGTHUNIT"])
+        .last()
+        .or_else(|| found.child(&["AXIS"]).and_then(|axis| axis.child(&["LENGTHUNIT", "UNIT"])));
+    let metres = unit.and_then(|unit| unit.number(1)).filter(|metres| *metres > 0.0);
+    let axis = found.child(&["AXIS"]).is_some_and(|axis| {
+        axis.values.iter().any(|value| matches!(value, wkt::Value::Node(word) if word.key == "DOWN"))
+    });
+    // ESRI counts depths by a parameter.
+    let parameter = found.children(&["PARAMETER"]).any(|parameter| {
+        parameter.text(0).is_some_and(|name| name.eq_ignore_ascii_case("direction"))
+            && parameter.number(1) == Some(-1.0)
+    });
+    Some(Vertical {
+        name: plain_name(found.text(0).unwrap_or("")),
+        code,
+        unit_name: unit
+            .and_then(|unit| unit.text(0))
+            .or(entry.map(|entry| entry.unit_name))
+            .unwrap_or("metre")
+            .to_owned(),
+        metres: exact_metres(metres.or(entry.map(|entry| entry.metres)).unwrap_or(1.0)),
+        is_down: axis || parameter,
+    })
+}
+
+/// Heights of a geographic system of three dimensions are above its ellipsoid.
+fn ellipsoidal(node: &Node) -> Option<Vertical> {
+    let axis = node.children(&["AXIS"]).nth(2)?;
+    let unit = axis.child(&["LENGTHUNIT", "UNIT"]);
+    Some(Vertical {
+        name: "height above the ellipsoid".into(),
+        code: None,
+        unit_name: unit.and_then(|unit| unit.text(0)).unwrap_or("metre").to_owned(),
+        metres: exact_metres(unit.and_then(|unit| unit.number(1)).filter(|m| *m > 0.0).unwrap_or(1.0)),
+        is_down: false,
+    })
+}
+
+/// Whether a text is a system that no place on the ground follows from.
+pub(super) fn is_geocentric(text: &str) -> bool {
+    wkt::parse(text).is_some_and(|nodes| nodes.iter().any(|node| node.find(&GEOCENTRIC).is_some()))
+}

@@ -1,0 +1,258 @@
+//! From coordinates of a system to longitude and latitude and back, and how long a step is on the ground. Projections are crate `proj4rs`'s.
+//!
+//! PROJ strings are stripped of what this program does itself: units and the directions of axes. A datum whose grid is not at hand loses its shift, of some hundred metres at
+//! most, and not its place. Angles are radians. Cost: a microsecond a point.
+
+use super::from_proj;
+use super::system::{Kind, System};
+use crate::guard::quiet;
+use crate::reader::HorizontalSize;
+use proj4rs::proj::Proj;
+use proj4rs::transform::transform;
+
+/// Words of a PROJ string that are dealt with here, or say nothing about the plane.
+const LEFT_OUT: [&str; 12] = [
+    "units",
+    "to_meter",
+    "vunits",
+    "vto_meter",
+    "axis",
+    "type",
+    "wktext",
+    "no_defs",
+    "geoidgrids",
+    "geoid_crs",
+    "over",
+    "init",
+];
+
+/// A system that coordinates can be brought out of and into.
+#[derive(Clone)]
+pub(crate) struct Ground {
+    proj: Proj,
+    /// Longitude and latitude on the same ellipsoid, without a shift of datum.
+    own: Proj,
+    /// Longitude and latitude of WGS 84, or of the same body.
+    world: Proj,
+    /// Metres or radians a unit.
+    size: f64,
+    signs: [f64; 2],
+    is_geographic: bool,
+    /// Semi-axes of the ellipsoid in metres.
+    axes_m: [f64; 2],
+}
+
+impl std::fmt::Debug for Ground {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Ground")
+            .field("size", &self.size)
+            .field("axes_m", &self.axes_m)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The string without the words `left_out`.
+fn without(text: &str, left_out: &[&str]) -> String {
+    let kept: Vec<&str> = text
+        .split_whitespace()
+        .filter(|word| {
+            let key = word.trim_start_matches('+').split('=').next().unwrap_or("");
+            !left_out.contains(&key)
+        })
+        .collect();
+    kept.join(" ")
+}
+
+/// Whether a radius is that of one of the Earth's ellipsoids.
+pub(crate) fn is_earth(radius_m: f64) -> bool {
+    (6_300_000.0..6_450_000.0).contains(&radius_m)
+}
+
+impl Ground {
+    /// The way to the ground of a system; `None` where there is none: local systems, projections that are not known.
+    pub(crate) fn new(system: &System) -> Option<Self> {
+        let text = match (&system.proj, system.kind) {
+            (Some(text), _) => text.clone(),
+            (None, Kind::Geographic) => match system.radius_m {
+                Some(radius) if !is_earth(radius) => format!("+proj=longlat +a={radius} +b={radius}"),
+                _ => "+proj=longlat +datum=WGS84".into(),
+            },
+            (None, _) => return None,
+        };
+        let bare = without(&text, &LEFT_OUT);
+        let no_grid = match from_proj::word(&bare, "nadgrids") {
+            Some("@null") | None => bare,
+            Some(_) => without(&bare, &["nadgrids"]),
+        };
+        let size = match system.unit.as_ref()?.size {
+            HorizontalSize::Metres(metres) => metres,
+            HorizontalSize::Radians(radians) => radians,
+        };
+        // Others' code on a stranger's text.
+        quiet(|| {
+            Self::of(&no_grid, size, system.signs).or_else(|| Self::of(&plain(&no_grid), size, system.signs))
+        })
+        .flatten()
+    }
+
+    fn of(text: &str, size: f64, signs: [f64; 2]) -> Option<Self> {
+        let proj = Proj::from_proj_string(text).ok()?;
+        let (a, b) = proj.ellipse_parameters();
+        let own = Proj::from_proj_string(&format!("+proj=longlat +a={a} +b={b}")).ok()?;
+        let world = match is_earth(a) {
+            true => Proj::from_proj_string("+proj=longlat +datum=WGS84").ok()?,
+            false => own.clone(),
+        };
+        let is_geographic = proj.is_latlong();
+        let this = Self { proj, own, world, size, signs, is_geographic, axes_m: [a, b] };
+        // A datum by a grid that is not here shows at the first point.
+        let (lon, lat) = (this.proj.longitude_of_origin(), this.proj.latitude_of_origin().clamp(-1.4, 1.4));
+        let mut probe = (lon + 0.01, lat + 0.01);
+        transform(&this.world, &this.proj, &mut probe).ok()?;
+        transform(&this.proj, &this.world, &mut probe).ok()?;
+        (probe.0.is_finite() && probe.1.is_finite()).then_some(this)
+    }
+
+    /// Longitude and latitude on the system's own ellipsoid.
+    pub(crate) fn own(&self, point: [f64; 2]) -> Option<[f64; 2]> {
+        self.out_of(point, &self.own)
+    }
+
+    /// Longitude and latitude of WGS 84; on other bodies their own.
+    pub(crate) fn world(&self, point: [f64; 2]) -> Option<[f64; 2]> {
+        self.out_of(point, &self.world)
+    }
+
+    fn out_of(&self, [x, y]: [f64; 2], to: &Proj) -> Option<[f64; 2]> {
+        let mut point = (x * self.signs[0] * self.size, y * self.signs[1] * self.size);
+        transform(&self.proj, to, &mut point).ok()?;
+        (point.0.is_finite() && point.1.is_finite()).then_some([point.0, point.1])
+    }
+
+    /// The point of a longitude and latitude of WGS 84.
+    pub(crate) fn of_world(&self, [lon, lat]: [f64; 2]) -> Option<[f64; 2]> {
+        let mut point = (lon, lat);
+        transform(&self.world, &self.proj, &mut point).ok()?;
+        let point = [point.0 * self.signs[0] / self.size, point.1 * self.signs[1] / self.size];
+        point.iter().all(|value| value.is_finite()).then_some(point)
+    }
+
+    /// A point of this system in another one.
+    pub(crate) fn across_to(&self, other: &Self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let mut point = (x * self.signs[0] * self.size, y * self.signs[1] * self.size);
+        transform(&self.proj, &other.proj, &mut point).ok()?;
+        let point = [point.0 * other.signs[0] / other.size, point.1 * other.signs[1] / other.size];
+        point.iter().all(|value| value.is_finite()).then_some(point)
+    }
+
+    /// Whether coordinates are longitude and latitude.
+    pub(crate) fn is_geographic(&self) -> bool {
+        self.is_geographic
+    }
+
+    /// A full turn in the system's unit, where coordinates are angles.
+    pub(crate) fn turn(&self) -> Option<f64> {
+        self.is_geographic.then(|| std::f64::consts::TAU / self.size)
+    }
+
+    /// Whether the length of a step depends on the latitude alone and strongly, as on Mercator's maps.
+    pub(crate) fn is_cylindrical(&self) -> bool {
+        matches!(self.proj.projname(), "merc" | "webmerc" | "eqc" | "cea" | "mill" | "gall" | "tcea")
+    }
+
+    /// Latitude and metres on the ellipsoid of the two steps `across` and `down` at a point.
+    pub(crate) fn steps_m(&self, at: [f64; 2], steps: [[f64; 2]; 2]) -> Option<([f64; 2], f64)> {
+        let middle = self.own(at)?;
+        let [a, b] = self.axes_m;
+        let e2 = 1.0 - (b / a) * (b / a);
+        let (sin, cos) = middle[1].sin_cos();
+        let w = 1.0 - e2 * sin * sin;
+        let [metres_lon, metres_lat] = [a * cos / w.sqrt(), a * (1.0 - e2) / (w * w.sqrt())];
+        let length = |[dx, dy]: [f64; 2]| {
+            let from = self.own([at[0] - dx / 2.0, at[1] - dy / 2.0])?;
+            let to = self.own([at[0] + dx / 2.0, at[1] + dy / 2.0])?;
+            let turn = std::f64::consts::TAU;
+            let mut lon = (to[0] - from[0]) % turn;
+            if lon.abs() > turn / 2.0 {
+                lon -= turn.copysign(lon);
+            }
+            Some((lon * metres_lon).hypot((to[1] - from[1]) * metres_lat))
+        };
+        Some(([length(steps[0])?, length(steps[1])?], middle[1]))
+    }
+}
+
+/// The string with its ellipsoid and without its datum's shift.
+fn plain(text: &str) -> String {
+    let ellipsoid = match from_proj::word(text, "datum") {
+        Some("NAD27") => " +ellps=clrk66",
+        Some("NAD83") => " +ellps=GRS80",
+        Some("OSGB36") => " +ellps=airy",
+        Some("potsdam" | "hermannskogel") => " +ellps=bessel",
+        Some("nzgd49") => " +ellps=intl",
+        Some("carthage") => " +ellps=clrk80ign",
+        Some("ire65") => " +ellps=mod_airy",
+        Some("GGRS87") => " +ellps=GRS80",
+        Some(_) => " +ellps=WGS84",
+        None => "",
+    };
+    format!("{}{ellipsoid}", without(text, &["datum", "nadgrids", "towgs84"]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::resolve::by_text;
+    use super::*;
+
+    fn ground(text: &str) -> Ground {
+        Ground::new(&by_text(text).unwrap()).unwrap_or_else(|| panic!("{text}"))
+    }
+
+    /// Positions by gdaltransform (PROJ 9.1): x, y, longitude, latitude in degrees. Datums are shifted by few parameters here and by grids there, hence some metres.
+    #[test]
+    fn places_are_those_of_proj() {
+        for (system, [x, y], [lon, lat], tolerance_deg) in [
+            ("EPSG:32632", [500_000.0, 5_000_000.0], [9.0, 45.153_477_183_356], 1e-9),
+            (
+                "EPSG:3857",
+                [1_200_000.0, 8_400_047.889_818],
+                [10.779_783_409_434_3, 60.001_392_359_384_9],
+                1e-9,
+            ),
+            ("EPSG:2263", [980_000.0, 200_000.0], [-74.015_331_015_319_3, 40.715_629_477_243_7], 1e-8),
+            ("EPSG:3035", [4_321_000.0, 3_210_000.0], [10.0, 52.0], 1e-9),
+            ("EPSG:3031", [1_000_000.0, 500_000.0], [63.434_948_822_922, -79.736_420_851_25], 1e-9),
+            ("EPSG:2193", [1_600_000.0, 5_400_000.0], [173.0, -41.551_664_523_452_8], 1e-9),
+            ("EPSG:2154", [700_000.0, 6_600_000.0], [3.0, 46.5], 1e-9),
+            ("EPSG:5070", [100_000.0, 1_500_000.0], [-94.872_589_251_067_4, 36.541_672_730_115_9], 1e-8),
+            ("EPSG:2046", [50_000.0, 3_000_000.0], [14.495_755_477_362_1, -27.110_730_617_771_7], 1e-8),
+            ("EPSG:4807", [2.0, 50.0], [4.136_623_906_269_87, 44.999_984_761_451_1], 1e-5),
+            ("EPSG:21781", [600_000.0, 200_000.0], [7.438_632_420_871_81, 46.951_082_771_871_1], 1e-5),
+            ("EPSG:27700", [400_000.0, 300_000.0], [-2.001_433_115_510_89, 52.597_792_430_833_8], 1e-4),
+            ("EPSG:28992", [155_000.0, 463_000.0], [5.387_203_508_413_77, 52.155_172_301_192_2], 1e-4),
+            ("EPSG:26710", [565_000.0, 4_756_000.0], [-122.204_252_342_292, 42.955_620_123_025_6], 2e-3),
+            ("+proj=utm +zone=32 +datum=WGS84 +units=km", [500.0, 5000.0], [9.0, 45.153_477_183_356], 1e-9),
+        ] {
+            let ground = ground(system);
+            let found = ground.world([x, y]).unwrap().map(f64::to_degrees);
+            let away = (found[0] - lon).abs().max((found[1] - lat).abs());
+            assert!(away <= tolerance_deg, "{system}: {found:?} is {away} from {lon}, {lat}");
+            let back = ground.of_world(found.map(f64::to_radians)).unwrap();
+            let [dx, dy] = [back[0] - x, back[1] - y];
+            assert!(dx.hypot(dy) < 1e-4 * x.abs().max(1.0), "{system}: {back:?}");
+        }
+    }
+
+    #[test]
+    fn steps_are_as_long_as_on_the_ground() {
+        let mercator = ground("EPSG:3857");
+        let ([east, north], latitude) =
+            mercator.steps_m([1_200_000.0, 8_399_737.9], [[20.0, 0.0], [0.0, -20.0]]).unwrap();
+        // 20 cos 60 on a sphere; on the ellipsoid a quarter of a percent more to the east, a tenth to the north.
+        assert!((latitude.to_degrees() - 60.0).abs() < 1e-4, "{latitude}");
+        assert!((east - 10.0252).abs() < 1e-3 && (north - 10.0084).abs() < 1e-3, "{east} {north}");
+        let utm = ground("EPSG:32632");
+        let ([east, north], _) = utm.steps_m([500_000.0, 5_000_000.0], [[10.0, 0.0], [0.0, -10.0]]).unwrap();
+        assert!((east - 10.004).abs() < 1e-4 && (north - 10.004).abs() < 1e-4, "{east} {north}");
+    }
+}

@@ -1,0 +1,89 @@
+//! The EPSG registry: crate `crs-definitions`, and beside it what that lacks: vertical systems, the parts of compound ones, units, and systems added since.
+//!
+//! The tables beside this file are made from PROJ's copy of the EPSG dataset by `data-scripts/make-crs-tables.py`. Cost: a search of a sorted table in memory, some microseconds.
+
+use crate::reader::HorizontalSize;
+
+const VERTICAL: &str = include_str!("registry/vertical.txt");
+const COMPOUND: &str = include_str!("registry/compound.txt");
+const MISSING: &str = include_str!("registry/missing.txt");
+const UNITS: &str = include_str!("registry/units.txt");
+
+/// A horizontal system.
+pub(super) enum Horizontal {
+    /// Its WKT and its PROJ string.
+    Text { wkt: &'static str, proj: &'static str },
+    /// Its parts.
+    Parts { name: &'static str, unit_name: &'static str, size: HorizontalSize, proj: &'static str },
+}
+
+/// A vertical system.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct VerticalEntry {
+    pub(super) name: &'static str,
+    pub(super) unit_name: &'static str,
+    pub(super) metres: f64,
+    pub(super) is_down: bool,
+}
+
+/// The fields after the code, of the line that begins with it.
+fn line<const N: usize>(table: &'static str, code: u32) -> Option<[&'static str; N]> {
+    let wanted = code.to_string();
+    let rest = table.lines().find_map(|line| line.strip_prefix(&wanted)?.strip_prefix('|'))?;
+    let mut fields = rest.splitn(N, '|');
+    let fields = std::array::from_fn(|_| fields.next().unwrap_or(""));
+    Some(fields)
+}
+
+/// The horizontal system of a code; compound ones are none.
+pub(super) fn horizontal(code: u32) -> Option<Horizontal> {
+    let known = u16::try_from(code).ok().and_then(crs_definitions::from_code);
+    if let Some(def) = known.filter(|def| !def.wkt.is_empty() && !def.wkt.starts_with("COMPD_CS")) {
+        return Some(Horizontal::Text { wkt: def.wkt, proj: def.proj4 });
+    }
+    let [name, kind, unit_name, size, proj] = line(MISSING, code)?;
+    let size: f64 = size.parse().ok()?;
+    let size = if kind == "p" { HorizontalSize::Metres(size) } else { HorizontalSize::Radians(size) };
+    Some(Horizontal::Parts { name, unit_name, size, proj })
+}
+
+/// Codes of the horizontal and the vertical part of a compound system.
+pub(super) fn compound(code: u32) -> Option<(u32, u32)> {
+    let [horizontal, vertical, _name] = line(COMPOUND, code)?;
+    Some((horizontal.parse().ok()?, vertical.parse().ok()?))
+}
+
+/// The vertical system of a code.
+pub(super) fn vertical(code: u32) -> Option<VerticalEntry> {
+    let [name, unit_name, metres, direction] = line(VERTICAL, code)?;
+    Some(VerticalEntry { name, unit_name, metres: metres.parse().ok()?, is_down: direction == "down" })
+}
+
+/// Name and size of the unit of a code.
+pub(crate) fn unit(code: u32) -> Option<(&'static str, HorizontalSize)> {
+    let [name, kind, size] = line(UNITS, code)?;
+    let size = size.parse().ok()?;
+    Some((name, if kind == "length" { HorizontalSize::Metres(size) } else { HorizontalSize::Radians(size) }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_found_in_either_table() {
+        assert!(
+            matches!(horizontal(2263), Some(Horizontal::Text { wkt, .. }) if wkt.contains("Long Island"))
+        );
+        let Some(Horizontal::Parts { size, .. }) = horizontal(2221) else { panic!("2221 is missing") };
+        assert_eq!(size, HorizontalSize::Metres(0.3048));
+        assert!(horizontal(7415).is_none() && horizontal(5709).is_none() && horizontal(1).is_none());
+        assert_eq!(compound(7415), Some((28992, 5709)));
+        let feet = vertical(6360).unwrap();
+        assert!((feet.metres - 1200.0 / 3937.0).abs() < 1e-15 && !feet.is_down);
+        assert_eq!(vertical(8228).unwrap().metres, 0.3048);
+        assert!(vertical(5715).unwrap().is_down && vertical(32632).is_none());
+        assert_eq!(unit(9005).unwrap().1, HorizontalSize::Metres(0.3047972654));
+        assert_eq!(unit(9001).unwrap().1, HorizontalSize::Metres(1.0));
+    }
+}

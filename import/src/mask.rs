@@ -1,0 +1,175 @@
+//! Masks: samples that another image, inside the file or beside it, calls void.
+//!
+//! The mask is read first, into a bit a sample: in memory where the budget allows it, else in a nameless temporary file. Then samples pass, and those under a 0
+//! become NaN. Cost: one pass over the mask, a copy of each window with such samples.
+
+use crate::options::OpenOptions;
+use crate::reader::Reader;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use terrasoar_layout::dem::{SampleSink, Window};
+use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::file::disk::{read_at, write_at};
+
+/// Share of the memory allowed that a mask may take.
+const SHARE: u64 = 8;
+
+/// A mask that is to be applied.
+pub(crate) struct Masking {
+    /// A file of its own; without it the reader's own mask.
+    file: Option<Box<dyn Reader>>,
+    path: PathBuf,
+    samples: [u32; 2],
+    in_memory: bool,
+    scratch: PathBuf,
+}
+
+/// A bit a sample, rows padded to whole bytes.
+enum Bits {
+    Memory(Mutex<Vec<u8>>),
+    File(Mutex<File>),
+}
+
+impl Masking {
+    /// The mask of a data set of `samples` (columns, rows): of its own or of the file that `beside` read.
+    pub(crate) fn new(
+        path: &Path,
+        samples: [u32; 2],
+        file: Option<Box<dyn Reader>>,
+        options: &OpenOptions,
+    ) -> Self {
+        let allowed = (options.memory_mib.unwrap_or(512) << 20) / SHARE;
+        Self {
+            file,
+            path: path.to_owned(),
+            samples,
+            in_memory: Self::bytes_of(samples) <= allowed,
+            scratch: options.scratch.clone().unwrap_or_else(std::env::temp_dir),
+        }
+    }
+
+    fn bytes_of([columns, rows]: [u32; 2]) -> u64 {
+        u64::from(columns.div_ceil(8)) * u64::from(rows)
+    }
+
+    /// Memory that it takes.
+    pub(crate) fn memory_bytes(&self) -> u64 {
+        if self.in_memory { Self::bytes_of(self.samples) } else { 0 }
+    }
+
+    /// Streams `reader` into `sink` with what is masked as NaN.
+    pub(crate) fn stream(&self, reader: &dyn Reader, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let Some(mask) = self.file.as_deref().or_else(|| reader.mask()) else { return reader.stream(sink) };
+        let bytes = Self::bytes_of(self.samples);
+        let failed =
+            |source| LayoutError::io(&self.scratch, "cannot keep the mask in a temporary file in", source);
+        let bits = if self.in_memory {
+            Bits::Memory(Mutex::new(vec![0; usize::try_from(bytes).unwrap_or(usize::MAX)]))
+        } else {
+            let file = tempfile::tempfile_in(&self.scratch).map_err(failed)?;
+            file.set_len(bytes).map_err(failed)?;
+            Bits::File(Mutex::new(file))
+        };
+        let keeping = Keeping { masking: self, bits: &bits };
+        mask.stream(&keeping)?;
+        reader.stream(&Masked { masking: self, bits: &bits, sink })
+    }
+
+    /// Calls `each` with every row of a window: its bytes, and the bit at which the window begins.
+    fn rows(
+        &self,
+        bits: &Bits,
+        window: Window,
+        write: bool,
+        mut each: impl FnMut(usize, &mut [u8], usize),
+    ) -> Result<(), LayoutError> {
+        let pitch = u64::from(self.samples[0].div_ceil(8));
+        let inside = window.col.checked_add(window.width).is_some_and(|end| end <= self.samples[0])
+            && window.row.checked_add(window.height).is_some_and(|end| end <= self.samples[1]);
+        if !inside {
+            return Err(LayoutError::damaged(
+                &self.path,
+                "mask",
+                "its size changed while it was read; start again",
+            ));
+        }
+        let (first, last) = (u64::from(window.col / 8), u64::from((window.col + window.width).div_ceil(8)));
+        let bit = (window.col % 8) as usize;
+        let length = (last - first) as usize;
+        match bits {
+            Bits::Memory(bytes) => {
+                let mut bytes = bytes.lock().unwrap_or_else(PoisonError::into_inner);
+                for row in 0..window.height {
+                    let at = (u64::from(window.row + row) * pitch + first) as usize;
+                    each(row as usize, &mut bytes[at..at + length], bit);
+                }
+            }
+            Bits::File(file) => {
+                let file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                let failed = |source| {
+                    LayoutError::io(&self.scratch, "cannot use the temporary file of the mask in", source)
+                };
+                let mut bytes = vec![0; length];
+                for row in 0..window.height {
+                    let at = u64::from(window.row + row) * pitch + first;
+                    read_at(&file, &mut bytes, at).map_err(failed)?;
+                    each(row as usize, &mut bytes, bit);
+                    if write {
+                        write_at(&file, &bytes, at).map_err(failed)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Keeps a mask as it streams.
+struct Keeping<'a> {
+    masking: &'a Masking,
+    bits: &'a Bits,
+}
+
+impl SampleSink for Keeping<'_> {
+    fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
+        let width = window.width as usize;
+        self.masking.rows(self.bits, window, true, |row, bytes, bit| {
+            for (at, value) in samples[row * width..(row + 1) * width].iter().enumerate() {
+                if *value != 0.0 && !value.is_nan() {
+                    bytes[(bit + at) / 8] |= 1 << ((bit + at) % 8);
+                }
+            }
+        })
+    }
+
+    fn put_void(&self, _window: Window) -> Result<(), LayoutError> {
+        Ok(())
+    }
+}
+
+/// Passes samples on with NaN under the mask.
+struct Masked<'a> {
+    masking: &'a Masking,
+    bits: &'a Bits,
+    sink: &'a dyn SampleSink,
+}
+
+impl SampleSink for Masked<'_> {
+    fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
+        let width = window.width as usize;
+        let mut masked = samples.to_vec();
+        self.masking.rows(self.bits, window, false, |row, bytes, bit| {
+            for (at, value) in masked[row * width..(row + 1) * width].iter_mut().enumerate() {
+                if bytes[(bit + at) / 8] >> ((bit + at) % 8) & 1 == 0 {
+                    *value = f64::NAN;
+                }
+            }
+        })?;
+        self.sink.put(window, &masked)
+    }
+
+    fn put_void(&self, window: Window) -> Result<(), LayoutError> {
+        self.sink.put_void(window)
+    }
+}

@@ -1,0 +1,147 @@
+//! Metres between samples, on the ground, at the centre of the grid.
+//!
+//! Lengths on a map are taken as they are where the map is true to a percent, as surveyors' maps are. Degrees, Mercator's and other maps that are not are measured on the ellipsoid
+//! at the centre; where the step differs from that by more than a percent within the grid, this is said, with the way out: reprojection. Coordinates of no known unit are
+//! metres or degrees; which, is decided only where it is plain ([`Guess`]), and otherwise asked.
+
+use super::guess::Guess;
+use crate::crs::{Ground, Kind, System};
+use crate::reader::HorizontalSize;
+use std::path::Path;
+use terrasoar_layout::dem::Warning;
+use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::remedy::Remedy;
+
+/// How far a map may be from the ground before it is measured, and how far the step may change within a grid before this is said.
+const TRUE_TO: f64 = 0.01;
+/// Latitudes beyond which a degree of longitude is no measure.
+const POLE_DEG: f64 = 89.9;
+
+/// Metres between samples and where they came from.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Spacing {
+    /// East and north; `None` if nothing says.
+    pub(crate) metres: Option<[f64; 2]>,
+    /// Latitude of the centre in degrees, where it was converted from angles.
+    pub(crate) latitude_deg: Option<f64>,
+    /// Where it came from, in words.
+    pub(crate) words: String,
+}
+
+/// The spacing of a north-up grid of `samples` with this map. A person who `stated` a spacing is not asked.
+///
+/// # Errors
+/// [`LayoutError::Usage`] where the centre lies at a pole of a grid of degrees, or where metres and degrees are as likely.
+pub(crate) fn spacing(
+    path: &Path,
+    system: &mut System,
+    map: Option<[f64; 6]>,
+    samples: [u32; 2],
+    stated: bool,
+    warnings: &mut Vec<Warning>,
+) -> Result<Spacing, LayoutError> {
+    let Some(map) = map else { return Ok(Spacing::default()) };
+    let steps = [[map[1], map[4]], [map[2], map[5]]];
+    let lengths = steps.map(|[x, y]| x.hypot(y));
+    if system.unit.is_none() {
+        let guess = Guess::of(&map, samples);
+        if !stated {
+            guess.tell(path, lengths, warnings)?;
+        }
+        system.unit = Some(guess.unit());
+        if guess.is_degrees() {
+            system.kind = Kind::Geographic;
+        }
+    }
+    let size = system.unit.as_ref().map(|unit| unit.size);
+    let ground = Ground::new(system);
+    let [columns, rows] = samples.map(|count| f64::from(count.max(2) - 1));
+    let at =
+        |col: f64, row: f64| [map[0] + map[1] * col + map[2] * row, map[3] + map[4] * col + map[5] * row];
+    let centre = at(columns / 2.0, rows / 2.0);
+    let measured = |place: [f64; 2]| ground.as_ref().and_then(|ground| ground.steps_m(place, steps));
+    match size {
+        Some(HorizontalSize::Radians(size)) => {
+            let latitude = (centre[1] * system.signs[1] * size).to_degrees();
+            if latitude.is_nan() || latitude.abs() >= POLE_DEG {
+                if stated {
+                    return Ok(Spacing::default());
+                }
+                return Err(LayoutError::Usage(format!(
+                    "{}: the elevation model is in degrees and its centre lies at latitude {latitude:.4}, where degrees have no useful length; \
+                     state the spacing in metres, or reproject the model",
+                    path.display()
+                ))
+                .mended_by(Remedy::Spacing));
+            }
+            let (metres, _) = measured(centre).ok_or_else(|| beyond(path))?;
+            if !stated {
+                tell_change(&measured, &at, [columns, rows], metres, warnings);
+            }
+            let words = format!("measured on the ellipsoid at the centre latitude {latitude:.4}");
+            Ok(Spacing { metres: Some(metres), latitude_deg: Some(latitude), words })
+        }
+        Some(HorizontalSize::Metres(size)) => {
+            let on_map = lengths.map(|length| length * size);
+            let Some((metres, latitude)) = measured(centre) else {
+                return Ok(Spacing { metres: Some(on_map), latitude_deg: None, words: String::new() });
+            };
+            let off = (0..2).map(|i| (metres[i] / on_map[i] - 1.0).abs()).fold(0.0, f64::max);
+            let is_cylindrical = ground.as_ref().is_some_and(Ground::is_cylindrical);
+            if !(off > TRUE_TO || is_cylindrical && off > 1e-6) || !off.is_finite() {
+                if !stated {
+                    tell_change(&measured, &at, [columns, rows], metres, warnings);
+                }
+                return Ok(Spacing { metres: Some(on_map), latitude_deg: None, words: String::new() });
+            }
+            if !stated {
+                tell_change(&measured, &at, [columns, rows], metres, warnings);
+            }
+            let words = format!(
+                "measured on the ellipsoid at the centre latitude {:.4}; on the map it is {:.4} x {:.4} m",
+                latitude.to_degrees(),
+                on_map[0],
+                on_map[1]
+            );
+            Ok(Spacing { metres: Some(metres), latitude_deg: None, words })
+        }
+        None => Ok(Spacing { metres: Some(lengths), latitude_deg: None, words: String::new() }),
+    }
+}
+
+fn beyond(path: &Path) -> LayoutError {
+    LayoutError::Usage(format!(
+        "{}: the centre of the elevation model lies outside of what its reference system covers; check its place, or state the spacing in metres",
+        path.display()
+    ))
+    .mended_by(Remedy::Spacing)
+}
+
+/// Says how much the step changes within the grid, if it is much.
+fn tell_change(
+    measured: &impl Fn([f64; 2]) -> Option<([f64; 2], f64)>,
+    at: &impl Fn(f64, f64) -> [f64; 2],
+    [columns, rows]: [f64; 2],
+    centre_m: [f64; 2],
+    warnings: &mut Vec<Warning>,
+) {
+    let mut most: f64 = 0.0;
+    for (col, row) in
+        [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.5), (1.0, 0.5), (0.0, 1.0), (0.5, 1.0), (1.0, 1.0)]
+    {
+        let Some((metres, _)) = measured(at(col * columns, row * rows)) else { continue };
+        for i in 0..2 {
+            most = most.max((metres[i] / centre_m[i] - 1.0).abs());
+        }
+    }
+    if most > TRUE_TO && most.is_finite() {
+        warnings.push(
+            Warning::new(format!(
+                "the distance between samples differs by up to {:.1} % over the elevation model, and that of the centre is used throughout; bring it into a \
+                 metric system for true distances",
+                100.0 * most
+            ))
+            .mended_by(Remedy::Reproject, "utm"),
+        );
+    }
+}
