@@ -5,7 +5,7 @@
 //! libtiff has it. libtiff packs the bytes of a big-endian file as if they were little-endian numbers, so what comes out stands in the file's order either way.
 
 use super::chunks::Chunks;
-use super::codec::Failure;
+use super::failure::Failure;
 use lerc_reader::Decoded;
 use terrasoar_layout::dem::SampleType;
 
