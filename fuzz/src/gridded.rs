@@ -31,7 +31,11 @@ pub(crate) mod dted {
 
     /// A cell of `columns` by `rows` behind `labels`, without the lines told.
     fn cell(columns: u16, rows: u16, labels: usize, left_out: &[u16]) -> Vec<u8> {
-        let mut bytes: Vec<u8> = [b"VOL1", b"HDR1"].iter().take(labels).flat_map(|label| [&label[..], &[b' '; 76]].concat()).collect();
+        let mut bytes: Vec<u8> = [b"VOL1", b"HDR1"]
+            .iter()
+            .take(labels)
+            .flat_map(|label| [&label[..], &[b' '; 76]].concat())
+            .collect();
         let head = format!("UHL10063000W0503000N00300010NA  U  {:12}{columns:04}{rows:04}0", "");
         bytes.extend(format!("{head:<80}").bytes());
         bytes.extend([b' '; 648 + 2700]);
@@ -48,7 +52,12 @@ pub(crate) mod dted {
     }
 
     pub(crate) fn seeds() -> Inputs {
-        let cells = [("plain", cell(20, 15, 0, &[])), ("labels", cell(4, 3, 2, &[])), ("lines left out", cell(20, 15, 0, &[3, 9])), ("tall", cell(3, 60, 1, &[]))];
+        let cells = [
+            ("plain", cell(20, 15, 0, &[])),
+            ("labels", cell(4, 3, 2, &[])),
+            ("lines left out", cell(20, 15, 0, &[3, 9])),
+            ("tall", cell(3, 60, 1, &[])),
+        ];
         cells.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)).collect()
     }
 
@@ -67,7 +76,17 @@ pub(crate) mod usgs_dem {
         let mut put = |from: usize, length: usize, text: String| {
             record[from..from + length].copy_from_slice(format!("{text:>length$}").as_bytes());
         };
-        for (from, value) in [(144, 3), (150, 1), (156, system), (162, 10), (528, 2), (534, 1), (540, 4), (852, 1), (858, columns)] {
+        for (from, value) in [
+            (144, 3),
+            (150, 1),
+            (156, system),
+            (162, 10),
+            (528, 2),
+            (534, 1),
+            (540, 4),
+            (852, 1),
+            (858, columns),
+        ] {
             put(from, 6, value.to_string());
         }
         for (at, (x, y)) in [(0, 0), (0, 1), (1, 1), (1, 0)].into_iter().enumerate() {
@@ -78,16 +97,29 @@ pub(crate) mod usgs_dem {
             put(from, 12, text.into());
         }
         for column in 0..columns {
-            let places = [format!("{}.0D+00", 560_000 + 30 * column), "4750020.0D+00".into(), "0.0D+00".into(), "0.0D+00".into(), "9.0D+02".into()];
+            let places = [
+                format!("{}.0D+00", 560_000 + 30 * column),
+                "4750020.0D+00".into(),
+                "0.0D+00".into(),
+                "0.0D+00".into(),
+                "9.0D+02".into(),
+            ];
             let places: String = places.iter().map(|place| format!("{place:>24}")).collect();
-            let heights: String = (0..rows).map(|row| format!("{:6}", if row == 3 { -32767 } else { (100 + column + row) as i32 })).collect();
+            let heights: String = (0..rows)
+                .map(|row| format!("{:6}", if row == 3 { -32767 } else { (100 + column + row) as i32 }))
+                .collect();
             record.extend(format!("{:6}{:6}{rows:6}{:6}{places}{heights}\n", 1, column + 1, 1).bytes());
         }
         record
     }
 
     pub(crate) fn seeds() -> Inputs {
-        let sheets = [("new", sheet(9, 7, 1024, 1)), ("old", sheet(5, 5, 864, 1)), ("undocumented", sheet(4, 12, 893, 2)), ("degrees", sheet(6, 6, 1024, 0))];
+        let sheets = [
+            ("new", sheet(9, 7, 1024, 1)),
+            ("old", sheet(5, 5, 864, 1)),
+            ("undocumented", sheet(4, 12, 893, 2)),
+            ("degrees", sheet(6, 6, 1024, 0)),
+        ];
         sheets.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)).collect()
     }
 

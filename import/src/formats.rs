@@ -161,9 +161,10 @@ fn stranger(path: &Path, _: &OpenOptions, refusal: String) -> Result<Box<dyn Rea
 #[cfg(feature = "gdal")]
 fn stranger(path: &Path, options: &OpenOptions, refusal: String) -> Result<Box<dyn Reader>, LayoutError> {
     match crate::gdal::GdalDem::open(path, options) {
-        Err(LayoutError::NotThisFormat { .. }) => {
-            Err(LayoutError::not_this_format(path, format!("{refusal} ({READ_HERE}, and all that GDAL opens)")))
-        }
+        Err(LayoutError::NotThisFormat { .. }) => Err(LayoutError::not_this_format(
+            path,
+            format!("{refusal} ({READ_HERE}, and all that GDAL opens)"),
+        )),
         opened => boxed(opened),
     }
 }

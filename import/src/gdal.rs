@@ -124,13 +124,20 @@ impl Reader for GdalDem {
         let across = u64::from(columns.div_ceil(wide));
         let tasks = across * u64::from(rows.div_ceil(high));
         // Rows of a large block come from the cache, which many workers would empty for each other.
-        let workers = if u64::from(self.block[0]) * u64::from(self.block[1]) > LARGEST_WINDOW { 1 } else { usize::MAX };
-        each_task(tasks, workers, || dataset(&self.path), |dataset, task| {
-            // Both lie in the grid, whose sides are 31-bit.
-            let (col, row) = ((task % across) as u32 * wide, (task / across) as u32 * high);
-            let window = Window { col, row, width: wide.min(columns - col), height: high.min(rows - row) };
-            sink.put(window, &self.read(dataset, window)?)
-        })
+        let workers =
+            if u64::from(self.block[0]) * u64::from(self.block[1]) > LARGEST_WINDOW { 1 } else { usize::MAX };
+        each_task(
+            tasks,
+            workers,
+            || dataset(&self.path),
+            |dataset, task| {
+                // Both lie in the grid, whose sides are 31-bit.
+                let (col, row) = ((task % across) as u32 * wide, (task / across) as u32 * high);
+                let window =
+                    Window { col, row, width: wide.min(columns - col), height: high.min(rows - row) };
+                sink.put(window, &self.read(dataset, window)?)
+            },
+        )
     }
 }
 
@@ -139,7 +146,9 @@ impl GdalDem {
         let size = (window.width as usize, window.height as usize);
         let at = (window.col as isize, window.row as isize);
         let place = || format!("rows from {}", window.row);
-        let failed = |error: gdal::errors::GdalError| LayoutError::damaged(&self.path, place(), format!("{}; fetch the file again", said(&error)));
+        let failed = |error: gdal::errors::GdalError| {
+            LayoutError::damaged(&self.path, place(), format!("{}; fetch the file again", said(&error)))
+        };
         guard(&self.path, place, || {
             let mut bands = Vec::with_capacity(self.pick.bands.len());
             for number in &self.pick.bands {
@@ -155,7 +164,10 @@ impl GdalDem {
             };
             if self.pick.is_masked {
                 let band = dataset.rasterband(self.pick.bands[0]).map_err(failed)?;
-                let mask = band.open_mask_band().and_then(|mask| mask.read_as::<u8>(at, size, size, None)).map_err(failed)?;
+                let mask = band
+                    .open_mask_band()
+                    .and_then(|mask| mask.read_as::<u8>(at, size, size, None))
+                    .map_err(failed)?;
                 let hidden = samples.iter_mut().zip(mask.data()).filter(|(_, seen)| **seen == 0);
                 hidden.for_each(|(sample, _)| *sample = f64::NAN);
             }
@@ -173,20 +185,28 @@ fn dataset(path: &Path) -> Result<Dataset, LayoutError> {
         // Fails for names with a NUL alone.
         let _ = gdal::config::set_config_option("GDAL_CACHEMAX", &CACHE_MIB.to_string());
     });
-    let open = || Dataset::open(path).map_err(|error| LayoutError::not_this_format(path, format!("GDAL does not open it either: {}", said(&error))));
+    let open = || {
+        Dataset::open(path).map_err(|error| {
+            LayoutError::not_this_format(path, format!("GDAL does not open it either: {}", said(&error)))
+        })
+    };
     guard(path, || "header".into(), open)
 }
 
 /// GDAL's own words, shortened.
 fn said(error: &gdal::errors::GdalError) -> String {
     match error {
-        gdal::errors::GdalError::CplError { msg, .. } if !msg.is_empty() => format!("GDAL says \"{}\"", harmless(msg, 200)),
+        gdal::errors::GdalError::CplError { msg, .. } if !msg.is_empty() => {
+            format!("GDAL says \"{}\"", harmless(msg, 200))
+        }
         _ => "GDAL cannot read it".to_owned(),
     }
 }
 
 fn band<'d>(path: &Path, dataset: &'d Dataset, number: usize) -> Result<RasterBand<'d>, LayoutError> {
-    dataset.rasterband(number).map_err(|error| LayoutError::damaged(path, format!("band {number}"), said(&error)))
+    dataset
+        .rasterband(number)
+        .map_err(|error| LayoutError::damaged(path, format!("band {number}"), said(&error)))
 }
 
 /// The data sets in a file that is none itself.
@@ -206,7 +226,9 @@ fn pick(path: &Path, dataset: &Dataset, options: &OpenOptions) -> Result<Pick, L
     let bands = (1..=count).map(|number| band(path, dataset, number)).collect::<Result<Vec<_>, _>>()?;
     let is_masked = |number: usize| {
         let flags = bands[number - 1].mask_flags();
-        flags.is_ok_and(|flags| !flags.is_all_valid() && !flags.is_nodata() && (flags.is_per_dataset() || flags.is_alpha()))
+        flags.is_ok_and(|flags| {
+            !flags.is_all_valid() && !flags.is_nodata() && (flags.is_per_dataset() || flags.is_alpha())
+        })
     };
     if let Some(text) = &options.decode {
         if count < 3 {
@@ -215,7 +237,11 @@ fn pick(path: &Path, dataset: &Dataset, options: &OpenOptions) -> Result<Pick, L
                 path.display()
             )));
         }
-        return Ok(Pick { bands: vec![1, 2, 3], decode: Some(value::decode(text)?), is_masked: is_masked(1) });
+        return Ok(Pick {
+            bands: vec![1, 2, 3],
+            decode: Some(value::decode(text)?),
+            is_masked: is_masked(1),
+        });
     }
     let names: Vec<String> = bands.iter().map(|band| band.description().unwrap_or_default()).collect();
     let number = if let Some(word) = &options.band {
@@ -225,9 +251,17 @@ fn pick(path: &Path, dataset: &Dataset, options: &OpenOptions) -> Result<Pick, L
         let is_alpha = |band: &RasterBand<'_>| band.color_interpretation() == ColorInterpretation::AlphaBand;
         let choices: Vec<usize> = (1..=count).filter(|number| !is_alpha(&bands[number - 1])).collect();
         let [number] = choices[..] else {
-            let known: Vec<String> = (1..).zip(&names).filter(|(_, name)| !name.is_empty()).take(12).map(|(n, name)| format!("{n} \"{}\"", harmless(name, 40))).collect();
+            let known: Vec<String> = (1..)
+                .zip(&names)
+                .filter(|(_, name)| !name.is_empty())
+                .take(12)
+                .map(|(n, name)| format!("{n} \"{}\"", harmless(name, 40)))
+                .collect();
             let known = if known.is_empty() { String::new() } else { format!(" ({})", known.join(", ")) };
-            let problem = format!("this is a data set of {} bands{known}; say which one holds the heights", choices.len());
+            let problem = format!(
+                "this is a data set of {} bands{known}; say which one holds the heights",
+                choices.len()
+            );
             return Err(LayoutError::unsupported(path, problem).mended_by(Remedy::Band));
         };
         number
@@ -268,7 +302,8 @@ fn declare(dataset: &Dataset, band: &RasterBand<'_>, declared: &mut Declared, is
         return;
     }
     let value = &mut declared.value;
-    value.scale = band.scale().filter(|scale| *scale != 0.0 && *scale != 1.0).map(|scale| Said::new(scale, said));
+    value.scale =
+        band.scale().filter(|scale| *scale != 0.0 && *scale != 1.0).map(|scale| Said::new(scale, said));
     value.offset = band.offset().filter(|offset| *offset != 0.0).map(|offset| Said::new(offset, said));
     let unit = band.unit();
     value.unit = (!unit.is_empty()).then(|| Said::new(VerticalUnit::Name(unit), said));

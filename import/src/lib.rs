@@ -21,14 +21,14 @@ mod identify;
 pub(crate) mod input;
 pub(crate) mod jpeg_frame;
 mod labelled;
-mod netcdf;
 mod mask;
+mod netcdf;
 mod opened;
 mod options;
 mod parallel;
 pub(crate) mod picture;
-mod plain;
 mod placement;
+mod plain;
 mod png;
 pub(crate) mod png_stream;
 mod pnm;
@@ -39,8 +39,8 @@ pub mod synth;
 mod text;
 mod usgs_dem;
 mod value;
-mod xyz;
 mod warp;
+mod xyz;
 
 use std::path::{Path, PathBuf};
 

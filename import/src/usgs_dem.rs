@@ -72,7 +72,10 @@ impl UsgsDem {
                 [text.whole(), text.whole(), text.whole(), text.whole()].map(|number| number.ok().flatten());
             if let [Some(1), Some(0 | 1), Some(1..), Some(1)] = first {
                 let reals = [text.real(), text.real(), text.real()].map(|number| number.ok().flatten());
-                begin = reals[0].zip(reals[1]).zip(reals[2]).map(|((west, south), datum)| (at, west, south, datum));
+                begin = reals[0]
+                    .zip(reals[1])
+                    .zip(reals[2])
+                    .map(|((west, south), datum)| (at, west, south, datum));
                 break;
             }
         }

@@ -14,7 +14,8 @@ fn with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Grid, LayoutErr
 
 /// A Surfer grid in text of 9 x 7 samples, rows from the south.
 fn surfer() -> String {
-    let rows = (0..7).map(|row| (0..9).map(|col| format!("{} ", 100 + 3 * col + 7 * row)).collect::<String>());
+    let rows =
+        (0..7).map(|row| (0..9).map(|col| format!("{} ", 100 + 3 * col + 7 * row)).collect::<String>());
     let rows = rows.collect::<Vec<_>>().join("\n").replace("127 ", "1.70141e+38 ");
     format!("DSAA\n9 7\n10 14\n40 43\n100 166\n{rows}\n")
 }
@@ -39,7 +40,8 @@ fn a_format_of_gdal_alone_and_virtual_paths() {
     assert!(grid.info.format.contains("by GDAL"), "{}", grid.info.format);
     is_surfer(&grid);
     let packed = folder.path().join("b.grd.gz");
-    let mut encoder = flate2::write::GzEncoder::new(std::fs::File::create(&packed).unwrap(), flate2::Compression::new(6));
+    let mut encoder =
+        flate2::write::GzEncoder::new(std::fs::File::create(&packed).unwrap(), flate2::Compression::new(6));
     encoder.write_all(surfer().as_bytes()).unwrap();
     encoder.finish().unwrap();
     is_surfer(&with(format!("/vsigzip/{}", packed.display()), &OpenOptions::default()).unwrap());
@@ -58,7 +60,9 @@ fn virtual_raster(folder: &Path, sources: &[&str]) -> PathBuf {
         })
         .collect();
     let path = folder.join("a.vrt");
-    let text = format!("<VRTDataset rasterXSize=\"70\" rasterYSize=\"50\"><SRS>EPSG:26710</SRS><GeoTransform>565165.6371951220, 10.08128048780488, 0, 4756879.792682927, 0, -13.63902439024390</GeoTransform>{bands}</VRTDataset>");
+    let text = format!(
+        "<VRTDataset rasterXSize=\"70\" rasterYSize=\"50\"><SRS>EPSG:26710</SRS><GeoTransform>565165.6371951220, 10.08128048780488, 0, 4756879.792682927, 0, -13.63902439024390</GeoTransform>{bands}</VRTDataset>"
+    );
     std::fs::write(&path, text).unwrap();
     path
 }

@@ -25,7 +25,10 @@ fn band(word: &str) -> OpenOptions {
 }
 
 fn refused(path: &Path, options: &OpenOptions) -> String {
-    with(path, options).err().map(|error| error.to_string()).unwrap_or_else(|| panic!("{} was read", path.display()))
+    with(path, options)
+        .err()
+        .map(|error| error.to_string())
+        .unwrap_or_else(|| panic!("{} was read", path.display()))
 }
 
 /// The height in metres at a place, whichever way the rows run.
@@ -33,7 +36,10 @@ fn at(grid: &Grid, x: f64, y: f64) -> f64 {
     let [x0, a, b, y0, d, e] = grid.info.georeference.pixel_to_crs.expect("a place");
     assert_eq!([b, d], [0.0; 2]);
     let (col, row) = ((x - x0) / a, (y - y0) / e);
-    assert!((col - col.round()).abs() < 1e-6 && (row - row.round()).abs() < 1e-6, "{x}, {y} is no sample: {col}, {row}");
+    assert!(
+        (col - col.round()).abs() < 1e-6 && (row - row.round()).abs() < 1e-6,
+        "{x}, {y} is no sample: {col}, {row}"
+    );
     grid.at(col.round() as u32, row.round() as u32) * grid.info.height_scale + grid.info.height_offset_m
 }
 
@@ -47,13 +53,27 @@ fn is_usual(name: &str, grid: &Grid, west: f64, height: impl Fn(f64) -> f64) {
         let wanted = height(f64::from(100 + 3 * col + 7 * row));
         let found = at(grid, west + 0.5 * f64::from(col), 40.0 + 0.5 * f64::from(row));
         let is_near = (found - wanted).abs() <= 1e-9 * wanted.abs().max(1.0);
-        assert!(is_near || (found.is_nan() && wanted.is_nan()), "{name}: {found} at {col}, {row}, and not {wanted}");
+        assert!(
+            is_near || (found.is_nan() && wanted.is_nan()),
+            "{name}: {found} at {col}, {row}, and not {wanted}"
+        );
     }
 }
 
 #[test]
 fn netcdf_of_every_kind() {
-    for name in ["classic", "offset-64", "cdf-5", "nc4", "nc4-classic", "falling-latitude", "packed", "chunks", "columns-first", "groups"] {
+    for name in [
+        "classic",
+        "offset-64",
+        "cdf-5",
+        "nc4",
+        "nc4-classic",
+        "falling-latitude",
+        "packed",
+        "chunks",
+        "columns-first",
+        "groups",
+    ] {
         is_usual(name, &opened(&format!("{name}.nc")), 10.0, |height| height);
     }
     for name in ["gmt", "gmt-area", "gmt-old", "gmt-old-area"] {
@@ -146,7 +166,10 @@ fn netcdf_cut_short_or_changed_ends_in_words() {
                 std::fs::write(&path, &bytes).unwrap();
                 if let Err(error) = with(&path, &OpenOptions::default()) {
                     let said = error.to_string();
-                    assert!(said.len() > 30 && said.len() < 700 && !said.contains(".rs"), "{name}, {at}: {said}");
+                    assert!(
+                        said.len() > 30 && said.len() < 700 && !said.contains(".rs"),
+                        "{name}, {at}: {said}"
+                    );
                     refusals += 1;
                 }
             }
@@ -163,13 +186,17 @@ fn dted_with_voids_and_negative_heights() {
     for (col, row) in [(0, 0), (120, 0), (0, 120), (120, 120), (17, 3), (3, 90)] {
         let void = (col + row) % 11 == 5;
         let found = at(&grid, -7.0 + f64::from(col) / 120.0, -33.0 + f64::from(row) / 120.0);
-        assert!(if void { found.is_nan() } else { found == f64::from(3 * col - 7 * row) }, "{found} at {col}, {row}");
+        assert!(
+            if void { found.is_nan() } else { found == f64::from(3 * col - 7 * row) },
+            "{found} at {col}, {row}"
+        );
     }
 }
 
 /// A cell of `columns` by `rows`, three arc-seconds by one apart, whose lines are kept where told.
 fn cell(columns: u16, rows: u16, is_there: impl Fn(u16) -> bool, labels: usize, is_summed: bool) -> Vec<u8> {
-    let mut bytes: Vec<u8> = (0..labels).flat_map(|label| format!("{:<80}", ["VOL1", "HDR1"][label % 2]).into_bytes()).collect();
+    let mut bytes: Vec<u8> =
+        (0..labels).flat_map(|label| format!("{:<80}", ["VOL1", "HDR1"][label % 2]).into_bytes()).collect();
     let head = format!("UHL10063000W0503000N00300010NA  U  {:12}{columns:04}{rows:04}0", "");
     bytes.extend(format!("{head:<80}").bytes());
     bytes.extend([b' '; 648 + 2700]);
@@ -200,7 +227,10 @@ fn dted_with_labels_missing_lines_and_wrong_sums() {
     for labels in 0..3 {
         let grid = read(&cell(30, 20, |_| true, labels, true)).unwrap();
         let west = -(6.0 + 30.0 / 60.0);
-        assert_eq!(at(&grid, west + 29.0 * 30.0 / 36_000.0, 50.5 + 19.0 * 10.0 / 36_000.0), f64::from(3 * 29 - 7 * 19));
+        assert_eq!(
+            at(&grid, west + 29.0 * 30.0 / 36_000.0, 50.5 + 19.0 * 10.0 / 36_000.0),
+            f64::from(3 * 29 - 7 * 19)
+        );
     }
     let grid = read(&cell(30, 20, |column| column != 4 && column != 17, 0, true)).unwrap();
     assert_eq!(grid.voids(), 40);
@@ -225,7 +255,10 @@ fn usgs_sheets() {
             let void = (col + row) % 11 == 5;
             let found = at(&grid, 560_000.0 + 30.0 * f64::from(col), 4_750_000.0 + 30.0 * f64::from(row));
             let wanted = f64::from(3 * col - 7 * row);
-            assert!(if void { found.is_nan() } else { (found - wanted).abs() < 1e-9 }, "{name}: {found} at {col}, {row}");
+            assert!(
+                if void { found.is_nan() } else { (found - wanted).abs() < 1e-9 },
+                "{name}: {found} at {col}, {row}"
+            );
         }
     }
 }
@@ -233,7 +266,9 @@ fn usgs_sheets() {
 /// A sheet with an A record of 864 bytes, in feet and degrees, whose profiles begin at several heights.
 fn old_sheet() -> Vec<u8> {
     let mut head = vec![b' '; 864];
-    let mut put = |from: usize, length: usize, text: &str| head[from..from + length].copy_from_slice(format!("{text:>length$}").as_bytes());
+    let mut put = |from: usize, length: usize, text: &str| {
+        head[from..from + length].copy_from_slice(format!("{text:>length$}").as_bytes())
+    };
     put(144, 6, "3");
     put(150, 6, "1");
     put(156, 6, "0");
@@ -265,7 +300,8 @@ fn old_sheet() -> Vec<u8> {
             "0.9D+03"
         );
         for row in first..first + count {
-            record += &format!("{:6}", if (column, row) == (4, 4) { -32767 } else { 1000 + 10 * column + row });
+            record +=
+                &format!("{:6}", if (column, row) == (4, 4) { -32767 } else { 1000 + 10 * column + row });
         }
         head.extend(format!("{record:<1024}").bytes());
     }

@@ -78,23 +78,12 @@ fn samples(decoded: &Decoded, depth: usize, chunks: &Chunks) -> Option<Vec<u8>> 
         (PixelData::I32(values), SampleType::I32) => bytes!(values),
         (PixelData::U32(values), SampleType::U32) => bytes!(values),
         (PixelData::F32(values), SampleType::F32) => {
-<<<<<<< HEAD
             let seen = values.iter().enumerate().map(|(at, value)| if hidden(at) { nan_32 } else { *value });
             bytes!(seen.collect::<Vec<_>>())
         }
         (PixelData::F64(values), SampleType::F64) => {
             let seen = values.iter().enumerate().map(|(at, value)| if hidden(at) { nan_64 } else { *value });
             bytes!(seen.collect::<Vec<_>>())
-=======
-            let seen =
-                values.iter().enumerate().map(|(at, value)| if hidden(at) { f32::NAN } else { *value });
-            bytes!(seen.collect::<Vec<_>>(), big)
-        }
-        (PixelData::F64(values), SampleType::F64) => {
-            let seen =
-                values.iter().enumerate().map(|(at, value)| if hidden(at) { f64::NAN } else { *value });
-            bytes!(seen.collect::<Vec<_>>(), big)
->>>>>>> dem
         }
         _ => return None,
     })

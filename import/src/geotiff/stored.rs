@@ -110,16 +110,11 @@ impl Stored {
     /// The first `count` samples of a row that is not plain.
     pub(super) fn odd(self, row: &[u8], big_endian: bool, count: usize) -> impl Iterator<Item = f64> {
         (0..count).map(move |number| {
-<<<<<<< HEAD
             let value = match (self.bits, self.kind) {
                 (24, Kind::Real) => triple(row, big_endian, number),
                 (24, _) => triple(row, !big_endian, number),
                 _ => bits(row, self.bits, number),
             };
-=======
-            let value =
-                if self.bits == 24 { triple(row, big_endian, number) } else { bits(row, self.bits, number) };
->>>>>>> dem
             match self.kind {
                 Kind::Unsigned => value as f64,
                 Kind::Signed => ((value << (64 - self.bits)) as i64 >> (64 - self.bits)) as f64,
