@@ -6,6 +6,7 @@
 mod edits;
 mod flight;
 mod fly;
+mod gridded;
 mod grids;
 mod image;
 mod import;
@@ -20,6 +21,7 @@ mod use_files;
 mod words;
 mod world_file;
 
+use gridded::{dted, netcdf, usgs_dem};
 use grids::{ascii_grid, labelled, netpbm, packed_png, raw, tiles, xyz};
 pub use seeds::Inputs;
 
@@ -100,6 +102,12 @@ targets! {
     tiles { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A PNG whose colours are heights, or in seven passes.
     packed_png { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// NetCDF, classic and over HDF5.
+    netcdf { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A DTED cell.
+    dted { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A sheet of the USGS.
+    usgs_dem { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// A picture: opened, read, draped, its tiles read.
     image { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A world file beside a picture: draped where it says.

@@ -94,6 +94,21 @@ fn packed_png() {
 }
 
 #[test]
+fn netcdf() {
+    replay("netcdf");
+}
+
+#[test]
+fn cells_of_dted() {
+    replay("dted");
+}
+
+#[test]
+fn sheets_of_the_usgs() {
+    replay("usgs_dem");
+}
+
+#[test]
 fn pictures() {
     replay("image");
 }

@@ -122,6 +122,10 @@ pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn R
 }
 
 fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    #[cfg(feature = "gdal")]
+    if crate::gdal::is_name(path) {
+        return boxed(crate::gdal::GdalDem::open(path, options));
+    }
     let look = Look::at(path)?;
     if let Some(format) = SIGNED.iter().find(|format| (format.is)(&look)) {
         if options.raw.is_some() && !hgt::is_tile(path) {
@@ -139,13 +143,29 @@ fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, Layo
         return boxed(raw::RawDem::stated(path, shape));
     }
     if let Some(refusal) = strangers::signed(&look) {
-        return Err(LayoutError::not_this_format(path, format!("{refusal} ({READ_HERE})")));
+        return stranger(path, options, refusal);
     }
     match NAMED.iter().find(|format| (format.is)(&look)) {
         Some(format) => (format.open)(path, options),
-        None => {
-            Err(LayoutError::not_this_format(path, format!("{} ({READ_HERE})", strangers::unknown(&look))))
-        }
+        None => stranger(path, options, strangers::unknown(&look)),
+    }
+}
+
+/// Refuses what no line knows, with the words of its kind.
+#[cfg(not(feature = "gdal"))]
+fn stranger(path: &Path, _: &OpenOptions, refusal: String) -> Result<Box<dyn Reader>, LayoutError> {
+    Err(LayoutError::not_this_format(path, format!("{refusal} ({READ_HERE})")))
+}
+
+/// Hands what no line knows to GDAL; what that does not open either is refused with the words of its kind.
+#[cfg(feature = "gdal")]
+fn stranger(path: &Path, options: &OpenOptions, refusal: String) -> Result<Box<dyn Reader>, LayoutError> {
+    match crate::gdal::GdalDem::open(path, options) {
+        Err(LayoutError::NotThisFormat { .. }) => Err(LayoutError::not_this_format(
+            path,
+            format!("{refusal} ({READ_HERE}, and all that GDAL opens)"),
+        )),
+        opened => boxed(opened),
     }
 }
 

@@ -12,6 +12,8 @@ mod bt;
 mod crs;
 mod dted;
 mod formats;
+#[cfg(feature = "gdal")]
+mod gdal;
 mod geotiff;
 mod guard;
 mod hgt;

@@ -18,7 +18,8 @@ const fn stranger(at: usize, magic: &'static [u8], what: &'static str, advice: &
     Stranger { at, magic, what, advice }
 }
 
-const CONVERT: &str = "convert it with: gdal_translate INPUT output.tif";
+const CONVERT: &str =
+    "read it with a build that has the feature gdal, or convert it with: gdal_translate INPUT output.tif";
 const CONVERT_BAND: &str = "list what is in it with gdalinfo INPUT and convert the data set with the heights: gdal_translate NAME_OF_THE_DATA_SET output.tif";
 const PICTURE: &str = "a picture of a terrain has no heights: look for the elevation data it was made from";
 const UNPACK: &str = "unpack it and name the elevation file inside";
