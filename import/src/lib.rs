@@ -8,6 +8,7 @@
 
 mod beside;
 mod bt;
+mod coordinates;
 mod crs;
 mod geotiff;
 mod guard;
@@ -35,6 +36,7 @@ use reader::Reader;
 use terrasoar_layout::dem::DemSource;
 use terrasoar_layout::error::LayoutError;
 
+pub use coordinates::Coordinates;
 pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;
