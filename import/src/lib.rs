@@ -23,6 +23,7 @@
 mod ascii_grid;
 mod beside;
 mod bt;
+mod coordinates;
 mod crs;
 mod dted;
 mod formats;
@@ -61,6 +62,7 @@ use std::path::{Path, PathBuf};
 use terrasoar_layout::dem::DemSource;
 use terrasoar_layout::error::LayoutError;
 
+pub use coordinates::Coordinates;
 pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;

@@ -4,7 +4,7 @@ mod common;
 
 use common::{MemoryDem, build_bytes, open_bytes};
 use terrasoar_layout::build::BuildOptions;
-use terrasoar_layout::dem::{Georeference, HorizontalUnit, SampleType};
+use terrasoar_layout::dem::{About, Georeference, HorizontalUnit, SampleType, UnitOf};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::VertexClass;
 
@@ -32,11 +32,15 @@ fn dem() -> MemoryDem {
 
 /// Bytes as the fixture states them: `length N`, `OFFSET: bytes in hex`, `OFFSET..END repeat bytes`; `#` begins a comment. What is not stated is zero.
 fn stated(text: &str) -> Vec<u8> {
+    stated_over(Vec::new(), text)
+}
+
+/// As [`stated`], with what is not stated as it was.
+fn stated_over(mut bytes: Vec<u8>, text: &str) -> Vec<u8> {
     let hex = |words: &str| -> Vec<u8> {
         words.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect()
     };
     let offset = |word: &str| usize::from_str_radix(word.trim(), 16).unwrap();
-    let mut bytes = Vec::new();
     for line in text.lines() {
         let line = line.split('#').next().unwrap().trim();
         if line.is_empty() {
@@ -61,11 +65,32 @@ fn stated(text: &str) -> Vec<u8> {
 
 #[test]
 fn the_file_is_as_stated_byte_for_byte() {
-    let built = build_bytes(&dem(), &BuildOptions::default()).unwrap();
+    compare(&dem(), stated(include_str!("fixtures/golden.txt")));
+}
+
+#[test]
+fn what_is_said_about_a_dem_stands_in_the_header() {
+    let mut dem = dem();
+    dem.info_mut().about = About {
+        crs_text: "EPSG:32610".into(),
+        horizontal_unit: Some(UnitOf { name: "metre".into(), size: 1.0, is_angle: false }),
+        vertical_name: "NAVD88 height (ft)".into(),
+        vertical_epsg: Some(8228),
+        vertical_unit: Some(UnitOf { name: "ft".into(), size: 0.3048, is_angle: false }),
+        origins: vec![("heights".into(), "unit ft".into())],
+        warnings: vec!["a pit".into()],
+    };
+    let plain = stated(include_str!("fixtures/golden.txt"));
+    compare(&dem, stated_over(plain, include_str!("fixtures/golden-about.txt")));
+    let terrain = open_bytes(build_bytes(&dem, &BuildOptions::default()).unwrap()).unwrap();
+    assert_eq!(terrain.header().about, dem.info_mut().about);
+}
+
+fn compare(dem: &MemoryDem, stated: Vec<u8>) {
+    let built = build_bytes(dem, &BuildOptions::default()).unwrap();
     if let Some(path) = std::env::var_os("TERRASOAR_GOLDEN_DUMP") {
         std::fs::write(path, &built).unwrap();
     }
-    let stated = stated(include_str!("fixtures/golden.txt"));
     assert_eq!(built.len(), stated.len(), "length");
     let differs = built.iter().zip(&stated).position(|(a, b)| a != b);
     if let Some(at) = differs {

@@ -15,14 +15,17 @@ use terrasoar_layout::grid::record::RecordKind;
 
 /// Make a terrain file (.iqt) from elevation data.
 ///
-/// Reads 16-bit and 8-bit grey PNG, VTP BT, SRTM .hgt (one tile, or several that border each other) and GeoTIFF, of any size and any
-/// rectangle. The output appears when it is complete; a build that fails or is killed leaves nothing, and the next one starts from the
+/// Reads GeoTIFF, PNG (grey, or heights packed into colours), PGM, .hgt (a tile, several that border each other, packed ones, or a folder of
+/// them), Esri ASCII grids, XYZ grids, .flt and .bil with their .hdr, ENVI, netCDF, DTED, USGS DEM, VTP BT and headerless heightmaps, of any size
+/// and any rectangle. The output appears when it is complete; a build that fails or is killed leaves nothing, and the next one starts from the
 /// beginning. The same input gives the same bytes whatever --threads and --memory.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   terrasoar build alps.tif -o alps.iqt
   terrasoar build N46E007.hgt N46E008.hgt -o valais.iqt
+  terrasoar build srtm-folder -o all.iqt
+  terrasoar build island.raw --raw 1025x1025:u16le --spacing 10 -o island.iqt
   terrasoar build puget.png --spacing 160 --z-scale 0.1 -o puget.iqt
   terrasoar build huge.tif --memory 2048 -o huge.iqt
   terrasoar build world.tif --reproject utm --resolution 30 -o metric.iqt
@@ -34,7 +37,7 @@ A DEM in degrees gets the spacing in metres that degrees have at its centre; `te
 state it, or it is taken to be 1 m. What else the data does not say can be stated: its reference system, its unit of heights, which numbers mean \"no data\".
 What looks wrong is said aloud, with the flag to type.")]
 pub(super) struct Args {
-    /// Elevation data: one file, or several .hgt tiles that border each other
+    /// Elevation data: one file, several .hgt tiles that border each other, or a folder of them
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
     /// Terrain file to write

@@ -1,6 +1,7 @@
 //! `terrasoar info`: what a terrain file says about itself.
 
 use super::output::{decimal, grouped, print, print_json, table};
+use super::place;
 use super::terrain::{self, TerrainArgs};
 use anyhow::Result;
 use serde::Serialize;
@@ -52,6 +53,8 @@ struct Info {
     /// What was found where.
     origins: Vec<[String; 2]>,
     warnings: Vec<String>,
+    /// West, south, east and north in degrees of WGS 84.
+    bounds_wgs84: Option<[f64; 4]>,
     /// Samples east and north of the south-west one to coordinates: x = m0 + m1 x + m2 y, y = m3 + m4 x + m5 y.
     sample_to_crs: Option<[f64; 6]>,
     record: &'static str,
@@ -139,6 +142,7 @@ impl Info {
             vertical_unit: header.about.vertical_unit.as_ref().map(terrain::unit),
             origins: header.about.origins.iter().map(|(what, words)| [what.clone(), words.clone()]).collect(),
             warnings: header.about.warnings.clone(),
+            bounds_wgs84: place::bounds_deg(header),
             sample_to_crs: header.sample_to_crs,
             record: header.record_kind.name(),
             record_bytes: header.record_kind.bytes(),

@@ -27,6 +27,7 @@ mod parse;
 mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
+mod place;
 mod progress;
 #[cfg(feature = "pictures")]
 mod quiet;

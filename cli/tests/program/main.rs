@@ -15,6 +15,7 @@ mod iobench;
 mod killed;
 #[cfg(unix)]
 mod kills;
+mod misread;
 mod outputs;
 mod pictures;
 mod support;

@@ -76,7 +76,7 @@ mod tests {
             matches!(horizontal(2263), Some(Horizontal::Text { wkt, .. }) if wkt.contains("Long Island"))
         );
         let Some(Horizontal::Parts { size, .. }) = horizontal(2221) else { panic!("2221 is missing") };
-        assert_eq!(size, HorizontalSize::Metres(0.3048));
+        assert_eq!(size, HorizontalSize::Metres(1.0));
         assert!(horizontal(7415).is_none() && horizontal(5709).is_none() && horizontal(1).is_none());
         assert_eq!(compound(7415), Some((28992, 5709)));
         let feet = vertical(6360).unwrap();

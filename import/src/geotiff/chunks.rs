@@ -2,7 +2,6 @@
 //! read here.
 
 use super::chunk_grid::{ChunkGrid, side};
-use super::lerc;
 use super::span::{LARGEST_WHOLE, Span};
 use super::stored::{MAX_BANDS, Stored};
 use super::tags::{self, Directory, TiffFile};
@@ -90,6 +89,8 @@ pub(super) struct Chunks {
     pub(super) stored_samples: u64,
 }
 
+/// Longest chunk of LERC when unpacked.
+const MOST_LERC_BYTES: u64 = 64 << 20;
 /// Longest row of a chunk: what is unpacked at once at least.
 const MAX_ROW_BYTES: u64 = 64 << 20;
 
@@ -165,7 +166,7 @@ impl Chunks {
                 ),
             ));
         }
-        if matches!(self.compression, Compression::Lerc(_)) && self.decoded_bytes() > lerc::MOST_BYTES {
+        if matches!(self.compression, Compression::Lerc(_)) && self.decoded_bytes() > MOST_LERC_BYTES {
             return Err(LayoutError::unsupported(
                 file.path(),
                 format!(
@@ -173,7 +174,7 @@ impl Chunks {
                      gdal_translate -co TILED=YES -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER INPUT output.tif",
                     self.grid.kind(),
                     self.decoded_bytes() >> 20,
-                    lerc::MOST_BYTES >> 20
+                    MOST_LERC_BYTES >> 20
                 ),
             ));
         }

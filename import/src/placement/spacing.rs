@@ -1,7 +1,7 @@
 //! Metres between samples, on the ground, at the centre of the grid.
 //!
-//! Lengths on a map are taken as they are where the map is true to a percent, as surveyors' maps are. Degrees, Mercator's and other maps that are not are measured on the ellipsoid
-//! at the centre; where the step differs from that by more than a percent within the grid, this is said, with the way out: reprojection. Coordinates of no known unit are
+//! Lengths on a map are taken as they are, for surveyors' maps are true, and where one is off by more than a percent this is said. Degrees and maps of Mercator's kind, whose steps grow with
+//! the latitude, are measured on the ground at the centre; where the step differs from that by more than a percent within the grid, this is said, with the way out: reprojection. Coordinates of no known unit are
 //! metres or degrees; which, is decided only where it is plain ([`Guess`]), and otherwise asked.
 
 use super::guess::Guess;
@@ -86,11 +86,9 @@ pub(crate) fn spacing(
             let Some((metres, latitude)) = measured(centre) else {
                 return Ok(Spacing { metres: Some(on_map), latitude_deg: None, words: String::new() });
             };
-            let off = (0..2).map(|i| (metres[i] / on_map[i] - 1.0).abs()).fold(0.0, f64::max);
-            let is_cylindrical = ground.as_ref().is_some_and(Ground::is_cylindrical);
-            if !(off > TRUE_TO || is_cylindrical && off > 1e-6) || !off.is_finite() {
+            if !ground.as_ref().is_some_and(Ground::is_cylindrical) {
                 if !stated {
-                    tell_change(&measured, &at, [columns, rows], metres, warnings);
+                    tell_off(on_map, metres, latitude, warnings);
                 }
                 return Ok(Spacing { metres: Some(on_map), latitude_deg: None, words: String::new() });
             }
@@ -106,6 +104,22 @@ pub(crate) fn spacing(
             Ok(Spacing { metres: Some(metres), latitude_deg: None, words })
         }
         None => Ok(Spacing { metres: Some(lengths), latitude_deg: None, words: String::new() }),
+    }
+}
+
+/// Says how far the map is from the ground, if it is far.
+fn tell_off(on_map_m: [f64; 2], metres: [f64; 2], latitude: f64, warnings: &mut Vec<Warning>) {
+    let off = (0..2).map(|i| (metres[i] / on_map_m[i] - 1.0).abs()).fold(0.0, f64::max);
+    if off > TRUE_TO && off.is_finite() {
+        warnings.push(
+            Warning::new(format!(
+                "distances on the map differ by {:.1} % from those on the ground at the centre, latitude {:.2}, and were taken as they are; bring the elevation model into \
+                 a system made for its place for true ones",
+                100.0 * off,
+                latitude.to_degrees()
+            ))
+            .mended_by(Remedy::Reproject, "utm"),
+        );
     }
 }
 

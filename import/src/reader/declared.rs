@@ -95,6 +95,7 @@ pub(crate) enum VerticalUnit {
     /// By its name as found: "ft", "International feet", "mm".
     Name(String),
     /// Metres a unit.
+    #[allow(dead_code, reason = "for readers of formats that give a unit's size")]
     Metres(f64),
     /// Unit code of EPSG: 9001 metre, 9002 foot, 9003 US survey foot, ...
     Code(u32),

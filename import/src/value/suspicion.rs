@@ -102,9 +102,12 @@ impl Suspicion {
                 range = [range[0].min(common), range[1].max(common)];
             }
         }
+        if range[0] > range[1] {
+            return warnings;
+        }
         let metres = range.map(|raw| raw * scale_m + offset_m);
         let [low, high] = [metres[0].min(metres[1]), metres[0].max(metres[1])];
-        if is_earth && low <= high && (low < EARTH_M[0] || high > EARTH_M[1]) {
+        if is_earth && (low < EARTH_M[0] || high > EARTH_M[1]) {
             let could_be_feet = !unit_is_known && high <= EVEREST_FEET && low >= EARTH_M[0] / 0.3048;
             let words = format!(
                 "heights go from {} to {} m, beyond any on the Earth{}",

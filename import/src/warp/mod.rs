@@ -251,8 +251,9 @@ fn rim<'a>(places: impl Iterator<Item = &'a [f64; 2]>) -> Option<([f64; 2], [f64
 
 /// The grid in the same system with its axes north-up, its steps those of the file.
 fn north_up(path: &Path, system: &System, map: &[f64; 6], samples: [u32; 2]) -> Result<Grid, LayoutError> {
-    let [column, row] = [map[1].hypot(map[4]), map[2].hypot(map[5])];
-    let steps = if map[1].abs() >= map[2].abs() { [column, row] } else { [row, column] };
+    // The step along what is nearer to the east, and across it so that as many samples cover the same ground.
+    let along = if map[1].abs() >= map[2].abs() { map[1].hypot(map[4]) } else { map[2].hypot(map[5]) };
+    let steps = [along, (map[1] * map[5] - map[2] * map[4]).abs() / along];
     target::grid(path, samples, steps, None, system.signs, |at| Some(apply(map, at)))
 }
 
@@ -298,14 +299,25 @@ fn reprojected(
     Ok((Some(target), grid, mapping))
 }
 
-/// New samples an old one at the centre, at most 1; a whole number of old ones where it is nearly that, as GDAL has it.
+/// New samples an old one, at most 1: the middle of what it is at places all over the grid, and a whole number of old ones where it is nearly that, as GDAL has it.
 fn scale(mapping: &Mapping, grid: &Grid) -> [f64; 2] {
-    let centre = grid.samples.map(|count| f64::from(count - 1) / 2.0);
-    let at = |dx: f64, dy: f64| mapping.place([centre[0] + dx, centre[1] + dy]);
-    let [a, b, c, d] = [at(-0.5, 0.0), at(0.5, 0.0), at(0.0, -0.5), at(0.0, 0.5)];
-    let old: [f64; 2] = std::array::from_fn(|i| (b[i] - a[i]).abs().max((d[i] - c[i]).abs()));
-    old.map(|old| {
-        if !old.is_finite() || old <= 1.05 {
+    let mut found: [Vec<f64>; 2] = Default::default();
+    for (i, j) in (0..5u32).flat_map(|j| (0..5u32).map(move |i| (i, j))) {
+        let share = |k: u32, count: u32| (f64::from(count) - 1.0) * (0.1 + 0.2 * f64::from(k));
+        let (x, y) = (share(i, grid.samples[0]), share(j, grid.samples[1]));
+        let at = |dx: f64, dy: f64| mapping.place([x + dx, y + dy]);
+        let [a, b, c, d] = [at(-0.5, 0.0), at(0.5, 0.0), at(0.0, -0.5), at(0.0, 0.5)];
+        for (k, found) in found.iter_mut().enumerate() {
+            let old = (b[k] - a[k]).abs().max((d[k] - c[k]).abs());
+            if old.is_finite() {
+                found.push(old);
+            }
+        }
+    }
+    found.map(|mut found| {
+        found.sort_by(f64::total_cmp);
+        let old = found.get(found.len() / 2).copied().unwrap_or(1.0);
+        if old <= 1.05 {
             return 1.0;
         }
         let whole = old.round();

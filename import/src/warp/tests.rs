@@ -66,7 +66,8 @@ fn turned_grids_come_north_up() {
             // At the rim a kernel lacks samples on one side.
             let off = (value - plane(x, y)).abs();
             assert!(off < 10.0, "{kernel:?} at {x}, {y}: {off}");
-            seen += u32::from(off < 0.05);
+            // Lanczos' weights are near those of a plane, no more.
+            seen += u32::from(off < if kernel == Resampling::Lanczos { 0.5 } else { 0.05 });
         }
         // As many as before, and nearly all of them right: the area is the same.
         assert!(seen > 4000, "{kernel:?}: {seen} of {}", 81 * 61);

@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use terrasoar_import::OpenOptions;
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
 
@@ -73,9 +74,10 @@ pub(crate) fn collect(dem: &dyn DemSource) -> Result<Grid, LayoutError> {
     Ok(Grid { info, samples })
 }
 
-/// Opens and streams files.
+/// Opens and streams files, rows and columns as they lie in them.
 pub(crate) fn read(paths: &[PathBuf]) -> Result<Grid, LayoutError> {
-    collect(&*terrasoar_import::open(paths)?)
+    let options = OpenOptions { as_stored: true, ..OpenOptions::default() };
+    collect(&*terrasoar_import::open_with(paths, &options)?)
 }
 
 /// The message with which opening or streaming fails.

@@ -95,8 +95,10 @@ pub(super) fn check_heights(
     let range_m = stats.range.map(|raw| code.metres(code.code(raw)));
     let range_m = if code.raw_step < 0.0 { [range_m[1], range_m[0]] } else { range_m };
     if range_m.iter().any(|h| h.is_nan() || h.abs() > 1e9) || code.step_m.is_nan() || code.step_m <= 0.0 {
+        // Wider than any terrain, before any factor: a mark for "no data" is likely.
+        let is_wide = stats.range.iter().any(|raw| raw.abs() > 1e9);
         let [low, high] = stats.range.map(number);
-        let (hint, remedy) = if !info.sample_type.is_integer() {
+        let (hint, remedy) = if is_wide || !info.sample_type.is_integer() {
             ("is a no-data value not declared? name it", Remedy::Nodata)
         } else {
             ("check the factor on heights", Remedy::HeightFactor)

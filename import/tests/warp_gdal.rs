@@ -1,0 +1,186 @@
+//! Warps against a live `gdalwarp`, kernel by kernel: every sample within what a twentieth of a sample's shift would change.
+//!
+//! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-import --test warp_gdal -- --ignored`.
+
+mod import_support;
+
+use import_support::{Grid, collect};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::tempdir;
+use terrasoar_import::{OpenOptions, Resampling, open_with};
+
+fn run(program: &str, arguments: &[&str]) {
+    let output = Command::new(program)
+        .args(arguments)
+        .output()
+        .unwrap_or_else(|_| panic!("{program} is needed: install gdal-bin"));
+    assert!(output.status.success(), "{program} {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn read(path: &Path, options: &OpenOptions) -> Grid {
+    collect(&*open_with(&[path.to_owned()], options).unwrap()).unwrap()
+}
+
+/// A terrain of hills and some voids as a Float32 GeoTIFF with this map of corners: upper left, lower right.
+fn hills(folder: &Path, system: &str, [west, north, east, south]: [f64; 4], samples: [u32; 2]) -> PathBuf {
+    let plain = folder.join("hills.asc");
+    let [wide, high] = samples;
+    let mut text =
+        format!("ncols {wide}\nnrows {high}\nxllcorner 0\nyllcorner 0\ncellsize 1\nNODATA_value -9999\n");
+    for row in 0..high {
+        for col in 0..wide {
+            let (x, y) = (f64::from(col), f64::from(row));
+            let void = (60..75).contains(&col) && (40..52).contains(&row) || (col * 7 + row * 13) % 331 == 0;
+            let height = 500.0 + 200.0 * (x / 9.0).sin() * (y / 11.0).cos() + 3.0 * x - 2.0 * y;
+            text.push_str(&if void { "-9999 ".to_owned() } else { format!("{height:.3} ") });
+        }
+        text.push('\n');
+    }
+    std::fs::write(&plain, text).unwrap();
+    let path = folder.join("hills.tif");
+    let corners = [west, north, east, south].map(|value| value.to_string());
+    let [plain, tif] = [&plain, &path].map(|path| path.to_str().unwrap().to_owned());
+    run(
+        "gdal_translate",
+        &[
+            "-q",
+            "-ot",
+            "Float32",
+            "-a_srs",
+            system,
+            "-a_ullr",
+            &corners[0],
+            &corners[1],
+            &corners[2],
+            &corners[3],
+            &plain,
+            &tif,
+        ],
+    );
+    path
+}
+
+/// Compares what is read of `path` with `options` to what gdalwarp makes on the same grid.
+fn agrees(path: &Path, target: &str, options: &OpenOptions, folder: &Path) {
+    let ours = read(path, options);
+    let map = ours.info.georeference.pixel_to_crs.unwrap();
+    let [wide, high] = [ours.info.samples_wide, ours.info.samples_high].map(f64::from);
+    let (west, north) = (map[0] - 0.5 * map[1], map[3] - 0.5 * map[5]);
+    let extent =
+        [west, north + map[5] * high, west + map[1] * wide, north].map(|value| format!("{value:.9}"));
+    let size = [ours.info.samples_wide, ours.info.samples_high].map(|count| count.to_string());
+    let name = options.resampling.unwrap_or_default().name();
+    let kernel = if name == "nearest" { "near" } else { name };
+    let out = folder.join(format!("{name}.tif"));
+    let [from, to] = [path, &out].map(|path| path.to_str().unwrap().to_owned());
+    run(
+        "gdalwarp",
+        &[
+            "-q",
+            "-overwrite",
+            "-et",
+            "0",
+            "-t_srs",
+            target,
+            "-r",
+            kernel,
+            "-dstnodata",
+            "-9999",
+            "-te",
+            &extent[0],
+            &extent[1],
+            &extent[2],
+            &extent[3],
+            "-ts",
+            &size[0],
+            &size[1],
+            &from,
+            &to,
+        ],
+    );
+    let theirs =
+        read(&out, &OpenOptions { as_stored: true, spacing_is_stated: true, ..OpenOptions::default() });
+    assert_eq!(ours.samples.len(), theirs.samples.len());
+    // How much the terrain changes over a twentieth of a sample: by the steps between neighbours.
+    let width = ours.info.samples_wide as usize;
+    let steepest = |at: usize| {
+        let around = [at.wrapping_sub(1), at + 1, at.wrapping_sub(width), at + width];
+        let step =
+            around.iter().filter_map(|other| Some((theirs.samples.get(*other)? - theirs.samples[at]).abs()));
+        step.filter(|step| !step.is_nan()).fold(1.0, f64::max)
+    };
+    let (mut voids, mut both, mut worst) = (0, 0, 0.0f64);
+    for (at, (a, b)) in ours.samples.iter().zip(&theirs.samples).enumerate() {
+        match (a.is_nan(), b.is_nan()) {
+            (false, false) => {
+                both += 1;
+                worst = worst.max((a - b).abs() / steepest(at));
+            }
+            (true, true) => {}
+            _ => voids += 1,
+        }
+    }
+    // The rim and edges of voids are a rounding's affair: one in two hundred.
+    println!("{name} to {target}: {both} samples, {voids} voids differ, worst {worst:.4} of a step");
+    assert!(
+        both > 3000 && voids * 200 <= both,
+        "{name}: {voids} of {both} samples are void on one side alone"
+    );
+    assert!(worst <= 0.05, "{name}: {worst} of a step");
+}
+
+#[test]
+#[ignore = "needs gdalwarp"]
+fn kernels_are_those_of_gdal() {
+    let folder = tempdir().unwrap();
+    let path = hills(folder.path(), "EPSG:4326", [8.0, 46.06, 8.12, 45.96], [120, 100]);
+    for resampling in Resampling::ALL {
+        for resolution in [None, Some(80.0), Some(300.0)] {
+            let options = OpenOptions {
+                reproject: Some("utm".into()),
+                resampling: Some(resampling),
+                resolution,
+                ..OpenOptions::default()
+            };
+            agrees_with_size(&path, "EPSG:32632", &options, folder.path(), resolution);
+        }
+    }
+}
+
+/// Coarse grids have few samples; what is asked of them is the same.
+fn agrees_with_size(
+    path: &Path,
+    target: &str,
+    options: &OpenOptions,
+    folder: &Path,
+    resolution: Option<f64>,
+) {
+    match resolution {
+        Some(metres) if metres > 100.0 => {
+            let finer = hills(folder, "EPSG:4326", [8.0, 46.3, 8.36, 45.9], [360, 400]);
+            agrees(&finer, target, options, folder);
+        }
+        _ => agrees(path, target, options, folder),
+    }
+}
+
+#[test]
+#[ignore = "needs gdalwarp"]
+fn systems_of_every_kind_are_brought_over() {
+    let folder = tempdir().unwrap();
+    for (system, corners, target, resolution) in [
+        ("EPSG:32632", [500_000.0, 5_010_000.0, 512_000.0, 5_000_000.0], "EPSG:3857", 150.0),
+        ("EPSG:2263", [980_000.0, 210_000.0, 992_000.0, 200_000.0], "EPSG:26918", 40.0),
+        ("EPSG:3857", [1_200_000.0, 8_410_000.0, 1_212_000.0, 8_400_000.0], "EPSG:3035", 60.0),
+        ("EPSG:4326", [350.0, 70.0, 362.0, 60.0], "EPSG:3413", 9000.0),
+    ] {
+        let path = hills(folder.path(), system, corners, [120, 100]);
+        let options = OpenOptions {
+            reproject: Some(target.into()),
+            resolution: Some(resolution),
+            ..OpenOptions::default()
+        };
+        agrees(&path, target, &options, folder.path());
+    }
+}
