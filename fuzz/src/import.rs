@@ -5,6 +5,7 @@ use crate::words::{refused, told};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::PoisonError;
+use terrasoar_import::OpenOptions;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{DemInfo, DemSource, SampleSink, Window};
@@ -22,15 +23,21 @@ pub(crate) fn seeds() -> Inputs {
 }
 
 pub(crate) fn body(data: &[u8]) {
-    let folder = crate::scratch::folder();
     let is_hgt = !(data.starts_with(b"\x89PNG")
         || data.starts_with(b"binterr")
         || data.starts_with(b"II")
         || data.starts_with(b"MM"));
     // These tiles alone are told by their name.
-    let path = folder.path().join(if is_hgt { "N10E010.hgt" } else { "dem" });
-    seeds::write(&path, &seeds::with_png_sums(data));
-    let Some(dem) = told(terrasoar_import::open(std::slice::from_ref(&path))) else { return };
+    let name = if is_hgt { "N10E010.hgt" } else { "dem" };
+    read(&[(name, &seeds::with_png_sums(data))], &OpenOptions::default());
+}
+
+/// Opens the first of some files that lie in one folder, streams it and builds it.
+pub(crate) fn read(files: &[(&str, &[u8])], options: &OpenOptions) {
+    let folder = crate::scratch::folder();
+    files.iter().for_each(|(name, bytes)| seeds::write(&folder.path().join(name), bytes));
+    let path = folder.path().join(files.first().map_or("dem", |(name, _)| name));
+    let Some(dem) = told(terrasoar_import::open_with(std::slice::from_ref(&path), options)) else { return };
     let info = dem.info();
     assert!(info.samples_wide >= 2 && info.samples_high >= 2, "{info:?}");
     let sink = Sink::new(info);
@@ -39,12 +46,12 @@ pub(crate) fn body(data: &[u8]) {
         sink.check_whole();
     }
     if u64::from(info.samples_wide) * u64::from(info.samples_high) <= MOST_SAMPLES {
-        builds(&*dem, folder.path());
+        builds(&*dem, folder.path(), files.len());
     }
 }
 
 /// What is built opens and is sound; what is not built leaves nothing.
-fn builds(dem: &dyn DemSource, folder: &Path) {
+fn builds(dem: &dyn DemSource, folder: &Path, files: usize) {
     let out = folder.join("out.iqt");
     let options = BuildOptions::default().memory_mib(48);
     match build(dem, &out, &options, &Silent) {
@@ -63,7 +70,7 @@ fn builds(dem: &dyn DemSource, folder: &Path) {
     }
     let names: Vec<_> =
         std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
-    assert!(names.len() <= 2, "{names:?}");
+    assert!(names.len() <= files + 1, "{names:?}");
 }
 
 /// Looks at what arrives, and has enough after a while.

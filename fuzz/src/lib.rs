@@ -6,6 +6,8 @@
 mod edits;
 mod flight;
 mod fly;
+mod gridded;
+mod grids;
 mod image;
 mod import;
 mod land;
@@ -19,6 +21,8 @@ mod use_files;
 mod words;
 mod world_file;
 
+use gridded::{dted, netcdf, usgs_dem};
+use grids::{ascii_grid, labelled, netpbm, packed_png, raw, tiles, xyz};
 pub use seeds::Inputs;
 
 use std::panic::{PanicHookInfo, resume_unwind};
@@ -84,6 +88,26 @@ macro_rules! targets {
 targets! {
     /// Elevation data: opened, streamed, built with little memory, the file that comes of it opened and verified.
     import { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// An Esri ASCII grid.
+    ascii_grid { is_text: true, fixed_mib: 160, per_byte: 64 }
+    /// An XYZ grid.
+    xyz { is_text: true, fixed_mib: 160, per_byte: 64 }
+    /// Plain numbers with a label of ESRI's or ENVI's beside them.
+    labelled { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A Netpbm picture.
+    netpbm { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A heightmap without a header, and what a person says of its shape.
+    raw { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// An `.hgt` tile, packed or in an archive.
+    tiles { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A PNG whose colours are heights, or in seven passes.
+    packed_png { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// NetCDF, classic and over HDF5.
+    netcdf { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A DTED cell.
+    dted { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A sheet of the USGS.
+    usgs_dem { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// A picture: opened, read, draped, its tiles read.
     image { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A world file beside a picture: draped where it says.

@@ -59,6 +59,56 @@ fn elevation_data() {
 }
 
 #[test]
+fn ascii_grids() {
+    replay("ascii_grid");
+}
+
+#[test]
+fn xyz_grids() {
+    replay("xyz");
+}
+
+#[test]
+fn labelled_numbers() {
+    replay("labelled");
+}
+
+#[test]
+fn netpbm_pictures() {
+    replay("netpbm");
+}
+
+#[test]
+fn headerless_heightmaps() {
+    replay("raw");
+}
+
+#[test]
+fn packed_tiles() {
+    replay("tiles");
+}
+
+#[test]
+fn packed_png() {
+    replay("packed_png");
+}
+
+#[test]
+fn netcdf() {
+    replay("netcdf");
+}
+
+#[test]
+fn cells_of_dted() {
+    replay("dted");
+}
+
+#[test]
+fn sheets_of_the_usgs() {
+    replay("usgs_dem");
+}
+
+#[test]
 fn pictures() {
     replay("image");
 }

@@ -251,13 +251,14 @@ fn png_kinds() {
     std::fs::write(&path, png(ColorType::Rgb, BitDepth::Eight, &[0; 36], |_| ())).unwrap();
     let message = refusal(std::slice::from_ref(&path));
     assert!(message.contains("8-bit RGB PNG") && message.contains("gdal_translate"), "{message}");
-    // The encoder cannot interlace: set the flag and repair the header's checksum.
+    // Interlaced by its header alone: seven passes take more bytes than its rows. Set the flag and repair the header's checksum.
     let mut interlaced = png(ColorType::Grayscale, BitDepth::Eight, &bytes[..12], |_| ());
     interlaced[28] = 1;
     let checksum = crc32fast::hash(&interlaced[12..29]);
     interlaced[29..33].copy_from_slice(&checksum.to_be_bytes());
     std::fs::write(&path, interlaced).unwrap();
-    assert!(refusal(&[path]).contains("interlaced"));
+    let message = refusal(&[path]);
+    assert!(message.contains("damaged") || message.contains("ends early"), "{message}");
 }
 
 #[test]
@@ -272,7 +273,7 @@ fn strangers_are_named() {
     // The name decides nothing.
     assert!(say("a.tif", b"\xff\xd8\xff\xe0 and so on").contains("JPEG picture"));
     assert!(say("a.zip", b"PK\x03\x04....").contains("unpack"));
-    assert!(say("a.asc", b"ncols 100\nnrows 100\n").contains("gdal_translate"));
+    assert!(say("a.asc", b"ncols 100\nnrows 100\n").contains("100 x 100 samples do not fit"));
     assert!(say("a.iqt", b"whatever it is").contains("already built"));
     let unknown = say("a.dat", b"what is this");
     assert!(
@@ -280,7 +281,7 @@ fn strangers_are_named() {
         "{unknown}"
     );
     assert!(say("empty.tif", b"").contains("empty"));
-    assert!(refusal(&[folder.path().to_owned()]).contains("directory"));
+    assert!(refusal(&[folder.path().to_owned()]).contains("no .hgt tiles in this folder"));
     assert!(refusal(&[folder.path().join("missing.tif")]).contains("missing.tif"));
     assert!(refusal(&[]).contains("no elevation file"));
     // Right by content, wrong by name.

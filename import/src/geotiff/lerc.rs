@@ -2,7 +2,7 @@
 //!
 //! A chunk is one blob, which `lerc-reader` unpacks as a whole; so its size is held against that of the chunk before, and chunks of more than
 //! [`MOST_BYTES`] are refused when the file is opened. What a blob's mask leaves out is NaN among reals; among whole numbers it has no value, and stays 0 as
-//! libtiff has it.
+//! libtiff has it. libtiff packs the bytes of a big-endian file as if they were little-endian numbers, so what comes out stands in the file's order either way.
 
 use super::chunks::Chunks;
 use super::failure::Failure;
@@ -59,36 +59,31 @@ pub(super) fn unpack(chunks: &Chunks, blob: &[u8], rows: u32) -> Result<Vec<u8>,
 }
 
 macro_rules! bytes {
-    ($values:expr, $big:expr) => {
-        if $big {
-            $values.iter().flat_map(|value| value.to_be_bytes()).collect()
-        } else {
-            $values.iter().flat_map(|value| value.to_le_bytes()).collect()
-        }
+    ($values:expr) => {
+        $values.iter().flat_map(|value| value.to_le_bytes()).collect()
     };
 }
 
 /// The samples as bytes in the file's order, if they are of the type that the file declares.
 fn samples(decoded: &Decoded, depth: usize, chunks: &Chunks) -> Option<Vec<u8>> {
     use lerc_core::PixelData;
-    let big = chunks.big_endian;
+    // A NaN whichever way its bytes are read.
+    let (nan_32, nan_64) = (f32::from_bits(u32::MAX), f64::from_bits(u64::MAX));
     let hidden = |at: usize| decoded.mask.as_ref().is_some_and(|mask| mask.get(at / depth) == Some(&0));
     Some(match (&decoded.pixels, chunks.sample_type) {
-        (PixelData::I8(values), SampleType::I8) => bytes!(values, big),
-        (PixelData::U8(values), SampleType::U8) => bytes!(values, big),
-        (PixelData::I16(values), SampleType::I16) => bytes!(values, big),
-        (PixelData::U16(values), SampleType::U16) => bytes!(values, big),
-        (PixelData::I32(values), SampleType::I32) => bytes!(values, big),
-        (PixelData::U32(values), SampleType::U32) => bytes!(values, big),
+        (PixelData::I8(values), SampleType::I8) => bytes!(values),
+        (PixelData::U8(values), SampleType::U8) => bytes!(values),
+        (PixelData::I16(values), SampleType::I16) => bytes!(values),
+        (PixelData::U16(values), SampleType::U16) => bytes!(values),
+        (PixelData::I32(values), SampleType::I32) => bytes!(values),
+        (PixelData::U32(values), SampleType::U32) => bytes!(values),
         (PixelData::F32(values), SampleType::F32) => {
-            let seen =
-                values.iter().enumerate().map(|(at, value)| if hidden(at) { f32::NAN } else { *value });
-            bytes!(seen.collect::<Vec<_>>(), big)
+            let seen = values.iter().enumerate().map(|(at, value)| if hidden(at) { nan_32 } else { *value });
+            bytes!(seen.collect::<Vec<_>>())
         }
         (PixelData::F64(values), SampleType::F64) => {
-            let seen =
-                values.iter().enumerate().map(|(at, value)| if hidden(at) { f64::NAN } else { *value });
-            bytes!(seen.collect::<Vec<_>>(), big)
+            let seen = values.iter().enumerate().map(|(at, value)| if hidden(at) { nan_64 } else { *value });
+            bytes!(seen.collect::<Vec<_>>())
         }
         _ => return None,
     })

@@ -1,8 +1,8 @@
 //! How a sample is stored: whole numbers of 1 to 64 bits and reals of 16, 24, 32 and 64.
 //!
 //! Samples of a width that no machine has are packed without gaps, the most significant bit first whatever the byte order, and rows begin at a byte (TIFF 6.0, section 8;
-//! GDAL's NBITS). Those of 24 bits are three bytes in the file's byte order, as libtiff and GDAL have them; a real of 24 bits is a sign, 7 bits of exponent and
-//! 16 of fraction (Adobe Photoshop TIFF Technical Note 3, 2005). Cost: one pass.
+//! GDAL's NBITS). Those of 24 bits are what GDAL makes of them, which is nearly alone in writing such files: the most significant byte first, and in big-endian files last. A real of
+//! 24 bits is in the file's byte order: a sign, 7 bits of exponent and 16 of fraction (Adobe Photoshop TIFF Technical Note 3, 2005). Cost: one pass.
 
 use super::tags::{self, Directory, TiffFile};
 use terrasoar_layout::dem::SampleType;
@@ -110,8 +110,11 @@ impl Stored {
     /// The first `count` samples of a row that is not plain.
     pub(super) fn odd(self, row: &[u8], big_endian: bool, count: usize) -> impl Iterator<Item = f64> {
         (0..count).map(move |number| {
-            let value =
-                if self.bits == 24 { triple(row, big_endian, number) } else { bits(row, self.bits, number) };
+            let value = match (self.bits, self.kind) {
+                (24, Kind::Real) => triple(row, big_endian, number),
+                (24, _) => triple(row, !big_endian, number),
+                _ => bits(row, self.bits, number),
+            };
             match self.kind {
                 Kind::Unsigned => value as f64,
                 Kind::Signed => ((value << (64 - self.bits)) as i64 >> (64 - self.bits)) as f64,

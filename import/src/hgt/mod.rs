@@ -1,19 +1,25 @@
-//! SRTM height tiles (`.hgt`): one, or a mosaic of neighbours.
+//! SRTM height tiles (`.hgt`): one, or a mosaic of neighbours; packed ones, archives and folders of them.
 //!
-//! A tile has no header: `side * side` big-endian 16-bit heights in metres from the north-west corner,
-//! rows eastwards, covering one degree each way *including* both borders, void -32768. Its name says
-//! its south-west corner. Neighbours repeat their common border, so a mosaic of `n` tiles in a line has
+//! A tile has no header: big-endian 16-bit heights in metres from the north-west corner, rows eastwards, covering one degree each way *including* both borders,
+//! void -32768. Its length says how many ([`shape`]), its name its south-west corner. Neighbours repeat their common border, so a mosaic of `n` tiles in a line has
 //! `n * (side - 1) + 1` samples. The grid spans the tiles' bounding box; what no tile covers is void.
 
+mod folder;
 mod mosaic;
 mod name;
+mod shape;
+mod tile;
+mod unpacked;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use crate::reader::{CrsSaid, Declared, Reader, Said};
+use crate::reader::{CrsSaid, Declared, HorizontalSize, Reader, Said};
+pub(crate) use folder::tiles_in;
 use mosaic::Mosaic;
 use terrasoar_layout::dem::{SampleSink, SampleType};
 use terrasoar_layout::error::LayoutError;
+use tile::Tile;
+pub(crate) use tile::{has_tiles, is_tile};
 
 /// One or several `.hgt` tiles.
 #[derive(Debug)]
@@ -22,35 +28,30 @@ pub(super) struct HgtDem {
     mosaic: Mosaic,
 }
 
-/// Samples along a side of the tile at `path`, from its length.
-pub(super) fn side_of(path: &Path, file_bytes: u64) -> Result<u32, LayoutError> {
-    let side = (file_bytes / 2).isqrt();
-    match u32::try_from(side) {
-        Ok(side @ 2..) if u64::from(side).pow(2) * 2 == file_bytes => Ok(side),
-        _ => Err(LayoutError::not_this_format(
-            path,
-            format!(
-                "{file_bytes} bytes are no square of 16-bit heights, so this is no .hgt tile or it is cut short (1201 x \
-                 1201 heights are 2884802 bytes, 3601 x 3601 are 25934402); fetch it again, and unpack it if it is an archive"
-            ),
-        )),
-    }
-}
-
 impl HgtDem {
-    /// Places the tiles; reads only their lengths.
-    pub(super) fn open(paths: &[PathBuf]) -> Result<Self, LayoutError> {
-        let mosaic = Mosaic::place(paths)?;
-        let step = 1.0 / f64::from(mosaic.side - 1);
-        let format = match paths.len() {
-            1 => format!("SRTM .hgt, {0} x {0}", mosaic.side),
-            tiles => format!("mosaic of {tiles} SRTM .hgt tiles, {0} x {0} each", mosaic.side),
+    /// Places the tiles, which have the `stated` columns and rows if a person states them; reads only their lengths.
+    pub(super) fn open(paths: &[PathBuf], stated: Option<[u32; 2]>) -> Result<Self, LayoutError> {
+        let mut tiles = Vec::new();
+        for path in paths {
+            tiles.extend(Tile::all_of(path, stated)?);
+        }
+        let count = tiles.len();
+        let mosaic = Mosaic::place(tiles)?;
+        let [wide, high] = mosaic.sides;
+        let format = match count {
+            1 => format!("SRTM .hgt, {wide} x {high}"),
+            tiles => format!("mosaic of {tiles} SRTM .hgt tiles, {wide} x {high} each"),
         };
         let mut declared = Declared::new([mosaic.samples_wide, mosaic.samples_high], SampleType::I16, format);
-        declared.crs = CrsSaid { code: Some(Said::new(4326, "the format .hgt")), ..CrsSaid::default() };
+        declared.crs = CrsSaid {
+            code: Some(Said::new(4326, "the format .hgt")),
+            unit: Some(Said::new(HorizontalSize::Radians(1f64.to_radians()), "the format .hgt")),
+            ..CrsSaid::default()
+        };
         match mosaic.north_west {
             Some((north, west)) => {
-                declared.place = Some(Said::new([west, step, 0.0, north, 0.0, -step], "the file's name"));
+                let [across, down] = [wide, high].map(|side| 1.0 / f64::from(side - 1));
+                declared.place = Some(Said::new([west, across, 0.0, north, 0.0, -down], "the file's name"));
             }
             // The tile is a degree wide wherever it is, but how many metres that is depends on its latitude.
             None => declared.crs.name = "WGS 84, one degree square at an unknown place".into(),
@@ -62,6 +63,10 @@ impl HgtDem {
 impl Reader for HgtDem {
     fn declared(&self) -> &Declared {
         &self.declared
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.mosaic.memory_bytes()
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {

@@ -10,12 +10,12 @@
 
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
-use std::path::PathBuf;
 
 use super::super::WINDOW_SAMPLES;
 use super::super::input;
 use super::super::parallel::each_task;
-use super::{name, side_of};
+use super::tile::Tile;
+use super::unpacked::{Unpacked, WORKERS};
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
 
@@ -27,50 +27,42 @@ const CELLS_PER_TILE: u64 = 1000;
 /// Tiles with their places in the grid.
 #[derive(Debug)]
 pub(super) struct Mosaic {
-    /// Samples along a tile's side.
-    pub(super) side: u32,
+    /// Samples along a tile's sides: columns, rows.
+    pub(super) sides: [u32; 2],
     pub(super) samples_wide: u32,
     pub(super) samples_high: u32,
     /// Latitude and longitude of the first sample, unless the only tile's name does not say.
     pub(super) north_west: Option<(f64, f64)>,
     cells_wide: u32,
     cells_high: u32,
-    /// Tiles by (cell row from the north, cell column from the west).
-    tiles: BTreeMap<(u32, u32), PathBuf>,
+    tiles: Vec<Tile>,
+    /// Numbers of tiles by (cell row from the north, cell column from the west).
+    places: BTreeMap<(u32, u32), usize>,
+    unpacked: Unpacked,
 }
 
 impl Mosaic {
-    /// Works out where the tiles at `paths` lie and that they fit together.
-    pub(super) fn place(paths: &[PathBuf]) -> Result<Self, LayoutError> {
-        let mut side = None;
-        for path in paths {
-            let metadata = std::fs::metadata(path);
-            let bytes =
-                metadata.map_err(|source| LayoutError::io(path, "cannot read the .hgt tile", source))?.len();
-            let this = side_of(path, bytes)?;
-            if *side.get_or_insert(this) != this {
-                return Err(LayoutError::Usage(format!(
-                    "{}: this tile has {this} x {this} heights and {} has {side} x {side}; a mosaic needs tiles of one \
-                     resolution: build them apart, or resample with gdalwarp",
-                    path.display(),
-                    paths[0].display(),
-                    side = side.unwrap_or(this),
-                )));
+    /// Works out where the tiles lie and that they fit together.
+    pub(super) fn place(tiles: Vec<Tile>) -> Result<Self, LayoutError> {
+        let mut corners: Vec<(i32, i32)> = Vec::with_capacity(tiles.len());
+        let sides = match tiles.first() {
+            Some(first) => first.samples,
+            None => return Err(LayoutError::Usage("no .hgt tile was named".into())),
+        };
+        for tile in &tiles {
+            if tile.samples != sides {
+                return Err(unlike(&tiles[0], tile));
             }
-        }
-        let side = side.ok_or_else(|| LayoutError::Usage("no .hgt tile was named".into()))?;
-        let mut corners: Vec<(i32, i32)> = Vec::with_capacity(paths.len());
-        for path in paths {
-            match name::corner(path) {
+            match tile.corner() {
                 Some(corner) => corners.push(corner),
-                None if paths.len() == 1 => {
-                    return Self::with_cells(side, None, (1, 1), vec![((0, 0), path.clone())]);
+                None if tiles.len() == 1 => {
+                    return Self::with_cells(sides, None, (1, 1), vec![(0, 0)], tiles);
                 }
                 None => {
                     return Err(LayoutError::Usage(format!(
                         "{}: the name does not say where the tile lies; in a mosaic name every tile by its south-west \
                          corner, like N29E080.hgt",
-                        path.display()
+                        tile.shown()
                     )));
                 }
             }
@@ -81,27 +73,25 @@ impl Mosaic {
         let west = corners.iter().map(|c| c.1).min().unwrap_or(0);
         let east = corners.iter().map(|c| c.1).max().unwrap_or(0);
         let cells = (north.abs_diff(south) + 1, east.abs_diff(west) + 1);
-        let placed = corners
-            .iter()
-            .zip(paths)
-            .map(|(c, path)| ((north.abs_diff(c.0), c.1.abs_diff(west)), path.clone()));
-        Self::with_cells(side, Some((f64::from(north + 1), f64::from(west))), cells, placed.collect())
+        let placed = corners.iter().map(|c| (north.abs_diff(c.0), c.1.abs_diff(west))).collect();
+        Self::with_cells(sides, Some((f64::from(north + 1), f64::from(west))), cells, placed, tiles)
     }
 
     fn with_cells(
-        side: u32,
+        sides: [u32; 2],
         north_west: Option<(f64, f64)>,
         (cells_high, cells_wide): (u32, u32),
-        placed: Vec<((u32, u32), PathBuf)>,
+        placed: Vec<(u32, u32)>,
+        tiles: Vec<Tile>,
     ) -> Result<Self, LayoutError> {
-        let samples = |cells: u32| {
+        let samples = |cells: u32, side: u32| {
             u32::try_from(u64::from(cells) * u64::from(side - 1) + 1).map_err(|_| {
                 LayoutError::Usage(format!(
                     "a mosaic of {cells} tiles in a line has too many samples; name fewer"
                 ))
             })
         };
-        let (samples_high, samples_wide) = (samples(cells_high)?, samples(cells_wide)?);
+        let (samples_high, samples_wide) = (samples(cells_high, sides[1])?, samples(cells_wide, sides[0])?);
         if u64::from(cells_high) * u64::from(cells_wide) > CELLS_PER_TILE * placed.len() as u64 {
             return Err(LayoutError::Usage(format!(
                 "the {} tiles lie scattered over {cells_wide} x {cells_high} degrees, nearly all of it void; name tiles \
@@ -109,28 +99,47 @@ impl Mosaic {
                 placed.len()
             )));
         }
-        let mut tiles = BTreeMap::new();
-        for (cell, path) in placed {
-            if let Some(earlier) = tiles.insert(cell, path.clone()) {
+        let mut places = BTreeMap::new();
+        for (number, cell) in placed.into_iter().enumerate() {
+            if let Some(earlier) = places.insert(cell, number) {
                 return Err(LayoutError::Usage(format!(
                     "{} and {} are the same tile; name each tile once",
-                    earlier.display(),
-                    path.display()
+                    tiles[earlier].shown(),
+                    tiles[number].shown()
                 )));
             }
         }
-        Ok(Self { side, samples_wide, samples_high, north_west, cells_wide, cells_high, tiles })
+        let unpacked = Unpacked::default();
+        Ok(Self {
+            sides,
+            samples_wide,
+            samples_high,
+            north_west,
+            cells_wide,
+            cells_high,
+            tiles,
+            places,
+            unpacked,
+        })
+    }
+
+    /// Memory that packed tiles take.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        let packed = self.tiles.iter().filter(|tile| tile.is_packed());
+        packed.take(Unpacked::MOST).map(Tile::bytes).sum()
     }
 
     /// Pushes every sample of the grid once.
     pub(super) fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let [across_side, down_side] = self.sides;
         let band_rows =
-            u32::try_from(WINDOW_SAMPLES / u64::from(self.side)).unwrap_or(u32::MAX).clamp(1, self.side);
-        let bands = u64::from(self.side.div_ceil(band_rows));
+            u32::try_from(WINDOW_SAMPLES / u64::from(across_side)).unwrap_or(u32::MAX).clamp(1, down_side);
+        let bands = u64::from(down_side.div_ceil(band_rows));
+        let workers = if self.tiles.iter().any(Tile::is_packed) { WORKERS } else { usize::MAX };
         let tasks = u64::from(self.cells_wide) * u64::from(self.cells_high) * bands;
-        each_task(
+        let streamed = each_task(
             tasks,
-            usize::MAX,
+            workers,
             || Ok(()),
             |(), task| {
                 let cell = task / bands;
@@ -138,15 +147,15 @@ impl Mosaic {
                 let (down, across) =
                     ((cell / u64::from(self.cells_wide)) as u32, (cell % u64::from(self.cells_wide)) as u32);
                 let first = (task % bands) as u32 * band_rows;
-                let height = if down + 1 == self.cells_high { self.side } else { self.side - 1 };
-                let width = if across + 1 == self.cells_wide { self.side } else { self.side - 1 };
+                let height = if down + 1 == self.cells_high { down_side } else { down_side - 1 };
+                let width = if across + 1 == self.cells_wide { across_side } else { across_side - 1 };
                 if first >= height {
                     return Ok(());
                 }
                 let rows = band_rows.min(height - first);
                 let window = Window {
-                    col: across * (self.side - 1),
-                    row: down * (self.side - 1) + first,
+                    col: across * (across_side - 1),
+                    row: down * (down_side - 1) + first,
                     width,
                     height: rows,
                 };
@@ -155,7 +164,9 @@ impl Mosaic {
                     None => sink.put_void(window),
                 }
             },
-        )
+        );
+        self.unpacked.clear();
+        streamed
     }
 
     /// The samples of a cell's rows `first..first + rows` and its first `width` columns; `None` if all are void.
@@ -167,7 +178,7 @@ impl Mosaic {
         width: u32,
     ) -> Result<Option<Vec<f64>>, LayoutError> {
         let (down, across) = cell;
-        let side = self.side as usize;
+        let side = self.sides[0] as usize;
         let width = width as usize;
         let mut heights = vec![VOID; width * rows as usize];
         if let Some(own) = self.rows_of(Some(down), Some(across), first, rows)? {
@@ -175,7 +186,7 @@ impl Mosaic {
                 to.copy_from_slice(&from[..width]);
             }
         }
-        let last = self.side - 1;
+        let last = self.sides[1] - 1;
         if first == 0
             && heights[..width].contains(&VOID)
             && let Some(north) = self.rows_of(down.checked_sub(1), Some(across), last, 1)?
@@ -212,15 +223,22 @@ impl Mosaic {
         let (Some(down), Some(across)) = (down, across) else {
             return Ok(None);
         };
-        let Some(path) = self.tiles.get(&(down, across)) else {
+        let Some(number) = self.places.get(&(down, across)) else {
             return Ok(None);
         };
-        let row_bytes = self.side as usize * 2;
-        let mut bytes = vec![0; row_bytes * rows as usize];
+        let tile = &self.tiles[*number];
+        let row_bytes = self.sides[0] as usize * 2;
+        let (begin, length) = (first as usize * row_bytes, rows as usize * row_bytes);
+        let heights =
+            |bytes: &[u8]| bytes.chunks_exact(2).map(|pair| i16::from_be_bytes([pair[0], pair[1]])).collect();
+        if tile.is_packed() {
+            // A tile is unpacked to its whole length, or refused.
+            return Ok(Some(heights(&self.unpacked.bytes(*number, tile)?[begin..begin + length])));
+        }
+        let path = tile.path();
+        let mut bytes = vec![0; length];
         let mut file = input::open(path, "cannot open the .hgt tile")?;
-        let read = file
-            .seek(SeekFrom::Start(u64::from(first) * row_bytes as u64))
-            .and_then(|_| file.read_exact(&mut bytes));
+        let read = file.seek(SeekFrom::Start(begin as u64)).and_then(|_| file.read_exact(&mut bytes));
         read.map_err(|source| match source.kind() {
             ErrorKind::UnexpectedEof => LayoutError::damaged(
                 path,
@@ -229,8 +247,23 @@ impl Mosaic {
             ),
             _ => LayoutError::io(path, "cannot read the .hgt tile", source),
         })?;
-        Ok(Some(bytes.chunks_exact(2).map(|pair| i16::from_be_bytes([pair[0], pair[1]])).collect()))
+        Ok(Some(heights(&bytes)))
     }
+}
+
+/// Tiles of unlike size, in words.
+fn unlike(first: &Tile, other: &Tile) -> LayoutError {
+    let [[a, b], [c, d]] = [other.samples, first.samples];
+    let why = if b == d {
+        "towards the poles tiles have fewer columns (half as many from 50 degrees north on), and a mosaic needs tiles of one width"
+    } else {
+        "a mosaic needs tiles of one resolution"
+    };
+    LayoutError::Usage(format!(
+        "{}: this tile has {a} x {b} heights and {} has {c} x {d}; {why}: build them apart, or join them first: gdalwarp -r bilinear FILES all.tif",
+        other.shown(),
+        first.shown()
+    ))
 }
 
 /// Takes a neighbour's height where there is none.

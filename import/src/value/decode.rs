@@ -29,18 +29,19 @@ pub(crate) struct Decode {
     base: f64,
 }
 
-/// Tilezen's and Mapzen's packing.
-const TERRARIUM: Decode = Decode { factors: [256.0, 1.0, 1.0 / 256.0], base: -32768.0 };
-
 impl Decode {
+    /// Mapbox's packing.
+    pub(crate) const MAPBOX: Self = Self { factors: [6553.6, 25.6, 0.1], base: -10_000.0 };
+    /// Tilezen's and Mapzen's packing.
+    pub(crate) const TERRARIUM: Self = Self { factors: [256.0, 1.0, 1.0 / 256.0], base: -32768.0 };
     /// What heights are once they are unpacked.
     pub(crate) const SAMPLE_TYPE: SampleType = SampleType::F64;
 
     /// The packing of that name, or of four numbers "R,G,B,BASE".
     pub(crate) fn parse(text: &str) -> Option<Self> {
         match text.trim().to_ascii_lowercase().as_str() {
-            "mapbox" => return Some(Self::mapbox()),
-            "terrarium" => return Some(TERRARIUM),
+            "mapbox" => return Some(Self::MAPBOX),
+            "terrarium" => return Some(Self::TERRARIUM),
             _ => {}
         }
         let numbers: Vec<f64> =
@@ -50,13 +51,9 @@ impl Decode {
         (sound && [red, green, blue] != [0.0; 3]).then_some(Self { factors: [red, green, blue], base })
     }
 
-    fn mapbox() -> Self {
-        Self { factors: [6553.6, 25.6, 0.1], base: -10_000.0 }
-    }
-
     /// Metres of a pixel. The sum is taken of whole numbers where the factors are tenths of such, so that 0.1 m stay 0.1 m.
     pub(crate) fn height(&self, [red, green, blue]: [f64; 3]) -> f64 {
-        if *self == Self::mapbox() {
+        if *self == Self::MAPBOX {
             return ((65_536.0 * red + 256.0 * green + blue) - 100_000.0) / 10.0;
         }
         self.factors[0] * red + self.factors[1] * green + self.factors[2] * blue + self.base

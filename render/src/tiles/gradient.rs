@@ -118,7 +118,7 @@ mod tests {
             TileId { level: 1, x: 0, y: 1 },
             TileId { level: 2, x: 0, y: 0 },
         ] {
-            let [x0, y0] = [tile.x, tile.y].map(|t| t * TILE_CELLS << tile.level);
+            let [x0, y0] = [tile.x, tile.y].map(|t| (t * TILE_CELLS) << tile.level);
             let cell = 1 << tile.level;
             let heights: Vec<f32> = (0..SIDE * SIDE)
                 .map(|n| {

@@ -83,7 +83,7 @@ impl<'a> Scene<'a> {
 /// Heights of a tile, samples as they are.
 pub fn heights_of(square: &Square, tile: TileId) -> Vec<f32> {
     let side = i64::from(TILE_CELLS) + 3;
-    let [x0, y0] = [tile.x, tile.y].map(|t| i64::from(t * TILE_CELLS << tile.level));
+    let [x0, y0] = [tile.x, tile.y].map(|t| i64::from((t * TILE_CELLS) << tile.level));
     let cell = 1_i64 << tile.level;
     let heights: Vec<f32> = (0..side * side)
         .map(|n| {

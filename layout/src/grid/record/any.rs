@@ -3,8 +3,9 @@
 use super::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, Vertex};
 use crate::grid::Grid;
 
-/// One of the three codecs.
+/// One of the three codecs. A terrain has one, boxed: their sizes do not matter.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "a terrain has one, in a box")]
 pub(crate) enum AnyCodec {
     Compact(Compact),
     Exact8(Exact8),

@@ -1,0 +1,191 @@
+//! The formats that are read, one a line: how each is known, and what opens it.
+//!
+//! The order is that of asking: signatures first, then what a label beside a file says, then names. A file that no line knows is a stranger ([`crate::strangers`]).
+
+use crate::identify::{self, Look};
+use crate::reader::Reader;
+use crate::strangers;
+use crate::{
+    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz,
+};
+use std::path::{Path, PathBuf};
+use terrasoar_layout::error::LayoutError;
+
+type Opens = fn(&Path, &OpenOptions) -> Result<Box<dyn Reader>, LayoutError>;
+
+/// A format that is read.
+struct Format {
+    /// Its name in messages.
+    name: &'static str,
+    is: fn(&Look<'_>) -> bool,
+    open: Opens,
+}
+
+/// Formats with a signature.
+const SIGNED: &[Format] = &[
+    Format {
+        name: "PNG",
+        is: |look| look.begins(b"\x89PNG\r\n\x1a\n"),
+        open: |path, options| boxed(png::PngDem::open(path, options)),
+    },
+    Format {
+        name: "VTP BT",
+        is: |look| look.begins(b"binterr"),
+        open: |path, _| boxed(bt::BtDem::open(path)),
+    },
+    Format {
+        name: "TIFF",
+        is: |look| identify::is_tiff(&look.head),
+        open: |path, options| boxed(geotiff::TiffDem::open(path, options)),
+    },
+    Format {
+        name: "netCDF",
+        is: |look| netcdf::is_netcdf(&look.head),
+        open: |path, options| boxed(netcdf::NetcdfDem::open(path, options)),
+    },
+    Format {
+        name: "DTED",
+        is: |look| dted::is_dted(&look.head),
+        open: |path, _| boxed(dted::DtedDem::open(path)),
+    },
+    Format {
+        name: "USGS DEM",
+        is: |look| usgs_dem::is_usgs_dem(&look.head),
+        open: |path, _| boxed(usgs_dem::UsgsDem::open(path)),
+    },
+    Format {
+        name: "Netpbm",
+        is: |look| pnm::is_pnm(&look.head),
+        open: |path, _| boxed(pnm::PnmDem::open(path)),
+    },
+    Format {
+        name: ".hgt archive",
+        is: |look| look.begins(b"PK\x03\x04") && hgt::has_tiles(look.path),
+        open: |path, options| tiles(&[path.to_owned()], options),
+    },
+    Format {
+        name: ".hgt.gz",
+        is: |look| look.begins(b"\x1f\x8b") && look.is_called("hgt.gz"),
+        open: |path, options| tiles(&[path.to_owned()], options),
+    },
+    Format {
+        name: "Esri ASCII grid",
+        is: |look| ascii_grid::is_ascii_grid(&look.head) && !look.is_called("hdr"),
+        open: |path, _| boxed(ascii_grid::AsciiGrid::open(path)),
+    },
+];
+
+/// Formats without one.
+const NAMED: &[Format] = &[
+    Format {
+        name: ".hgt",
+        is: |look| hgt::is_tile(look.path),
+        open: |path, options| tiles(&[path.to_owned()], options),
+    },
+    Format {
+        name: "labelled (.hdr)",
+        is: |look| labelled::is_labelled(look.path),
+        open: |path, options| boxed(labelled::LabelledDem::open(path, options)),
+    },
+    Format {
+        name: "headerless heightmap",
+        is: |look| ["r16", "r32", "raw"].iter().any(|e| look.is_called(e)),
+        open: |path, _| boxed(raw::RawDem::square(path)),
+    },
+    Format { name: "XYZ", is: xyz::is_xyz, open: |path, _| boxed(xyz::XyzDem::open(path)) },
+];
+
+/// What is read, in a few words for messages.
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT and headerless heightmaps";
+
+fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
+    Ok(Box::new(opened?))
+}
+
+/// Opens tiles, in the shape that a person states if they do.
+fn tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    let stated = options.raw.as_deref().map(raw::tile_shape).transpose()?;
+    boxed(hgt::HgtDem::open(paths, stated))
+}
+
+/// Opens what a person names: a file, a folder of tiles, or several tiles.
+///
+/// # Errors
+/// As [`crate::open_with`].
+pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    match paths {
+        [] => Err(LayoutError::Usage("no elevation file was named; name one, or several .hgt tiles".into())),
+        [path] if path.is_dir() => tiles(&hgt::tiles_in(path)?, options),
+        [path] => open_file(path, options),
+        paths => open_tiles(paths, options),
+    }
+}
+
+fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    #[cfg(feature = "gdal")]
+    if crate::gdal::is_name(path) {
+        return boxed(crate::gdal::GdalDem::open(path, options));
+    }
+    let look = Look::at(path)?;
+    if let Some(format) = SIGNED.iter().find(|format| (format.is)(&look)) {
+        if options.raw.is_some() && !hgt::is_tile(path) {
+            return Err(LayoutError::Usage(format!(
+                "{}: a shape was stated, which is for files that do not say what they hold, and this is a {} file; leave the shape out",
+                path.display(),
+                format.name
+            )));
+        }
+        return (format.open)(path, options);
+    }
+    if let Some(shape) = &options.raw
+        && !hgt::is_tile(path)
+    {
+        return boxed(raw::RawDem::stated(path, shape));
+    }
+    if let Some(refusal) = strangers::signed(&look) {
+        return stranger(path, options, refusal);
+    }
+    match NAMED.iter().find(|format| (format.is)(&look)) {
+        Some(format) => (format.open)(path, options),
+        None => stranger(path, options, strangers::unknown(&look)),
+    }
+}
+
+/// Refuses what no line knows, with the words of its kind.
+#[cfg(not(feature = "gdal"))]
+fn stranger(path: &Path, _: &OpenOptions, refusal: String) -> Result<Box<dyn Reader>, LayoutError> {
+    Err(LayoutError::not_this_format(path, format!("{refusal} ({READ_HERE})")))
+}
+
+/// Hands what no line knows to GDAL; what that does not open either is refused with the words of its kind.
+#[cfg(feature = "gdal")]
+fn stranger(path: &Path, options: &OpenOptions, refusal: String) -> Result<Box<dyn Reader>, LayoutError> {
+    match crate::gdal::GdalDem::open(path, options) {
+        Err(LayoutError::NotThisFormat { .. }) => Err(LayoutError::not_this_format(
+            path,
+            format!("{refusal} ({READ_HERE}, and all that GDAL opens)"),
+        )),
+        opened => boxed(opened),
+    }
+}
+
+/// Several files make one data set only if every one is an `.hgt` tile, whose name says where it lies.
+fn open_tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    for path in paths {
+        if hgt::is_tile(path) {
+            continue;
+        }
+        let look = Look::at(path)?;
+        let format = SIGNED
+            .iter()
+            .chain(NAMED)
+            .find(|format| (format.is)(&look))
+            .map_or("other", |format| format.name);
+        return Err(LayoutError::Usage(format!(
+            "{}: several inputs are read together only if all of them are .hgt tiles, and this is a {format} file; \
+             merge the files first, for example with: gdalbuildvrt all.vrt FILES && gdal_translate all.vrt all.tif",
+            path.display(),
+        )));
+    }
+    tiles(paths, options)
+}

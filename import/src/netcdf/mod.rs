@@ -1,0 +1,332 @@
+//! NetCDF, classic (CDF-1, -2, -5) and over HDF5 (netCDF-4), by COARDS and CF; and GMT's grids of before version 4.
+//!
+//! `netcdf-reader` knows the bytes ([`file`]); here is found which variable holds the heights ([`choose`]), where its samples lie ([`axes`], [`system`]), and they are read
+//! window by window ([`stream`]). A leading dimension of one layer is taken, of more a layer must be asked for. Memory: some windows, or a chunk where the file's own are larger.
+//! There is no reader of our own for the classic layout: the crate reads it piece by piece as well.
+
+mod attributes;
+mod axes;
+mod choose;
+mod file;
+mod stream;
+mod system;
+
+use crate::options::{Direction, OpenOptions};
+use crate::reader::{Declared, HorizontalSize, Reader, Said, VerticalUnit};
+use attributes::{Unit, exact, is_unsigned, number, numbers, text};
+use axes::{Axis, Way};
+use choose::{Chosen, Grid};
+use file::Purpose;
+use netcdf_reader::{NcFile, NcGroup, NcType, NcVariable};
+use std::path::{Path, PathBuf};
+use stream::Source;
+use terrasoar_layout::dem::{SampleSink, SampleType};
+use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::words::harmless;
+
+/// Metres a second and second, by which a geopotential is divided.
+const STANDARD_GRAVITY: f64 = 9.80665;
+
+/// Whether a file begins so: classic of any version, or HDF5.
+pub(crate) fn is_netcdf(head: &[u8]) -> bool {
+    [&b"CDF\x01"[..], b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n"]
+        .iter()
+        .any(|magic| head.starts_with(magic))
+}
+
+/// A netCDF file with a grid of heights.
+#[derive(Debug)]
+pub(crate) struct NetcdfDem {
+    path: PathBuf,
+    declared: Declared,
+    source: Source,
+}
+
+impl NetcdfDem {
+    /// Reads the head of the file, and the coordinates of its grid.
+    pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<Self, LayoutError> {
+        let file = file::open(path, Purpose::Look)?;
+        let root = file::guarded(path, "header", || file.root_group())?;
+        let grids = choose::grids(root);
+        let Chosen { grid, layer } = choose::choose(path, &grids, options.band.as_deref())?;
+        let about = About { path, file: &file, root, grid: &grid };
+        let (mut declared, shape) = if grid.is_flat { about.flat()? } else { about.grid()? };
+        about.values(&mut declared);
+        if grids.len() > 1 || layer > 0 {
+            let layer = if layer > 0 { format!(", layer {}", layer + 1) } else { String::new() };
+            declared.notes.push(format!("heights are variable \"{}\"{layer}", harmless(&grid.place, 40)));
+        }
+        let source = Source::new(path, &grid, layer, shape, is_unsigned(grid.variable))?;
+        Ok(Self { path: path.to_owned(), declared, source })
+    }
+}
+
+impl Reader for NetcdfDem {
+    fn declared(&self) -> &Declared {
+        &self.declared
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.source.memory_bytes()
+    }
+
+    fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        self.source.stream(&self.path, sink)
+    }
+}
+
+/// Columns and rows as they are handed over, and how they lie in the variable.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    samples: [u32; 2],
+    /// Whether the variable's last dimension runs north.
+    is_transposed: bool,
+}
+
+/// What is asked about a grid.
+struct About<'a> {
+    path: &'a Path,
+    file: &'a NcFile,
+    root: &'a NcGroup,
+    grid: &'a Grid<'a>,
+}
+
+impl About<'_> {
+    /// Size and place of a grid with coordinate variables.
+    fn grid(&self) -> Result<(Declared, Shape), LayoutError> {
+        let dimensions = self.grid.variable.dimensions();
+        let [rows, columns] = &dimensions[dimensions.len() - 2..] else { return Err(self.too_large()) };
+        let coordinates =
+            [rows, columns].map(|dimension| self.beside(&dimension.name).filter(|(_, v)| v.ndim() == 1));
+        let ways =
+            [0, 1].map(|at| axes::way(&[rows, columns][at].name, coordinates[at].as_ref().map(|(_, v)| *v)));
+        let is_transposed = ways == [Some(Way::East), Some(Way::North)]
+            || matches!(ways, [Some(Way::East), None] | [None, Some(Way::North)]);
+        let sizes = [columns.size, rows.size]
+            .map(|size| u32::try_from(size).ok().filter(|size| *size <= i32::MAX as u32));
+        let [Some(columns), Some(rows)] = sizes else { return Err(self.too_large()) };
+        let samples = if is_transposed { [rows, columns] } else { [columns, rows] };
+        let shape = Shape { samples, is_transposed };
+        let mut declared = Declared::new(samples, self.sample_type(), self.format());
+        let [mut down, mut across] = coordinates;
+        if is_transposed {
+            std::mem::swap(&mut down, &mut across);
+        }
+        match (across, down) {
+            (Some((x_at, x)), Some((y_at, y))) => {
+                let x = axes::read(self.path, self.file, &x_at, x)?;
+                let y = axes::read(self.path, self.file, &y_at, y)?;
+                self.place(&mut declared, &x, &y);
+            }
+            (None, None) => self.places_apart()?,
+            _ => {}
+        }
+        Ok((declared, shape))
+    }
+
+    /// Refuses a grid whose places are listed sample by sample.
+    fn places_apart(&self) -> Result<(), LayoutError> {
+        let Some(names) = text(self.grid.variable.attributes(), "coordinates") else { return Ok(()) };
+        let two = |name: &str| {
+            self.beside(name).is_some_and(|(_, v)| v.ndim() == 2 && axes::way("", Some(v)).is_some())
+        };
+        if names.split_whitespace().filter(|name| two(name)).count() < 2 {
+            return Ok(());
+        }
+        Err(LayoutError::unsupported(
+            self.path,
+            "the places of its samples are listed one by one, not as columns and rows; make a regular grid of it: gdalwarp -geoloc INPUT output.tif",
+        ))
+    }
+
+    /// The place that two axes make, and what their units say of the system.
+    fn place(&self, declared: &mut Declared, x: &Axis, y: &Axis) {
+        let mapping = text(self.grid.variable.attributes(), "grid_mapping");
+        // More than one mapping is "name: coordinates name: coordinates"; the first counts.
+        let mapping = mapping.and_then(|names| {
+            let first = names.split_whitespace().next()?.trim_end_matches(':').to_owned();
+            self.beside(&first)
+        });
+        if let Some((_, mapping)) = mapping
+            && let Some((found, by)) = system::of(mapping)
+        {
+            let by = format!("attribute {by} of variable \"{}\"", harmless(mapping.name(), 40));
+            declared.crs.text = Some(Said::new(found, by));
+        }
+        let by = format!("variables \"{}\" and \"{}\"", harmless(&x.name, 40), harmless(&y.name, 40));
+        // A projection counts in metres, whatever a writer found handier to list.
+        let factor = match (&declared.crs.text, x.unit) {
+            (Some(_), Some(Unit::Metres(1000.0))) => 1000.0,
+            (Some(_), _) => 1.0,
+            (None, unit) => {
+                let size = unit.map(|unit| match unit {
+                    Unit::Degrees => HorizontalSize::Radians(1f64.to_radians()),
+                    Unit::Metres(metres) => HorizontalSize::Metres(metres),
+                });
+                declared.crs.unit = size.map(|size| Said::new(size, format!("units of {by}")));
+                1.0
+            }
+        };
+        let map = [x.first, x.step, 0.0, y.first, 0.0, y.step].map(|value| value * factor);
+        declared.place = Some(Said::new(map, by));
+    }
+
+    /// Size and place of a grid of GMT before version 4: a list of samples from the north-west, and its shape in variables beside it.
+    fn flat(&self) -> Result<(Declared, Shape), LayoutError> {
+        let two = |name: &str| -> Result<Option<[f64; 2]>, LayoutError> {
+            let Some((place, variable)) = self.beside(name) else { return Ok(None) };
+            if variable.shape() != [2] {
+                return Ok(None);
+            }
+            let all = netcdf_reader::NcSliceInfo::all(1);
+            let values = file::guarded(self.path, &format!("variable \"{}\"", harmless(name, 40)), || {
+                self.file.read_variable_slice_as_f64(&place, &all)
+            })?;
+            Ok(values.as_slice().and_then(|values| <[f64; 2]>::try_from(values).ok()))
+        };
+        let damaged = |problem: &str| LayoutError::damaged(self.path, "variable \"dimension\"", problem);
+        let sides = two("dimension")?
+            .ok_or_else(|| damaged("it does not hold columns and rows; fetch the file again"))?;
+        let is_side = |side: f64| side.fract() == 0.0 && (2.0..=f64::from(i32::MAX)).contains(&side);
+        let listed = self.grid.variable.shape()[0];
+        if !sides.iter().all(|side| is_side(*side)) || sides[0] * sides[1] != listed as f64 {
+            return Err(damaged("it does not go with the number of samples; fetch the file again"));
+        }
+        // Checked just above.
+        let samples = sides.map(|side| side as u32);
+        let mut declared =
+            Declared::new(samples, self.sample_type(), format!("{} (GMT before 4)", self.format()));
+        if let (Some([west, east]), Some([south, north])) = (two("x_range")?, two("y_range")?) {
+            let attributes = self.grid.variable.attributes();
+            let is_area = number(attributes, "node_offset") == Some(1.0);
+            let gaps = sides.map(|side| if is_area { side } else { side - 1.0 });
+            let [across, down] = [(east - west) / gaps[0], (north - south) / gaps[1]];
+            let half = if is_area { 0.5 } else { 0.0 };
+            let map = [west + half * across, across, 0.0, north - half * down, 0.0, -down];
+            if map.iter().all(|value| value.is_finite()) && across > 0.0 && down > 0.0 {
+                declared.place = Some(Said::new(map, "variables \"x_range\" and \"y_range\""));
+            }
+            let unit = self
+                .beside("x_range")
+                .and_then(|(_, v)| text(v.attributes(), "units"))
+                .and_then(|name| attributes::unit(&name));
+            if unit == Some(Unit::Degrees) {
+                let size = HorizontalSize::Radians(1f64.to_radians());
+                declared.crs.unit = Some(Said::new(size, "units of variable \"x_range\""));
+            }
+        }
+        Ok((declared, Shape { samples, is_transposed: false }))
+    }
+
+    /// What the numbers of the variable mean.
+    fn values(&self, declared: &mut Declared) {
+        let attributes = self.grid.variable.attributes();
+        let name = harmless(&self.grid.place, 40);
+        let by = |attribute: &str| format!("attribute {attribute} of variable \"{name}\"");
+        let value = &mut declared.value;
+        let scale = number(attributes, "scale_factor").filter(|scale| *scale != 0.0);
+        value.scale = scale.map(|scale| Said::new(scale, by("scale_factor")));
+        value.offset = number(attributes, "add_offset").map(|offset| Said::new(offset, by("add_offset")));
+        for attribute in ["_FillValue", "missing_value"] {
+            let texts = exact(attributes, attribute).into_iter().take(16).map(|text| self.without_sign(text));
+            value.nodata.extend(texts.map(|text| Said::new(text, by(attribute))));
+        }
+        if value.nodata.is_empty()
+            && let Some(fill) = default_fill(self.grid.variable.dtype())
+        {
+            value.nodata.push(Said::new(fill.to_owned(), "netCDF's own fill value"));
+        }
+        let standard = text(attributes, "standard_name").unwrap_or_default();
+        let units = text(attributes, "units").unwrap_or_default();
+        let squared = units.replace(['*', '^', ' '], "");
+        if matches!(squared.as_str(), "m2s-2" | "m2/s2" | "m2s−2" | "J/kg" | "Jkg-1") {
+            value.unit = Some(Said::new(VerticalUnit::Metres(1.0 / STANDARD_GRAVITY), by("units")));
+            declared.notes.push(format!(
+                "variable \"{name}\" is a geopotential in {}; divided by {STANDARD_GRAVITY} m/s2 it is a height",
+                harmless(&units, 20)
+            ));
+        } else if !units.is_empty() {
+            value.unit = Some(Said::new(VerticalUnit::Name(units), by("units")));
+        }
+        let positive = text(attributes, "positive").unwrap_or_default();
+        if positive.eq_ignore_ascii_case("down") {
+            value.direction = Some(Said::new(Direction::Down, by("positive")));
+        } else if standard.starts_with("sea_floor_depth") || standard == "depth" {
+            value.direction = Some(Said::new(Direction::Down, by("standard_name")));
+        }
+        if numbers(attributes, "scale_factor").len() > 1 {
+            value.scale = None;
+        }
+    }
+
+    /// A fill value that is written with a sign and meant without.
+    fn without_sign(&self, text: String) -> String {
+        let bits = match self.grid.variable.dtype() {
+            NcType::Byte => 8,
+            NcType::Short => 16,
+            NcType::Int => 32,
+            _ => return text,
+        };
+        let number = text.parse::<i64>().ok().filter(|number| *number < 0 && is_unsigned(self.grid.variable));
+        number.map_or(text, |number| (number + (1i64 << bits)).to_string())
+    }
+
+    /// A variable in the grid's group, or in that above all, with its place.
+    fn beside(&self, name: &str) -> Option<(String, &NcVariable)> {
+        let inside = self.grid.place.rsplit_once('/').map(|(group, _)| format!("{group}/"));
+        let here = self.grid.group.variables.iter().find(|variable| variable.name() == name);
+        if let Some(variable) = here {
+            return Some((format!("{}{name}", inside.unwrap_or_default()), variable));
+        }
+        let above = self.root.variables.iter().find(|variable| variable.name() == name);
+        above.map(|variable| (name.to_owned(), variable))
+    }
+
+    fn sample_type(&self) -> SampleType {
+        let unsigned = is_unsigned(self.grid.variable);
+        match self.grid.variable.dtype() {
+            NcType::Byte if unsigned => SampleType::U8,
+            NcType::Byte => SampleType::I8,
+            NcType::UByte => SampleType::U8,
+            NcType::Short if unsigned => SampleType::U16,
+            NcType::Short => SampleType::I16,
+            NcType::UShort => SampleType::U16,
+            NcType::Int if unsigned => SampleType::U32,
+            NcType::Int => SampleType::I32,
+            NcType::UInt => SampleType::U32,
+            NcType::Int64 => SampleType::I64,
+            NcType::UInt64 => SampleType::U64,
+            NcType::Float => SampleType::F32,
+            _ => SampleType::F64,
+        }
+    }
+
+    fn format(&self) -> String {
+        use netcdf_reader::NcFormat;
+        let name = match self.file.format() {
+            NcFormat::Classic => "netCDF classic",
+            NcFormat::Offset64 => "netCDF 64-bit offset",
+            NcFormat::Cdf5 => "netCDF CDF-5",
+            NcFormat::Nc4 | NcFormat::Nc4Classic => "netCDF-4",
+        };
+        name.to_owned()
+    }
+
+    fn too_large(&self) -> LayoutError {
+        let place = format!("variable \"{}\"", harmless(&self.grid.place, 40));
+        LayoutError::damaged(self.path, place, "its size is out of range; fetch the file again")
+    }
+}
+
+/// What netCDF puts where nothing was written. Bytes have none, for all their values are in use.
+fn default_fill(dtype: &NcType) -> Option<&'static str> {
+    Some(match dtype {
+        NcType::Short => "-32767",
+        NcType::Int => "-2147483647",
+        NcType::UShort => "65535",
+        NcType::UInt => "4294967295",
+        NcType::Float => "9.969209968386869e36",
+        NcType::Double => "9.969209968386869e36",
+        _ => return None,
+    })
+}

@@ -1,0 +1,83 @@
+//! GDAL's tools as the truth that this package is held against.
+
+#![allow(dead_code, reason = "each test binary uses a part of this")]
+
+use super::import_support::{Random, read};
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Runs a tool; what it printed.
+pub(crate) fn run(folder: &Path, tool: &str, arguments: &[&str]) -> String {
+    let output = Command::new(tool)
+        .args(arguments)
+        .current_dir(folder)
+        .env("GDAL_PAM_ENABLED", "NO")
+        .output()
+        .unwrap_or_else(|error| panic!("{tool} is needed: install gdal-bin ({error})"));
+    let said =
+        format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{tool} {}: {said}", arguments.join(" "));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The values that GDAL reads at places (column, row) of a file.
+pub(crate) fn values(path: &Path, places: &[(u32, u32)]) -> Vec<f64> {
+    let mut child = Command::new("gdallocationinfo")
+        .args(["-valonly", "-b", "1"])
+        .arg(path)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("gdallocationinfo is needed: install gdal-bin");
+    let mut input = child.stdin.take().unwrap();
+    let asked = places.to_vec();
+    let writer =
+        std::thread::spawn(move || asked.iter().try_for_each(|(col, row)| writeln!(input, "{col} {row}")));
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap().unwrap();
+    assert!(output.status.success());
+    let answers = String::from_utf8(output.stdout).unwrap();
+    let answers: Vec<f64> = answers.lines().map(|line| line.trim().parse().unwrap()).collect();
+    assert_eq!(answers.len(), places.len(), "{}", path.display());
+    answers
+}
+
+/// Compares random samples and the place of `path` with what GDAL says; samples of value `void` must be voids here. Our row 0 must be GDAL's.
+pub(crate) fn agrees(path: &Path, void: f64) {
+    let grid = read(&[path.to_owned()]).unwrap_or_else(|error| panic!("{error}"));
+    let [wide, high] = [grid.info.samples_wide, grid.info.samples_high];
+    let mut random = Random(path.as_os_str().len() as u64);
+    let mut places: Vec<(u32, u32)> =
+        (0..500).map(|_| (random.below(wide.into()) as u32, random.below(high.into()) as u32)).collect();
+    places.extend([(0, 0), (wide - 1, 0), (0, high - 1), (wide - 1, high - 1)]);
+    for ((col, row), wanted) in places.iter().zip(values(path, &places)) {
+        let got = grid.at(*col, *row);
+        let is_void = got.is_nan() && (wanted.is_nan() || wanted == void);
+        // gdallocationinfo prints singles with nine digits or more.
+        let is_near = (got - wanted).abs() <= 1e-6 * wanted.abs() && wanted != void;
+        assert!(is_near || is_void, "{}: ({col}, {row}) is {got}, GDAL says {wanted}", path.display());
+    }
+    let said = run(Path::new("."), "gdalinfo", &[path.to_str().unwrap()]);
+    assert!(
+        said.contains(&format!("Size is {wide}, {high}")),
+        "{}: {wide} x {high}, GDAL says {said}",
+        path.display()
+    );
+    let pair = |key: &str| {
+        let line = said.lines().find(|line| line.starts_with(key))?;
+        let inside = line.split('(').nth(1)?.split(')').next()?;
+        let (a, b) = inside.split_once(',')?;
+        Some([a.parse::<f64>().ok()?, b.parse::<f64>().ok()?])
+    };
+    if let (Some(origin), Some(size)) = (pair("Origin = "), pair("Pixel Size = ")) {
+        let map =
+            grid.info.georeference.pixel_to_crs.unwrap_or_else(|| panic!("{}: no place", path.display()));
+        // Of sample centres, where GDAL counts from the corner.
+        let wanted = [origin[0] + size[0] / 2.0, size[0], 0.0, origin[1] + size[1] / 2.0, 0.0, size[1]];
+        for (got, wanted) in map.iter().zip(wanted) {
+            let near = 1e-9 * wanted.abs() + 1e-12;
+            assert!((got - wanted).abs() <= near, "{}: {map:?}, GDAL says {wanted:?}", path.display());
+        }
+    }
+}
