@@ -6,7 +6,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("made-up.tif");
-//! write(&SynthOptions { size: 65, ..Default::default() }, &path, &|_| {})?;
+//! write(&SynthOptions::default().size(65), &path, &|_| {})?;
 //! let dem = terrasoar_import::open_file(&path)?;
 //! assert_eq!(dem.info().samples_wide, 65);
 //! # Ok(())

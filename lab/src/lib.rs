@@ -16,14 +16,7 @@
 //! # build(&dem, &path, &BuildOptions::default().spacing_m([30.0, 30.0]), &Silent)?;
 //! let terrain = MappedTerrain::open(&path)?;
 //! let views = [0.0, 50.0, 100.0].map(|north| View::new([3800.0, 500.0 + north, 900.0], 0.0, -20.0));
-//! let options = CountOptions {
-//!     layouts: vec![LayoutKind::Ours, LayoutKind::Row],
-//!     preloads: vec![Prefetch::None],
-//!     cache_pages: 1024,
-//!     disk_pages: 128,
-//!     block_m: 1000.0,
-//!     trace: false,
-//! };
+//! let options = CountOptions::default().layouts(vec![LayoutKind::Ours, LayoutKind::Row]).preloads(vec![Prefetch::None]);
 //! let runs =
 //!     count(terrain.file(), &views, Culling::Vertices, Reader::Engine(EngineKind::Kinetic), &options, &mut |_| {})?;
 //! for run in &runs {
