@@ -35,6 +35,7 @@ mod options;
 mod parallel;
 pub(crate) mod picture;
 mod placement;
+pub mod places;
 mod png;
 pub(crate) mod png_stream;
 mod reader;

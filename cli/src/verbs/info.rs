@@ -1,6 +1,7 @@
 //! `terrasoar info`: what a terrain file says about itself.
 
 use super::output::{decimal, grouped, print, print_json, table};
+use super::siting::{self, Siting};
 use super::terrain::{self, TerrainArgs};
 use anyhow::Result;
 use serde::Serialize;
@@ -54,6 +55,9 @@ struct Info {
     warnings: Vec<String>,
     /// Samples east and north of the south-west one to coordinates: x = m0 + m1 x + m2 y, y = m3 + m4 x + m5 y.
     sample_to_crs: Option<[f64; 6]>,
+    /// Where it lies.
+    #[serde(flatten)]
+    siting: Siting,
     record: &'static str,
     record_bytes: usize,
     error: &'static str,
@@ -132,7 +136,7 @@ impl Info {
             nodata_samples: header.nodata_samples,
             crs: terrain::crs(header),
             epsg: header.epsg,
-            crs_wkt: Some(header.about.crs_text.clone()).filter(|text| !text.is_empty()),
+            crs_wkt: siting::crs_text(header),
             horizontal_unit: terrain::horizontal_unit(header),
             vertical_crs: Some(header.about.vertical_name.clone()).filter(|name| !name.is_empty()),
             vertical_epsg: header.about.vertical_epsg,
@@ -140,6 +144,7 @@ impl Info {
             origins: header.about.origins.iter().map(|(what, words)| [what.clone(), words.clone()]).collect(),
             warnings: header.about.warnings.clone(),
             sample_to_crs: header.sample_to_crs,
+            siting: Siting::of(header),
             record: header.record_kind.name(),
             record_bytes: header.record_kind.bytes(),
             error: header.error_kind.name(),
@@ -181,6 +186,8 @@ impl Info {
             ("file size", format!("{} bytes", grouped(self.file_bytes))),
             ("a sample", format!("{:.2} bytes", self.bytes_per_sample)),
         ];
+        let at = rows.iter().position(|(name, _)| *name == "records").unwrap_or(rows.len());
+        rows.splice(at..at, self.siting.rows());
         if let Some(overlay) = &self.overlay {
             rows.insert(1, ("with edits in", overlay.clone()));
         }

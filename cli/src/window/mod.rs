@@ -38,6 +38,8 @@ pub(crate) use keys::list as list_of_keys;
 pub(crate) struct Plan {
     /// Terrain file.
     pub file: PathBuf,
+    /// Whether it was made of elevation data and lies in the folder for caches, where edits would be lost.
+    pub is_kept: bool,
     /// Edits of it in a file of their own.
     pub overlay: Option<PathBuf>,
     /// Flight to play.

@@ -116,7 +116,7 @@ impl Viewer {
         let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
         let rig = sight::start(&stage, &screen, &window, &settings);
         let tools = ToolBox::new(stage.heights().extent_m());
-        let workshop = edit::workshop_for(&stage, &proxy);
+        let workshop = edit::workshop_for(&stage, &plan, &proxy);
         let mut viewer = Self {
             terrain_name: String::new(),
             window,
