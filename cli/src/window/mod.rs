@@ -1,10 +1,11 @@
 //! `terrasoar view`: a window that a terrain is flown over in.
 //!
-//! `camera`, `pick`, `flights`, `settings`, `keys`, `hand`, `job` and `workshop` know no window and are tested by themselves; `screen` and
+//! `camera`, `coordinates`, `pick`, `flights`, `settings`, `keys`, `hand`, `job` and `workshop` know no window and are tested by themselves; `screen` and
 //! `overlay` know no terrain; `viewer` puts a frame together, `events` brings it the window's events. A frame is drawn when something
 //! moves or was touched; else nothing is. **Whatever fails while the window is open is said in it.**
 
 mod camera;
+mod coordinates;
 mod display;
 mod events;
 mod flights;

@@ -13,6 +13,7 @@ mod tell;
 
 use super::Plan;
 use super::camera::Rig;
+use super::coordinates::Coordinates;
 use super::flights::{Player, Recorder};
 use super::hand::Hand;
 use super::history::History;
@@ -63,6 +64,7 @@ pub(super) struct Viewer {
     overlay: Overlay,
     stage: Stage,
     terrain_name: String,
+    coordinates: Coordinates,
     settings: Settings,
     memory: Memory,
     rig: Rig,
@@ -119,6 +121,7 @@ impl Viewer {
         let workshop = edit::workshop_for(&stage, &plan, &proxy);
         let mut viewer = Self {
             terrain_name: String::new(),
+            coordinates: Coordinates::of(stage.terrain().header()),
             window,
             display,
             proxy,

@@ -5,6 +5,7 @@
 
 use super::Viewer;
 use crate::window::Plan;
+use crate::window::coordinates::Coordinates;
 use crate::window::stage::Stage;
 use crate::window::tool::{RADII_M, Stroke, Tool};
 use crate::window::wake::Wake;
@@ -237,6 +238,7 @@ impl Viewer {
     /// Puts another stage in place of the one before, whose edits are settled.
     pub(super) fn take_stage(&mut self, stage: Stage) {
         self.workshop = workshop_for(&stage, &self.plan, &self.proxy);
+        self.coordinates = Coordinates::of(stage.terrain().header());
         self.stage = stage;
         self.frozen = None;
         self.touched = true;
