@@ -23,7 +23,6 @@
 mod ascii_grid;
 mod beside;
 mod bt;
-mod coordinates;
 mod crs;
 mod dted;
 mod formats;
@@ -43,6 +42,7 @@ mod options;
 mod parallel;
 pub(crate) mod picture;
 mod placement;
+pub mod places;
 mod plain;
 mod png;
 pub(crate) mod png_stream;
@@ -62,7 +62,6 @@ use std::path::{Path, PathBuf};
 use terrasoar_layout::dem::DemSource;
 use terrasoar_layout::error::LayoutError;
 
-pub use coordinates::Coordinates;
 pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;

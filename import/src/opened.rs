@@ -62,9 +62,9 @@ impl OpenedDem {
         };
         let mut samples = turn.samples(declared.samples);
         let mut map = file_map.map(|map| turn.map(map, declared.samples));
-        let mut notes = declared.notes.clone();
+        let (mut placed, notes) = (Vec::new(), declared.notes.clone());
         if !turn.is_none() {
-            notes.push(turn.words().to_owned());
+            placed.push(turn.words().to_owned());
         }
         let is_stated = options.spacing_is_stated || options.reproject.is_some();
         // What the unit of coordinates is may have to be guessed, and is needed before a warp.
@@ -81,14 +81,24 @@ impl OpenedDem {
                 )));
             }
             (samples, map, sample_type) = (warp.samples(), Some(warp.map()), warp.sample_type());
-            notes.push(warp.words());
+            placed.push(warp.words());
             if let Some(target) = warp.system() {
                 system = System { vertical: system.vertical.clone(), ..target.clone() };
             }
             found = spacing(path, &mut system, map, samples, options.spacing_is_stated, &mut warnings)?;
         }
         let is_earth = system.radius_m.is_none_or(crs::is_earth) && system.kind != Kind::Local;
-        let info = describe(&declared, &system, &heights, &found, map, samples, sample_type, &voids, notes);
+        let info = describe(
+            &declared,
+            &system,
+            &heights,
+            &found,
+            map,
+            samples,
+            sample_type,
+            &voids,
+            [placed, notes],
+        );
         Ok(Self {
             reader,
             info,
@@ -164,7 +174,7 @@ fn describe(
     samples: [u32; 2],
     sample_type: terrasoar_layout::dem::SampleType,
     voids: &Voids,
-    notes: Vec<String>,
+    [placed, notes]: [Vec<String>; 2],
 ) -> DemInfo {
     let mut georeference = crs::georeference(system, map);
     georeference.spacing_m = found.metres;
@@ -184,6 +194,9 @@ fn describe(
     if !void_texts.is_empty() {
         let by = if by.is_empty() { "as typed".to_owned() } else { format!("from {}", by.join(", ")) };
         say("no data", format!("{} {by}", void_texts.join(", ")));
+    }
+    for words in placed {
+        say("placement", words);
     }
     for note in notes {
         say("note", note);

@@ -15,6 +15,14 @@ const FIXED_BYTES: usize = 33;
 /// # Errors
 /// A picture without pixels, or with another number of them.
 pub fn encode(rgb: &[u8], size_px: [u32; 2]) -> io::Result<Vec<u8>> {
+    encode_with(rgb, size_px, &[])
+}
+
+/// As [`encode`], with more texts: keywords of at most 79 letters, and what they say.
+///
+/// # Errors
+/// As [`encode`]; a keyword that PNG does not take.
+pub fn encode_with(rgb: &[u8], size_px: [u32; 2], texts: &[(&'static str, String)]) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, size_px[0], size_px[1]);
     encoder.set_color(ColorType::Rgb);
@@ -22,6 +30,12 @@ pub fn encode(rgb: &[u8], size_px: [u32; 2]) -> io::Result<Vec<u8>> {
     encoder.set_compression(Compression::Balanced);
     encoder.set_filter(Filter::Adaptive);
     encoder.add_text_chunk(MAKER[0].into(), MAKER[1].into())?;
+    for (keyword, text) in texts {
+        match text.is_ascii() {
+            true => encoder.add_text_chunk((*keyword).into(), text.clone())?,
+            false => encoder.add_itxt_chunk((*keyword).into(), text.clone())?,
+        }
+    }
     let mut writer = encoder.write_header()?;
     writer.write_image_data(rgb)?;
     writer.finish()?;
@@ -50,6 +64,12 @@ mod tests {
         assert_eq!(read.to_rgb8().into_raw(), rgb);
         assert!(is_ours(&file) && is_ours(&file[..100]));
         assert_eq!(file, encode(&rgb, [7, 5]).unwrap());
+        let texts = [("Reference system", "EPSG:32632".to_owned()), ("Heights", "m über NN".to_owned())];
+        let told = encode_with(&rgb, [7, 5], &texts).unwrap();
+        assert!(is_ours(&told) && image::load_from_memory(&told).unwrap().to_rgb8().into_raw() == rgb);
+        for chunk in [&b"tEXtReference system\0EPSG:32632"[..], "m über NN".as_bytes()] {
+            assert!(told.windows(chunk.len()).any(|window| window == chunk));
+        }
         assert!(encode(&rgb, [7, 6]).is_err() && encode(&[], [0, 0]).is_err());
     }
 

@@ -1,26 +1,44 @@
-//! `terrasoar height`: the height at a place.
+//! `terrasoar height`: the height at a place, or at all places of a table.
 
-use super::output::{decimal, print, print_json};
+mod points;
+mod table;
+
+use super::output::{complain, decimal, print, print_json};
 use super::parse;
 use super::terrain::TerrainArgs;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use serde::Serialize;
+use terrasoar_import::places::{Crs, Frame};
+use terrasoar_layout::file::header::Header;
+use terrasoar_layout::read::terrain::Terrain;
 
-/// Print the height at a place.
+/// Print the height at a place, or at all places of a table.
 ///
-/// The place is metres east and north of the south-west sample; between samples the height is interpolated bilinearly. Where a sample is
-/// void it prints "no data", which is an answer and no failure.
+/// A place is two numbers, east before north: metres from the south-west sample, or with --crs coordinates of a reference system, longitude before latitude. Between samples
+/// the height is interpolated bilinearly. Where a sample is void it prints "no data", which is an answer and no failure.
+///
+/// A table is text with a place a row: separated by commas, semicolons, tabs or spaces, with names of columns in its first row or without. The columns lon and lat, x and y, or
+/// east and north are taken by name, else the first two. Columns named lon and lat are degrees where no --crs is given. Each row is printed with its height in metres added, empty where
+/// there is none.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   terrasoar height alps.iqt --at 1500,820.5
-  terrasoar height alps.iqt --at 1500,820.5 --json")]
+  terrasoar height alps.iqt --at 7.6586,45.9763 --crs EPSG:4326
+  terrasoar height alps.iqt --at 395000,5092000 --crs dem --json
+  terrasoar height alps.iqt --points huts.csv > huts-with-heights.csv")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
-    /// Metres east and north of the south-west sample
-    #[arg(long, value_name = "X,Y", value_parser = parse::place_m, allow_hyphen_values = true)]
-    at: [f64; 2],
+    /// Place, east before north: metres from the south-west sample, or coordinates of --crs
+    #[arg(long, value_name = "X,Y", value_parser = parse::place, allow_hyphen_values = true, required_unless_present = "points")]
+    at: Option<[f64; 2]>,
+    /// Table of places, or - for standard input
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["at", "json"])]
+    points: Option<std::path::PathBuf>,
+    /// System of the places: dem for the elevation model's own coordinates, EPSG:n, WKT or a PROJ string
+    #[arg(long, value_name = "SYSTEM")]
+    crs: Option<String>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -31,25 +49,71 @@ struct Answer {
     at_m: [f64; 2],
     /// Null where the terrain has no data.
     height_m: Option<f64>,
+    /// The place as it was given.
+    at: [f64; 2],
+    /// Null for metres from the corner.
+    crs: Option<String>,
+}
+
+/// The terrain in the system that places are given in; nothing for metres from its corner.
+fn frame(header: &Header, crs: Option<&str>) -> Result<Option<Frame>> {
+    let Some(text) = crs else { return Ok(None) };
+    let frame = if text.trim().eq_ignore_ascii_case("dem") {
+        Frame::own(header).context(
+            "the terrain does not know where on the ground it lies, for its elevation model did not say; leave --crs away and give metres from its corner",
+        )?
+    } else {
+        Frame::of(header, &Crs::named(text)?)?
+    };
+    if frame.is_rough() {
+        complain(
+            "note: the shift between the two datums is a grid that is not here; places may be off by up to some hundred metres",
+        );
+    }
+    Ok(Some(frame))
+}
+
+/// The system in words.
+fn name(frame: &Frame) -> String {
+    frame.crs().map_or_else(|| "its own coordinates".into(), Crs::name)
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let terrain = args.terrain.open()?;
-    let extent_m = terrain.grid().extent_m();
-    let is_outside = |(at, extent): (f64, f64)| !(-1e-9 * extent..=extent * (1.0 + 1e-9)).contains(&at);
-    if args.at.into_iter().zip(extent_m).any(is_outside) {
-        bail!(
-            "{}: {},{} lies outside the terrain, which extends from 0,0 to {},{} metres",
-            args.terrain.file.display(),
-            args.at[0],
-            args.at[1],
-            decimal(extent_m[0], 4),
-            decimal(extent_m[1], 4)
-        );
+    if let Some(path) = &args.points {
+        return points::run(&terrain, path, args.crs.as_deref());
     }
-    let height_m = terrain.height_m(args.at[0], args.at[1])?;
+    let Some(at) = args.at else { return Ok(()) };
+    let frame = frame(terrain.header(), args.crs.as_deref())
+        .with_context(|| args.terrain.file.display().to_string())?;
+    let at_m = match &frame {
+        None => Some(at),
+        Some(frame) => frame.place_m(at),
+    };
+    let Some(at_m) = at_m.filter(|at_m| is_inside(&terrain, *at_m)) else {
+        bail!("{}: {}", args.terrain.file.display(), outside(&terrain, frame.as_ref(), at));
+    };
+    let height_m = terrain.height_m(at_m[0], at_m[1])?;
     if args.json {
-        return print_json(&Answer { at_m: args.at, height_m });
+        return print_json(&Answer { at_m, height_m, at, crs: frame.as_ref().map(name) });
     }
     print(&height_m.map_or_else(|| "no data".to_owned(), |h| format!("{} m", decimal(h, 6))))
+}
+
+fn is_inside(terrain: &Terrain, at_m: [f64; 2]) -> bool {
+    let is_within = |(at, extent): (f64, f64)| (-1e-9 * extent..=extent * (1.0 + 1e-9)).contains(&at);
+    at_m.into_iter().zip(terrain.grid().extent_m()).all(is_within)
+}
+
+/// Where the terrain is, in the system that was asked for.
+fn outside(terrain: &Terrain, frame: Option<&Frame>, at: [f64; 2]) -> String {
+    let place = format!("{},{} lies outside the terrain", at[0], at[1]);
+    let Some(frame) = frame else {
+        let [east, north] = terrain.grid().extent_m().map(|m| decimal(m, 4));
+        return format!("{place}, which extends from 0,0 to {east},{north} metres");
+    };
+    let Some([x0, y0, x1, y1]) = frame.bounds() else { return place };
+    let digits = if frame.crs().is_some_and(Crs::is_geographic) { 7 } else { 3 };
+    let [x0, y0, x1, y1] = [x0, y0, x1, y1].map(|value| decimal(value, digits));
+    format!("{place}, which extends from {x0},{y0} to {x1},{y1} in {}", name(frame))
 }

@@ -1,7 +1,7 @@
 //! `terrasoar info`: what a terrain file says about itself.
 
 use super::output::{decimal, grouped, print, print_json, table};
-use super::place;
+use super::siting::{self, Siting};
 use super::terrain::{self, TerrainArgs};
 use anyhow::Result;
 use serde::Serialize;
@@ -53,10 +53,11 @@ struct Info {
     /// What was found where.
     origins: Vec<[String; 2]>,
     warnings: Vec<String>,
-    /// West, south, east and north in degrees of WGS 84.
-    bounds_wgs84: Option<[f64; 4]>,
     /// Samples east and north of the south-west one to coordinates: x = m0 + m1 x + m2 y, y = m3 + m4 x + m5 y.
     sample_to_crs: Option<[f64; 6]>,
+    /// Where it lies.
+    #[serde(flatten)]
+    siting: Siting,
     record: &'static str,
     record_bytes: usize,
     error: &'static str,
@@ -135,15 +136,15 @@ impl Info {
             nodata_samples: header.nodata_samples,
             crs: terrain::crs(header),
             epsg: header.epsg,
-            crs_wkt: Some(header.about.crs_text.clone()).filter(|text| !text.is_empty()),
+            crs_wkt: siting::crs_text(header),
             horizontal_unit: terrain::horizontal_unit(header),
             vertical_crs: Some(header.about.vertical_name.clone()).filter(|name| !name.is_empty()),
             vertical_epsg: header.about.vertical_epsg,
             vertical_unit: header.about.vertical_unit.as_ref().map(terrain::unit),
             origins: header.about.origins.iter().map(|(what, words)| [what.clone(), words.clone()]).collect(),
             warnings: header.about.warnings.clone(),
-            bounds_wgs84: place::bounds_deg(header),
             sample_to_crs: header.sample_to_crs,
+            siting: Siting::of(header),
             record: header.record_kind.name(),
             record_bytes: header.record_kind.bytes(),
             error: header.error_kind.name(),
@@ -185,6 +186,8 @@ impl Info {
             ("file size", format!("{} bytes", grouped(self.file_bytes))),
             ("a sample", format!("{:.2} bytes", self.bytes_per_sample)),
         ];
+        let at = rows.iter().position(|(name, _)| *name == "records").unwrap_or(rows.len());
+        rows.splice(at..at, self.siting.rows());
         if let Some(overlay) = &self.overlay {
             rows.insert(1, ("with edits in", overlay.clone()));
         }

@@ -5,6 +5,7 @@ use super::output::{grouped, print};
 use super::outputs::{Force, Kind};
 use super::parse;
 use super::replay::{QualityArgs, batches_of};
+use super::siting;
 use super::terrain::TerrainArgs;
 use anyhow::Result;
 use std::path::{Path, PathBuf};
@@ -13,7 +14,7 @@ use terrasoar::flyover::{EngineKind, frame_mesh};
 
 /// Write the triangles of one frame of a flight as PLY or OBJ.
 ///
-/// Coordinates are metres east, north and up of the south-west sample. The engine flies all frames before it.
+/// Coordinates are metres east, north and up of the south-west sample; comments in the file say in which reference system that lies, and how to get from one to the other. The engine flies all frames before it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -64,7 +65,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     let mesh =
         frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine, &batches)?;
-    mesh_file::write(&args.output, &mesh, format)?;
+    mesh_file::write(&args.output, &mesh, format, &siting::notes(terrain.header()))?;
     print(&format!(
         "{}: {} triangles, {} vertices",
         args.output.display(),

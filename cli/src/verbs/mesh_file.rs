@@ -6,6 +6,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use terrasoar::flyover::FrameMesh;
 use terrasoar_layout::file::atomic::AtomicFile;
+use terrasoar_layout::printable;
 
 /// What to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,21 +16,27 @@ pub(super) enum Format {
     Obj,
 }
 
-/// Writes `mesh` to `path`.
-pub(super) fn write(path: &Path, mesh: &FrameMesh, format: Format) -> Result<()> {
+/// What a file says of where the mesh lies: names and values.
+type Notes<'n> = &'n [(&'static str, String)];
+
+/// Writes `mesh` to `path`, with `notes` as comments.
+pub(super) fn write(path: &Path, mesh: &FrameMesh, format: Format, notes: Notes<'_>) -> Result<()> {
     let file = AtomicFile::create(path)?;
     let mut out = BufWriter::with_capacity(1 << 20, file.file());
-    write_to(&mut out, mesh, format)
+    write_to(&mut out, mesh, format, notes)
         .and_then(|()| out.flush())
         .with_context(|| format!("{}: cannot write the mesh; check the free space", path.display()))?;
     drop(out);
     Ok(file.publish()?)
 }
 
-fn write_to(out: &mut impl Write, mesh: &FrameMesh, format: Format) -> io::Result<()> {
+fn write_to(out: &mut impl Write, mesh: &FrameMesh, format: Format, notes: Notes<'_>) -> io::Result<()> {
     match format {
         Format::Obj => {
             writeln!(out, "# {MESH_NOTE}")?;
+            for (name, value) in notes {
+                writeln!(out, "# {name}: {}", printable::line(value))?;
+            }
             for [x, y, z] in &mesh.positions {
                 writeln!(out, "v {x} {y} {z}")?;
             }
@@ -39,7 +46,7 @@ fn write_to(out: &mut impl Write, mesh: &FrameMesh, format: Format) -> io::Resul
             }
         }
         Format::PlyText => {
-            ply_header(out, mesh, "ascii")?;
+            ply_header(out, mesh, "ascii", notes)?;
             for [x, y, z] in &mesh.positions {
                 writeln!(out, "{x} {y} {z}")?;
             }
@@ -48,7 +55,7 @@ fn write_to(out: &mut impl Write, mesh: &FrameMesh, format: Format) -> io::Resul
             }
         }
         Format::PlyBinary => {
-            ply_header(out, mesh, "binary_little_endian")?;
+            ply_header(out, mesh, "binary_little_endian", notes)?;
             for position in &mesh.positions {
                 for coordinate in position {
                     out.write_all(&coordinate.to_le_bytes())?;
@@ -65,12 +72,14 @@ fn write_to(out: &mut impl Write, mesh: &FrameMesh, format: Format) -> io::Resul
     Ok(())
 }
 
-fn ply_header(out: &mut impl Write, mesh: &FrameMesh, encoding: &str) -> io::Result<()> {
+fn ply_header(out: &mut impl Write, mesh: &FrameMesh, encoding: &str, notes: Notes<'_>) -> io::Result<()> {
+    write!(out, "ply\nformat {encoding} 1.0\ncomment {MESH_NOTE}\n")?;
+    for (name, value) in notes {
+        writeln!(out, "comment {name}: {}", printable::line(value))?;
+    }
     write!(
         out,
-        "ply\nformat {encoding} 1.0\n\
-         comment {MESH_NOTE}\n\
-         element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+        "element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
          element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         mesh.positions.len(),
         mesh.triangles.len()
@@ -87,15 +96,21 @@ mod tests {
             triangles: vec![[0, 1, 2]],
         };
         let mut out = Vec::new();
-        write_to(&mut out, &mesh, format).unwrap();
+        let notes = [("Reference system", "a\nb".to_owned()), ("Coordinates", "x = 1 + 2 * east".to_owned())];
+        write_to(&mut out, &mesh, format, &notes).unwrap();
         out
     }
 
     #[test]
     fn text_formats_read_as_specified() {
         let obj = String::from_utf8(written(Format::Obj)).unwrap();
+        assert!(
+            obj.contains("\n# Reference system: a\\nb\n# Coordinates: x = 1 + 2 * east\nv 0 0 1.5\n"),
+            "{obj}"
+        );
         assert!(obj.ends_with("v 0 0 1.5\nv 10 0 2\nv 0 10 3.25\nf 1 2 3\n"));
         let ply = String::from_utf8(written(Format::PlyText)).unwrap();
+        assert!(ply.contains("\ncomment Reference system: a\\nb\ncomment Coordinates: "), "{ply}");
         assert!(
             ply.starts_with("ply\nformat ascii 1.0\n")
                 && ply.ends_with("end_header\n0 0 1.5\n10 0 2\n0 10 3.25\n3 0 1 2\n")

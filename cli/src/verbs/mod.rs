@@ -5,6 +5,7 @@
 //! itself is wrong.** A reader that closes our output early ends the program quietly.
 
 mod build;
+mod cache;
 mod cap;
 mod compare;
 mod defect;
@@ -27,7 +28,6 @@ mod parse;
 mod picture;
 #[cfg(not(feature = "view"))]
 mod pictureless;
-mod place;
 mod progress;
 #[cfg(feature = "pictures")]
 mod quiet;
@@ -35,6 +35,7 @@ mod remedy;
 mod replay;
 #[cfg(unix)]
 mod signals;
+mod siting;
 #[cfg(feature = "pictures")]
 mod snapshot;
 mod sweep;

@@ -4,7 +4,7 @@
 
 use anyhow::{Context, Result};
 use serde::Serialize;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use terrasoar_layout::printable;
 use terrasoar_layout::words::thousands;
 
@@ -22,6 +22,18 @@ fn write_out(text: &str) -> Result<()> {
         .and_then(|()| if text.ends_with('\n') { Ok(()) } else { out.write_all(b"\n") })
         .and_then(|()| out.flush())
         .context(TO_STDOUT)
+}
+
+/// Prints rows of a table to standard output: as they are to files and pipes, harmlessly to a terminal.
+pub(super) fn print_rows(rows: &[u8]) -> Result<()> {
+    if rows.is_empty() {
+        return Ok(());
+    }
+    if io::stdout().is_terminal() {
+        return write_out(&printable::lines(&String::from_utf8_lossy(rows)));
+    }
+    let mut out = io::stdout().lock();
+    out.write_all(rows).and_then(|()| out.flush()).context(TO_STDOUT)
 }
 
 /// Prints one JSON object to standard output.

@@ -89,6 +89,13 @@ pub(super) fn place_m(text: &str) -> Result<[f64; 2], String> {
     Ok([number(east)?, number(north)?])
 }
 
+/// `X,Y`: a place in some system, east before north.
+pub(super) fn place(text: &str) -> Result<[f64; 2], String> {
+    let (east, north) =
+        text.split_once(',').ok_or("give two numbers, east before north, such as 1500,820.5")?;
+    Ok([number(east)?, number(north)?])
+}
+
 /// `A` or `A,B`: one number above 0, or the least and the greatest.
 pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
     match text.split_once(',') {

@@ -9,7 +9,7 @@ use terrasoar::flyover::Quality;
 use terrasoar::ground::PictureEngine;
 use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
-use terrasoar_lab::picture::encode;
+use terrasoar_lab::picture::encode_with;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
 use terrasoar_render::{LOOKS, Look};
@@ -149,7 +149,12 @@ pub(super) fn angles(text: &str) -> Result<[f64; 2], String> {
 
 /// Three bytes a pixel as the bytes of a PNG file.
 pub(super) fn png(rgb: &[u8], size: Viewport) -> Result<Vec<u8>> {
-    encode(rgb, size.size_px()).context("the picture is incomplete")
+    png_with(rgb, size, &[])
+}
+
+/// As [`png`], with texts in it.
+pub(super) fn png_with(rgb: &[u8], size: Viewport, texts: &[(&'static str, String)]) -> Result<Vec<u8>> {
+    encode_with(rgb, size.size_px(), texts).context("the picture is incomplete")
 }
 
 /// Draws a frame of a flight, flown to it; gives the bytes of a PNG file and the adapter's name.

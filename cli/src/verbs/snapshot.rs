@@ -2,8 +2,9 @@
 
 use super::output::{decimal, grouped, print, print_json};
 use super::outputs::{Force, Kind};
-use super::picture::{PictureArgs, angles, png};
+use super::picture::{PictureArgs, angles, png_with};
 use super::progress::Meter;
+use super::siting;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
 use anyhow::{Context, Result};
@@ -23,6 +24,7 @@ use terrasoar_scene::overview::{FOV_DEG, overview, towards_middle, view_from};
 ///
 /// Of a frame of a flight, of a view that is given, or of the whole terrain from obliquely above. With a flight the engine flies all frames before it.
 /// Needs a graphics driver; one in software does. The same input gives the same bytes on the same driver.
+/// Texts in the PNG say in which reference system the terrain lies.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -126,7 +128,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let rgb = studio.picture(view, &look)?;
     let mut file = FileSink::create(&args.output)?;
-    file.write_all(&png(&rgb, picture.size)?).with_context(|| {
+    file.write_all(&png_with(&rgb, picture.size, &siting::notes(terrain.header()))?).with_context(|| {
         format!("{}: cannot write the picture; check the free space", args.output.display())
     })?;
     file.publish()?;

@@ -2,16 +2,18 @@
 
 use anyhow::Result;
 use std::path::{Path, PathBuf};
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::dem::{HorizontalUnit, UnitOf};
 use terrasoar_layout::file::header::{Header, SpacingOrigin};
 use terrasoar_layout::read::terrain::Terrain;
 
+use super::cache;
 use super::output::decimal;
 
 /// Which terrain is read: a file, and edits of it in another.
 #[derive(Debug, clap::Args)]
 pub(super) struct TerrainArgs {
-    /// Terrain file (.iqt)
+    /// Terrain file (.iqt); elevation data is built first, into the folder for caches, where it is to be looked at only
     pub(super) file: PathBuf,
     /// Edits of it that are kept apart (.iqo), as `terrasoar edit --overlay` makes them
     #[arg(long, value_name = "O.iqo")]
@@ -19,11 +21,24 @@ pub(super) struct TerrainArgs {
 }
 
 impl TerrainArgs {
-    /// Opens it, mapped.
+    /// Opens it, mapped. Elevation data is built first.
     pub(super) fn open(&self) -> Result<Terrain> {
-        match &self.overlay {
-            Some(overlay) => Ok(Terrain::open_with_overlay(&self.file, overlay)?),
+        if let Some(overlay) = &self.overlay {
+            return Ok(Terrain::open_with_overlay(&self.file, overlay)?);
+        }
+        match self.kept()? {
+            Some(kept) => open(&kept),
             None => open(&self.file),
+        }
+    }
+
+    /// Where the terrain file is that elevation data is built into; `None` where this is no elevation data.
+    pub(super) fn kept(&self) -> Result<Option<PathBuf>> {
+        match Terrain::open_unmapped(&self.file) {
+            Err(LayoutError::NotThisFormat { .. }) if self.overlay.is_none() => {
+                cache::of_elevation_data(&self.file)
+            }
+            _ => Ok(None),
         }
     }
 

@@ -61,8 +61,10 @@ fn after_help() -> String {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
+    let kept = args.terrain.kept()?;
     window::run(Plan {
-        file: args.terrain.file.clone(),
+        is_kept: kept.is_some(),
+        file: kept.unwrap_or_else(|| args.terrain.file.clone()),
         overlay: args.terrain.overlay.clone(),
         flight: args.flight.clone(),
         style: args.style.clone(),

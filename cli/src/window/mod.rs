@@ -1,10 +1,11 @@
 //! `terrasoar view`: a window that a terrain is flown over in.
 //!
-//! `camera`, `pick`, `flights`, `settings`, `keys`, `hand`, `job` and `workshop` know no window and are tested by themselves; `screen` and
+//! `camera`, `coordinates`, `pick`, `flights`, `settings`, `keys`, `hand`, `job` and `workshop` know no window and are tested by themselves; `screen` and
 //! `overlay` know no terrain; `viewer` puts a frame together, `events` brings it the window's events. A frame is drawn when something
 //! moves or was touched; else nothing is. **Whatever fails while the window is open is said in it.**
 
 mod camera;
+mod coordinates;
 mod display;
 mod events;
 mod flights;
@@ -38,6 +39,8 @@ pub(crate) use keys::list as list_of_keys;
 pub(crate) struct Plan {
     /// Terrain file.
     pub file: PathBuf,
+    /// Whether it was made of elevation data and lies in the folder for caches, where edits would be lost.
+    pub is_kept: bool,
     /// Edits of it in a file of their own.
     pub overlay: Option<PathBuf>,
     /// Flight to play.

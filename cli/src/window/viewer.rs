@@ -13,6 +13,7 @@ mod tell;
 
 use super::Plan;
 use super::camera::Rig;
+use super::coordinates::Coordinates;
 use super::flights::{Player, Recorder};
 use super::hand::Hand;
 use super::history::History;
@@ -63,6 +64,7 @@ pub(super) struct Viewer {
     overlay: Overlay,
     stage: Stage,
     terrain_name: String,
+    coordinates: Coordinates,
     settings: Settings,
     memory: Memory,
     rig: Rig,
@@ -116,9 +118,10 @@ impl Viewer {
         let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
         let rig = sight::start(&stage, &screen, &window, &settings);
         let tools = ToolBox::new(stage.heights().extent_m());
-        let workshop = edit::workshop_for(&stage, &proxy);
+        let workshop = edit::workshop_for(&stage, &plan, &proxy);
         let mut viewer = Self {
             terrain_name: String::new(),
+            coordinates: Coordinates::of(stage.terrain().header()),
             window,
             display,
             proxy,

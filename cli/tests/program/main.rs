@@ -3,6 +3,7 @@
 #[cfg(target_os = "linux")]
 mod aliases;
 mod build;
+mod cache;
 mod drape;
 mod edit;
 mod edit_flights;
@@ -18,6 +19,7 @@ mod kills;
 mod misread;
 mod outputs;
 mod pictures;
+mod places;
 mod support;
 #[path = "../../../layout/tests/import_support/tiff.rs"]
 mod tiff;

@@ -7,11 +7,12 @@ use std::process::{Command, Output, Stdio};
 /// A temporary folder that the program runs in.
 pub struct Bench {
     folder: tempfile::TempDir,
+    cache: tempfile::TempDir,
 }
 
 impl Bench {
     pub fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
+        Self { folder: tempfile::tempdir().unwrap(), cache: tempfile::tempdir().unwrap() }
     }
 
     /// With `land.tif`, `land.iqt` and `land.flight` of 40 frames in it.
@@ -47,6 +48,11 @@ impl Bench {
         self.folder.path()
     }
 
+    /// The folder for caches.
+    pub fn cache(&self) -> &Path {
+        self.cache.path()
+    }
+
     /// Names of everything in the folder, sorted.
     pub fn names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.folder()).unwrap();
@@ -59,6 +65,7 @@ impl Bench {
         let mut command = Command::new(env!("CARGO_BIN_EXE_terrasoar"));
         // Where this is not set drivers in software complain on standard error, unless they are kept from it.
         command.env_remove("XDG_RUNTIME_DIR");
+        command.env("XDG_CACHE_HOME", self.cache.path());
         command.args(args).current_dir(self.folder()).stdin(Stdio::null());
         command
     }

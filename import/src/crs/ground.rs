@@ -40,6 +40,7 @@ pub(crate) struct Ground {
     is_geographic: bool,
     /// Semi-axes of the ellipsoid in metres.
     axes_m: [f64; 2],
+    is_shift_lost: bool,
 }
 
 impl std::fmt::Debug for Ground {
@@ -80,9 +81,9 @@ impl Ground {
             (None, _) => return None,
         };
         let bare = without(&text, &LEFT_OUT);
-        let no_grid = match from_proj::word(&bare, "nadgrids") {
-            Some("@null") | None => bare,
-            Some(_) => without(&bare, &["nadgrids"]),
+        let (no_grid, had_grid) = match from_proj::word(&bare, "nadgrids") {
+            Some("@null") | None => (bare, false),
+            Some(_) => (without(&bare, &["nadgrids"]), true),
         };
         let size = match system.unit.as_ref()?.size {
             HorizontalSize::Metres(metres) => metres,
@@ -90,7 +91,12 @@ impl Ground {
         };
         // Others' code on a stranger's text.
         quiet(|| {
-            Self::of(&no_grid, size, system.signs).or_else(|| Self::of(&plain(&no_grid), size, system.signs))
+            let whole = Self::of(&no_grid, size, system.signs);
+            let whole = whole.map(|ground| Self { is_shift_lost: had_grid, ..ground });
+            whole.or_else(|| {
+                let rough = Self::of(&plain(&no_grid), size, system.signs)?;
+                Some(Self { is_shift_lost: true, ..rough })
+            })
         })
         .flatten()
     }
@@ -113,7 +119,8 @@ impl Ground {
             false => own.clone(),
         };
         let is_geographic = proj.is_latlong();
-        let this = Self { proj, own, world, size, signs, is_geographic, axes_m: [a, b] };
+        let this =
+            Self { proj, own, world, size, signs, is_geographic, axes_m: [a, b], is_shift_lost: false };
         // A datum by a grid that is not here shows at the first point.
         let (lon, lat) = (this.proj.longitude_of_origin(), this.proj.latitude_of_origin().clamp(-1.4, 1.4));
         let mut probe = (lon + 0.01, lat + 0.01);
@@ -152,6 +159,16 @@ impl Ground {
         transform(&self.proj, &other.proj, &mut point).ok()?;
         let point = [point.0 * other.signs[0] / other.size, point.1 * other.signs[1] / other.size];
         point.iter().all(|value| value.is_finite()).then_some(point)
+    }
+
+    /// Whether the datum is told by a grid that is not here, so that places are off by its shift where they are brought to another datum.
+    pub(crate) fn is_shift_lost(&self) -> bool {
+        self.is_shift_lost
+    }
+
+    /// Radius of the equator in metres.
+    pub(crate) fn radius_m(&self) -> f64 {
+        self.axes_m[0]
     }
 
     /// Whether coordinates are longitude and latitude.

@@ -29,7 +29,10 @@ fn by_code_alone(code: u32) -> Option<System> {
             let mut system = from_wkt::system(wkt)?;
             if !proj.is_empty() {
                 system.proj = Some(proj.to_owned());
-                system.signs = from_proj::signs(proj);
+                // A string that says nothing of axes does not deny what the text says of them, as for Krovak's to the south and west.
+                if from_proj::word(proj, "axis").is_some() {
+                    system.signs = from_proj::signs(proj);
+                }
             }
             system
         }

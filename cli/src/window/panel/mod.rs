@@ -11,6 +11,7 @@ mod place;
 mod status;
 mod tools;
 
+use super::coordinates::Coordinates;
 use super::flights::{Player, Recorder};
 use super::history::History;
 use super::keys::Action;
@@ -29,7 +30,7 @@ pub(crate) const WIDTH: f64 = 286.0;
 pub(crate) enum Wish {
     /// What a key would do.
     Act(Action),
-    /// To fly to a place typed as metres east and north.
+    /// To fly to a place that was typed.
     GoTo(String),
     /// A frame of the flight.
     Seek(usize),
@@ -47,6 +48,8 @@ pub(crate) struct Facts<'a> {
     pub terrain: &'a str,
     /// Metres from the south-west to the north-east sample.
     pub extent_m: [f64; 2],
+    /// Its places in words.
+    pub coordinates: &'a Coordinates,
     /// Whether an image is draped over it.
     pub has_image: bool,
     /// The adapter's name.

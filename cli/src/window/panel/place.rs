@@ -8,15 +8,18 @@ use egui::{Key, TextEdit, Ui};
 pub(super) fn show(ui: &mut Ui, facts: &Facts<'_>, memory: &mut Memory, wishes: &mut Vec<Wish>) {
     let [east, north, up] = facts.eye_m;
     ui.label(format!("eye {east:.0}, {north:.0}, {up:.0} m"));
+    ui.weak(facts.coordinates.shown([east, north]));
     let speed = format!("speed {}/s", length(facts.speed_m_s));
     ui.label(match facts.follow_m {
         Some(height_m) => format!("{speed}, {} above ground", length(height_m)),
         None => speed,
     });
     ui.horizontal(|ui| {
-        let hint = format!("{:.0}, {:.0}", 0.5 * facts.extent_m[0], 0.5 * facts.extent_m[1]);
+        let hint = facts.coordinates.hint();
         let field = TextEdit::singleline(&mut memory.place).hint_text(hint).desired_width(140.0);
-        let field = ui.add(field).on_hover_text("Metres east and north of the south-west corner");
+        let field = ui.add(field).on_hover_text(
+            "The DEM's coordinates, east before north; latitude and longitude, such as 45.9763 N 7.6586 E; or metres from the south-west corner, such as 1500 m, 820 m",
+        );
         if std::mem::take(&mut memory.focus_place) {
             field.request_focus();
         }

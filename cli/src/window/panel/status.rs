@@ -28,6 +28,6 @@ pub(super) fn show(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
 fn under(facts: &Facts<'_>) -> String {
     let Some(hit) = facts.under else { return "sky".to_owned() };
     let slope = hit.slope_deg.map_or_else(String::new, |deg| format!("   slope {deg:.0}°"));
-    let [x, y] = [hit.at_m.x, hit.at_m.y].map(|m| format!("{m:.0}"));
-    format!("{x}, {y} m   height {:.1} m{slope}   {} away", hit.height_m, length(hit.distance_m))
+    let at = facts.coordinates.shown([hit.at_m.x, hit.at_m.y]);
+    format!("{at}   height {:.1} m{slope}   {} away", hit.height_m, length(hit.distance_m))
 }

@@ -181,22 +181,11 @@ impl Viewer {
     }
 
     fn go_to(&mut self, text: &str) {
-        let numbers: Vec<Option<f64>> = text
-            .split([',', ' ', ';'])
-            .filter(|word| !word.is_empty())
-            .map(|word| word.parse().ok().filter(|n: &f64| n.is_finite()))
-            .collect();
-        let [Some(east), Some(north)] = numbers[..] else {
-            return self.trouble(format!(
-                "{text:?} is no place: give metres east and north of the south-west corner, such as 1500, 820.5"
-            ));
+        let [east, north] = match self.coordinates.meant(text) {
+            Ok(place_m) => place_m,
+            Err(words) => return self.trouble(words),
         };
         let [wide, high] = self.stage.heights().extent_m();
-        if !((0.0..=wide).contains(&east) && (0.0..=high).contains(&north)) {
-            return self.trouble(format!(
-                "{east}, {north} lies outside the terrain, which extends from 0, 0 to {wide:.0}, {high:.0} metres"
-            ));
-        }
         let exaggeration = self.settings.exaggeration;
         let at = glam::DVec3::new(east, north, 0.0);
         let below_m = ground_below_m(&self.stage.heights(), at, exaggeration);

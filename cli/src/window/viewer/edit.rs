@@ -4,6 +4,8 @@
 //! is on the disk, [`MOST_HELD`] pages at most.
 
 use super::Viewer;
+use crate::window::Plan;
+use crate::window::coordinates::Coordinates;
 use crate::window::stage::Stage;
 use crate::window::tool::{RADII_M, Stroke, Tool};
 use crate::window::wake::Wake;
@@ -31,6 +33,8 @@ const MOST_HELD: usize = 32_768;
 /// What is said then.
 const UNSAVED: &str =
     "128 MiB of edited ground are not on the disk yet, so this stroke ends here; go on when they are saved";
+/// What is said of a terrain in the folder for caches.
+const KEPT: &str = "this terrain was built of elevation data for looking at, and edits of it would be lost; make a file of it with `terrasoar build` and open that";
 /// Points of the ring that shows where a tool works.
 const RING_POINTS: usize = 72;
 
@@ -42,12 +46,16 @@ pub(in crate::window) struct Rain {
 }
 
 /// A workshop for what is on show, which wakes the window.
-pub(super) fn workshop_for(stage: &Stage, proxy: &EventLoopProxy<Wake>) -> Workshop {
+pub(super) fn workshop_for(stage: &Stage, plan: &Plan, proxy: &EventLoopProxy<Wake>) -> Workshop {
     let proxy = proxy.clone();
-    Workshop::new(stage.terrain(), move || {
+    let wake = move || {
         // A window that has gone needs no waking.
         let _ = proxy.send_event(Wake);
-    })
+    };
+    if plan.is_kept && stage.path() == plan.file {
+        return Workshop::closed(stage.terrain(), KEPT, wake);
+    }
+    Workshop::new(stage.terrain(), wake)
 }
 
 impl Viewer {
@@ -229,7 +237,8 @@ impl Viewer {
 
     /// Puts another stage in place of the one before, whose edits are settled.
     pub(super) fn take_stage(&mut self, stage: Stage) {
-        self.workshop = workshop_for(&stage, &self.proxy);
+        self.workshop = workshop_for(&stage, &self.plan, &self.proxy);
+        self.coordinates = Coordinates::of(stage.terrain().header());
         self.stage = stage;
         self.frozen = None;
         self.touched = true;

@@ -27,6 +27,7 @@ impl Viewer {
         let facts = Facts {
             terrain: &self.terrain_name,
             extent_m,
+            coordinates: &self.coordinates,
             has_image: self.stage.scene.has_image(),
             adapter: &adapter,
             under: self.under,

@@ -76,6 +76,16 @@ impl Workshop {
         Self::with(terrain, Arc::new(open), Arc::new(wake), spawn)
     }
 
+    /// A workshop for `terrain` that edits nothing, and says `why`.
+    pub(crate) fn closed(
+        terrain: &Terrain,
+        why: &'static str,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Self {
+        let open = move || Err(LayoutError::Usage(why.into()));
+        Self::with(terrain, Arc::new(open), Arc::new(wake), spawn)
+    }
+
     fn with(terrain: &Terrain, open: Open, wake: Wake, spawn: Spawn) -> Self {
         let (path, generation) = (terrain.path().to_path_buf(), terrain.header().generation);
         Self { state: State::Closed, path, generation, open, wake, spawn }

@@ -1,0 +1,105 @@
+//! Where a terrain lies, in the words that `info` prints and that meshes and pictures carry.
+//!
+//! Cost: for the bounds in longitude and latitude some thousand projections.
+
+use super::output::decimal;
+use super::terrain;
+use serde::Serialize;
+use terrasoar_import::places::{Crs, Frame};
+use terrasoar_layout::file::header::Header;
+
+/// How the samples lie on the ground.
+#[derive(Debug, Serialize)]
+pub(super) struct Placement {
+    /// "north-up", or how else rows and columns run; what was done to the elevation model to have them so.
+    words: Vec<String>,
+    /// Samples east and north of the south-west one to coordinates: x = m0 + m1 x + m2 y, y = m3 + m4 x + m5 y.
+    sample_to_crs: Option<[f64; 6]>,
+}
+
+/// Where the terrain lies.
+#[derive(Debug, Serialize)]
+pub(super) struct Siting {
+    placement: Placement,
+    /// Least x and y and greatest x and y of the samples, in the DEM's coordinates.
+    bounds: Option<[f64; 4]>,
+    /// West, south, east and north in degrees of WGS 84; west is greater than east across the antimeridian. Null where it cannot be known.
+    bounds_wgs84: Option<[f64; 4]>,
+}
+
+impl Siting {
+    pub(super) fn of(header: &Header) -> Self {
+        let done = header.about.origins.iter().filter(|(what, _)| what == "placement");
+        let mut words = vec![lie(header).to_owned()];
+        words.extend(done.map(|(_, words)| words.clone()));
+        Self {
+            placement: Placement { words, sample_to_crs: header.sample_to_crs },
+            bounds: Frame::own(header).and_then(|frame| frame.bounds()),
+            bounds_wgs84: Frame::wgs84(header).and_then(|frame| frame.bounds_deg()),
+        }
+    }
+
+    /// Rows of `info`.
+    pub(super) fn rows(&self) -> Vec<(&'static str, String)> {
+        let corners = |[x0, y0, x1, y1]: [f64; 4], digits| {
+            let [x0, y0, x1, y1] = [x0, y0, x1, y1].map(|value| decimal(value, digits));
+            format!("{x0},{y0} to {x1},{y1}")
+        };
+        let mut rows = vec![("placement", self.placement.words.join("; "))];
+        rows.extend(self.bounds.map(|bounds| ("bounds", corners(bounds, 7))));
+        rows.extend(
+            self.bounds_wgs84
+                .map(|bounds| ("longitude, latitude", format!("{} (WGS 84)", corners(bounds, 7)))),
+        );
+        rows
+    }
+}
+
+/// How rows and columns run by the map alone.
+fn lie(header: &Header) -> &'static str {
+    let Some([_, a, b, _, d, e]) = header.sample_to_crs else { return "unknown" };
+    match (b == 0.0 && d == 0.0, a > 0.0, e > 0.0) {
+        (true, true, true) => "north-up",
+        (true, false, false) => "north-up, in a system that counts to the west and south",
+        (true, false, true) => "north-up, in a system that counts to the west",
+        (true, true, false) => "north-up, in a system that counts to the south",
+        (false, ..) => "turned or sheared",
+    }
+}
+
+/// What a file made of a terrain says of where that lies: names and values. Nothing that is not known.
+pub(super) fn notes(header: &Header) -> Vec<(&'static str, String)> {
+    let mut notes = Vec::new();
+    if let Some(name) = terrain::crs(header) {
+        notes.push(("Reference system", name));
+    }
+    if let Some([x, a, b, y, d, e]) = header.sample_to_crs {
+        let [east_m, north_m] = header.grid.spacing_m();
+        let sum = |from: f64, east: f64, north: f64| {
+            let mut text = format!("{from}");
+            for (factor, name) in [(east / east_m, "east"), (north / north_m, "north")] {
+                if factor != 0.0 {
+                    let sign = if factor < 0.0 { '-' } else { '+' };
+                    text.push_str(&format!(" {sign} {} * {name}", factor.abs()));
+                }
+            }
+            text
+        };
+        notes.push(("Coordinates", format!("x = {}; y = {}", sum(x, a, b), sum(y, d, e))));
+    }
+    let above = &header.about.vertical_name;
+    if !above.is_empty() {
+        let code = header.about.vertical_epsg.map(|code| format!(" (EPSG:{code})")).unwrap_or_default();
+        notes.push(("Heights", format!("metres, {above}{code}")));
+    }
+    notes
+}
+
+/// The system in full, where it is known by text or code.
+pub(super) fn crs_text(header: &Header) -> Option<String> {
+    let kept = &header.about.crs_text;
+    if !kept.is_empty() {
+        return Some(kept.clone());
+    }
+    Crs::of(header).map(|crs| crs.text().to_owned()).filter(|text| !text.is_empty())
+}
