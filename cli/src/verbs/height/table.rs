@@ -5,7 +5,8 @@
 
 use anyhow::{Context, Result, anyhow, bail};
 use csv::{ByteRecord, ReaderBuilder};
-use std::cell::Cell;
+use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::io::{self, Cursor, Read};
 use std::path::Path;
 use std::rc::Rc;
@@ -31,28 +32,44 @@ const NAMES: [([&str; 2], bool); 13] = [
     (["decimallongitude", "decimallatitude"], true),
 ];
 
+/// What is known of the bytes that were read.
+#[derive(Default)]
+struct Passed {
+    /// Bytes that the row may still have.
+    left: u64,
+    bytes: u64,
+    /// Where lines end that no row has passed yet.
+    ends: VecDeque<u64>,
+    lines: u64,
+}
+
 /// A reader that gives up where a row takes too much.
 struct Bounded<R> {
     from: R,
-    left: Rc<Cell<u64>>,
+    passed: Rc<RefCell<Passed>>,
 }
 
 impl<R: Read> Read for Bounded<R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let Some(left) = self.left.get().checked_sub(bytes.len() as u64) else {
-            return Err(io::Error::other(
+        let mut passed = self.passed.borrow_mut();
+        passed.left = passed.left.checked_sub(bytes.len() as u64).ok_or_else(|| {
+            io::Error::other(
                 "a row is longer than a mebibyte; is a quotation mark left open, or is this no table?",
-            ));
-        };
-        self.left.set(left);
-        self.from.read(bytes)
+            )
+        })?;
+        let read = self.from.read(bytes)?;
+        let start = passed.bytes;
+        let is_end = |(_, byte): &(usize, &u8)| **byte == b'\n';
+        passed.ends.extend(bytes[..read].iter().enumerate().filter(is_end).map(|(at, _)| start + at as u64));
+        passed.bytes += read as u64;
+        Ok(read)
     }
 }
 
 /// A table under way.
 pub(super) struct Table<R> {
     reader: csv::Reader<Bounded<io::Chain<Cursor<Vec<u8>>, R>>>,
-    left: Rc<Cell<u64>>,
+    passed: Rc<RefCell<Passed>>,
     /// What the messages call it.
     name: String,
     pub(super) separator: u8,
@@ -86,13 +103,13 @@ impl<R: Read> Table<R> {
             start.drain(..3);
         }
         let separator = separator(&start);
-        let left = Rc::new(Cell::new(2 * LONGEST_ROW));
-        let from = Bounded { from: Cursor::new(start).chain(from), left: Rc::clone(&left) };
+        let passed = Rc::new(RefCell::new(Passed::default()));
+        let from = Bounded { from: Cursor::new(start).chain(from), passed: Rc::clone(&passed) };
         let reader =
             ReaderBuilder::new().delimiter(separator).has_headers(false).flexible(true).from_reader(from);
         let mut table = Self {
             reader,
-            left,
+            passed,
             name,
             separator,
             header: None,
@@ -103,6 +120,10 @@ impl<R: Read> Table<R> {
         };
         let mut first = ByteRecord::new();
         let Some(line) = table.read_row(&mut first)? else { return Ok(table) };
+        // A sign of a comment that stands alone is no name.
+        if first.get(0) == Some(b"#") && separator == b' ' {
+            first = first.iter().skip(1).collect();
+        }
         table.fields = first.len();
         if let Some((columns, is_lon_lat)) = named(&first, wants_degrees) {
             (table.columns, table.is_lon_lat, table.header) = (columns, is_lon_lat, Some(first));
@@ -152,7 +173,7 @@ impl<R: Read> Table<R> {
     /// Reads a row and says which line it begins in; `None` at the end. Fields that only several spaces in a row make are left out.
     fn read_row(&mut self, row: &mut ByteRecord) -> Result<Option<u64>> {
         loop {
-            self.left.set(2 * LONGEST_ROW);
+            self.passed.borrow_mut().left = 2 * LONGEST_ROW;
             let is_there = self.reader.read_byte_record(row).map_err(|error| match error.into_kind() {
                 csv::ErrorKind::Io(error) => anyhow!("{}: cannot read the table: {error}", self.name),
                 _ => anyhow!("{}: the table cannot be read", self.name),
@@ -160,15 +181,29 @@ impl<R: Read> Table<R> {
             if !is_there {
                 return Ok(None);
             }
-            let line = row.position().map_or(0, csv::Position::line);
+            let line = self.line(row);
             if self.separator == b' ' {
                 *row = row.iter().filter(|field| !field.is_empty()).collect();
             }
             // A line of blanks is none.
-            if !row.is_empty() && !(row.len() == 1 && row[0].trim_ascii().is_empty()) {
+            if row.len() > 1 || row.iter().any(|field| !field.trim_ascii().is_empty()) {
                 return Ok(Some(line));
             }
         }
+    }
+
+    /// The line that a row begins in which was just read. The crate's own count is one off after blank lines, and where lines end in two characters.
+    fn line(&self, row: &ByteRecord) -> u64 {
+        let last = self.reader.position().byte().saturating_sub(1);
+        let mut passed = self.passed.borrow_mut();
+        while passed.ends.front().is_some_and(|end| *end < last) {
+            passed.ends.pop_front();
+            passed.lines += 1;
+        }
+        let within = row.as_slice().iter().filter(|byte| **byte == b'\n').count() as u64;
+        // Where a quotation mark is left open, the last end of a line is in the row.
+        let is_open = last + 1 == passed.bytes && row.as_slice().ends_with(b"\n");
+        1 + passed.lines.saturating_sub(within - u64::from(is_open))
     }
 
     /// A finite number; with a comma for the point where commas do not separate.
@@ -266,6 +301,8 @@ mod tests {
     fn wrong_rows_are_told_by_their_line() {
         for (text, words) in [
             ("x,y\n1,2\n\n3,abc\n", "line 4: `abc` in column 2"),
+            ("x,y\r\n1,2\r\n\r\n3,abc\r\n", "line 4: `abc`"),
+            ("x,y,z\n1,2,\"a\nb\"\n3,abc,z", "line 4: `abc`"),
             ("x,y\n1,2\n3\n", "line 3: a place needs two numbers, and there is 1 field"),
             ("1,2\n3,4,5\n", "line 2: there are 3 fields, and 2 in the first row"),
             ("x,y\n1,\"2\n3,4\n", "line 2"),
