@@ -145,6 +145,15 @@ impl Ground {
         (point.0.is_finite() && point.1.is_finite()).then_some([point.0, point.1])
     }
 
+    /// The point of a longitude and latitude of WGS 84.
+    #[cfg(test)]
+    fn of_world(&self, [lon, lat]: [f64; 2]) -> Option<[f64; 2]> {
+        let mut point = (lon, lat);
+        transform(&self.world, &self.proj, &mut point).ok()?;
+        let point = [point.0 * self.signs[0] / self.size, point.1 * self.signs[1] / self.size];
+        point.iter().all(|value| value.is_finite()).then_some(point)
+    }
+
     /// A point of this system in another one.
     pub(crate) fn across_to(&self, other: &Self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let mut point = (x * self.signs[0] * self.size, y * self.signs[1] * self.size);

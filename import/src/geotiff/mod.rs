@@ -22,6 +22,7 @@ mod convert;
 mod failure;
 mod geokeys;
 mod images;
+mod keys;
 mod lerc;
 mod listing;
 mod metadata;
