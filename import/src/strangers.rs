@@ -41,7 +41,7 @@ const SIGNED: &[Stranger] = &[
         0,
         b"v/1\x01",
         "an OpenEXR picture",
-        "heights in it are for a program of pictures to write: convert it to a 16-bit grey PNG, for example with oiiotool INPUT --ch Y -d uint16 output.png",
+        "write its heights as a 16-bit grey PNG with a program of pictures, such as oiiotool, and name that",
     ),
     stranger(4, b"jP  \r\n", "a JPEG 2000 file", CONVERT),
     stranger(0, b"\xffO\xffQ", "a JPEG 2000 stream", CONVERT),

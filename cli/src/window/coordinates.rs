@@ -6,6 +6,9 @@
 use terrasoar_import::places::{Crs, Frame};
 use terrasoar_layout::file::header::Header;
 
+/// Metres by which rounding moves a place that is shown: five decimals of a degree.
+const ROUNDED_BY_M: f64 = 1.2;
+
 /// What a place may look like.
 const FORMS: &str = "give the DEM's coordinates, east before north, or latitude and longitude such as 45.9763 N 7.6586 E, or metres from the south-west corner such as 1500 m, 820 m";
 
@@ -89,8 +92,12 @@ impl Coordinates {
         found.ok_or_else(|| self.outside(text))
     }
 
+    /// A place within the terrain. What is shown is rounded, so a place a hair outside means one on the edge.
     fn inside(&self, place_m: Option<[f64; 2]>) -> Option<[f64; 2]> {
-        place_m.filter(|m| (0..2).all(|axis| (0.0..=self.extent_m[axis]).contains(&m[axis])))
+        let place_m = place_m?;
+        let nearest = [0, 1].map(|axis| place_m[axis].clamp(0.0, self.extent_m[axis]));
+        let is_near = (0..2).all(|axis| (place_m[axis] - nearest[axis]).abs() <= ROUNDED_BY_M);
+        is_near.then_some(nearest)
     }
 
     fn outside(&self, text: &str) -> String {
