@@ -17,6 +17,7 @@ mod formats;
 mod gdal;
 mod geotiff;
 mod guard;
+mod heights;
 mod hgt;
 mod identify;
 pub(crate) mod input;

@@ -5,11 +5,12 @@
 
 use crate::beside::Beside;
 use crate::crs::{self, Kind, System};
+use crate::heights::{Heights, heights};
 use crate::mask::Masking;
 use crate::options::OpenOptions;
 use crate::placement::{Lie, Spacing, Turn, Turning, spacing, turned_by};
 use crate::reader::{Declared, Reader};
-use crate::value::{Heights, Suspicion, Voids, heights};
+use crate::value::{Suspicion, Voids};
 use crate::warp::Warp;
 use std::path::Path;
 use terrasoar_layout::dem::{About, DemInfo, DemSource, SampleSink, UnitOf, Warning, Window};

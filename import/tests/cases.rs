@@ -99,7 +99,7 @@ fn units_of_coordinates_come_from_codes_keys_and_sizes() {
     }
     spacing_is("13-tfw.tif", [10.0; 2]);
     spacing_is("15-arcsec.tif", [21.9003, 30.87]);
-    spacing_is("15-grads.tif", [70.897, 100.01]);
+    spacing_is("15-grads.tif", [70.983, 100.017]);
 }
 
 #[test]
@@ -241,6 +241,11 @@ fn heights_packed_into_colours_are_read_by_name() {
     let built = built(&case("26-terrainrgb.tif"), &typed, None).unwrap();
     assert_eq!(built.height_m([0, 0]), Some(100.0));
     assert_eq!(built.height_m([40, 30]), Some(430.0));
+    for (name, packing) in [("26-terrainrgb.png", "mapbox"), ("26-terrarium.png", "terrarium")] {
+        let typed = OpenOptions { decode: Some(packing.into()), ..OpenOptions::default() };
+        let built = cases_support::built(&case(name), &typed, None).unwrap();
+        assert_eq!((built.height_m([0, 0]), built.height_m([40, 30])), (Some(100.0), Some(430.0)), "{name}");
+    }
 }
 
 #[test]

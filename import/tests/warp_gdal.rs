@@ -110,12 +110,14 @@ fn agrees(path: &Path, target: &str, options: &OpenOptions, folder: &Path) {
             around.iter().filter_map(|other| Some((theirs.samples.get(*other)? - theirs.samples[at]).abs()));
         step.filter(|step| !step.is_nan()).fold(1.0, f64::max)
     };
-    let (mut voids, mut both, mut worst) = (0, 0, 0.0f64);
+    let (mut voids, mut both, mut other, mut worst) = (0, 0, 0, 0.0f64);
     for (at, (a, b)) in ours.samples.iter().zip(&theirs.samples).enumerate() {
         match (a.is_nan(), b.is_nan()) {
             (false, false) => {
                 both += 1;
-                worst = worst.max((a - b).abs() / steepest(at));
+                let off = (a - b).abs() / steepest(at);
+                other += u32::from(off > 0.05);
+                worst = worst.max(off);
             }
             (true, true) => {}
             _ => voids += 1,
@@ -127,7 +129,12 @@ fn agrees(path: &Path, target: &str, options: &OpenOptions, folder: &Path) {
         both > 3000 && voids * 200 <= both,
         "{name}: {voids} of {both} samples are void on one side alone"
     );
-    assert!(worst <= 0.05, "{name}: {worst} of a step");
+    // Of two samples that are as near, either is the nearest one.
+    let is_nearest = options.resampling == Some(Resampling::Nearest);
+    assert!(
+        worst <= 0.05 || is_nearest && other * 50 <= both,
+        "{name}: {worst} of a step, {other} of {both}"
+    );
 }
 
 #[test]

@@ -39,14 +39,14 @@ fn number(text: &str) -> Option<f64> {
     (value.is_finite() && value > 0.0).then_some(value)
 }
 
+/// The EPSG code that a string names instead of describing the system: `+init=epsg:4326`.
+pub(super) fn init_code(text: &str) -> Option<u32> {
+    word(text, "init")?.to_ascii_lowercase().strip_prefix("epsg:")?.parse().ok()
+}
+
 /// The system that a string describes; `None` if it is no such string.
 pub(super) fn system(text: &str) -> Option<System> {
     let text = text.trim();
-    if let Some(code) =
-        word(text, "init").and_then(|init| init.to_ascii_lowercase().strip_prefix("epsg:")?.parse().ok())
-    {
-        return super::resolve::by_code(code);
-    }
     let projection = word(text, "proj")?;
     let mut system = System::unknown();
     system.text = text.to_owned();

@@ -74,7 +74,10 @@ pub(crate) fn by_text(text: &str) -> Option<System> {
         return from_wkt::system(text);
     }
     if text.contains("proj=") || text.contains("init=") {
-        return from_proj::system(text);
+        return match from_proj::init_code(text) {
+            Some(code) => by_code(code),
+            None => from_proj::system(text),
+        };
     }
     let lower = text.to_ascii_lowercase();
     if matches!(lower.as_str(), "wgs84" | "ogc:crs84" | "crs84" | "crs:84" | "urn:ogc:def:crs:ogc:1.3:crs84")

@@ -21,6 +21,7 @@ mod colour_table;
 mod convert;
 mod geokeys;
 mod images;
+mod keys;
 mod lerc;
 mod listing;
 mod metadata;

@@ -3,7 +3,7 @@
 //! Keys are those of the GeoTIFF standard (OGC 19-008r4, section 7.4); which of several origins counts depends on the projection, and writers confuse them, so the first
 //! that is there is taken. False eastings are in the file's unit and metres in the string. What is not known gives no string: the terrain is built by its units alone.
 
-use super::geokeys::Keys;
+use super::keys::Keys;
 use crate::crs::by_text;
 
 const GEOGRAPHIC_TYPE: u16 = 2048;

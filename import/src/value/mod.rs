@@ -2,14 +2,12 @@
 
 mod band;
 mod decode;
-mod heights;
 mod suspicion;
 mod unit;
 mod voids;
 
 pub(crate) use band::band;
 pub(crate) use decode::{Decode, decode};
-pub(crate) use heights::{Heights, heights};
 pub(crate) use suspicion::Suspicion;
 pub(crate) use unit::{US_SURVEY_FOOT_M, unit_m};
 pub(crate) use voids::Voids;

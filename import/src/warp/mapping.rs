@@ -1,6 +1,6 @@
 //! From a place in the new grid to a place among the old samples: the new grid's coordinates, another system's, the old grid's columns and rows.
 //!
-//! A projection is asked at the nodes of a mesh, and between them places are interpolated, where that is right to a hundredth of a step; else it is asked everywhere.
+//! A projection is asked at the nodes of a mesh, and between them places are interpolated, where that is right to a five-hundredth of a step; else it is asked everywhere.
 //! Cost: a microsecond a node.
 
 use crate::crs::Ground;
@@ -38,7 +38,7 @@ pub(super) fn apply(map: &[f64; 6], [u, v]: [f64; 2]) -> [f64; 2] {
 /// Nodes of the mesh on each side of a cell.
 const CELL: usize = 16;
 /// Farthest that an interpolated place may be off, in old steps.
-const OFF_STEPS: f64 = 0.01;
+const OFF_STEPS: f64 = 0.002;
 
 impl Mapping {
     pub(super) fn new(

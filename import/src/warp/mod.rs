@@ -76,7 +76,7 @@ impl Warp {
         };
         let kernel = Kernel {
             resampling,
-            scale: scale(&mapping, &grid),
+            scale: scale(grid.samples, samples),
             samples,
             wraps: wraps(system, &map, samples),
         };
@@ -299,24 +299,11 @@ fn reprojected(
     Ok((Some(target), grid, mapping))
 }
 
-/// New samples an old one, at most 1: the middle of what it is at places all over the grid, and a whole number of old ones where it is nearly that, as GDAL has it.
-fn scale(mapping: &Mapping, grid: &Grid) -> [f64; 2] {
-    let mut found: [Vec<f64>; 2] = Default::default();
-    for (i, j) in (0..5u32).flat_map(|j| (0..5u32).map(move |i| (i, j))) {
-        let share = |k: u32, count: u32| (f64::from(count) - 1.0) * (0.1 + 0.2 * f64::from(k));
-        let (x, y) = (share(i, grid.samples[0]), share(j, grid.samples[1]));
-        let at = |dx: f64, dy: f64| mapping.place([x + dx, y + dy]);
-        let [a, b, c, d] = [at(-0.5, 0.0), at(0.5, 0.0), at(0.0, -0.5), at(0.0, 0.5)];
-        for (k, found) in found.iter_mut().enumerate() {
-            let old = (b[k] - a[k]).abs().max((d[k] - c[k]).abs());
-            if old.is_finite() {
-                found.push(old);
-            }
-        }
-    }
-    found.map(|mut found| {
-        found.sort_by(f64::total_cmp);
-        let old = found.get(found.len() / 2).copied().unwrap_or(1.0);
+/// New samples an old one, at most 1: by how many there are of either, for the new grid covers all of the old one. A whole number of old ones where it is nearly that, as GDAL
+/// has it.
+fn scale(new: [u32; 2], old: [u32; 2]) -> [f64; 2] {
+    std::array::from_fn(|i| {
+        let old = f64::from(old[i]) / f64::from(new[i]);
         if old <= 1.05 {
             return 1.0;
         }

@@ -3,10 +3,10 @@
 //! A unit is taken from the person, the band, the vertical system, in this order. One that is named and not known is said aloud, and so is one that only the map has: maps in
 //! feet often come with heights in feet, and often not.
 
-use super::unit::unit_m;
 use crate::crs::{System, unit_of_code};
 use crate::options::{Direction, OpenOptions};
 use crate::reader::{HorizontalSize, ValueSaid, VerticalUnit};
+use crate::value::unit_m;
 use terrasoar_layout::dem::{UnitOf, Warning};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
@@ -159,7 +159,7 @@ fn tell_feet(system: &System, warnings: &mut Vec<Warning>) {
     let Some(unit) = &system.unit else { return };
     let HorizontalSize::Metres(metres) = unit.size else { return };
     if (0.3..0.31).contains(&metres) {
-        let flag = if metres == super::US_SURVEY_FOOT_M { "ftUS" } else { "ft" };
+        let flag = if metres == crate::value::US_SURVEY_FOOT_M { "ftUS" } else { "ft" };
         warnings.push(
             Warning::new(format!(
                 "coordinates are in {} and nothing says what heights are in; metres were taken",
