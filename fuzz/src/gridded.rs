@@ -43,7 +43,7 @@ pub(crate) mod dted {
             let mut record = vec![0xaa, 0, 0, 0];
             record.extend(column.to_be_bytes());
             record.extend([0, 0]);
-            record.extend((0..rows).flat_map(|row| (column * 3 + row | (row % 5) << 15).to_be_bytes()));
+            record.extend((0..rows).flat_map(|row| ((column * 3 + row) | ((row % 5) << 15)).to_be_bytes()));
             let sum: u32 = record.iter().map(|byte| u32::from(*byte)).sum();
             record.extend(sum.to_be_bytes());
             bytes.extend(record);

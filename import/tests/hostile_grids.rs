@@ -79,7 +79,7 @@ fn claims_beyond_the_file_take_no_memory() {
         (vec![("a.pgm", b"P5 4294967295 4294967295 255\n", long)], "cut short"),
         (vec![("a.bil", b"x", long), ("a.hdr", b"nrows 4294967295\nncols 4294967295\nnbits 64\nnbands 4294967295\nlayout bip\n", 0)], "cut short"),
         (vec![("a.bil", b"x", long), ("a.hdr", b"nrows 2\nncols 2\nnbits 64\nnbands 60000000\nlayout bip\n", 0)], "bytes apart"),
-        (vec![("a.bil", b"x", long), ("a.hdr", b"nrows 2\nncols 2\n", long as u64)], "unknown"),
+        (vec![("a.bil", b"x", long), ("a.hdr", b"nrows 2\nncols 2\n", long)], "unknown"),
         (vec![("a.dat", b"x", long), ("a.hdr", b"ENVI\nsamples = 99999\nlines = 99999\ndata type = 5\nheader offset = 18446744073709551615\n", 0)], "cut short"),
         (vec![("a.raw", b"x", long)], "state its shape"),
         (vec![("a.hgt", b"x", long)], "no tile"),

@@ -73,7 +73,7 @@ impl Convert {
         }
     }
 
-    fn pixels(&self, mut values: impl Iterator<Item = f64>, samples: &mut Vec<f64>) {
+    fn pixels(&self, values: impl Iterator<Item = f64>, samples: &mut Vec<f64>) {
         if let (1, Pick::Band(_)) = (self.bands, &self.pick) {
             samples.extend(values);
             return;
@@ -82,7 +82,7 @@ impl Convert {
         let mut place = 0;
         let (mut picked, mut seen) = (0.0, true);
         // One value after the other: pixels of any number of bands, without a copy of them.
-        while let Some(value) = values.next() {
+        for value in values {
             match &self.pick {
                 Pick::Band(band) if *band == place => picked = value,
                 Pick::Decode(_) if place < 3 => colours[place] = value,

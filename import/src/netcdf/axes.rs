@@ -107,7 +107,8 @@ pub(super) fn read(
             let wanted = first + step * at as f64;
             let value = value * scale + offset;
             // An error that sums up is as bad as a jump.
-            if !((value - wanted).abs() <= tolerance.min(step.abs() * 0.5)) {
+            let off = (value - wanted).abs();
+            if off.is_nan() || off > tolerance.min(step.abs() * 0.5) {
                 return Err(LayoutError::unsupported(
                     path,
                     format!(

@@ -65,7 +65,7 @@ pub(super) fn system(
     let on_earth = old.radius_m.is_none_or(is_earth);
     let zone = ((lon + 180.0) / 6.0).floor().rem_euclid(60.0) as u32 + 1;
     let utm = if lat < 0.0 { 32_700 + zone } else { 32_600 + zone };
-    let is_polar = lat > 84.0 || lat < -80.0;
+    let is_polar = !(-80.0..=84.0).contains(&lat);
     let radius = old.radius_m.filter(|_| !on_earth);
     let code = match (lower.as_str(), on_earth) {
         (_, true) if is_polar => Some(if lat > 0.0 { 32_661 } else { 32_761 }),

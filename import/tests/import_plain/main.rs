@@ -256,7 +256,7 @@ fn heightmaps_without_a_header() {
     }
     // .raw says nothing: what would fit is named, and works.
     let raw = square("a.raw", "u16be", 65);
-    let refused = terrasoar_import::open(&[raw.clone()]).err().unwrap();
+    let refused = terrasoar_import::open(std::slice::from_ref(&raw)).err().unwrap();
     assert_eq!(refused.remedy(), Some(Remedy::RawShape));
     assert!(refused.to_string().contains("65x65:u16le"), "{refused}");
     let shaped = |path: &Path, shape: &str| {
