@@ -5,6 +5,7 @@ use super::output::{grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::picture::PictureArgs;
 use super::progress::Meter;
+use super::siting;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
 use anyhow::Result;
@@ -82,7 +83,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let mut studio = picture.studio(&terrain)?;
     let has_image = studio.has_image();
     let look = picture.look(has_image);
-    let mut movie = MovieFile::create(&args.output, format, picture.size, args.fps, args.force.is_given())?;
+    let mut movie = MovieFile::create(&args.output, format, picture.size, args.fps, args.force.is_given())?
+        .with_notes(siting::notes(terrain.header()));
     let progress = Meter::new("frames");
     progress.begin("drawing", flight.frames.len() as u64);
     let (mut pictures, mut triangles) = (0_u32, 0_u64);

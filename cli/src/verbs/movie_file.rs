@@ -4,7 +4,7 @@
 //! Cost: a picture at a time in memory; a folder takes twice its room on the disk for a moment.
 
 use super::outputs::FILM_NOTE;
-use super::picture::png;
+use super::picture::png_with;
 use anyhow::{Context, Result, bail};
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Write};
@@ -43,6 +43,8 @@ impl MovieFormat {
 pub(super) struct MovieFile {
     path: PathBuf,
     size: Viewport,
+    /// What each picture of a folder says of itself.
+    notes: Vec<(&'static str, String)>,
     sink: Sink,
 }
 
@@ -95,14 +97,19 @@ impl MovieFile {
                 Sink::Mp4 { ffmpeg, file }
             }
         };
-        Ok(Self { path: path.to_owned(), size, sink })
+        Ok(Self { path: path.to_owned(), size, notes: Vec::new(), sink })
+    }
+
+    /// Has each picture of a folder say this of itself.
+    pub(super) fn with_notes(self, notes: Vec<(&'static str, String)>) -> Self {
+        Self { notes, ..self }
     }
 
     /// Adds a picture, three bytes a pixel.
     pub(super) fn add(&mut self, rgb: &[u8]) -> Result<()> {
         match &mut self.sink {
             Sink::Folder { pictures, next } => {
-                let file = png(rgb, self.size)?;
+                let file = png_with(rgb, self.size, &self.notes)?;
                 pictures.add(&frame_name(*next), |out| out.write_all(&file))?;
                 *next += 1;
                 Ok(())
