@@ -100,6 +100,12 @@ impl OpenedDem {
             &voids,
             [placed, notes],
         );
+        let z_scale = options.z_scale.unwrap_or(1.0);
+        // A factor that was typed is an answer to what advises one.
+        let is_answered = |warning: &Warning| {
+            z_scale != 1.0 && matches!(&warning.mended_by, Some((Remedy::HeightFactor, _)))
+        };
+        warnings.retain(|warning| !is_answered(warning));
         Ok(Self {
             reader,
             info,
@@ -111,7 +117,7 @@ impl OpenedDem {
             warnings,
             is_earth,
             unit_is_known: heights.unit_is_known,
-            z_scale: options.z_scale.unwrap_or(1.0),
+            z_scale,
         })
     }
 

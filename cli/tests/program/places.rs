@@ -121,7 +121,10 @@ fn a_long_table_is_answered_row_by_row() {
     let bench = Bench::new();
     utm(&bench);
     let mut input = String::new();
-    let place = |i: u32| [f64::from(i * 7919 % 39_000) * 0.01, f64::from(i * 104_729 % 38_000) * 0.01];
+    let place = |i: u32| {
+        let spread = |factor: u64, range: u64| (u64::from(i) * factor % range) as f64 * 0.01;
+        [spread(7919, 39_000), spread(104_729, 38_000)]
+    };
     for i in 0..1_100_000u32 {
         let [x, y] = place(i % 100_000);
         input.push_str(&format!("{x},{y}\n"));
