@@ -2,7 +2,8 @@
 //!
 //! Coordinates count sample centres: 0 is the first one. A place is void outside of the outermost samples' areas. Bilinear and Lanczos weigh the samples that are there and
 //! divide by the sum of their weights; cubic falls back on bilinear where one of its 16 is not; the mean weighs samples by how much of them lies under the new one.
-//! Where new samples are farther apart than old ones, kernels are widened by as much, so that nothing is skipped. Cost: the samples under the kernel.
+//! Where new samples are farther apart than old ones, kernels are widened by as much, so that nothing is skipped. A widened Lanczos kernel stands, in GDAL as here, at the centre of an
+//! old sample, up to half a step off; bilinear and cubic ones stand where they belong. Cost: the samples under the kernel.
 
 use crate::options::Resampling;
 
@@ -48,15 +49,21 @@ impl Kernel {
 
     /// The new sample at a place; `area` are two opposite corners of its own area, for the mean.
     pub(super) fn sample(&self, from: &impl Samples, place: [f64; 2], area: [[f64; 2]; 2]) -> f64 {
-        if !self.is_inside(place) || !place[0].is_finite() {
+        if !place[0].is_finite() {
+            return f64::NAN;
+        }
+        // A mean is of whatever lies under the new sample, wherever its own centre is.
+        if self.resampling == Resampling::Average {
+            return self.mean(from, area);
+        }
+        if !self.is_inside(place) {
             return f64::NAN;
         }
         let nearest =
             || from.at((place[0] + 0.5 + 1e-10).floor() as i64, (place[1] + 0.5 + 1e-10).floor() as i64);
         let is_wide = self.scale.iter().any(|scale| *scale < 1.0);
         match self.resampling {
-            Resampling::Nearest => nearest(),
-            Resampling::Average => self.mean(from, area),
+            Resampling::Nearest | Resampling::Average => nearest(),
             // A void stays one: edges of voids are where they were, to a sample.
             _ if nearest().is_nan() => f64::NAN,
             Resampling::Bilinear if !is_wide => bilinear(from, place),
@@ -70,6 +77,10 @@ impl Kernel {
     /// The samples within `radius` of a place, weighed by a function of the distance by columns and by rows.
     fn weighed(&self, from: &impl Samples, [x, y]: [f64; 2], radius: f64, weight: fn(f64) -> f64) -> f64 {
         let [across, down] = self.scale;
+        // GDAL makes the weights of a widened Lanczos kernel once, for places at a sample's centre.
+        let is_fixed = self.resampling == Resampling::Lanczos;
+        let x = if is_fixed && across < 1.0 { x.floor() } else { x };
+        let y = if is_fixed && down < 1.0 { y.floor() } else { y };
         let range =
             |at: f64, scale: f64| ((at - radius / scale).ceil() as i64, (at + radius / scale).floor() as i64);
         let ((west, east), (north, south)) = (range(x, across), range(y, down));
@@ -85,7 +96,7 @@ impl Kernel {
                 }
             }
         }
-        if weights.abs() < LEAST_WEIGHT { f64::NAN } else { sum / weights }
+        if weights < LEAST_WEIGHT { f64::NAN } else { sum / weights }
     }
 
     /// The mean of what lies between two corners.
@@ -97,6 +108,10 @@ impl Kernel {
         };
         let (west, east) = range(a[0], b[0], columns, self.wraps);
         let (north, south) = range(a[1], b[1], rows, false);
+        // NaN as well.
+        if !(west < east && north < south) {
+            return f64::NAN;
+        }
         let cover = |at: i64, low: f64, high: f64| ((at + 1) as f64).min(high) - (at as f64).max(low);
         let ends = |low: f64, high: f64| {
             let (first, last) = ((low + 1e-10).floor() as i64, (high - 1e-10).ceil() as i64);
@@ -208,13 +223,17 @@ mod tests {
             assert!((at(x, y) - wanted).abs() <= off, "{resampling:?}: {} {wanted}", at(x, y));
             assert_eq!(at(12.0, 17.0), 100.0 + 36.0 - 119.0, "{resampling:?}");
             assert!(at(30.0, 30.0).is_nan(), "{resampling:?}");
-            assert!(at(-0.6, 5.0).is_nan() && at(5.0, 49.6).is_nan() && at(f64::NAN, 1.0).is_nan());
+            // A mean is of what lies under it, whether its centre does or not.
+            let far = if resampling == Resampling::Average { 0.5 } else { 0.1 };
+            assert!(at(-0.5 - far, 5.0).is_nan() && at(5.0, 49.5 + far).is_nan(), "{resampling:?}");
+            assert!(at(f64::NAN, 1.0).is_nan());
             assert!(!at(-0.4, 5.0).is_nan() && !at(49.4, 49.4).is_nan(), "{resampling:?}");
             assert!(!at(30.6, 30.0).is_nan(), "{resampling:?}");
             let wide = Kernel { scale: [0.5; 2], ..kernel };
             let far = wide.sample(&Plane, [12.5, 17.5], [[11.5, 16.5], [13.5, 18.5]]);
             assert!(
-                (far - (100.0 + 37.5 - 122.5)).abs() <= if off > 1.0 { 10.0 } else { 1e-9 },
+                (far - (100.0 + 37.5 - 122.5)).abs()
+                    <= if off > 1.0 || resampling == Resampling::Lanczos { 10.0 } else { 1e-9 },
                 "{resampling:?}: {far}"
             );
         }
