@@ -36,7 +36,8 @@ fn a_format_of_gdal_alone_and_virtual_paths() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.grd");
     std::fs::write(&path, surfer()).unwrap();
-    let grid = with(&path, &OpenOptions::default()).unwrap();
+    let degrees = OpenOptions { crs: Some("EPSG:4326".into()), ..OpenOptions::default() };
+    let grid = with(&path, &degrees).unwrap();
     assert!(grid.info.format.contains("by GDAL"), "{}", grid.info.format);
     is_surfer(&grid);
     let packed = folder.path().join("b.grd.gz");
@@ -44,7 +45,7 @@ fn a_format_of_gdal_alone_and_virtual_paths() {
         flate2::write::GzEncoder::new(std::fs::File::create(&packed).unwrap(), flate2::Compression::new(6));
     encoder.write_all(surfer().as_bytes()).unwrap();
     encoder.finish().unwrap();
-    is_surfer(&with(format!("/vsigzip/{}", packed.display()), &OpenOptions::default()).unwrap());
+    is_surfer(&with(format!("/vsigzip/{}", packed.display()), &degrees).unwrap());
 }
 
 /// A virtual raster of bands of our fixtures.

@@ -59,9 +59,11 @@ pub(super) enum Unit {
     Metres(f64),
 }
 
-/// The unit of coordinates by its name.
+/// The unit of coordinates by its name; GMT has it in brackets behind what is counted: "longitude [degrees_east]".
 pub(super) fn unit(name: &str) -> Option<Unit> {
-    let name = name.to_ascii_lowercase();
+    let inside =
+        name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside.trim());
+    let name = inside.unwrap_or(name).to_ascii_lowercase();
     Some(match name.as_str() {
         "degree" | "degrees" | "deg" => Unit::Degrees,
         _ if ["degree_", "degrees_", "degreen", "degreee", "degreesn", "degreese"]
