@@ -53,7 +53,7 @@ pub struct VerifyReport {
     pub vertices_checked: u64,
     /// Tiles of imagery read and held against their checksum.
     pub tiles_checked: u64,
-    /// The first [`LISTED_PROBLEMS`] problems, in file order within each pass; at most one a page and pass.
+    /// The first 20 problems, in file order within each pass; at most one a page and pass.
     pub problems: Vec<Problem>,
     /// All problems.
     pub problem_count: u64,

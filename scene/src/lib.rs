@@ -6,7 +6,7 @@
 //! | take pictures without a window | [`studio`] |
 //! | choose how much memory and work it may take | [`options`] |
 //! | see a terrain as a whole, or look from a place | [`overview`] |
-//! | show pictures on the ground, and what edits change of them | [`drape`], [`repaint`] |
+//! | show pictures on the ground, and what edits change of them | [`repaint`] |
 //!
 //! The repository's `examples/window` is a program of its own: a window, ground that streams, and a cube that stands on it.
 //!
