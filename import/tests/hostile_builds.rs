@@ -85,7 +85,8 @@ fn numbers_that_no_header_holds_are_refused_before_a_sample_is_read() {
             "",
         ),
         (metadata("1e13", "0"), &stated, "factor on heights"),
-        (metadata("-1", "0"), &stated, "factor on heights"),
+        // Depths counted downward.
+        (metadata("-1", "0"), &stated, ""),
         (vec![], &scaled, "factor on heights"),
         (metadata("1e300", "1e300"), &scaled, "factor on heights"),
     ] {
@@ -216,7 +217,7 @@ fn what_is_no_file_is_refused_without_waiting_for_it() {
         let _listening = UnixListener::bind(&socket).unwrap();
         let inside = at(&format!("folder.{end}"));
         std::fs::create_dir(&inside).unwrap();
-        for (path, words) in [(pipe, "pipe"), (zero, "device"), (socket, "socket"), (inside, "directory")] {
+        for (path, words) in [(pipe, "pipe"), (zero, "device"), (socket, "socket"), (inside, "folder")] {
             assert!(said(&path).contains(words), "{}: {}", path.display(), said(&path));
             let both: Vec<PathBuf> = vec![path.clone(), path];
             assert!(terrasoar_import::open(&both).is_err());

@@ -68,14 +68,14 @@ fn netcdf() {
                             &name,
                         ],
                     );
-                    agrees(&folder.path().join(&name), -32767.0);
+                    agrees(&folder.path().join(&name));
                 }
             }
         }
     }
     let crater = data("crater_lake_1025.bt");
     run(folder.path(), "gdal_translate", &["-q", "-of", "netCDF", crater.to_str().unwrap(), "utm.nc"]);
-    agrees(&folder.path().join("utm.nc"), -32768.0);
+    agrees(&folder.path().join("utm.nc"));
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn dted_of_every_level_and_zone() {
             source(folder.path(), [columns, rows], -7.0, south + 1.0, steps);
             let name = format!("a{level}-{south}.dt{level}");
             run(folder.path(), "gdal_translate", &["-q", "-of", "DTED", "source.vrt", &name]);
-            agrees(&folder.path().join(&name), -32767.0);
+            agrees(&folder.path().join(&name));
         }
     }
 }
@@ -101,7 +101,7 @@ fn usgs_dem() {
     let folder = tempdir().unwrap();
     source(folder.path(), [121, 151], -120.0, 41.0, [1.0 / 1200.0; 2]);
     run(folder.path(), "gdal_translate", &["-q", "-of", "USGSDEM", "source.vrt", "degrees.dem"]);
-    agrees(&folder.path().join("degrees.dem"), -32767.0);
+    agrees(&folder.path().join("degrees.dem"));
     let options = [
         "-q",
         "-t_srs",
@@ -116,12 +116,8 @@ fn usgs_dem() {
         "utm.tif",
     ];
     run(folder.path(), "gdalwarp", &options);
-    run(
-        folder.path(),
-        "gdal_translate",
-        &["-q", "-of", "USGSDEM", "-co", "ZRESOLUTION=0.1", "utm.tif", "utm.dem"],
-    );
-    agrees(&folder.path().join("utm.dem"), -32767.0);
+    run(folder.path(), "gdal_translate", &["-q", "-of", "USGSDEM", "utm.tif", "utm.dem"]);
+    agrees(&folder.path().join("utm.dem"));
 }
 
 #[test]
@@ -196,7 +192,7 @@ fn tiff_of_odd_widths_planes_and_lerc() {
                         }
                         arguments.extend(["positive.tif", &name]);
                         run(folder.path(), "gdal_translate", &arguments);
-                        agrees(&folder.path().join(&name), f64::NEG_INFINITY);
+                        agrees(&folder.path().join(&name));
                         made += 1;
                     }
                 }
@@ -222,7 +218,7 @@ fn tiff_of_odd_widths_planes_and_lerc() {
                             &name,
                         ],
                     );
-                    agrees(&folder.path().join(&name), -32767.0);
+                    agrees(&folder.path().join(&name));
                     made += 1;
                 }
             }

@@ -43,10 +43,13 @@ pub(crate) fn values(path: &Path, places: &[(u32, u32)]) -> Vec<f64> {
     answers
 }
 
-/// Compares random samples and the place of `path` with what GDAL says; samples of value `void` must be voids here. Our row 0 must be GDAL's.
-pub(crate) fn agrees(path: &Path, void: f64) {
+/// Compares random samples and the place of `path` with what GDAL says; what has no data for GDAL must be void here, and nothing else. Our row 0 must be GDAL's.
+pub(crate) fn agrees(path: &Path) {
     let grid = read(&[path.to_owned()]).unwrap_or_else(|error| panic!("{error}"));
     let [wide, high] = [grid.info.samples_wide, grid.info.samples_high];
+    let said = run(Path::new("."), "gdalinfo", &[path.to_str().unwrap()]);
+    let marked = said.lines().find_map(|line| line.trim().strip_prefix("NoData Value="));
+    let void = marked.map_or(f64::NAN, |text| text.parse().unwrap());
     let mut random = Random(path.as_os_str().len() as u64);
     let mut places: Vec<(u32, u32)> =
         (0..500).map(|_| (random.below(wide.into()) as u32, random.below(high.into()) as u32)).collect();
@@ -58,7 +61,6 @@ pub(crate) fn agrees(path: &Path, void: f64) {
         let is_near = (got - wanted).abs() <= 1e-6 * wanted.abs() && wanted != void;
         assert!(is_near || is_void, "{}: ({col}, {row}) is {got}, GDAL says {wanted}", path.display());
     }
-    let said = run(Path::new("."), "gdalinfo", &[path.to_str().unwrap()]);
     assert!(
         said.contains(&format!("Size is {wide}, {high}")),
         "{}: {wide} x {high}, GDAL says {said}",

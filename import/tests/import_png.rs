@@ -1,10 +1,18 @@
-//! PNG in seven passes, and of colours that heights are packed into.
+//! PNG in seven passes, with transparency, and of colours that heights are packed into; told by arithmetic.
 
-use super::adam7::interlaced_png;
-use super::import_support::{data, read, refusal};
-use super::with;
+#[path = "import_support/adam7.rs"]
+mod adam7;
+mod import_support;
+
+use adam7::interlaced_png;
+use import_support::{Grid, collect, data, read, refusal};
+use std::path::Path;
 use tempfile::tempdir;
-use terrasoar_import::OpenOptions;
+use terrasoar_import::{OpenOptions, open_with};
+
+fn with(path: &Path, options: OpenOptions) -> Result<Grid, terrasoar_layout::LayoutError> {
+    collect(&*open_with(&[path.to_owned()], &options)?)
+}
 
 #[test]
 fn interlaced_png_of_every_size_and_kind() {

@@ -1,10 +1,6 @@
-//! Plain numbers: with ESRI's and ENVI's labels, without any header, as Netpbm; and PNG in seven passes and of packed colours. One ground, told by arithmetic.
+//! Plain numbers: with ESRI's and ENVI's labels, without any header, and as Netpbm. One ground, told by arithmetic.
 
-#[path = "../import_support/adam7.rs"]
-mod adam7;
-#[path = "../import_support/mod.rs"]
 mod import_support;
-mod png_files;
 
 use import_support::{Grid, collect, data, read, refusal};
 use std::path::{Path, PathBuf};
@@ -217,11 +213,11 @@ fn envi_labels_of_every_layout_and_type() {
             assert_eq!(grid.info.georeference.pixel_to_crs, Some(PLACE));
         }
     }
-    let label = "ENVI\nsamples = 7\nlines = 5\ndata type = 4\nmap info = {Geographic Lat/Lon, 1, 1, 100, 250, 10, 10, WGS-84, units=Degrees}\n\
+    let label = "ENVI\nsamples = 7\nlines = 5\ndata type = 4\nmap info = {Geographic Lat/Lon, 1, 1, 10, 50, 0.5, 0.25, WGS-84, units=Degrees}\n\
                  data gain values = {0.5}\ndata offset values = {-3}\n";
     let (_folder, path) = pair(["a.img", "a.hdr"], &laid_out("f32le", 1, "bsq", [0; 3]), label);
     let grid = read(&[path]).unwrap();
-    assert_eq!(grid.info.georeference.pixel_to_crs, Some(PLACE));
+    assert_eq!(grid.info.georeference.pixel_to_crs, Some([10.25, 0.5, 0.0, 49.875, 0.0, -0.25]));
     assert_eq!((grid.info.height_scale, grid.info.height_offset_m), (0.5, -3.0));
     for (line, wanted) in [
         ("data type = 6", "real or whole numbers"),
