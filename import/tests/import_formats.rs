@@ -248,6 +248,10 @@ fn png_kinds() {
     let grid = read(std::slice::from_ref(&path)).unwrap();
     assert!(grid.at(1, 0).is_nan() && grid.voids() == 1);
     assert_eq!(grid.at(2, 0), f64::from(0x0405));
+    let with_void = |info: &mut png::Info<'_>| info.trns = Some(vec![0, 7].into());
+    std::fs::write(&path, png(ColorType::Grayscale, BitDepth::Eight, &bytes[..12], with_void)).unwrap();
+    let grid = read(std::slice::from_ref(&path)).unwrap();
+    assert!(grid.at(3, 1).is_nan() && grid.voids() == 1);
     std::fs::write(&path, png(ColorType::Rgb, BitDepth::Eight, &[0; 36], |_| ())).unwrap();
     let message = refusal(std::slice::from_ref(&path));
     assert!(message.contains("8-bit RGB PNG") && message.contains("gdal_translate"), "{message}");

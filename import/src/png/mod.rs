@@ -89,7 +89,8 @@ impl PngDem {
         declare_texts(&mut declared, header);
         let void = header.trns.as_deref().and_then(|bytes| match (pixels, bytes) {
             (Pixels::Grey16, [high, low]) => Some(u16::from_be_bytes([*high, *low])),
-            (Pixels::Grey8, [_, low]) => Some((*low).into()),
+            // The decoder keeps the low byte alone.
+            (Pixels::Grey8, [low] | [_, low]) => Some((*low).into()),
             _ => None,
         });
         declared.value.nodata.extend(void.map(|value| Said::new(value.to_string(), "the transparent grey")));
