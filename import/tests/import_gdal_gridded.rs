@@ -4,7 +4,7 @@
 mod gdal;
 mod import_support;
 
-use gdal::{agrees, run};
+use gdal::{agrees, agrees_north_up, run};
 use import_support::data;
 use std::path::Path;
 use tempfile::tempdir;
@@ -68,14 +68,14 @@ fn netcdf() {
                             &name,
                         ],
                     );
-                    agrees(&folder.path().join(&name));
+                    agrees_north_up(&folder.path().join(&name));
                 }
             }
         }
     }
     let crater = data("crater_lake_1025.bt");
     run(folder.path(), "gdal_translate", &["-q", "-of", "netCDF", crater.to_str().unwrap(), "utm.nc"]);
-    agrees(&folder.path().join("utm.nc"));
+    agrees_north_up(&folder.path().join("utm.nc"));
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn dted_of_every_level_and_zone() {
             source(folder.path(), [columns, rows], -7.0, south + 1.0, steps);
             let name = format!("a{level}-{south}.dt{level}");
             run(folder.path(), "gdal_translate", &["-q", "-of", "DTED", "source.vrt", &name]);
-            agrees(&folder.path().join(&name));
+            agrees_north_up(&folder.path().join(&name));
         }
     }
 }
@@ -101,7 +101,7 @@ fn usgs_dem() {
     let folder = tempdir().unwrap();
     source(folder.path(), [121, 151], -120.0, 41.0, [1.0 / 1200.0; 2]);
     run(folder.path(), "gdal_translate", &["-q", "-of", "USGSDEM", "source.vrt", "degrees.dem"]);
-    agrees(&folder.path().join("degrees.dem"));
+    agrees_north_up(&folder.path().join("degrees.dem"));
     let options = [
         "-q",
         "-t_srs",
@@ -117,7 +117,7 @@ fn usgs_dem() {
     ];
     run(folder.path(), "gdalwarp", &options);
     run(folder.path(), "gdal_translate", &["-q", "-of", "USGSDEM", "utm.tif", "utm.dem"]);
-    agrees(&folder.path().join("utm.dem"));
+    agrees_north_up(&folder.path().join("utm.dem"));
 }
 
 #[test]

@@ -82,10 +82,14 @@ impl Source {
             Some(([wide, high], _)) if u64::from(wide) * u64::from(high) > LARGEST_WINDOW => {
                 [wide, fit(wide).min(high)]
             }
-            // As many chunks side by side as make a window.
+            // As many chunks side by side as make a window, and of flat ones as many below each other.
             Some(([wide, high], _)) => {
-                let across = u64::from(wide) * (WINDOW_SAMPLES / (u64::from(wide) * u64::from(high))).max(1);
-                [u32::try_from(across).unwrap_or(u32::MAX).min(columns), high.min(rows)]
+                let (columns, rows) = (u64::from(columns), u64::from(rows));
+                let (wide, high) = (u64::from(wide), u64::from(high));
+                let across = (wide * (WINDOW_SAMPLES / (wide * high)).max(1)).min(columns);
+                let down = (high * (WINDOW_SAMPLES / (across * high)).max(1)).min(rows);
+                // Both are sides of the grid at most.
+                [across as u32, down as u32]
             }
         }
     }

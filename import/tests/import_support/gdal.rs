@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "each test binary uses a part of this")]
 
-use super::import_support::{Random, read};
+use super::import_support::{Grid, Random, collect, read};
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -45,7 +45,16 @@ pub(crate) fn values(path: &Path, places: &[(u32, u32)]) -> Vec<f64> {
 
 /// Compares random samples and the place of `path` with what GDAL says; what has no data for GDAL must be void here, and nothing else. Our row 0 must be GDAL's.
 pub(crate) fn agrees(path: &Path) {
-    let grid = read(&[path.to_owned()]).unwrap_or_else(|error| panic!("{error}"));
+    agrees_with(path, &read(&[path.to_owned()]).unwrap_or_else(|error| panic!("{error}")));
+}
+
+/// As [`agrees`] of files whose rows may run north, which GDAL turns as we do.
+pub(crate) fn agrees_north_up(path: &Path) {
+    let opened = terrasoar_import::open(&[path.to_owned()]).and_then(|dem| collect(&*dem));
+    agrees_with(path, &opened.unwrap_or_else(|error| panic!("{error}")));
+}
+
+fn agrees_with(path: &Path, grid: &Grid) {
     let [wide, high] = [grid.info.samples_wide, grid.info.samples_high];
     let said = run(Path::new("."), "gdalinfo", &[path.to_str().unwrap()]);
     let marked = said.lines().find_map(|line| line.trim().strip_prefix("NoData Value="));
