@@ -109,7 +109,12 @@ fn usgs_dem() {
         "-tr",
         "30",
         "30",
-        "-tap",
+        // Centres on whole multiples of the spacing, as sheets have them.
+        "-te",
+        "753015",
+        "4530015",
+        "759015",
+        "4542015",
         "-dstnodata",
         "-32767",
         "source.vrt",
