@@ -310,14 +310,15 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
             }
             let got_on = frame.work.late < least_late || frame.work.slots_written > 0;
             least_late = least_late.min(frame.work.late);
+            if frame.work.unread == 0 && !got_on {
+                // No page is lacking, and what is left stays as it is: records that are not nested want vertices whose parents are not wanted. Pages on their way are for
+                // later views, and a pool that is too small for them has always one to come.
+                return self.now - start;
+            }
             if frame.outstanding > 0 {
                 self.fetch.wait();
-            } else if frame.pages_come == 0
-                && (frame.work.unread > 0 || !got_on)
-                && !self.fetch.has_arrivals()
-            {
-                // What is left cannot be read, or stays as it is: records that are not nested want vertices whose parents are not wanted. Waiting would keep us here
-                // for ever.
+            } else if frame.pages_come == 0 && frame.work.unread > 0 && !self.fetch.has_arrivals() {
+                // The pages that are left cannot be read.
                 return self.now - start;
             }
         }

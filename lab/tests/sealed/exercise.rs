@@ -19,7 +19,7 @@ use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
 /// Frames near the ground, far above it and turning.
-fn frames(terrain: &Terrain) -> Vec<FlightFrame> {
+pub fn frames(terrain: &Terrain) -> Vec<FlightFrame> {
     let [east, north] = terrain.grid().extent_m();
     let [low, high] = terrain.header().height_range_m;
     let up_m = (high + 0.05 * east.max(north)).clamp(-1e8, 1e8);
