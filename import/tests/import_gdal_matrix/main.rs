@@ -9,6 +9,8 @@ mod compare;
 mod matrix;
 mod page;
 mod source;
+#[path = "../import_support/tools.rs"]
+mod tools;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};

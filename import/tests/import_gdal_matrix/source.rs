@@ -1,25 +1,13 @@
 //! Files made by GDAL: raw samples and a virtual raster that says what they are, brought into the format by `gdal_translate`.
 
 use super::combination::{Combination, Kind, Unit, Void};
+use super::tools;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-/// Runs one of GDAL's tools with its files beside in force, for these are what is tried; what it printed.
+/// Runs one of GDAL's tools with its files beside in force, for these are what is tried.
 pub(crate) fn run(folder: &Path, tool: &str, arguments: &[&str]) -> Result<String, String> {
-    let output = Command::new(tool)
-        .args(arguments)
-        .current_dir(folder)
-        .env("GDAL_PAM_ENABLED", "YES")
-        .output()
-        .map_err(|error| format!("{tool} is needed: install gdal-bin ({error})"))?;
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    let complaint = String::from_utf8_lossy(&output.stderr);
-    if output.status.success() {
-        Ok(said)
-    } else {
-        Err(format!("{tool} {}: {complaint}", arguments.join(" ")))
-    }
+    tools::try_run(folder, tool, arguments, true)
 }
 
 /// Makes the file of a combination in `folder`.
