@@ -95,6 +95,22 @@ impl Crs {
         Some(Self { system, ground })
     }
 
+    /// A system that a file names.
+    pub(crate) fn of_system(system: System) -> Self {
+        let ground = Ground::new(&system);
+        Self { system, ground }
+    }
+
+    /// Whether anything is known of it.
+    pub(crate) fn is_said(&self) -> bool {
+        self.system.kind != Kind::Unknown || self.system.unit.is_some()
+    }
+
+    /// The way to the ground, if there is one.
+    pub(crate) fn ground(&self) -> Option<&Ground> {
+        self.ground.as_ref()
+    }
+
     /// Its name, with its code: "WGS 84 / UTM zone 32N (EPSG:32632)".
     pub fn name(&self) -> String {
         let name = harmless(&self.system.name, 200);
@@ -126,13 +142,13 @@ impl Crs {
     }
 
     /// A full turn, where coordinates are angles.
-    fn turn(&self) -> Option<f64> {
+    pub(crate) fn turn(&self) -> Option<f64> {
         let HorizontalSize::Radians(size) = self.system.unit.as_ref()?.size else { return None };
         Some(std::f64::consts::TAU / size)
     }
 
     /// Whether coordinates of both are the same numbers.
-    fn is_same(&self, other: &Self) -> bool {
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
         let [a, b] = [&self.system, &other.system];
         let size = |system: &System| system.unit.as_ref().map(|unit| unit.size);
         let is_proj_same = match (&a.proj, &b.proj) {

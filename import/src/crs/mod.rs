@@ -19,7 +19,6 @@ pub(crate) use resolve::by_text;
 pub(crate) use resolve::resolve;
 pub(crate) use system::{Kind, System, Unit, exact_metres};
 
-use crate::reader::CrsSaid;
 pub(crate) use crate::reader::HorizontalSize;
 use crate::value::US_SURVEY_FOOT_M;
 use terrasoar_layout::dem::{Georeference, HorizontalUnit};
@@ -50,10 +49,4 @@ pub(crate) fn georeference(system: &System, map: Option<[f64; 6]>) -> Georeferen
         body_radius_m: system.radius_m.filter(|radius| !is_earth(*radius)),
         ..Georeference::default()
     }
-}
-
-/// The georeference of a picture.
-pub(crate) fn of_picture(said: &CrsSaid, map: Option<[f64; 6]>) -> Georeference {
-    let system = resolve(said, None, &mut Vec::new()).unwrap_or_else(|_| System::unknown());
-    georeference(&system, map)
 }

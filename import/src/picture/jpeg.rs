@@ -4,13 +4,15 @@
 //! texel of the usual kind, 7.5 of a progressive one. That counts against the memory budget; larger pictures go through a tiled GeoTIFF.
 
 use super::png::spread;
-use super::world;
 use crate::jpeg_frame::JpegFrame;
+use crate::reader::Picture;
 use crate::{guard, input};
+use image::metadata::Orientation;
 use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat, UnsupportedFeature};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use terrasoar_layout::dem::Georeference;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
 
@@ -20,6 +22,7 @@ pub(super) struct JpegImage {
     path: PathBuf,
     info: ImageInfo,
     channels: usize,
+    orientation: Orientation,
 }
 
 impl JpegImage {
@@ -41,7 +44,7 @@ impl JpegImage {
         let progressive = header.coding_process == CodingProcess::DctProgressive;
         let info = ImageInfo {
             texels,
-            georeference: world::georeference(path, &["jgw", "jpgw", "jpegw", "wld"])?,
+            georeference: Georeference::default(),
             format: format!(
                 "{}{} JPEG",
                 if progressive { "progressive " } else { "" },
@@ -50,7 +53,19 @@ impl JpegImage {
             notes: Vec::new(),
             memory_bytes: frame.memory_bytes(),
         };
-        Ok(Self { path: path.to_owned(), info, channels })
+        let orientation = decoder.exif_data().and_then(Orientation::from_exif_chunk);
+        let orientation = orientation.unwrap_or(Orientation::NoTransforms);
+        Ok(Self { path: path.to_owned(), info, channels, orientation })
+    }
+}
+
+impl Picture for JpegImage {
+    fn orientation(&self) -> Orientation {
+        self.orientation
+    }
+
+    fn has_bytes(&self) -> bool {
+        true
     }
 }
 

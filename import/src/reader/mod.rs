@@ -5,8 +5,10 @@
 //! system or a unit is, comparing voids, scaling, and asking the person who typed the command are done once, behind this seam, for every format.
 
 mod declared;
+mod picture;
 
 pub(crate) use declared::{CrsSaid, Declared, HorizontalSize, Said, ValueSaid, VerticalUnit};
+pub(crate) use picture::Picture;
 
 use terrasoar_layout::dem::SampleSink;
 use terrasoar_layout::error::LayoutError;
