@@ -11,8 +11,7 @@ use super::{TiffMask, codec, failure, geokeys, predictor, tags};
 use crate::guard::guard;
 use crate::input;
 use crate::jpeg_frame::JpegFrame;
-use crate::reader::{CrsSaid, Picture, Reader};
-use image::metadata::Orientation;
+use crate::reader::{CrsSaid, Orientation, Picture, Reader};
 use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 use rayon::prelude::*;
 use std::fs::File;
@@ -55,8 +54,7 @@ impl TiffImage {
             Some(directory) => Some(TiffMask::of(&mut file, &directory)?),
             None => None,
         };
-        let turned = file.number(&directory, tags::ORIENTATION)?.and_then(|tag| u8::try_from(tag).ok());
-        let orientation = turned.and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms);
+        let orientation = Orientation::of_tag(file.number(&directory, tags::ORIENTATION)?.unwrap_or(1));
         let info = ImageInfo {
             texels: [table.grid.width, table.grid.height],
             georeference: Georeference::default(),

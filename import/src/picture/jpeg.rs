@@ -5,9 +5,8 @@
 
 use super::png::spread;
 use crate::jpeg_frame::JpegFrame;
-use crate::reader::Picture;
+use crate::reader::{Orientation, Picture};
 use crate::{guard, input};
-use image::metadata::Orientation;
 use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat, UnsupportedFeature};
 use std::fs::File;
 use std::io::BufReader;
@@ -53,8 +52,8 @@ impl JpegImage {
             notes: Vec::new(),
             memory_bytes: frame.memory_bytes(),
         };
-        let orientation = decoder.exif_data().and_then(Orientation::from_exif_chunk);
-        let orientation = orientation.unwrap_or(Orientation::NoTransforms);
+        let orientation = decoder.exif_data().map(Orientation::of_exif);
+        let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
         Ok(Self { path: path.to_owned(), info, channels, orientation })
     }
 }

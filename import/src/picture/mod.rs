@@ -10,10 +10,9 @@ mod oriented;
 mod png;
 mod texels;
 
-use crate::reader::Picture;
+use crate::reader::{Orientation, Picture};
 use crate::{TiffImage, input, is_tiff};
 use completed::Completed;
-use image::metadata::Orientation;
 use oriented::Oriented;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -51,7 +50,7 @@ pub fn open_images_on(paths: &[PathBuf], header: &Header) -> Result<Vec<Box<dyn 
 
 /// Undoes how the camera was held, of a picture that lies nowhere: programs of maps place the rows of the file, whatever was done to them.
 fn upright(completed: Completed, orientation: Orientation) -> Box<dyn ImageSource> {
-    if orientation == Orientation::NoTransforms || completed.info().georeference.pixel_to_crs.is_some() {
+    if orientation == Orientation::UPRIGHT || completed.info().georeference.pixel_to_crs.is_some() {
         return Box::new(completed);
     }
     Box::new(Oriented::new(completed, orientation))

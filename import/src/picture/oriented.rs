@@ -2,7 +2,7 @@
 //!
 //! The first row of such a picture needs all of its rows, so all of it is held while it is read: 4 bytes a texel, which counts against the memory budget.
 
-use image::metadata::Orientation;
+use crate::reader::Orientation;
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
@@ -14,25 +14,14 @@ pub(super) struct Oriented<S> {
     orientation: Orientation,
 }
 
-/// Whether columns and rows change places.
-fn is_sideways(orientation: Orientation) -> bool {
-    matches!(
-        orientation,
-        Orientation::Rotate90
-            | Orientation::Rotate270
-            | Orientation::Rotate90FlipH
-            | Orientation::Rotate270FlipH
-    )
-}
-
 impl<S: ImageSource> Oriented<S> {
     pub(super) fn new(picture: S, orientation: Orientation) -> Self {
         let mut info = picture.info().clone();
         let [wide, high] = info.texels;
-        if is_sideways(orientation) {
+        if orientation.is_sideways() {
             info.texels = [high, wide];
         }
-        info.notes.push(format!("turned as its EXIF tag says ({})", orientation.to_exif()));
+        info.notes.push(format!("turned as its EXIF tag says ({})", orientation.tag()));
         let held = u64::from(wide) * u64::from(high) * 4;
         info.memory_bytes = info.memory_bytes.saturating_add(held);
         Self { picture, info, orientation }
@@ -40,16 +29,16 @@ impl<S: ImageSource> Oriented<S> {
 
     /// Column and row in the file of a texel as it is shown, whose size in the file is `wide` x `high`.
     fn source(&self, [col, row]: [usize; 2], [wide, high]: [usize; 2]) -> [usize; 2] {
-        match self.orientation {
-            Orientation::NoTransforms => [col, row],
-            Orientation::FlipHorizontal => [wide - 1 - col, row],
-            Orientation::Rotate180 => [wide - 1 - col, high - 1 - row],
-            Orientation::FlipVertical => [col, high - 1 - row],
-            // Turned clockwise, and the mirror images of that.
-            Orientation::Rotate90 => [row, high - 1 - col],
-            Orientation::Rotate270 => [wide - 1 - row, col],
-            Orientation::Rotate90FlipH => [row, col],
-            Orientation::Rotate270FlipH => [wide - 1 - row, high - 1 - col],
+        match self.orientation.tag() {
+            2 => [wide - 1 - col, row],
+            3 => [wide - 1 - col, high - 1 - row],
+            4 => [col, high - 1 - row],
+            // Sideways, and the mirror images of that.
+            5 => [row, col],
+            6 => [row, high - 1 - col],
+            7 => [wide - 1 - row, high - 1 - col],
+            8 => [wide - 1 - row, col],
+            _ => [col, row],
         }
     }
 }
@@ -116,7 +105,7 @@ mod tests {
             (7, "right", "bottom"),
             (8, "left", "bottom"),
         ] {
-            let shown = Oriented::new(stored.clone(), Orientation::from_exif(tag).unwrap());
+            let shown = Oriented::new(stored.clone(), Orientation::of_tag(tag));
             let [wide, high] = shown.info().texels.map(|side| side as usize);
             let mut rgba = vec![0; wide * high * 4];
             shown.rows().unwrap().read(&mut rgba).unwrap();

@@ -6,9 +6,8 @@
 use crate::guard;
 use crate::png_stream;
 use crate::png_stream::{PngRows, Texts, decoding_error};
-use crate::reader::Picture;
+use crate::reader::{Orientation, Picture};
 use ::png::{BitDepth, ColorType, Transformations};
-use image::metadata::Orientation;
 use std::path::{Path, PathBuf};
 use terrasoar_layout::dem::Georeference;
 use terrasoar_layout::error::LayoutError;
@@ -60,8 +59,8 @@ impl PngImage {
             notes,
             memory_bytes: png_stream::memory_bytes(header),
         };
-        let orientation = header.exif_metadata.as_deref().and_then(Orientation::from_exif_chunk);
-        let orientation = orientation.unwrap_or(Orientation::NoTransforms);
+        let orientation = header.exif_metadata.as_deref().map(Orientation::of_exif);
+        let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
         let has_bytes = header.bit_depth != BitDepth::Sixteen;
         Ok(Self { path: path.to_owned(), info, orientation, has_bytes })
     }
