@@ -57,7 +57,7 @@ impl FlightFrame {
 /// Costs 64 bytes a frame; [`FlightReader`] and [`FlightWriter`] pass frames on one by one instead.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Flight {
-    /// Named notes in file order, such as `("terrain", "alps.tsoar")`. Names match `[a-z][a-z0-9-]*`, values
+    /// Named notes in file order, such as `("terrain", "alps.iqt")`. Names match `[a-z][a-z0-9-]*`, values
     /// are single lines without surrounding white space; at most 256.
     pub notes: Vec<(String, String)>,
     /// Frames in the order flown, 1..=[`MAX_FRAMES`] of them, whose times never decrease.
