@@ -1,7 +1,7 @@
 //! Opening a terrain file: to be streamed, or mapped as a whole.
 //!
-//! [`Terrain`] reads what it needs and maps nothing: a file of any size, on any storage, and one that can be edited while it is flown over. [`MappedTerrain`] lends all
-//! records at once, for the engines that want them all and for measuring, and asks something of whoever else has the file.
+//! [`Terrain`] reads what it needs and maps nothing: a file of any size, on any storage, and one that can be edited while it is flown over. [`MappedTerrain`] gives all
+//! records at once, for engines that need them all and for measuring. While it is open, other programs must not shorten the file.
 
 use crate::ground::{Ground, PictureEngine, StreamOptions};
 use crate::refine::Culling;

@@ -1,4 +1,4 @@
-//! Words of a line of a script: split at white space, quoted where they hold any, taken out of the line by the name before them.
+//! The words of a script's line. They are split at white space, stand in quotation marks where they hold any, and are asked for by the name before them.
 
 use crate::flight::format::{excerpt, is_decimal};
 

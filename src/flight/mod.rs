@@ -1,7 +1,7 @@
 //! Recorded flights: a camera path as data, so that every replay sees the same frames.
 //!
 //! A flight is a text file (`FLIGHT.md` beside this source specifies it) or is generated over a terrain.
-//! **A flight holds no clock and no chance: equal input gives equal frames.**
+//! **Nothing in a flight depends on a clock or on chance: equal input gives equal frames.**
 
 mod error;
 pub(crate) mod format;

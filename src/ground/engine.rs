@@ -1,6 +1,6 @@
-//! An engine as those who draw its mesh see it: a mesh, what changed in it, and heights, whatever the engine and the kind of its records.
+//! An engine as seen by code that draws its mesh: a mesh, what changed in it, and heights, whatever the engine and the kind of its records.
 //!
-//! Invariant: the patches told since the last [`MeshEngine::whole`], applied in order to it, give the mesh. Cost: the engine's own, and a call through a
+//! Invariant: the patches since the last [`MeshEngine::whole`], applied to it in order, give the mesh. Cost: the engine's own, and one call through a
 //! table a frame.
 
 use super::samples::HeightTile;

@@ -1,9 +1,9 @@
 //! Ground under a moving eye: a terrain, the engine that refines its mesh, and its edits, as one thing.
 //!
-//! A frame is [`Ground::update`]. Whoever keeps a copy of the mesh, on a graphics device for example, asks for [`Ground::change_since`] the step that the copy is at, and gets what
-//! is missing: the patch of one update, or the whole mesh where more was missed. So a copy cannot fall behind unnoticed. Heights are asked for by [`Ground::height_at`] and never wait.
+//! A frame is [`Ground::update`]. Code that keeps a copy of the mesh, on a graphics device for example, calls [`Ground::change_since`] with the step that the copy is at. It gets what the copy
+//! lacks: the patch of one update, or the whole mesh if the copy missed more than one. So a copy cannot fall behind unnoticed. [`Ground::height_at`] gives heights and never waits.
 //!
-//! Invariants: whatever the engine, the mesh of a view is the same once its pages are at hand; edits are seen by the next update. Cost: the engine's own, and a call through a table a
+//! Invariants: whatever the engine, the mesh of a view is the same once its pages are at hand; edits are seen by the next update. Cost: the engine's own, and one call through a table a
 //! frame.
 
 #[cfg(feature = "files")]
