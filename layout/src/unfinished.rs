@@ -1,8 +1,8 @@
-//! Files and folders that have a name before they are complete, and what is done about them when a signal ends the program.
+//! Files and folders that have a name before they are complete, and how they are removed when a signal ends the program.
 //!
-//! Whoever makes one takes it away when it fails; a signal ends the process before that. So all of them are on one list of the process, and a program that hears signals calls
-//! [`remove_all`] before it goes. Where files can do without a name, as on Linux, the list is nearly always empty. **A name is on the list from the moment that it exists**, for it is made
-//! while the list is held.
+//! Code that makes one removes it when it fails, but a signal ends the process before that. So all of them are on one list of the process, and a program that handles signals calls
+//! [`remove_all`] before it ends. Where files need no name, as on Linux, the list is nearly always empty. **A name is on the list from the moment that it exists**, because it is made
+//! while the list is locked.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
-//! The end of a file that grows while others read it: what is written behind everything that a header leads to, and the header that makes it count (FORMAT.md, sections 7.1 and 8.5).
+//! The end of a file that grows while others read it: new bytes behind everything that a header leads to, and the header that makes them count (FORMAT.md, sections 7.1 and 8.5).
 //!
-//! The order is always the same: the new bytes, a sync, a look whether the file still has its name, the header slot that is not current, a sync. Nothing that a header
-//! leads or led to is written over. Killed or cut off anywhere, the file holds what it held before or all of the new.
+//! The order is always the same: the new bytes, a sync, a check that the file still has its name, the header slot that is not current, a sync. Nothing that a header
+//! leads or led to is written over. Wherever this is cut off, the file holds what it held before, or all that is new.
 //!
-//! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers it, so that the next write goes behind what that header counts and takes the generation after its.
+//! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers such a header, so that the next write goes behind what it counts and takes the next generation.
 
 use super::bytes::{PAGE_BYTES, Page};
 use super::disk::Disk;

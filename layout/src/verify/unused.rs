@@ -1,4 +1,4 @@
-//! How much of a file nothing leads to: pages that edits and imagery replaced (FORMAT.md, sections 7 and 8).
+//! How much of a file is not used: pages that edits and imagery replaced (FORMAT.md, sections 7 and 8).
 
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, to_usize};

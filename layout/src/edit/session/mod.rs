@@ -1,7 +1,7 @@
 //! Edits of a file, in memory first and on the disk batch by batch, with undo and redo.
 //!
-//! [`EditSession::apply`] changes the ground at once, in memory; [`EditSession::commit`] makes all since the last one durable, as one batch. Undoing and redoing are commits of
-//! their own: a header that leads to a state that is in the file already. One session at a time has a file; readers need not stop.
+//! [`EditSession::apply`] changes the ground at once, in memory. [`EditSession::commit`] makes everything since the last commit durable, as one batch. Undo and redo are commits of
+//! their own: a header that leads to a state that is in the file already. One session at a time may have a file; readers need not stop.
 
 mod checked_state;
 pub(crate) mod commit;

@@ -1,7 +1,7 @@
-//! Which numbers a header may hold, in one place for those who open files and those who make them.
+//! Which numbers a header may hold, in one place for opening files and for making them.
 //!
-//! A build works for hours before it writes its header, and no file may come of it that does not open. So it asks here, by the very rules of opening, as soon as it knows a
-//! number. Cost: a few comparisons.
+//! A build may work for hours before it writes its header, and the file that it makes must open. So it checks each number here as soon as it
+//! knows it, by the same rules as opening. Cost: a few comparisons.
 
 use super::{Header, SpacingOrigin};
 use crate::error::LayoutError;

@@ -1,14 +1,14 @@
-//! Pages read in threads of their own, the one that is due first before all others, so that a frame never waits for storage.
+//! Pages are read in threads of their own, those that are due first before all others. So a frame never waits for storage.
 //!
-//! A frame asks for pages and takes those that have come; what went wrong comes as an error that names the page, and the page may be asked for
-//! again. Pages that wait and lie within the same aligned 64 KiB of the file are read together, for a long read costs little more than a short one. Every page is
+//! A frame asks for pages and takes those that have come. A read that failed comes as an error that names the page, and the page may be asked for
+//! again. Waiting pages that lie within the same aligned 64 KiB of the file are read together, because a long read costs little more than a short one. Every page is
 //! checked against its checksum before it is handed over.
 //!
-//! Edits move pages: a commit writes them elsewhere in the file, an undo leads back to where they lay. Whoever commits says so ([`Loader::relocate`]), and pages are read from where
-//! they lie by then. A read that was under way at that moment may bring what the page held before; it is made again before anybody sees it.
+//! Edits move pages: a commit writes them elsewhere in the file, and an undo leads back to where they were. After a commit [`Loader::relocate`] must be called; from then on pages are read from their
+//! new places. A read that was under way at that moment may bring the page's old content. Such a read is made again before its page is given out.
 //!
-//! Invariants: whatever was asked for comes back once: read, failed or dropped. What comes is what the page held where the newest relocation says it lies. A page that nobody has asked
-//! for again for [`STALE_FRAMES`] after it was due is dropped unread: the eye has gone elsewhere. Cost: a lock a frame, one a page that comes and two a read; some 24 bytes a page that has moved.
+//! Invariants: every page that was asked for comes back once: read, failed or dropped. Its content is that of the place that the newest relocation names. A page that was not asked
+//! for again for [`STALE_FRAMES`] after it was due is dropped unread, because the eye has gone elsewhere. Cost: a lock a frame, one a page that comes and two a read; some 24 bytes for each page that has moved.
 
 mod places;
 mod queue;
