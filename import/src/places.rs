@@ -1,7 +1,7 @@
 //! Places on the ground: coordinates of a terrain's own reference system, or of another, to metres from its south-west sample and back.
 //!
-//! Coordinates are east before north in every system: longitude before latitude. A [`Frame`] is a terrain seen in one system. Longitudes may be given with any full turns. Datums are
-//! shifted by parameters; where only a grid that is not here tells the shift, it is left out and [`Frame::is_rough`] says so. Cost: in the terrain's own system a few operations a place, in
+//! Coordinates are east before north in every system: longitude before latitude. A [`Frame`] is a terrain seen in one system. Longitudes may have any number of full turns added. Datums are
+//! shifted by parameters. Where the shift needs a grid, which is not here, it is left out and [`Frame::is_rough`] says so. Cost: in the terrain's own system a few operations a place, in
 //! others a microsecond.
 //!
 //! ```

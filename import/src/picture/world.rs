@@ -1,7 +1,7 @@
 //! World files: six numbers beside a picture that say where it lies (ESRI's convention: `.pgw`, `.jgw`, `.wld`).
 //!
-//! The lines are the step east a column, north a column, east a row, north a row, and the centre of the north-west texel. A file of that name that says something else
-//! is refused: who put it there counts on it. Cost: a look at each name.
+//! The lines are the step east a column, north a column, east a row, north a row, and the centre of the north-west texel. A file of that name that holds something else
+//! is an error, because the person who put it there expects it to be used. Cost: a look at each name.
 
 use crate::input;
 use std::io::Read;
