@@ -1,7 +1,7 @@
-//! Elevation data where a terrain file is asked for: built once into the user's folder for caches, and taken from there after that.
+//! Elevation data given where a terrain file is needed. It is built once into the user's folder for caches, and taken from there afterwards.
 //!
-//! A kept file is known by what it was made of: name, length and time of the elevation data and of the files beside it, the content (the whole of small files, both ends of large ones), and this
-//! program's version. **Whatever of that changes, it is built anew**; a kept file that does not open is too. Files that nobody asked for in a month go when another is built. Cost of a second call: the reading of
+//! A kept file is identified by what it was made of: name, length and time of the elevation data and of the files beside it, the content (the whole of small files, both ends of large ones), and this
+//! program's version. **If any of that changes, it is built anew**, and so is a kept file that does not open. Files that were not used for a month are removed when another is built. Cost of a second call: reading
 //! at most 8 MiB.
 
 use super::output::complain;

@@ -2,7 +2,7 @@
 //!
 //! Each verb is a file with its arguments, help and function; clap and the value parsers in [`parse`] check what can be checked without
 //! opening a file. Results go to standard output, everything else to standard error. **Exit codes: 0 done, 1 failed, 2 the command line
-//! itself is wrong.** A reader that closes our output early ends the program quietly.
+//! itself is wrong.** If the reader of our output closes it early, the program ends quietly.
 
 mod build;
 mod cache;

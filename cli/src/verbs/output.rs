@@ -1,6 +1,6 @@
 //! What a verb prints: text or one JSON object on standard output, complaints on standard error.
 //!
-//! Invariant: all that the program writes to a terminal goes through here, and nothing of it that came from a file, a name or the command line is obeyed by the terminal.
+//! Invariant: everything that the program writes to a terminal goes through here, and no text from a file, a name or the command line can control the terminal.
 
 use anyhow::{Context, Result};
 use serde::Serialize;

@@ -1,4 +1,4 @@
-//! What a file is that is there already, in words.
+//! What kind of file is there already, in words.
 
 use crate::verbs::output::grouped;
 use std::fs::File;

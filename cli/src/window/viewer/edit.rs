@@ -1,6 +1,6 @@
 //! The ground changed by hand: strokes, undo and redo, a rain of craters. A crater scorches the picture, where one is draped.
 //!
-//! Frames order and take what has become of orders; the workshop's thread does the work. A stroke is seen a frame or two after the hand made it. Edited ground is kept in memory until it
+//! Frames give orders and take results; the workshop's thread does the work. A stroke is seen a frame or two after the hand made it. Edited ground is kept in memory until it
 //! is on the disk, [`MOST_HELD`] pages at most.
 
 use super::Viewer;

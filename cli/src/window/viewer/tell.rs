@@ -1,4 +1,4 @@
-//! What the viewer says: notes in the window, and lines on standard output for who drives it.
+//! What the viewer says: notes in the window, and lines on standard output for tests that drive it.
 
 use super::Viewer;
 use crate::window::camera::Camera;

@@ -1,10 +1,10 @@
-//! The right to edit the terrain on show, taken at the first edit, and the thread that has it: it reads pages, edits, paints and undoes, so that no frame waits for the disk.
+//! The thread that edits the terrain on show. It takes the right to edit at the first edit. It reads pages, edits, paints and undoes, so that no frame waits for the disk.
 //!
-//! The window sends orders and takes what has become of them, frame by frame, in the order they were given. Edits are in memory before they are seen; a stroke is committed when it
-//! ends, by a second thread, while the next one is under way already. **What is told as saved is on the disk.** Whoever closes the workshop waits for it.
+//! The window sends orders and takes their results, frame by frame, in the order in which they were given. Edits are in memory before they are seen. A stroke is committed when it
+//! ends, by a second thread, while the next stroke may be under way already. **What is reported as saved is on the disk.** Closing the workshop waits for this.
 //!
-//! A thread that cannot start is words, and the next edit tries again. One that comes to an unexpected end is words that say how much was not on the disk, and edits are refused until the
-//! terrain is opened again; the right to edit is given back first, and what was being written is written. Cost: a message an order and one back, with the pages that changed.
+//! A thread that cannot start is an error message, and the next edit tries again. If the thread ends unexpectedly, a message says how much was not on the disk, and edits are refused until the
+//! terrain is opened again. Before that, what was being written is written, and the right to edit is given back. Cost: a message an order and one back, with the pages that changed.
 
 mod bench;
 mod news;

@@ -1,4 +1,4 @@
-//! What the window and the workshop's thread say to each other: plain values, whole in themselves, so that neither waits for the other.
+//! What the window and the workshop's thread send each other: plain values that share nothing, so that neither waits for the other.
 
 use terrasoar::stream::GroundPatch;
 use terrasoar_layout::LayoutError;
