@@ -31,7 +31,7 @@ use terrasoar_layout::words::harmless;
 
 /// Steps on each side of the mesh whose points tell how far a terrain reaches.
 const MESH: u32 = 64;
-/// Places so few samples off one mean that one: roundings of projections, by far less than anybody measures.
+/// A place at most so many samples off a sample means that sample. This is the rounding of projections, far less than can be measured.
 const SNAP: f64 = 1e-6;
 
 /// A reference system that coordinates are given in.

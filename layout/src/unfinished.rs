@@ -54,7 +54,7 @@ impl Drop for Guard {
     }
 }
 
-/// Removes everything on the list, for good: whoever wants to make another afterwards waits for the end of the process, which should follow at once.
+/// Removes everything on the list, for good. A thread that would add to the list afterwards waits for the end of the process, which should follow at once.
 pub fn remove_all() {
     let mut list = LIST.lock().unwrap_or_else(PoisonError::into_inner);
     list.drain(..).for_each(|path| remove(&path));

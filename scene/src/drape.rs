@@ -176,7 +176,7 @@ impl Drape {
         self.is_behind || self.threads.as_ref().is_some_and(Threads::is_reading)
     }
 
-    /// What could not be read and nobody has heard of yet.
+    /// The oldest error of reading that has not been reported yet.
     pub fn take_error(&mut self) -> Option<LayoutError> {
         self.errors.pop_front()
     }

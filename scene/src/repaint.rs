@@ -89,7 +89,7 @@ impl PictureWatch {
     }
 }
 
-/// Reads those of the tiles that are the file's, coarse ones first, as many as are worth it. One that cannot be read is left to whoever shows it, and tells.
+/// Reads those of the tiles that are in the file, coarse ones first, up to a bound. One that cannot be read is tried again, and reported, when it is shown.
 fn read(painter: &Painter, tiles: &BTreeSet<TileId>) -> Vec<(TileId, Option<Vec<u8>>)> {
     let most = (READ_BYTES / painter.shape().format.tile_bytes()).max(1);
     let files = tiles.iter().rev().filter(|id| painter.painted_tile(**id).is_none());

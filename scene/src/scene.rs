@@ -358,7 +358,7 @@ impl Scene {
         self.shows_image && self.drape.as_ref().is_some_and(Drape::is_waiting)
     }
 
-    /// What could not be read of the image and nobody has heard of yet. [`Ground::take_error`] tells of the mesh.
+    /// The oldest error of reading the image that has not been reported yet. [`Ground::take_error`] has those of the mesh.
     pub fn take_error(&mut self) -> Option<LayoutError> {
         self.drape.as_mut().and_then(Drape::take_error)
     }

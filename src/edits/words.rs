@@ -108,7 +108,7 @@ impl<'a> Fields<'a> {
         self.optional(name, parse)?.ok_or_else(|| format!("`{name}` is missing; write `{form}`"))
     }
 
-    /// Refuses words that nobody took.
+    /// Refuses words that were not used.
     pub(super) fn finish(self) -> Result<(), String> {
         match self.words.into_iter().flatten().next() {
             None => Ok(()),

@@ -144,7 +144,7 @@ impl Writing {
     }
 }
 
-/// Tells of an end that nobody expected.
+/// Reports an unexpected end.
 struct Teller {
     shared: Arc<Shared>,
     path: PathBuf,

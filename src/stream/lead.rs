@@ -5,7 +5,7 @@
 
 /// Shortest lead.
 const LEAST: f32 = 12.0;
-/// Longest lead: farther ahead nobody knows where the eye will be.
+/// Longest lead: farther ahead it is not known where the eye will be.
 const MOST: f32 = 90.0;
 /// Frames to spare.
 const SPARE: f32 = 8.0;

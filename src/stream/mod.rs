@@ -45,7 +45,7 @@ use web_time::Instant;
 
 /// Pages put into the pool in one frame at most: two megabytes are copied in a fraction of a millisecond.
 const INSTALLS_A_FRAME: usize = 512;
-/// Errors kept for whoever asks.
+/// How many errors are kept.
 const ERRORS_KEPT: usize = 64;
 
 /// How pages are asked for before they are needed.
@@ -210,12 +210,12 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
         self.requests.is_in_trouble(page)
     }
 
-    /// The oldest error that nobody has heard of yet. Each page that cannot be read is told once, however often it is tried.
+    /// The oldest error that has not been reported yet. A page that cannot be read is reported once, however often it is tried.
     pub fn take_error(&mut self) -> Option<LayoutError> {
         self.errors.pop_front()
     }
 
-    /// Brings the mesh to `view` with the pages at hand. Waits for nothing.
+    /// Refines the mesh for `view` with the pages in memory. It never waits.
     pub fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> StreamFrame {
         self.now += 1;
         let mut frame = StreamFrame::default();

@@ -95,7 +95,7 @@ impl Requests {
         self.trouble.remove(&page);
     }
 
-    /// A page was not read, for nobody seemed to need it.
+    /// A page was not read, because it was not asked for again.
     pub(super) fn dropped(&mut self, page: u64) {
         self.pending.remove(&page);
     }

@@ -22,7 +22,7 @@ use terrasoar_layout::read::terrain::Terrain;
 
 /// Bytes of each end of a file that are looked at; a file of twice as many is looked at whole.
 const END_BYTES: u64 = 4 << 20;
-/// How long a file that nobody asks for is kept.
+/// How long a file is kept after its last use.
 const KEPT: Duration = Duration::from_secs(30 * 24 * 3600);
 /// Longest part of a name that is kept in the name of the file.
 const MAX_NAME_CHARS: usize = 40;
@@ -136,7 +136,7 @@ fn describe(path: &Path, key: &mut DefaultHasher) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Takes away what nobody has asked for in a month. What cannot be taken away stays.
+/// Removes files that were not used for a month. A file that cannot be removed stays.
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {

@@ -100,7 +100,7 @@ fn join(capped: &Path, mib: u64) -> Result<Standing> {
     Ok(standing.within(|| Ok(())).map(|()| standing).unwrap_or_else(|e| Standing::uncapped(format!("{e:#}"))))
 }
 
-/// Ends this copy soon after the program that made the group, should that be killed: nobody waits for the copy then, and nobody else would remove the group.
+/// Ends this copy soon after the program that made the group, if that is killed: nothing waits for the copy then, and nothing else would remove the group.
 #[cfg(unix)]
 fn end_with_parent(capped: PathBuf, home: PathBuf) {
     let parent = std::os::unix::process::parent_id();

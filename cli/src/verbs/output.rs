@@ -48,7 +48,7 @@ pub(super) fn print_line(line: &str) -> Result<()> {
     write_out(&printable::line(line))
 }
 
-/// Prints one line to standard error, harmlessly. If nobody can read it there is nobody to tell.
+/// Prints one line to standard error, harmlessly. Errors of printing are ignored.
 pub(super) fn complain(line: &str) {
     complain_lines(&printable::line(line));
 }

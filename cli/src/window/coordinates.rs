@@ -62,7 +62,7 @@ impl Coordinates {
     /// The place that `text` means, in metres.
     ///
     /// # Errors
-    /// In words, what is no place or lies outside.
+    /// Why the text is no place, or that it lies outside, as a message.
     pub(crate) fn meant(&self, text: &str) -> Result<[f64; 2], String> {
         let no_place = || format!("{text:?} is no place: {FORMS}");
         let upper = text.to_uppercase();

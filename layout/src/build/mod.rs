@@ -318,7 +318,7 @@ impl<'a, C: RecordCodec> State<'a, C> {
         own && codes && children
     }
 
-    /// Makes every row that can be made, writes every page that can be written, forgets what nobody needs.
+    /// Makes every row that can be made, writes every page that can be written, and drops what is no longer needed.
     fn advance(&mut self) -> Result<(), LayoutError> {
         for level in 0..self.grid.levels() {
             let shape = self.shapes[level as usize];

@@ -53,7 +53,7 @@ pub(super) fn page_queue() -> (SyncSender<PlacedPages>, Receiver<PlacedPages>) {
     sync_channel(1)
 }
 
-/// Writes pages as they arrive, until there will be no more: the work of a thread of its own, so that nobody waits for the disk.
+/// Writes pages as they arrive, until there are no more. It runs on a thread of its own, so that no other thread waits for the disk.
 pub(super) fn write_pages(
     file: &AtomicFile,
     disk: &dyn Disk,

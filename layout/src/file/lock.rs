@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// Times that a file may be replaced under its name while its lock is taken.
 const MOST_TRIES: u32 = 100;
 
-/// The right to write to a terrain file, and the file. Whoever has a clone has the right.
+/// The right to write to a terrain file, and the file. Each clone has the right too.
 #[derive(Debug, Clone)]
 pub(crate) struct WriteLock {
     locked: Arc<Locked>,

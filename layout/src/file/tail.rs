@@ -40,7 +40,7 @@ impl Attempted {
     }
 }
 
-/// How far a header came. Whoever ordered the write keeps a clone, to know what may be on the disk if nobody comes back.
+/// How far the writing of a header came. The code that ordered the write keeps a clone, to know what may be on the disk if the write does not return.
 #[derive(Debug)]
 pub(crate) struct Attempt {
     generation: u32,
@@ -97,7 +97,7 @@ impl Tail {
         Self::new(path, TailFile::Live(lock.clone()), start, slots, attempted)
     }
 
-    /// The end of a file that nobody else knows of, because it is not published yet.
+    /// The end of a file that no other program knows of, because it is not published yet.
     pub(crate) fn of_new(path: &Path, file: &File, slots: &Slots) -> Result<Self, LayoutError> {
         let file =
             file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
@@ -163,7 +163,7 @@ impl Tail {
             .map_err(|e| LayoutError::write(&self.path, "cannot append to the file", when_full, e))
     }
 
-    /// Brings the file to the disk, if anybody could miss it.
+    /// Syncs the file to the disk, if it is published.
     fn sync(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
         match &self.file {
             TailFile::New(_) => Ok(()),

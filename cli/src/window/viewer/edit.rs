@@ -311,7 +311,7 @@ impl Viewer {
     /// Waits until all edits are on the disk and gives the right to edit back.
     ///
     /// # Errors
-    /// In words, what could not be saved.
+    /// What could not be saved, as a message.
     pub(in crate::window) fn close_workshop(&mut self) -> Result<(), String> {
         self.end_work();
         let (news, closed) = self.workshop.close();

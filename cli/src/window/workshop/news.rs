@@ -82,7 +82,7 @@ pub(crate) enum News {
     NotOpened(LayoutError),
     /// The right was given back, everything being on the disk but for what the error says.
     Closed(Option<LayoutError>),
-    /// The thread came to an unexpected end; in words, what that means.
+    /// The thread ended unexpectedly; what that means, as a message.
     Broken(String),
 }
 

@@ -40,7 +40,7 @@ pub struct Committed {
     pub pages: u64,
     /// Bytes by which the file grew.
     pub bytes: u64,
-    /// Each logical page that was written, and its entry in the directory now, ascending: where whoever reads the file finds it.
+    /// Each logical page that was written, and its entry in the directory now, ascending: where readers of the file find it.
     pub places: Vec<(u64, Entry)>,
 }
 
@@ -355,7 +355,7 @@ impl EditSession {
         Ok(committed)
     }
 
-    /// If the commit under way has nobody left to write it, it has failed: all that it took is to be committed again.
+    /// If the thread that was to write the commit under way is gone, the commit has failed: all that it took must be committed again.
     fn notice_lost_job(&mut self) {
         let Phase::Committing { taken, edits, attempt } = &self.phase else { return };
         if Arc::strong_count(attempt) > 1 {

@@ -61,7 +61,7 @@ impl Header {
         .find_map(|(field, holds)| (!holds).then_some(field))
     }
 
-    /// Refuses a header-to-be that would not open, in words for those who gave the numbers.
+    /// Refuses a future header that would not open, with a message for the person who gave the numbers.
     ///
     /// # Errors
     /// [`LayoutError::Usage`] and the like, saying which number.

@@ -28,7 +28,7 @@ use std::time::{Duration, Instant};
 
 /// Pages of the longest read: 64 KiB.
 const RUN_PAGES: u64 = 16;
-/// A page this many frames past due that nobody has asked for again is not read.
+/// A page this many frames past due that was not asked for again is not read.
 pub const STALE_FRAMES: u64 = 30;
 
 /// A page that was asked for.
@@ -47,7 +47,7 @@ pub enum Outcome {
     Read(Box<Page>),
     /// It could not be read, or is damaged.
     Failed(LayoutError),
-    /// It was not read: nobody seemed to need it any more.
+    /// It was not read, because it was not asked for again.
     Dropped,
 }
 
@@ -266,7 +266,7 @@ fn gather(terrain: &Terrain, page: u64, state: &mut State, wanted: &mut Vec<(u64
     wanted.sort_unstable_by_key(|(_, entry)| entry.page);
 }
 
-/// Reads runs and hands their pages over. `None` if nobody listens any more.
+/// Reads runs and hands their pages over. `None` if there is no receiver any more.
 fn read_runs(terrain: &Terrain, runs: &mut [Run], arrivals: &Sender<Sent>) -> Option<LoaderStats> {
     let mut done = LoaderStats { reads: runs.len() as u64, ..LoaderStats::default() };
     let mut jobs: Vec<ReadJob<'_>> = Vec::with_capacity(runs.len());

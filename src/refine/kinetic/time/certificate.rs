@@ -253,7 +253,7 @@ impl Judge {
         b + half_chord2.max(0.0).sqrt()
     }
 
-    /// The margin of the error test. Written without branches, for which answer is right is anybody's guess.
+    /// The margin of the error test. Written without branches, because no processor can predict the answer.
     #[inline(always)]
     fn error_margin_m(&self, sighting: &Sighting, selected: bool, distance_m: f64, reach_m: f64) -> f64 {
         const ACROSS2: f64 = 1.0 - RATE * RATE;
