@@ -95,7 +95,10 @@ impl Fields {
                 }
             }
             Value::Array(items) => {
-                items.iter().filter(|item| item.is_object()).for_each(|item| self.add(item, &format!("{path}[]")));
+                items
+                    .iter()
+                    .filter(|item| item.is_object())
+                    .for_each(|item| self.add(item, &format!("{path}[]")));
             }
             _ => {}
         }
@@ -104,7 +107,8 @@ impl Fields {
     /// Whether something that `name` is a part of is null here.
     fn is_below_null(&self, name: &str) -> bool {
         let dots = name.match_indices('.').map(|(at, _)| &name[..at]);
-        dots.filter(|above| !above.ends_with("[]")).any(|above| self.all.contains(above) && !self.some.contains(above))
+        dots.filter(|above| !above.ends_with("[]"))
+            .any(|above| self.all.contains(above) && !self.some.contains(above))
     }
 }
 

@@ -107,7 +107,8 @@ fn of_help(help: &str) -> BTreeSet<Flag> {
                 // In the short form what it does stands behind two blanks.
                 let rest = rest.split("  ").next().unwrap();
                 let (long, value) = rest.split_once(' ').unwrap_or((rest, ""));
-                let flag = Flag { short: short.into(), long: long.into(), value: value.into(), default: None };
+                let flag =
+                    Flag { short: short.into(), long: long.into(), value: value.into(), default: None };
                 flags.push(flag);
             }
         } else if indent == 0 && !line.is_empty() {

@@ -9,8 +9,18 @@ const REPOSITORY: &str = "https://github.com/terrasoar/terrasoar/blob/main/";
 
 /// Folders that a path in a code span begins with.
 const FOLDERS: [&str; 12] = [
-    "benches/", "cli/", "data-scripts/", "docs/", "examples/", "fuzz/", "import/", "lab/", "layout/", "render/",
-    "scene/", "src/",
+    "benches/",
+    "cli/",
+    "data-scripts/",
+    "docs/",
+    "examples/",
+    "fuzz/",
+    "import/",
+    "lab/",
+    "layout/",
+    "render/",
+    "scene/",
+    "src/",
 ];
 
 /// What is wrong with all links.

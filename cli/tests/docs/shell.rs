@@ -28,10 +28,7 @@ pub fn run(script: &str, folder: &Path) -> Ended {
         .stdin(Stdio::null())
         .output()
         .unwrap();
-    Ended {
-        is_good: output.status.success(),
-        said: String::from_utf8_lossy(&output.stdout).into_owned(),
-    }
+    Ended { is_good: output.status.success(), said: String::from_utf8_lossy(&output.stdout).into_owned() }
 }
 
 /// The program's own word; it must succeed.

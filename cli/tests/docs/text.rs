@@ -45,7 +45,8 @@ pub fn wrong_blocks(pages: &[Page]) -> Wrong {
             let words: Vec<&str> = block.words.iter().map(String::as_str).collect();
             let is_command = matches!(words.first(), Some(&("sh" | "console")));
             let body = &page.text[block.body.clone()];
-            if !is_command && body.lines().any(|line| line.trim_start_matches("$ ").starts_with("terrasoar ")) {
+            if !is_command && body.lines().any(|line| line.trim_start_matches("$ ").starts_with("terrasoar "))
+            {
                 let at = place(page, block);
                 wrong.push(format!("{at}: commands stand in blocks marked sh or console"));
             }
