@@ -49,7 +49,8 @@ fn wrong_columns(page: &Page, order: &Order, output: &str) -> Wrong {
     wrong
 }
 
-fn wrong_fields(page: &Page, order: &Order, output: &str) -> Wrong {
+/// What is wrong with the fields that a section explains, against those of `output`.
+pub fn wrong_fields(page: &Page, order: &Order, output: &str) -> Wrong {
     let at = format!("{}#{}", page.name, order.section);
     let value: Value = match serde_json::from_str(output) {
         Ok(value) => value,

@@ -94,7 +94,7 @@ fn of_page(page: &Page, wrong: &mut Wrong) -> BTreeSet<Flag> {
 fn of_help(help: &str) -> BTreeSet<Flag> {
     let mut flags: Vec<Flag> = Vec::new();
     let mut is_flag = false;
-    for line in help.lines() {
+    for line in help.lines().take_while(|line| !line.starts_with("Example")) {
         let indent = line.len() - line.trim_start().len();
         let told = line.trim_start();
         let (short, rest) = match told.split_once(", ") {
@@ -144,7 +144,10 @@ pub fn wrong_typed(pages: &[Page]) -> Wrong {
                 }
             }
         }
-        let lines = page.blocks.iter().flat_map(|block| page.text[block.body.clone()].lines());
+        // Indented ones have no words.
+        let are_typed = |words: &[String]| words.first().is_none_or(|word| word == "sh" || word == "console");
+        let blocks = page.blocks.iter().filter(|block| are_typed(&block.words));
+        let lines = blocks.flat_map(|block| page.text[block.body.clone()].lines());
         for line in lines.map(|line| line.trim_start().trim_start_matches("$ ")) {
             let Some(typed) = line.strip_prefix("terrasoar ") else { continue };
             let typed = typed.split(" #").next().unwrap_or(typed);

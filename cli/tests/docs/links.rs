@@ -48,7 +48,7 @@ pub fn wrong(pages: &[Page]) -> Wrong {
 }
 
 /// Why a link leads nowhere.
-fn fault(pages: &[Page], page: &Page, base: &Path, to: &str) -> Option<String> {
+pub fn fault(pages: &[Page], page: &Page, base: &Path, to: &str) -> Option<String> {
     let (file, anchor) = to.split_once('#').unwrap_or((to, ""));
     let path = match file {
         "" => PathBuf::from(&page.name),
@@ -57,11 +57,16 @@ fn fault(pages: &[Page], page: &Page, base: &Path, to: &str) -> Option<String> {
             None => return Some("leads out of the repository".into()),
         },
     };
-    if !root().join(&path).exists() {
+    if !file.is_empty() && !root().join(&path).exists() {
         return Some(format!("leads to {}, which is not there", path.display()));
     }
     if anchor.is_empty() {
         return None;
+    }
+    if anchor.contains("--") {
+        return Some(
+            "leads to a heading with marks in it, of which forges and the book make other anchors".into(),
+        );
     }
     let name = path.to_string_lossy().replace('\\', "/");
     let Some(other) = pages.iter().find(|other| other.name == name) else {

@@ -12,6 +12,7 @@ mod commands;
 mod fields;
 mod flags;
 mod links;
+mod made_up;
 mod page;
 mod shell;
 mod shown;
@@ -26,6 +27,7 @@ type Wrong = Vec<String>;
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let mut trials = vec![
+        trial("made_up", made_up::wrong),
         trial("links", || links::wrong(&page::all())),
         trial("paths", || links::wrong_paths(&page::all())),
         trial("book", || text::wrong_book(&page::all())),

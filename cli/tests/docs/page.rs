@@ -119,7 +119,7 @@ impl Page {
         Self::of(name, text)
     }
 
-    fn of(name: String, text: String) -> Self {
+    pub fn of(name: String, text: String) -> Self {
         let dangling = RefCell::new(Vec::new());
         let mut page = Reader::default().page(&text, &dangling);
         (page.name, page.text, page.dangling) = (name, text, dangling.into_inner());

@@ -43,8 +43,14 @@ fn steady(line: &str, figures: bool) -> String {
         let length = rest[..length].trim_end_matches(['.', ',']).len();
         let (number, behind) = rest.split_at(length);
         steady.push_str(&left[..at]);
-        steady.push_str(if figures || has_unit(behind) { "#" } else { number });
-        left = behind;
+        let is_measured = has_unit(behind);
+        steady.push_str(if figures || is_measured { "#" } else { number });
+        // Thousands and millions are the machine's too.
+        left = [" k", " M"]
+            .iter()
+            .find_map(|size| behind.strip_prefix(size))
+            .filter(|_| is_measured)
+            .unwrap_or(behind);
     }
     steady.push_str(left);
     if figures {
