@@ -90,7 +90,10 @@ fn console(page: &Page, block: &Block, folder: &Path) -> (String, Wrong) {
         let ended = shell::run(&typed, folder);
         let printed: Vec<&str> = ended.said.lines().collect();
         let holds = shown::shows(&step.shown, &printed, figures);
-        let lines = if holds { &step.shown } else { &printed };
+        let error_is_shown = step.shown.iter().any(|line| line.starts_with("error: "));
+        // A page is not made to show an error that it did not mean to show.
+        let is_kept = holds || ended.is_good == error_is_shown;
+        let lines = if is_kept { &step.shown } else { &printed };
         lines.iter().for_each(|line| is.push_str(&format!("{line}\n")));
         if !holds {
             wrong.push(format!(
@@ -100,7 +103,6 @@ fn console(page: &Page, block: &Block, folder: &Path) -> (String, Wrong) {
                 step.shown.join("\n")
             ));
         }
-        let error_is_shown = step.shown.iter().any(|line| line.starts_with("error: "));
         if ended.is_good == error_is_shown {
             let how = if ended.is_good { "succeeds" } else { "fails" };
             wrong.push(format!("{}: `{typed}` {how}: {}", place(page, block), ended.said));
