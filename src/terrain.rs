@@ -49,8 +49,11 @@ impl Terrain {
 
     /// Ground to fly over: pages are read by threads into memory of a fixed size.
     ///
+    /// It is the ground as it was when the terrain was opened. Edits that another ground has made since are seen when the terrain is opened again; until then this one
+    /// takes no edits of its own ([`Ground::edit`] says so).
+    ///
     /// # Errors
-    /// The first page cannot be read; the system gives no thread; the file was edited since it was opened, which must be opened again.
+    /// The first page cannot be read; the system gives no thread.
     pub fn stream(&self, options: StreamOptions) -> Result<Ground<'static>, LayoutError> {
         Ground::streamed(Arc::clone(&self.file), &options)
     }

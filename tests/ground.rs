@@ -254,6 +254,27 @@ fn one_at_a_time_edits_and_only_what_is_on_show() {
 }
 
 #[test]
+fn ground_of_a_terrain_opened_before_an_edit_is_the_ground_of_then_and_takes_no_edits() {
+    let (_folder, path) = land();
+    let opened = Terrain::open(&path).unwrap();
+    let stream = |terrain: &Terrain| terrain.stream(StreamOptions::default().cache_mib(4)).unwrap();
+    let mut first = stream(&opened);
+    settle(&mut first, &view(0));
+    let before = heights_of(&mut first);
+    first.edit(&[crater(800.0, 1200.0)]).unwrap();
+    first.commit("a crater").unwrap().wait().unwrap();
+    drop(first);
+    let mut second = stream(&opened);
+    settle(&mut second, &view(0));
+    assert!(heights_of(&mut second) == before);
+    let refused = second.edit(&[crater(800.0, 1200.0)]).unwrap_err().to_string();
+    assert!(refused.contains("open it again"), "{refused}");
+    let mut third = streamed(&path);
+    settle(&mut third, &view(0));
+    assert!(heights_of(&mut third) == heights_in(&path) && heights_of(&mut third) != before);
+}
+
+#[test]
 fn edits_that_are_refused_change_nothing() {
     let (_folder, path) = land();
     let mut ground = streamed(&path);

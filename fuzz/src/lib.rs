@@ -3,6 +3,7 @@
 //! A body takes bytes and does with them what the program would. **It panics where a promise is broken**: a panic of the libraries, memory out of proportion to the input,
 //! a message that cannot be shown, a file that was called sound or complete and is not. What is refused with words is well. No body leaves a file behind.
 
+mod beside;
 mod edits;
 mod flight;
 mod fly;
@@ -21,6 +22,7 @@ mod use_files;
 mod words;
 mod world_file;
 
+use beside::{aux_xml, reference_system};
 use gridded::{dted, netcdf, usgs_dem};
 use grids::{ascii_grid, labelled, netpbm, packed_png, raw, tiles, xyz};
 pub use seeds::Inputs;
@@ -108,6 +110,10 @@ targets! {
     dted { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A sheet of the USGS.
     usgs_dem { is_text: true, fixed_mib: 160, per_byte: 64 }
+    /// A reference system as text: named by a person, and beside a DEM, which is brought out of it.
+    reference_system { is_text: true, fixed_mib: 160, per_byte: 64 }
+    /// What GDAL keeps beside a DEM.
+    aux_xml { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// A picture: opened, read, draped, its tiles read.
     image { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A world file beside a picture: draped where it says.

@@ -20,8 +20,9 @@
 //!
 //! The extents are those of the samples' *areas*: the spacing is extent / samples, the first sample
 //! half a spacing inside, as GDAL reads and writes BT (VTP's own programs divide by samples - 1; a
-//! file of 1025 columns then differs by 0.1 %). A void is -32768 in every sample type. The `.prj`
-//! file beside a BT is not read; the header's zone and datum stand. The grid is read in blocks of 64
+//! file of 1025 columns then differs by 0.1 %). A void is -32768 in every sample type. Where the
+//! header points to the `.prj` file beside it and that is there, it is the reference system, else the header's zone
+//! and datum. The grid is read in blocks of 64
 //! columns and transposed; blocks in parallel, half a mebibyte of samples a worker.
 
 use std::fs::File;
@@ -65,7 +66,13 @@ impl BtDem {
             ));
         }
         file.read_exact(&mut header).map_err(cannot_read)?;
-        let declared = parse(path, &Header(&header), file_bytes)?;
+        let header = Header(&header);
+        let mut declared = parse(path, &header, file_bytes)?;
+        // The flag says that the system stands in a .prj file, which the header only sums up.
+        let is_told_beside = declared.format != "VTP BT 1.0" && header.i16(60) == 1;
+        if is_told_beside && ["prj", "PRJ"].iter().any(|ending| path.with_extension(ending).is_file()) {
+            declared.crs.code = None;
+        }
         Ok(Self { path: path.to_owned(), declared })
     }
 
@@ -263,6 +270,8 @@ fn system(header: &Header<'_>, version: u8) -> CrsSaid {
         code: epsg.map(|code| Said::new(code, "the header's zone and datum")),
         name,
         unit: unit.map(|unit| Said::new(unit, "the header's unit")),
+        // Programs that write the system beside the file leave metres here whatever it counts.
+        unit_yields: true,
         ..CrsSaid::default()
     }
 }

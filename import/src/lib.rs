@@ -70,6 +70,7 @@ pub(crate) use identify::is_tiff;
 pub use options::{Direction, OpenOptions, Resampling};
 pub use picture::open_image;
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
+pub use strangers::strangers;
 
 /// Samples handed to a sink in one window, at most, unless a row has more: half a mebibyte of `f64`.
 const WINDOW_SAMPLES: u64 = 1 << 16;

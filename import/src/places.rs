@@ -12,7 +12,7 @@
 //! use terrasoar_layout::progress::Silent;
 //! # let folder = tempfile::tempdir()?;
 //! # let (dem, out) = (folder.path().join("made-up.tif"), folder.path().join("made-up.iqt"));
-//! write(&SynthOptions { size: 65, ..Default::default() }, &dem, &|_| {})?;
+//! write(&SynthOptions::default().size(65), &dem, &|_| {})?;
 //! let header = build(&*terrasoar_import::open_file(&dem)?, &out, &BuildOptions::default(), &Silent)?;
 //! if let Some(own) = Frame::own(&header) {
 //!     let [east, north] = own.coordinates([0.0, 0.0]).ok_or("no coordinates")?;

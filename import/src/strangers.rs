@@ -160,6 +160,12 @@ fn find(look: &Look<'_>, strangers: &[Stranger]) -> Option<String> {
     Some(told(stranger.what, stranger.advice))
 }
 
+/// Formats that are known and not read: what each is, and the way from it to one that is read. Some are there twice.
+pub fn strangers() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let signed = SIGNED.iter().chain(WEAK).map(|stranger| (stranger.what, stranger.advice));
+    signed.chain(NAMES.iter().map(|(_, what, advice)| (*what, *advice)))
+}
+
 /// What to say of a file with the signature of a format that is not read.
 pub(crate) fn signed(look: &Look<'_>) -> Option<String> {
     find(look, SIGNED).or_else(|| database(look)).or_else(|| archive(look)).or_else(|| markup(look))

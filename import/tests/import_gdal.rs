@@ -1,12 +1,12 @@
 //! A thousand samples of each format against a live `gdallocationinfo`.
 //!
-//! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-layout --test import_gdal -- --ignored`.
+//! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-import --test import_gdal -- --ignored`.
 
 mod import_support;
+#[path = "import_support/tools.rs"]
+mod tools;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 use import_support::{Random, data, fixtures, read, write_hgt};
 use tempfile::tempdir;
@@ -17,6 +17,7 @@ use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
+use tools::values;
 
 /// Compares random samples of `path`.
 fn agrees(path: &Path) {
@@ -30,23 +31,7 @@ fn agrees(path: &Path) {
             )
         })
         .collect();
-    let mut child = Command::new("gdallocationinfo")
-        .arg("-valonly")
-        .arg(path)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("gdallocationinfo is needed: install gdal-bin");
-    let mut input = child.stdin.take().unwrap();
-    let asked = places.clone();
-    let writer =
-        std::thread::spawn(move || asked.iter().try_for_each(|(col, row)| writeln!(input, "{col} {row}")));
-    let output = child.wait_with_output().unwrap();
-    writer.join().unwrap().unwrap();
-    assert!(output.status.success());
-    let answers = String::from_utf8(output.stdout).unwrap();
-    let answers: Vec<f64> = answers.lines().map(|line| line.trim().parse().unwrap()).collect();
-    assert_eq!(answers.len(), places.len());
+    let answers = values(path, &places);
     file_agrees(path, &places, &answers);
     for ((col, row), wanted) in places.into_iter().zip(answers) {
         let got = grid.at(col, row);

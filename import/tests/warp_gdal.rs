@@ -3,19 +3,16 @@
 //! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-import --test warp_gdal -- --ignored`.
 
 mod import_support;
+#[path = "import_support/tools.rs"]
+mod tools;
 
 use import_support::{Grid, collect};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use tempfile::tempdir;
 use terrasoar_import::{OpenOptions, Resampling, open_with};
 
 fn run(program: &str, arguments: &[&str]) {
-    let output = Command::new(program)
-        .args(arguments)
-        .output()
-        .unwrap_or_else(|_| panic!("{program} is needed: install gdal-bin"));
-    assert!(output.status.success(), "{program} {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    tools::run(Path::new("."), program, arguments);
 }
 
 fn read(path: &Path, options: &OpenOptions) -> Grid {

@@ -2,11 +2,14 @@
 //!
 //! Read are `cargo metadata`, `cargo package --list` and the sources, offline. Nothing is packed or compiled.
 
+#[path = "../support/workspace.rs"]
+mod workspace;
+
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
-use std::process::Command;
+use workspace::{cargo, root};
 
 /// Packages that are published, in an order in which they can be, and the most bytes of the files of each.
 const PACKAGES: [(&str, u64); 7] = [
@@ -37,17 +40,6 @@ const CATEGORIES: [&str; 10] = [
     "visualization",
     "wasm",
 ];
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn cargo(arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO")).args(arguments).current_dir(root()).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "cargo {}: {said}", arguments.join(" "));
-    String::from_utf8(output.stdout).unwrap()
-}
 
 /// All packages of the workspace by name.
 fn packages() -> BTreeMap<String, Value> {

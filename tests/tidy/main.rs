@@ -7,6 +7,8 @@
 mod lex;
 mod modules;
 mod rings;
+#[path = "../support/workspace.rs"]
+mod workspace;
 
 use lex::words;
 use modules::Modules;
@@ -14,7 +16,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use workspace::{cargo, root};
 
 /// Packages, and those of the workspace that each may use.
 const PACKAGES: [(&str, &[&str]); 7] = [
@@ -63,17 +65,6 @@ const UNSAFE: [&str; 5] = [
     "layout/src/imagery/encode.rs",
     "layout/src/read/prefetch.rs",
 ];
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn cargo(arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO")).args(arguments).current_dir(root()).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "cargo {}: {said}", arguments.join(" "));
-    String::from_utf8(output.stdout).unwrap()
-}
 
 /// The packages of the workspace, those that are never published left out.
 fn packages() -> Vec<Value> {

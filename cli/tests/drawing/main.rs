@@ -1,8 +1,9 @@
 //! The verbs that draw, by the real program.
 //!
-//! These need a graphics adapter; a software one does. Where there is none they count as ignored and say why; with TERRASOAR_NEED_ADAPTER=1, as
-//! continuous integration sets it, that is a failure.
+//! These need a graphics adapter (tests/support/adapter.rs).
 
+#[path = "../../../tests/support/adapter.rs"]
+mod adapter;
 #[cfg(unix)]
 #[path = "../program/killed.rs"]
 #[allow(dead_code, reason = "shared with the tests of the other verbs")]
@@ -13,41 +14,17 @@ mod program;
 #[allow(dead_code, reason = "shared with the tests of the other verbs")]
 mod support;
 
-use libtest_mimic::{Arguments, Completion, Failed, Trial};
+use adapter::{Drawn, Outcome, ensure};
 use std::process::ExitCode;
 use terrasoar_render::Gpu;
 
-/// A test's outcome: what is wrong, in words.
-type Outcome = Result<(), String>;
 type Test = (&'static str, fn(&Gpu) -> Outcome);
 
 fn main() -> ExitCode {
-    let mut arguments = Arguments::from_args();
-    // One software device uses all cores by itself, and its errors are those of the test that runs.
-    arguments.test_threads.get_or_insert(1);
-    let gpu: Option<&'static Gpu> = match Gpu::headless_blocking() {
-        Ok(gpu) => {
-            println!("adapter: {} ({})", gpu.capabilities.adapter, gpu.capabilities.backend);
-            Some(Box::leak(Box::new(gpu)))
-        }
-        Err(error) => {
-            println!("all tests are ignored: {error}");
-            if std::env::var_os("TERRASOAR_NEED_ADAPTER").is_some_and(|v| v == "1") {
-                return ExitCode::FAILURE;
-            }
-            None
-        }
-    };
-    let trials = [outputs::TESTS, program::TESTS].concat().into_iter().map(|(name, test): Test| {
-        Trial::ignorable_test(name, move || match gpu {
-            None => Ok(Completion::ignored_with("no adapter")),
-            Some(gpu) => test(gpu).map(|()| Completion::Completed).map_err(Failed::from),
-        })
-    });
-    libtest_mimic::run(&arguments, trials.collect()).exit_code()
-}
-
-/// Fails with words unless something holds.
-fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome {
-    if holds { Ok(()) } else { Err(otherwise()) }
+    let tests = [outputs::TESTS, program::TESTS].concat().into_iter();
+    adapter::run(tests.map(|(name, test): Test| Drawn {
+        name: name.into(),
+        lacks: |_, _| None,
+        test: Box::new(test),
+    }))
 }

@@ -64,6 +64,16 @@ fn without(text: &str, left_out: &[&str]) -> String {
     kept.join(" ")
 }
 
+/// Semi-axes of the ellipsoid of WGS 84 in metres.
+const WGS84_M: [f64; 2] = [6_378_137.0, 6_356_752.314_245_179];
+
+/// Whether latitudes of the ellipsoid are drawn by the formulas of a sphere of its equator, as the maps of web pages do: distances on the ground are the ellipsoid's.
+fn is_web_mercator(proj: &Proj, text: &str) -> bool {
+    let number = |key: &str| from_proj::word(text, key).and_then(|value| value.parse::<f64>().ok());
+    let is_sphere = [number("a"), number("b")] == [Some(WGS84_M[0]); 2] || number("R") == Some(WGS84_M[0]);
+    proj.projname() == "webmerc" || (proj.projname() == "merc" && is_sphere)
+}
+
 /// Whether a radius is that of one of the Earth's ellipsoids.
 pub(crate) fn is_earth(radius_m: f64) -> bool {
     (6_300_000.0..6_450_000.0).contains(&radius_m)
@@ -113,14 +123,14 @@ impl Ground {
             .collect();
         let body = Proj::from_proj_string(&format!("+proj=longlat {}", ellipsoid.join(" "))).ok()?;
         let (a, b) = body.ellipse_parameters();
+        let axes_m = if is_web_mercator(&proj, text) { WGS84_M } else { [a, b] };
         let own = Proj::from_proj_string(&format!("+proj=longlat +a={a} +b={b}")).ok()?;
         let world = match is_earth(a) {
             true => Proj::from_proj_string("+proj=longlat +datum=WGS84").ok()?,
             false => own.clone(),
         };
         let is_geographic = proj.is_latlong();
-        let this =
-            Self { proj, own, world, size, signs, is_geographic, axes_m: [a, b], is_shift_lost: false };
+        let this = Self { proj, own, world, size, signs, is_geographic, axes_m, is_shift_lost: false };
         // A datum by a grid that is not here shows at the first point.
         let (lon, lat) = (this.proj.longitude_of_origin(), this.proj.latitude_of_origin().clamp(-1.4, 1.4));
         let mut probe = (lon + 0.01, lat + 0.01);
@@ -270,9 +280,22 @@ mod tests {
         let mercator = ground("EPSG:3857");
         let ([east, north], latitude) =
             mercator.steps_m([1_200_000.0, 8_399_737.889_818], [[20.0, 0.0], [0.0, -20.0]]).unwrap();
-        // 20 cos 60 on the sphere that this map is made on.
+        // 20 cos 60 on the sphere by whose formulas the map is drawn, times the ellipsoid's radii over the sphere's: N and M of
+        // latitude 60 are 6,394,209.17 and 6,383,453.86 m.
         assert!((latitude.to_degrees() - 60.0).abs() < 1e-6, "{latitude}");
-        assert!((east - 10.0).abs() < 1e-6 && (north - 10.0).abs() < 1e-6, "{east} {north}");
+        let [wanted_east, wanted_north] =
+            [6_394_209.17, 6_383_453.86].map(|radius| 10.0 * radius / 6_378_137.0);
+        assert!((east - wanted_east).abs() < 1e-6, "{east} {wanted_east}");
+        assert!((north - wanted_north).abs() < 1e-6, "{north} {wanted_north}");
+        for same in ["EPSG:900913", "+proj=webmerc +datum=WGS84", "EPSG:3785"] {
+            let steps =
+                ground(same).steps_m([1_200_000.0, 8_399_737.889_818], [[20.0, 0.0], [0.0, -20.0]]).unwrap();
+            assert_eq!(
+                steps.0.map(|m| (m * 1e6).round()),
+                [east, north].map(|m| (m * 1e6).round()),
+                "{same}"
+            );
+        }
         let utm = ground("EPSG:32632");
         let ([east, north], _) = utm.steps_m([500_000.0, 5_000_000.0], [[10.0, 0.0], [0.0, -10.0]]).unwrap();
         assert!((east - 10.004).abs() < 1e-4 && (north - 10.004).abs() < 1e-4, "{east} {north}");

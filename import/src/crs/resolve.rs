@@ -140,8 +140,9 @@ pub(crate) fn resolve(
         return Ok(system);
     }
     let mut system = found(said, warnings);
-    // What the file states by itself wins over the registry, as the standard has it.
-    if let Some(unit) = &said.unit {
+    // What the file states by itself wins over the registry, as the standard of GeoTIFF has it.
+    let yields = said.unit_yields && system.unit.is_some();
+    if let Some(unit) = said.unit.as_ref().filter(|_| !yields) {
         let size = exact(unit.value);
         let differs = system.unit.as_ref().is_none_or(|known| known.size != size);
         if differs {

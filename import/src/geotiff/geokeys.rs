@@ -161,6 +161,7 @@ fn system(keys: &Keys) -> CrsSaid {
     };
     let name = names.iter().find_map(|key| keys.text(*key)).map(|name| short_name(&name)).unwrap_or_default();
     CrsSaid {
+        unit_yields: false,
         text,
         code: code.map(|code| Said::new(code, code_by)),
         vertical_code: keys.code(VERTICAL_TYPE).map(|code| Said::new(code, "key VerticalCSType")),

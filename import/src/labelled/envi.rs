@@ -112,7 +112,8 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Label, LayoutError> {
         row_bytes: [None; 2],
         band_gap: 0,
         place: place.map(|place| Said::new(place, format!("map info in {}", beside::name(path)))),
-        crs: CrsSaid { text: text.or(crs.text.clone()), ..crs },
+        // The words of units are few: feet of surveys are "Feet" too.
+        crs: CrsSaid { unit_yields: text.is_some(), text: text.or(crs.text.clone()), ..crs },
         nodata: value("data ignore value")
             .map(|text| Said::new(text.to_owned(), format!("data ignore value in {}", beside::name(path)))),
         names: value("band names")

@@ -83,6 +83,8 @@ pub(crate) struct CrsSaid {
     pub(crate) name: String,
     /// The unit of coordinates, where the file states it by itself.
     pub(crate) unit: Option<Said<HorizontalSize>>,
+    /// Whether that unit is a rounded word of a label, which yields to the unit of the system.
+    pub(crate) unit_yields: bool,
     /// Equatorial radius of the body in metres, where the file states it by itself and there is no text.
     pub(crate) radius_m: Option<f64>,
     /// Whether the file says that its coordinates are of a local site or an engineering system: lengths, never degrees.

@@ -2,46 +2,12 @@
 
 #![allow(dead_code, reason = "each test binary uses a part of this")]
 
+#[path = "tools.rs"]
+mod tools;
+
 use super::import_support::{Grid, Random, collect, read};
-use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
-
-/// Runs a tool; what it printed.
-pub(crate) fn run(folder: &Path, tool: &str, arguments: &[&str]) -> String {
-    let output = Command::new(tool)
-        .args(arguments)
-        .current_dir(folder)
-        .env("GDAL_PAM_ENABLED", "NO")
-        .output()
-        .unwrap_or_else(|error| panic!("{tool} is needed: install gdal-bin ({error})"));
-    let said =
-        format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "{tool} {}: {said}", arguments.join(" "));
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-/// The values that GDAL reads at places (column, row) of a file.
-pub(crate) fn values(path: &Path, places: &[(u32, u32)]) -> Vec<f64> {
-    let mut child = Command::new("gdallocationinfo")
-        .args(["-valonly", "-b", "1"])
-        .arg(path)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("gdallocationinfo is needed: install gdal-bin");
-    let mut input = child.stdin.take().unwrap();
-    let asked = places.to_vec();
-    let writer =
-        std::thread::spawn(move || asked.iter().try_for_each(|(col, row)| writeln!(input, "{col} {row}")));
-    let output = child.wait_with_output().unwrap();
-    writer.join().unwrap().unwrap();
-    assert!(output.status.success());
-    let answers = String::from_utf8(output.stdout).unwrap();
-    let answers: Vec<f64> = answers.lines().map(|line| line.trim().parse().unwrap()).collect();
-    assert_eq!(answers.len(), places.len(), "{}", path.display());
-    answers
-}
+pub(crate) use tools::{run, values};
 
 /// Compares random samples and the place of `path` with what GDAL says; what has no data for GDAL must be void here, and nothing else. Our row 0 must be GDAL's.
 pub(crate) fn agrees(path: &Path) {
