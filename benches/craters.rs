@@ -1,7 +1,7 @@
 //! What it costs to change the ground: craters of 16 x 16 samples, one by one and in batches, records and their ancestors brought up to date.
 //!
 //! Questions: how long does a crater take on one thread, where its pages are in memory and where they are not; how many records does it change; how many a second are
-//! made in batches? Data: a terrain file named on the command line, 4,097 x 4,097 samples for the figures of the README. Command:
+//! made in batches? Data: a terrain file named on the command line, 4,097 x 4,097 samples for docs/figures.md. Command:
 //!
 //!     cargo bench --bench craters -- TERRAIN.iqt [--craters N]
 //!

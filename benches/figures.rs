@@ -1,4 +1,4 @@
-//! The figures of the README, measured in one run.
+//! Figures of docs/figures.md, measured in one run.
 //!
 //! Questions: how many of SOAR's vertex tests does SMART make, how fast is the SOAR it is compared with, how fast and in how much memory is
 //! a file built? Data: synthetic Puget-Sound-style terrain, or a DEM named with `--dem`. Command:

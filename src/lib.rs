@@ -1,10 +1,10 @@
-//! Fly over terrain far larger than memory: a terrain file and a view go in, a conforming triangle mesh whose every visible sample is within a tolerance in pixels comes out,
-//! and costs what changed since the last frame.
+//! Fly over terrain far larger than memory. A terrain file and a view go in. A triangle mesh without cracks comes out, in which every visible sample is within a tolerance in pixels.
+//! A frame costs what has changed since the frame before.
 //!
 //! # In a program
 //!
-//! [`Terrain`] is an opened file, [`Ground`] is that terrain under a moving eye, [`View`] is where the eye is. Pages are read by threads into memory of a fixed size, and no frame
-//! waits for one: what is late is coarse, whole, and refines by itself.
+//! [`Terrain`] is an opened file, [`Ground`] is that terrain under a moving eye, [`View`] is where the eye is. Threads read pages into memory of a fixed size, and no frame
+//! waits for one. Where a page is late, the ground is coarse and without holes, and becomes fine once the page has come.
 //!
 //! ```
 //! use terrasoar::{StreamOptions, Terrain, View};
@@ -27,14 +27,14 @@
 //! ```
 //!
 //! Space is metres east, north and up of the terrain's south-west sample at height zero. Package `terrasoar-scene` draws ground with wgpu, into a render pass of its own or of
-//! yours; whoever draws by other means takes [`Ground::change_since`]. [`Ground::edit`] changes heights at once, [`Ground::commit`] brings them to the disk in the background. Terrain files are made
+//! yours. To draw by other means, use [`Ground::change_since`]. [`Ground::edit`] changes heights at once, [`Ground::commit`] brings them to the disk in the background. Terrain files are made
 //! by [`terrasoar_layout::build`](mod@terrasoar_layout::build) from data in memory, and by package `terrasoar-import` or the program from elevation files.
 //! EMBEDDING.md goes through it step by step, with programs that run.
 //!
-//! # Beneath
+//! # Below the front door
 //!
-//! * [`refine`]: the engines, and what they tell. [`refine::naive`] is the definition, [`refine::kinetic`] what [`Ground`] uses.
-//! * [`stream`]: a pool of pages, who is asked for which page by when.
+//! * [`refine`]: the engines, and what they report. [`refine::naive`] is the definition, [`refine::kinetic`] what [`Ground`] uses.
+//! * [`stream`]: an engine over a pool of pages: which page is asked for, and by when.
 //! * [`flight`], [`flyover`], [`stats`]: recorded flights, their replay by any engine, and figures. A replay reads no clock.
 //! * [`edits`]: scripts of edits. [`metric`], [`mesh`], [`view`]: the error on the screen, triangles, the camera.
 //! * Package `terrasoar-layout` has the file: reading, building, editing, verifying.

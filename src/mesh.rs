@@ -1,7 +1,7 @@
 //! Triangles of a refined mesh: their identity, which of them are drawn, and strips of them.
 //!
 //! A triangle is named by its longest edge and the side its apex lies on ([`TriangleKey`]), so meshes of different engines compare as
-//! sets. Not drawn are triangles that the fold of padding leaves without area, and triangles that void touches (FORMAT.md,
+//! sets. Triangles that padding leaves without area are not drawn, nor are triangles that a void touches (FORMAT.md,
 //! section 1).
 
 use terrasoar_layout::grid::{Grid, GridPoint};

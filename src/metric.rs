@@ -3,7 +3,7 @@
 //!
 //! Based on: P. Lindstrom, V. Pascucci, "Visualization of Large Terrains Made Easy", IEEE Visualization 2001, section 3;
 //! X. Bao, R. Pajarola, M. Shafae, "SMART", section 3.2 (eq. 3) and 4.
-//! Every engine decides through this file, with the same operations in the same order, so that all decide alike to
+//! Every engine decides by this file, with the same operations in the same order. So all decide alike to
 //! the last bit. It is the only file that knows the projection. Cost: some ten floating-point operations a test.
 
 use crate::view::View;

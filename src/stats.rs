@@ -1,4 +1,4 @@
-//! What a frame cost and what a flight cost in sum: plain figures, in the field names that reports use.
+//! What a frame cost, and what a flight cost as a whole: plain figures, under the names that reports use.
 
 use serde::Serialize;
 

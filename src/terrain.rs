@@ -1,7 +1,7 @@
 //! Opening a terrain file: to be streamed, or mapped as a whole.
 //!
-//! [`Terrain`] reads what it needs and maps nothing: a file of any size, on any storage, and one that can be edited while it is flown over. [`MappedTerrain`] lends all
-//! records at once, for the engines that want them all and for measuring, and asks something of whoever else has the file.
+//! [`Terrain`] reads what it needs and maps nothing: a file of any size, on any storage, and one that can be edited while it is flown over. [`MappedTerrain`] gives all
+//! records at once, for engines that need them all and for measuring. While it is open, other programs must not shorten the file.
 
 use crate::ground::{Ground, PictureEngine, StreamOptions};
 use crate::refine::Culling;
@@ -96,7 +96,7 @@ impl From<Arc<TerrainFile>> for Terrain {
 
 /// A terrain file that is mapped, so that all its records are at hand.
 ///
-/// **While it is open nobody may truncate the file**: on Unix the system then ends the program with the signal SIGBUS at the next touch of what is gone. Programs of this
+/// **While it is open no program may truncate the file**: otherwise, on Unix, the system ends this program with the signal SIGBUS when it touches what is gone. Programs of this
 /// project only append to terrain files and replace them under their name, which does no harm; so does copying a new file over the name with `mv`, but not
 /// with `cp`. A failing disk has the same effect. Where that cannot be promised, [`Terrain`] is the one to take: it has words for all of it.
 #[derive(Debug)]
@@ -114,7 +114,7 @@ impl MappedTerrain {
         Ok(Self { file: TerrainFile::open(path.as_ref())? })
     }
 
-    /// A terrain file whose `bytes` are in memory, called `name` in messages. Nobody else has them, so that nothing is asked of anybody.
+    /// A terrain file whose `bytes` are in memory, called `name` in messages. No other program can change them.
     ///
     /// # Errors
     /// As [`Terrain::open`].
@@ -122,7 +122,7 @@ impl MappedTerrain {
         Ok(Self { file: TerrainFile::from_source(Box::new(MemorySource::new(name, bytes)))? })
     }
 
-    /// Ground to fly over with all records at hand: no page is ever late. It cannot be edited.
+    /// Ground to fly over with all records in memory: no page is ever late. It cannot be edited.
     ///
     /// # Errors
     /// [`LayoutError::Usage`] if the file lends no bytes, which one that was opened here always does.

@@ -1,4 +1,4 @@
-//! Where the eye is and what it sees: one frame's camera and its requirements on the mesh.
+//! Where the eye is and what it sees: one frame's camera, and how exact its mesh must be.
 //!
 //! Space is metres east, north and up of the terrain's south-west sample at height zero. Angles at this
 //! boundary are radians; flights and flags speak degrees.

@@ -1,4 +1,4 @@
-//! The program `terrasoar`. What it does is in the library; how it is asked to is in [`cli`](verbs).
+//! The program `terrasoar`. The work is done in libraries; the command line is in [`verbs`].
 
 mod verbs;
 #[cfg(feature = "view")]

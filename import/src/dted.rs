@@ -2,7 +2,7 @@
 //!
 //! Three heads of fixed length (UHL 80 bytes, DSI 648, ACC 2700), perhaps behind labels of 80 bytes, then a record for each line of longitude from west to east: a mark, three
 //! counts, heights from south to north in two bytes, the sign apart from the number, and the sum of all bytes. Towards the poles lines are further apart, as the head says. A line
-//! that the file leaves out is void. A wrong sum is damage, unless no line has a right one: then its writer kept none. Lines are read in blocks, blocks in parallel.
+//! that the file leaves out is void. A wrong sum is damage, unless no line has a right one: then its writer wrote no sums. Lines are read in blocks, blocks in parallel.
 
 use crate::WINDOW_SAMPLES;
 use crate::input;

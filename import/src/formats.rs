@@ -1,6 +1,6 @@
 //! The formats that are read, one a line: how each is known, and what opens it.
 //!
-//! The order is that of asking: signatures first, then what a label beside a file says, then names. A file that no line knows is a stranger ([`crate::strangers`]).
+//! They are tried in this order: signatures first, then what a label beside a file says, then names. A file that no line knows is looked up among formats that are not read ([`crate::strangers`]).
 
 use crate::identify::{self, Look};
 use crate::reader::Reader;

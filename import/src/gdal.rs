@@ -1,7 +1,7 @@
-//! Everything that GDAL opens, through the system's library: with the feature `gdal` alone, for it is C++ and asks for GDAL 3.5 or later where the program is built and where it runs.
+//! Everything that GDAL opens, through the system's library: with the feature `gdal` only, because it needs GDAL 3.5 or later, a C++ library, where the program is built and where it runs.
 //!
-//! Files that are read here are not handed to it. What it opens besides, among them names that are no files (`/vsicurl/...`, `NETCDF:"a.nc":z`), is read block by block, a data set of its own for
-//! each worker, with GDAL's cache held to [`CACHE_MIB`]. Where GDAL says that a sample is masked it is void.
+//! Files of formats that this package reads itself are not handed to it. Everything else that it opens is read block by block, even names that are no files (`/vsicurl/...`, `NETCDF:"a.nc":z`). Each
+//! worker has a data set of its own, and GDAL's cache is held to [`CACHE_MIB`]. Where GDAL says that a sample is masked it is void.
 
 use crate::options::OpenOptions;
 use crate::parallel::each_task;

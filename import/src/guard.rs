@@ -1,8 +1,8 @@
 //! Keeps a panic inside a third-party decoder from leaving the reader.
 //!
-//! The decoders are fuzzed by their makers, and still assert and index; on hostile bytes an assertion
-//! that fires is damage in the file and nothing else. State that a panic interrupted is dropped by
-//! every caller. A program that speaks up at a panic can ask whether it is one of these ([`is_guarded`]). Cost: none on the good path.
+//! The decoders are fuzzed by their makers, but they still have assertions and index into arrays. If one of them panics on hostile bytes,
+//! the file is damaged, and the program goes on. Every caller drops the state that a panic interrupted.
+//! A program that reports panics can ask whether a panic is one of these ([`is_guarded`]). Cost: none where nothing panics.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -1,7 +1,7 @@
 //! What a raw number is in metres: scale, offset, unit and direction, and where each was found.
 //!
-//! A unit is taken from the person, the band, the vertical system, in this order. One that is named and not known is said aloud, and so is one that only the map has: maps in
-//! feet often come with heights in feet, and often not.
+//! A unit is taken from the person, the band, or the vertical system, in this order. A unit that is named and not known gives a warning. So does a unit that only the map has: maps in
+//! feet often come with heights in feet, and often they do not.
 
 use crate::crs::{System, unit_of_code};
 use crate::options::{Direction, OpenOptions};

@@ -1,6 +1,6 @@
 //! What a file looks like: its name, its length and its first bytes.
 //!
-//! A format with a signature is known by it alone, whatever the file is called; formats without one are known by name, and by what lies beside. Cost: one read of 4 KiB.
+//! A format with a signature is recognised by it alone, whatever the file is called. Formats without one are recognised by name, and by files beside. Cost: one read of 4 KiB.
 
 use std::ffi::OsStr;
 use std::io::Read;

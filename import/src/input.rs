@@ -1,7 +1,7 @@
 //! Opens the files that are read: regular ones, and no others.
 //!
-//! A pipe waits for a writer when it is opened, a device may never end, and neither can be read in several places at once, as readers here do. So what
-//! a name leads to is looked at before it is opened, and once more in what was opened. Cost: two calls of the system.
+//! Opening a pipe waits for a writer, and a device may never end. Neither can be read in several places at once, as readers here do. So the kind of file
+//! is checked before it is opened, and once more afterwards. Cost: two calls of the system.
 
 use std::fs::{File, FileType};
 use std::path::Path;

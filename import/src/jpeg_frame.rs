@@ -1,6 +1,6 @@
 //! What a JPEG stream declares, read marker by marker before anything is decoded: size, sampling, scans.
 //!
-//! A picture may come in any number of scans, each of which the decoder goes through whole for a few bytes of file; and what it holds while it works follows from
+//! A picture may come in any number of scans. For each of them the decoder goes through the whole picture, even if the scan has a few bytes. The memory that it takes follows from
 //! size and sampling alone. Both are known here before the decoder sees a byte (ITU-T T.81, annex B). Cost: one pass over the bytes.
 
 use std::io::BufRead;

@@ -15,10 +15,10 @@
 //!
 //! What comes out is for `terrasoar_layout::build`, and for `terrasoar_layout::imagery::drape`.
 //!
-//! [`open`] looks at a file's first bytes and hands it to the one reader that knows them, whatever its
-//! name; formats without a signature are known by name, and by what lies beside them. Opening
+//! [`open`] looks at a file's first bytes and gives it to the reader of that format, whatever its
+//! name. Formats without a signature are recognised by name, and by files beside them. Opening
 //! reads headers, streaming reads samples. Nothing in a file is trusted: every size it declares is
-//! held against the length of the file before memory is taken for it.
+//! checked against the length of the file before memory is taken for it.
 
 mod ascii_grid;
 mod beside;

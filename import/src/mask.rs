@@ -1,6 +1,6 @@
 //! Masks: samples that another image, inside the file or beside it, calls void.
 //!
-//! The mask is read first, into a bit a sample: in memory where the budget allows it, else in a nameless temporary file. Then samples pass, and those under a 0
+//! The mask is read first, a bit for each sample: in memory where the budget allows it, else in a nameless temporary file. Then samples are read, and those whose bit is 0
 //! become NaN. Cost: one pass over the mask, a copy of each window with such samples.
 
 use crate::options::OpenOptions;

@@ -1,6 +1,6 @@
 //! From what a file says to a DEM that can be built: the one layer between every reader and the build.
 //!
-//! Statements become a reference system, metres, north and voids here, once for all formats. Samples pass through: voids become NaN, then rows and columns are turned north-up.
+//! Here a file's statements become a reference system, metres, a direction and voids, once for all formats. Samples pass through: voids become NaN, then rows and columns are turned north-up.
 //! Cost: a copy of each window where there are voids to look for or rows to turn.
 
 use crate::beside::Beside;

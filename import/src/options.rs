@@ -1,4 +1,4 @@
-//! What a person says about elevation data that the file does not, or says wrongly.
+//! What a person states about elevation data where the file says nothing, or something wrong.
 //!
 //! Cost: none. A new format adds a field here with a default that changes nothing.
 

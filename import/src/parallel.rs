@@ -2,7 +2,7 @@
 //!
 //! Each worker takes the lowest task not yet taken, so a file is read from front to back whatever
 //! the number of workers, and opens its own state (a file, a decoder) once. The first error stops
-//! everybody; of several the one of the lowest task is reported.
+//! all workers. Of several errors the one of the lowest task is reported.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

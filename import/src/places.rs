@@ -1,7 +1,7 @@
 //! Places on the ground: coordinates of a terrain's own reference system, or of another, to metres from its south-west sample and back.
 //!
-//! Coordinates are east before north in every system: longitude before latitude. A [`Frame`] is a terrain seen in one system. Longitudes may be given with any full turns. Datums are
-//! shifted by parameters; where only a grid that is not here tells the shift, it is left out and [`Frame::is_rough`] says so. Cost: in the terrain's own system a few operations a place, in
+//! Coordinates are east before north in every system: longitude before latitude. A [`Frame`] is a terrain seen in one system. Longitudes may have any number of full turns added. Datums are
+//! shifted by parameters. Where the shift needs a grid, which is not here, it is left out and [`Frame::is_rough`] says so. Cost: in the terrain's own system a few operations a place, in
 //! others a microsecond.
 //!
 //! ```
@@ -31,7 +31,7 @@ use terrasoar_layout::words::harmless;
 
 /// Steps on each side of the mesh whose points tell how far a terrain reaches.
 const MESH: u32 = 64;
-/// Places so few samples off one mean that one: roundings of projections, by far less than anybody measures.
+/// A place at most so many samples off a sample means that sample. This is the rounding of projections, far less than can be measured.
 const SNAP: f64 = 1e-6;
 
 /// A reference system that coordinates are given in.

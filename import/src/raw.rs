@@ -1,7 +1,7 @@
 //! Heightmaps without any header: `.r16`, `.r32`, `.raw` and whatever else, from the north-western sample on, row by row.
 //!
-//! What the numbers are and how many make a row is said by a person ("1025x1025:u16le"). The extensions `.r16` and `.r32` say the type by custom, and a square
-//! is what nearly all of them are; so those two are read without a word, with a warning that says what was taken for granted. Nothing else is guessed: what would fit is listed.
+//! A person says the type of the numbers and how many make a row ("1025x1025:u16le"). The extensions `.r16` and `.r32` usually stand for a type, and nearly all such files are
+//! squares. So those two are read without being told, with a warning that says what was assumed. Nothing else is guessed; the error lists what would fit.
 
 use crate::plain::{Kind, Plain};
 use crate::reader::{Declared, Reader};

@@ -1,4 +1,4 @@
-//! Formats that are known and not read: what they are, and the way from them to one that is read.
+//! Formats that are recognised but not read: what they are, and how to convert them to one that is read.
 //!
 //! A line each. Signatures of four bytes or more are looked at before any name; shorter ones and names last, for samples of a file without a header may look like them.
 //! A command in an advice has INPUT where the file's name belongs.

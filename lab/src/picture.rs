@@ -1,6 +1,6 @@
-//! A picture of red, green and blue as PNG, and how ours are told from those of others.
+//! A picture of red, green and blue as PNG, and how a picture of ours is recognised.
 //!
-//! Ours say so: the text chunk `Software` before the pixels. The same pixels give the same bytes. Cost: the whole file in memory.
+//! It has the text chunk `Software` before the pixels. The same pixels give the same bytes. Cost: the whole file in memory.
 
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
 use std::io;

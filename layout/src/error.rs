@@ -1,6 +1,6 @@
 //! The one error type of this crate. Its variants tell apart what a caller would handle apart:
 //! not our format, damaged, unsupported, I/O, wrong usage. Every message says what, where, and
-//! what to do; how that is done in a program, by which flag or button, is the program's to add ([`Remedy`]).
+//! what to do. The program adds by which flag or button that is done ([`Remedy`]).
 
 use crate::remedy::Remedy;
 use std::io::ErrorKind;

@@ -1,7 +1,7 @@
-//! The Terrasoar terrain file: elevation data in, error bounds and nested spheres computed, pages out, and a reader of it.
+//! The Terrasoar terrain file. Elevation data go in, error bounds and nested spheres are computed, and pages come out; and there are readers of these.
 //!
-//! A terrain file has everything that a view-dependent refinement asks of a vertex in four bytes: height, error bound, radius, in an order in which
-//! a view's vertices lie on few pages of 4 KiB. This crate knows bytes and knows no camera; package `terrasoar` flies.
+//! A terrain file holds in four bytes everything that view-dependent refinement needs of a vertex: height, error bound, radius. Their order is such that
+//! a view's vertices lie on few pages of 4 KiB. This crate knows bytes and knows no camera. Package `terrasoar` flies over the file.
 //!
 //! # Building and reading
 //!
@@ -28,7 +28,7 @@
 //! # fn main() {}
 //! ```
 //!
-//! Without the feature `files` nothing of the system is asked for: a terrain is opened by [`Terrain::from_source`](read::terrain::Terrain::from_source) from
+//! Without the feature `files` nothing of the system is needed: a terrain is opened by [`Terrain::from_source`](read::terrain::Terrain::from_source) from
 //! [bytes in memory](file::source::MemorySource) or whatever else is a [`Source`](file::source::Source), on any target.
 //!
 //! # The way through the modules

@@ -1,6 +1,6 @@
 //! Numbers that look random and are the same on every machine.
 //!
-//! Invariant: equal seeds give equal sequences, for files and tests have what came of them. Cost: a few instructions a number.
+//! Invariant: equal seeds give equal sequences, now and later, because files and tests depend on them. Cost: a few instructions a number.
 
 /// Mixes 64 bits: the finaliser of SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014).
 #[inline]

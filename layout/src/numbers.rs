@@ -1,4 +1,4 @@
-//! Which numbers edits and paint may have, and the words for those they may not.
+//! Which numbers edits and paint may have, and the message for those they may not have.
 
 use crate::error::LayoutError;
 

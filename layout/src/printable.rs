@@ -1,7 +1,7 @@
-//! Text from files, names and command lines as it may be shown: characters that a terminal would obey, or that make text look like another, are spelt out.
+//! Makes text from files, names and command lines safe to show. Characters that a terminal would obey, or that make a text look like another one, are spelt out.
 //!
-//! Spelt out are control characters (C0, DEL, C1), those that turn the direction of writing, and those that take no room; everything else stays, whatever its language. What a file
-//! says is kept as it is in memory and on the disk; whoever shows it comes here. Cost: a look at each character, a copy only if one must be spelt out.
+//! These are control characters (C0, DEL, C1), characters that turn the direction of writing, and characters that take no room. Everything else stays, whatever its language. In memory and on the disk texts
+//! are kept as they are; only showing them goes through here. Cost: a look at each character, a copy only if one must be spelt out.
 
 use std::borrow::Cow;
 use std::fmt::Write;

@@ -1,4 +1,4 @@
-//! How long work gets on, for whoever waits for it.
+//! How far long work has come.
 
 /// Hears how a build gets on.
 pub trait Progress: Sync {

@@ -1,7 +1,7 @@
-//! A finished terrain file gets its name, if it opens.
+//! A finished terrain file gets its name only if it opens.
 //!
-//! Whatever was written is read back from the file as whoever opens it would: header, directory, inert page, the imagery's directory. What would be refused then is refused now, and
-//! whatever had the name stays.
+//! What was written is read back from the file as opening reads it: header, directory, inert page, the imagery's directory. A file that would be refused when it is opened is not published, and
+//! the file that had the name stays.
 
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;

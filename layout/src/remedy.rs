@@ -1,7 +1,7 @@
-//! What a caller can ask for to mend a refusal, as a value.
+//! What would help where something was refused, as a value.
 //!
-//! A library does not know by which flag or button a program asks for more memory or another spacing. Its messages say what to change in words, and
-//! the error carries the same as a [`Remedy`], which a program turns into its own way of asking. Cost: none.
+//! A library does not know by which flag or button a program asks for more memory or another spacing. Its messages say in words what to change.
+//! The error has the same as a [`Remedy`], which a program turns into the name of its flag or button. Cost: none.
 
 /// Something that can be asked for and would mend a refusal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

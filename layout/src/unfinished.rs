@@ -1,8 +1,8 @@
-//! Files and folders that have a name before they are complete, and what is done about them when a signal ends the program.
+//! Files and folders that have a name before they are complete, and how they are removed when a signal ends the program.
 //!
-//! Whoever makes one takes it away when it fails; a signal ends the process before that. So all of them are on one list of the process, and a program that hears signals calls
-//! [`remove_all`] before it goes. Where files can do without a name, as on Linux, the list is nearly always empty. **A name is on the list from the moment that it exists**, for it is made
-//! while the list is held.
+//! Code that makes one removes it when it fails, but a signal ends the process before that. So all of them are on one list of the process, and a program that handles signals calls
+//! [`remove_all`] before it ends. Where files need no name, as on Linux, the list is nearly always empty. **A name is on the list from the moment that it exists**, because it is made
+//! while the list is locked.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -54,7 +54,7 @@ impl Drop for Guard {
     }
 }
 
-/// Removes everything on the list, for good: whoever wants to make another afterwards waits for the end of the process, which should follow at once.
+/// Removes everything on the list, for good. A thread that would add to the list afterwards waits for the end of the process, which should follow at once.
 pub fn remove_all() {
     let mut list = LIST.lock().unwrap_or_else(PoisonError::into_inner);
     list.drain(..).for_each(|path| remove(&path));

@@ -1,10 +1,10 @@
-//! Whether a terrain file is sound: every page against its checksum, every page number used once, and what section 3 of FORMAT.md
-//! promises of the records.
+//! Whether a terrain file is sound: every page matches its checksum, every page number is used once, and records are as section 3 of FORMAT.md
+//! promises.
 //!
-//! Opening checks header, directory and inert page; this checks the rest, in passes. `structure` looks at what the directory says besides page numbers,
+//! Opening checks header, directory and inert page. This checks the rest, in passes. `structure` looks at what the directory says besides page numbers,
 //! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children, `imagery` reads the tiles. Of an edited file
 //! `journal` looks at all states that it can go back and forth to, by checksums and page numbers; how their records are nested is checked of the current one alone.
-//! Cost: each page is read some ten times, never more than a few hundred kilobytes a thread are held, and the directory. Not covered, for nothing depends
+//! Cost: each page is read some ten times; each thread holds a few hundred kilobytes at most, and there is the directory. Some bytes are not checked, because nothing depends
 //! on them: the header slot that is not current, the bytes after the directory root's last entry, pages that no state reaches.
 //!
 //! Invariant: a report without problems means that every promise refinement relies on holds for the bytes as they were read.

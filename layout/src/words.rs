@@ -1,7 +1,7 @@
-//! Numbers and texts of files as messages and headers can bear them.
+//! Numbers and texts of files in a form that is fit for messages and headers.
 //!
-//! A file may hold any number and any text. A number of three hundred digits says less than its power of ten; a text may move a terminal's cursor,
-//! ring its bell or turn what follows from right to left. Cost: one pass over what is shown.
+//! A file may hold any number and any text. A number of three hundred digits is shown as a power of ten. A text could move a terminal's cursor,
+//! ring its bell or turn what follows from right to left, so such characters are left out. Cost: one pass over what is shown.
 
 use crate::printable::is_harmless;
 

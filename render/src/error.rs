@@ -1,4 +1,4 @@
-//! What can go wrong, told apart by what the caller can do about it.
+//! What can go wrong, divided by what the caller can do about it.
 
 /// Errors of this crate.
 #[derive(Debug, Clone, thiserror::Error)]

@@ -1,6 +1,6 @@
-//! From nothing to a device: which adapter, which of its abilities are used, and how its loss is noticed.
+//! Getting a device: which adapter, which of its features are used, and how its loss is noticed.
 //!
-//! Only features that are present are asked for, so every adapter that can run compute shaders will do. Errors that
+//! Only features that the adapter has are asked for, so every adapter that can run compute shaders will do. Errors that
 //! arrive outside a call (a lost device, a refused command) are kept in a [`DeviceWatch`] and returned by its `check`,
 //! instead of ending the program.
 

@@ -8,7 +8,7 @@
 //! 1. [`Renderer::apply`] takes a [`MeshPatch`]: vertices and triangles that changed, by slot, and the ranges of
 //!    triangles that are seen. What is sent to the device is the patch, 36 bytes a vertex and 16 a triangle.
 //! 2. [`Renderer::want_tiles`] says which normal tiles the view lacks, most urgent first; [`Renderer::give_tile`] takes their heights.
-//!    How many a frame is the caller's choice. Until a tile comes a coarser one stands in; until any comes, triangles are shaded flat.
+//!    How many a frame is the caller's choice. Until a tile comes a coarser one is used. Until any comes, triangles are shaded flat.
 //!    [`Renderer::want_imagery`] and [`Renderer::give_imagery`] do the same for an image on the ground, if [`Renderer::set_imagery`] says that there is one.
 //! 3. [`Renderer::render`] draws ground, walls and sky as a [`Look`] says. An overlay may follow in the same encoder.
 //!
@@ -57,14 +57,14 @@
 //!
 //! # When a device is lost
 //!
-//! [`DeviceWatch::check`] returns [`RenderError::DeviceLost`] from then on. All that was on the device is gone, and none of it was
-//! the only copy: make a [`Gpu`] and a [`Renderer`] anew, apply one patch with the whole mesh,
+//! [`DeviceWatch::check`] returns [`RenderError::DeviceLost`] from then on. All that was on the device is gone, but the caller has
+//! all of it: make a [`Gpu`] and a [`Renderer`] anew, apply one patch with the whole mesh,
 //! set the image if there was one, and give tiles as they are wanted.
 //!
 //! # How things are
 //!
 //! * **Space** is metres east, north and up of the terrain's south-west sample at height zero, heights exaggerated. Positions go to the
-//!   device as whole grid numbers and are taken from the eye's cell there, so nothing trembles a thousand kilometres from the origin.
+//!   device as whole grid numbers and are taken from the eye's cell there. So pictures are steady even a thousand kilometres from the origin.
 //! * **Depth** is reversed and endless: 1 at the near plane, 0 at infinity.
 //! * **Movement.** A vertex enters on the edge that it splits and reaches its own place when the eye has come half the way nearer. That
 //!   depends on vertex and eye alone: there are no cracks at any moment.

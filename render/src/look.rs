@@ -84,7 +84,7 @@ pub enum Haze {
 pub struct Contours {
     /// Metres of height from line to line, above 0.
     pub interval_m: f32,
-    /// Every so manieth line is an index line, twice as wide and darker.
+    /// Each line whose number is a multiple of this is an index line, twice as wide and darker.
     pub index_every: u32,
     /// Width of a line in pixels.
     pub width_px: f32,
@@ -106,7 +106,7 @@ impl Contours {
         Self { interval_m, ..self }
     }
 
-    /// These contours with every so manieth line an index line.
+    /// These contours with another distance of index lines, counted in lines.
     pub fn index_every(self, index_every: u32) -> Self {
         Self { index_every, ..self }
     }

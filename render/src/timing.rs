@@ -1,7 +1,7 @@
 //! How long the device took for a frame, where it can tell.
 //!
-//! Results arrive some frames later and are read without waiting. Three frames may be under way; a frame that finds no free
-//! place goes untimed.
+//! Results arrive some frames later and are read without waiting. Three frames may be under way; a frame beyond these
+//! is not timed.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};

@@ -1,6 +1,6 @@
-//! What the driver layer says, in words that mean something to who flies.
+//! What the graphics driver reports, in words for the user of a program.
 //!
-//! Its own texts are chains of causes over several lines, with labels and types in them. What is kept of them is the last cause, on one line.
+//! Its own texts are chains of causes over several lines, with labels and types in them. Only the last cause is kept, on one line.
 
 /// An error that arrived outside a call.
 pub(crate) fn of_error(error: &wgpu::Error) -> String {

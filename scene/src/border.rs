@@ -1,4 +1,4 @@
-//! Where the mesh ends: the edges that walls go down from.
+//! Where the mesh ends: the edges from which walls go down.
 
 use std::collections::HashMap;
 use terrasoar::refine::kinetic::Patch;

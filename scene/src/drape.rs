@@ -1,12 +1,12 @@
 //! The image on a terrain as the renderer is given it: tiles read from the terrain file, and decoded where the device takes no blocks.
 //!
-//! Pictures that must repeat read all that a view wants before it is drawn. A window has threads read: every frame leaves them the list of what it wants, coarse before fine, and
-//! after that what the view some frames ahead will want; what has come is given, so much a frame. A list is forgotten with its frame, so nothing is read for
-//! where the eye no longer is. Where a tile cannot be read its ancestor shows; it is told once and tried again later.
+//! For a picture that must repeat, all tiles of its view are read before it is drawn. A window has threads that read. Every frame gives them a list of the tiles it needs, coarse ones before fine ones, and
+//! then of those that the view some frames ahead will need. Tiles that have come are passed on, a bounded number in a frame. Each frame's list replaces the one before, so nothing is read for
+//! places that the eye has left. Where a tile cannot be read a coarser one is shown; the error is reported once, and the tile is tried again later.
 //!
-//! What is painted in an editing session is in memory and asked before the file. Tiles that changed are wanted anew; those that are painted, and those that an undo or a redo brought
-//! back and that were read with it, are given in the very next frame, so many at most. After a commit, an undo or a redo tiles are read from the section that counts by then; reads
-//! that were begun before are thrown away when they come. So are those for a device that is gone: another may take other formats.
+//! Tiles painted in an editing session are in memory and are taken before those of the file. Tiles that changed are asked for again. Painted ones, and those that an undo or a redo brought
+//! back and read, are passed on in the next frame, up to a bound. After a commit, an undo or a redo tiles are read from the section that counts then; reads
+//! that were begun before are thrown away. So are reads for a device that is gone, because another device may take other formats.
 //!
 //! Invariant: a frame with threads never waits for storage. Cost: a lock and a copy of each tile that comes.
 
@@ -176,7 +176,7 @@ impl Drape {
         self.is_behind || self.threads.as_ref().is_some_and(Threads::is_reading)
     }
 
-    /// What could not be read and nobody has heard of yet.
+    /// The oldest error of reading that has not been reported yet.
     pub fn take_error(&mut self) -> Option<LayoutError> {
         self.errors.pop_front()
     }

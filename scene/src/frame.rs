@@ -1,4 +1,4 @@
-//! A frame that is ready to be drawn into a render pass of the caller's.
+//! A frame that is ready to be drawn into a render pass of the caller.
 
 use super::options::{Drawn, SceneError};
 use glam::{DVec3, Mat4};

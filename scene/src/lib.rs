@@ -1,4 +1,4 @@
-//! Where the engine meets the renderer: all that is seen of a terrain goes through [`scene`].
+//! Engine and renderer together: everything that is drawn of a terrain goes through [`scene`].
 //!
 //! | to | there is |
 //! |---|---|
@@ -10,8 +10,8 @@
 //!
 //! The repository's `examples/window` is a program of its own: a window, ground that streams, and a cube that stands on it.
 //!
-//! The engine knows no pixels and the renderer no terrain file; nothing but this module knows both. It owns no window and no
-//! device: the caller brings these and says when a frame is drawn.
+//! The engine knows no pixels, and the renderer knows no terrain file. Only this package knows both. It owns no window and no
+//! device: the caller has these and says when a frame is drawn.
 
 mod border;
 mod drape;

@@ -1,4 +1,4 @@
-//! Views that nobody has to think of: a whole terrain in the picture, from obliquely above.
+//! A view of a whole terrain, from obliquely above, for when no view is given.
 
 use glam::DVec3;
 use terrasoar::view::{View, Viewport};

@@ -1,7 +1,7 @@
-//! What became of the picture in an editing session, apart from the session: found out where that is, shown where the device is.
+//! What an editing session changed in the picture, as a value that can go from the session's thread to the thread that draws.
 //!
-//! Invariant: taken over in order, a drape shows the picture as the session has it. Cost: a name and a shared pointer a painted tile; after an undo or a redo, tiles read so that they
-//! are at hand for the next picture.
+//! Invariant: a drape that takes these values in order shows the picture as the session has it. Cost: a name and a shared pointer for each painted tile; after an undo or a redo also tiles that are read so that
+//! they are there for the next picture.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -89,7 +89,7 @@ impl PictureWatch {
     }
 }
 
-/// Reads those of the tiles that are the file's, coarse ones first, as many as are worth it. One that cannot be read is left to whoever shows it, and tells.
+/// Reads those of the tiles that are in the file, coarse ones first, up to a bound. One that cannot be read is tried again, and reported, when it is shown.
 fn read(painter: &Painter, tiles: &BTreeSet<TileId>) -> Vec<(TileId, Option<Vec<u8>>)> {
     let most = (READ_BYTES / painter.shape().format.tile_bytes()).max(1);
     let files = tiles.iter().rev().filter(|id| painter.painted_tile(**id).is_none());

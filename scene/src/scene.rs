@@ -1,13 +1,13 @@
 //! A terrain in sight: a renderer that holds the mesh of some ground, kept in step with it.
 //!
-//! A frame is [`Ground::update`], which brings the mesh to a view, and then one of two ways to the picture. [`Scene::frame`] prepares it, and [`SceneFrame::draw`] draws it into a
-//! render pass of the caller's, beside whatever else is there: clearing, depth buffer and sky are the caller's. [`Scene::sync`] and [`Scene::draw`] record all of it, pass
-//! and sky included, into an encoder. Refinement may be frozen while the eye goes on: leave the update out, and say which view the mesh is for.
+//! A frame begins with [`Ground::update`], which refines the mesh for a view. Then there are two ways to the picture. [`Scene::frame`] prepares it, and [`SceneFrame::draw`] draws it into a
+//! render pass of the caller, beside whatever else is in it; the caller does clearing, depth buffer and sky. Or [`Scene::sync`] and [`Scene::draw`] record everything, pass
+//! and sky included, into an encoder. To freeze refinement while the eye goes on, leave the update out, and say which view the mesh is for.
 //!
-//! **What is drawn is the ground's mesh as it is now.** The scene knows which step of it the device has, and sends what is missing: the change of one update, or all of it where
-//! more was missed. Ground of another terrain than the scene was made for is refused.
+//! **What is drawn is the present mesh of the ground.** The scene knows which step of the mesh the device has, and sends what is missing: the change of one update, or the whole mesh if
+//! the device missed more than one. Ground of another terrain than the scene was made for is refused.
 //!
-//! **The device holds nothing that is not here.** After its loss [`Scene::recover`] takes a new one, which may be able to do other things, and the next picture is the same. Light
+//! **The device holds nothing that the scene cannot send again.** After its loss [`Scene::recover`] takes a new one, which may have other features, and the next picture is the same. Light
 //! comes from tiles of heights: a bounded number a frame for a window, all of them for a picture that must repeat byte by byte.
 //!
 //! Cost on the processor: a copy of what changed in the mesh, some 2 ms a tile.
@@ -358,7 +358,7 @@ impl Scene {
         self.shows_image && self.drape.as_ref().is_some_and(Drape::is_waiting)
     }
 
-    /// What could not be read of the image and nobody has heard of yet. [`Ground::take_error`] tells of the mesh.
+    /// The oldest error of reading the image that has not been reported yet. [`Ground::take_error`] has those of the mesh.
     pub fn take_error(&mut self) -> Option<LayoutError> {
         self.drape.as_mut().and_then(Drape::take_error)
     }

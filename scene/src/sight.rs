@@ -1,4 +1,4 @@
-//! Where a steady eye will be, and a terrain as the renderer takes it.
+//! Where an eye that keeps its way will be, and a terrain's shape in the renderer's terms.
 
 use std::f64::consts::FRAC_PI_2;
 use terrasoar::view::View;

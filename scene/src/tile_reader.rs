@@ -1,6 +1,6 @@
-//! Tiles of an image read from the terrain file, at once or by threads that are left a list every frame.
+//! Tiles of an image read from the terrain file, at once or by threads that get a new list every frame.
 //!
-//! Invariants: a list is forgotten with its frame; what was read by a reader that does not count any more comes marked so. Cost: a lock a frame and two a tile.
+//! Invariants: each frame's list replaces the one before; tiles read by a reader that is out of date are marked as such. Cost: a lock a frame and two a tile.
 
 use std::collections::{HashSet, VecDeque};
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -1,4 +1,4 @@
-//! Batches with the heights of their stamps: elevation data read once each and shared.
+//! Batches with the heights of their stamps. Elevation data that several stamps name is read once and shared.
 
 use super::{Batch, Moment, Script, ScriptError, StampFile, Step};
 use std::collections::HashMap;

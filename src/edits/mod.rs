@@ -1,7 +1,7 @@
-//! Scripts of edits: what is done to a terrain as data, so that it can be written by hand, generated, repeated and replayed along a flight.
+//! Scripts of edits: a list of what is done to a terrain, which can be written by hand, generated, repeated, and replayed along a flight.
 //!
-//! A script is a text file (`EDITS.md` beside this source specifies it) or is generated ([`rain`]). It knows no terrain: what an edit does is in
-//! `terrasoar_layout::edit`. **A script holds no clock and no chance: the same script over the same terrain gives the same ground.** Cost: some 120 bytes an edit.
+//! A script is a text file (`EDITS.md` beside this source specifies it) or is generated ([`rain`]). It knows no terrain; what an edit does is in
+//! `terrasoar_layout::edit`. **Nothing in a script depends on a clock or on chance: the same script over the same terrain gives the same ground.** Cost: some 120 bytes an edit.
 #![cfg(feature = "files")]
 
 mod error;

@@ -1,6 +1,6 @@
 //! A rain of craters: places, sizes and directions by chance, the same for the same seed everywhere.
 //!
-//! Only whole numbers, sums and products of them decide, no function of the system's library, so every machine makes the same script.
+//! Only whole numbers and their sums and products decide. No function of the system's library is used, so every machine makes the same script.
 
 use super::{Batch, Script};
 use terrasoar_layout::edit::{Crater, Edit};

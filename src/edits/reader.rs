@@ -1,6 +1,6 @@
-//! Reads a script: lines gathered into batches, every number checked as far as it can be without a terrain.
+//! Reads a script. Lines are gathered into batches, and every number is checked as far as that is possible without a terrain.
 //!
-//! The text is read whole (a line of an edit takes some 60 bytes, and a script may have a million), then line by line.
+//! The text is read as a whole (an edit's line takes some 60 bytes, and a script may have a million edits), then taken line by line.
 
 use super::format::{self, Line, MAGIC, MAX_EDITS, MAX_LINE_BYTES, UNITS, VERSION};
 use super::{Batch, Moment, Script, ScriptError};

@@ -1,4 +1,4 @@
-//! When along a flight batches are done.
+//! At which frame of a flight each batch is done.
 
 use super::{LoadedBatch, Moment};
 use crate::flight::FlightFrame;

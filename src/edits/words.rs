@@ -1,4 +1,4 @@
-//! Words of a line of a script: split at white space, quoted where they hold any, taken out of the line by the name before them.
+//! The words of a script's line. They are split at white space, stand in quotation marks where they hold any, and are asked for by the name before them.
 
 use crate::flight::format::{excerpt, is_decimal};
 
@@ -108,7 +108,7 @@ impl<'a> Fields<'a> {
         self.optional(name, parse)?.ok_or_else(|| format!("`{name}` is missing; write `{form}`"))
     }
 
-    /// Refuses words that nobody took.
+    /// Refuses words that were not used.
     pub(super) fn finish(self) -> Result<(), String> {
         match self.words.into_iter().flatten().next() {
             None => Ok(()),

@@ -2,9 +2,9 @@
 //! frame before did not have (Bao et al. 2004, section 5, which gives 0.61, 1.36 and 5.29 %).
 //!
 //! Incoherence grows about as a power of the speed, so the search is false position in the logarithms of both,
-//! with the Illinois correction and halving where noise stalls it. **Every trial lies inside the bracket of those
-//! before it**, so a measure that is not quite monotone costs trials and not correctness. Costs at most 24 trials
-//! of 24 pairs of frames, and a check of other pairs; two more trials where an error has to state the range.
+//! with the Illinois correction, and with halving where noise stalls it. **Every trial lies inside the bracket of those
+//! before it.** So a measure that is not quite monotone costs more trials, and the result is still right. Cost: at most 24 trials
+//! of 24 pairs of frames, and a check with other pairs; two more trials where an error has to state the range.
 
 use super::generate::{FlightPlan, GenerateError, Ground, generate};
 use super::{Flight, FlightFrame};

@@ -1,7 +1,7 @@
 //! Recorded flights: a camera path as data, so that every replay sees the same frames.
 //!
 //! A flight is a text file (`FLIGHT.md` beside this source specifies it) or is generated over a terrain.
-//! **A flight holds no clock and no chance: equal input gives equal frames.**
+//! **Nothing in a flight depends on a clock or on chance: equal input gives equal frames.**
 
 mod error;
 pub(crate) mod format;
@@ -57,7 +57,7 @@ impl FlightFrame {
 /// Costs 64 bytes a frame; [`FlightReader`] and [`FlightWriter`] pass frames on one by one instead.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Flight {
-    /// Named notes in file order, such as `("terrain", "alps.tsoar")`. Names match `[a-z][a-z0-9-]*`, values
+    /// Named notes in file order, such as `("terrain", "alps.iqt")`. Names match `[a-z][a-z0-9-]*`, values
     /// are single lines without surrounding white space; at most 256.
     pub notes: Vec<(String, String)>,
     /// Frames in the order flown, 1..=[`MAX_FRAMES`] of them, whose times never decrease.

@@ -150,7 +150,7 @@ mod tests {
             [0.0, 81910.0, 8191.0, 5200.5, 0.0, -15.0, 0.0, 45.0],
             [1.0 / 30.0, 81910.0, 8203.0, 5200.5, 0.0, -15.0, 0.0, 45.0],
         ]);
-        example.notes.push(("terrain".into(), "alps.tsoar".into()));
+        example.notes.push(("terrain".into(), "alps.iqt".into()));
         let text = text_of(&example).unwrap();
         let indented: String = text.lines().map(|l| format!("    {l}\n")).collect();
         assert!(include_str!("FLIGHT.md").contains(&indented), "{text}");

@@ -1,6 +1,6 @@
 //! Replays: a recorded flight through an engine, frame by frame, with what each frame cost.
 //!
-//! A replay makes two passes. The first times the updates and looks at nothing else; the second counts tests, pages and triangles through a probe and
+//! A replay makes two passes. The first only times the updates. The second counts tests, pages and triangles through a probe, and
 //! compares each frame with the one before. Everything but the times is the same in every replay.
 #![cfg(feature = "files")]
 

@@ -1,10 +1,10 @@
 //! Edits of ground that is flown over: in memory first, then on the disk in the background.
 //!
-//! The right to edit is taken by the first edit and kept until the ground is dropped or [`Ground::end_editing`]: one at a time has it, over all programs. Edits are seen by the next
-//! update; a commit is written by a thread of its own while flying and editing go on. **Nothing is lost in silence**: an edit that is not on the disk is in memory, whoever drops the
-//! ground waits for the commit under way, and one that failed is told and part of the next.
+//! One ground at a time may edit a file, over all programs. The first edit takes this right; it is kept until [`Ground::end_editing`] or until the ground is dropped. The next
+//! update shows an edit. A commit is written by a thread of its own while flying and editing go on. **Nothing that was committed is lost unnoticed.** Dropping the
+//! ground waits for the commit under way. A commit that failed is reported, and its edits are part of the next one.
 //!
-//! What was edited and never committed is gone with the ground: commit before.
+//! What was edited and never committed is lost when the ground is dropped.
 
 use super::ticket::{CommitTicket, Writing};
 use super::{Ground, Opened};

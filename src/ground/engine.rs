@@ -1,6 +1,6 @@
-//! An engine as those who draw its mesh see it: a mesh, what changed in it, and heights, whatever the engine and the kind of its records.
+//! An engine as seen by code that draws its mesh: a mesh, what changed in it, and heights, whatever the engine and the kind of its records.
 //!
-//! Invariant: the patches told since the last [`MeshEngine::whole`], applied in order to it, give the mesh. Cost: the engine's own, and a call through a
+//! Invariant: the patches since the last [`MeshEngine::whole`], applied to it in order, give the mesh. Cost: the engine's own, and one call through a
 //! table a frame.
 
 use super::samples::HeightTile;
@@ -42,7 +42,7 @@ pub(super) trait MeshEngine: Send {
     /// Bounds what a frame may do. Whether it can.
     fn set_budget(&mut self, budget: Budget) -> bool;
 
-    /// Heights of a tile, voids not a number; replaces what `heights_m` held. `false` if they are not at hand yet: then they have been asked for.
+    /// Heights of a tile, voids not a number; replaces what `heights_m` held. `false` if they are not in memory yet: then they have been asked for.
     fn heights_m(&mut self, tile: HeightTile, heights_m: &mut Vec<f32>) -> bool;
 
     /// Lowest and highest height in metres, edits included.
@@ -88,7 +88,7 @@ pub(super) trait MeshEngine: Send {
         false
     }
 
-    /// What could not be read and nobody has heard of yet.
+    /// The oldest error of reading that has not been reported yet.
     fn take_error(&mut self) -> Option<LayoutError> {
         None
     }

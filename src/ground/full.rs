@@ -1,4 +1,4 @@
-//! SOAR's mesh as one patch a frame: every triangle sent, nothing remembered. The reference for pictures of an engine that sends changes.
+//! SOAR's mesh as one patch a frame: every triangle is sent, and nothing is remembered. Pictures of engines that send changes are compared with it.
 //!
 //! Vertices are numbered in the order of their grid points, so equal meshes give equal patches. Cost: the whole mesh, and a sort of its vertices.
 

@@ -1,4 +1,4 @@
-//! The kinetic engine over records that are all in memory: never a wait, and no edits.
+//! The kinetic engine over records that are all in memory. It never waits, and it takes no edits.
 
 use super::engine::{MeshEngine, Reads, Refined};
 use super::full::FullMesh;

@@ -1,9 +1,9 @@
 //! Ground under a moving eye: a terrain, the engine that refines its mesh, and its edits, as one thing.
 //!
-//! A frame is [`Ground::update`]. Whoever keeps a copy of the mesh, on a graphics device for example, asks for [`Ground::change_since`] the step that the copy is at, and gets what
-//! is missing: the patch of one update, or the whole mesh where more was missed. So a copy cannot fall behind unnoticed. Heights are asked for by [`Ground::height_at`] and never wait.
+//! A frame is [`Ground::update`]. Code that keeps a copy of the mesh, on a graphics device for example, calls [`Ground::change_since`] with the step that the copy is at. It gets what the copy
+//! lacks: the patch of one update, or the whole mesh if the copy missed more than one. So a copy cannot fall behind unnoticed. [`Ground::height_at`] gives heights and never waits.
 //!
-//! Invariants: whatever the engine, the mesh of a view is the same once its pages are at hand; edits are seen by the next update. Cost: the engine's own, and a call through a table a
+//! Invariants: whatever the engine, the mesh of a view is the same once its pages are at hand; edits are seen by the next update. Cost: the engine's own, and one call through a table a
 //! frame.
 
 #[cfg(feature = "files")]
@@ -50,7 +50,7 @@ pub struct Ground<'t> {
     /// The right to edit, from the first edit on.
     #[cfg(feature = "files")]
     editing: Option<Box<Editing>>,
-    /// Generation of the file that is shown while nobody edits.
+    /// Generation of the file that is shown while there is no editing session.
     seen_generation: u32,
     /// Rectangles of samples whose heights changed, the newest last, and how many there were before these.
     edited: VecDeque<SampleRect>,
@@ -138,7 +138,7 @@ impl<'t> Ground<'t> {
         }
     }
 
-    /// Brings the mesh to a view with what is at hand. Streamed ground waits for nothing but its first view.
+    /// Refines the mesh for a view with what is in memory. Streamed ground waits for its first view only.
     pub fn update(&mut self, view: &View) -> Refined {
         #[cfg(feature = "files")]
         self.settle();
@@ -190,17 +190,17 @@ impl<'t> Ground<'t> {
         }
     }
 
-    /// Height of the ground, edits included, at a place in metres east and north of the south-west sample, from what is at hand.
+    /// Height of the ground, edits included, at a place in metres east and north of the south-west sample, from what is in memory.
     pub fn height_at(&self, east_m: f64, north_m: f64) -> HeightAt {
         self.engine.height_at(east_m, north_m)
     }
 
-    /// Asks for what the exact height at a place needs; it is at hand some updates later.
+    /// Asks for the pages that the exact height at a place needs; they are in memory some updates later.
     pub fn want_height(&mut self, east_m: f64, north_m: f64) {
         self.engine.want_height(east_m, north_m);
     }
 
-    /// Heights of a tile of samples, voids not a number, rows from the south; replaces what `heights_m` held. `false` if they are not at hand yet: then they have been asked for.
+    /// Heights of a tile of samples, voids not a number, rows from the south; replaces what `heights_m` held. `false` if they are not in memory yet: then they have been asked for.
     pub fn tile_heights_m(&mut self, tile: HeightTile, heights_m: &mut Vec<f32>) -> bool {
         self.engine.heights_m(tile, heights_m)
     }
@@ -276,7 +276,7 @@ impl<'t> Ground<'t> {
         self.engine.lacks_pages()
     }
 
-    /// What could not be read or written and nobody has heard of yet. Where a page cannot be read the ground stays coarse; edits that could not be written are part of the next commit.
+    /// The oldest error of reading or writing that has not been reported yet. Where a page cannot be read the ground stays coarse. Edits that could not be written are part of the next commit.
     pub fn take_error(&mut self) -> Option<LayoutError> {
         self.errors.pop_front().or_else(|| self.engine.take_error())
     }

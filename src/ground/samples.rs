@@ -1,4 +1,4 @@
-//! Square tiles of heights, as renderers make light of: every n-th sample, taken from whatever records are at hand.
+//! Square tiles of heights, from which a renderer computes light: every n-th sample, taken from the records that are in memory.
 
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};

@@ -1,7 +1,7 @@
-//! The kinetic engine over a terrain of which only some pages are in memory: nothing that it does waits for storage but the first frame, and that no longer than it was told.
+//! The kinetic engine over a terrain of which only some pages are in memory. Only the first frame waits for storage, and no longer than it was told to.
 //!
-//! Tiles of heights are made of the same pool as the mesh. Where pages of one are away they are asked for, and the tile is made once all have come; a
-//! coarser one stands in meanwhile. Where a page cannot be read, heights are those of the finest triangles at hand.
+//! Tiles of heights come from the same pool as the mesh. If pages of a tile are missing, they are asked for, and the tile is made once all have come. A
+//! coarser tile is used meanwhile. Where a page cannot be read, heights are those of the finest triangles in memory.
 
 use super::engine::{MeshEngine, Reads, Refined};
 use super::options::StreamOptions;

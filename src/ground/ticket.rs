@@ -1,6 +1,6 @@
-//! A commit on its way to the disk: a thread that writes it, and a ticket by which anybody may ask what became of it.
+//! A commit on its way to the disk: a thread that writes it, and a ticket that tells what became of it.
 //!
-//! The ticket owns what it tells of: it may be kept, sent to another thread or dropped, and the ground may go before it. **What it tells as saved is on the disk.**
+//! The ticket owns what it reports. It may be kept, sent to another thread or dropped, and it may outlive the ground. **When it says that a commit is saved, the commit is on the disk.**
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -144,7 +144,7 @@ impl Writing {
     }
 }
 
-/// Tells of an end that nobody expected.
+/// Reports an unexpected end.
 struct Teller {
     shared: Arc<Shared>,
     path: PathBuf,

@@ -1,4 +1,4 @@
-//! What engines are told when the ground was edited, and which of their vertices that can concern.
+//! What engines are told when the ground was edited, and which of their vertices this can concern.
 
 use std::ops::Range;
 use terrasoar_layout::edit::SampleRect;

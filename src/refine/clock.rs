@@ -1,7 +1,7 @@
 //! Live ranges: how long a status holds, counted on the total length of the eye's path.
 //!
-//! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART", section 4 (eq. 11 and 12). Corrected: the paper floors each frame's movement,
-//! so slow flight never advances its clock and statuses go stale; here the total is kept in fixed point and rounded up.
+//! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART", section 4 (eq. 11 and 12), with a correction. The paper rounds each frame's movement down,
+//! so slow flight never advances its clock and statuses become wrong. Here the total is kept in fixed point and rounded up.
 //!
 //! Claim: if a status is certain while the eye has moved less than `d - guard` metres, then `f < L` with `L = f0 + floor((d - guard) / q)`
 //! implies it still holds. Proof: a rounding rho of the total has rho(x) - rho(y) > x - y - 1, so the path since is shorter than

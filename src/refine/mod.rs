@@ -2,7 +2,7 @@
 //! [`smart`] remembers how long each vertex's status holds, [`kinetic`] keeps the mesh and looks only at what is over.
 //!
 //! All engines draw the same triangles for the same view. They read records and nothing else, and report what they
-//! read to a [`Probe`] that costs nothing when nobody listens.
+//! read to a [`Probe`], which costs nothing where it is not used.
 
 pub mod change;
 mod clock;

@@ -1,6 +1,6 @@
 //! The definition, by brute force: test every vertex of the terrain against the view, then split every triangle whose vertex passed.
 //!
-//! No tree is walked to decide, no answer is inherited or remembered. Cost: one test a vertex of the terrain a frame; for tests and
+//! It walks no tree to decide, and inherits or remembers no answer. Cost: one test for each vertex of the terrain in every frame. It is for tests and
 //! small terrains.
 
 use super::change::GroundChange;

@@ -4,9 +4,9 @@
 //! a triangle whose split vertex has been tested; its 4-byte word holds the vertex's status and when it expires. The vertex array has
 //! an entry for every node, at the same index plus `FIRST_NODE_VERTEX`. When the array has doubled it is rebuilt in depth-first order.
 //!
-//! Differences from the paper, each needed to draw SOAR's mesh in every frame: the clock (`super::clock`); a vertex must be selected
+//! Three differences from the paper are needed to draw SOAR's mesh in every frame: the clock (`super::clock`); a vertex must be selected
 //! *and* not culled, so its status holds for |min(d_tau, d_c)|, not min(|d_tau|, |d_c|) (eq. 10); a word says whether it depends on the
-//! view's planes (then a rotation re-evaluates it, as in the paper) or rests on an ancestor that is wholly inside them (then it is re-evaluated once
+//! view's planes (then a rotation re-evaluates it, as in the paper) or on an ancestor that is wholly inside them (then it is re-evaluated once
 //! no ancestor is).
 //!
 //! Cost: an integer comparison for each of 2T - 1 nodes a frame, a record read and a test for those that expired. Allocates nothing

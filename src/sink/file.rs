@@ -1,7 +1,7 @@
 //! A file that appears when it is complete, or a stream by its name.
 //!
-//! Links are followed: what they lead to decides. A descriptor of the process (`/dev/stdout`, `/dev/fd/3`) is written to where it stands, also where it leads to a file, for whoever
-//! opened it goes on with it. Invariant: a descriptor, pipe or device is never replaced by a file.
+//! Links are followed: what they lead to decides. A descriptor of the process (`/dev/stdout`, `/dev/fd/3`) is written to directly, also where it leads to a file, because the program that
+//! opened it goes on using it. Invariant: a descriptor, pipe or device is never replaced by a file.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

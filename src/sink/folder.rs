@@ -1,7 +1,7 @@
 //! A folder of files that appear when all of them are complete.
 //!
-//! While they are made, they lie one behind the other in one file without a name, so that whatever ends the program leaves nothing. Then a new folder is filled under a hidden name,
-//! `.NAME.*.terrasoar-new`, and renamed; into a folder that is there already the files go one by one, each complete, in the order in which they were added. A process killed while they are
+//! While they are made, they lie one behind the other in one file without a name. So nothing is left, whatever ends the program. Then a new folder is filled under a hidden name,
+//! `.NAME.*.terrasoar-new`, and renamed. If the folder is there already, the files go into it one by one, each complete, in the order in which they were added. A process killed while they are
 //! copied out can leave that hidden folder. Files of other names are left alone. Cost: everything is written twice, and takes twice the room for a moment.
 
 use super::file::FileSink;

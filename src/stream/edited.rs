@@ -1,7 +1,7 @@
-//! Pages that edits have changed and that are not in the file yet, kept beside a pool; and what edits made of the ground, on its way from who edits to who draws.
+//! Pages that edits have changed and that are not in the file yet, kept beside a pool; and the changes that edits made, on their way from the editor to the renderer.
 //!
-//! Such a page never comes from storage; where the mesh wants one that the pool has given up it is brought from here. Once it is committed it is dropped, and is a page of
-//! the file as any other, which lies elsewhere. Cost: 4 KiB a page that differs from the file, as many as a stroke touches where strokes are committed.
+//! Such a page is never read from storage. Where the mesh needs one that the pool has dropped, it comes from here. Once it is committed it is dropped here too, and is a page of
+//! the file like any other, in a new place. Cost: 4 KiB for each page that differs from the file; where strokes are committed, as many as a stroke touches.
 
 use std::collections::HashMap;
 use terrasoar_layout::edit::{Changes, Editor, SampleRect};

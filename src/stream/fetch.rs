@@ -1,4 +1,4 @@
-//! What brings pages: threads that read a file, or a model of a disk that makes every replay the same.
+//! Where pages come from: threads that read a file, or a model of a disk with which every replay is the same.
 
 use std::time::Duration;
 use terrasoar_layout::file::entries::Entry;

@@ -15,7 +15,7 @@ use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
 use terrasoar_layout::grid::{Grid, GridPoint};
 use terrasoar_layout::read::store::RecordStore;
 
-/// A view and what of its surroundings is to be at hand.
+/// A view, and how much of its surroundings is loaded too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExtendedView {
     /// Where errors are measured from: the view, moved on by S.

@@ -1,11 +1,11 @@
-//! How many frames ahead of need a page is asked for: what pages take to come, measured while flying, in frames.
+//! How many frames before it is needed a page is asked for. It is the time that pages take to come, measured while flying, in frames.
 //!
-//! A smoothed mean and a smoothed deviation, as networks time their retransmissions (V. Jacobson, "Congestion Avoidance and Control", SIGCOMM 1988). Counted in
-//! frames, so that no clock is read and whatever slows frames down or storage is in it.
+//! A smoothed mean and a smoothed deviation, as networks time their retransmissions (V. Jacobson, "Congestion Avoidance and Control", SIGCOMM 1988). It is counted in
+//! frames. So no clock is read, and anything that slows down frames or storage is counted too.
 
 /// Shortest lead.
 const LEAST: f32 = 12.0;
-/// Longest lead: farther ahead nobody knows where the eye will be.
+/// Longest lead: farther ahead it is not known where the eye will be.
 const MOST: f32 = 90.0;
 /// Frames to spare.
 const SPARE: f32 = 8.0;

@@ -1,11 +1,11 @@
 //! Flying over a terrain of which only some pages are in memory, without waiting for any.
 //!
-//! A frame goes: pages that have come are put into the pool; the engine refines with what is there; the pages that it lacks or will need are asked for, each with the frame by which
-//! it is needed. What is late stays coarse, conforming, and its error is told; it refines by itself once its page has come. What cannot be read is
-//! told once and tried again later.
+//! In a frame, pages that have come are put into the pool. The engine refines with what is there. Then it asks for the pages that it lacks or will need, each with the frame by which
+//! it is needed. Where a page is late, the ground stays coarse, without cracks, and its error is reported; it becomes fine once the page has come. A page that cannot be read is
+//! reported once and tried again later.
 //!
 //! Invariant: nothing here waits for storage but [`Streamed::fill`]. Once all has come the mesh is the one that an engine over the whole file makes. Cost beside the
-//! engine's: a copy of 4 KiB a page that comes, a look into a table a page that is wanted.
+//! engine's: a copy of 4 KiB for each page that comes, and a look into a table for each page that is asked for.
 
 mod edited;
 mod fetch;
@@ -45,7 +45,7 @@ use web_time::Instant;
 
 /// Pages put into the pool in one frame at most: two megabytes are copied in a fraction of a millisecond.
 const INSTALLS_A_FRAME: usize = 512;
-/// Errors kept for whoever asks.
+/// How many errors are kept.
 const ERRORS_KEPT: usize = 64;
 
 /// How pages are asked for before they are needed.
@@ -210,12 +210,12 @@ impl<C: RecordCodec, F: Fetch> Streamed<C, F> {
         self.requests.is_in_trouble(page)
     }
 
-    /// The oldest error that nobody has heard of yet. Each page that cannot be read is told once, however often it is tried.
+    /// The oldest error that has not been reported yet. A page that cannot be read is reported once, however often it is tried.
     pub fn take_error(&mut self) -> Option<LayoutError> {
         self.errors.pop_front()
     }
 
-    /// Brings the mesh to `view` with the pages at hand. Waits for nothing.
+    /// Refines the mesh for `view` with the pages in memory. It never waits.
     pub fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> StreamFrame {
         self.now += 1;
         let mut frame = StreamFrame::default();

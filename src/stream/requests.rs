@@ -1,7 +1,7 @@
 //! Which pages have been asked for, when they are due, and which could not be read.
 //!
-//! Invariant: a page is asked for again only if it is needed earlier than it was said, or is late, or was dropped; a page that failed waits before it is tried again, twice as long
-//! each time. Cost: a look into a table a page that is wanted.
+//! Invariant: a page is asked for again only if it is needed earlier than was said before, or is late, or was dropped. A page that failed waits before it is tried again, twice as long
+//! each time. Cost: a look into a table for each page that is asked for.
 
 use std::collections::HashMap;
 use terrasoar_layout::read::loader::{PageRequest, STALE_FRAMES};
@@ -95,7 +95,7 @@ impl Requests {
         self.trouble.remove(&page);
     }
 
-    /// A page was not read, for nobody seemed to need it.
+    /// A page was not read, because it was not asked for again.
     pub(super) fn dropped(&mut self, page: u64) {
         self.pending.remove(&page);
     }

@@ -1,7 +1,7 @@
-//! The height of the ground at a place, from whatever records are at hand.
+//! The height of the ground at a place, from the records that are in memory.
 //!
-//! With the four samples around the place at hand it is their bilinear mean, as [`Terrain::height_m`](terrasoar_layout::read::terrain::Terrain::height_m) gives it. Where one is
-//! away it is the height of the finest triangle around the place whose corners are at hand, off by no more than the error of the vertex that would split it.
+//! If the four samples around the place are in memory, it is their bilinear mean, as [`Terrain::height_m`](terrasoar_layout::read::terrain::Terrain::height_m) gives it. If one is
+//! missing, it is the height of the finest triangle around the place whose corners are in memory. That is off by no more than the error of the vertex that would split the triangle.
 //! Cost: four records, or two a level of the way down to that triangle.
 
 use terrasoar_layout::grid::GridPoint;

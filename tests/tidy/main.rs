@@ -1,4 +1,4 @@
-//! What ARCHITECTURE.md says of the house, held: which package uses which, that nothing uses what uses it, how long files are, where code is
+//! Checks what ARCHITECTURE.md says of the code: which package uses which, that no module uses one that uses it, how long files are, where code is
 //! unsafe, and how much an embedder compiles.
 //!
 //! Read are `cargo metadata`, `cargo tree` and the sources, these as words: comments and literals left out, paths followed as far as they lead

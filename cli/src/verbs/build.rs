@@ -209,7 +209,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     print(&summary(&args.output, &header, seconds))
 }
 
-/// The spacing decides slopes and speeds: whoever did not state it should hear where it came from.
+/// The spacing decides slopes and speeds, so where it came from is printed if it was not stated.
 fn warn_about_spacing(header: &Header) {
     match header.spacing_origin {
         SpacingOrigin::Dem | SpacingOrigin::User => {}

@@ -1,7 +1,7 @@
-//! Elevation data where a terrain file is asked for: built once into the user's folder for caches, and taken from there after that.
+//! Elevation data given where a terrain file is needed. It is built once into the user's folder for caches, and taken from there afterwards.
 //!
-//! A kept file is known by what it was made of: name, length and time of the elevation data and of the files beside it, the content (the whole of small files, both ends of large ones), and this
-//! program's version. **Whatever of that changes, it is built anew**; a kept file that does not open is too. Files that nobody asked for in a month go when another is built. Cost of a second call: the reading of
+//! A kept file is identified by what it was made of: name, length and time of the elevation data and of the files beside it, the content (the whole of small files, both ends of large ones), and this
+//! program's version. **If any of that changes, it is built anew**, and so is a kept file that does not open. Files that were not used for a month are removed when another is built. Cost of a second call: reading
 //! at most 8 MiB.
 
 use super::output::complain;
@@ -22,7 +22,7 @@ use terrasoar_layout::read::terrain::Terrain;
 
 /// Bytes of each end of a file that are looked at; a file of twice as many is looked at whole.
 const END_BYTES: u64 = 4 << 20;
-/// How long a file that nobody asks for is kept.
+/// How long a file is kept after its last use.
 const KEPT: Duration = Duration::from_secs(30 * 24 * 3600);
 /// Longest part of a name that is kept in the name of the file.
 const MAX_NAME_CHARS: usize = 40;
@@ -136,7 +136,7 @@ fn describe(path: &Path, key: &mut DefaultHasher) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Takes away what nobody has asked for in a month. What cannot be taken away stays.
+/// Removes files that were not used for a month. A file that cannot be removed stays.
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {

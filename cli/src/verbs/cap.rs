@@ -1,8 +1,8 @@
 //! A cap on the memory of what is measured, page cache included, by a Linux control group.
 //!
-//! The program makes a group, caps it, and runs itself again; the copy is in the group while it measures and out of it while it counts, so that the cap is on what flying and
-//! reading take: memory stays charged where it was first touched. The first program outlives the copy, tells if the kernel ended it, and removes the group; should the
-//! first be killed, the copy ends too and removes it. What is left all the same goes at the next cap. Version 1 has `memory.limit_in_bytes`, version 2 `memory.max`. Where neither can be had, the program
+//! The program makes a group, caps it, and runs itself again. The copy is in the group while it measures and out of it while it counts. So the cap holds for the memory that flying and
+//! reading take; memory is charged to the group in which it was first touched. The first program outlives the copy, reports if the kernel ended it, and removes the group. If the
+//! first program is killed, the copy ends too and removes the group. A group that is left all the same is removed by the next cap. Version 1 has `memory.limit_in_bytes`, version 2 `memory.max`. Where neither can be had, the program
 //! goes on without a cap and says why.
 
 use super::WrongUsage;
@@ -100,7 +100,7 @@ fn join(capped: &Path, mib: u64) -> Result<Standing> {
     Ok(standing.within(|| Ok(())).map(|()| standing).unwrap_or_else(|e| Standing::uncapped(format!("{e:#}"))))
 }
 
-/// Ends this copy soon after the program that made the group, should that be killed: nobody waits for the copy then, and nobody else would remove the group.
+/// Ends this copy soon after the program that made the group, if that is killed: nothing waits for the copy then, and nothing else would remove the group.
 #[cfg(unix)]
 fn end_with_parent(capped: PathBuf, home: PathBuf) {
     let parent = std::os::unix::process::parent_id();

@@ -1,7 +1,7 @@
-//! What is said when the program itself is at fault.
+//! The message when the program itself is at fault.
 //!
-//! A panic is a defect, never an answer. It ends the program with exit code 1 and one line that says so and where to report it; where in the source it was, and the library's own words, are for
-//! those who ask for them by RUST_BACKTRACE.
+//! A panic is always a defect. It ends the program with exit code 1 and one line that says so and where to report it. The place in the source and the panic's own words are shown
+//! only if RUST_BACKTRACE is set.
 
 use super::output::complain;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook};

@@ -2,7 +2,7 @@
 //!
 //! Each verb is a file with its arguments, help and function; clap and the value parsers in [`parse`] check what can be checked without
 //! opening a file. Results go to standard output, everything else to standard error. **Exit codes: 0 done, 1 failed, 2 the command line
-//! itself is wrong.** A reader that closes our output early ends the program quietly.
+//! itself is wrong.** If the reader of our output closes it early, the program ends quietly.
 
 mod build;
 mod cache;
@@ -58,8 +58,8 @@ use terrasoar_layout::printable;
 
 /// Fly over terrain far larger than memory.
 ///
-/// A DEM goes in (16-bit PNG, VTP BT, SRTM .hgt, GeoTIFF), a terrain file (.iqt) comes out, and recorded flights are replayed over it, out of
-/// core, with every visible sample within a tolerance in pixels.
+/// Elevation data (GeoTIFF, SRTM .hgt, netCDF, ASCII grids, PNG and others) become one terrain file (.iqt). It is drawn, flown over and
+/// edited, with every visible sample within a tolerance in pixels, and only the parts that a view needs are read.
 #[derive(Debug, Parser)]
 #[command(
     name = "terrasoar",

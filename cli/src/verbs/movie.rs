@@ -34,7 +34,7 @@ pub(super) struct Args {
     output: PathBuf,
     #[command(flatten)]
     force: Force,
-    /// Draw every so manieth frame
+    /// Draw every Nth frame
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
     /// Pictures a second

@@ -1,7 +1,7 @@
 //! Where the pictures of a movie go: a folder of PNG files, a GIF, or an MP4 that an installed ffmpeg encodes.
 //!
-//! Invariant: nothing half-written has a name. A movie appears when its last picture is in, a folder of pictures too.
-//! Cost: a picture at a time in memory; a folder takes twice its room on the disk for a moment.
+//! Invariant: nothing that is incomplete has a name. A movie appears when its last picture has been written, and so does a folder of pictures.
+//! Cost: one picture in memory; a folder takes twice its room on the disk for a moment.
 
 use super::outputs::FILM_NOTE;
 use super::picture::png_with;

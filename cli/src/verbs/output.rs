@@ -1,6 +1,6 @@
 //! What a verb prints: text or one JSON object on standard output, complaints on standard error.
 //!
-//! Invariant: all that the program writes to a terminal goes through here, and nothing of it that came from a file, a name or the command line is obeyed by the terminal.
+//! Invariant: everything that the program writes to a terminal goes through here, and no text from a file, a name or the command line can control the terminal.
 
 use anyhow::{Context, Result};
 use serde::Serialize;
@@ -48,7 +48,7 @@ pub(super) fn print_line(line: &str) -> Result<()> {
     write_out(&printable::line(line))
 }
 
-/// Prints one line to standard error, harmlessly. If nobody can read it there is nobody to tell.
+/// Prints one line to standard error, harmlessly. Errors of printing are ignored.
 pub(super) fn complain(line: &str) {
     complain_lines(&printable::line(line));
 }

@@ -1,4 +1,4 @@
-//! Words of the command line that are more than a number: each parser says what it takes when it refuses.
+//! Parsers for words of the command line that are more than a number. Each says what it takes when it refuses a word.
 
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! The verbs that draw, in a program built without them: they take any arguments and say what is missing.
+//! The verbs that draw, in a program built without pictures: they take any arguments and say what is missing.
 
 /// One verb: its module as the others have theirs, what it does, and what is missing.
 macro_rules! missing {

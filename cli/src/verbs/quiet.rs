@@ -1,9 +1,9 @@
 //! Keeps a driver's complaint off standard error where there is no folder for a session's sockets.
 //!
 //! Mesa's layer that chooses a device looks for a Wayland display whenever a device is asked for, and libwayland writes "error: XDG_RUNTIME_DIR is invalid or not set" each time where that
-//! variable names no folder: in containers, over ssh, under cron. Neither can be told otherwise but by that variable, and a program's own variables cannot be set without `unsafe`.
-//! So the program becomes itself once more, in the same process and before it has done anything, with the variable set to a folder that does not exist. By an absolute
-//! name that is not there no display is found either, so nothing else changes. Cost: a few milliseconds, where the variable is not set.
+//! variable names no folder: in containers, over ssh, under cron. Only that variable changes it, and a program cannot set its own variables without `unsafe`.
+//! So the program starts itself once more, in the same process and before it has done anything, with the variable set to a folder that does not exist. With such
+//! an absolute name no display is found either, so nothing else changes. Cost: a few milliseconds, where the variable is not set.
 
 #[cfg(target_os = "linux")]
 use std::os::unix::process::CommandExt;

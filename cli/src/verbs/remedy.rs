@@ -1,6 +1,6 @@
-//! What would mend a refusal, as the flag to type.
+//! Where something is refused: the flag that would help.
 //!
-//! The libraries say in words what to change and hand over the same as a [`Remedy`]; only here does it become a flag. A flag is named only if
+//! The libraries say in words what to change, and give the same as a [`Remedy`]. Here it becomes a flag. A flag is named only if
 //! the verb that was typed has it.
 
 use super::{Typed, message};

@@ -1,11 +1,11 @@
-//! Signals that would end the program without a word, or leave something behind.
+//! Signals that would otherwise end the program without a message, or leave files behind.
 //!
-//! A mapped file that others cut short, or whose disk fails, raises SIGBUS where it is read: that ends the program as any failure does, with a line that says what happened and what to do,
-//! and exit code 1. Verbs that read instead of mapping (`view`, `iobench` over a pool) never get there. A limit on the size of files (`ulimit -f`) raises SIGXFSZ: heard, it leaves
-//! the write an error like that of a full disk, and whoever writes says so.
+//! A mapped file that another program shortens, or whose disk fails, raises SIGBUS when it is read. This ends the program like any failure, with a line that says what happened and what to do,
+//! and exit code 1. Verbs that read instead of mapping (`view`, `iobench` over a pool) do not get this signal. A limit on the size of files (`ulimit -f`) raises SIGXFSZ. It is handled, so that
+//! the write fails with an error like that of a full disk, which is reported.
 //!
-//! SIGINT, SIGTERM and SIGHUP end the program as ever, after files and folders that have a name before they are complete are gone (`unfinished` in the layout package). A thread hears them, so
-//! that more may be done than a handler may. What the program was started to ignore, as `nohup` has it, stays ignored. While a copy of the program does the work, the signal is the copy's.
+//! SIGINT, SIGTERM and SIGHUP end the program as usual, but first files and folders that have a name before they are complete are removed (`unfinished` in the layout package). A thread waits for these signals,
+//! because a handler may do very little. Signals that the program was started to ignore, as by `nohup`, stay ignored. While a copy of the program does the work, the signal is passed to the copy.
 
 use signal_hook::consts::{SIGBUS, SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::{flag, low_level};

@@ -1,6 +1,6 @@
 //! Where a terrain lies, in the words that `info` prints and that meshes and pictures carry.
 //!
-//! Cost: for the bounds in longitude and latitude some thousand projections.
+//! Cost: some thousand projections, for the bounds in longitude and latitude.
 
 use super::output::decimal;
 use super::terrain;

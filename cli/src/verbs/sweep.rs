@@ -1,7 +1,7 @@
 //! The sweeps of a comparison: speed-up by tolerance and by incoherence, the SMART paper's figures 9 and 10.
 //!
 //! A point flies a short stretch: the middle of the flight for tolerances, a new flight of the same kind at a solved speed for
-//! incoherences. An incoherence that this terrain and flight cannot reach is left out with a note, not a failure.
+//! incoherences. An incoherence that this terrain and flight cannot reach is left out, with a note.
 
 use super::progress::Meter;
 use super::replay::fly;

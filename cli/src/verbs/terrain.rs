@@ -1,4 +1,4 @@
-//! The terrain file as an argument, and the words for what it says about itself.
+//! The terrain file as an argument, and words for what its header says.
 
 use anyhow::Result;
 use std::path::{Path, PathBuf};

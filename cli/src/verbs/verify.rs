@@ -1,4 +1,4 @@
-//! `terrasoar verify`: whether every page of a terrain file is what was written.
+//! `terrasoar verify`: checks every page of a terrain file.
 
 use super::Lines;
 use super::output::{grouped, print_line};

@@ -1,6 +1,6 @@
 //! Places as people read and type them: the DEM's own coordinates, latitude and longitude, metres from the south-west sample.
 //!
-//! **What is shown can be typed.** Numbers with a letter of the compass are latitude and longitude, such with `m` are metres. Two numbers without are the first of these that lies in the
+//! **What is shown can be typed.** Numbers with a letter of the compass are latitude and longitude; numbers with `m` are metres. Two plain numbers are the first of these that lies in the
 //! terrain: the DEM's coordinates, latitude before longitude as maps on the web have it, metres. Cost: a projection or two a place.
 
 use terrasoar_import::places::{Crs, Frame};
@@ -62,7 +62,7 @@ impl Coordinates {
     /// The place that `text` means, in metres.
     ///
     /// # Errors
-    /// In words, what is no place or lies outside.
+    /// Why the text is no place, or that it lies outside, as a message.
     pub(crate) fn meant(&self, text: &str) -> Result<[f64; 2], String> {
         let no_place = || format!("{text:?} is no place: {FORMS}");
         let upper = text.to_uppercase();

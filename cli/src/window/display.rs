@@ -1,6 +1,6 @@
-//! Why there is no window, in words that say what is missing and what to do instead.
+//! Why there is no window: a message that says what is missing and what to do instead.
 //!
-//! What the window library says of an error begins with a place in its own source text; that is left out.
+//! The window library's own message begins with a place in its source text, which is left out.
 
 use std::ffi::OsString;
 use std::fmt::Display;

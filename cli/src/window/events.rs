@@ -1,6 +1,6 @@
 //! The window's events, one by one, until it is closed.
 //!
-//! The event loop sleeps while nothing moves. An error before the first picture ends the program; later ones are the viewer's to tell.
+//! The event loop sleeps while nothing moves. An error before the first picture ends the program. The viewer reports later ones.
 
 use super::Plan;
 use super::display::plain;

@@ -1,6 +1,6 @@
-//! What the user's hands do: keys held, buttons dragged, clicks told from drags.
+//! What the user's hands do: keys held, buttons dragged, and whether a press is a click or a drag.
 //!
-//! A drag belongs to whom it began over. What was dragged is asked for once a frame and then begins anew.
+//! A drag belongs to the panel or terrain over which it began. A frame takes the movement since the frame before.
 
 use super::camera::Controls;
 use super::keys;

@@ -1,6 +1,6 @@
-//! The heights of the terrain on show as flying and picking want them: what is at hand of it, and never a wait.
+//! The heights of the terrain on show, for flying and picking, from what is in memory. It never waits.
 //!
-//! A place outside the data or at a void has no height. Where records are away it is the height of the finest triangle at hand.
+//! A place outside the data or in a void has no height. Where records are not in memory it is the height of the finest triangle that is.
 
 use terrasoar::flight::generate::Ground;
 use terrasoar::ground::Ground as GroundOnShow;

@@ -1,7 +1,7 @@
 //! Making a terrain file from elevation data that was dropped on the window, on threads of its own.
 //!
-//! The file goes beside the elevation data where nothing has its name yet, else into the folder for temporary files. **Whatever goes wrong comes back as
-//! words.** A window that closes meanwhile leaves nothing: a build's output has no name before it is complete.
+//! The file goes beside the elevation data where nothing has its name yet, else into the folder for temporary files. **Every error comes back as
+//! a message.** If the window closes meanwhile nothing is left, because a build's output has no name before it is complete.
 
 use super::threads;
 use std::path::{Path, PathBuf};

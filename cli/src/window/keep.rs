@@ -1,4 +1,4 @@
-//! Files that the window leaves: named by terrain and time, in the folder it was started in.
+//! Files that the window writes: named by terrain and time, in the folder it was started in.
 //!
 //! **Nothing is replaced**: where a name is taken a number follows.
 

@@ -1,8 +1,8 @@
 //! `terrasoar view`: a window that a terrain is flown over in.
 //!
 //! `camera`, `coordinates`, `pick`, `flights`, `settings`, `keys`, `hand`, `job` and `workshop` know no window and are tested by themselves; `screen` and
-//! `overlay` know no terrain; `viewer` puts a frame together, `events` brings it the window's events. A frame is drawn when something
-//! moves or was touched; else nothing is. **Whatever fails while the window is open is said in it.**
+//! `overlay` know no terrain; `viewer` puts a frame together, `events` brings it the window's events. A frame is drawn only when something
+//! moves or was touched. **What fails while the window is open is shown in the window.**
 
 mod camera;
 mod coordinates;

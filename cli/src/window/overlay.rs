@@ -1,6 +1,6 @@
-//! What lies over the terrain: egui between the window's events and the frame's encoder.
+//! The panels over the terrain: egui between the window's events and the frame's encoder.
 //!
-//! Keys go to the overlay only while something is typed into it, for all other keys fly.
+//! Keys go to the panels only while something is typed there. Otherwise keys fly.
 
 use egui::epaint::ClippedPrimitive;
 use egui::{Color32, CornerRadius, Stroke, Theme, ViewportId, Visuals};

@@ -1,7 +1,7 @@
 //! What lies under a place of the picture: a ray from the eye marched to the ground.
 //!
-//! Steps grow with the distance, as a pixel's foot print does, and the crossing is halved down. **What a step may miss is smaller on the
-//! screen than a few pixels.** Voids and what lies outside are passed through. Cost: some hundred heights.
+//! Steps grow with the distance, as a pixel's footprint does, and the crossing is found by halving. **What a step may miss is smaller on the
+//! screen than a few pixels.** The ray passes through voids and through what lies outside. Cost: some hundred heights.
 
 use glam::DVec3;
 use terrasoar::flight::generate::Ground;

@@ -1,7 +1,7 @@
 //! The window's surface and the device that draws on it, through resizes and losses.
 //!
-//! A surface that is out of date or lost is made anew at once; while there is nothing to draw on, no frame is drawn. A lost device is told by
-//! the device's watch, and [`Screen::renew`] makes another; what lay on the old one is then for its owners to send again.
+//! A surface that is out of date or lost is made anew at once; while there is nothing to draw on, no frame is drawn. The device's watch
+//! reports a lost device, and [`Screen::renew`] makes another. What was on the old one must then be sent again.
 
 use anyhow::{Context, Result, anyhow};
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! What the window remembers from one run to the next: a TOML file in the user's folder for settings.
 //!
-//! **A file that cannot be understood is told and replaced by defaults, and never an obstacle**; values out of range are brought into it, and
-//! names that are unknown by now count as unset. The file appears when it is complete.
+//! **A file that cannot be understood never keeps the window from opening**: this is reported and defaults are used. Values out of range are brought into it, and
+//! unknown names count as unset. The file appears when it is complete.
 
 use anyhow::{Context, Result};
 use etcetera::{BaseStrategy, choose_base_strategy};

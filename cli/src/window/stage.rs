@@ -96,7 +96,7 @@ impl Stage {
         self.ground.is_waiting() || self.scene.is_waiting()
     }
 
-    /// What could not be read and nobody has heard of yet.
+    /// The oldest error of reading that has not been reported yet.
     pub(crate) fn take_error(&mut self) -> Option<LayoutError> {
         self.ground.take_error().or_else(|| self.scene.take_error())
     }

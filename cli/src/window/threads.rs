@@ -1,4 +1,4 @@
-//! Threads for work in the background of the window, apart from those that frames share their work out to: whoever waits for these never waits for a build or a commit.
+//! Threads for work in the background of the window. They are apart from those that frames use, so a frame never waits for a build or a commit.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::io;

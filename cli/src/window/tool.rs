@@ -1,6 +1,6 @@
 //! What the left button does to the ground: a tool, its size, its strength, and the edits that a stroke of it makes.
 //!
-//! Knows no window. A stroke is a row of edits set apart by a part of the radius, so that it is the same however fast the hand moved.
+//! It knows no window. A stroke is a row of edits at distances of a part of the radius, so that it is the same however fast the hand moved.
 
 use glam::DVec2;
 use terrasoar_layout::edit::{Area, Brush, BrushAction, Crater, Edit, Falloff};

@@ -1,7 +1,7 @@
 //! A frame of the window, and what keys and panels ask for.
 //!
-//! The order of a frame: move the eye, lay the panels out, grant their wishes, refine, draw, show. What goes wrong becomes a note in the window;
-//! a lost device is replaced and told, twice in a row it ends the program.
+//! The order of a frame: move the eye, lay the panels out, do what they ask for, refine, draw, show. Errors become notes in the window.
+//! A lost device is replaced, with a note. If it is lost twice in a row the program ends.
 
 mod act;
 mod draw;

@@ -1,6 +1,6 @@
 //! The head of an Esri ASCII grid: words and their values, in any order and any letters.
 //!
-//! It ends where a number stands in the place of a word. Everything in it is a claim of the file and is checked here, but for the number of samples.
+//! It ends where a number stands in the place of a word. Everything that the file states in it is checked here, except the number of samples.
 
 use crate::text::{number, shown, words};
 use std::path::Path;

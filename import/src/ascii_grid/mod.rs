@@ -1,6 +1,6 @@
 //! Esri ASCII grid (`.asc`): a head of words, then the samples as text, row by row from north to south.
 //!
-//! Samples are words between blanks; ends of lines mean nothing, so a row may take several lines or share one. The file is read once from front to back,
+//! Samples are words between blanks. Ends of lines have no meaning: a row may take several lines, and a line may hold several rows. The file is read once from front to back,
 //! taken apart by all threads ([`crate::text`]). Samples are kept in single precision, as GDAL does.
 
 mod header;

@@ -1,6 +1,6 @@
 //! GDAL's `.aux.xml` beside a file (PAM): place, reference system, and for each band "no data", scale, offset, unit and name.
 //!
-//! The text is read by crate `roxmltree`; what is no such text says nothing. Cost: one pass.
+//! The text is read by crate `roxmltree`. A file that is no such text is ignored. Cost: one pass.
 
 use crate::reader::{Declared, Said, VerticalUnit};
 use roxmltree::{Document, Node};

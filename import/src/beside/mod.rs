@@ -1,6 +1,6 @@
 //! Files beside a DEM that say more about it: GDAL's `.aux.xml` and `.msk`, world files, `.prj`.
 //!
-//! What GDAL keeps beside a file wins over the file, for that is how it is corrected; a world file or a `.prj` counts where the file says nothing. Each is looked for by its
+//! What GDAL keeps beside a file counts before the file itself, because that is how it is corrected. A world file or a `.prj` counts where the file says nothing. Each is looked for by its
 //! name in small and in capital letters. Cost: a look at some names.
 
 mod aux_xml;

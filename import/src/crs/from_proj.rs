@@ -1,4 +1,4 @@
-//! PROJ strings: `+proj=utm +zone=32 +datum=WGS84 +units=us-ft`, and what of them a terrain needs.
+//! PROJ strings: `+proj=utm +zone=32 +datum=WGS84 +units=us-ft`, and the parts of them that a terrain needs.
 
 use super::registry;
 use super::system::{Kind, System, Unit, Vertical, exact_metres};

@@ -1,7 +1,7 @@
 //! From coordinates of a system to longitude and latitude and back, and how long a step is on the ground. Projections are crate `proj4rs`'s.
 //!
-//! PROJ strings are stripped of what this program does itself: units and the directions of axes. A datum whose grid is not at hand loses its shift, of some hundred metres at
-//! most, and not its place. Angles are radians. Cost: a microsecond a point.
+//! Units and the directions of axes are taken out of PROJ strings, because this program applies them itself. Where the grid of a datum's shift is missing, the shift is left out, which is some hundred metres at
+//! most; the place remains known. Angles are radians. Cost: a microsecond a point.
 
 use super::from_proj;
 use super::system::{Kind, System};

@@ -1,6 +1,6 @@
 //! Reference systems: from what a file says to units, names, codes, and the ground.
 //!
-//! [`resolve`] turns statements into a [`System`]; [`Ground`] brings coordinates of one to longitude and latitude and back.
+//! [`resolve`] turns statements into a [`System`]. [`Ground`] converts a system's coordinates to longitude and latitude and back.
 
 mod from_proj;
 mod from_wkt;

@@ -1,4 +1,4 @@
-//! The EPSG registry: crate `crs-definitions`, and beside it what that lacks: vertical systems, the parts of compound ones, units, and systems added since.
+//! The EPSG registry: crate `crs-definitions`, and tables of what it lacks: vertical systems, the parts of compound ones, units, and systems added since.
 //!
 //! The tables beside this file are made from PROJ's copy of the EPSG dataset by `data-scripts/make-crs-tables.py`. Cost: a search of a sorted table in memory, some microseconds.
 

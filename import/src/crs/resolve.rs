@@ -1,7 +1,7 @@
 //! From what a file says, or a person, to a [`System`]: texts, codes, compound codes, units apart.
 //!
-//! The more exact statement wins: what a person says before the file; a text before a code; a unit stated by itself before the registry's. Where a code is not in the
-//! registry, or a text cannot be read, that is said aloud, for a unit may hang on it.
+//! The more exact statement counts: what a person says before the file; a text before a code; a unit stated by itself before the registry's. Where a code is not in the
+//! registry, or a text cannot be read, there is a warning, because a unit may depend on it.
 
 use super::from_proj::{self, unit_name};
 use super::from_wkt;

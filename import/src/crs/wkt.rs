@@ -1,6 +1,6 @@
 //! Well-known text as a tree: keywords with values in brackets (WKT 1 of OGC and ESRI, WKT 2: ISO 19162).
 //!
-//! Read is only the shape; what keywords mean is [`super::from_wkt`]'s. The text is a stranger's: its length and depth are bounded. Cost: one pass.
+//! Only the shape is read here; [`super::from_wkt`] knows what keywords mean. The text is not trusted: its length and depth are bounded. Cost: one pass.
 
 /// Longest text read; the longest systems have some 10 KB.
 pub(super) const MAX_BYTES: usize = 1 << 18;

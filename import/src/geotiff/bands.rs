@@ -1,6 +1,6 @@
 //! Which of an image's bands holds the heights: the only one, the one that was asked for, or three that heights are packed into.
 //!
-//! A second band that the file calls alpha makes voids and is no choice. Between others nothing is guessed.
+//! A second band that the file calls alpha makes voids and does not count as a band of heights. Between other bands nothing is guessed.
 
 use super::chunks::Chunks;
 use super::convert::Pick;

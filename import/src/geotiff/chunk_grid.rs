@@ -1,7 +1,7 @@
 //! Where the strips or tiles of an image lie, whatever they hold: heights ([`super::chunks`]) or colours ([`super::colour_table`]).
 //!
 //! Chunk `i` covers a rectangle of `chunk_width * chunk_height` samples, `across` of them side by side.
-//! Tiles at the right and lower edge are stored whole, strips at the lower edge only as far as the image. Nothing is held but the shape: places stay in the file
+//! Tiles at the right and lower edge are stored whole, strips at the lower edge only as far as the image. Only the shape is held in memory. Where each chunk lies stays in the file
 //! ([`super::listing`]).
 
 use super::listing::{Listing, Place, Places};

@@ -1,8 +1,8 @@
 //! Unpacks a chunk: LZW, DEFLATE, ZSTD and PackBits, a few rows at a time.
 //!
-//! A chunk must yield at least the bytes asked for; what it holds beyond them (rows below the image, a
-//! missing end code) does not matter, as writers differ in both. An [`Unpacker`] reads and writes piece by piece, so that what is held does not depend on how long a
-//! chunk is or becomes: the codec's own state, of ZSTD a window ([`super::zstd_frame`]). The `tiff` crate (0.11.3) is not used: it
+//! A chunk must yield at least the bytes asked for. What it holds beyond them (rows below the image) does not matter, nor does a
+//! missing end code, because writers differ in both. An [`Unpacker`] reads and writes piece by piece. So its memory does not depend on how long a
+//! chunk is: it holds the codec's own state, and for ZSTD a window ([`super::zstd_frame`]). The `tiff` crate (0.11.3) is not used: it
 //! refuses sound LZW tiles at the right edge ("no lzw end code found" in `int16-tiles-lzw-p2.tif` of the
 //! fixtures), and inverts "white is zero" heights. Cost: the codec's.
 

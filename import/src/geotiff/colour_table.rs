@@ -1,7 +1,7 @@
 //! The chunks of a TIFF picture: how they are packed, what their channels mean, and that all this can be read.
 //!
 //! Uncompressed chunks that are taller than needed are cut into lower ones here, so that one huge strip reads like many. Every size is
-//! held against the file before memory is taken for it.
+//! checked against the file's length before memory is taken for it.
 
 use super::chunk_grid::{ChunkGrid, side};
 use super::chunks::{Compression, compression_of};

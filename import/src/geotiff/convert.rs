@@ -1,7 +1,7 @@
 //! Bytes of pixels into raw numbers: one band of them, or heights packed into three.
 //!
-//! Where a band of alpha is 0 the sample is void. What a file declares to mean "no data" passes as it is; it is compared behind the seam, for every
-//! format alike. Cost: one pass.
+//! Where a band of alpha is 0 the sample is void. Values that a file declares to mean "no data" pass unchanged here. They are turned into voids later, in
+//! the same way for every format. Cost: one pass.
 
 use half::f16;
 use terrasoar_layout::dem::SampleType;

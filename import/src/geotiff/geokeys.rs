@@ -2,8 +2,8 @@
 //!
 //! A tie point and a pixel size, or a matrix, map raster to ground; the raster's origin is the corner of
 //! the first pixel (PixelIsArea, the default) or the first sample itself (PixelIsPoint), and the map
-//! returned starts at sample centres either way. Keys name the reference system. What is missing or
-//! contradictory leaves the field empty: a DEM without a place can still be flown over.
+//! returned starts at sample centres either way. Keys name the reference system. Where something is missing or
+//! contradictory the field stays empty: a DEM without a place can still be flown over.
 
 use super::keys::Keys;
 use super::projection;

@@ -1,6 +1,6 @@
 //! The key directory of a GeoTIFF: numbers and texts by the number of their key (OGC 19-008r4, section 7.1).
 //!
-//! What a key has to say stands in the directory itself, or in one of two other tags at a place that it gives. A key that points elsewhere says nothing. Cost: a search of
+//! A key's value stands in the directory itself, or in one of two other tags at a place that it gives. A key that points elsewhere is ignored. Cost: a search of
 //! some dozen entries a key.
 
 use super::tags::{self, Directory, TiffFile};

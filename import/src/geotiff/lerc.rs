@@ -1,6 +1,6 @@
 //! LERC chunks (Esri's Limited Error Raster Compression, version 2), plain or packed once more by DEFLATE or ZSTD.
 //!
-//! A chunk is one blob, which `lerc-reader` unpacks as a whole; so its size is held against that of the chunk before, and chunks of more than
+//! A chunk is one blob, which `lerc-reader` unpacks as a whole; so its size is compared with that of the chunk before that, and chunks of more than
 //! 64 MiB are refused when the file is opened. What a blob's mask leaves out is NaN among reals; among whole numbers it has no value, and stays 0 as
 //! libtiff has it. libtiff packs the bytes of a big-endian file as if they were little-endian numbers, so what comes out stands in the file's order either way.
 

@@ -1,7 +1,7 @@
 //! Where the chunks of an image lie: two lists of numbers in the file, read a block at a time.
 //!
-//! The lists are as long as the image has chunks, and a file of a few gigabytes, all holes, can list hundreds of millions. So they are never in memory as a whole: a
-//! [`Listing`] knows where they stand, a [`Places`] has a block of them at hand. Cost: 16 KiB a reader; two reads of the file a block of
+//! The lists are as long as the image has chunks, and a file of a few gigabytes, all holes, can list hundreds of millions. So they are never in memory as a whole. A
+//! [`Listing`] knows where they stand, and a [`Places`] holds a block of them. Cost: 16 KiB a reader; two reads of the file a block of
 //! [`BLOCK`] chunks, as long as chunks are asked for in order.
 
 use std::fs::File;

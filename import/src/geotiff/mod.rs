@@ -1,15 +1,15 @@
 //! GeoTIFF, BigTIFF and cloud-optimised ones, one chunk (strip or tile) at a time.
 //!
-//! [`tags`] reads the directory and holds every declared size against the file, [`chunks`] makes the
+//! [`tags`] reads the directory and checks every declared size against the file's length, [`chunks`] makes the
 //! table of chunks of the one that [`images`] chooses, [`geokeys`] and [`metadata`] say where the grid lies and what a unit is.
 //! Chunks are read piecewise, however large: uncompressed ones by [`raw`], compressed ones by
 //! [`packed`] with [`rows`], [`codec`], [`lerc`] and [`predictor`]. [`stored`] and [`convert`] turn bytes into samples, [`planes`] joins bands that lie apart.
 //! Memory: some rows a worker, whatever the file declares; of LERC a chunk.
 //!
-//! This is our own code, for no crate does all of it: tiff-reader 0.10 reads every fixture here and holds each chunk as a whole, so that a file of one strip takes
+//! This is our own code, because no crate does all of it: tiff-reader 0.10 reads every fixture here and holds each chunk as a whole, so that a file of one strip takes
 //! the memory of the terrain, and refuses files that state no lengths of chunks; tiff 0.11.3 refuses sound LZW tiles that GDAL writes and inverts "white is zero".
 //!
-//! Kept from GDAL: a chunk without data is void if the file declares a void value, else zero; heights
+//! Two things are as in GDAL: a chunk without data is void if the file declares a void value, else zero; heights
 //! are not inverted for "white is zero" files.
 
 mod bands;

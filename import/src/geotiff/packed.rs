@@ -1,7 +1,7 @@
 //! Reads compressed chunks, each by one worker, some rows at a time.
 //!
-//! What a worker holds is a window of rows, not the chunk: a file of one huge strip takes no more memory than a tiled one. So many workers read as find room in
-//! [`BUDGET_BYTES`]; only rows of more than a megabyte, large windows of ZSTD and chunks of LERC take more, which [`Chunks::memory_bytes`] tells. Bands that lie one after the other
+//! What a worker holds is a window of rows, not the chunk: a file of one huge strip takes no more memory than a tiled one. As many workers read as fit into
+//! [`BUDGET_BYTES`]. Only rows of more than a megabyte, large windows of ZSTD and chunks of LERC take more, which [`Chunks::memory_bytes`] tells. Bands that lie one after the other
 //! are read in step.
 
 use std::fs::File;

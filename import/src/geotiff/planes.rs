@@ -1,6 +1,6 @@
-//! Bands that lie one after the other in the file, each an image of its own: which of them are read, and what becomes of their samples.
+//! Bands that lie one after the other in the file, each an image of its own: which of them are read, and what their samples are used for.
 //!
-//! Nearly always one is read and the others are passed over. Several are read in step where colours hold packed heights, or a band of alpha makes voids.
+//! Nearly always one band is read and the others are skipped. Several are read in step where colours hold packed heights, or a band of alpha makes voids.
 
 use super::bands::Bands;
 use super::convert::Pick;

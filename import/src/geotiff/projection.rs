@@ -1,7 +1,7 @@
 //! A projection that a file defines by its own parameters, as a PROJ string.
 //!
 //! Keys are those of the GeoTIFF standard (OGC 19-008r4, section 7.4); which of several origins counts depends on the projection, and writers confuse them, so the first
-//! that is there is taken. False eastings are in the file's unit and metres in the string. What is not known gives no string: the terrain is built by its units alone.
+//! that is there is taken. False eastings are in the file's unit and metres in the string. An unknown projection gives no string; then only the units of the terrain are known.
 
 use super::keys::Keys;
 use crate::crs::by_text;

@@ -1,6 +1,6 @@
 //! A compressed chunk on its way out of the file, some rows at a time.
 //!
-//! Most codecs unpack piece by piece. Two work on a whole chunk: LERC, and ZSTD where its window is larger than the chunk. Rows come as they would lie in a
+//! Most codecs unpack piece by piece. Two work on a whole chunk: LERC, and ZSTD where its window is larger than the chunk. Rows come out as they would lie in a
 //! file without compression and predictor.
 
 use super::chunks::{Chunks, Compression, Lerc, Predictor};

@@ -1,8 +1,8 @@
 //! The tag directories of a TIFF or BigTIFF file.
 //!
 //! A directory is a list of (tag, type, count, value or place of the values). Every place and count is
-//! held against the length of the file when the directory is read. That says little of memory, for a file may be long and empty, and tags may
-//! share their values: so whoever reads values says how many of them mean anything, and no more are read. The one list that grows with the image,
+//! checked against the length of the file when the directory is read. That does not bound memory by itself, because a file may be long and empty, and tags may
+//! share their values. So code that reads values says how many of them it can use, and no more are read. The one list that grows with the image,
 //! that of its chunks, stays in the file ([`super::listing`]). Cost: one small read a directory, one read a value.
 
 use std::collections::BTreeMap;

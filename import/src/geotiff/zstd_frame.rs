@@ -1,7 +1,7 @@
 //! What a ZSTD stream needs in memory, from its first bytes (RFC 8878, section 3.1.1).
 //!
-//! A stream looks back over a window of what it has already unpacked, and names the window's size first. Encoders that do not know how much will come name
-//! the largest of their level, up to 128 MiB, for a chunk of a few KiB. So a short chunk whose window is larger than itself is unpacked at once, where no window
+//! A stream looks back over a window of what it has already unpacked, and names the window's size first. Encoders that do not know how much data will come name
+//! the largest window of their level, up to 128 MiB, even for a chunk of a few KiB. So a short chunk whose window is larger than itself is unpacked at once, where no window
 //! is needed ([`unpack_whole`]); a long one has the window that it asks for, which counts against the memory allowed.
 
 use super::zstd_codec;

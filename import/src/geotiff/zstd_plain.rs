@@ -1,6 +1,6 @@
 //! ZSTD in plain Rust, for programs without a C compiler: the same frames, windows and refusals as by the library.
 //!
-//! Blocks are unpacked one by one, so that a few bytes that stand for many are no more in memory than a block of 128 KiB beside the window.
+//! Blocks are unpacked one by one. So a few bytes that unpack to very many take no more memory than a block of 128 KiB beside the window.
 
 use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};

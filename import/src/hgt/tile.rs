@@ -1,6 +1,6 @@
 //! A tile as a file, packed (`.hgt.gz`) or one of several in a zip archive.
 //!
-//! A tile's length says its shape, so a packed one must say its length before it is unpacked: gzip does so in its last four bytes, zip in its directory. Unpacking stops at that
+//! A tile's length gives its shape, so the length of a packed tile must be known before it is unpacked: gzip does so in its last four bytes, zip in its directory. Unpacking stops at that
 //! length and refuses any other. Cost: a packed tile is unpacked whole, some 26 MB for one arc-second.
 
 use super::name;

@@ -1,7 +1,7 @@
-//! The packed tiles that are in use, unpacked: few, the last used ones.
+//! The packed tiles that are in use, unpacked. A few are kept, those used last.
 //!
-//! Cells are read from north to south, so a tile is needed for its own cell, beside its neighbour in the west, and as the northern neighbour of the next row. Two threads that
-//! want the same tile wait for one unpacking.
+//! Cells are read from north to south. So a tile is needed for its own cell, for the cell of its neighbour, and as the northern neighbour of the next row. When two threads
+//! need the same tile, it is unpacked once.
 
 use super::tile::Tile;
 use std::collections::VecDeque;

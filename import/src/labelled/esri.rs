@@ -1,6 +1,6 @@
 //! ESRI's label: a keyword and its value a line, in any order and any letters.
 //!
-//! Two spellings are one here: that of `.bil` (ULXMAP, XDIM: the middle of the north-western sample) and that of `.flt` (xllcorner, cellsize: the grid's south-western corner).
+//! Two spellings mean the same: that of `.bil` (ULXMAP, XDIM: the middle of the north-western sample) and that of `.flt` (xllcorner, cellsize: the grid's south-western corner).
 //! Where PIXELTYPE is left out, whole numbers have a sign if the value for "no data" has one; so GDAL reads them too.
 
 use super::{Interleave, Label, beside, side, whole};

@@ -1,7 +1,7 @@
 //! Plain numbers with a label beside them: `.flt`, `.bil`, `.bip`, `.bsq` and GTOPO30's `.dem` with ESRI's `.hdr`, and anything with ENVI's `.hdr`.
 //!
 //! The label is a text ([`esri`], [`envi`]) that says how the numbers lie in the data file; both become a [`Label`], and [`crate::plain`] reads the band that is asked for. A person
-//! may name either of the two files. Cost: the label; nothing of the data but a look at its length.
+//! may name either of the two files. Cost: reading the label. Of the data only the length is looked at.
 
 mod beside;
 mod envi;

@@ -1,4 +1,4 @@
-//! Attributes of variables by name, and words for what they say.
+//! Attributes of variables by name, as numbers or text.
 
 use netcdf_reader::{NcAttrValue, NcAttribute, NcVariable};
 

@@ -1,7 +1,7 @@
 //! Where the columns and rows of a grid lie: its coordinate variables (CF 1.11, section 5; COARDS).
 //!
-//! A dimension's coordinates are the variable of its name. They may grow or fall and begin anywhere; that they are evenly apart is checked of every one, for nothing else can be
-//! flown over without being moved. Cost: one reading of each, a block at a time.
+//! A dimension's coordinates are the variable of its name. They may grow or fall and begin anywhere. Each is checked to be evenly spaced, because other grids
+//! would have to be resampled. Cost: one reading of each, a block at a time.
 
 use super::attributes::{Unit, number, text, unit};
 use super::file::guarded;

@@ -1,7 +1,7 @@
 //! Which variable of a netCDF file holds the heights, and which of its layers.
 //!
-//! What is asked for comes first: a name, a name and the number of a layer ("z:3"), or a number alone. Else the only grid there is, or the only one that
-//! calls itself an elevation. Between several, and between the layers of one, nothing is guessed.
+//! What a person asks for comes first: a name, a name and the number of a layer ("z:3"), or a number alone. Otherwise it is the only grid there is, or the only one that
+//! is called an elevation. Between several, and between the layers of one, nothing is guessed.
 
 use super::attributes::text;
 use netcdf_reader::{NcGroup, NcType, NcVariable};

@@ -1,7 +1,7 @@
-//! The bytes of a netCDF file, read piece by piece, and what its libraries report in words of our own.
+//! The bytes of a netCDF file, read piece by piece, and our own messages for what its libraries report.
 //!
-//! `netcdf-reader` asks for stretches of the file. While the file is opened they are metadata: each is held to [`MOST_AT_ONCE`], all together to [`MOST_METADATA`],
-//! so that a head which claims gigabytes ends in words. Samples are read from a file that was opened anew with limits of their own.
+//! `netcdf-reader` asks for stretches of the file. While the file is opened they are metadata: each is at most [`MOST_AT_ONCE`], all together at most [`MOST_METADATA`].
+//! So a head that claims gigabytes is an error. Samples are read from a file that was opened anew with limits of their own.
 
 use crate::guard::guard;
 use crate::input;

@@ -1,7 +1,7 @@
 //! The samples of a grid, window by window.
 //!
-//! What lies in the file as it is, is read some rows at a time. Chunks of HDF5 are unpacked by whoever asks for a part of them, so windows are whole
-//! chunks, each unpacked once; of chunks larger than [`LARGEST_WINDOW`] the last one is kept while its rows are handed on, by one worker.
+//! Samples that are not compressed are read some rows at a time. A chunk of HDF5 is unpacked as a whole even for a part of it. So windows are whole
+//! chunks, and each is unpacked once. Of chunks larger than [`LARGEST_WINDOW`] one worker keeps the last one while its rows are passed on.
 
 use super::Shape;
 use super::choose::Grid;

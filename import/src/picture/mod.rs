@@ -1,7 +1,7 @@
 //! Readers of images: each turns one format into an [`ImageSource`].
 //!
 //! [`open_image`] looks at a file's first bytes, never at its name. Opening reads headers and what stands beside the file ([`completed`]); rows are read when they are asked for.
-//! Nothing in a file is trusted: what it declares is held against limits before memory is taken for it.
+//! Nothing in a file is trusted: what it declares is checked against limits before memory is taken for it.
 
 mod across;
 mod completed;

@@ -1,8 +1,8 @@
 //! Metres or degrees, where a file gives coordinates and no unit.
 //!
-//! Nothing in such a file decides it for sure. Steps of whole arc-seconds that are no round decimals, such as 1/1200, are degrees, and so is a grid around the globe; coordinates
-//! beyond the globe are lengths. Steps of a metre and more are lengths. Round decimal steps below that are either: where the whole grid is less than one unit wide, a
-//! site in centimetres is more likely than a degree file of so few samples, and metres are taken aloud; else the person is asked.
+//! Nothing in such a file decides this with certainty. Steps of whole arc-seconds that are no round decimals, such as 1/1200, are degrees, and so is a grid around the globe; coordinates
+//! beyond the globe are lengths. Steps of a metre and more are lengths. Round decimal steps below that may be either. Where the whole grid is less than one unit wide, a
+//! site in centimetres is more likely than so few samples in degrees: metres are taken, with a warning. Otherwise the person must say it.
 
 use crate::crs::Unit;
 use crate::crs::unit_in_words;

@@ -1,8 +1,8 @@
 //! Metres between samples, on the ground, at the centre of the grid.
 //!
-//! Lengths on a map are taken as they are, for surveyors' maps are true, and where one is off by more than a percent this is said. Degrees and maps of Mercator's kind, whose steps grow with
-//! the latitude, are measured on the ground at the centre; where the step differs from that by more than a percent within the grid, this is said, with the way out: reprojection. Coordinates of no known unit are
-//! metres or degrees; which, is decided only where it is plain ([`Guess`]), and otherwise asked.
+//! Lengths on a map are taken as they are, because most maps are true to scale; where one is off by more than a percent there is a warning. In degrees and in maps of Mercator's kind steps grow with
+//! the latitude, so they are measured on the ground at the centre. Where the step differs from that by more than a percent within the grid, a warning says so and advises reprojection. Coordinates without a known unit are
+//! metres or degrees. Which of them is decided only where it is certain ([`Guess`]); otherwise the person must say it.
 
 use super::guess::Guess;
 use crate::crs::{Ground, Kind, System};

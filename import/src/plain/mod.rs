@@ -1,7 +1,7 @@
 //! Grids of plain numbers: samples of one size at regular distances in a file, whatever header describes them.
 //!
-//! [`Plain`] says where the numbers are; bands of rows are read by all threads, each with a mebibyte at most. Invariant: a `Plain` is made by [`Plain::checked`]
-//! alone, so that every sample lies in the file.
+//! [`Plain`] says where the numbers are; all threads read bands of rows, each of a mebibyte at most. Invariant: only [`Plain::checked`] makes a `Plain`,
+//! so every sample lies in the file.
 
 mod kind;
 

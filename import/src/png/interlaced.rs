@@ -1,7 +1,7 @@
 //! Interlaced PNG (Adam7), whose pixels come in seven passes over the whole picture.
 //!
-//! A strip of rows is held as bytes; the stream is decoded once for each strip, and what belongs to other rows is left. So memory has a bound, whatever the picture's size, at
-//! the price of decoding a large one several times.
+//! A strip of rows is held as bytes. The stream is decoded once for each strip, and pixels of other rows are ignored. So memory is bounded, whatever the picture's size.
+//! The price is that a large picture is decoded several times.
 
 use super::PngDem;
 use super::pixels::Pixels;

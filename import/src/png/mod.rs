@@ -46,7 +46,7 @@ fn transformations(header: &Info<'_>) -> Transformations {
 }
 
 impl PngDem {
-    /// Reads the header and the text chunks before the image data; and of a colour picture, where nobody says how heights are packed, its beginning.
+    /// Reads the header and the text chunks before the image data; and of a colour picture its beginning, if nothing says how heights are packed.
     pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Self, LayoutError> {
         let reader = png_stream::open(path, Transformations::IDENTITY, Texts::Kept)?;
         let header = reader.info();

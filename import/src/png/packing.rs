@@ -1,8 +1,8 @@
-//! Whether the colours of a picture are heights, told by the colours alone, where that is certain.
+//! Whether the colours of a picture are packed heights, found from the colours alone, where that is certain.
 //!
-//! Heights of the Earth have a narrow range of red: 0 to 2 with Mapbox's packing, 81 to 163 with Terrarium's. And packed heights carry: where the upper byte of a number changes, the lower
-//! one runs over and goes far the other way, so that the number changes little. Pictures do not do that. Looked at are up to four million pixels from the first on; what
-//! follows is held against the range of red while it is read. Whatever is not certain is left for a person to say.
+//! Heights of the Earth have a narrow range of red: 0 to 2 with Mapbox's packing, 81 to 163 with Terrarium's. And packed heights have carries: where the upper byte of a number changes, the lower
+//! one runs over and goes far the other way, so that the number changes little. Pictures do not do that. Up to the first four million pixels are looked at. The
+//! following ones are checked for the range of red while they are read. Where it is not certain, a person must say it.
 
 use super::{open_pixels, transformations};
 use crate::guard;

@@ -17,7 +17,7 @@ pub(super) enum Pixels {
     /// Red, green and blue, 8 bits each, and perhaps alpha.
     Packed {
         packing: Decode,
-        /// The packing that was found, where nobody named one; every pixel is held against it.
+        /// The packing that was found, where none was named; every pixel is checked against it.
         found: Option<Packing>,
         has_alpha: bool,
     },

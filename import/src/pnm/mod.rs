@@ -1,6 +1,6 @@
 //! Grey Netpbm pictures as heights: PGM as text (`P2`) and as bytes (`P5`, 8 or 16 bits, high byte first), and PFM (`Pf`, reals, from the south row on).
 //!
-//! A header of words says the size and the largest value. Rows run from north to south but in PFM. Nothing says where the picture lies. The first picture of a file is
+//! A header of words says the size and the largest value. Rows run from north to south, except in PFM. Nothing says where the picture lies. The first picture of a file is
 //! read; colour and black-and-white ones have no heights. Cost: as for any grid of plain numbers ([`crate::plain`]) or of text ([`crate::text`]).
 
 mod header;

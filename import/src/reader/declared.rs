@@ -1,6 +1,6 @@
 //! What a file says about its samples, where they lie and what they mean: statements, not conclusions.
 //!
-//! Every number comes with the place it was found (`by`: "tag ModelPixelScale", "N46E007.prj"), for people ask where it came from. A field that the file says nothing about
+//! Every number comes with the place where it was found (`by`: "tag ModelPixelScale", "N46E007.prj"), because people ask where it came from. A field that the file says nothing about
 //! stays empty; a reader never fills in a default.
 
 use crate::options::Direction;

@@ -1,8 +1,8 @@
-//! The seam between formats and everything else: what a file says ([`Declared`]) and its samples in the order of the file ([`Reader`]).
+//! The border between formats and everything else: what a file says ([`Declared`]) and its samples in the order of the file ([`Reader`]).
 //!
-//! A reader knows one format and nothing else. It hands over what is written in the file, as it is written there: rows as they lie in the file, raw numbers,
-//! the reference system as text or code, units, scale, offset and "no data" with the place each was found. Turning rows north-up, finding out what a
-//! system or a unit is, comparing voids, scaling, and asking the person who typed the command are done once, behind this seam, for every format.
+//! A reader knows one format and nothing else. It passes on what is written in the file, as it is written there: rows in their order, raw numbers,
+//! the reference system as text or code, units, scale, offset and "no data", each with the place where it was found. Everything else is done once for all formats, outside of readers: turning rows north-up,
+//! finding out what a system or a unit is, comparing voids, scaling, and asking the person who typed the command.
 
 mod declared;
 mod picture;

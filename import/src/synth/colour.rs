@@ -1,7 +1,7 @@
-//! A photograph that never was: colour from height, slope and noise, over any terrain file, of any size.
+//! A made-up photograph: colour from height, slope and noise, over any terrain file, of any size.
 //!
 //! Water, shore, fields and woods, bare rock where it is steep, scree and snow above; patches of some hundred metres and grain down to the
-//! texel. Every texel is a function of seed, place and the heights around it, so threads do not show. The picture covers the terrain from its first sample to its last
+//! texel. Every texel depends only on the seed, its place and the heights around it, so the number of threads makes no difference. The picture covers the terrain from its first sample to its last
 //! and lies in the terrain's reference system: an uncompressed tiled GeoTIFF, BigTIFF above 4 GiB. A row of tiles is made in parallel while
 //! the one before is written. Memory: two rows of tiles, 3 KiB a texel of width.
 

@@ -102,7 +102,7 @@ impl Output {
 /// The first failure of a [`Watched`] file.
 type Failure = Arc<Mutex<Option<io::Error>>>;
 
-/// A file that remembers its first failure: the PNG encoder writes its last chunks while it is dropped, and has nobody to tell then.
+/// A file that remembers its first failure: the PNG encoder writes its last chunks while it is dropped, and cannot report an error then.
 struct Watched {
     file: File,
     failure: Failure,

@@ -1,7 +1,7 @@
 //! Whether a file is one that this module makes.
 //!
-//! Whoever is about to replace a file asks this first. **The answer is by content alone**: what stands before the samples must be, byte for byte, what would be written
-//! before samples of that number at that place, and the file as long as they need. Samples are not looked at. Cost: the header is read once and made twice.
+//! Code that is about to replace a file asks this first. **The answer depends on content alone**: the bytes before the samples must be exactly those that would be written
+//! before samples of that number at that place, and the file must be as long as they need. Samples are not looked at. Cost: the header is read once and made twice.
 
 use super::colour::TILE;
 use super::output::PNG_KEYS;

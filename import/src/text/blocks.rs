@@ -1,6 +1,6 @@
-//! A stream cut into blocks between words or lines; blocks are worked on by all threads, what comes of them is taken in order.
+//! A stream cut into blocks between words or lines. All threads work on blocks, and results are taken in order.
 //!
-//! While a batch of blocks is worked on, what came of the batch before is taken. Invariant: the blocks joined are the stream, and no word (or line) is in two of them.
+//! While a batch of blocks is worked on, the results of the batch before are taken. Invariant: the blocks joined are the stream, and no word (or line) is in two of them.
 
 use rayon::prelude::*;
 use std::io::Read;

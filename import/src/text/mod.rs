@@ -1,4 +1,4 @@
-//! Text files of millions of numbers: cut into blocks between words or lines, taken apart on all cores, handed on in order.
+//! Text files of millions of numbers: cut into blocks between words or lines, read on all cores, passed on in order.
 //!
 //! Nothing is held but the blocks under way. Cost: a quarter of a mebibyte of text and the numbers in it, twice, for each thread.
 

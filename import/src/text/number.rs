@@ -1,4 +1,4 @@
-//! A word as a number, as fast as digits can be looked at.
+//! A word as a number, fast.
 //!
 //! The decimal sign is a point or a comma. Up to 15 digits without an exponent are exact in a double and divided once, which rounds once, so it is
 //! the nearest double (Clinger 1990, section 4); everything else is left to the standard library.

@@ -1,6 +1,6 @@
 //! Samples that come one after the other, row by row, as windows of a sink.
 //!
-//! What comes is handed on at once: the end of a row that was begun, whole rows, the beginning of a row. Nothing is kept but the place.
+//! Samples are passed on at once: the end of a row that was begun, whole rows, the beginning of a row. Only the position is kept.
 
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;

@@ -1,4 +1,4 @@
-//! A band by its number or name, as a person says it.
+//! A band by its number or name, as a person gives it.
 
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;

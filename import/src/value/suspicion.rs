@@ -1,6 +1,6 @@
-//! What in the samples themselves looks wrong: numbers that commonly mean "no data" and are not declared, heights beyond the Earth's, a range that feet would explain.
+//! What looks wrong in the samples themselves: numbers that commonly mean "no data" and are not declared, heights beyond the Earth's, a range that feet would explain.
 //!
-//! Samples are looked at as they pass. Cost: the lowest and the highest of each window; a second look where one of them is such a number.
+//! Samples are looked at while they are read. Cost: the lowest and the highest of each window; a second look where one of them is such a number.
 
 use std::sync::{Mutex, PoisonError};
 use terrasoar_layout::dem::Warning;

@@ -1,6 +1,6 @@
 //! New samples out of old ones, as GDAL's warper makes them (alg/gdalwarpkernel.cpp of 3.6).
 //!
-//! Coordinates count sample centres: 0 is the first one. A place is void outside of the outermost samples' areas. Bilinear and Lanczos weigh the samples that are there and
+//! Coordinates count sample centres: 0 is the first one. A place is void outside of the outermost samples' areas. Bilinear and Lanczos weight the samples that are there and
 //! divide by the sum of their weights; cubic falls back on bilinear where one of its 16 is not; the mean weighs samples by how much of them lies under the new one.
 //! Where new samples are farther apart than old ones, kernels are widened by as much, so that nothing is skipped. A widened Lanczos kernel stands, in GDAL as here, at the centre of an
 //! old sample, up to one step off; bilinear and cubic ones stand where they belong. Cost: the samples under the kernel.

@@ -1,6 +1,6 @@
 //! From a place in the new grid to a place among the old samples: the new grid's coordinates, another system's, the old grid's columns and rows.
 //!
-//! A projection is asked at the nodes of a mesh, and between them places are interpolated, where that is right to a five-hundredth of a step; else it is asked everywhere.
+//! The projection is computed at the nodes of a mesh, and places between them are interpolated where that is right to a five-hundredth of a step. Otherwise it is computed everywhere.
 //! Cost: a microsecond a node.
 
 use crate::crs::Ground;

@@ -1,7 +1,7 @@
 //! The system that data is brought into, and the new grid in it.
 //!
 //! The new grid covers all the old one covers, its sample centres at whole multiples of its step, so that neighbouring data sets make grids that meet. The rim is
-//! found by bringing the old rim and a mesh inside of it over. Cost: some hundred points.
+//! found by projecting the old rim and a mesh inside it. Cost: some hundred points.
 
 use super::mapping::apply;
 use crate::crs::{Ground, HorizontalSize, Kind, System, by_text, is_earth};

@@ -1,7 +1,7 @@
 //! The grid that coordinates lie on, found from the coordinates that occur.
 //!
 //! Along each axis the distinct coordinates must be whole steps apart, the step being the same all along. Coordinates are printed with few digits, so a step is the mean
-//! over all steps and a coordinate may be a fifth of a step off its place. Steps that nobody stands on are gaps. Cost: the distinct coordinates of an axis, sorted.
+//! over all steps and a coordinate may be a fifth of a step off its place. Steps without a coordinate are gaps. Cost: the distinct coordinates of an axis, sorted.
 
 use std::collections::HashSet;
 

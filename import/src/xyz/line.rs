@@ -1,6 +1,6 @@
 //! A line of an XYZ file: which of its words are east, north and height, and their numbers.
 //!
-//! What separates words is told from the first line of numbers: a semicolon, else blanks, else a comma; so `1,5 2,5 3,5` has decimal commas and `1.5,2.5,3.5` does not.
+//! The sign that separates words is found from the first line of numbers: a semicolon, else blanks, else a comma; so `1,5 2,5 3,5` has decimal commas and `1.5,2.5,3.5` does not.
 
 use crate::text::{is_blank, number};
 

@@ -1,6 +1,6 @@
 //! The second pass over an XYZ file: every point to its sample.
 //!
-//! Points are read by all threads and placed in order by one. Which samples have a point is told by their not being NaN, so a point whose height is NaN is as good as none.
+//! Points are read by all threads and placed in order by one. A sample has a point if it is not NaN. So a point whose height is NaN counts as no point.
 
 use super::XyzDem;
 use super::line::is_passed_over;

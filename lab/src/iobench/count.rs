@@ -1,6 +1,6 @@
 //! The counting run: a flight through one reader, what its reads touch under every layout, and what a page cache of a stated size misses.
 //!
-//! One pass serves all layouts and all ways of preloading: the engine's reads are the same. Within a frame a page is needed once, however often it is read.
+//! One pass is enough for all layouts and all ways of preloading, because the engine's reads are the same. Within a frame a page is needed once, however often it is read.
 //! Preloads come from a disk of stated speed: so many pages between two frames, the coarsest first. **Nothing here reads a clock or the state of the machine**: equal
 //! input gives equal counts.
 

@@ -1,7 +1,7 @@
 //! What the kernel says about reading: page faults, bytes fetched from storage, memory held; and how to make it forget a file.
 //!
-//! Linux tells all of it in files under /proc, and takes the order to forget through `posix_fadvise`. Elsewhere, and where /proc is not mounted, every answer is
-//! `None`: not known, which is not 0. How much of a file is in memory is asked where files are mapped
+//! Linux tells all of it in files under /proc, and drops a file from memory through `posix_fadvise`. Elsewhere, and where /proc is not mounted, every answer is
+//! `None`: not known. How much of a file is in memory is asked where files are mapped
 //! ([`resident_bytes`](terrasoar_layout::file::source::resident_bytes)). Cost: one small
 //! file read an answer, some tens of microseconds, so ask outside what is timed.
 

@@ -7,7 +7,7 @@
 //! | `soar` | 20 bytes | the interleaved quadtrees of Lindstrom and Pascucci, ghosts included |
 //! | `ours` | the file's own | the terrain file as it is, by its page directory |
 //!
-//! 20 bytes are SOAR's record: x, y, z, error and radius in single precision. Of `row` and `tiled`, which have no use for an order by level, only the place
+//! 20 bytes are SOAR's record: x, y, z, error and radius in single precision. In `row` and `tiled`, which are not ordered by level, only the place
 //! differs. A 20-byte record may lie across two lines or pages and then touches both. Invariant: no two grid points share a byte, but for those whose page is
 //! absent from the terrain file, which all read the inert page. Cost: a few shifts a record.
 

@@ -42,7 +42,7 @@ pub enum Reader {
     Engine(EngineKind),
     /// Kinetic over pages that are read into a pool by the time they are needed.
     Pool,
-    /// The mesh itself: every record that a refinement of the frame from nothing looks at, whoever has it in memory already. SOAR reads just these.
+    /// The mesh itself: every record that a refinement of the frame from nothing looks at, even if an engine has it in memory. SOAR reads just these.
     Mesh,
 }
 

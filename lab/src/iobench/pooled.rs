@@ -141,7 +141,7 @@ pub struct Pooled {
 }
 
 impl Pooled {
-    /// The flight as a run of counts. `mesh_pages` is what each frame's mesh needs, whoever has it in memory.
+    /// The flight as a run of counts. `mesh_pages` is what each frame's mesh needs, in memory or not.
     pub fn run(&self, terrain: &Terrain, prefetch: Prefetch, mesh_pages: &[u64]) -> Run {
         let frame = |(i, frame): (usize, &StreamFrame)| FrameIo {
             frame: i as u64,

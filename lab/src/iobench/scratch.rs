@@ -1,7 +1,7 @@
 //! Other layouts on a real disk: the page trace of a flight, replayed against a file of the layout's size.
 //!
-//! The file is full of bytes that do not compress and none of it is sparse, or the disk would not be asked. It has no use but being read, lies in a folder that the
-//! user names, and has no name, so that even a killed program leaves nothing. Each replay starts cold.
+//! The file is full of bytes that do not compress and has no holes; otherwise the disk might not be read. It is only there to be read. It lies in a folder that the
+//! user chooses and has no name, so that even a killed program leaves nothing. Each replay starts cold.
 
 use super::kernel;
 use super::timed::{UpdateCost, observed};

@@ -1,6 +1,6 @@
-//! Sums of a flight's counts and costs, in the field names of reports.
+//! Sums of a flight's counts and costs, under the names that reports use.
 //!
-//! Means, medians and sums leave the first frame out, which starts from nothing; a flight of one frame has no other, and its figures are that one's. Totals over all
+//! Means, medians and sums leave the first frame out, which starts from nothing. For a flight of one frame they are the figures of that frame. Totals over all
 //! frames say so in their names. What was not measured or is not known is `None`.
 
 use super::kernel::Faults;

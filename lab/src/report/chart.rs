@@ -1,4 +1,4 @@
-//! A chart as data: what is to be drawn, before anybody knows where; and the axes' limits and ticks.
+//! A chart as data, independent of how it is drawn: its series, and the limits and ticks of its axes.
 //!
 //! Limits always span something and all coordinates are finite, whatever the data: values that are not finite,
 //! or not above 0 on a logarithmic axis, are left out.

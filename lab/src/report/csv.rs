@@ -1,4 +1,4 @@
-//! The frames of a replay as CSV: a header with the field names of [`FrameStats`], then a line a frame.
+//! The frames of a replay as CSV: a header with the field names of [`FrameStats`], then a line for each frame.
 //!
 //! Hashes are 16 hexadecimal digits; times have the shortest digits that read back the same.
 

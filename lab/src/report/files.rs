@@ -1,6 +1,6 @@
-//! Which files a report is made of, and how ours are told from those of others.
+//! Which files a report has, and how a file of ours is recognised.
 //!
-//! Whoever is about to replace a file asks this first. **The answer is by how the file starts**, so that a table or a page of somebody else is known as such whatever it is called.
+//! Code that is about to replace a file asks this first. **The answer depends on how the file starts**, so that another program's table or page is recognised as such whatever it is called.
 
 use super::html::FLIGHT_PICTURE;
 use super::{ComparisonReport, csv, file_parts, html, io};

@@ -1,4 +1,4 @@
-//! The report's page: one HTML file with the verdict, tables and plots, that refers to nothing outside itself but
+//! The report's page: one HTML file with the verdict, tables and plots. It refers only to
 //! the data files beside it.
 //!
 //! All text that comes from outside is escaped.

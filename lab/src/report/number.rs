@@ -1,4 +1,4 @@
-//! Numbers as people read them: thousands apart, no more digits than they carry.
+//! Numbers as people read them: with commas between thousands, and only as many digits as mean something.
 
 use terrasoar_layout::words::thousands;
 

@@ -1,7 +1,7 @@
 //! Largest and smallest of many numbers, voids (NaN) left out.
 //!
-//! `f64::max` asks of both numbers whether they are NaN, in four instructions; where only the newcomer can be, one instruction does. Eight
-//! lanes let the compiler take several numbers at once, which it may not do by itself, for it cannot know that order does not matter.
+//! `f64::max` checks both numbers for NaN, in four instructions. Where only the new number can be NaN, one instruction is enough. Eight
+//! lanes let the compiler take several numbers at once. It may not do that by itself, because it cannot know that the order does not matter.
 
 const LANES: usize = 8;
 

@@ -1,7 +1,7 @@
 //! How a vertex's record follows from heights and its children's records: the one place that says so, for builds and for edits.
 //!
-//! `diamond` looks at every sample, `plane` is a triangle's plane over the samples, `padding` what the fold of padding does to triangles, `rules` puts error, radius and class together. All of it is
-//! arithmetic in a fixed order: whoever asks gets the same bits.
+//! `diamond` looks at every sample, `plane` is a triangle's plane over the samples, `padding` says how padding deforms triangles, `rules` puts error, radius and class together. All of it is
+//! arithmetic in a fixed order, so every caller gets the same bits.
 
 mod diamond;
 mod extremes;

@@ -1,4 +1,4 @@
-//! Triangles that the fold of padding deforms: how far the surface moves when their vertex is split.
+//! Triangles that padding deforms: how far the surface moves when their vertex is split.
 //!
 //! Where a diagonal edge crosses the data's border, its folded midpoint leaves the folded edge, so the two triangles of the
 //! diamond and their four children cover the same ground with differently placed edges. Both surfaces are piecewise

@@ -1,7 +1,7 @@
 //! The plane of a bin-tree triangle over the sample grid, and the largest distance of samples from it.
 //!
-//! Every sample's distance is computed from the triangle's own numbers in one fixed order of operations, whichever tile
-//! asks: tile size, memory budget and threads cannot change a bit of the result. On whole height codes all of
+//! Every sample's distance is computed from the triangle's own numbers in one fixed order of operations, whatever the tile.
+//! So tile size, memory budget and threads cannot change a bit of the result. On whole height codes all of
 //! it is exact.
 
 use super::larger;

@@ -1,7 +1,7 @@
 //! One vertex's record from its own error and its children's records: classes, saturated error, nested radius.
 //!
-//! The radius is computed from decoded heights and decoded child radii, and rounded up with a margin, so that nesting holds on what
-//! the file says and survives the rounding of the engine's arithmetic (FORMAT.md, section 3).
+//! The radius is computed from decoded heights and decoded radii of children, and rounded up with a margin. So nesting holds for the numbers in
+//! the file, and still holds after the rounding of the engine's arithmetic (FORMAT.md, section 3).
 
 use super::padding::{deviation, has_area};
 use super::{larger, smaller};

@@ -1,6 +1,6 @@
 //! The rows of height codes the build is working on: a window that slides north over the terrain, voids filled in.
 //!
-//! A void's height serves positions only. It is interpolated along its row between the nearest samples that have one; a row of
+//! A void's height is used for positions only. It is interpolated along its row between the nearest samples that have one; a row of
 //! nothing but voids repeats the row south of it, and shares its memory. Both depend on the data alone, so every band size gives the same fill.
 
 use super::spool::Spool;

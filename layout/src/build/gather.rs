@@ -1,6 +1,6 @@
 //! The records of the slots of one part of a page, from the rows in which they were made.
 //!
-//! The rows are looked up once a part. A part in an ocean, all inert, costs a look at the rectangle around it and makes no page.
+//! The rows are looked up once for each part. A part with nothing but inert records, as in an ocean, costs a look at the rectangle around it and makes no page.
 
 use super::levels::{LevelShape, Levels};
 use super::plan::{PagePart, block_bounds};

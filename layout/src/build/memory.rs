@@ -1,6 +1,6 @@
 //! How a build's memory budget is spent: the largest tile that fits, and whether the samples may stay in memory.
 //!
-//! An account of what grows with the terrain, somewhat on the safe side; `benches/runs` has what was measured.
+//! It estimates all that grows with the terrain, rather too high than too low. `benches/runs` has what was measured.
 
 use super::options::{BuildOptions, LARGEST_TILE};
 use crate::dem::SampleType;

@@ -1,9 +1,9 @@
-//! From a DEM to a terrain file, out of core: spool the samples, survey them, then work north in bands, computing error, radius and
-//! saturation bottom-up and writing pages as they fill.
+//! From a DEM to a terrain file, out of core. The samples are copied to a spool and surveyed. Then the build works north in bands: it computes error, radius and
+//! saturation from the bottom up and writes pages as they fill.
 //!
 //! The order of work: a row of tiles is scanned for own errors (`scan`); then every level, finest first, makes the records of the rows whose
-//! children and own errors are complete (`saturate`); then pages whose rows are complete are written (`writer`). Each level lags a little
-//! behind the one below, so a few rows a level are all that is held. Cost: one pass over the samples to spool them, one to survey, one to build.
+//! children and own errors are complete (`saturate`); then pages whose rows are complete are written (`writer`). Each level is a little
+//! behind the level below it, so a few rows of each level are all that is held. Cost: one pass over the samples to spool them, one to survey, one to build.
 //!
 //! Invariant: neither threads nor the memory budget change a byte of the file.
 
@@ -318,7 +318,7 @@ impl<'a, C: RecordCodec> State<'a, C> {
         own && codes && children
     }
 
-    /// Makes every row that can be made, writes every page that can be written, forgets what nobody needs.
+    /// Makes every row that can be made, writes every page that can be written, and drops what is no longer needed.
     fn advance(&mut self) -> Result<(), LayoutError> {
         for level in 0..self.grid.levels() {
             let shape = self.shapes[level as usize];

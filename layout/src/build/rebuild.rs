@@ -1,6 +1,6 @@
 //! A terrain built anew from its own heights: in its own scale, which must give the same records, or in one with room for other heights.
 //!
-//! The samples are read back from the records, so nothing is lost that the file had. Voids keep the heights they are filled with. Cost and memory are a build's.
+//! The samples are read back from the records, so nothing that the file held is lost. Voids keep the heights they are filled with. Cost and memory are those of a build.
 
 use super::spool::Spool;
 use super::survey::HeightCode;

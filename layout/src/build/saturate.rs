@@ -1,6 +1,6 @@
 //! The records of a row of vertices, from the rows of heights around it and its children's rows of records.
 //!
-//! Nearly all vertices lie away from borders and voids; a row of those is looked up once and worked through in one go. The others are made one by one.
+//! Nearly all vertices lie away from borders and voids. A row of these is looked up once and worked through as a whole. The others are made one by one.
 
 use super::band::Band;
 use super::levels::{LevelShape, Levels};

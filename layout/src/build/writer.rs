@@ -1,8 +1,8 @@
-//! Records into pages, pages into the file: gathers the parts of each planned page once their last row is known, then closes the gaps that
-//! all-void pages left and writes directory and header.
+//! Records into pages, pages into the file. The parts of each planned page are gathered once their last row is known. At the end the gaps that
+//! pages of nothing but voids left are closed, and directory and header are written.
 //!
-//! Pages are gathered in parallel and land at places fixed by the plan, so threads and order do not show in the bytes. Of an ocean no page is
-//! ever made.
+//! Pages are gathered in parallel and written to places fixed by the plan, so neither threads nor order change the bytes. No page is ever made
+//! for an ocean.
 
 use super::gather::gather;
 use super::levels::{LevelShape, Levels};
@@ -53,7 +53,7 @@ pub(super) fn page_queue() -> (SyncSender<PlacedPages>, Receiver<PlacedPages>) {
     sync_channel(1)
 }
 
-/// Writes pages as they arrive, until there will be no more: the work of a thread of its own, so that nobody waits for the disk.
+/// Writes pages as they arrive, until there are no more. It runs on a thread of its own, so that no other thread waits for the disk.
 pub(super) fn write_pages(
     file: &AtomicFile,
     disk: &dyn Disk,

@@ -1,8 +1,8 @@
 //! Terrain edited while it is flown over: heights of a region change, and the records of the region and its ancestors follow, exactly as if the file were built
 //! from the edited heights.
 //!
-//! An [`Edit`] turns old heights into new ones; an [`Editor`] makes records of them, in memory. Which records an edit reaches and why few of them are looked at is told in
-//! `update` and `farthest`. Based on the bottom-up update of Yang et al. for libMini ("dynamic tiled terrain", section 3), done for saturated error bounds and nested spheres.
+//! An [`Edit`] turns old heights into new ones; an [`Editor`] makes records of them, in memory. `update` and `farthest` say which records an edit reaches, and why only few of them have to be looked at.
+//! Based on: M. Liao, F. Xu, X. He, "Improvement on Dynamic Tiled Terrain Rendering Algorithm in libMini", section 3: the update from the bottom up, here for saturated error bounds and nested spheres.
 //!
 //! Voids stay voids and samples stay samples: edits pass over voids, whose filled-in heights stay as they are, so that no vertex changes its class.
 //!

@@ -2,14 +2,14 @@
 //!
 //! On Linux the bytes go to a file without a name, so that even a killed process leaves nothing behind; elsewhere, and on file
 //! systems without nameless files, to a temporary file beside the target that is removed when dropped.
-//! Publishing syncs the bytes, gives them the name in place of whatever had it, and syncs the folder: after that the new file is there whatever happens to the power.
+//! Publishing syncs the bytes, gives them the name in place of whatever had it, and syncs the folder. After that the new file is there even if the power fails.
 //!
 //! **What the name stood for stays.** A symbolic link goes on leading to the file, which is replaced where it really lies. The new file takes over the mode of the one it replaces, and its owner
 //! where the system allows that; a file that replaces none has the mode that the process gives new files. What is no regular file, such as a device, is not replaced. A terrain that somebody is
 //! writing to is not replaced either (`lock`), nor one that was edited after the new file was begun (`seen`).
 //!
 //! **A nameless file cannot replace another.** Where the target exists it gets a name of its own first, `.NAME.*.terrasoar-new`, and is renamed at once. A process killed between
-//! these two calls leaves a complete file of that name; whoever publishes to the same target later takes it away. What has a name before it is complete is on the list of [`unfinished`].
+//! these two calls leaves a complete file of that name; the next publication to the same target removes it. A file that has a name before it is complete is on the list of [`unfinished`].
 
 use super::disk::{Disk, SystemDisk};
 use super::lock::{ReplaceLock, WriteLock};

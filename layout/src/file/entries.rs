@@ -2,8 +2,8 @@
 //!
 //! On disk it has two levels, so that an edit rewrites one leaf and the root and a mostly void terrain has a small one. In memory it is flat.
 //!
-//! Cost: 12 bytes a logical page, of which the system gives only what is not void: entries of absent leaves are zeros that nobody writes. Without that a file of 1.7 MB, a
-//! void square of 2^16 steps in the largest records, would ask for 340 MB; of a file of 20 KB, 1.6 MB are the most.
+//! Cost: 12 bytes a logical page. The system gives memory only for leaves that are there, because entries of absent leaves are zeros that are never written. Otherwise a file of 1.7 MB, a
+//! void square of 2^16 steps in the largest records, would take 340 MB. A file of 20 KB takes 1.6 MB at most.
 
 mod uses;
 

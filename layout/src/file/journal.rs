@@ -1,6 +1,6 @@
 //! The journal of an edited file: one page a commit, each with the state that it led to and the commit before it (FORMAT.md, section 7).
 //!
-//! Nothing is ever written over, so every state that a file was in is still there; a journal page says where. Going back is a header that names an older state.
+//! Nothing is ever written over, so every state that a file was in is still there, and a journal page says where. To go back, a header is written that names an older state.
 
 use super::bytes::{
     PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64, put_f64, put_text, put_u16,

@@ -1,11 +1,11 @@
 //! One writer at a time: a lock on the terrain file itself, so that no other name of it, a link or another path, makes a second writer.
 //!
-//! Readers hold a shared lock on the whole file for as long as they have it open, and appending need not wait for them (FORMAT.md, section 7.4); so writers exclude each other on
-//! one byte far behind any file's end. **The lock belongs to the open file:** it ends with the process, however that ends, and leaves nothing behind; in a process that goes on it is given back by name,
-//! for a program that is being started at that moment has copies of all open files for a while. Nothing is made beside the file. Whoever replaces a file by a new one takes part: it asks for the same byte, shared with others who replace.
+//! Readers hold a shared lock on the whole file for as long as they have it open, and appending need not wait for them (FORMAT.md, section 7.4). So writers exclude each other by a lock on
+//! one byte far behind any file's end. **The lock belongs to the open file:** it ends with the process, however that ends, and leaves nothing behind. In a process that goes on it is given back explicitly,
+//! because a program that is being started at that moment has copies of all open files for a while. No file is made beside the terrain. Code that replaces a file by a new one takes part: it takes the same lock, shared with others that replace.
 //!
-//! Linux locks the byte (an open file description lock). On Windows a writer opens the file so that nobody else can open it for writing, and whoever replaces it so that nobody can
-//! who is not replacing it too. On other systems, macOS among them, whose such lock no safe function has, and on file systems without locks, nobody is kept out.
+//! Linux locks the byte (an open file description lock). On Windows a writer opens the file so that no other process can open it for writing; code that replaces it opens it so that only others that
+//! replace can. On other systems no other writer is kept out: macOS has such a lock, but no safe function for it. Nor is one kept out on file systems without locks.
 
 use crate::error::LayoutError;
 use std::fs::File;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// Times that a file may be replaced under its name while its lock is taken.
 const MOST_TRIES: u32 = 100;
 
-/// The right to write to a terrain file, and the file. Whoever has a clone has the right.
+/// The right to write to a terrain file, and the file. Each clone has the right too.
 #[derive(Debug, Clone)]
 pub(crate) struct WriteLock {
     locked: Arc<Locked>,

@@ -1,4 +1,4 @@
-//! The one way to the disk: how terrain files come to be, grow and are replaced, so that nothing told as durable is lost and nothing of others is harmed.
+//! The one way to the disk: how terrain files are made, grow and are replaced. Nothing that was reported as durable is lost, and no other program's file is harmed.
 //!
 //! * [`atomic`]: a new file appears under its name only when it is complete, keeps what the name stood for (a link, a mode, an owner), and its name is on the disk too.
 //! * `lock`: one writer at a time, by a lock on the file itself, whatever name it is reached by.
@@ -7,8 +7,8 @@
 //! * `journal`: what commits led to and what was before them.
 //! * `slots`: which of a file's two headers counts.
 //! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
-//! * `publish`: a terrain file that does not open is not published; `seen`: nor is one put in the place of a terrain that was edited meanwhile.
-//! * `opening`: pipes are not waited for.
+//! * `publish`: a terrain file that does not open is not published; `seen`: a terrain that was edited meanwhile is not replaced.
+//! * `opening`: opening a pipe does not wait.
 
 #[cfg(feature = "files")]
 pub mod atomic;

@@ -1,4 +1,4 @@
-//! Opens what a name leads to without waiting for it: a pipe whose other end nobody has would keep whoever opens it for ever. What it is can be asked once it is open.
+//! Opens what a name leads to without waiting. Opening a pipe whose other end is not open would otherwise wait for ever. What kind of file it is can be asked once it is open.
 
 use std::fs::OpenOptions;
 

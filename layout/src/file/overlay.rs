@@ -1,4 +1,4 @@
-//! Edits in a file of their own beside a terrain that stays as it is: what would be written behind the terrain's end is written to the overlay instead (FORMAT.md, section 7.3).
+//! Edits in a file of their own, beside a terrain that stays as it is. What would be written behind the terrain's end is written to the overlay instead (FORMAT.md, section 7.3).
 //!
 //! Page numbers and offsets in an overlay go on where those of the base end, so that both read as one file; only the header slots are the overlay's own. It names
 //! the state of the base that it belongs to, and is refused with any other.

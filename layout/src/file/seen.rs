@@ -1,7 +1,7 @@
 //! What a terrain file was when it was decided to replace it.
 //!
-//! Whoever makes a file for minutes, and replaces another by it, has looked at the other one first. Edits that were committed to it meanwhile were told as durable: they must not be lost.
-//! So the header pages, which every commit changes, are kept and compared at the end. Of other files nothing is kept. Cost: two pages.
+//! Making a file may take minutes, and the decision to replace another by it is made before. Edits that were committed to the other meanwhile were reported as durable, and must not be lost.
+//! So its header pages, which every commit changes, are kept and compared at the end. Of files that are no terrain nothing is kept. Cost: two pages.
 
 use super::bytes::PAGE_BYTES;
 use super::header::MAGIC;

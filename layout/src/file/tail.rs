@@ -1,9 +1,9 @@
-//! The end of a file that grows while others read it: what is written behind everything that a header leads to, and the header that makes it count (FORMAT.md, sections 7.1 and 8.5).
+//! The end of a file that grows while others read it: new bytes behind everything that a header leads to, and the header that makes them count (FORMAT.md, sections 7.1 and 8.5).
 //!
-//! The order is always the same: the new bytes, a sync, a look whether the file still has its name, the header slot that is not current, a sync. Nothing that a header
-//! leads or led to is written over. Killed or cut off anywhere, the file holds what it held before or all of the new.
+//! The order is always the same: the new bytes, a sync, a check that the file still has its name, the header slot that is not current, a sync. Nothing that a header
+//! leads or led to is written over. Wherever this is cut off, the file holds what it held before, or all that is new.
 //!
-//! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers it, so that the next write goes behind what that header counts and takes the generation after its.
+//! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers such a header, so that the next write goes behind what it counts and takes the next generation.
 
 use super::bytes::{PAGE_BYTES, Page};
 use super::disk::Disk;
@@ -40,7 +40,7 @@ impl Attempted {
     }
 }
 
-/// How far a header came. Whoever ordered the write keeps a clone, to know what may be on the disk if nobody comes back.
+/// How far the writing of a header came. The code that ordered the write keeps a clone, to know what may be on the disk if the write does not return.
 #[derive(Debug)]
 pub(crate) struct Attempt {
     generation: u32,
@@ -97,7 +97,7 @@ impl Tail {
         Self::new(path, TailFile::Live(lock.clone()), start, slots, attempted)
     }
 
-    /// The end of a file that nobody else knows of, because it is not published yet.
+    /// The end of a file that no other program knows of, because it is not published yet.
     pub(crate) fn of_new(path: &Path, file: &File, slots: &Slots) -> Result<Self, LayoutError> {
         let file =
             file.try_clone().map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
@@ -163,7 +163,7 @@ impl Tail {
             .map_err(|e| LayoutError::write(&self.path, "cannot append to the file", when_full, e))
     }
 
-    /// Brings the file to the disk, if anybody could miss it.
+    /// Syncs the file to the disk, if it is published.
     fn sync(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
         match &self.file {
             TailFile::New(_) => Ok(()),

@@ -1,12 +1,12 @@
-//! The square grid under the terrain: 2^k + 1 samples a side, vertex levels, and the fold that
-//! brings padding back onto the data.
+//! The square grid under the terrain: 2^k + 1 samples a side, vertex levels, and the fold, which
+//! moves padding back onto the data.
 //!
 //! Column x runs east, row y runs north, sample (0, 0) is the south-west corner of the data. A DEM of
 //! any rectangle lies in the south-west of the square; a padding sample has the whole position
 //! (x, y and height) of the nearest data sample. Triangles wholly beyond the data thereby lose their
 //! area, and what remains covers the data exactly.
 //!
-//! Invariant: [`Grid::new`] is the only way in, so `k` is 1..=16 and both sample counts fit the square.
+//! Invariant: only [`Grid::new`] makes a grid, so `k` is 1..=16 and both sample counts fit the square.
 
 pub(crate) mod octave;
 pub mod order;

@@ -1,4 +1,4 @@
-//! Logarithmic tables that every machine computes bit for bit alike.
+//! Logarithmic tables that are bit for bit the same on every machine.
 //!
 //! `2^(1/steps)` comes from repeated square roots and the powers from repeated multiplication, both exactly rounded by
 //! IEEE 754, where `exp2` may differ in the last bit from one C library to another. Cost: a lookup to decode, a lookup and

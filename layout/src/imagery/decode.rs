@@ -1,4 +1,4 @@
-//! Tiles as plain RGBA, for devices that know no block compression and for tests. Blocks are decoded by bcdec_rs.
+//! Tiles as plain RGBA, for devices without block compression and for tests. Blocks are decoded by bcdec_rs.
 
 use super::encode::BlockTexels;
 use super::shape::{TILE_TEXELS, TileFormat};

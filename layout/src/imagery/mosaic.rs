@@ -1,6 +1,6 @@
-//! Several images as one picture: the smallest rectangle of texels around them, those later in the list above those before.
+//! Several images as one picture: the smallest rectangle of texels around them. Later images in the list lie above earlier ones.
 //!
-//! Images of a mosaic have one texel size and lie on one grid of texels; resampling is gdalwarp's business. Where no image is, the picture is
+//! Images of a mosaic have one texel size and lie on one grid of texels. Others must be resampled first, for example by gdalwarp. Where no image is, the picture is
 //! transparent. Cost: a copy of the rows.
 
 use super::place::{Extent, Place, PlaceOrigin, place};

@@ -1,7 +1,7 @@
 //! Where an image lies on a terrain: from both georeferences, from a stated extent, or over the whole terrain if neither is known.
 //!
-//! The terrain's metres are multiples of its sample spacing, so the way from an image's texel is: texel, coordinate of the reference system, sample, metre. What
-//! comes out is upright and unrotated or refused, for tiles are.
+//! The terrain's metres are multiples of its sample spacing, so the way from an image's texel is: texel, coordinate of the reference system, sample, metre. Tiles
+//! are upright and unrotated, so an image that is not is refused.
 
 use super::section::is_place;
 use super::source::ImageSource;

@@ -1,7 +1,7 @@
 //! The image on its way from rows to tiles: a few hundred rows of each level, from north to south.
 //!
 //! A level's texel is the mean of the (at most) four below it, in linear light and weighted by alpha. Levels keep the rows that the tile row
-//! under way needs, border included; a tile row leaves once its southernmost row is there. Nothing is written and read
+//! under way needs, border included. A tile row is finished once its southernmost row is there. Nothing is written and read
 //! again. Memory: 576 rows a level, 12 bytes a texel of level 0's width for all of them together.
 //!
 //! Invariant: rows of a level arrive once each, in descending order; a tile is cut only when every row it repeats has arrived.

@@ -1,7 +1,7 @@
 //! The section's first page and its directory as bytes: FORMAT.md, section 8, field by field.
 //!
 //! Invariant: a [`Section`] that [`Section::parse`] returned has every field in range, consistent with the others, and a directory that lies
-//! in the section, so whoever reads it allocates no more than the file has.
+//! in the section. So reading it allocates no more than the file holds.
 
 use super::shape::{BORDER_TEXELS, ImageryShape, MAX_TEXELS, TILE_TEXELS, TileFormat, TileId};
 use crate::error::LayoutError;

@@ -1,7 +1,7 @@
-//! What images say about themselves and how their texels arrive: rows from north to south, as red, green, blue, alpha.
+//! What images say about themselves, and how their texels arrive: rows from north to south, as red, green, blue, alpha.
 //!
-//! Every format here is stored that way or in tiles that are, so a reader holds a few rows, or one row of tiles, and no image as a whole. The one
-//! exception is JPEG, which says so.
+//! Formats are stored in that order, or in tiles that are. So a reader holds a few rows, or one row of tiles. The one
+//! exception is JPEG, which is held as a whole; its reader says so.
 
 use crate::dem::Georeference;
 use crate::error::LayoutError;

@@ -1,4 +1,4 @@
-//! The records of a mapped terrain with pages of it replaced: what engines fly over that need all records at hand while the ground is edited.
+//! The records of a mapped terrain with some of its pages replaced. Engines that need all records fly over this while the ground is edited.
 //!
 //! Pages are the file's until they are installed, and then this store's own. Cost over [`Records`]: a branch a record, and 4 bytes a logical page.
 

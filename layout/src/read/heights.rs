@@ -1,6 +1,6 @@
-//! Heights at places: bilinear between the four samples around, of checked pages, few of which are kept.
+//! Heights at places: bilinear between the four samples around. Pages are checked, and a few of them are kept.
 //!
-//! A place needs up to four pages, for neighbours of different levels lie apart. [`Heights`] keeps pages by number, so places that come near each other cost a page once. [`heights_m`] puts any
+//! A place needs up to four pages, because neighbours of different levels lie apart in the file. [`Heights`] keeps pages by number, so places near each other read a page once. [`heights_m`] puts any
 //! number of places into such an order first and shares them out to threads. Cost: some tens of nanoseconds a sample whose page is kept; else a read of 4 KiB and its checksum.
 
 use super::terrain::Terrain;

@@ -1,4 +1,4 @@
-//! The three kinds of records as one: what a terrain's records and pools are, whichever kind its file has.
+//! The three kinds of records behind one type: a terrain's records and pools, whichever kind its file has.
 
 use super::pool::PagePool;
 use super::records::{Records, Slices};

@@ -1,6 +1,6 @@
-//! A terrain file opened: [`terrain`], and from a slot to a vertex by [`records`] that are mapped or a [`pool`] of pages that are read.
+//! An opened terrain file: [`terrain`]. The way from a slot to a vertex goes through mapped [`records`], or through a [`pool`] of pages that are read.
 //!
-//! Engines are written for [`store`], which is all of these.
+//! Engines are written for the trait in [`store`], which all of these have.
 
 pub mod edited;
 pub mod heights;

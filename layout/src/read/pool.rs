@@ -1,10 +1,10 @@
 //! The resident pool: pages of a terrain file in memory of a fixed size, for terrains larger than memory.
 //!
-//! The pool reads nothing. Whoever loads pages ([`Loader`](super::loader::Loader)) hands them over between two frames; a frame then finds a record or hears that its
-//! page is away, and never waits. Since nothing is mapped, a file that shrinks or a disk that fails cannot raise a signal here.
+//! The pool reads nothing. A [`Loader`](super::loader::Loader) loads pages, which are put into the pool between two frames. A frame then finds a record or is told that its
+//! page is not there, and never waits. Since nothing is mapped, a file that shrinks or a disk that fails cannot raise a signal here.
 //!
-//! Invariants: at most the stated number of bytes holds pages, whatever the system's own cache does; the inert page and page 0 stay. A full
-//! pool gives up a page that was not read since the last round of the hand (second chance, after F. Corbato, "A Paging Experiment with the Multics
+//! Invariants: pages take at most the stated number of bytes, whatever the system's own cache does. The inert page and page 0 stay. A full
+//! pool drops a page that was not read since the last round of the hand (second chance, after F. Corbato, "A Paging Experiment with the Multics
 //! System", 1968). Cost: 4 bytes a logical page of the file, a load more than a mapped file a record.
 
 use super::prefetch::prefetch;

@@ -1,4 +1,4 @@
-//! Asking memory for what will be needed soon. A hint: nothing depends on it but time.
+//! Asks the processor to bring memory that will be needed soon. It is a hint: only times depend on it.
 
 /// Asks for the cache line that element `index` of `slice` begins in. An index past the end asks for nothing.
 #[inline(always)]

@@ -1,7 +1,7 @@
-//! What refinement reads records from: all of a file, or what is at hand of it.
+//! What refinement reads records from: all of a file, or the part of it that is in memory.
 //!
 //! [`Records`](super::records::Records) lends every record of a mapped file, [`EditedRecords`](super::edited::EditedRecords) those of one that is edited meanwhile; [`PagePool`](super::pool::PagePool) holds some pages of a file of any size and
-//! says which it lacks. An engine written for the trait flies over both; where all records are at hand, what it does about absent ones compiles to nothing.
+//! says which it lacks. An engine written for the trait flies over all of them. Where all records are there, its code for absent ones compiles to nothing.
 
 use crate::file::bytes::PAGE_BYTES;
 use crate::grid::order::slot_of;

@@ -1,6 +1,6 @@
 //! An opened terrain file: checked header and directory over a source, and the way from a slot to a vertex.
 //!
-//! [`Terrain`] owns the source and knows what the header knows. [`Records`](super::records::Records) is what refinement holds.
+//! [`Terrain`] owns the source and has the header. Refinement holds [`Records`](super::records::Records).
 //!
 //! Invariant: every page number in the table lies inside the source as it was when it was opened.
 

@@ -1,4 +1,4 @@
-//! Everything that this crate does with a file, done to one that may hold nonsense: each part works or says why not, and what it makes is in proportion to what it was given.
+//! Everything that this crate does with a file, done to one that may hold nonsense. Each part works or says why not, and what it makes is in proportion to what it was given.
 
 use super::sealed::Sealed;
 use crate::edit::{

@@ -1,6 +1,6 @@
 //! One change of a file, told by eight bytes: which kind, which part, where in it, which value. Values are mostly those at which arithmetic goes wrong.
 //!
-//! A change that finds no part to work on changes nothing.
+//! A change whose part is not in the file changes nothing.
 
 use super::image::Image;
 use super::parts::{Part, What};

@@ -1,4 +1,4 @@
-//! Where the parts of a file lie, as far as its header slots and its journal lead to them. Whatever leads nowhere is left out.
+//! Where the parts of a file lie, as far as its header slots and its journal lead to them. Links that lead nowhere are left out.
 
 use super::image::{Image, JOURNAL_MAGIC, SECTION_MAGIC};
 use crate::file::bytes::{PAGE_BYTES, get_u32};

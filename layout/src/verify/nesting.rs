@@ -1,9 +1,9 @@
 //! What records promise of one another: nested errors and radii, classes, folded padding, heights in the range stated, voids counted.
 //!
 //! Parents and children lie together within each level, so a task that walks neighbouring pages finds nearly every child in a small
-//! cache of pages. Pages that failed their checksum are left out, as are the relations that reach into them: their problem is known.
-//! Absent pages are not walked, however many: a vertex in a present page looks up as well as down where its parents' page is absent,
-//! and the count of heights shows whether samples got lost in one. Cost: four children a vertex, about 0.2 microseconds.
+//! cache of pages. Pages that failed their checksum are left out, and so are relations that reach into them: their problem is known already.
+//! Absent pages are not walked, however many there are. Where the page of a vertex's parents is absent, the vertex looks up as well as down,
+//! and the count of heights shows whether samples got lost in an absent page. Cost: four children a vertex, about 0.2 microseconds.
 
 use super::{Findings, TASK_PAGES, record_page};
 use crate::error::LayoutError;

@@ -1,8 +1,8 @@
-//! Older and newer states of an edited file, down to the pages that they alone lead to.
+//! Older and newer states of an edited file, down to the pages that only they lead to.
 //!
-//! States share most of what they are made of, so each is looked at by what differs from the one looked at before: leaves are read where the root names another, record pages
-//! and tiles once, however many states have them. What writers make lies nowhere over anything else, so that all of it together is no longer than the file; more is
-//! refused, lest a small file keep a reader busy for long. Cost: a read of what the file holds besides its current state, 24 bytes a record page or tile read, and what
+//! States share most of their pages. So of each only what differs from the state looked at before is read: leaves where the root names another one, record pages
+//! and tiles once, however many states have them. Nothing that writers make overlaps, so all of it together is no longer than the file. A file that claims more is
+//! refused; otherwise a small file could keep a reader busy for long. Cost: a read of what the file holds besides its current state, 24 bytes a record page or tile read, and what
 //! opening takes.
 
 use super::Findings;

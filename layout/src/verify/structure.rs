@@ -1,4 +1,4 @@
-//! What the directory says besides page numbers: which generation wrote each page, and nothing at all of absent ones; and whether the header agrees with itself on voids.
+//! What the directory says besides page numbers: which generation wrote each page, and that entries of absent pages are empty. It also checks whether the header's numbers of voids agree.
 //!
 //! Opening has checked checksums of root and leaves, that every page lies in the file, and that none has two uses. Cost: a look at each entry.
 

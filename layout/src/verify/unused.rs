@@ -1,4 +1,4 @@
-//! How much of a file nothing leads to: pages that edits and imagery replaced (FORMAT.md, sections 7 and 8).
+//! How much of a file is not used: pages that edits and imagery replaced (FORMAT.md, sections 7 and 8).
 
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, to_usize};
@@ -7,7 +7,7 @@ use crate::imagery::Imagery;
 use crate::read::terrain::Terrain;
 
 /// Bytes of the file that neither header, directory nor imagery lead to, bytes behind its counted end included: what undoing and redoing would need, if the file was
-/// edited, and what nobody needs any more. Reads the directory's root and that of the imagery.
+/// edited, and what is no longer needed. Reads the directory's root and that of the imagery.
 ///
 /// # Errors
 /// I/O.

@@ -1,7 +1,7 @@
 //! The two buffers of the mesh, and the scatter that writes patches into them.
 //!
 //! A patch goes to the device as one block of (slot, content) entries, and a compute shader puts each in its place:
-//! one upload and two dispatches, however scattered the slots are, where a copy a run would be thousands.
+//! one upload and two dispatches, however scattered the slots are. One copy for each run of slots would be thousands of copies.
 //! Buffers grow by half, within the device, and never shrink. Cost on the processor: sorting and copying the patch.
 
 use wgpu::util::DeviceExt;

@@ -1,7 +1,7 @@
 //! The mesh as it comes from the caller: changes since the last frame, in slots.
 //!
 //! Vertices and triangles live in slots of two buffers on the device. A patch rewrites some slots and says which
-//! triangle slots are visible; everything else stays where it is. So what is uploaded follows what changed.
+//! triangle slots are visible; everything else stays where it is. So only what changed is uploaded.
 
 mod buffers;
 mod draws;

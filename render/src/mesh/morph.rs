@@ -1,6 +1,6 @@
-//! Heights of vertices on their way: computed for all slots before a frame, a few steps of one fetch each.
+//! Heights of vertices that are moving into place. They are computed for all slots before a frame, in a few steps of one fetch each.
 //!
-//! In the vertex shader the same would follow every vertex's ends and theirs again and again; here each height is
+//! A vertex shader would have to follow every vertex's ends, and the ends of these, again and again. Here each height is
 //! computed once. Cost on the device: 12 bytes a vertex slot, and [`STEPS`] + 1 passes over them.
 
 use crate::mesh::MeshBuffers;

@@ -1,4 +1,4 @@
-//! A patch as words for the device: slots ascending, each once, so that the scatter has no two writers of one place
+//! A patch as words for the device: slots ascending, each once, so that no two threads of the scatter write to one place
 //! and neighbours in memory are neighbours in the list.
 //!
 //! Cost: sorting the patch, unless it came sorted. Keeps its arrays.

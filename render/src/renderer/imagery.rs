@@ -1,4 +1,4 @@
-//! The image on the terrain: what a caller sets, is asked for and gives.
+//! The image on the terrain: the calls that set it, that tell which tiles are needed, and that give them.
 
 use super::Renderer;
 use crate::error::{RenderError, Result};

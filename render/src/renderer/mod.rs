@@ -1,6 +1,6 @@
-//! From patches to a frame: the one place that orders commands.
+//! From patches to a frame: the one place that decides the order of commands.
 //!
-//! A renderer holds device memory and nothing that the caller does not have: after the loss of a device it is made anew and
+//! A renderer holds nothing but device memory, and the caller has all that is in it. So after the loss of a device it is made anew and
 //! given one patch with the whole mesh and the tiles it then asks for. Cost of a frame on the processor: the patch,
 //! one block of uniforms, a handful of commands and one draw a visible range (or one for all of them).
 

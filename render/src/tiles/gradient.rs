@@ -1,6 +1,6 @@
 //! Content for shading: the slope of the ground east and north, as two half-precision numbers.
 //!
-//! Slopes instead of normals, because exaggeration then is a factor and filtering stays linear. Each of the
+//! They are slopes and not normals, because then exaggeration is a factor and filtering is linear. Each of the
 //! `TILE_CELLS + 1` squared grid points of a tile has the central difference of its neighbours, so neighbouring tiles
 //! agree on their common edge and bilinear filtering never looks outside.
 

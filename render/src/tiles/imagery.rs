@@ -3,9 +3,9 @@
 //! Unlike slopes, which lie on the grid's points, texels are areas and the image has a place and a texel size of its own. Tiles carry a
 //! border, so that a filter as wide as [`BORDER_TEXELS`](terrasoar_layout::imagery::BORDER_TEXELS) needs one tile alone and there is no seam.
 //!
-//! What is filtered fades into the ground below without a fringe where colours are multiplied by alpha, in linear light. Transparent texels
-//! of BC1 are black, so they are; RGBA8 is multiplied on its way to the device, for which opaque tiles cost a look;
-//! BC7 can only be multiplied when it has been filtered.
+//! Filtered colours fade into the ground below without a fringe if they are multiplied by alpha, in linear light. Transparent texels
+//! of BC1 are black, so these are multiplied already. RGBA8 is multiplied on its way to the device; opaque tiles are only checked.
+//! BC7 can only be multiplied after it has been filtered.
 
 use std::borrow::Cow;
 use std::collections::HashSet;

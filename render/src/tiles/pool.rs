@@ -1,6 +1,6 @@
 //! Layers of an array texture, and the page table that says what is in them.
 //!
-//! Knows bytes a texel block, not their meaning. An upload is one texture write and one or two texels of the
+//! It knows how many bytes a block of texels has, and not what they mean. An upload is one texture write and one or two texels of the
 //! page table; nothing else moves.
 
 use super::{Pyramid, Residency};

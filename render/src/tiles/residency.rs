@@ -2,8 +2,8 @@
 //!
 //! Least recently wanted goes first. A tile wanted by the current view is never put out, nor is the coarsest level ever; so what comes in one
 //! frame stays for as long as it is wanted, and a budget too small for the view leaves its fine tiles out instead of exchanging
-//! them without end. Whatever stands in for a missing tile is wanted itself, so it stays too. Tiles that a view ahead will want come second: they take
-//! the place of what neither view wants, and no more room than the current view leaves. Cost: a hash lookup
+//! them without end. A coarser tile that is used in place of a missing one counts as wanted, so it stays too. Tiles that a view ahead will want come second: they take
+//! the place of tiles that neither view wants, and only room that the current view leaves. Cost: a hash lookup
 //! a wanted tile; an insertion into a full pool looks at all layers.
 
 use std::collections::{HashMap, HashSet};

@@ -1,8 +1,8 @@
 //! The terrain-following flight: a smooth closed path over the ground at a clearance.
 //!
 //! The path is an oval with three bulges, tabulated by length. Over each entry the height is the highest ground
-//! for a way ahead and behind, then averaged over the same way: an average of maxima that all include the entry
-//! is never below it, so the profile is smooth and keeps the clearance. Void ground has the height before it.
+//! for a way ahead and behind, then averaged over the same way. Each of the averaged maxima includes the entry, so their
+//! average is never below it: the profile is smooth and keeps the clearance. Over a void the last height before it counts.
 
 use super::{FlightPlan, Ground, Pose, Stage};
 

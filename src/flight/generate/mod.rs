@@ -1,6 +1,6 @@
 //! Flights made over a terrain: straight, orbit, terrain-following and turning.
 //!
-//! Every frame is a closed formula of its number, so nothing drifts however long the flight. **The eye stays over
+//! Every frame follows from its number by a formula, so nothing drifts however long the flight is. **The eye stays over
 //! the terrain in every flight.** A frame costs a few sines; the terrain-following flight reads 16,384 heights
 //! first and one a frame.
 

@@ -1,6 +1,6 @@
 //! A terrain file as the ground that flights are made over.
 //!
-//! The ground's interface knows no failure; the first one is kept and asked for when the flight is made.
+//! The interface of the ground has no errors. So the first error is kept here, and asked for when the flight has been made.
 
 use super::Ground;
 use std::cell::RefCell;

@@ -1,7 +1,7 @@
 //! The turning flight: constant speed, constant turn.
 //!
 //! Steps of equal length whose heading turns by the same angle add up to the chord of a circle, so frame i is at
-//! `speed * sin(i rate / 2) / sin(rate / 2)` from the start, in the heading halfway: no sum, no drift, and no
+//! `speed * sin(i rate / 2) / sin(rate / 2)` from the start, in the heading halfway. So there is no sum, no drift, and no
 //! difference of large numbers when the circle is wide.
 
 use super::straight::PITCH_DEG;

@@ -1,4 +1,4 @@
-//! How arrays grow and lists shrink, so that what is held follows the mesh and not the largest frame ever.
+//! How arrays grow and lists shrink, so that memory follows the present mesh and not the largest there ever was.
 
 /// Lists below this many bytes are left as they are.
 const SMALL_BYTES: usize = 32 << 10;

@@ -1,17 +1,17 @@
-//! Kinetic: refinement whose cost follows the change, not the mesh.
+//! Kinetic: refinement that costs what changes, not what the mesh holds.
 //!
 //! The mesh of the frame before is kept. Every vertex in it has a live-range word, a certificate of how long its status holds
 //! (`certificate`), and lies in a queue by the tick at which that ends (`queue`, `clocks`). A frame takes the words that are over, tests their
-//! vertices again and splits or merges those whose status has changed (`tree`); nothing else is looked at. Triangles and vertices
-//! keep their slots (`pages`, `vertices`), so what changed is a short [`Patch`].
+//! vertices again and splits or merges those whose status has changed (`tree`). Nothing else is looked at. Triangles and vertices
+//! keep their slots (`clusters`, `vertices`), so what changed is a short [`Patch`].
 //!
 //! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART" (live ranges, the bin-tree array); P. Lindstrom, V. Pascucci, "Visualization of Large Terrains Made
 //! Easy", IEEE Visualization 2001 (the mesh, which is SOAR's in every frame); J. Basch, L. Guibas, J. Hershberger, "Data Structures for Mobile Data",
 //! SODA 1997 (certificates that fail one by one).
 //!
-//! One word a vertex serves both its triangles. That mesh and words agree needs no bookkeeping: errors and radii are saturated, so an active vertex's
-//! parents are active in the same frame; splits go from coarse to fine, merges from fine to coarse. Where a word is late, because a
-//! [`Budget`] ran out, its vertex stays as it is, and no vertex is split before its parents: the mesh conforms whatever is late.
+//! A vertex has one word for both its triangles. Mesh and words agree without any bookkeeping: errors and radii are saturated, so an active vertex's
+//! parents are active in the same frame; splits go from coarse to fine, merges from fine to coarse. Where a
+//! [`Budget`] runs out, a word is late and its vertex stays as it is. No vertex is split before its parents, so the mesh has no cracks whatever is late.
 //!
 //! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
 

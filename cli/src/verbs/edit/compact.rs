@@ -1,4 +1,4 @@
-//! `terrasoar compact`: a file without what edits left behind.
+//! `terrasoar compact`: a terrain file written anew, without what edits left behind.
 
 use crate::verbs::WrongUsage;
 use crate::verbs::output::{grouped, print, print_json};

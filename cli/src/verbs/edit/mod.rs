@@ -15,7 +15,7 @@ use work::{Target, Work};
 
 /// Change the ground of a terrain file by a script of edits.
 ///
-/// A script (src/edits/EDITS.md) has craters, brushes, stamps of other elevation data, and areas set to a height or back to the one they were built with. Each of its
+/// A script of edits (EDITS.md in the repository specifies it) has craters, brushes, stamps of other elevation data, and areas set to a height or back to the one they were built with. Each of its
 /// batches is applied whole or not at all and becomes durable before the next; `terrasoar undo` takes it back. Programs that have the file open go on reading it as
 /// it was. With --overlay, the edits go to a file of their own and the terrain is not touched. Heights that the file's records cannot hold make it rewrite the file with
 /// room for them, which ends its history; it says so. Where a picture is draped, craters scorch it, in the same commits.

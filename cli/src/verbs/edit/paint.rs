@@ -1,4 +1,4 @@
-//! What edits do to the picture over the ground: craters scorch it, restored ground has its old picture again.
+//! What edits do to the picture over the ground: craters scorch it, and restored ground gets its old picture back.
 
 use terrasoar_layout::edit::{Area, Edit};
 use terrasoar_layout::grid::Grid;

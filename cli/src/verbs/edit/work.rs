@@ -1,4 +1,4 @@
-//! Batches applied to a file, one durable commit each, or in memory only; the file rewritten with more room where it must be.
+//! Batches applied to a file, one durable commit each, or in memory only. Where heights need more room, the file is rewritten.
 
 use super::paint::paints_of;
 use crate::verbs::output::{complain, decimal, grouped};

@@ -1,6 +1,6 @@
-//! Heights at the places of a table, row by row as they came, in batches whose places are looked up together.
+//! Heights at the places of a table, in the order of its rows. Places are looked up in batches.
 //!
-//! A batch is a million rows or 64 MiB of their text, so that places that lie near each other cost a page once. Cost a row: reading and writing it, a projection where the system is
+//! A batch is a million rows or 64 MiB of their text, so that a page is read once for all places on it. Cost a row: reading and writing it, a projection where the system is
 //! another, and `heights_m`.
 
 use super::table::Table;

@@ -1,6 +1,6 @@
 //! A table of places: which sign separates its columns, which columns are the place, and its rows one after the other.
 //!
-//! Nothing is asked of a table but that each row has as many fields as the first. Fields stay as they are. **Memory is bounded whatever the file is**: a row longer than a
+//! A table only has to have as many fields in each row as in the first. Fields stay as they are. **Memory is bounded whatever the file is**: a row longer than a
 //! mebibyte, such as an open quotation mark makes, is refused. Cost: crate `csv`'s one pass.
 
 use anyhow::{Context, Result, anyhow, bail};

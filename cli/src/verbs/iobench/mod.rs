@@ -22,7 +22,7 @@ use terrasoar_layout::file::bytes::PAGE_BYTES;
 /// Measure how much of a file a flight touches, by engine and layout.
 ///
 /// Counts, which repeat: the records that each frame reads, the pages they lie on, and those of them that a page cache of the stated size does not hold when they are
-/// needed. Measured, cold and warm: update times, page faults and bytes read over the file itself. The row mesh is all that a frame's mesh needs, whoever has it in memory already.
+/// needed. Measured, cold and warm: update times, page faults and bytes read over the file itself. The row mesh is all that a frame's mesh needs, even if the engine has it in memory.
 /// Rows whose source is pool fly kinetic at a steady pace over pages that threads read into --cache of memory: no frame waits, and what came too late is told.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\

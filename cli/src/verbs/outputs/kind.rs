@@ -1,4 +1,4 @@
-//! What verbs write, and whether what is there could be one of it.
+//! What verbs write, and whether a file that is there could be of that kind.
 
 use super::there::{named, start_of, terrain};
 use std::io;

@@ -1,8 +1,8 @@
 //! What may be replaced: the rule for everything that a verb writes under a name that the user gave.
 //!
-//! **No verb replaces a file that it could not have made, nor a terrain that holds edits or a picture, unless `--force` is given**; the message says what would be lost. What a file is
-//! is judged by what is in it, never by its name, and where the name is a link, by what it leads to. Devices, pipes, sockets and folders are never replaced, and neither is an input. An empty
-//! file is nobody's. This is asked before any work is done. Cost: the start of a file is read; a terrain file is opened.
+//! **No verb replaces a file that it could not have made, nor a terrain that holds edits or a picture, unless `--force` is given**; the message says what would be lost. The kind of a file
+//! is judged by its content, never by its name; where the name is a link, by the file it leads to. Devices, pipes, sockets and folders are never replaced, and neither is an input. An empty
+//! file may be replaced. All this is checked before any work is done. Cost: the start of a file is read; a terrain file is opened.
 
 mod kind;
 mod there;

@@ -1,4 +1,4 @@
-//! What a file is that is there already, in words.
+//! What kind of file is there already, in words.
 
 use crate::verbs::output::grouped;
 use std::fs::File;
@@ -10,7 +10,7 @@ use terrasoar_layout::file::header;
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::read::terrain::Terrain;
 
-/// The first bytes of a file, as many as anybody needs.
+/// The first bytes of a file, enough to know its kind.
 pub(super) fn start_of(path: &Path) -> io::Result<Vec<u8>> {
     let mut start = Vec::new();
     File::open(path)?.take(START_BYTES as u64).read_to_end(&mut start)?;

@@ -1,4 +1,4 @@
-//! The way from one camera to another, by the clock: it starts and ends slowly and rises in between, over what may lie on the way.
+//! The way from one camera to another. It starts and ends slowly, and rises in between, over ground that may lie on the way.
 //!
 //! The camera is a function of the time passed, so the way is the same at any frame rate.
 

@@ -1,6 +1,6 @@
 //! Where the eye is and how it moves: plain numbers, no window.
 //!
-//! A [`Rig`] takes what is held and dragged ([`Controls`]) and a span of time, and moves its [`Camera`]. Speeds are approached by exact
+//! A [`Rig`] takes the keys held and the mouse's movement ([`Controls`]) and a span of time, and moves its [`Camera`]. Speeds are approached by exact
 //! integration, so **the way does not depend on the frame rate**, and **the eye is never nearer to the ground below it than
 //! [`CLEARANCE_M`]**, heights exaggerated. Angles are kept in degrees, as flight files have them, so that a recorded view is the view that
 //! was seen, bit by bit. Cost: one height a step.

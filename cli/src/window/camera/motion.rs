@@ -1,4 +1,4 @@
-//! A speed that is approached, not taken: starting and stopping without a jerk.
+//! A speed that changes gradually, so that the eye starts and stops without a jerk.
 //!
 //! The difference to the wanted velocity decays with a time constant, and the way is its exact integral, so two half steps are one step.
 

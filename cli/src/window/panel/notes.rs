@@ -1,6 +1,6 @@
-//! What has to be said: where a file went, what went wrong, how a build gets on.
+//! Notes: where a file was written, what went wrong, how far a build has come.
 //!
-//! News goes by itself after a while; what went wrong stays until it is read.
+//! News disappears by itself after a while. Errors stay until they are closed.
 
 use super::{Facts, Wish};
 use crate::window::overlay::PANEL;

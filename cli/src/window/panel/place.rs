@@ -1,4 +1,4 @@
-//! Where one is, and where one wants to be.
+//! Where the eye is, and coordinates to go to.
 
 use super::{Facts, Memory, Wish, button, length};
 use crate::window::keys::Action;

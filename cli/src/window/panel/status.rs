@@ -1,4 +1,4 @@
-//! The line at the bottom: what is under the cursor, and what goes on.
+//! The line at the bottom: what is under the cursor, and what is being done.
 
 use super::{Facts, Wish, length};
 use crate::window::keys::Action;

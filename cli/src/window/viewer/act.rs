@@ -1,4 +1,4 @@
-//! What keys, panels and dropped files ask for, carried out.
+//! Does what keys, panels and dropped files ask for.
 
 use super::{Viewer, sight};
 use crate::window::camera::ground_below_m;

@@ -1,4 +1,4 @@
-//! The picture: refined, drawn, covered by the overlay, shown; and what that took.
+//! The picture: refined, drawn, covered by the panels, shown; and how long that took.
 
 use super::Viewer;
 use crate::window::history::Figures;

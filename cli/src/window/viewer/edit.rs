@@ -1,6 +1,6 @@
 //! The ground changed by hand: strokes, undo and redo, a rain of craters. A crater scorches the picture, where one is draped.
 //!
-//! Frames order and take what has become of orders; the workshop's thread does the work. A stroke is seen a frame or two after the hand made it. Edited ground is kept in memory until it
+//! Frames give orders and take results; the workshop's thread does the work. A stroke is seen a frame or two after the hand made it. Edited ground is kept in memory until it
 //! is on the disk, [`MOST_HELD`] pages at most.
 
 use super::Viewer;
@@ -311,7 +311,7 @@ impl Viewer {
     /// Waits until all edits are on the disk and gives the right to edit back.
     ///
     /// # Errors
-    /// In words, what could not be saved.
+    /// What could not be saved, as a message.
     pub(in crate::window) fn close_workshop(&mut self) -> Result<(), String> {
         self.end_work();
         let (news, closed) = self.workshop.close();

@@ -1,4 +1,4 @@
-//! What the window hears: its own changes, keys and the mouse, each made a state or an action for the next frame.
+//! Events of the window: changes of the window itself, keys and the mouse. Each becomes a state or an action for the next frame.
 
 use super::Viewer;
 use crate::window::keys;

@@ -1,4 +1,4 @@
-//! The panels of a frame: laid out, their wishes granted, other settings followed.
+//! The panels of a frame: they are laid out, what they ask for is done, and changed settings take effect.
 
 use super::Viewer;
 use crate::window::overlay::Layer;

@@ -1,4 +1,4 @@
-//! What the viewer says: notes in the window, and lines on standard output for who drives it.
+//! What the viewer says: notes in the window, and lines on standard output for tests that drive it.
 
 use super::Viewer;
 use crate::window::camera::Camera;
@@ -25,7 +25,7 @@ impl Viewer {
         self.touched = true;
     }
 
-    /// Tells who drives the window what happened. If nobody listens there is nobody to tell.
+    /// Writes to standard output what happened, for tests that drive the window. Errors are ignored.
     pub(super) fn tell(&self, line: &str) {
         if self.plan.narrate {
             let mut out = std::io::stdout().lock();

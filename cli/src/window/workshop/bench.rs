@@ -1,7 +1,7 @@
 //! The workshop's thread: the session that edits, and what it does with each order.
 //!
-//! Invariants: orders are carried out as they come; of what the second thread is writing nothing is told as saved before it says so; whoever asks for an undo gets it after everything
-//! before is on the disk. Cost: the session's own, and a copy of each page that changed.
+//! Invariants: orders are carried out in the order in which they come. Nothing is reported as saved before the second thread has written it. An undo is done after everything
+//! before it is on the disk. Cost: the session's own, and a copy of each page that changed.
 
 use super::news::{News, Order, Report, Seen, Tally};
 use super::writer::Writer;

@@ -1,10 +1,10 @@
-//! The right to edit the terrain on show, taken at the first edit, and the thread that has it: it reads pages, edits, paints and undoes, so that no frame waits for the disk.
+//! The thread that edits the terrain on show. It takes the right to edit at the first edit. It reads pages, edits, paints and undoes, so that no frame waits for the disk.
 //!
-//! The window sends orders and takes what has become of them, frame by frame, in the order they were given. Edits are in memory before they are seen; a stroke is committed when it
-//! ends, by a second thread, while the next one is under way already. **What is told as saved is on the disk.** Whoever closes the workshop waits for it.
+//! The window sends orders and takes their results, frame by frame, in the order in which they were given. Edits are in memory before they are seen. A stroke is committed when it
+//! ends, by a second thread, while the next stroke may be under way already. **What is reported as saved is on the disk.** Closing the workshop waits for this.
 //!
-//! A thread that cannot start is words, and the next edit tries again. One that comes to an unexpected end is words that say how much was not on the disk, and edits are refused until the
-//! terrain is opened again; the right to edit is given back first, and what was being written is written. Cost: a message an order and one back, with the pages that changed.
+//! A thread that cannot start is an error message, and the next edit tries again. If the thread ends unexpectedly, a message says how much was not on the disk, and edits are refused until the
+//! terrain is opened again. Before that, what was being written is written, and the right to edit is given back. Cost: a message an order and one back, with the pages that changed.
 
 mod bench;
 mod news;
@@ -46,11 +46,11 @@ pub(crate) struct Workshop {
 
 /// Who has the right to edit.
 enum State {
-    /// Nobody: the next order takes it.
+    /// No thread has it; the next order takes it.
     Closed,
     /// A thread.
     Open(Worker),
-    /// Nobody, until the terrain is opened again: what is on show is not what is in the file. In words, why.
+    /// No thread can have it until the terrain is opened again, because what is on show is not what is in the file. The text says why.
     Broken(String),
 }
 
@@ -94,7 +94,7 @@ impl Workshop {
     /// Has edits applied, and paint on the picture. Of a stroke of which something was refused nothing more is applied.
     ///
     /// # Errors
-    /// In words, why there can be no edits now.
+    /// Why there can be no edits now, as a message.
     pub(crate) fn apply(&mut self, stroke: u64, edits: Vec<Edit>, paints: Vec<Paint>) -> Result<(), String> {
         let worker = self.worker()?;
         worker.sent.orders += 1;
@@ -103,7 +103,7 @@ impl Workshop {
         Ok(())
     }
 
-    /// Has everything so far written to the disk, as one batch that `label` describes; nothing if nobody has edited.
+    /// Has everything so far written to the disk, as one batch that `label` describes; nothing if there are no edits.
     pub(crate) fn commit(&mut self, label: &str) {
         if let State::Open(worker) = &self.state {
             worker.send(Order::Commit { label: label.to_owned() });
@@ -134,7 +134,7 @@ impl Workshop {
     /// Waits until all orders are carried out and all edits are on the disk, and gives the right back. What has become of the orders comes with it.
     ///
     /// # Errors
-    /// In words, what could not be saved.
+    /// What could not be saved, as a message.
     pub(crate) fn close(&mut self) -> (Vec<News>, Result<(), String>) {
         let mut news = Vec::new();
         if let State::Open(worker) = &self.state {
@@ -213,7 +213,7 @@ impl Workshop {
         news
     }
 
-    /// The thread has ended without a word: in words, what that means.
+    /// The thread has ended unexpectedly; what that means, as a message.
     fn break_down(&mut self) -> String {
         let unsaved = match &self.state {
             State::Open(worker) => worker.unsaved(),

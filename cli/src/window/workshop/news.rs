@@ -1,4 +1,4 @@
-//! What the window and the workshop's thread say to each other: plain values, whole in themselves, so that neither waits for the other.
+//! What the window and the workshop's thread send each other: plain values that share nothing, so that neither waits for the other.
 
 use terrasoar::stream::GroundPatch;
 use terrasoar_layout::LayoutError;
@@ -82,7 +82,7 @@ pub(crate) enum News {
     NotOpened(LayoutError),
     /// The right was given back, everything being on the disk but for what the error says.
     Closed(Option<LayoutError>),
-    /// The thread came to an unexpected end; in words, what that means.
+    /// The thread ended unexpectedly; what that means, as a message.
     Broken(String),
 }
 

@@ -1,6 +1,6 @@
-//! The thread that brings commits to the disk, one by one, while edits go on.
+//! The thread that writes commits to the disk, one by one, while edits go on.
 //!
-//! Invariants: every commit it is given comes back, whatever happens to it; who drops it waits until it has written what it was given, so the right to edit, which is dropped after it,
+//! Invariants: a result comes back for every commit it is given. Dropping it waits until it has written all of them. So the right to edit, which is dropped after it,
 //! outlives every write. Cost: a thread that sleeps.
 
 use super::Spawn;

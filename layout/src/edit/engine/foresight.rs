@@ -1,6 +1,6 @@
-//! What heights edits will lead to, found without making records: so that a file can be rewritten with room for them before the first batch, not in the middle.
+//! Which heights edits will lead to, found without making records. So a file can be rewritten with room for them before the first batch, instead of in the middle.
 //!
-//! **A little more than the truth at most:** heights are not rounded between edits as records round them. Cost: that of [`Edit::apply`] and a copy of each window; 8 bytes for every
+//! **The answer may be a little too wide:** heights are not rounded between edits as records round them. Cost: that of [`Edit::apply`] and a copy of each window; 8 bytes for every
 //! sample of the 64 x 64 tiles that edits touch.
 
 use crate::edit::operations::area::shared;

@@ -1,4 +1,4 @@
-//! Heights and records as they are in the middle of an update: new heights first, then whatever the records say.
+//! Heights and records as they are in the middle of an update: new heights where there are any, else those of the records.
 
 use super::pages::Pages;
 use crate::edit::operations::window::SampleRect;

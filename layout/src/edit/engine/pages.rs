@@ -1,10 +1,10 @@
 //! The pages that an editor works on, the terrain's own until they are written to, and what was overwritten.
 //!
-//! Pages come when they are touched. Those that are not committed stay; of all others, which can be read again from where they lie in the file, a bounded number is kept. A page that
-//! cannot be read does not stop the work halfway through: the first error is kept for whoever ends the batch, and takes it back.
+//! Pages are read when they are touched. Those that are not committed stay. Of all others, which can be read again from the file, a bounded number is kept. A page that
+//! cannot be read does not stop the work halfway through. The first error is kept until the end of the batch, which then is taken back.
 //!
-//! Invariants: the log holds every record that was overwritten since the batch began, in order, so that going back through it takes the batch back; a page that was
-//! written to since the last commit has a copy from before, which takes everything back; of a commit that is under way the copies from before it are kept until it has succeeded.
+//! Invariants: the log holds every record that was overwritten since the batch began, in order, so that going back through it takes the batch back. A page that was
+//! written to since the last commit has a copy from before, which takes everything back. While a commit is under way the copies from before it are kept until it has succeeded.
 
 use crate::error::LayoutError;
 use crate::file::bytes::{Page, to_usize};

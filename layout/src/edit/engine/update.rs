@@ -1,5 +1,5 @@
-//! From new heights to new records, bottom-up: every vertex whose triangles touch what changed, and whoever depends on a record that changed (engine of the
-//! update: recompute as the maximum over all contributions, up until nothing changes, so that values fall as well as rise).
+//! From new heights to new records, from the bottom up: every vertex whose triangles touch what changed, and every vertex that depends on a record that changed. Each
+//! is recomputed as the maximum over all contributions, upwards until nothing changes. So values fall as well as rise.
 //!
 //! The work goes level by level. At a level, the vertices whose diamonds touch the changed rectangle are enumerated, and the parents of changed children outside it
 //! are added. A bounded error has contributions from all samples in the diamond; most of the time two comparisons show that it stays as it is, else

@@ -1,7 +1,7 @@
 //! Places on the ground: rectangles of samples and discs in metres, and the samples that lie in them.
 //!
-//! **A sample lies in a disc if its own position does**, computed from its column and row alone, so every window over it agrees. `samples` is as
-//! tight as that: each side of the rectangle is a row or column that the disc's extent holds. Cost: none a sample beyond the squared distance.
+//! **A sample lies in a disc if its own position does**, computed from its column and row alone. So the answer is the same through every window. `samples` is exactly
+//! tight: each side of the rectangle is a row or column that the disc's extent holds. Cost: the squared distance for each sample.
 
 use super::window::{HeightWindow, SampleRect};
 use crate::error::LayoutError;

@@ -1,4 +1,4 @@
-//! Brushes: round, of a strength that falls off from the centre.
+//! Brushes: round, with a strength that falls off from the centre.
 //!
 //! With t the distance from the centre in radii, the strength is multiplied by 1 (hard), 1 - t (linear) or (1 - t^2)^2 (smooth, level at both ends) where t <= 1.
 //! Smoothing reads old heights only, so the result does not depend on the order of samples. Cost: O(samples), nine reads each for smoothing.

@@ -1,4 +1,4 @@
-//! Which numbers an edit may have, and the words for those it may not.
+//! Which numbers an edit may have, and the message for those it may not have.
 
 use super::window::SampleRect;
 use crate::error::LayoutError;

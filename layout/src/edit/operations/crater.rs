@@ -1,6 +1,7 @@
 //! The crater of a shell: a bowl, and a rim of what was in it.
 //!
-//! After the crater model of dynamic terrain over libMini (position, direction, radius, depth), whose profile reaches to twice the radius. With t the distance from
+//! Based on: M. Liao, F. Xu, X. He, "Improvement on Dynamic Tiled Terrain Rendering Algorithm in libMini", section 5 (after K. Yang, 2009): the parameters position, direction,
+//! radius and depth, and a profile that reaches to twice the radius. The formula is our own. With t the distance from
 //! the centre in radii, d the depth, s = t - 1 and c the cosine of the angle between the direction and the way from the centre, the ground changes by
 //!
 //! ```text
@@ -26,7 +27,7 @@ pub const REACH: f64 = 2.0;
 /// How much more than the mean the ejecta heap up straight ahead, far out on the rim.
 const THROWN_FORWARD: f64 = 0.8;
 
-/// A crater, after Xi et al. (position, direction, radius, depth).
+/// A crater by position, direction, radius and depth, as in Liao et al. (EDITS.md).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crater {
     /// Its centre in metres east and north of the south-west sample.

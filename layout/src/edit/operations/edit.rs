@@ -1,6 +1,6 @@
 //! What an edit does to heights: a region and a function from old heights to new ones.
 //!
-//! **What becomes of a sample depends on the edit, the sample's place and old heights within the margin, never on the window it is looked at through**, and
+//! **A sample's new height depends on the edit, the sample's place and old heights within the margin.** It never depends on the window through which it is looked at, and
 //! nothing outside the bounds changes. Voids stay voids. Cost: O(samples of the bounds), nothing allocated but by smoothing, which copies the window.
 
 use super::area::{Area, each_sample};

@@ -1,6 +1,6 @@
 //! A state that the file is to go to, checked as opening checks it, before any header names it.
 //!
-//! Undoing and redoing write a header alone, so nothing but this stands between a journal of nonsense and a file that does not open. Cost: what opening the file costs, less the
+//! Undo and redo write nothing but a header. Without this check a nonsensical journal could lead to a file that does not open. Cost: that of opening the file, less the
 //! leaves that the state has in common with the one that is known.
 
 use crate::error::LayoutError;

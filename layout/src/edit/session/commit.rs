@@ -51,7 +51,7 @@ impl CommitJob {
         self.data.len() as u64
     }
 
-    /// How far it has come, for whoever waits for it.
+    /// How far it has come.
     pub(crate) fn attempt(&self) -> Arc<Attempt> {
         Arc::clone(&self.next.attempt)
     }

@@ -1,4 +1,4 @@
-//! A terrain file written anew as a build would have left it: pages in order, imagery behind them, and nothing of what edits replaced.
+//! A terrain file written anew as a build would have left it: pages in order, imagery behind them, and without what edits replaced.
 
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;

@@ -1,7 +1,7 @@
 //! Edits of a file, in memory first and on the disk batch by batch, with undo and redo.
 //!
-//! [`EditSession::apply`] changes the ground at once, in memory; [`EditSession::commit`] makes all since the last one durable, as one batch. Undoing and redoing are commits of
-//! their own: a header that leads to a state that is in the file already. One session at a time has a file; readers need not stop.
+//! [`EditSession::apply`] changes the ground at once, in memory. [`EditSession::commit`] makes everything since the last commit durable, as one batch. Undo and redo are commits of
+//! their own: a header that leads to a state that is in the file already. One session at a time may have a file; readers need not stop.
 
 mod checked_state;
 pub(crate) mod commit;
@@ -40,7 +40,7 @@ pub struct Committed {
     pub pages: u64,
     /// Bytes by which the file grew.
     pub bytes: u64,
-    /// Each logical page that was written, and its entry in the directory now, ascending: where whoever reads the file finds it.
+    /// Each logical page that was written, and its entry in the directory now, ascending: where readers of the file find it.
     pub places: Vec<(u64, Entry)>,
 }
 
@@ -355,7 +355,7 @@ impl EditSession {
         Ok(committed)
     }
 
-    /// If the commit under way has nobody left to write it, it has failed: all that it took is to be committed again.
+    /// If the thread that was to write the commit under way is gone, the commit has failed: all that it took must be committed again.
     fn notice_lost_job(&mut self) {
         let Phase::Committing { taken, edits, attempt } = &self.phase else { return };
         if Arc::strong_count(attempt) > 1 {

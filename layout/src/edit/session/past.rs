@@ -1,4 +1,4 @@
-//! Back and forth through a file's history: a header that names a state which is in the file already.
+//! Back and forth through a file's history, by a header that names a state which is in the file already.
 
 use super::EditSession;
 use super::checked_state::check_state;

@@ -1,4 +1,4 @@
-//! The picture's part of an editing session: paint in memory beside edited heights, in the same commits, undone and redone with them.
+//! The picture's part of an editing session: paint in memory beside edited heights. It is committed, undone and redone together with them.
 //!
 //! The picture is opened when it is first painted or when going to another state changes it; a session that only edits heights reads nothing of it.
 

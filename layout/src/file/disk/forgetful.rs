@@ -1,8 +1,8 @@
-//! A disk for tests that loses what was not synced: every call goes to the system too, and is written down, so that afterwards the folder can be laid out as a power cut at any moment may
+//! A disk for tests that loses what was not synced. Every call goes to the system and is recorded. Afterwards the folder can be laid out as a power cut at any moment may
 //! have left it.
 //!
-//! What counts as safe is what POSIX promises and no more. Bytes are safe when their file was synced after they were written; of others any sectors may have arrived, in any order. A name is safe when its folder
-//! was synced after it was given; of later ones the first few may have arrived, in their order. That a file was synced says nothing of its name.
+//! Only what POSIX promises counts as safe. Bytes are safe when their file was synced after they were written; of other bytes any sectors may have arrived, in any order. A name is safe when its folder
+//! was synced after the name was given; of later names the first few may have arrived, in their order. Syncing a file says nothing of its name.
 
 use super::{Disk, SystemDisk};
 use crate::mix::Random;

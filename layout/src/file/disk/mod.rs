@@ -1,8 +1,8 @@
-//! What writers ask of the disk: a handful of calls on open files and on names, behind one trait, so that a disk that fails, fills or forgets can stand in for
+//! The calls that writers make of the disk, on open files and on names, behind one trait. So a disk that fails, fills or forgets can stand in for
 //! the system's.
 //!
-//! Every byte of a terrain file and of the samples on their way to it passes through here, and every name that such a file gets. Invariant: an offset and a length say where; no file
-//! has a position that threads could quarrel over.
+//! Every byte of a terrain file passes through here, every byte of the samples on their way to it, and every name that such a file gets. Invariant: each call says offset and length; no file
+//! has a position that threads would have to share.
 
 #[cfg(any(test, feature = "testing"))]
 mod failing;

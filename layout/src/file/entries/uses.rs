@@ -1,8 +1,8 @@
-//! No page of one state has two uses: else a small file would stand for a large terrain, and whatever reads, draws or rewrites it would work on what is not there.
+//! No page of one state has two uses. Otherwise a small file could claim to be a large terrain, and reading, drawing or rewriting it would take time and memory out of proportion.
 //!
-//! A bit a page of the file says whether it is taken. States of an edited file share pages with one another and never with themselves, so each is looked at by itself.
-//! Invariant: what was accepted has no more pages, and no more tiles, than the file. Cost: one bit of the file's 32,768, taken from the system as it is touched, and a
-//! nanosecond a page: reading and checking a leaf costs more.
+//! A bit for each page of the file says whether it is taken. The states of an edited file share pages with one another, so each state is looked at by itself.
+//! Invariant: an accepted state has no more pages, and no more tiles, than the file. Cost: one bit for 32,768 bits of the file, and a
+//! nanosecond a page. Reading and checking a leaf costs more.
 
 use super::{ENTRY_BYTES, Entry};
 use crate::error::LayoutError;

@@ -1,7 +1,7 @@
-//! What a header keeps of a DEM in words: fields of a kind and a length, one after the other (FORMAT.md, section 4.1).
+//! What a header says of a DEM in words: fields, each with its kind and its length, one after the other (FORMAT.md, section 4.1).
 //!
 //! What does not fit is left out, the least needed first: units come before the text of the reference system, that before warnings, these before what was found where. A
-//! field of a kind that is not known is passed over. Cost: one pass over at most 2,810 bytes.
+//! field of an unknown kind is skipped. Cost: one pass over at most 2,810 bytes.
 
 use crate::dem::{About, UnitOf};
 use crate::file::bytes::{get_f64, get_u16, get_u32, put_u16};

@@ -1,6 +1,6 @@
 //! A header slot's fields, read and checked one after the other (FORMAT.md, section 4).
 //!
-//! Invariant: no field is believed before the checksum holds, and none that contradicts another.
+//! Invariant: no field is used before the checksum was found right, and a field that contradicts another is an error.
 
 use super::about;
 use super::{ErrorKind, Header, History, INERT_PAGE, ImageryPlace, SpacingOrigin};

@@ -1,7 +1,7 @@
-//! Which numbers a header may hold, in one place for those who open files and those who make them.
+//! Which numbers a header may hold, in one place for opening files and for making them.
 //!
-//! A build works for hours before it writes its header, and no file may come of it that does not open. So it asks here, by the very rules of opening, as soon as it knows a
-//! number. Cost: a few comparisons.
+//! A build may work for hours before it writes its header, and the file that it makes must open. So it checks each number here as soon as it
+//! knows it, by the same rules as opening. Cost: a few comparisons.
 
 use super::{Header, SpacingOrigin};
 use crate::error::LayoutError;
@@ -61,7 +61,7 @@ impl Header {
         .find_map(|(field, holds)| (!holds).then_some(field))
     }
 
-    /// Refuses a header-to-be that would not open, in words for those who gave the numbers.
+    /// Refuses a future header that would not open, with a message for the person who gave the numbers.
     ///
     /// # Errors
     /// [`LayoutError::Usage`] and the like, saying which number.

@@ -1,6 +1,6 @@
 //! The terrain file as a read-only memory map. memmap2 is used in this file only.
 //!
-//! Contract: while a map is open nobody may truncate the file or the process gets SIGBUS at the next touch of a
+//! Contract: while a map is open no program may truncate the file; otherwise the process gets SIGBUS when it touches a
 //! missing page. Opening takes a shared advisory lock, and writers of this crate rename a new file over the old one, which leaves the mapped one
 //! intact, or append behind what a reader reaches and rewrite a header page that is never read through a map (FORMAT.md, section 8.5). Programs that
 //! do otherwise are outside the contract; use [`PreadSource`](super::PreadSource) for files on storage others may truncate.

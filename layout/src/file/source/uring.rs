@@ -1,6 +1,6 @@
-//! The terrain file through io_uring: many reads under way at once from one thread. For storage whose latency, not its rate, is what one waits for.
+//! The terrain file through io_uring: many reads under way at once from one thread. It is for storage with long delays and a high rate.
 //!
-//! The kernel reads into buffers of the ring's own, which are copied out: they live until the ring has none under way, whatever becomes of the caller's. Where
+//! The kernel reads into buffers that the ring owns, and what was read is copied out of them. They live until no read is under way, whatever happens to the caller's buffers. Where
 //! the ring fails, reads go on one by one.
 //!
 //! Cost: a system call a batch, a copy of what is read.

@@ -1,7 +1,7 @@
 //! Bytes to vertices and back: the three record kinds of FORMAT.md, section 3.
 //!
-//! Decoding is total: any bytes give some vertex. Encoding rounds errors and radii up, so that what holds for the
-//! numbers holds for the records. A codec is a few kilobytes of tables and is copied into whoever decodes.
+//! Any bytes can be decoded and give some vertex. Encoding rounds errors and radii up, so that what holds for the
+//! numbers holds for the records too. A codec is a few kilobytes of tables; each decoder has a copy of its own.
 //! Cost: about two table lookups a vertex for compact records.
 
 mod any;

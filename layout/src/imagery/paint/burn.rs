@@ -1,8 +1,8 @@
 //! How burnt the ground is at a place: rays of ejecta and lumps, from hashes.
 //!
 //! With u the distance from the centre in radii, a ray of reach q (up to 1, longer ahead than behind) is burnt wholly up to 0.3 q, not at all from q on, and smoothly
-//! between. Lumps move that edge, grain spares single texels in part. Rays turn with the direction and all differs from scorch to scorch, for hashes begin
-//! with its centre; the same scorch is always the same.
+//! between. Lumps move that edge, grain spares single texels in part. Rays turn with the direction. Hashes begin
+//! with the scorch's centre, so scorches at different places look different, and the same scorch always looks the same.
 
 use crate::mix::mixed_32;
 

@@ -1,4 +1,4 @@
-//! The tiles that a painter has in memory: painted ones until they are committed and taken out, clean ones up to a bound, those of use longest ago first to go.
+//! The tiles that a painter has in memory. Painted ones stay until they are committed. Clean ones are kept up to a bound; those not used for longest are dropped first.
 
 use super::super::Imagery;
 use super::super::shape::TileId;

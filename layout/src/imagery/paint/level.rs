@@ -1,6 +1,6 @@
-//! One level painted, or made anew from the finer one: blocks decoded, texels changed, blocks in which one changed encoded and put into all tiles that hold them.
+//! One level painted, or made anew from the finer one. Blocks are decoded and texels changed; blocks in which a texel changed are encoded and put into all tiles that hold them.
 //!
-//! **The rule for coarser levels.** The pyramid was filtered from texels before they were encoded; these are gone, so a texel over a changed one becomes the mean of the four
+//! **The rule for coarser levels.** The pyramid was filtered from texels before they were encoded. These are no longer there, so a texel over a changed one becomes the mean of the four
 //! below it as they are decoded now, in linear light and weighted by alpha. Texels over unchanged ones stay as they are decoded; only what shares a block
 //! of 4 x 4 with a changed one is encoded a second time. A block whose blocks below are all as they were before all paint is put back, byte for byte.
 //!

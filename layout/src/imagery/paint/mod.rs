@@ -1,4 +1,4 @@
-//! The picture over the terrain painted: scorched, filled, restored; blocks that change are encoded anew, in all levels and all tiles that hold them.
+//! Painting the picture over the terrain: scorched, filled, restored. Blocks that change are encoded anew, in all levels and all tiles that hold them.
 //!
 //! [`Painter::paint`] decodes the blocks of 4 x 4 texels that an operation touches, changes texels, and encodes those blocks of which one changed; then the same for each coarser
 //! level, whose texels over changed ones become means of what is decoded from the finer one now (`level` has the rule). All tiles that hold a

@@ -1,7 +1,7 @@
 //! What paint does to a texel: operations, their bounds, and the function from an old colour to a new one.
 //!
-//! Colours mix in linear light with integers, and places with additions, products and square roots only, so equal paint gives equal texels on every machine. A texel is
-//! where its centre is. Cost of a scorched texel: a square root, a division and ten hashes.
+//! Colours are mixed in linear light with integers, and places need additions, products and square roots only. So equal paint gives equal texels on every machine. A texel's
+//! place is that of its centre. Cost of a scorched texel: a square root, a division and ten hashes.
 
 use super::super::linear::{Linear, TABLES};
 use super::super::shape::ImageryShape;

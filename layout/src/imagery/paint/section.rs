@@ -1,6 +1,6 @@
 //! Painted tiles on their way into the file: a section of its own with a directory that points to new tiles and old ones (FORMAT.md, section 8.6).
 //!
-//! Cost: each painted tile is decoded once for its mean colour and checked off once, in parallel; one copy of all bytes.
+//! Cost: each painted tile is decoded once for its mean colour and gets its checksum once, in parallel; one copy of all bytes.
 
 use super::super::Imagery;
 use super::super::reader::check_uses;

@@ -1,6 +1,6 @@
 //! One tile in memory as it is stored, and which of its blocks differ from the picture before all paint.
 //!
-//! Bytes are shared with whoever shows them; a tile that is painted while they are shared is copied first.
+//! Its bytes may be shared with code that shows them. A tile that is painted while its bytes are shared is copied first.
 
 use super::super::encode::{BlockTexels, encode_blocks, is_transparent};
 use super::super::linear::TABLES;

@@ -1,14 +1,14 @@
-//! Pages read in threads of their own, the one that is due first before all others, so that a frame never waits for storage.
+//! Pages are read in threads of their own, those that are due first before all others. So a frame never waits for storage.
 //!
-//! A frame asks for pages and takes those that have come; what went wrong comes as an error that names the page, and the page may be asked for
-//! again. Pages that wait and lie within the same aligned 64 KiB of the file are read together, for a long read costs little more than a short one. Every page is
+//! A frame asks for pages and takes those that have come. A read that failed comes as an error that names the page, and the page may be asked for
+//! again. Waiting pages that lie within the same aligned 64 KiB of the file are read together, because a long read costs little more than a short one. Every page is
 //! checked against its checksum before it is handed over.
 //!
-//! Edits move pages: a commit writes them elsewhere in the file, an undo leads back to where they lay. Whoever commits says so ([`Loader::relocate`]), and pages are read from where
-//! they lie by then. A read that was under way at that moment may bring what the page held before; it is made again before anybody sees it.
+//! Edits move pages: a commit writes them elsewhere in the file, and an undo leads back to where they were. After a commit [`Loader::relocate`] must be called; from then on pages are read from their
+//! new places. A read that was under way at that moment may bring the page's old content. Such a read is made again before its page is given out.
 //!
-//! Invariants: whatever was asked for comes back once: read, failed or dropped. What comes is what the page held where the newest relocation says it lies. A page that nobody has asked
-//! for again for [`STALE_FRAMES`] after it was due is dropped unread: the eye has gone elsewhere. Cost: a lock a frame, one a page that comes and two a read; some 24 bytes a page that has moved.
+//! Invariants: every page that was asked for comes back once: read, failed or dropped. Its content is that of the place that the newest relocation names. A page that was not asked
+//! for again for [`STALE_FRAMES`] after it was due is dropped unread, because the eye has gone elsewhere. Cost: a lock a frame, one a page that comes and two a read; some 24 bytes for each page that has moved.
 
 mod places;
 mod queue;
@@ -28,7 +28,7 @@ use std::time::{Duration, Instant};
 
 /// Pages of the longest read: 64 KiB.
 const RUN_PAGES: u64 = 16;
-/// A page this many frames past due that nobody has asked for again is not read.
+/// A page this many frames past due that was not asked for again is not read.
 pub const STALE_FRAMES: u64 = 30;
 
 /// A page that was asked for.
@@ -47,7 +47,7 @@ pub enum Outcome {
     Read(Box<Page>),
     /// It could not be read, or is damaged.
     Failed(LayoutError),
-    /// It was not read: nobody seemed to need it any more.
+    /// It was not read, because it was not asked for again.
     Dropped,
 }
 
@@ -266,7 +266,7 @@ fn gather(terrain: &Terrain, page: u64, state: &mut State, wanted: &mut Vec<(u64
     wanted.sort_unstable_by_key(|(_, entry)| entry.page);
 }
 
-/// Reads runs and hands their pages over. `None` if nobody listens any more.
+/// Reads runs and hands their pages over. `None` if there is no receiver any more.
 fn read_runs(terrain: &Terrain, runs: &mut [Run], arrivals: &Sender<Sent>) -> Option<LoaderStats> {
     let mut done = LoaderStats { reads: runs.len() as u64, ..LoaderStats::default() };
     let mut jobs: Vec<ReadJob<'_>> = Vec::with_capacity(runs.len());

@@ -1,6 +1,6 @@
-//! Where pages lie by now: as the terrain's directory says, but for those that were committed elsewhere since it was opened.
+//! Where pages lie now: where the terrain's directory says, except those that were committed elsewhere since it was opened.
 //!
-//! Invariant: the newest word counts. Cost: some 24 bytes a page that lies elsewhere; one that is back where it was costs nothing.
+//! Invariant: the newest place counts. Cost: some 24 bytes a page that lies elsewhere; one that is back where it was costs nothing.
 
 use crate::file::entries::Entry;
 use crate::read::terrain::Terrain;

@@ -1,13 +1,13 @@
-//! Live ranges as an I/O schedule: which pages will be needed, and in how many frames, for terrains of which only some pages are at hand.
+//! Live ranges as a schedule for reading: which pages will be needed, and in how many frames, where only some pages of a terrain are in memory.
 //!
-//! A page is needed when a vertex splits whose children lie on it, and a vertex's certificate says when that can be at the earliest. So words are looked at twice:
-//! some frames before they are over (`until`), and when they are. At the first look the children's records are sought. Those at
-//! hand get a certificate of their own, as if they were in the mesh, and where that is over soon enough their children are sought in turn; those away are
-//! wanted by the frame in which their parent may split, and looked for again when they have come.
+//! A page is needed when a vertex splits whose children lie on it. A vertex's certificate says when that can happen at the earliest. So each word is looked at twice:
+//! some frames before its live range is over (`until`), and when it is over. The first look ahead goes to the children's records. A child in
+//! memory gets a certificate of its own, as if it were in the mesh. If that is over soon enough, the look goes on to its children in turn. A child whose page is not in memory is
+//! asked for by the frame in which its parent may split, and is looked at again when the page has come.
 //!
-//! Invariant, with a lead of H frames and an eye that keeps its pace and course: what is needed in frame t has been wanted in frame t - H. For a look at a vertex
-//! that may split in x frames goes down to everything needed within x + H, so what comes after its split is covered for H frames, and its
-//! children are looked at when they are made or H frames before they are over. Cost: one move from queue to queue a word, and a test for each vertex that a
+//! Invariant, with a lead of H frames and an eye that keeps its pace and course: what is needed in frame t was asked for in frame t - H. The reason: a look at a vertex
+//! that may split in x frames goes down to everything needed within x + H frames. So what comes after its split is covered for H frames, and its
+//! children are looked at when they are made, or H frames before they are over. Cost: one move from queue to queue a word, and a test for each vertex that a
 //! look meets, most of them two or three times.
 //!
 //! Based on: the deadline of a vertex, max of what the error test and the planes allow, which is what a certificate states along the course; earliest deadline first

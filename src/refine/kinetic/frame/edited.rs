@@ -1,12 +1,12 @@
-//! The ground was edited: nodes take over records that changed, and their words are over.
+//! The ground was edited: nodes get the records that changed, and are tested again.
 //!
-//! One walk down the refinement graph, to vertices only that an edit can concern ([`Areas`]) and to each of them once, compares each node's record with the one that there is
-//! now. A node whose record is another one keeps its place; its word is due in the next update, which tests it as any other, and a vertex in the mesh is sent anew, once
-//! however many edits come between two frames. Errors and radii are saturated as before, so the mesh conforms, and without a budget it is SOAR's over the edited ground in the same frame.
-//! What looks ahead have seen below a leaf may no longer be so: they look again.
+//! One walk goes down the refinement graph, only to vertices that an edit can concern ([`Areas`]), and to each of them once. It compares each node's record with the present
+//! one. A node whose record has changed keeps its place. Its word is due in the next update, which tests it as any other. If its vertex is in the mesh it is sent anew, once
+//! however many edits come between two frames. Errors and radii are saturated as before. So the mesh has no cracks, and without a budget it is SOAR's over the edited ground in the same frame.
+//! Earlier looks ahead below a leaf saw records that may have changed, so they are made again.
 //!
-//! Invariant: after the walk every node that has a record has the one that there is. Cost: the nodes met, which are those whose record changed, their ancestors and a few around each
-//! area; nothing is allocated once the lists have grown.
+//! Invariant: after the walk every node that has a record has the present one. Cost: the nodes met, which are those whose record changed, their ancestors and a few around each
+//! area. Nothing is allocated once the lists have grown.
 
 use crate::refine::change::{Areas, GroundChange};
 use crate::refine::kinetic::mesh::labels::{child_point, level_of};

@@ -1,4 +1,4 @@
-//! What happens in a frame, in this order: what is over is collected, tested and carried out; what is shown is listed; the next pages are wanted.
+//! What happens in a frame, in this order. Words that are over are collected and their vertices tested; vertices are split and merged; what is shown is listed; the next pages are asked for.
 
 pub(crate) mod ahead;
 pub(crate) mod budget;

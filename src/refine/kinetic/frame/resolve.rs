@@ -1,8 +1,8 @@
 //! The middle of a frame: vertices that are due are tested, and those whose status has changed are split or merged.
 //!
-//! Invariant: without a budget nothing is left due, and what is split is what the words want. Tests give the same answers in whatever order and on
-//! however many threads they are made; splits and merges go one by one, in an order that the list of what was over decides. Cost: what is over, and the
-//! children of what is split.
+//! Invariant: without a budget nothing is left due, and exactly the vertices are split whose words say so. Tests give the same answers in whatever order and on
+//! however many threads they are made. Splits and merges go one by one, in the order of the list of words that were over. Cost: in proportion to the words that are over, and to the
+//! children of vertices that are split.
 
 use super::budget::Allowance;
 use crate::refine::kinetic::Kinetic;

@@ -1,7 +1,7 @@
-//! What a frame tells: slots that show something else than before, and what there is to draw.
+//! What a frame reports: slots that show something else than before, and what there is to draw.
 //!
-//! Whether a triangle is drawn follows from what its node holds, so no file is read for it. A triangle whose split vertex has not come yet is drawn; whether void
-//! touches it is known when it comes. Cost: the slots that changed.
+//! Whether a triangle is drawn follows from what its node holds, so no file is read for it. A triangle is drawn even if the record of its split vertex has not come yet. Whether a void
+//! touches it is known when the record comes. Cost: the slots that changed.
 
 use crate::mesh::has_area;
 use crate::metric::Metric;

@@ -1,4 +1,4 @@
-//! The whole mesh at once, for those who cannot follow patches: as one patch, as triangles, as SOAR's strip. Cost: proportional to the mesh; updates need
+//! The whole mesh at once, for code that cannot follow patches: as one patch, as triangles, as SOAR's strip. Cost: in proportion to the mesh. Updates need
 //! none of it.
 
 use crate::refine::kinetic::mesh::nodes::{CENTRE, body};

@@ -1,7 +1,7 @@
-//! Bounds of the clusters, laid out for culling all of them every frame: a column a number, so that each plane is a pass over three columns.
+//! Bounds of the clusters, laid out for culling all of them every frame. Each number has a column of its own, so that a test against a plane is a pass over three columns.
 //!
 //! Single precision, with planes moved outwards by more than its rounding: a box is called outside only if it is. Cost: some two nanoseconds a box for all
-//! four planes; the passes vectorise by themselves.
+//! four planes. The compiler turns the passes into vector instructions.
 
 use crate::metric::{BoxPlane, PLANES};
 

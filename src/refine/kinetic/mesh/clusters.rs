@@ -1,8 +1,8 @@
-//! Places in the bin-tree array and its triangle slots, dealt out in clusters of [`CLUSTER`] nodes.
+//! Places in the bin-tree array and its triangle slots, given out in clusters of [`CLUSTER`] nodes.
 //!
-//! Culling works on clusters too: its triangles' slots are one range, and it has bounds. Two ways of dealing:
-//! *packed* fills whatever cluster has room, so that the array is as short as can be; *near* puts a child into its parent's cluster, or into
-//! the cluster that this one spills into when it is full, so that a cluster's triangles lie together on the ground.
+//! Culling works on clusters too: the slots of a cluster's triangles are one range, and a cluster has bounds. There are two ways of giving out places.
+//! *Packed* fills any cluster that has room, so that the array is as short as possible. *Near* puts a child into its parent's cluster, or, when that is full, into
+//! the one that continues it, so that a cluster's triangles lie together on the ground.
 //!
 //! Invariant: a cluster's bounds contain all triangles that its slots show. Cost: a few bit operations a node.
 

@@ -1,4 +1,4 @@
-//! Who lies where around a vertex: relatives named by direction, so that all are reached by index arithmetic.
+//! Where a vertex's parents and children lie around it. They are numbered by direction, so that all are reached by index arithmetic.
 //!
 //! * Children of a white vertex (a cell's centre) lie east, north, west, south: labels 0 to 3; those of a black one (an edge's midpoint) lie
 //!   south-east, north-east, north-west, south-west. Opposite labels differ by 2.

@@ -4,7 +4,7 @@
 //! Lindstrom & Pascucci (2001, section 3): a node has up to two parents, the apexes of the triangles that it splits, and up to four
 //! children (`super::labels` names them). Node i owns the triangle slots 2i and 2i + 1, one a side, so triangles need no array of
 //! their own: what a slot shows follows from its node. At the finest level, where a split makes four triangles that no vertex splits any
-//! further, an *annex*, a node without a vertex, lends the two slots that are missing.
+//! further, an *annex*, a node without a vertex, has the two slots that are missing.
 //!
 //! Invariants: a split node's parents are split; a side's parent is recorded exactly while that side's triangle exists; a node without
 //! parents is free. The word's own bits ([`ACTIVE`] and the certificate) say what is wanted, [`SPLIT`] what is.

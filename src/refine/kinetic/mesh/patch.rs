@@ -1,4 +1,4 @@
-//! What a frame changed in the mesh: all that a GPU's copy of it needs to follow.
+//! What a frame changed in the mesh: all that is needed to bring a GPU's copy of it up to date.
 
 use std::ops::Range;
 

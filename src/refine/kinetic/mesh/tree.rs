@@ -1,8 +1,8 @@
 //! Splitting and merging nodes: relatives, triangles and vertices kept in step.
 //!
 //! Invariant: after each call all of `super::nodes` holds, and the slots that show something else have been noted. A split makes two triangles of
-//! each of a node's one or two, a merge the reverse. Cost: six slots, at most four nodes made or freed; what it costs is the wait for memory, which
-//! [`Kinetic::fetch`] shortens by asking for a node's relatives some splits ahead.
+//! each of a node's one or two, a merge the reverse. Cost: six slots, at most four nodes made or freed. Most of the time is the wait for memory, which
+//! [`Kinetic::fetch`] shortens by prefetching a node's relatives some splits ahead.
 
 use super::bounds::Bounds;
 use super::labels::{child_point, level_of};

@@ -1,6 +1,6 @@
 //! How long a status will hold: the certificate that a live-range word states.
 //!
-//! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART", sections 4.1 and 4.2, whose safe distance assumes that the eye may turn against the
+//! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART", sections 4.1 and 4.2. The paper's safe distance assumes that the eye may turn towards the
 //! vertex at once. Here the eye has a course, a straight line from where it is now along u. A margin m(s) is known for
 //! every point s metres along it; a clock (`super::clocks`) counts rho s plus the way off the course. The word lives on as long as its clock has
 //! counted less than the largest L with
@@ -253,7 +253,7 @@ impl Judge {
         b + half_chord2.max(0.0).sqrt()
     }
 
-    /// The margin of the error test. Written without branches, for which answer is right is anybody's guess.
+    /// The margin of the error test. Written without branches, because no processor can predict the answer.
     #[inline(always)]
     fn error_margin_m(&self, sighting: &Sighting, selected: bool, distance_m: f64, reach_m: f64) -> f64 {
         const ACROSS2: f64 = 1.0 - RATE * RATE;

@@ -1,13 +1,13 @@
-//! How far every live range has been used up: clocks that run on what the camera does, in margin metres.
+//! How much of every live range has been used up: clocks that advance with the camera's movement, in metres of margin.
 //!
 //! Based on: X. Bao, R. Pajarola, M. Shafae, "SMART", section 4 (eq. 11 and 12), corrected and widened. A status holds while its margin is
-//! positive; a clock adds up, rounded up, what the camera can have taken from the margin since. There is one clock for every combination of
+//! positive. A clock adds up, rounded up, how much the camera's movement can have taken from the margin since. There is one clock for every combination of
 //!
 //! * a *course*: the direction the eye is expected to keep, and the axis it is expected to turn about. Course 0 expects nothing and counts the whole
-//!   path and every turn. Any other counts [`RATE`] times the way along its direction and the angle about its axis, and all that goes off
-//!   them; what lies ahead was taken into account when the margin was made (`super::certificate`). A word made on one course stays on it
+//!   path and every turn. Any other course counts [`RATE`] times the way along its direction and the angle about its axis, and all of the way and angle that goes off
+//!   them. What lies ahead on the course was taken into account when the margin was made (`super::certificate`). A word made on one course stays on it
 //!   when the eye takes another;
-//! * a *kind*: whether the status rests on the view's planes, so that turning uses it up too;
+//! * a *kind*: whether the status depends on the view's planes, so that turning uses it up too;
 //! * a *band*: a power of two that bounds the distances which turning (by an angle) and zooming (by a ratio) act on.
 //!
 //! Claim: with L = f0 + floor(m / q), m metres of margin made at tick f0 and ticks of q metres, `f < L` implies that less than m has been used.

@@ -1,4 +1,4 @@
-//! When a vertex is to be looked at again: clocks, words, and the queue they wait in.
+//! When a vertex must be looked at again: clocks, words, and the queue in which words wait.
 
 pub(crate) mod certificate;
 pub(crate) mod clocks;

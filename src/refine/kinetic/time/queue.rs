@@ -1,6 +1,6 @@
-//! The expiry queue: which words are over now, without looking at any that is not.
+//! The expiry queue: it finds the words that are over now, without looking at any other.
 //!
-//! A hierarchical timing wheel a clock, after G. Varghese, T. Lauck, "Hashed and Hierarchical Timing Wheels", SOSP 1987: an entry lies on
+//! Each clock has a hierarchical timing wheel, after G. Varghese, T. Lauck, "Hashed and Hierarchical Timing Wheels", SOSP 1987: an entry lies on
 //! the level of the highest digit (of 6 bits) in which its expiry differs from the clock, and moves down at most once a
 //! level as the clock advances. Entries of words that have changed since are left where they are; they no longer equal the
 //! word and are dropped when their turn comes.

@@ -1,4 +1,4 @@
-//! What pages that got other contents make of the ground: found by comparing records.
+//! What changed on the ground when pages got other contents, found by comparing records.
 
 use super::Core;
 use crate::edit::{Changes, SampleRect};

@@ -1,4 +1,4 @@
-//! Other contents put into pages, as undoing does: all that can fail comes before the file changes, and what follows cannot.
+//! Other contents put into pages, as undo does. All that can fail comes before the file changes; what follows cannot fail.
 
 use super::Core;
 use crate::edit::Changes;
