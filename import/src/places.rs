@@ -106,6 +106,11 @@ impl Crs {
         self.system.kind != Kind::Unknown || self.system.unit.is_some()
     }
 
+    /// Whether it is a site's own system of lengths, tied to nothing.
+    pub(crate) fn is_site(&self) -> bool {
+        matches!(self.system.kind, Kind::Local | Kind::Unknown) && self.ground.is_none()
+    }
+
     /// The way to the ground, if there is one.
     pub(crate) fn ground(&self) -> Option<&Ground> {
         self.ground.as_ref()

@@ -84,7 +84,9 @@ impl Across {
             Some(ours) if system.is_said() => {
                 let both = ours.ground().zip(system.ground());
                 let projections = both.map(|(new, old)| Projections { old: old.clone(), new: new.clone() });
-                let is_same = ours.is_same(&system) || (both.is_none() && ours.name() == system.name());
+                // Two sites' own systems are taken for one, for nothing tells them apart but names that people give.
+                let are_sites = both.is_none() && ours.is_site() && system.is_site();
+                let is_same = ours.is_same(&system) || are_sites;
                 if !is_same && both.is_none() {
                     return Err(LayoutError::unsupported(
                         picture.path(),
