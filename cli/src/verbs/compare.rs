@@ -73,6 +73,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     args.force.folder(&args.output, &files, &args.terrain.inputs(&[&args.flight]))?;
     let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
+    args.quality.look_at(&terrain, &flight, &args.flight)?;
     let quality = args.quality.quality();
     let progress = Meter::new("frames");
     let mut runs: Vec<(String, Vec<FrameStats>)> = Vec::new();

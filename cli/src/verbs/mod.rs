@@ -44,6 +44,7 @@ mod terrain;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+mod within;
 
 #[cfg(not(feature = "view"))]
 use pictureless::view;

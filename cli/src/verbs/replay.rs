@@ -4,7 +4,7 @@ use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
 use super::terrain::TerrainArgs;
-use super::{WrongUsage, parse};
+use super::{WrongUsage, parse, within};
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -79,6 +79,16 @@ impl QualityArgs {
             .vertical_exaggeration(self.exaggeration)
             .culling(self.culling)
     }
+
+    /// Looks whether a flight fits the terrain and these; says what does not.
+    ///
+    /// # Errors
+    /// A flight that lies wholly outside the terrain.
+    pub(super) fn look_at(self, terrain: &Terrain, flight: &Flight, path: &Path) -> Result<()> {
+        within::flight(terrain, flight, path, self.viewport)?;
+        within::below_ground(terrain, flight, path, self.exaggeration);
+        Ok(())
+    }
 }
 
 /// Flies `frames` with one engine, showing progress under `title`.
@@ -103,6 +113,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let terrain = Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
+    args.quality.look_at(&terrain, &flight, &args.flight)?;
     let progress = Meter::new("frames");
     let name = args.engine.name();
     let mut quality = args.quality.quality();
@@ -116,7 +127,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let frames = match &args.edits {
         None => fly(&terrain, &flight.frames, quality, args.engine, name, &progress)?,
         Some(script) => {
-            let batches = batches_of(script, &flight.frames)?;
+            let batches = batches_of(script, &flight.frames, &terrain)?;
             progress.begin(name, 2 * flight.frames.len() as u64);
             let done = &mut |done| progress.set(done);
             replay_edited(&terrain, &flight.frames, quality, args.engine, &batches, done)
@@ -132,8 +143,14 @@ pub(super) fn run(args: &Args) -> Result<()> {
 }
 
 /// A script's batches at their frames. Those whose moment never comes are told.
-pub(super) fn batches_of(script: &Path, frames: &[FlightFrame]) -> Result<Vec<TimedBatch>> {
+pub(super) fn batches_of(
+    script: &Path,
+    frames: &[FlightFrame],
+    terrain: &Terrain,
+) -> Result<Vec<TimedBatch>> {
     let batches = Loader::new(script, terrasoar_import::open_file).script(&Script::read(script)?)?;
+    let warning = within::edits(&batches, terrain.grid(), Some(script))?;
+    warning.iter().for_each(|words| complain(words));
     let late = batches.iter().filter(|batch| batch.frame(frames).is_none()).count();
     if late > 0 {
         complain(&format!(
