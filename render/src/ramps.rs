@@ -31,7 +31,7 @@ pub const RAMPS: &[Ramp] = &[
             (0.91, 0xe3e2e2),
             (1.00, 0xfafbfd),
         ],
-        least_span_m: 1500.0,
+        least_span_m: 1000.0,
     },
     Ramp {
         name: "atlas",
@@ -46,7 +46,7 @@ pub const RAMPS: &[Ramp] = &[
             (0.90, 0x8f5d3f),
             (1.00, 0xefe6e0),
         ],
-        least_span_m: 1500.0,
+        least_span_m: 1000.0,
     },
     Ramp {
         name: "desert",
@@ -58,7 +58,7 @@ pub const RAMPS: &[Ramp] = &[
         name: "arctic",
         about: "tundra to ice",
         stops: &[(0.00, 0x5d6f6a), (0.25, 0x8b9c96), (0.50, 0xb9c7cb), (0.75, 0xdde8f0), (1.00, 0xffffff)],
-        least_span_m: 1500.0,
+        least_span_m: 1000.0,
     },
     Ramp {
         name: "mars",

@@ -55,7 +55,7 @@ pub(super) struct PictureArgs {
     /// How far one sees: auto (the far side is still seen), off (for ever), or metres after which a third of a thing's own light is left; the style has its own without it
     #[arg(long, value_name = "auto|off|METRES", value_parser = haze)]
     pub haze: Option<Haze>,
-    /// Heights in metres of the ramp's two ends, or stretch for the terrain's lowest and highest. Without it that too, but alpine, atlas and arctic span 1500 m at least, for
+    /// Heights in metres of the ramp's two ends, or stretch for the terrain's lowest and highest. Without it that too, but alpine, atlas and arctic span 1000 m at least, for
     /// what they say of meadows and snow
     #[arg(long, value_name = "LOW,HIGH|stretch", value_parser = ramp_range, allow_hyphen_values = true)]
     pub ramp_range: Option<RampRange>,
