@@ -15,6 +15,7 @@ mod flight;
 mod height;
 mod info;
 mod iobench;
+mod made;
 mod mesh;
 mod mesh_file;
 #[cfg(feature = "pictures")]
