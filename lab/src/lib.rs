@@ -38,5 +38,6 @@
 //! The frames that reports are about come from [`replay`](terrasoar::flyover::replay).
 
 pub mod iobench;
+pub mod made;
 pub mod picture;
 pub mod report;

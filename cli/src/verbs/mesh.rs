@@ -59,8 +59,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     let terrain = std::sync::Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
+    args.quality.look_at(&terrain, &flight, &args.flight)?;
     let batches = match &args.edits {
-        Some(script) => batches_of(script, &flight.frames)?,
+        Some(script) => batches_of(script, &flight.frames, &terrain)?,
         None => Vec::new(),
     };
     let mesh =

@@ -15,6 +15,7 @@ mod flight;
 mod height;
 mod info;
 mod iobench;
+mod made;
 mod mesh;
 mod mesh_file;
 #[cfg(feature = "pictures")]
@@ -44,6 +45,7 @@ mod terrain;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+mod within;
 
 #[cfg(not(feature = "view"))]
 use pictureless::view;

@@ -25,3 +25,4 @@ mod support;
 mod tiff;
 mod usage;
 mod verbs;
+mod within;
