@@ -95,6 +95,11 @@ impl Crs {
         Some(Self { system, ground })
     }
 
+    /// All that is known of it.
+    pub(crate) fn system(&self) -> &System {
+        &self.system
+    }
+
     /// Its name, with its code: "WGS 84 / UTM zone 32N (EPSG:32632)".
     pub fn name(&self) -> String {
         let name = harmless(&self.system.name, 200);

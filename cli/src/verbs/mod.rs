@@ -4,6 +4,7 @@
 //! opening a file. Results go to standard output, everything else to standard error. **Exit codes: 0 done, 1 failed, 2 the command line
 //! itself is wrong.** A reader that closes our output early ends the program quietly.
 
+mod area;
 mod build;
 mod cache;
 mod cap;
@@ -11,6 +12,7 @@ mod compare;
 mod defect;
 mod drape;
 mod edit;
+mod export;
 mod flight;
 mod height;
 mod info;
@@ -71,6 +73,7 @@ Examples, in the order of the work:
   terrasoar crater alps.iqt --at 1500,820 --radius 40 --depth 9
   terrasoar info alps.iqt
   terrasoar snapshot alps.iqt -o alps.png
+  terrasoar export alps.iqt -o edited.tif
   terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
   terrasoar compare alps.iqt --flight alps.flight --engines soar,smart -o report
 
@@ -95,6 +98,7 @@ enum Verb {
     Info(info::Args),
     Verify(verify::Args),
     Height(height::Args),
+    Export(export::Args),
     Synth(synth::Args),
     Flight(flight::Args),
     Replay(replay::Args),
@@ -169,6 +173,7 @@ fn carry_out() -> ExitCode {
         Verb::Info(args) => info::run(&args),
         Verb::Verify(args) => verify::run(&args),
         Verb::Height(args) => height::run(&args),
+        Verb::Export(args) => export::run(&args),
         Verb::Synth(args) => synth::run(&args),
         Verb::Flight(args) => flight::run(&args),
         Verb::Replay(args) => replay::run(&args),

@@ -2,8 +2,9 @@
 //!
 //! Cost: for the bounds in longitude and latitude some thousand projections.
 
-use super::output::decimal;
+use super::output::{complain, decimal};
 use super::terrain;
+use anyhow::{Context, Result};
 use serde::Serialize;
 use terrasoar_import::places::{Crs, Frame};
 use terrasoar_layout::file::header::Header;
@@ -102,4 +103,38 @@ pub(super) fn crs_text(header: &Header) -> Option<String> {
         return Some(kept.clone());
     }
     Crs::of(header).map(|crs| crs.text().to_owned()).filter(|text| !text.is_empty())
+}
+
+/// The terrain in the system that places are given in; nothing for metres from its corner. Says what may be off.
+pub(super) fn frame(header: &Header, crs: Option<&str>) -> Result<Option<Frame>> {
+    let Some(text) = crs else { return Ok(None) };
+    let frame = if text.trim().eq_ignore_ascii_case("dem") {
+        Frame::own(header).context(
+            "the terrain does not know where on the ground it lies, for its elevation model did not say; leave --crs away and give metres from its corner",
+        )?
+    } else {
+        Frame::of(header, &Crs::named(text)?)?
+    };
+    if frame.is_rough() {
+        complain(
+            "note: the shift between the two datums is a grid that is not here; places may be off by up to some hundred metres",
+        );
+    }
+    Ok(Some(frame))
+}
+
+/// The system of a frame in words.
+pub(super) fn system_name(frame: &Frame) -> String {
+    frame.crs().map_or_else(|| "its own coordinates".into(), Crs::name)
+}
+
+/// From where to where the terrain extends, in a system, or in metres from its corner: "from 0,0 to 5000,4000 metres".
+pub(super) fn reach(header: &Header, frame: Option<&Frame>) -> Option<String> {
+    let Some(frame) = frame else {
+        let [east, north] = header.grid.extent_m().map(|m| decimal(m, 4));
+        return Some(format!("from 0,0 to {east},{north} metres"));
+    };
+    let digits = if frame.crs().is_some_and(Crs::is_geographic) { 7 } else { 3 };
+    let [x0, y0, x1, y1] = frame.bounds()?.map(|value| decimal(value, digits));
+    Some(format!("from {x0},{y0} to {x1},{y1} in {}", system_name(frame)))
 }

@@ -5,6 +5,7 @@ use std::io;
 use std::path::Path;
 use terrasoar::edits::{Script, Step};
 use terrasoar::flight::generate::is_generated;
+use terrasoar_import::export::is_exported;
 use terrasoar_import::synth::is_synthetic;
 use terrasoar_lab::picture;
 use terrasoar_lab::report::ReportFile;
@@ -17,6 +18,8 @@ pub(in crate::verbs) enum Kind {
     Terrain,
     /// Synthetic elevation data, or a picture of synthetic colours.
     Synthetic,
+    /// Heights of a terrain, or differences of them, as GeoTIFF.
+    Elevation,
     /// A flight that was generated.
     Flight,
     /// A script of craters.
@@ -40,9 +43,10 @@ pub(in crate::verbs) const FILM_NOTE: &str = "made with Terrasoar";
 
 impl Kind {
     #[cfg(test)]
-    pub(super) const ALL: [Self; 13] = [
+    pub(super) const ALL: [Self; 14] = [
         Self::Terrain,
         Self::Synthetic,
+        Self::Elevation,
         Self::Flight,
         Self::Craters,
         Self::Mesh,
@@ -68,6 +72,7 @@ impl Kind {
                 None => false,
             },
             Self::Synthetic => is_synthetic(path)?,
+            Self::Elevation => is_exported(&start),
             Self::Flight => is_generated(&start),
             Self::Craters => is_craters(path, &start)?,
             Self::Mesh => is_mesh(&start),
