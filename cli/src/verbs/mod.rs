@@ -18,7 +18,6 @@ mod height;
 mod info;
 mod iobench;
 mod mesh;
-mod mesh_file;
 #[cfg(feature = "pictures")]
 mod movie;
 #[cfg(feature = "pictures")]
@@ -74,6 +73,7 @@ Examples, in the order of the work:
   terrasoar info alps.iqt
   terrasoar snapshot alps.iqt -o alps.png
   terrasoar export alps.iqt -o edited.tif
+  terrasoar mesh alps.iqt --max-error 2 -o alps.glb
   terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
   terrasoar compare alps.iqt --flight alps.flight --engines soar,smart -o report
 

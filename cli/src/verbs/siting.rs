@@ -7,6 +7,8 @@ use super::terrain;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use terrasoar_import::places::{Crs, Frame};
+use terrasoar_lab::mesh_file::Placing;
+use terrasoar_layout::dem::HorizontalUnit;
 use terrasoar_layout::file::header::Header;
 
 /// How the samples lie on the ground.
@@ -92,6 +94,42 @@ pub(super) fn notes(header: &Header) -> Vec<(&'static str, String)> {
     if !above.is_empty() {
         let code = header.about.vertical_epsg.map(|code| format!(" (EPSG:{code})")).unwrap_or_default();
         notes.push(("Heights", format!("metres, {above}{code}")));
+    }
+    notes
+}
+
+/// How metres from the south-west sample become coordinates of the elevation model, heights in their unit where that is a length; and whether they are angles. `None` where nothing is known.
+pub(super) fn placing(header: &Header) -> Option<(Placing, bool)> {
+    let [x, a, b, y, d, e] = header.sample_to_crs?;
+    let [east_m, north_m] = header.grid.spacing_m();
+    let (is_angle, unit_m) = match (&header.about.horizontal_unit, header.crs_unit) {
+        (Some(unit), _) => (unit.is_angle, if unit.is_angle { 1.0 } else { unit.size }),
+        (None, HorizontalUnit::Degree) => (true, 1.0),
+        (None, HorizontalUnit::Foot) => (false, 0.3048),
+        (None, HorizontalUnit::UsSurveyFoot) => (false, 1200.0 / 3937.0),
+        (None, HorizontalUnit::Unknown | HorizontalUnit::Metre) => (false, 1.0),
+    };
+    let map = [x, a / east_m, b / north_m, y, d / east_m, e / north_m];
+    Some((Placing { map, height_factor: 1.0 / unit_m }, is_angle))
+}
+
+/// [`notes`] for a mesh, in local coordinates or in those of the elevation model.
+pub(super) fn mesh_notes(header: &Header, is_dem: bool) -> Vec<(&'static str, String)> {
+    let mut notes = notes(header);
+    if !is_dem {
+        return notes;
+    }
+    notes.retain(|(name, _)| *name != "Coordinates");
+    let (unit, heights) = (terrain::horizontal_unit(header), placing(header));
+    let unit = match heights {
+        Some((placing, false)) if placing.height_factor != 1.0 => {
+            unit.unwrap_or_else(|| "the unit of x and y".into())
+        }
+        _ => "metres".into(),
+    };
+    match notes.iter_mut().find(|(name, _)| *name == "Heights") {
+        Some((_, words)) => *words = words.replacen("metres", &unit, 1),
+        None => notes.push(("Heights", unit)),
     }
     notes
 }

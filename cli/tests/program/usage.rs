@@ -2,9 +2,9 @@
 
 use crate::support::{Bench, text};
 
-const VERBS: [&str; 17] = [
+const VERBS: [&str; 18] = [
     "build", "drape", "edit", "crater", "undo", "redo", "history", "compact", "info", "verify", "height",
-    "synth", "flight", "replay", "compare", "iobench", "mesh",
+    "export", "synth", "flight", "replay", "compare", "iobench", "mesh",
 ];
 /// Verbs of the feature `pictures`.
 const DRAWING: &[&str] = if cfg!(feature = "pictures") { &["snapshot", "movie"] } else { &[] };
@@ -53,7 +53,7 @@ fn wrong_command_lines_end_with_2() {
         &["replay", "land.iqt", "--flight", "f", "--engine", "roam"],
         &["replay", "land.iqt", "--flight", "f", "--engine", "soar", "--viewport", "800"],
         &["compare", "land.iqt", "--flight", "f", "--engines", "soar,soar", "-o", "r"],
-        &["mesh", "land.iqt", "--flight", "f", "--frame", "0", "--engine", "soar", "-o", "x.stl"],
+        &["mesh", "land.iqt", "--flight", "f", "--frame", "0", "--engine", "soar", "-o", "x.3ds"],
     ];
     for args in wrong {
         bench.bad(2, args);

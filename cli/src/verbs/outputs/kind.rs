@@ -7,8 +7,8 @@ use terrasoar::edits::{Script, Step};
 use terrasoar::flight::generate::is_generated;
 use terrasoar_import::export::is_exported;
 use terrasoar_import::synth::is_synthetic;
-use terrasoar_lab::picture;
 use terrasoar_lab::report::ReportFile;
+use terrasoar_lab::{mesh_file, picture};
 use terrasoar_layout::edit::Edit;
 
 /// What a verb writes under a name.
@@ -36,9 +36,7 @@ pub(in crate::verbs) enum Kind {
     Report(ReportFile),
 }
 
-/// What says in a mesh that it is ours; both formats have it near their beginning.
-pub(in crate::verbs) const MESH_NOTE: &str = "metres east, north and up of the terrain's south-west sample";
-/// What says so in a film.
+/// What says in a film that it is ours.
 pub(in crate::verbs) const FILM_NOTE: &str = "made with Terrasoar";
 
 impl Kind {
@@ -75,7 +73,7 @@ impl Kind {
             Self::Elevation => is_exported(&start),
             Self::Flight => is_generated(&start),
             Self::Craters => is_craters(path, &start)?,
-            Self::Mesh => is_mesh(&start),
+            Self::Mesh => mesh_file::is_ours(&start),
             Self::Picture => picture::is_ours(&start),
             Self::Film => is_film(&start),
             Self::Report(file) => file.is_ours(&start),
@@ -102,15 +100,6 @@ fn is_craters(path: &Path, start: &[u8]) -> io::Result<bool> {
     let mut steps = script.batches.iter().flat_map(|batch| &batch.steps);
     let only_craters = steps.all(|step| matches!(step, Step::Edit(Edit::Crater(_))));
     Ok(only_craters && script.to_text(path).is_ok_and(|text| text.as_bytes() == bytes))
-}
-
-fn is_mesh(start: &[u8]) -> bool {
-    let mut lines = start.split(|byte| *byte == b'\n');
-    match lines.next() {
-        Some(b"ply") => lines.nth(1) == Some(format!("comment {MESH_NOTE}").as_bytes()),
-        Some(first) => first == format!("# {MESH_NOTE}").as_bytes(),
-        None => false,
-    }
 }
 
 fn is_film(start: &[u8]) -> bool {
