@@ -13,7 +13,8 @@
 //! # }
 //! ```
 //!
-//! What comes out is for `terrasoar_layout::build`, and for `terrasoar_layout::imagery::drape`.
+//! What comes out is for `terrasoar_layout::build`, and for `terrasoar_layout::imagery::drape`. The other way, [`export`] writes heights of a terrain as GeoTIFF,
+//! and [`difference`] compares two.
 //!
 //! [`open`] looks at a file's first bytes and hands it to the one reader that knows them, whatever its
 //! name; formats without a signature are known by name, and by what lies beside them. Opening
@@ -24,6 +25,7 @@ mod ascii_grid;
 mod beside;
 mod bt;
 mod crs;
+pub mod difference;
 mod dted;
 pub mod export;
 mod formats;

@@ -136,8 +136,13 @@ impl Crs {
         Some(std::f64::consts::TAU / size)
     }
 
+    /// Whether no more is known than a unit, and perhaps a name.
+    pub(crate) fn is_unnamed(&self) -> bool {
+        self.system.code.is_none() && self.system.proj.is_none()
+    }
+
     /// Whether coordinates of both are the same numbers.
-    fn is_same(&self, other: &Self) -> bool {
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
         let [a, b] = [&self.system, &other.system];
         let size = |system: &System| system.unit.as_ref().map(|unit| unit.size);
         let is_proj_same = match (&a.proj, &b.proj) {

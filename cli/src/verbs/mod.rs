@@ -9,6 +9,7 @@ mod build;
 mod cache;
 mod cap;
 mod compare;
+mod compare_ground;
 mod defect;
 mod drape;
 mod edit;
@@ -74,6 +75,7 @@ Examples, in the order of the work:
   terrasoar snapshot alps.iqt -o alps.png
   terrasoar export alps.iqt -o edited.tif
   terrasoar mesh alps.iqt --max-error 2 -o alps.glb
+  terrasoar compare-ground alps.iqt --picture changes.png
   terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
   terrasoar compare alps.iqt --flight alps.flight --engines soar,smart -o report
 
@@ -99,6 +101,7 @@ enum Verb {
     Verify(verify::Args),
     Height(height::Args),
     Export(export::Args),
+    CompareGround(compare_ground::Args),
     Synth(synth::Args),
     Flight(flight::Args),
     Replay(replay::Args),
@@ -174,6 +177,7 @@ fn carry_out() -> ExitCode {
         Verb::Verify(args) => verify::run(&args),
         Verb::Height(args) => height::run(&args),
         Verb::Export(args) => export::run(&args),
+        Verb::CompareGround(args) => compare_ground::run(&args),
         Verb::Synth(args) => synth::run(&args),
         Verb::Flight(args) => flight::run(&args),
         Verb::Replay(args) => replay::run(&args),

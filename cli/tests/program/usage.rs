@@ -2,9 +2,26 @@
 
 use crate::support::{Bench, text};
 
-const VERBS: [&str; 18] = [
-    "build", "drape", "edit", "crater", "undo", "redo", "history", "compact", "info", "verify", "height",
-    "export", "synth", "flight", "replay", "compare", "iobench", "mesh",
+const VERBS: [&str; 19] = [
+    "build",
+    "drape",
+    "edit",
+    "crater",
+    "undo",
+    "redo",
+    "history",
+    "compact",
+    "info",
+    "verify",
+    "height",
+    "export",
+    "compare-ground",
+    "synth",
+    "flight",
+    "replay",
+    "compare",
+    "iobench",
+    "mesh",
 ];
 /// Verbs of the feature `pictures`.
 const DRAWING: &[&str] = if cfg!(feature = "pictures") { &["snapshot", "movie"] } else { &[] };
