@@ -99,7 +99,7 @@ struct Answer {
 }
 
 impl Args {
-    /// Both terrains, and what the second one is called.
+    /// Both terrains, read page by page, and what the second one is called.
     fn open(&self) -> Result<(Terrain, Terrain, String)> {
         let plain = |file: &PathBuf| TerrainArgs { file: file.clone(), overlay: None };
         let with = |file: &PathBuf| TerrainArgs { file: file.clone(), overlay: self.overlay.clone() };
@@ -109,16 +109,17 @@ impl Args {
         };
         if self.second.is_some() || self.overlay.is_some() {
             let second = self.second.as_ref().unwrap_or(&self.first);
-            return Ok((plain(&self.first).open()?, with(second).open()?, overlaid(second)));
+            let (first, other) = (plain(&self.first).open()?, with(second).open()?);
+            return Ok((first.open_again_unmapped()?, other.open_again_unmapped()?, overlaid(second)));
         }
-        let second = plain(&self.first).open()?;
+        let second = plain(&self.first).open()?.open_again_unmapped()?;
         if second.header().history.is_none() {
             bail!(
                 "{}: the terrain holds no edits, so there is nothing to compare; name a second terrain, or edits with --overlay",
                 self.first.display()
             );
         }
-        let first = plain(&self.first).open()?.into_original()?;
+        let first = second.open_again_unmapped()?.into_original()?;
         Ok((first, second, format!("{} with its edits", self.first.display())))
     }
 }

@@ -60,7 +60,8 @@ enum NumbersWord {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     args.force.file(&args.output, Kind::Elevation, &args.terrain.inputs(&[]))?;
-    let terrain = args.terrain.open()?;
+    // Read page by page: a map of a large terrain would count as memory.
+    let terrain = args.terrain.open()?.open_again_unmapped()?;
     let window = args.area.window(&terrain, &args.terrain.file, args.step)?;
     let numbers = args.numbers.map(|word| match word {
         NumbersWord::Int16 => Numbers::Int16,
