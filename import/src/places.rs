@@ -116,6 +116,11 @@ impl Crs {
         self.ground.as_ref()
     }
 
+    /// All that is known of it.
+    pub(crate) fn system(&self) -> &System {
+        &self.system
+    }
+
     /// Its name, with its code: "WGS 84 / UTM zone 32N (EPSG:32632)".
     pub fn name(&self) -> String {
         let name = harmless(&self.system.name, 200);
@@ -150,6 +155,11 @@ impl Crs {
     pub(crate) fn turn(&self) -> Option<f64> {
         let HorizontalSize::Radians(size) = self.system.unit.as_ref()?.size else { return None };
         Some(std::f64::consts::TAU / size)
+    }
+
+    /// Whether no more is known than a unit, and perhaps a name.
+    pub(crate) fn is_unnamed(&self) -> bool {
+        self.system.code.is_none() && self.system.proj.is_none()
     }
 
     /// Whether coordinates of both are the same numbers.

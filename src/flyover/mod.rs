@@ -9,8 +9,9 @@ mod mesh;
 mod passes;
 mod sets;
 
+/// One frame's drawn triangles.
+pub use crate::mesh::IndexedMesh as FrameMesh;
 pub use edits::TimedBatch;
-pub use mesh::FrameMesh;
 
 use crate::flight::FlightFrame;
 use crate::refine::kinetic::{Budget, Kinetic};
