@@ -132,6 +132,86 @@ fn a_copy_that_misses_updates_gets_the_whole_mesh() {
 }
 
 #[test]
+fn rays_meet_the_ground_where_small_steps_along_them_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("holes.iqt");
+    let dem = MemoryDem::from_fn([101, 81], SampleType::F32, |x, y| {
+        let is_void = (40..47).contains(&x) && (30..36).contains(&y);
+        if is_void { f64::NAN } else { 3.0 * rugged(5, x, y) }
+    });
+    build(&dem, &path, &BuildOptions::default().spacing_m([10.0, 8.0]), &Silent).unwrap();
+    let mapped = MappedTerrain::open(&path).unwrap();
+    let ground = mapped.ground(PictureEngine::Soar, Culling::Vertices).unwrap();
+    let [low, high] = ground.height_range_m();
+    let mut random = Random::new(17);
+    let mut part =
+        |from: f64, to: f64| from + (to - from) * random.below(1 << 20) as f64 / f64::from(1 << 20);
+    let (mut hits, mut misses) = (0, 0);
+    for round in 0..400 {
+        let from = [part(-100.0, 1100.0), part(-100.0, 750.0), part(low - 20.0, high + 300.0)];
+        let mut direction = [part(-1.0, 1.0), part(-1.0, 1.0), part(-1.5, 0.1)];
+        if round % 10 == 0 {
+            // Straight down, and along lines of samples.
+            direction = [[0.0, 0.0, -2.0], [1.0, 0.0, -0.05], [0.0, -1.0, -0.1]][round / 10 % 3];
+        }
+        let length = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let at = |t: f64| [0, 1, 2].map(|axis| from[axis] + t * direction[axis] / length);
+        let above = |t: f64| {
+            let [x, y, z] = at(t);
+            ground.height_at(x, y).height_m.map(|height| z - height)
+        };
+        let found = ground.ray_hit(from, direction, 2500.0);
+        // The oracle: steps of 5 cm, then halves.
+        let mut wanted = None;
+        let mut before = above(0.0);
+        for step in 1..=50_000 {
+            let t = f64::from(step) * 0.05;
+            let now = above(t);
+            if let (Some(a), Some(b)) = (before, now)
+                && (a > 0.0) != (b > 0.0)
+            {
+                let (mut from, mut to) = (t - 0.05, t);
+                for _ in 0..40 {
+                    let middle = 0.5 * (from + to);
+                    if above(middle).is_some_and(|v| (v > 0.0) == (a > 0.0)) {
+                        from = middle
+                    } else {
+                        to = middle
+                    }
+                }
+                wanted = Some(to);
+                break;
+            }
+            before = now;
+        }
+        match (found, wanted) {
+            (Some(hit), Some(t)) => {
+                hits += 1;
+                assert!(
+                    hit.is_exact && (hit.distance_m - t).abs() < 0.06,
+                    "{from:?} {direction:?}: {hit:?}, {t}"
+                );
+                let ground_m = ground.height_at(hit.place_m[0], hit.place_m[1]).height_m.unwrap();
+                assert!((ground_m - hit.place_m[2]).abs() < 1e-6, "{hit:?}: {ground_m}");
+            }
+            (None, None) => misses += 1,
+            // Steps of the oracle may pass over a ridge that a ray cuts, and over the rim of the terrain.
+            (Some(hit), None) => assert!(
+                above(hit.distance_m).is_none_or(|v| v.abs() < 1e-6),
+                "{from:?} {direction:?}: {hit:?}"
+            ),
+            (None, Some(t)) => panic!("{from:?} {direction:?}: nothing, and {t}"),
+        }
+    }
+    assert!(hits > 100 && misses > 50, "{hits} hits, {misses} misses");
+    let eye = [500.0, 400.0, high + 100.0];
+    assert!(
+        ground.ray_hit(eye, [0.0, 0.0, 1.0], 1e9).is_none() && ground.ray_hit(eye, [0.0; 3], 1e9).is_none()
+    );
+    assert!(ground.ray_hit(eye, [0.0, 0.0, -1.0], 1.0).is_none(), "too far");
+}
+
+#[test]
 fn triangles_in_metres_cover_the_terrain_once() {
     let (_folder, path) = land();
     let mut ground = streamed(&path);

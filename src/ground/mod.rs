@@ -12,6 +12,7 @@ mod engine;
 mod full;
 mod mapped;
 mod options;
+mod ray;
 mod samples;
 mod streamed;
 #[cfg(feature = "files")]
@@ -20,6 +21,7 @@ mod ticket;
 pub use engine::Refined;
 pub use mapped::PictureEngine;
 pub use options::StreamOptions;
+pub use ray::RayHit;
 pub use samples::HeightTile;
 #[cfg(feature = "files")]
 pub use ticket::{CommitFailed, CommitTicket, Saved};
@@ -32,6 +34,7 @@ use crate::view::View;
 use editing::Editing;
 use engine::MeshEngine;
 use glam::DVec3;
+use ray::Ray;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -193,6 +196,15 @@ impl<'t> Ground<'t> {
     /// Height of the ground, edits included, at a place in metres east and north of the south-west sample, from what is in memory.
     pub fn height_at(&self, east_m: f64, north_m: f64) -> HeightAt {
         self.engine.height_at(east_m, north_m)
+    }
+
+    /// Where a ray from a place in metres east, north and up first meets the ground, edits included, from above or from below, within `longest_m` metres; from what is in memory. `None` where it
+    /// meets none, and for numbers that make no ray.
+    pub fn ray_hit(&self, from_m: [f64; 3], direction: [f64; 3], longest_m: f64) -> Option<RayHit> {
+        let grid = self.terrain().grid();
+        let height = |east_m: f64, north_m: f64| self.engine.height_at(east_m, north_m);
+        let range_m = self.engine.height_range_m();
+        Ray::new(from_m, direction)?.hit(longest_m, grid.spacing_m(), grid.extent_m(), range_m, height)
     }
 
     /// Asks for the pages that the exact height at a place needs; they are in memory some updates later.
