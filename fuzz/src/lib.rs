@@ -17,6 +17,7 @@ pub mod mutation;
 mod overlay_sealed;
 mod scratch;
 mod seeds;
+mod take_out;
 mod terrain_sealed;
 mod use_files;
 mod words;

@@ -6,6 +6,7 @@
 use crate::fly::{flies, frames_over};
 use crate::image::reads_tiles;
 use crate::land::{burn, dent, level};
+use crate::take_out::takes_out;
 use crate::words::{refused, told};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -62,6 +63,7 @@ pub(crate) fn uses(files: &Sealed) {
     let terrain = Arc::new(terrain);
     let is_sound = looks(&terrain);
     flies(&terrain, &frames_over(&terrain), is_sound);
+    takes_out(&terrain, folder.path(), is_sound);
     writes_anew(&terrain, folder.path(), is_sound);
     edits(&trial, is_sound);
     if is_sound {

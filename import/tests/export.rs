@@ -215,6 +215,9 @@ fn placed(text: &str, code: Option<u32>, unit: UnitOf, map: [f64; 6]) -> (Terrai
     (terrain, Terrain::from_source(Box::new(source)).unwrap(), written)
 }
 
+/// A text, a code, a unit, a map from samples to coordinates, and how far the export says it.
+type Case<'t> = (&'t str, Option<u32>, UnitOf, [f64; 6], Named);
+
 fn unit(name: &str, size: f64, is_angle: bool) -> UnitOf {
     UnitOf { name: name.into(), size, is_angle }
 }
@@ -225,7 +228,7 @@ fn places_survive_in_every_way_that_a_system_is_known() {
     let metre = || unit("metre", 1.0, false);
     let north_up = [500_000.0, 10.0, 0.0, 5_000_000.0, 0.0, -10.0];
     let moon = "GEOGCS[\"GCS_Moon_2000\",DATUM[\"D_Moon_2000\",SPHEROID[\"Moon_2000_IAU_IAG\",1737400.0,0.0]],PRIMEM[\"Reference_Meridian\",0.0],UNIT[\"Degree\",0.0174532925199433]]";
-    let cases: Vec<(&str, Option<u32>, UnitOf, [f64; 6], Named)> = vec![
+    let cases: Vec<Case<'_>> = vec![
         ("EPSG:32632", Some(32632), metre(), north_up, Named::Code),
         (
             "EPSG:4326",

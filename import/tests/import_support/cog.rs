@@ -13,7 +13,7 @@ impl Directory {
     pub fn numbers(&self, tag: u16) -> Vec<u64> {
         let Some((_, kind, bytes)) = self.tags.iter().find(|entry| entry.0 == tag) else { return Vec::new() };
         let size = size_of_kind(*kind);
-        bytes.chunks_exact(size).map(|bytes| number(bytes)).collect()
+        bytes.chunks_exact(size).map(number).collect()
     }
 
     pub fn number(&self, tag: u16) -> u64 {
@@ -43,7 +43,7 @@ pub fn directories(file: &[u8]) -> Vec<Directory> {
     let mut at = number(if big { &file[8..16] } else { &file[4..8] }) as usize;
     let mut found = Vec::new();
     while at != 0 {
-        assert!(at % 2 == 0, "directories begin at even places");
+        assert!(at.is_multiple_of(2), "directories begin at even places");
         let count = number(&file[at..at + count_bytes]) as usize;
         let mut tags: Vec<(u16, u16, Vec<u8>)> = Vec::new();
         let entry_bytes = 4 + 2 * word;

@@ -10,9 +10,11 @@ use terrasoar::flyover::{
     EngineKind, Quality, TimedBatch, frame_mesh, mean_incoherence_percent, replay, replay_edited,
 };
 use terrasoar::refine::{Culling, Unobserved};
+use terrasoar::simplify::{SimplifyOptions, simplify};
 use terrasoar::stream::{Streamed, ThreadFetch, height_at};
 use terrasoar::view::{View, Viewport};
 use terrasoar_lab::iobench::{CountOptions, LayoutKind, Prefetch, Reader, count};
+use terrasoar_lab::mesh_file::{Format, MeshFile, Texture};
 use terrasoar_layout::edit::{Crater, Edit, SampleRect};
 use terrasoar_layout::read::loader::Loader;
 use terrasoar_layout::read::terrain::Terrain;
@@ -98,7 +100,22 @@ pub fn fly(path: &Path, overlay: Option<&Path>) -> bool {
     count(&terrain, &views, quality.culling, Reader::Engine(EngineKind::Soar), &options, &mut |_| {})
         .expect("a terrain in memory is counted over");
     stream(&terrain, &views);
+    mesh(&terrain);
     true
+}
+
+/// A mesh without an eye, in every format.
+fn mesh(terrain: &Terrain) {
+    let [east, north] = terrain.grid().extent_m();
+    let texture = Texture::of(terrain, [0.0, 0.0, east, north], 64).ok().flatten();
+    for max_error_m in [0.0, 5.0] {
+        let options = SimplifyOptions::default().max_error_m(max_error_m).max_triangles(100_000);
+        let Ok(mesh) = simplify(terrain, &options) else { continue };
+        for format in [Format::PlyText, Format::Stl, Format::Glb] {
+            let file = MeshFile::new(&mesh).texture(texture.as_ref());
+            file.write(format, &mut std::io::sink()).expect("nothing refuses bytes here");
+        }
+    }
 }
 
 /// Flies over a pool.
