@@ -6,6 +6,7 @@ use super::terrain::{self, TerrainArgs};
 use anyhow::Result;
 use serde::Serialize;
 use terrasoar_layout::edit::history;
+use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::unused::unused_bytes;
@@ -17,7 +18,12 @@ use terrasoar_layout::verify::unused::unused_bytes;
 #[command(after_help = "\
 Examples:
   terrasoar info alps.iqt
-  terrasoar info alps.iqt --json | jq .spacing_m")]
+  terrasoar info alps.iqt --json | jq .spacing_m
+
+Bounds are least x and y and greatest x and y of the samples' own places (not of pixels around them), in the elevation model's coordinates; the row below them says how to get from
+samples to coordinates. In --json, sample_to_crs are the six numbers m of it: a sample so many columns east and rows north of the south-west one, both from 0, lies at
+x = m0 + m1 column + m2 row, y = m3 + m4 column + m5 row. bounds, bounds_wgs84, sample_to_crs and height_step_m are null where there are none. unused_bytes are bytes that nothing
+leads to; history_bytes those that undo and redo need, or that edits made after an undo left behind.")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
@@ -37,7 +43,8 @@ struct Info {
     spacing_origin: String,
     extent_m: [f64; 2],
     height_range_m: [f64; 2],
-    height_step_m: f64,
+    /// Null where heights are kept as the data has them, in no steps.
+    height_step_m: Option<f64>,
     heights_rounded: bool,
     nodata_samples: u64,
     crs: Option<String>,
@@ -73,8 +80,10 @@ struct Info {
     commits: u64,
     /// The terrain is in the state after this one; 0: as built.
     commit: u32,
-    /// Bytes that nothing leads to: what edits and other imagery replaced.
+    /// Bytes that nothing leads to: what other imagery replaced. 0 where the file has a history, whose bytes these may be.
     unused_bytes: u64,
+    /// Bytes that the terrain as it is does not use and that its history keeps: undone edits, and what edits replaced.
+    history_bytes: u64,
     imagery: Option<Pictures>,
 }
 
@@ -122,6 +131,8 @@ impl Info {
     fn of(terrain: &Terrain, args: &TerrainArgs) -> Result<Self> {
         let header = terrain.header();
         let commits = history(terrain)?;
+        let beside = unused_bytes(terrain)?;
+        let [unused_bytes, history_bytes] = if commits.is_empty() { [beside, 0] } else { [0, beside] };
         Ok(Self {
             path: args.file.display().to_string(),
             source: header.source.clone(),
@@ -131,7 +142,7 @@ impl Info {
             spacing_origin: terrain::spacing_origin(header),
             extent_m: header.grid.extent_m(),
             height_range_m: header.height_range_m,
-            height_step_m: header.scale.height_step_m,
+            height_step_m: (header.record_kind == RecordKind::Compact).then_some(header.scale.height_step_m),
             heights_rounded: header.heights_rounded,
             nodata_samples: header.nodata_samples,
             crs: terrain::crs(header),
@@ -156,13 +167,15 @@ impl Info {
             overlay: args.overlay.as_ref().map(|overlay| overlay.display().to_string()),
             commits: commits.len() as u64,
             commit: commits.iter().find(|commit| commit.is_current).map_or(0, |commit| commit.sequence),
-            unused_bytes: unused_bytes(terrain)?,
+            unused_bytes,
+            history_bytes,
             imagery: Pictures::of(terrain)?,
         })
     }
 
     fn text(&self) -> String {
         let pair = |[a, b]: [f64; 2], digits| format!("{} x {}", decimal(a, digits), decimal(b, digits));
+        let precision = if self.record_bytes > 8 { "double" } else { "single" };
         let rounded = if self.heights_rounded { ", heights rounded to it" } else { "" };
         let mut rows = vec![
             ("file", self.path.clone()),
@@ -175,7 +188,13 @@ impl Info {
                 "heights",
                 format!("{} to {} m", decimal(self.height_range_m[0], 3), decimal(self.height_range_m[1], 3)),
             ),
-            ("height step", format!("{} m{rounded}", decimal(self.height_step_m, 6))),
+            (
+                "height step",
+                match self.height_step_m {
+                    Some(step_m) => format!("{} m{rounded}", decimal(step_m, 6)),
+                    None => format!("none, heights are kept as the data has them, in {precision} precision"),
+                },
+            ),
             ("no data", format!("{} samples", grouped(self.nodata_samples))),
             ("reference system", self.crs.clone().unwrap_or_else(|| "unknown".into())),
             ("coordinates in", self.horizontal_unit.clone().unwrap_or_else(|| "unknown units".into())),
@@ -229,6 +248,13 @@ impl Info {
         rows.extend(self.warnings.iter().map(|words| ("warning", words.clone())));
         if self.unused_bytes > 0 {
             rows.push(("unused", format!("{} bytes that nothing leads to", grouped(self.unused_bytes))));
+        }
+        if self.history_bytes > 0 {
+            let bytes = grouped(self.history_bytes);
+            rows.push((
+                "history keeps",
+                format!("{bytes} bytes for undo and redo that the terrain as it is does not use; terrasoar compact gives them back"),
+            ));
         }
         table(&rows)
     }

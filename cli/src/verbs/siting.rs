@@ -49,13 +49,39 @@ impl Siting {
             format!("{x0},{y0} to {x1},{y1}")
         };
         let mut rows = vec![("placement", self.placement.words.join("; "))];
-        rows.extend(self.bounds.map(|bounds| ("bounds", corners(bounds, 7))));
+        rows.extend(
+            self.bounds
+                .map(|bounds| ("bounds", format!("{} (x,y of the outermost samples)", corners(bounds, 7)))),
+        );
+        rows.extend(self.placement.sample_to_crs.map(|map| ("sample to x,y", in_words(map))));
         rows.extend(
             self.bounds_wgs84
                 .map(|bounds| ("longitude, latitude", format!("{} (WGS 84)", corners(bounds, 7)))),
         );
         rows
     }
+}
+
+/// A map from samples to coordinates as two sums: "x = 500000 + 30 * column, y = 4000000 + 30 * row, from the south-west sample".
+fn in_words([x, a, b, y, d, e]: [f64; 6]) -> String {
+    let sum = |from: f64, column: f64, row: f64| {
+        let mut text = format!("{from}");
+        for (factor, name) in [(column, "column"), (row, "row")] {
+            if factor != 0.0 {
+                text.push_str(&format!(
+                    " {} {} * {name}",
+                    if factor < 0.0 { '-' } else { '+' },
+                    factor.abs()
+                ));
+            }
+        }
+        text
+    };
+    format!(
+        "x = {}, y = {}, columns east and rows north of the south-west sample",
+        sum(x, a, b),
+        sum(y, d, e)
+    )
 }
 
 /// How rows and columns run by the map alone.

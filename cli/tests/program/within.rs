@@ -140,3 +140,124 @@ fn an_eye_below_the_ground_is_said() {
     let said = text(&bench.run(&[&replay[..], &["--exaggeration", "2"]].concat()).stderr);
     assert!(said.contains("in 3 of 4 frames, first in frame 0"), "{said}");
 }
+
+#[test]
+fn a_build_counts_voids_and_fills_small_ones() {
+    let bench = Bench::new();
+    // Two holes, of one sample and of 3 x 2, and a strip along the border.
+    let grid = "ncols 8\nnrows 6\nxllcorner 500000\nyllcorner 4000000\ncellsize 30\nNODATA_value -9999\n\
+        10 10 10 10 10 10 10 -9999\n10 -9999 10 10 10 10 10 -9999\n10 10 10 10 10 10 10 -9999\n\
+        10 10 20 20 20 10 10 -9999\n10 20 -9999 -9999 -9999 20 10 -9999\n10 20 20 20 20 10 10 -9999\n";
+    std::fs::write(bench.path("g.asc"), grid).unwrap();
+    let build = |out: &str, more: &[&str]| bench.good(&[&["build", "g.asc", "-o", out][..], more].concat());
+    let told = build("plain.iqt", &[]);
+    assert!(told.contains("10 voids (20.833 %)"), "{told}");
+    assert_eq!(bench.json(&["info", "plain.iqt", "--json"])["nodata_samples"], 10);
+    let told = build("one.iqt", &["--fill-voids", "1"]);
+    assert!(
+        told.contains("9 voids") && told.contains("1 of 10 void samples were filled, 1 holes of up to 1 x 1"),
+        "{told}"
+    );
+    let told = build("three.iqt", &["--fill-voids", "3"]);
+    assert!(told.contains("6 voids") && told.contains("4 of 10 void samples were filled, 2 holes"), "{told}");
+    assert!(bench.good(&["info", "three.iqt"]).contains("voids: 4 of 10 void samples"));
+    for (at, height) in [("30,120", "10 m"), ("60,30", "20 m"), ("90,30", "20 m"), ("210,30", "no data")] {
+        assert_eq!(bench.good(&["height", "three.iqt", "--at", at]).trim(), height, "{at}");
+    }
+    assert_eq!(bench.good(&["height", "plain.iqt", "--at", "30,120"]).trim(), "no data");
+    build("all.iqt", &["--fill-voids", "6"]);
+    assert_eq!(bench.json(&["info", "all.iqt", "--json"])["nodata_samples"], 0);
+    bench.bad(2, &["build", "g.asc", "-o", "x.iqt", "--fill-voids", "257"]);
+}
+
+#[test]
+fn info_says_what_the_numbers_mean() {
+    let bench = Bench::new();
+    let grid = |values: &str| {
+        format!("ncols 3\nnrows 2\nxllcorner 500000\nyllcorner 4000000\ncellsize 30\n{values}\n")
+    };
+    std::fs::write(bench.path("g.asc"), grid("1 2 3\n4 5 6")).unwrap();
+    std::fs::write(bench.path("f.asc"), grid("1.12345 2.7182818 3.1415\n4.9 5.5 6.66667")).unwrap();
+    for name in ["g", "f"] {
+        bench.good(&["build", &format!("{name}.asc"), "-o", &format!("{name}.iqt")]);
+    }
+    let told = bench.good(&["info", "g.iqt"]);
+    // Corners of cells in the file, samples in the middle of them.
+    assert!(told.contains("500015,4000015 to 500075,4000045 (x,y of the outermost samples)"), "{told}");
+    assert!(told.contains("x = 500015 + 30 * column, y = 4000015 + 30 * row"), "{told}");
+    assert!(told.contains("height step       1 m"), "{told}");
+    let floats = bench.good(&["info", "f.iqt"]);
+    assert!(floats.contains("none, heights are kept as the data has them, in"), "{floats}");
+    assert!(bench.json(&["info", "f.iqt", "--json"])["height_step_m"].is_null());
+
+    let bench = with_script("set rect 10,10,20,20 to 60\n");
+    bench.good(&["edit", "land.iqt", "--script", "a.edits"]);
+    bench.good(&["undo", "land.iqt"]);
+    let info = bench.json(&["info", "land.iqt", "--json"]);
+    assert!(info["unused_bytes"] == 0 && info["history_bytes"].as_u64() > Some(4096), "{info}");
+    let told = bench.good(&["info", "land.iqt"]);
+    assert!(told.contains("bytes for undo and redo") && !told.contains("unused"), "{told}");
+}
+
+#[test]
+fn a_flight_says_for_which_pictures_its_speed_was_found() {
+    let bench = Bench::with_terrain();
+    let find = ["flight", "straight", "land.iqt", "-o", "s.flight", "--frames", "12", "--incoherence", "2"];
+    bench.good(&[&find[..], &["--tolerance-px", "0.5", "--viewport", "640x480"]].concat());
+    let notes = std::fs::read_to_string(bench.path("s.flight")).unwrap();
+    for note in ["solved-tolerance-px: 0.5", "solved-viewport: 640x480", "solved-exaggeration: 1"] {
+        assert!(notes.contains(&format!("# {note}\n")), "{notes}");
+    }
+    let replay = |more: &[&str]| {
+        let args = [&["replay", "land.iqt", "--flight", "s.flight"][..], more].concat();
+        text(&bench.run(&args).stderr)
+    };
+    assert_eq!(replay(&["--tolerance-px", "0.5", "--viewport", "640x480"]), "");
+    let said = replay(&["--viewport", "640x480"]);
+    assert!(said.contains("at a tolerance-px of 0.5 (here 1); it is another here"), "{said}");
+    assert!(replay(&["--tolerance-px", "0.5"]).contains("a viewport of 640x480 (here 800x600)"));
+}
+
+#[test]
+fn a_report_says_how_it_was_made_and_what_does_not_apply() {
+    let bench = Bench::with_flight();
+    let compare = [
+        "compare",
+        "land.iqt",
+        "--flight",
+        "land.flight",
+        "--no-sweeps",
+        "-o",
+        "r",
+        "--engines",
+        "soar,kinetic",
+    ];
+    bench.good(&compare);
+    let summary = std::fs::read_to_string(bench.path("r/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let made = &summary["made"];
+    assert_eq!(made["program"], concat!("terrasoar ", env!("CARGO_PKG_VERSION")));
+    assert!(made["command"].as_str().unwrap().ends_with(&compare.join(" ")), "{made}");
+    assert!(made["machine"].as_str().unwrap().contains(std::env::consts::ARCH), "{made}");
+    assert_eq!(made["date"].as_str().map(str::len), Some(20));
+    let engines = summary["comparison"]["engines"].as_array().unwrap();
+    for field in ["expired_total", "slots_written_total", "patch_bytes_total", "scan_us_p50", "apply_us_p50"]
+    {
+        assert!(engines[0][field].is_null() && engines[1][field].is_number(), "{field}");
+    }
+    for (engine, figures) in ["soar", "kinetic"].into_iter().zip(engines) {
+        let table = std::fs::read_to_string(bench.path(&format!("r/frames-{engine}.csv"))).unwrap();
+        let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let names = rows.next().unwrap();
+        let rows: Vec<_> = rows.collect();
+        for column in ["vertex_tests", "splits", "merges", "pages_touched", "expired", "patch_bytes", "late"]
+        {
+            let at = names.iter().position(|name| *name == column).unwrap();
+            let known: Vec<u64> = rows.iter().filter_map(|row| row[at].parse().ok()).collect();
+            match figures[format!("{column}_total")].as_u64() {
+                Some(total) => assert_eq!((known.len(), known.iter().sum()), (rows.len(), total), "{column}"),
+                None => assert!(known.is_empty() && rows.iter().all(|row| row[at].is_empty()), "{column}"),
+            }
+        }
+    }
+}
