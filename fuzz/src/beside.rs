@@ -50,7 +50,13 @@ pub(crate) mod aux_xml {
         let text = "<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"2,1\">EPSG:4326</SRS>\n  <GeoTransform> 8, 0.01, 0.001, 47, 0, -0.01</GeoTransform>\n  \
                     <Metadata><MDI key=\"AREA_OR_POINT\">Point</MDI></Metadata>\n  <PAMRasterBand band=\"1\">\n    <NoDataValue le_hex_equiv=\"0000\">-9.99e3</NoDataValue>\n    \
                     <UnitType>ft &amp; &#x6d;</UnitType>\n    <Offset>-100</Offset>\n    <Scale>0.1</Scale>\n  </PAMRasterBand>\n</PAMDataset>\n";
-        vec![("all".into(), text.into())]
+        let parts = [
+            "<PAMDataset><SRS>EPSG:32633</SRS></PAMDataset>",
+            "<PAMDataset><GeoTransform>8,0,0.01,46,0.01,0</GeoTransform></PAMDataset>",
+            "<PAMDataset><PAMRasterBand band=\"1\"><Scale>-1e-3</Scale><Offset>1e300</Offset><NoDataValue>nan</NoDataValue></PAMRasterBand></PAMDataset>",
+        ];
+        let parts = parts.iter().enumerate().map(|(i, text)| (format!("part {i}"), text.as_bytes().to_vec()));
+        parts.chain([("all".into(), text.into())]).collect()
     }
 
     pub(crate) fn body(data: &[u8]) {

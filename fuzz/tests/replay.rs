@@ -119,6 +119,16 @@ fn world_files() {
 }
 
 #[test]
+fn reference_systems() {
+    replay("reference_system");
+}
+
+#[test]
+fn files_beside_by_gdal() {
+    replay("aux_xml");
+}
+
+#[test]
 fn flights() {
     replay("flight");
 }
