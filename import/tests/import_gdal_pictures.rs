@@ -125,13 +125,13 @@ impl Case {
             ["Gray", "Undefined", "Undefined"]
         };
         let channels = self.channels();
-        for channel in 0..channels {
+        for (channel, colour) in colours.into_iter().enumerate().take(channels) {
             let is_void = self.hidden == Hidden::Nodata;
             put(channel + 1, bytes, &|col, row| {
                 if is_void && self.is_hidden(col, row) { 0 } else { self.number(channel, col, row) }
             })?;
             let nodata = if is_void { "<NoDataValue>0</NoDataValue>" } else { "" };
-            let inner = format!("{nodata}<ColorInterp>{}</ColorInterp>", colours[channel]);
+            let inner = format!("{nodata}<ColorInterp>{colour}</ColorInterp>");
             vrt += &band(kind, bytes, channel + 1, &inner);
         }
         let full = (1 << self.bits.max(8)) - 1;
@@ -265,7 +265,7 @@ fn cases() -> Vec<Case> {
                 continue;
             }
             for bands in [Bands::Grey, Bands::Rgb, Bands::Untagged] {
-                if bands == Bands::Untagged && driver != "GTiff" || bands == Bands::Untagged && is_jpeg {
+                if bands == Bands::Untagged && (driver != "GTiff" || is_jpeg) {
                     continue;
                 }
                 for hidden in

@@ -213,6 +213,9 @@ impl Rows<'_> {
     }
 }
 
+/// What is done with the samples of a chunk, so many channels a texel: RGBA is made of them.
+type Paints<'a> = dyn Fn(&[u8], usize, &mut [u8]) + 'a;
+
 #[derive(Default)]
 struct Scratch {
     packed: Vec<u8>,
@@ -227,7 +230,7 @@ impl TiffImage {
         (chunk, place): (u32, Option<(u64, u64)>),
         scratch: &mut Scratch,
         texels: &mut Vec<u8>,
-        paint: &dyn Fn(&[u8], usize, &mut [u8]),
+        paint: &Paints<'_>,
     ) -> Result<(), LayoutError> {
         let table = &self.table;
         let rows = table.grid.window(u64::from(chunk)).height;

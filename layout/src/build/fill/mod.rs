@@ -225,7 +225,7 @@ mod tests {
         fn regions_are_those_of_a_flood(wide in 1..12u32, high in 1..12u32, bits in prop::collection::vec(any::<bool>(), 144), most in 1..8u32) {
             let is_void = |x: u32, y: u32| bits[(y * 12 + x) as usize];
             let mut expected = Vec::new();
-            let mut seen = vec![false; 144];
+            let mut seen = [false; 144];
             for start in (0..high).flat_map(|y| (0..wide).map(move |x| (x, y))) {
                 let mut waiting = vec![start];
                 let mut cells = Vec::new();
