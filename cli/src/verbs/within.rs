@@ -219,7 +219,7 @@ pub(super) fn below_ground(terrain: &Terrain, flight: &Flight, path: &Path, exag
 
 /// An eye below the ground.
 #[derive(Debug, Clone, Copy)]
-#[cfg_attr(not(feature = "pictures"), expect(dead_code))]
+#[cfg_attr(not(feature = "pictures"), expect(dead_code, reason = "the verbs that draw use it"))]
 pub(super) struct Below {
     /// Height of the ground as drawn, metres.
     pub(super) ground_m: f64,
