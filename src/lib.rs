@@ -36,6 +36,7 @@
 //! * [`refine`]: the engines, and what they report. [`refine::naive`] is the definition, [`refine::kinetic`] what [`Ground`] uses.
 //! * [`stream`]: an engine over a pool of pages: which page is asked for, and by when.
 //! * [`flight`], [`flyover`], [`stats`]: recorded flights, their replay by any engine, and figures. A replay reads no clock.
+//! * [`simplify`](mod@simplify): a mesh of a terrain or a part of it, within a height of every sample, without an eye.
 //! * [`edits`]: scripts of edits. [`metric`], [`mesh`], [`view`]: the error on the screen, triangles, the camera.
 //! * Package `terrasoar-layout` has the file: reading, building, editing, verifying.
 //!
@@ -51,6 +52,7 @@ pub mod ground;
 pub mod mesh;
 pub mod metric;
 pub mod refine;
+pub mod simplify;
 pub mod sink;
 pub mod stats;
 pub mod stream;

@@ -38,6 +38,15 @@ impl TriangleKey {
     }
 }
 
+/// Triangles with shared vertices.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct IndexedMesh {
+    /// Vertices in metres east, north and up.
+    pub positions: Vec<[f64; 3]>,
+    /// Triangles, counter-clockwise seen from above, as indices into `positions`.
+    pub triangles: Vec<[u32; 3]>,
+}
+
 /// Rotates a bin-tree triangle so that the corner opposite its longest edge comes first.
 pub fn with_apex_first([p, q, r]: Triangle) -> Triangle {
     let length2 = |a: GridPoint, b: GridPoint| {

@@ -17,12 +17,12 @@ pub struct FrameStats {
     pub splits: u64,
     /// Bin-tree nodes that were split in the frame before and are no longer.
     pub merges: u64,
-    /// Live ranges that were over; 0 for engines that keep none in a queue.
-    pub expired: u64,
-    /// Triangle slots written; 0 for engines that keep no slots.
-    pub slots_written: u64,
-    /// Bytes of vertices and triangles that a GPU receives; 0 for engines that make no patches.
-    pub patch_bytes: u64,
+    /// Live ranges that were over; `None` for engines that keep none in a queue.
+    pub expired: Option<u64>,
+    /// Triangle slots written; `None` for engines that keep no slots.
+    pub slots_written: Option<u64>,
+    /// Bytes of vertices and triangles that a GPU receives; `None` for engines that make no patches.
+    pub patch_bytes: Option<u64>,
     /// Vertices left for later frames for want of budget.
     pub late: u64,
     /// Largest error on the screen that they leave, in pixels; 0 if none exceeds the tolerance.
@@ -33,12 +33,12 @@ pub struct FrameStats {
     pub record_bytes_touched: u64,
     /// Time the mesh update took, in milliseconds. Times are the only figures that differ between two replays.
     pub update_ms: f64,
-    /// The part of it spent on finding what is over, in microseconds; this and the next two are 0 for engines without such parts.
-    pub scan_us: f64,
+    /// The part of it spent on finding what is over, in microseconds; this and the next two are `None` for engines without such parts.
+    pub scan_us: Option<f64>,
     /// The part of it spent on testing, in microseconds.
-    pub test_us: f64,
+    pub test_us: Option<f64>,
     /// The part of it spent on splitting, merging and telling, in microseconds.
-    pub apply_us: f64,
+    pub apply_us: Option<f64>,
     /// Records that edits changed before this frame.
     pub edited_records: u64,
     /// Time these edits took before the update, in milliseconds; that in which the engine hears of them is part of the update's.
@@ -63,6 +63,9 @@ pub struct TimeSpread {
 }
 
 /// Figures of one engine over a whole flight.
+///
+/// **What is called a total is the sum of a column over all frames, the first included,** which makes the whole mesh from nothing. Incoherence, times and ratios leave the first
+/// frame out. `None` where a figure does not apply to an engine, or where there is no frame to take it from.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReplaySummary {
     /// Engine's name.
@@ -76,28 +79,28 @@ pub struct ReplaySummary {
     pub incoherence_percent: f64,
     /// Sum over all frames.
     pub vertex_tests_total: u64,
-    /// Sum over all frames but the first.
+    /// Sum over all frames.
     pub splits_total: u64,
-    /// Sum over all frames but the first.
+    /// Sum over all frames.
     pub merges_total: u64,
-    /// Sum over all frames but the first.
-    pub expired_total: u64,
-    /// Sum over all frames but the first.
-    pub slots_written_total: u64,
-    /// Sum over all frames but the first.
-    pub patch_bytes_total: u64,
+    /// Sum over all frames; `None` for engines that keep no live ranges in a queue.
+    pub expired_total: Option<u64>,
+    /// Sum over all frames; `None` for engines that keep no slots.
+    pub slots_written_total: Option<u64>,
+    /// Sum over all frames; `None` for engines that make no patches.
+    pub patch_bytes_total: Option<u64>,
     /// Sum over all frames.
     pub late_total: u64,
     /// Largest of all frames, in pixels.
     pub late_error_px_max: f64,
     /// Spread of the update times.
     pub update_ms: TimeSpread,
+    /// Median over all frames but the first, in microseconds; this and the next two are `None` for engines without such parts.
+    pub scan_us_p50: Option<f64>,
     /// Median, in microseconds.
-    pub scan_us_p50: f64,
+    pub test_us_p50: Option<f64>,
     /// Median, in microseconds.
-    pub test_us_p50: f64,
-    /// Median, in microseconds.
-    pub apply_us_p50: f64,
+    pub apply_us_p50: Option<f64>,
     /// Sum over all frames.
     pub edited_records_total: u64,
     /// Longest of all frames, in milliseconds.
@@ -165,6 +168,10 @@ impl ReplaySummary {
     pub fn of(engine: &str, frames: &[FrameStats]) -> Self {
         let later = frames.get(1..).unwrap_or_default();
         let sum = |f: fn(&FrameStats) -> u64| frames.iter().map(f).sum::<u64>();
+        let median_of = |f: fn(&FrameStats) -> Option<f64>| {
+            let mut values: Vec<f64> = later.iter().filter_map(f).collect();
+            (!values.is_empty()).then(|| median(&mut values))
+        };
         let mean = |total: f64, count: usize| total / (count.max(1) as f64);
         let incoherence =
             later.iter().map(|f| 100.0 * f.new_triangles as f64 / (f.triangles.max(1) as f64)).sum();
@@ -178,17 +185,18 @@ impl ReplaySummary {
             triangles_mean: mean(sum(|f| f.triangles) as f64, frames.len()),
             incoherence_percent: mean(incoherence, later.len()),
             vertex_tests_total: sum(|f| f.vertex_tests),
-            splits_total: later.iter().map(|f| f.splits).sum(),
-            merges_total: later.iter().map(|f| f.merges).sum(),
-            expired_total: later.iter().map(|f| f.expired).sum(),
-            slots_written_total: later.iter().map(|f| f.slots_written).sum(),
-            patch_bytes_total: later.iter().map(|f| f.patch_bytes).sum(),
+            splits_total: sum(|f| f.splits),
+            merges_total: sum(|f| f.merges),
+            // A sum of nothing but `None` is none.
+            expired_total: frames.iter().map(|f| f.expired).sum(),
+            slots_written_total: frames.iter().map(|f| f.slots_written).sum(),
+            patch_bytes_total: frames.iter().map(|f| f.patch_bytes).sum(),
             late_total: sum(|f| f.late),
             late_error_px_max: frames.iter().map(|f| f.late_error_px).fold(0.0, f64::max),
             update_ms: TimeSpread::of(later.iter().map(|f| f.update_ms)),
-            scan_us_p50: TimeSpread::of(later.iter().map(|f| f.scan_us)).p50,
-            test_us_p50: TimeSpread::of(later.iter().map(|f| f.test_us)).p50,
-            apply_us_p50: TimeSpread::of(later.iter().map(|f| f.apply_us)).p50,
+            scan_us_p50: median_of(|f| f.scan_us),
+            test_us_p50: median_of(|f| f.test_us),
+            apply_us_p50: median_of(|f| f.apply_us),
             edited_records_total: frames.iter().map(|f| f.edited_records).sum(),
             edit_ms_max: frames.iter().map(|f| f.edit_ms).fold(0.0, f64::max),
             mesh_hash: format!("{hash:016x}"),
@@ -261,6 +269,21 @@ mod tests {
             !Comparison::of(&[("a".into(), a.clone()), ("b".into(), frames(&[1, 1, 1], &[1.0; 3], 8))])
                 .same_mesh
         );
+    }
+
+    #[test]
+    fn totals_count_every_frame_and_say_where_there_is_nothing_to_count() {
+        let mut frames = frames(&[400, 4, 40], &[9.0, 1.0, 1.0], 7);
+        frames.iter_mut().zip(1..).for_each(|(f, i)| f.splits = 10 * i);
+        let plain = ReplaySummary::of("soar", &frames);
+        assert_eq!((plain.vertex_tests_total, plain.splits_total), (444, 60));
+        assert_eq!((plain.expired_total, plain.patch_bytes_total, plain.scan_us_p50), (None, None, None));
+        frames.iter_mut().zip(1..).for_each(|(f, i)| {
+            f.expired = Some(i);
+            f.scan_us = Some(i as f64);
+        });
+        let queued = ReplaySummary::of("kinetic", &frames);
+        assert_eq!((queued.expired_total, queued.scan_us_p50), (Some(6), Some(2.0)));
     }
 
     #[test]

@@ -13,7 +13,8 @@
 //! # }
 //! ```
 //!
-//! What comes out is for `terrasoar_layout::build`, and for `terrasoar_layout::imagery::drape`.
+//! What comes out is for `terrasoar_layout::build`, and for `terrasoar_layout::imagery::drape`. The other way, [`export`] writes heights of a terrain as GeoTIFF,
+//! and [`difference`] compares two.
 //!
 //! [`open`] looks at a file's first bytes and gives it to the reader of that format, whatever its
 //! name. Formats without a signature are recognised by name, and by files beside them. Opening
@@ -24,7 +25,9 @@ mod ascii_grid;
 mod beside;
 mod bt;
 mod crs;
+pub mod difference;
 mod dted;
+pub mod export;
 mod formats;
 #[cfg(feature = "gdal")]
 mod gdal;
@@ -48,11 +51,13 @@ mod plain;
 mod png;
 pub(crate) mod png_stream;
 mod pnm;
+mod raster;
 mod raw;
 mod reader;
 mod strangers;
 pub mod synth;
 mod text;
+mod tiff_tags;
 mod usgs_dem;
 mod value;
 mod warp;
@@ -68,7 +73,7 @@ pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
 pub use options::{Direction, OpenOptions, Resampling};
-pub use picture::open_image;
+pub use picture::{open_image, open_images_on};
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 pub use strangers::strangers;
 

@@ -58,9 +58,9 @@ impl Masking {
         if self.in_memory { Self::bytes_of(self.samples) } else { 0 }
     }
 
-    /// Streams `reader` into `sink` with what is masked as NaN.
-    pub(crate) fn stream(&self, reader: &dyn Reader, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        let Some(mask) = self.file.as_deref().or_else(|| reader.mask()) else { return reader.stream(sink) };
+    /// Reads the mask: that of its file, or else `own`. `None` where there is none.
+    pub(crate) fn keep(&self, own: Option<&dyn Reader>) -> Result<Option<Kept>, LayoutError> {
+        let Some(mask) = self.file.as_deref().or(own) else { return Ok(None) };
         let bytes = Self::bytes_of(self.samples);
         let failed =
             |source| LayoutError::io(&self.scratch, "cannot keep the mask in a temporary file in", source);
@@ -71,8 +71,30 @@ impl Masking {
             file.set_len(bytes).map_err(failed)?;
             Bits::File(Mutex::new(file))
         };
-        let keeping = Keeping { masking: self, bits: &bits };
-        mask.stream(&keeping)?;
+        mask.stream(&Keeping { masking: self, bits: &bits })?;
+        Ok(Some(Kept(bits)))
+    }
+
+    /// Calls `hide` with every texel of a row that the mask calls void.
+    pub(crate) fn hide_row(
+        &self,
+        kept: &Kept,
+        row: u32,
+        mut hide: impl FnMut(usize),
+    ) -> Result<(), LayoutError> {
+        let window = Window { col: 0, row, width: self.samples[0], height: 1 };
+        self.rows(&kept.0, window, false, |_, bytes, bit| {
+            for at in 0..self.samples[0] as usize {
+                if bytes[(bit + at) / 8] >> ((bit + at) % 8) & 1 == 0 {
+                    hide(at);
+                }
+            }
+        })
+    }
+
+    /// Streams `reader` into `sink` with what is masked as NaN.
+    pub(crate) fn stream(&self, reader: &dyn Reader, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let Some(Kept(bits)) = self.keep(reader.mask())? else { return reader.stream(sink) };
         reader.stream(&Masked { masking: self, bits: &bits, sink })
     }
 
@@ -124,6 +146,9 @@ impl Masking {
         Ok(())
     }
 }
+
+/// A mask that has been read.
+pub(crate) struct Kept(Bits);
 
 /// Keeps a mask as it streams.
 struct Keeping<'a> {

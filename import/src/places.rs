@@ -95,6 +95,32 @@ impl Crs {
         Some(Self { system, ground })
     }
 
+    /// A system that a file names.
+    pub(crate) fn of_system(system: System) -> Self {
+        let ground = Ground::new(&system);
+        Self { system, ground }
+    }
+
+    /// Whether anything is known of it.
+    pub(crate) fn is_said(&self) -> bool {
+        self.system.kind != Kind::Unknown || self.system.unit.is_some()
+    }
+
+    /// Whether it is a site's own system of lengths, tied to nothing.
+    pub(crate) fn is_site(&self) -> bool {
+        matches!(self.system.kind, Kind::Local | Kind::Unknown) && self.ground.is_none()
+    }
+
+    /// The way to the ground, if there is one.
+    pub(crate) fn ground(&self) -> Option<&Ground> {
+        self.ground.as_ref()
+    }
+
+    /// All that is known of it.
+    pub(crate) fn system(&self) -> &System {
+        &self.system
+    }
+
     /// Its name, with its code: "WGS 84 / UTM zone 32N (EPSG:32632)".
     pub fn name(&self) -> String {
         let name = harmless(&self.system.name, 200);
@@ -126,13 +152,18 @@ impl Crs {
     }
 
     /// A full turn, where coordinates are angles.
-    fn turn(&self) -> Option<f64> {
+    pub(crate) fn turn(&self) -> Option<f64> {
         let HorizontalSize::Radians(size) = self.system.unit.as_ref()?.size else { return None };
         Some(std::f64::consts::TAU / size)
     }
 
+    /// Whether no more is known than a unit, and perhaps a name.
+    pub(crate) fn is_unnamed(&self) -> bool {
+        self.system.code.is_none() && self.system.proj.is_none()
+    }
+
     /// Whether coordinates of both are the same numbers.
-    fn is_same(&self, other: &Self) -> bool {
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
         let [a, b] = [&self.system, &other.system];
         let size = |system: &System| system.unit.as_ref().map(|unit| unit.size);
         let is_proj_same = match (&a.proj, &b.proj) {

@@ -33,10 +33,15 @@
 //! | fly over pages that threads read, and see what comes late | [`iobench::fly_pooled`] |
 //! | time a flight over a mapped file, cold and warm | [`iobench::time()`], [`iobench::kernel`] |
 //! | write a comparison of engines for people and for programs | [`report::ComparisonReport`] |
+//! | colour differences | [`diverging`] |
+//! | write a mesh as PLY, OBJ, STL or GLB | [`mesh_file`] |
 //! | keep a picture as PNG that is known again as ours | [`picture`] |
 //!
 //! The frames that reports are about come from [`replay`](terrasoar::flyover::replay).
 
+pub mod diverging;
 pub mod iobench;
+pub mod made;
+pub mod mesh_file;
 pub mod picture;
 pub mod report;

@@ -49,6 +49,11 @@ fn defined(edit: &Edit, grid: &Grid, old: &HeightWindow, original: &HeightWindow
     };
     let inside = |area: &Area| match *area {
         Area::Rect(r) => x >= r.west && x <= r.east && y >= r.south && y <= r.north,
+        Area::Extent { sides_m: [w, s, e, n] } => {
+            let [x, y] = way([0.0; 2]);
+            let [near_x, near_y] = grid.spacing_m().map(|step| 1e-6 * step);
+            x >= w - near_x && x <= e + near_x && y >= s - near_y && y <= n + near_y
+        }
         Area::Disc { centre_m, radius_m } => way(centre_m)[0].hypot(way(centre_m)[1]) <= radius_m,
     };
     match edit {
@@ -157,6 +162,8 @@ fn any_area() -> impl Strategy<Value = Area> {
             Area::Rect(SampleRect { west, south, east: west + w, north: south + h })
         }),
         (any_place(), any_radius()).prop_map(|(centre_m, radius_m)| Area::Disc { centre_m, radius_m }),
+        (any_place(), any_radius())
+            .prop_map(|([x, y], r)| Area::Extent { sides_m: [x - r, y - 0.5 * r, x + r, y + r] }),
     ]
 }
 

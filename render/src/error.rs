@@ -46,6 +46,18 @@ pub enum RenderError {
         /// Bytes the device allows in one binding.
         limit_bytes: u64,
     },
+    /// A picture of no pixels, or of more than the device draws.
+    #[error(
+        "a picture of {wide} x {high} pixels cannot be drawn: this device draws up to {most} pixels a side; ask for a smaller one"
+    )]
+    PictureSize {
+        /// Pixels across.
+        wide: u32,
+        /// Pixels down.
+        high: u32,
+        /// Most pixels either way.
+        most: u32,
+    },
     /// A draw range names triangles that were never uploaded.
     #[error("triangles {start}..{end} are to be drawn where {uploaded} were uploaded")]
     RangeOutside {

@@ -17,13 +17,11 @@ impl Offscreen {
     ///
     /// # Errors
     ///
-    /// [`RenderError::Usage`] for no pixels or more than the device's textures have.
+    /// [`RenderError::PictureSize`] for no pixels or more than the device's textures have.
     pub fn new(device: &wgpu::Device, size_px: [u32; 2]) -> Result<Self> {
         let most = device.limits().max_texture_dimension_2d;
         if size_px.iter().any(|s| *s == 0 || *s > most) {
-            return Err(RenderError::Usage(
-                "a picture's sides must be from 1 to the device's largest texture",
-            ));
+            return Err(RenderError::PictureSize { wide: size_px[0], high: size_px[1], most });
         }
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),

@@ -12,6 +12,8 @@ pub struct Ramp {
     pub about: &'static str,
     /// Positions from 0 to 1, ascending, and sRGB colours 0xRRGGBB.
     pub stops: &'static [(f32, u32)],
+    /// Metres of height from end to end that the colours need to mean what they say, such as snow; 0 where they mean nothing but lower and higher.
+    pub least_span_m: f32,
 }
 
 /// All ramps; the first is the default.
@@ -29,6 +31,7 @@ pub const RAMPS: &[Ramp] = &[
             (0.91, 0xe3e2e2),
             (1.00, 0xfafbfd),
         ],
+        least_span_m: 1000.0,
     },
     Ramp {
         name: "atlas",
@@ -43,21 +46,25 @@ pub const RAMPS: &[Ramp] = &[
             (0.90, 0x8f5d3f),
             (1.00, 0xefe6e0),
         ],
+        least_span_m: 1000.0,
     },
     Ramp {
         name: "desert",
         about: "sand to red rock",
         stops: &[(0.00, 0xe8d3a2), (0.25, 0xd9b27c), (0.50, 0xc28a5a), (0.75, 0x9a5b42), (1.00, 0x6f4038)],
+        least_span_m: 0.0,
     },
     Ramp {
         name: "arctic",
         about: "tundra to ice",
         stops: &[(0.00, 0x5d6f6a), (0.25, 0x8b9c96), (0.50, 0xb9c7cb), (0.75, 0xdde8f0), (1.00, 0xffffff)],
+        least_span_m: 1000.0,
     },
     Ramp {
         name: "mars",
         about: "dark dust to pale dust",
         stops: &[(0.00, 0x5b2f25), (0.30, 0x94502f), (0.60, 0xc07a4a), (0.85, 0xddaa7a), (1.00, 0xf0d6b5)],
+        least_span_m: 0.0,
     },
     Ramp {
         name: "viridis",
@@ -73,16 +80,28 @@ pub const RAMPS: &[Ramp] = &[
             (0.875, 0x6ece58),
             (1.000, 0xfde725),
         ],
+        least_span_m: 0.0,
     },
     Ramp {
         name: "heat",
         about: "pale to dark red: slopes",
         stops: &[(0.00, 0xf6f3e6), (0.25, 0xf5d78e), (0.50, 0xee8f4c), (0.75, 0xc23a3a), (1.00, 0x5a1240)],
+        least_span_m: 0.0,
     },
-    Ramp { name: "grey", about: "dark to light", stops: &[(0.0, 0x5a5a5a), (1.0, 0xf4f4f4)] },
+    Ramp {
+        name: "grey",
+        about: "dark to light",
+        stops: &[(0.0, 0x5a5a5a), (1.0, 0xf4f4f4)],
+        least_span_m: 0.0,
+    },
 ];
 
 impl Ramp {
+    /// Heights in metres of the two ends over ground from `low_m` to `high_m`: the ground's own, or more where it is flatter than the colours allow.
+    pub fn range_m(&self, [low_m, high_m]: [f32; 2]) -> [f32; 2] {
+        [low_m, high_m.max(low_m + self.least_span_m)]
+    }
+
     /// The ramp of a name.
     pub fn named(name: &str) -> Option<&'static Self> {
         RAMPS.iter().find(|ramp| ramp.name == name)

@@ -69,7 +69,7 @@ pub(crate) struct LocalView {
     pub origin: [i32; 2],
     /// The eye's place within that cell, metres.
     pub eye_in_cell_m: [f32; 2],
-    /// Height near the eye's, before exaggeration.
+    /// Height near the eye's, before exaggeration; near the ground's where the eye is very far from it.
     pub height_origin_m: f32,
     /// The eye above the exaggerated height origin.
     pub eye_above_origin_m: f32,
@@ -78,7 +78,11 @@ pub(crate) struct LocalView {
 impl LocalView {
     pub(crate) fn new(view: &View, terrain: &TerrainShape) -> Self {
         let cell = [0, 1].map(|i| whole_and_rest(view.eye_m[i] / terrain.spacing_m[i]).0);
-        let height_origin_m = (view.eye_m.z / view.vertical_exaggeration) as f32;
+        let eye_height_m = view.eye_m.z / view.vertical_exaggeration;
+        let [low_m, high_m] = terrain.height_range_m;
+        let on_ground_m = eye_height_m.clamp(low_m, high_m);
+        let is_far = (eye_height_m - on_ground_m).abs() > FAR_ABOVE_M;
+        let height_origin_m = if is_far { on_ground_m } else { eye_height_m } as f32;
         Self {
             origin: cell,
             eye_in_cell_m: [0, 1].map(|i| (view.eye_m[i] - f64::from(cell[i]) * terrain.spacing_m[i]) as f32),
@@ -88,6 +92,9 @@ impl LocalView {
         }
     }
 }
+
+/// Metres between the eye's height and the ground's beyond which heights are counted from the ground: so far from the eye single precision knows no decimetres.
+const FAR_ABOVE_M: f64 = (1 << 20) as f64;
 
 /// A coordinate as a whole number and what is left. Far outside, the whole number ends where the shader's difference of two stays in range.
 pub(crate) fn whole_and_rest(at: f64) -> (i32, f64) {

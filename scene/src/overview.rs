@@ -69,12 +69,62 @@ pub fn overview(terrain: &Terrain, exaggeration: f64, fov_deg: f64, viewport: Vi
     View { eye_m, vertical_exaggeration: exaggeration, ..view }
 }
 
+/// A view of the whole terrain from straight above, north at the top, every pixel as many metres as every other; in the largest picture of the terrain's shape
+/// that `most` has room for. The ground's border is the picture's. Gives the metres of a pixel too.
+///
+/// The eye is so far away that the highest ground stands a twentieth of a pixel aside at most.
+pub fn from_above(terrain: &Terrain, exaggeration: f64, most: Viewport) -> (View, f64) {
+    let extent_m = terrain.grid().extent_m();
+    let [low_m, high_m] = terrain.header().height_range_m.map(|h| h * exaggeration);
+    let [most_wide, most_high] = most.size_px().map(f64::from);
+    let pixel_m = (extent_m[0] / most_wide).max(extent_m[1] / most_high);
+    let size = [0, 1].map(|i| (extent_m[i] / pixel_m).round().clamp(1.0, [most_wide, most_high][i]));
+    // Rather half a pixel less of the ground than a seam of sky.
+    let pixel_m = (extent_m[0] / size[0]).min(extent_m[1] / size[1]);
+    let away_m = (10.0 * size[0].max(size[1]) * (high_m - low_m)).max(10.0 * extent_m[0].hypot(extent_m[1]));
+    let eye_m = DVec3::new(0.5 * extent_m[0], 0.5 * extent_m[1], low_m + away_m);
+    let fov_deg = (2.0 * (0.5 * pixel_m * size[1] / away_m).atan()).to_degrees();
+    let viewport = Viewport::from(size.map(|side| side as u32));
+    let down = [0.0, -std::f64::consts::FRAC_PI_2];
+    (View { vertical_exaggeration: exaggeration, ..view_from(eye_m, down, fov_deg, viewport) }, pixel_m)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use terrasoar_layout::build::{BuildOptions, build};
     use terrasoar_layout::dem::{MemoryDem, SampleType};
     use terrasoar_layout::progress::Silent;
+
+    #[test]
+    fn from_above_a_pixel_is_as_large_everywhere() {
+        let dem = MemoryDem::from_fn([65, 33], SampleType::I16, |x, y| f64::from((x * 70) ^ (y * 50)));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("land.iqt");
+        build(&dem, &path, &BuildOptions::default().spacing_m([30.0, 20.0]), &Silent).unwrap();
+        let terrain = Terrain::open(&path).unwrap();
+        for (most, size) in [([1280, 720], [1280, 427]), ([300, 900], [300, 100]), ([1, 1], [1, 1])] {
+            let (view, pixel_m) = from_above(&terrain, 3.0, most.into());
+            assert_eq!(view.viewport.size_px(), size);
+            let [right, up, forward] = view.axes();
+            let tangents = view.half_tangents();
+            // Where corners at the lowest and the highest ground are, in pixels of the middle.
+            for (east, north) in [(0.0, 0.0), (1920.0, 0.0), (1920.0, 640.0)] {
+                for height in terrain.header().height_range_m {
+                    let to = DVec3::new(east, north, 3.0 * height) - view.eye_m;
+                    let at = [(right, 0), (up, 1)].map(|(axis, i)| {
+                        0.5 * f64::from(size[i]) * to.dot(axis) / to.dot(forward) / tangents[i]
+                    });
+                    let even = [(east - 960.0) / pixel_m, (north - 320.0) / pixel_m];
+                    for i in [0, 1] {
+                        assert!((at[i] - even[i]).abs() < 0.05, "{at:?} {even:?}");
+                        // The ground covers the picture.
+                        assert!(even[i].abs() >= 0.5 * f64::from(size[i]) - 1e-6);
+                    }
+                }
+            }
+        }
+    }
 
     #[test]
     fn the_whole_box_is_in_the_picture_and_fills_it_one_way() {

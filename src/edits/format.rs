@@ -7,8 +7,10 @@ use super::{Moment, StampFile, Step};
 use crate::flight::format::{excerpt, push_number};
 use terrasoar_layout::edit::{Area, Brush, BrushAction, Crater, Edit, Falloff, SampleRect, StampMode};
 
-/// Version of the format that is read and written.
-pub const VERSION: u32 = 1;
+/// Highest version of the format that is read.
+pub const VERSION: u32 = 2;
+/// The version in which `rect` is metres; before, it counts samples.
+const METRES: u32 = 2;
 /// Most edits a script may have.
 pub const MAX_EDITS: u64 = 1_000_000;
 /// Most bytes of a line, its end not counted.
@@ -25,7 +27,9 @@ const FLATTEN: &str = "flatten at X,Y radius M to M strength 0..1 falloff hard|l
 const LOWER: &str = "lower at X,Y radius M by M falloff hard|linear|smooth";
 const RAISE: &str = "raise at X,Y radius M by M falloff hard|linear|smooth";
 const RESTORE: &str = "restore rect W,S,E,N` or `restore disc X,Y radius M";
+const RESTORE_METRES: &str = "restore rect W,S,E,N`, `restore disc X,Y radius M` or `restore samples W,S,E,N";
 const SET: &str = "set rect W,S,E,N to M` or `set disc X,Y radius M to M";
+const SET_METRES: &str = "set rect W,S,E,N to M`, `set disc X,Y radius M to M` or `set samples W,S,E,N to M";
 const SMOOTH: &str = "smooth at X,Y radius M strength 0..1 falloff hard|linear|smooth";
 const STAMP: &str = "stamp FILE sample COLUMN,ROW mode set|add|max|min";
 
@@ -46,8 +50,8 @@ pub(super) enum Line {
     Step(Step),
 }
 
-/// Reads a line; `Err` says what is wrong and what to write instead.
-pub(super) fn parse(line: &str) -> Result<Line, String> {
+/// Reads a line of a script of some version; `Err` says what is wrong and what to write instead.
+pub(super) fn parse(line: &str, version: u32) -> Result<Line, String> {
     let line = line.trim_matches([' ', '\t']);
     if line.is_empty() {
         return Ok(Line::Blank);
@@ -73,7 +77,7 @@ pub(super) fn parse(line: &str) -> Result<Line, String> {
         ["end" | "frame" | "at", ..] => {
             Err("a line of its own is `end`, `frame N` or `at SECONDS`, and nothing beside it".into())
         }
-        _ => step(&words).map(Line::Step),
+        _ => step(&words, version).map(Line::Step),
     }
 }
 
@@ -91,7 +95,7 @@ pub(super) fn name_fault(name: &str) -> Option<String> {
         .then(|| format!("{} is no name; write one line of at most {MAX_NAME_BYTES} bytes", excerpt(name)))
 }
 
-fn step(words: &[String]) -> Result<Step, String> {
+fn step(words: &[String], version: u32) -> Result<Step, String> {
     let (verb, rest) = (words[0].as_str(), &words[1..]);
     let edit = match verb {
         "crater" => crater(Fields::new(rest, CRATER))?,
@@ -104,13 +108,14 @@ fn step(words: &[String]) -> Result<Step, String> {
         "smooth" => brush(Fields::new(rest, SMOOTH), |f| Ok(BrushAction::Smooth { strength: strength(f)? }))?,
         "set" => {
             let mut fields = Fields::new(rest, SET);
-            let (area, height_m) = (area(&mut fields, SET)?, fields.required("to", number)?);
+            let form = if version < METRES { SET } else { SET_METRES };
+            let (area, height_m) = (area(&mut fields, version, form)?, fields.required("to", number)?);
             fields.finish()?;
             Edit::Set { area, height_m }
         }
         "restore" => {
             let mut fields = Fields::new(rest, RESTORE);
-            let area = area(&mut fields, RESTORE)?;
+            let area = area(&mut fields, version, if version < METRES { RESTORE } else { RESTORE_METRES })?;
             fields.finish()?;
             Edit::Restore(area)
         }
@@ -159,12 +164,23 @@ fn brush<'a>(
     Ok(Edit::Brush(brush))
 }
 
-fn area(fields: &mut Fields<'_>, form: &str) -> Result<Area, String> {
-    let rect = fields.optional("rect", |word| list(word, "10,10,20,20", whole::<u32>))?;
+fn area(fields: &mut Fields<'_>, version: u32, form: &str) -> Result<Area, String> {
+    let samples = |word: &str| list(word, "10,10,20,20", whole::<u32>);
+    let (samples, extent) = if version < METRES {
+        (fields.optional("rect", samples)?, None)
+    } else {
+        let metres = |word: &str| list(word, "700,380,800,400.5", number);
+        (fields.optional("samples", samples)?, fields.optional("rect", metres)?)
+    };
     let disc = fields.optional("disc", place)?;
-    match (rect, disc) {
-        (Some([west, south, east, north]), None) => Ok(Area::Rect(SampleRect { west, south, east, north })),
-        (None, Some(centre_m)) => Ok(Area::Disc { centre_m, radius_m: fields.required("radius", number)? }),
+    match (samples, extent, disc) {
+        (Some([west, south, east, north]), None, None) => {
+            Ok(Area::Rect(SampleRect { west, south, east, north }))
+        }
+        (None, Some(sides_m), None) => Ok(Area::Extent { sides_m }),
+        (None, None, Some(centre_m)) => {
+            Ok(Area::Disc { centre_m, radius_m: fields.required("radius", number)? })
+        }
         _ => Err(format!("where is not said, or said twice; write `{form}`")),
     }
 }
@@ -195,8 +211,18 @@ fn name_of<T: PartialEq>(value: &T, names: &[(&'static str, T)]) -> &'static str
     names.iter().find(|(_, v)| v == value).map_or("", |(name, _)| name)
 }
 
-/// Appends a step's line without its end; `Err` says why it cannot be written.
-pub(super) fn push_step(line: &mut String, step: &Step) -> Result<(), String> {
+/// The lowest version that can say this.
+pub(super) fn version_of(step: &Step) -> u32 {
+    match step {
+        Step::Edit(Edit::Set { area: Area::Extent { .. }, .. } | Edit::Restore(Area::Extent { .. })) => {
+            METRES
+        }
+        _ => 1,
+    }
+}
+
+/// Appends a step's line without its end, as a version of the format has it; `Err` says why it cannot be written.
+pub(super) fn push_step(line: &mut String, step: &Step, version: u32) -> Result<(), String> {
     match step {
         Step::Stamp(stamp) => {
             let file = quoted(&stamp.file).filter(|_| !stamp.file.is_empty());
@@ -211,7 +237,7 @@ pub(super) fn push_step(line: &mut String, step: &Step) -> Result<(), String> {
         }
         Step::Edit(edit) => {
             edit.check_numbers().map_err(|error| error.to_string())?;
-            push_edit(line, edit);
+            push_edit(line, edit, version);
         }
     }
     if line.len() > MAX_LINE_BYTES {
@@ -220,7 +246,7 @@ pub(super) fn push_step(line: &mut String, step: &Step) -> Result<(), String> {
     Ok(())
 }
 
-fn push_edit(line: &mut String, edit: &Edit) {
+fn push_edit(line: &mut String, edit: &Edit, version: u32) {
     line.push_str(edit.name());
     match edit {
         Edit::Crater(crater) => {
@@ -246,24 +272,26 @@ fn push_edit(line: &mut String, edit: &Edit) {
             line.push_str(name_of(&brush.falloff, &FALLOFFS));
         }
         Edit::Set { area, height_m } => {
-            push_area(line, area);
+            push_area(line, area, version);
             push_values(line, "to", &[*height_m]);
         }
-        Edit::Restore(area) => push_area(line, area),
+        Edit::Restore(area) => push_area(line, area, version),
         // Refused before.
         Edit::Stamp(_) => {}
     }
 }
 
-fn push_area(line: &mut String, area: &Area) {
+fn push_area(line: &mut String, area: &Area, version: u32) {
     match area {
         Area::Rect(r) => {
-            line.push_str(&format!(" rect {},{},{},{}", r.west, r.south, r.east, r.north));
+            let name = if version < METRES { "rect" } else { "samples" };
+            line.push_str(&format!(" {name} {},{},{},{}", r.west, r.south, r.east, r.north));
         }
         Area::Disc { centre_m, radius_m } => {
             push_values(line, "disc", centre_m);
             push_values(line, "radius", &[*radius_m]);
         }
+        Area::Extent { sides_m } => push_values(line, "rect", sides_m),
     }
 }
 

@@ -31,13 +31,13 @@ impl Script {
     /// As [`Script::read`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, ScriptError> {
         let mut lines = Lines { rest: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), path, line: 0 };
-        read_header(&mut lines)?;
+        let version = read_header(&mut lines)?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(lines.fault(format!("the script is larger than {} MiB; split it", MAX_BYTES >> 20)));
         }
         let mut gathered = Gathered::default();
         while let Some(text) = lines.next()? {
-            let taken = format::parse(text).and_then(|line| gathered.take(line, lines.line));
+            let taken = format::parse(text, version).and_then(|line| gathered.take(line, lines.line));
             taken.map_err(|problem| lines.fault(problem))?;
         }
         let line = lines.line;
@@ -85,7 +85,8 @@ impl<'a> Lines<'a> {
     }
 }
 
-fn read_header(lines: &mut Lines<'_>) -> Result<(), ScriptError> {
+/// Reads the first two lines; gives the version.
+fn read_header(lines: &mut Lines<'_>) -> Result<u32, ScriptError> {
     let not_a_script = |found: &str| ScriptError::NotAScript { path: lines.path.into(), found: found.into() };
     let is_empty = lines.rest.is_empty();
     let not_text =
@@ -98,14 +99,14 @@ fn read_header(lines: &mut Lines<'_>) -> Result<(), ScriptError> {
         (Some(MAGIC), Some(version), None) if version.bytes().all(|b| b.is_ascii_digit()) => version,
         _ => return Err(not_a_script()),
     };
-    match version.parse::<u32>() {
-        Ok(VERSION) => {}
-        Ok(older) if older < VERSION => return Err(not_a_script()),
+    let version = match version.parse::<u32>() {
+        Ok(version @ 1..=VERSION) => version,
+        Ok(0) => return Err(not_a_script()),
         _ => return Err(ScriptError::Newer { path: path.into(), found: excerpt(version) }),
-    }
+    };
     let second = lines.next()?.unwrap_or_default();
     if second.split_ascii_whitespace().eq(UNITS) {
-        return Ok(());
+        return Ok(version);
     }
     Err(ScriptError::Line {
         path: path.into(),

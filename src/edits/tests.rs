@@ -70,7 +70,7 @@ fn what_is_wrong_is_said_at_its_line() {
             "a.edits:1: not a script of edits: it starts with `terrasoar-flight 1`",
         ),
         ("terrasoar-edits 0\n".into(), "a.edits:1: not a script"),
-        ("terrasoar-edits 2\n".into(), "a.edits:1: this is version `2`"),
+        ("terrasoar-edits 3\n".into(), "a.edits:1: this is version `3`"),
         ("terrasoar-edits 1\nunits feet\n".into(), "a.edits:2: found `units feet`; the second line must be"),
         (HEAD.into(), "a.edits: the script has no edits"),
         (format!("{HEAD}dig at 1,2\n"), "a.edits:3: `dig` is nothing that can be done; write crater, raise"),
@@ -200,6 +200,47 @@ fn stamps_are_loaded_from_the_scripts_folder_once() {
 }
 
 #[test]
+fn rectangles_count_samples_in_the_first_version_and_metres_in_the_second() {
+    let area = |version: u32, field: &str| {
+        let script = parse(&format!("terrasoar-edits {version}\nunits metres degrees\nset {field} to 7\n"))?;
+        match &script.batches[0].steps[0] {
+            Step::Edit(Edit::Set { area, height_m: 7.0 }) => Ok::<_, ScriptError>(*area),
+            other => panic!("{other:?}"),
+        }
+    };
+    let samples = Area::Rect(SampleRect { west: 10, south: 20, east: 30, north: 40 });
+    let metres = Area::Extent { sides_m: [10.0, 20.0, 30.0, 40.0] };
+    assert_eq!(area(1, "rect 10,20,30,40").unwrap(), samples);
+    assert_eq!(area(2, "samples 10,20,30,40").unwrap(), samples);
+    assert_eq!(area(2, "rect 10,20,30,40").unwrap(), metres);
+    assert_eq!(
+        area(2, "rect -1.5,2e1,30.25,40").unwrap(),
+        Area::Extent { sides_m: [-1.5, 20.0, 30.25, 40.0] }
+    );
+    for (version, field) in [
+        (1, "rect 1.5,2,3,4"),
+        (1, "samples 1,2,3,4"),
+        (2, "samples 1.5,2,3,4"),
+        (2, "rect 1,2,3,4 samples 1,2,3,4"),
+    ] {
+        assert!(area(version, field).is_err(), "{version} {field}");
+    }
+    let said = area(2, "rect 30,20,10,40").unwrap_err().to_string();
+    assert!(said.contains("inside out; give west, south, east and north"), "{said}");
+    let text = |area| {
+        let script = Script { batches: vec![Batch::of([Edit::Set { area, height_m: 7.0 }])] };
+        script.to_text(Path::new("x")).unwrap()
+    };
+    assert!(
+        text(samples).starts_with("terrasoar-edits 1\n")
+            && text(samples).contains("set rect 10,20,30,40 to 7")
+    );
+    assert!(
+        text(metres).starts_with("terrasoar-edits 2\n") && text(metres).contains("set rect 10,20,30,40 to 7")
+    );
+}
+
+#[test]
 fn batches_are_labelled_by_what_they_do() {
     let set = || Edit::set(SampleRect { west: 0, south: 0, east: 1, north: 1 }, 1.0);
     let restore = Edit::Restore(Area::Disc { centre_m: [0.0; 2], radius_m: 1.0 });
@@ -221,6 +262,9 @@ fn any_area() -> impl Strategy<Value = Area> {
             Area::Rect(SampleRect { west, south, east: west + w, north: south + h })
         }),
         (any_place(), any_radius()).prop_map(|(centre_m, radius_m)| Area::Disc { centre_m, radius_m }),
+        (any_place(), any_place()).prop_map(|(a, b)| Area::Extent {
+            sides_m: [a[0].min(b[0]), a[1].min(b[1]), a[0].max(b[0]), a[1].max(b[1])]
+        }),
     ]
 }
 
@@ -304,10 +348,12 @@ proptest! {
 
     #[test]
     fn no_text_makes_it_panic(line in "[-a-z0-9.,\"# \t]{0,60}", verb in "(crater|raise|set|restore|stamp|batch|frame|at) ") {
-        let _ = format::parse(&line);
-        if let Ok(Line::Step(step)) = format::parse(&format!("{verb}{line}")) {
-            let mut text = String::new();
-            prop_assert!(format::push_step(&mut text, &step).is_ok());
+        for version in 1..=format::VERSION {
+            let _ = format::parse(&line, version);
+            if let Ok(Line::Step(step)) = format::parse(&format!("{verb}{line}"), version) {
+                let mut text = String::new();
+                prop_assert!(format::push_step(&mut text, &step, version).is_ok());
+            }
         }
     }
 }

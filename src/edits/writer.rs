@@ -1,6 +1,6 @@
 //! Writes a script, and refuses what would not read back as itself. [`Script::write`] replaces the file only once it is complete.
 
-use super::format::{MAGIC, MAX_EDITS, UNITS, VERSION, name_fault, push_moment, push_step};
+use super::format::{MAGIC, MAX_EDITS, UNITS, name_fault, push_moment, push_step, version_of};
 use super::reader::order_fault;
 use super::{Script, ScriptError};
 use crate::sink::FileSink;
@@ -27,7 +27,10 @@ impl Script {
         if self.batches.is_empty() {
             return Err(ScriptError::NoEdits { path: path.into() });
         }
-        let mut text = format!("{MAGIC} {VERSION}\n{}\n", UNITS.join(" "));
+        // The lowest version that holds all of it, so that older programs read what they can.
+        let steps = self.batches.iter().flat_map(|batch| &batch.steps);
+        let version = steps.map(version_of).max().unwrap_or(1);
+        let mut text = format!("{MAGIC} {version}\n{}\n", UNITS.join(" "));
         let (mut before, mut edits) = (None, 0);
         for (batch, number) in self.batches.iter().zip(1..) {
             let refused = |problem| ScriptError::Unwritable { path: path.into(), batch: number, problem };
@@ -64,7 +67,7 @@ impl Script {
             let mut line = String::new();
             for step in &batch.steps {
                 line.clear();
-                push_step(&mut line, step).map_err(refused)?;
+                push_step(&mut line, step, version).map_err(refused)?;
                 text.push_str(&line);
                 text.push('\n');
             }

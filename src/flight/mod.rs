@@ -8,6 +8,7 @@ pub(crate) mod format;
 pub mod generate;
 pub mod incoherence;
 mod reader;
+pub mod sample;
 mod writer;
 
 use crate::view::{View, Viewport};

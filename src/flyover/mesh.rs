@@ -1,28 +1,19 @@
 //! A frame's drawn triangles as a mesh for other programs.
 
-use crate::mesh::{Triangle, is_drawn};
+use crate::mesh::{IndexedMesh, Triangle, is_drawn};
 use crate::refine::Engine;
 use std::collections::HashMap;
 use terrasoar_layout::read::store::RecordStore;
 
-/// One frame's drawn triangles with shared vertices.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct FrameMesh {
-    /// Vertices in metres east, north and up.
-    pub positions: Vec<[f64; 3]>,
-    /// Triangles, counter-clockwise seen from above, as indices into `positions`.
-    pub triangles: Vec<[u32; 3]>,
-}
-
 /// The mesh of an engine over its records.
-pub(super) fn collect_mesh<E: Engine>(mut engine: E) -> FrameMesh {
+pub(super) fn collect_mesh<E: Engine>(mut engine: E) -> IndexedMesh {
     let mut triangles: Vec<Triangle> = Vec::new();
     engine.for_each_triangle(&mut |triangle| triangles.push(triangle));
     mesh_of(&triangles, engine.store_mut())
 }
 
-fn mesh_of(triangles: &[Triangle], records: &impl RecordStore) -> FrameMesh {
-    let mut mesh = FrameMesh::default();
+fn mesh_of(triangles: &[Triangle], records: &impl RecordStore) -> IndexedMesh {
+    let mut mesh = IndexedMesh::default();
     let mut indices: HashMap<u64, u32> = HashMap::new();
     let grid = *records.grid();
     for t in triangles.iter().filter(|t| is_drawn(records, **t)) {

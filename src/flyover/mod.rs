@@ -9,8 +9,9 @@ mod mesh;
 mod passes;
 mod sets;
 
+/// One frame's drawn triangles.
+pub use crate::mesh::IndexedMesh as FrameMesh;
 pub use edits::TimedBatch;
-pub use mesh::FrameMesh;
 
 use crate::flight::FlightFrame;
 use crate::refine::kinetic::{Budget, Kinetic};
@@ -232,7 +233,7 @@ pub fn replay(
     with_records!(records_of(terrain)?, records => {
         let times = with_engine!(kind, records.clone(), quality, engine => time_updates(engine, &mut Still, frames, quality, done))?;
         let stats = with_engine!(kind, records.clone(), quality, engine => count_frames(engine, &mut Still, &records, frames, quality, done))?;
-        Ok(timed(stats, times))
+        Ok(timed(stats, times, kind))
     })
 }
 
@@ -269,15 +270,20 @@ pub fn replay_edited(
         let times = with_engine!(kind, store(), quality, engine => time_updates(engine, &mut ground, frames, quality, done))?;
         let mut ground = Changing::new(terrain, batches)?;
         let stats = with_engine!(kind, store(), quality, engine => count_frames(engine, &mut ground, &records, frames, quality, done))?;
-        Ok(timed(stats, times))
+        Ok(timed(stats, times, kind))
     })
 }
 
-/// Counts with the times of the other pass.
-fn timed(mut stats: Vec<FrameStats>, times: Vec<FrameTimes>) -> Vec<FrameStats> {
+/// Counts with the times of the other pass; without those that do not apply to the engine.
+fn timed(mut stats: Vec<FrameStats>, times: Vec<FrameTimes>, kind: EngineKind) -> Vec<FrameStats> {
     for (stats, times) in stats.iter_mut().zip(times) {
         stats.update_ms = times.update_ms;
-        [stats.scan_us, stats.test_us, stats.apply_us] = times.phases_us;
+        if kind == EngineKind::Kinetic {
+            [stats.scan_us, stats.test_us, stats.apply_us] = times.phases_us.map(Some);
+        } else {
+            // The others keep no queue and no slots, and their updates have no such parts.
+            (stats.expired, stats.slots_written, stats.patch_bytes) = (None, None, None);
+        }
         stats.edit_ms = times.edit_ms;
     }
     stats

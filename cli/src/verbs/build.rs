@@ -9,7 +9,7 @@ use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use terrasoar_import::{Direction, OpenOptions, Resampling};
-use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::build::{BuildOptions, MAX_FILL, build};
 use terrasoar_layout::file::header::{ErrorKind, Header, SpacingOrigin};
 use terrasoar_layout::grid::record::RecordKind;
 
@@ -29,13 +29,18 @@ Examples:
   terrasoar build puget.png --spacing 160 --z-scale 0.1 -o puget.iqt
   terrasoar build huge.tif --memory 2048 -o huge.iqt
   terrasoar build world.tif --reproject utm --resolution 30 -o metric.iqt
+  terrasoar build srtm-folder --fill-voids 20 -o whole.iqt
 
 Room on the output's disk: some 4 bytes a sample for the file (8 or 16 with exact records), and while building another 4 (8 where single
 precision does not hold the samples), unless --memory holds them. Voids take none.
 
 A DEM in degrees gets the spacing in metres that degrees have at its centre; `terrasoar info` says so. PNG says nothing about spacing:
 state it, or it is taken to be 1 m. What else the data does not say can be stated: its reference system, its unit of heights, which numbers mean \"no data\".
-What looks wrong is said aloud, with the flag to type.")]
+What looks wrong is said aloud, with the flag to type.
+
+Voids, samples without data, are counted and left as they are. --fill-voids N fills regions of voids that border each other east, west, north or south and whose box is
+at most N samples wide and high: each sample becomes the mean of its neighbours, as in a soap film over the rim, rounded to the steps of the data. How many is said,
+and kept in the file (terrasoar info).")]
 pub(super) struct Args {
     /// Elevation data: one file, several .hgt tiles that border each other, or a folder of them
     #[arg(required = true, value_name = "IN")]
@@ -66,6 +71,9 @@ pub(super) struct Args {
     /// Raw value that means "no data", beside what the DEM declares; several with commas between, or the flag several times
     #[arg(long, value_name = "VALUE", value_parser = parse::raw_value, allow_hyphen_values = true, value_delimiter = ',')]
     nodata: Vec<String>,
+    /// Fill holes of up to N samples across, either way, smoothly from their rims; larger ones stay void
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_FILL)), hide_default_value = true)]
+    fill_voids: u32,
     #[command(flatten)]
     reading: Reading,
 }
@@ -147,6 +155,7 @@ impl Args {
             .spacing_m(self.spacing)
             .z_scale(self.z_scale)
             .memory_mib(self.memory)
+            .fill_voids(self.fill_voids)
             .record(self.record.map(|word| match word {
                 RecordWord::Compact => RecordKind::Compact,
                 RecordWord::Exact => RecordKind::Exact8,
@@ -228,9 +237,16 @@ fn warn_about_spacing(header: &Header) {
 fn summary(out: &Path, header: &Header, seconds: f64) -> String {
     let [wide, high] = header.grid.samples().map(u64::from);
     let samples = wide * high;
+    let voids = match header.nodata_samples {
+        0 => "no voids".to_owned(),
+        voids => format!("{} voids ({:.3} %)", grouped(voids), 100.0 * voids as f64 / samples as f64),
+    };
+    let filled = header.about.origins.iter().find(|(what, _)| what == "voids");
+    let filled = filled.map(|(_, words)| format!("; {words}")).unwrap_or_default();
     format!(
         "{}: {} x {} samples in {seconds:.1} s ({} samples/s), {} bytes ({:.2} a sample)\n\
-         {} records of {} bytes, {} error, spacing {} ({})",
+         {} records of {} bytes, {} error, spacing {} ({})\n\
+         {voids}{filled}",
         out.display(),
         grouped(wide),
         grouped(high),

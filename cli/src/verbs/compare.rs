@@ -1,5 +1,6 @@
 //! `terrasoar compare`: engines on the same flight, side by side, and a report.
 
+use super::made::made;
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
@@ -23,6 +24,9 @@ use terrasoar_layout::read::terrain::Terrain;
 Examples:
   terrasoar compare alps.iqt --flight low.flight -o report
   terrasoar compare alps.iqt --flight low.flight --engines naive,soar,smart,kinetic --no-sweeps -o report --json
+
+summary.json says how it was made: program and version, commit where the build was told, machine, date, command, and the terrain, flight, tolerance and viewport. Totals are sums
+over all frames; null is what an engine does not have (terrasoar replay --help).
 
 Two sweeps redo the plots of the SMART paper: speed-up by tolerance (0.5 to 8 px) and by incoherence (0.6, 1.4, 5.3 %). They fly up to 120
 frames a point; --no-sweeps leaves them out.")]
@@ -73,6 +77,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     args.force.folder(&args.output, &files, &args.terrain.inputs(&[&args.flight]))?;
     let terrain = args.terrain.open()?;
     let flight = Flight::read(&args.flight)?;
+    args.quality.look_at(&terrain, &flight, &args.flight)?;
     let quality = args.quality.quality();
     let progress = Meter::new("frames");
     let mut runs: Vec<(String, Vec<FrameStats>)> = Vec::new();
@@ -101,6 +106,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         flight: name(&args.flight),
         tolerance_px: quality.tolerance_px,
         viewport: quality.viewport,
+        made: Some(made()),
     };
     let report = ComparisonReport {
         title: &title,

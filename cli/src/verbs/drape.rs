@@ -7,12 +7,14 @@ use anyhow::{Context, Result};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use terrasoar_import::open_image;
+use terrasoar_import::{open_image, open_images_on};
 use terrasoar_layout::imagery::{DrapeOptions, Draped, Extent, ImageSource, PlaceOrigin, TileFormat, drape};
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Drape an image over a terrain file.
 ///
-/// Reads PNG, JPEG and GeoTIFF of any size (JPEG only as far as memory allows), grey, RGB or palette, with or without alpha. Appends a pyramid of
+/// Reads PNG, JPEG and GeoTIFF of any size (JPEG only as far as memory allows), grey, RGB or palette, with or without alpha, masks and "no data". Pictures in another reference
+/// system, turned, mirrored or of other texels than the first are brought onto the terrain by bilinear interpolation. Appends a pyramid of
 /// compressed tiles to the file; until it is complete the file reads as before, whatever happens, and programs that have it open are not
 /// disturbed. Draping again puts other imagery in the place of the first, whose space is not used again.
 #[derive(Debug, clap::Args)]
@@ -23,8 +25,8 @@ Examples:
   terrasoar drape alps.iqt --image photo.png --extent 0,0,20480,15360
   terrasoar drape alps.iqt --image photo.jpg --extent-crs 600000,180000,620480,195360
 
-Where an image lies is taken from --extent, else from its georeference (GeoTIFF, or a world file beside it) if the terrain has one too; else
-it is laid over the whole terrain. Later images of a mosaic lie above earlier ones.")]
+Where an image lies is taken from --extent, else from its georeference (GeoTIFF tags, or a world file, .prj or .aux.xml beside it) if the
+terrain has one too; else it is laid over the whole terrain, upright as its EXIF tag says. Later images of a mosaic lie above earlier ones.")]
 pub(super) struct Args {
     /// Terrain file (.iqt)
     file: PathBuf,
@@ -82,8 +84,11 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let pool = pool.build().context("cannot start the threads; give fewer with --threads")?;
     let start = Instant::now();
     let draped = pool.install(|| -> Result<Draped> {
-        let images: Vec<Box<dyn ImageSource>> =
-            args.images.iter().map(|path| open_image(path)).collect::<Result<_, _>>()?;
+        let images: Vec<Box<dyn ImageSource>> = if args.extent.is_some() || args.extent_crs.is_some() {
+            args.images.iter().map(|path| open_image(path)).collect::<Result<_, _>>()?
+        } else {
+            open_images_on(&args.images, Terrain::open(&args.file)?.header())?
+        };
         for image in &images {
             for note in &image.info().notes {
                 complain(&format!("note: {}: {note}", image.path().display()));

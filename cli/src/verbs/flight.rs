@@ -5,7 +5,7 @@ use super::outputs::{Force, Kind};
 use super::progress::Meter;
 use super::replay::QualityArgs;
 use super::terrain::TerrainArgs;
-use super::{WrongUsage, parse};
+use super::{WrongUsage, parse, within};
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
@@ -26,7 +26,8 @@ Examples:
   terrasoar flight terrain alps.iqt -o low.flight --frames 1000 --incoherence 0.6
   terrasoar flight turn alps.iqt -o turn.flight --frames 360 --speed 5 --turn-rate 1
 
---tolerance-px and --viewport matter for --incoherence only: they decide which triangles a frame has.")]
+--tolerance-px, --viewport and --exaggeration matter for --incoherence only: they decide which triangles a frame has. The flight notes them, and the terrain's extent;
+terrasoar replay says when it is flown with others.")]
 pub(super) struct Args {
     /// What the flight does
     #[arg(value_name = "KIND", value_parser = parse::flight_kind())]
@@ -109,6 +110,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
                     .map(|v| decimal(v, 4));
             let mut flight = solution.flight;
             flight.notes.push(("incoherence-percent".into(), percent.clone()));
+            flight.notes.extend(args.quality.notes());
             (
                 flight,
                 format!(", {speed} m a frame for {percent} % new triangles ({checked} % on other frames)"),
@@ -117,6 +119,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     ground.check()?;
     note_terrain(&mut flight, args);
+    flight.notes.push(within::note_of(terrain.grid()));
     flight.write(&args.output)?;
     let told =
         format!("{}: {} flight of {} frames{told}", args.output.display(), args.kind.name(), args.frames);

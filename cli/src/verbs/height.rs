@@ -3,13 +3,13 @@
 mod points;
 mod table;
 
-use super::output::{complain, decimal, print, print_json};
+use super::output::{decimal, print, print_json};
 use super::parse;
+use super::siting::{self, frame};
 use super::terrain::TerrainArgs;
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
-use terrasoar_import::places::{Crs, Frame};
-use terrasoar_layout::file::header::Header;
+use terrasoar_import::places::Frame;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Print the height at a place, or at all places of a table.
@@ -55,29 +55,6 @@ struct Answer {
     crs: Option<String>,
 }
 
-/// The terrain in the system that places are given in; nothing for metres from its corner.
-fn frame(header: &Header, crs: Option<&str>) -> Result<Option<Frame>> {
-    let Some(text) = crs else { return Ok(None) };
-    let frame = if text.trim().eq_ignore_ascii_case("dem") {
-        Frame::own(header).context(
-            "the terrain does not know where on the ground it lies, for its elevation model did not say; leave --crs away and give metres from its corner",
-        )?
-    } else {
-        Frame::of(header, &Crs::named(text)?)?
-    };
-    if frame.is_rough() {
-        complain(
-            "note: the shift between the two datums is a grid that is not here; places may be off by up to some hundred metres",
-        );
-    }
-    Ok(Some(frame))
-}
-
-/// The system in words.
-fn name(frame: &Frame) -> String {
-    frame.crs().map_or_else(|| "its own coordinates".into(), Crs::name)
-}
-
 pub(super) fn run(args: &Args) -> Result<()> {
     let terrain = args.terrain.open()?;
     if let Some(path) = &args.points {
@@ -95,7 +72,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     let height_m = terrain.height_m(at_m[0], at_m[1])?;
     if args.json {
-        return print_json(&Answer { at_m, height_m, at, crs: frame.as_ref().map(name) });
+        return print_json(&Answer { at_m, height_m, at, crs: frame.as_ref().map(siting::system_name) });
     }
     print(&height_m.map_or_else(|| "no data".to_owned(), |h| format!("{} m", decimal(h, 6))))
 }
@@ -105,15 +82,11 @@ fn is_inside(terrain: &Terrain, at_m: [f64; 2]) -> bool {
     at_m.into_iter().zip(terrain.grid().extent_m()).all(is_within)
 }
 
-/// Where the terrain is, in the system that was asked for.
+/// That a place lies outside, and where the terrain is, in the system that was asked for.
 fn outside(terrain: &Terrain, frame: Option<&Frame>, at: [f64; 2]) -> String {
     let place = format!("{},{} lies outside the terrain", at[0], at[1]);
-    let Some(frame) = frame else {
-        let [east, north] = terrain.grid().extent_m().map(|m| decimal(m, 4));
-        return format!("{place}, which extends from 0,0 to {east},{north} metres");
-    };
-    let Some([x0, y0, x1, y1]) = frame.bounds() else { return place };
-    let digits = if frame.crs().is_some_and(Crs::is_geographic) { 7 } else { 3 };
-    let [x0, y0, x1, y1] = [x0, y0, x1, y1].map(|value| decimal(value, digits));
-    format!("{place}, which extends from {x0},{y0} to {x1},{y1} in {}", name(frame))
+    match siting::reach(terrain.header(), frame) {
+        Some(reach) => format!("{place}, which extends {reach}"),
+        None => place,
+    }
 }

@@ -1,75 +1,214 @@
-//! `terrasoar mesh`: one frame's triangles as a file that other programs read.
+//! `terrasoar mesh`: triangles as a file that other programs read, of one frame of a flight, or of the ground without an eye.
 
-use super::mesh_file::{self, Format};
-use super::output::{grouped, print};
+use super::area::AreaArgs;
+use super::output::{complain, grouped, print};
 use super::outputs::{Force, Kind};
-use super::parse;
 use super::replay::{QualityArgs, batches_of};
 use super::siting;
 use super::terrain::TerrainArgs;
-use anyhow::Result;
+use super::{WrongUsage, parse};
+use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flyover::{EngineKind, frame_mesh};
+use terrasoar::mesh::IndexedMesh;
+use terrasoar::simplify::{SimplifyOptions, simplify};
+use terrasoar_lab::mesh_file::{Format, MeshFile, Placing, Texture};
+use terrasoar_layout::file::atomic::AtomicFile;
+use terrasoar_layout::read::terrain::Terrain;
 
-/// Write the triangles of one frame of a flight as PLY or OBJ.
+/// Write a terrain as triangles: PLY, OBJ, STL or GLB.
 ///
-/// Coordinates are metres east, north and up of the south-west sample; comments in the file say in which reference system that lies, and how to get from one to the other. The engine flies all frames before it.
+/// With --max-error M every sample lies within M metres of the mesh, measured vertically, of the whole terrain or of a window; flat ground takes few triangles. With --flight it is
+/// what an engine draws in one frame, after it has flown all frames before it. Voids are left out.
+///
+/// Coordinates are metres east, north and up of the south-west sample, or with --coordinates dem those of the elevation model, with heights in the same unit (metres where coordinates are degrees). PLY and
+/// OBJ hold double precision. STL and GLB hold single precision, in which coordinates of some millions are good to half a metre only: where they are large the file holds them less an origin,
+/// which is printed, and which GLB adds again. GLB has the terrain's picture on it, if there is one; its y points up and its z south, as in all of glTF.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
+  terrasoar mesh alps.iqt --max-error 2 -o alps.glb
+  terrasoar mesh alps.iqt --max-error 0.5 --window 395000,5092000,396000,5093000 --crs dem --coordinates dem -o village.ply
+  terrasoar mesh alps.iqt --overlay dam.iqo --max-error 1 --window 0,0,2000,2000 -o print.stl
   terrasoar mesh alps.iqt --flight low.flight --frame 0 -o frame.ply
   terrasoar mesh alps.iqt --flight low.flight --frame 99 --engine soar --tolerance-px 4 -o frame.obj")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
+    /// Largest distance of any sample from the mesh, in metres
+    #[arg(long, value_name = "M", value_parser = parse::not_negative, required_unless_present = "flight", conflicts_with = "flight")]
+    max_error: Option<f64>,
+    #[command(flatten)]
+    area: AreaArgs,
+    /// Most triangles, beyond which nothing is made; a million take some 50 MiB of memory
+    #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = clap::value_parser!(u64).range(1..=1 << 31), conflicts_with = "flight")]
+    max_triangles: u64,
     /// Flight file
-    #[arg(long, value_name = "F")]
-    flight: PathBuf,
+    #[arg(long, value_name = "F", requires = "frame", conflicts_with = "window")]
+    flight: Option<PathBuf>,
     /// Frame, from 0
-    #[arg(long, value_name = "N")]
-    frame: usize,
+    #[arg(long, value_name = "N", requires = "flight")]
+    frame: Option<usize>,
     /// Engine
     #[arg(long, value_name = "ENGINE", default_value = EngineKind::default().name(), value_parser = parse::engine())]
     engine: EngineKind,
     #[command(flatten)]
     quality: QualityArgs,
     /// Edit the ground on the way, in memory only, by this script
-    #[arg(long, value_name = "E.edits")]
+    #[arg(long, value_name = "E.edits", requires = "flight")]
     edits: Option<PathBuf>,
-    /// File to write: binary PLY or OBJ by its extension
-    #[arg(short, long, value_name = "OUT.(ply|obj)", value_parser = parse::with_extension(&["ply", "obj"]))]
+    /// File to write: PLY, OBJ, STL or GLB by its extension, or what --format says
+    #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
+    /// Kind of file, whatever its name
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<FormatWord>,
     #[command(flatten)]
     force: Force,
     /// Write PLY as text
     #[arg(long)]
     ascii: bool,
+    /// What coordinates are
+    #[arg(long, value_name = "SYSTEM", default_value = "local")]
+    coordinates: CoordinatesWord,
+    /// Largest side of GLB's picture in texels; 0 for no picture
+    #[arg(long, value_name = "TEXELS", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(0..=16_384))]
+    texture: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FormatWord {
+    /// Polygon file, binary unless --ascii
+    Ply,
+    /// Wavefront OBJ
+    Obj,
+    /// For printers
+    Stl,
+    /// glTF in one file, with the picture
+    Glb,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CoordinatesWord {
+    /// Metres from the terrain's south-west sample
+    Local,
+    /// Those of the elevation model
+    Dem,
+}
+
+impl Args {
+    fn format(&self) -> Result<Format> {
+        let named = self
+            .output
+            .extension()
+            .and_then(|extension| FormatWord::from_str(extension.to_str()?, true).ok());
+        let word = self.format.or(named).ok_or_else(|| {
+            WrongUsage(format!(
+                "{}: the name of a mesh ends in .ply, .obj, .stl or .glb, or --format says which it is",
+                self.output.display()
+            ))
+        })?;
+        Ok(match (word, self.ascii) {
+            (FormatWord::Ply, false) => Format::PlyBinary,
+            (FormatWord::Ply, true) => Format::PlyText,
+            (FormatWord::Obj, _) => Format::Obj,
+            (FormatWord::Stl, _) => Format::Stl,
+            (FormatWord::Glb, _) => Format::Glb,
+        })
+    }
+
+    fn placing(&self, terrain: &Terrain, format: Format) -> Result<Placing> {
+        if self.coordinates == CoordinatesWord::Local {
+            return Ok(Placing::LOCAL);
+        }
+        let shown = self.terrain.file.display();
+        let Some((placing, is_angle)) = siting::placing(terrain.header()) else {
+            bail!(
+                "{shown}: the terrain does not know where on the ground it lies, for its elevation model did not say; leave --coordinates away"
+            );
+        };
+        if is_angle && format.is_single() {
+            bail!(
+                "{shown}: its coordinates are degrees, which make no shape beside heights in metres; write local coordinates, or PLY or OBJ"
+            );
+        }
+        Ok(placing)
+    }
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let inputs: Vec<&Path> =
-        [Some(&args.flight), args.edits.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
-    args.force.file(&args.output, Kind::Mesh, &args.terrain.inputs(&inputs))?;
-    let is_obj = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-    let format = match (is_obj, args.ascii) {
-        (true, _) => Format::Obj,
-        (false, true) => Format::PlyText,
-        (false, false) => Format::PlyBinary,
-    };
+    let format = args.format()?;
+    let others: Vec<&Path> =
+        [&args.flight, &args.edits].into_iter().flatten().map(PathBuf::as_path).collect();
+    args.force.file(&args.output, Kind::Mesh, &args.terrain.inputs(&others))?;
     let terrain = std::sync::Arc::new(args.terrain.open()?);
-    let flight = Flight::read(&args.flight)?;
-    let batches = match &args.edits {
-        Some(script) => batches_of(script, &flight.frames)?,
-        None => Vec::new(),
+    let placing = args.placing(&terrain, format)?;
+    let (mesh, part_m) = match (&args.flight, args.max_error) {
+        (None, Some(max_error_m)) => simplified(args, &terrain, max_error_m)?,
+        (Some(flight), _) => {
+            let path = flight;
+            let flight = Flight::read(path)?;
+            args.quality.look_at(&terrain, &flight, path)?;
+            let batches = match &args.edits {
+                Some(script) => batches_of(script, &flight.frames, &terrain)?,
+                None => Vec::new(),
+            };
+            let quality = args.quality.quality();
+            let frame = args.frame.unwrap_or(0);
+            let mesh = frame_mesh(&terrain, &flight.frames, frame, quality, args.engine, &batches)?;
+            let [east, north] = terrain.grid().extent_m();
+            (mesh, [0.0, 0.0, east, north])
+        }
+        (None, None) => return Err(WrongUsage("give --max-error, or --flight and --frame".into()).into()),
     };
-    let mesh =
-        frame_mesh(&terrain, &flight.frames, args.frame, args.quality.quality(), args.engine, &batches)?;
-    mesh_file::write(&args.output, &mesh, format, &siting::notes(terrain.header()))?;
+    let texture = match format {
+        Format::Glb if args.texture > 0 => Texture::of(&terrain, part_m, args.texture)?,
+        _ => None,
+    };
+    let notes = siting::mesh_notes(terrain.header(), args.coordinates == CoordinatesWord::Dem);
+    let file = MeshFile::new(&mesh).placing(placing).notes(&notes).texture(texture.as_ref());
+    write(&args.output, &file, format)?;
+    let [x, y] = file.origin(format);
+    if [x, y] != [0.0; 2] {
+        let again = if format == Format::Glb { "; its node adds it again" } else { "" };
+        complain(&format!(
+            "note: coordinates are large for single precision; the file holds them less {x},{y}{again}"
+        ));
+    }
+    let picture =
+        texture.map(|t| format!(", a picture of {} x {} texels", t.size[0], t.size[1])).unwrap_or_default();
     print(&format!(
-        "{}: {} triangles, {} vertices",
+        "{}: {} triangles, {} vertices{picture}",
         args.output.display(),
         grouped(mesh.triangles.len() as u64),
         grouped(mesh.positions.len() as u64)
     ))
+}
+
+/// The mesh of a part within the error, and the part's sides in metres.
+fn simplified(args: &Args, terrain: &Terrain, max_error_m: f64) -> Result<(IndexedMesh, [f64; 4])> {
+    let window = args.area.window(terrain, &args.terrain.file, 1)?;
+    let options =
+        SimplifyOptions::default().max_error_m(max_error_m).window(window).max_triangles(args.max_triangles);
+    let mesh = simplify(terrain, &options)?;
+    if mesh.triangles.is_empty() {
+        bail!("{}: there is nothing but voids in it, so there are no triangles", args.terrain.file.display());
+    }
+    let ([x0, y0], [x1, y1]) = (window.from, window.last());
+    let [east, north] = terrain.grid().spacing_m();
+    Ok((mesh, [f64::from(x0) * east, f64::from(y0) * north, f64::from(x1) * east, f64::from(y1) * north]))
+}
+
+/// Writes the file, which appears when it is complete.
+fn write(path: &Path, mesh: &MeshFile<'_>, format: Format) -> Result<()> {
+    let file = AtomicFile::create(path)?;
+    let mut out = BufWriter::with_capacity(1 << 20, file.file());
+    mesh.write(format, &mut out)
+        .and_then(|()| out.flush())
+        .with_context(|| format!("{}: cannot write the mesh; check the free space", path.display()))?;
+    drop(out);
+    Ok(file.publish()?)
 }

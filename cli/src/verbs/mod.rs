@@ -4,19 +4,22 @@
 //! opening a file. Results go to standard output, everything else to standard error. **Exit codes: 0 done, 1 failed, 2 the command line
 //! itself is wrong.** If the reader of our output closes it early, the program ends quietly.
 
+mod area;
 mod build;
 mod cache;
 mod cap;
 mod compare;
+mod compare_ground;
 mod defect;
 mod drape;
 mod edit;
+mod export;
 mod flight;
 mod height;
 mod info;
 mod iobench;
+mod made;
 mod mesh;
-mod mesh_file;
 #[cfg(feature = "pictures")]
 mod movie;
 #[cfg(feature = "pictures")]
@@ -44,6 +47,7 @@ mod terrain;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+mod within;
 
 #[cfg(not(feature = "view"))]
 use pictureless::view;
@@ -71,6 +75,9 @@ Examples, in the order of the work:
   terrasoar crater alps.iqt --at 1500,820 --radius 40 --depth 9
   terrasoar info alps.iqt
   terrasoar snapshot alps.iqt -o alps.png
+  terrasoar export alps.iqt -o edited.tif
+  terrasoar mesh alps.iqt --max-error 2 -o alps.glb
+  terrasoar compare-ground alps.iqt --picture changes.png
   terrasoar flight straight alps.iqt -o alps.flight --frames 1000 --incoherence 0.6
   terrasoar compare alps.iqt --flight alps.flight --engines soar,smart -o report
 
@@ -95,6 +102,8 @@ enum Verb {
     Info(info::Args),
     Verify(verify::Args),
     Height(height::Args),
+    Export(export::Args),
+    CompareGround(compare_ground::Args),
     Synth(synth::Args),
     Flight(flight::Args),
     Replay(replay::Args),
@@ -169,6 +178,8 @@ fn carry_out() -> ExitCode {
         Verb::Info(args) => info::run(&args),
         Verb::Verify(args) => verify::run(&args),
         Verb::Height(args) => height::run(&args),
+        Verb::Export(args) => export::run(&args),
+        Verb::CompareGround(args) => compare_ground::run(&args),
         Verb::Synth(args) => synth::run(&args),
         Verb::Flight(args) => flight::run(&args),
         Verb::Replay(args) => replay::run(&args),

@@ -50,7 +50,7 @@ pub(super) struct MovieFile {
 
 enum Sink {
     Folder { pictures: FolderSink, next: usize },
-    Gif { encoder: Box<gif::Encoder<BufWriter<File>>>, file: AtomicFile, delay_cs: u16 },
+    Gif { encoder: Box<gif::Encoder<BufWriter<File>>>, file: AtomicFile, fps: f64, shown: u64 },
     Mp4 { ffmpeg: Ffmpeg, file: AtomicFile },
 }
 
@@ -87,9 +87,7 @@ impl MovieFile {
                 encoder.set_repeat(gif::Repeat::Infinite)?;
                 let note = gif::AnyExtension(gif::Extension::Comment as u8);
                 encoder.write_raw_extension(note, &[FILM_NOTE.as_bytes()])?;
-                // Viewers take delays under two hundredths of a second for a tenth.
-                let delay_cs = (100.0 / fps).round().clamp(2.0, 65_535.0) as u16;
-                Sink::Gif { encoder, file, delay_cs }
+                Sink::Gif { encoder, file, fps, shown: 0 }
             }
             MovieFormat::Mp4 => {
                 let file = AtomicFile::create(path)?;
@@ -114,10 +112,13 @@ impl MovieFile {
                 *next += 1;
                 Ok(())
             }
-            Sink::Gif { encoder, delay_cs, .. } => {
+            Sink::Gif { encoder, fps, shown, .. } => {
                 let (width, height) = (self.size.width_px as u16, self.size.height_px as u16);
                 let mut frame = gif::Frame::from_rgb_speed(width, height, rgb, 10);
-                frame.delay = *delay_cs;
+                // In whole hundredths of a second, the rest carried on, so that the whole is as long as it should be. Viewers take less than two for ten.
+                let until_cs = |pictures: u64| (100.0 * pictures as f64 / *fps).round();
+                frame.delay = (until_cs(*shown + 1) - until_cs(*shown)).clamp(2.0, 65_535.0) as u16;
+                *shown += 1;
                 encoder
                     .write_frame(&frame)
                     .with_context(|| format!("{}: cannot write the picture", self.path.display()))

@@ -1,6 +1,6 @@
 //! How a picture is made: the flags that `snapshot` and `movie` share.
 
-use super::parse;
+use super::{WrongUsage, parse, within};
 use anyhow::{Context, Result, bail};
 use clap::ArgAction;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -12,7 +12,7 @@ use terrasoar::view::{View, Viewport};
 use terrasoar_lab::picture::encode_with;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
-use terrasoar_render::{LOOKS, Look};
+use terrasoar_render::{Haze, LOOKS, Look};
 use terrasoar_scene::scene::SceneError;
 use terrasoar_scene::studio::Studio;
 
@@ -49,6 +49,16 @@ pub(super) struct PictureArgs {
     /// Draw contour lines so many metres apart
     #[arg(long, value_name = "METRES", value_parser = parse::positive)]
     pub contours: Option<f64>,
+    /// Width of contour lines in pixels, 1 without it; needs --contours or the style contours
+    #[arg(long, value_name = "PX", value_parser = line_width)]
+    pub contour_width: Option<f64>,
+    /// How far one sees: auto (the far side is still seen), off (for ever), or metres after which a third of a thing's own light is left; the style has its own without it
+    #[arg(long, value_name = "auto|off|METRES", value_parser = haze)]
+    pub haze: Option<Haze>,
+    /// Heights in metres of the ramp's two ends, or stretch for the terrain's lowest and highest. Without it that too, but alpine, atlas and arctic span 1000 m at least, for
+    /// what they say of meadows and snow
+    #[arg(long, value_name = "LOW,HIGH|stretch", value_parser = ramp_range, allow_hyphen_values = true)]
+    pub ramp_range: Option<RampRange>,
     /// Engine: kinetic (the mesh changes from frame to frame) or soar (the whole mesh anew); the pictures are the same
     #[arg(long, value_name = "ENGINE", default_value = "kinetic", value_parser = engine())]
     pub engine: PictureEngine,
@@ -67,8 +77,18 @@ impl PictureArgs {
         }
     }
 
-    /// How a terrain looks, with an image or without. Edges are smooth.
-    pub(super) fn look(&self, has_image: bool) -> Look {
+    /// Refuses flags that mean nothing together.
+    pub(super) fn check(&self) -> Result<(), WrongUsage> {
+        let has_lines = self.contours.is_some()
+            || self.style.as_deref().and_then(Look::named).is_some_and(|look| look.contours.is_some());
+        if self.contour_width.is_some() && !has_lines {
+            return Err(WrongUsage("--contour-width needs --contours METRES, or --style contours".into()));
+        }
+        Ok(())
+    }
+
+    /// How a terrain with heights from the lowest to the highest looks, with an image or without. Edges are smooth.
+    pub(super) fn look(&self, has_image: bool, height_range_m: [f64; 2]) -> Look {
         let mut look = Look::named(self.style(has_image)).unwrap_or_default();
         look.imagery = self.image.unwrap_or(look.imagery);
         look.ramp = self.ramp.unwrap_or(look.ramp);
@@ -84,6 +104,16 @@ impl PictureArgs {
             let lines = look.contours.unwrap_or_default();
             look.contours = Some(lines.interval_m(metres as f32));
         }
+        if let Some(width) = self.contour_width {
+            look.contours = look.contours.map(|lines| lines.width_px(width as f32));
+        }
+        look.haze = self.haze.unwrap_or(look.haze);
+        let height_range_m = height_range_m.map(|metres| metres as f32);
+        look.tint_range_m = Some(match self.ramp_range {
+            None => look.ramp.range_m(height_range_m),
+            Some(RampRange::Stretch) => height_range_m,
+            Some(RampRange::Metres(range_m)) => range_m,
+        });
         look
     }
 
@@ -104,6 +134,44 @@ impl PictureArgs {
             PictureEngine::Soar => "soar",
         }
     }
+}
+
+/// Which heights the ends of a ramp are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum RampRange {
+    /// The terrain's lowest and highest.
+    Stretch,
+    /// These.
+    Metres([f32; 2]),
+}
+
+fn ramp_range(text: &str) -> Result<RampRange, String> {
+    if text == "stretch" {
+        return Ok(RampRange::Stretch);
+    }
+    let (low, high) = text.split_once(',').ok_or("give two heights in metres, such as 0,4000, or stretch")?;
+    match [parse::finite(low)?, parse::finite(high)?].map(|metres| metres as f32) {
+        [low, high] if low < high && low.is_finite() && high.is_finite() => {
+            Ok(RampRange::Metres([low, high]))
+        }
+        _ => Err("the first height must be lower than the second".into()),
+    }
+}
+
+fn haze(text: &str) -> Result<Haze, String> {
+    match text {
+        "auto" => Ok(Haze::Auto),
+        "off" => Ok(Haze::Off),
+        metres => match parse::positive(metres) {
+            Ok(metres) if metres <= 1e9 => Ok(Haze::Distance(metres as f32)),
+            _ => Err("give auto, off, or metres above 0 and at most 1e9".into()),
+        },
+    }
+}
+
+fn line_width(text: &str) -> Result<f64, String> {
+    let width = parse::positive(text)?;
+    if (0.1..=50.0).contains(&width) { Ok(width) } else { Err("it must be from 0.1 to 50 pixels".into()) }
 }
 
 fn share(text: &str) -> Result<f32, String> {
@@ -173,7 +241,11 @@ pub(super) fn draw_frame(
     for flown in &flight.frames[..=frame] {
         studio.fly(&view(flown));
     }
-    let look = Look::default().multisample(true);
-    let rgb = studio.picture(&view(asked), &look)?;
+    let (asked, _) = within::lifted(&mut within::Ground::new(terrain), view(asked));
+    studio.fly(&asked);
+    let mut look = Look::default().multisample(true);
+    let heights_m = terrain.header().height_range_m.map(|metres| metres as f32);
+    look.tint_range_m = Some(look.ramp.range_m(heights_m));
+    let rgb = studio.picture(&asked, &look)?;
     Ok((png(&rgb, quality.viewport)?, studio.capabilities().adapter.clone()))
 }

@@ -4,7 +4,7 @@ use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
 use super::terrain::TerrainArgs;
-use super::{WrongUsage, parse};
+use super::{WrongUsage, parse, within};
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,7 +26,11 @@ use terrasoar_layout::read::terrain::Terrain;
 Examples:
   terrasoar replay alps.iqt --flight low.flight
   terrasoar replay alps.iqt --flight low.flight --engine soar --tolerance-px 2 --stats frames.csv --json
-  terrasoar replay alps.iqt --flight low.flight --edits war.edits")]
+  terrasoar replay alps.iqt --flight low.flight --edits war.edits
+
+Totals (vertex tests, splits, merges and what else is called total in --json) are sums over all frames, the first included, which makes the mesh from nothing; so they
+are the sums of the columns of --stats. Triangles a frame are over all frames too. Incoherence and times leave the first frame out. What an engine does not have is -,
+null in --json and empty in --stats: only kinetic has a queue, slots, patches and parts of an update.")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
@@ -54,6 +58,11 @@ pub(super) struct Args {
     json: bool,
 }
 
+/// Names of the notes in which a flight says for which pictures its speed was found.
+const TOLERANCE_NOTE: &str = "solved-tolerance-px";
+const VIEWPORT_NOTE: &str = "solved-viewport";
+const EXAGGERATION_NOTE: &str = "solved-exaggeration";
+
 /// Picture and precision.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct QualityArgs {
@@ -79,6 +88,53 @@ impl QualityArgs {
             .vertical_exaggeration(self.exaggeration)
             .culling(self.culling)
     }
+
+    /// Looks whether a flight fits the terrain and these; says what does not.
+    ///
+    /// # Errors
+    /// A flight that lies wholly outside the terrain.
+    pub(super) fn look_at(self, terrain: &Terrain, flight: &Flight, path: &Path) -> Result<()> {
+        within::flight(terrain, flight, path, self.viewport)?;
+        within::below_ground(terrain, flight, path, self.exaggeration);
+        if let Some(words) = self.differs_from(flight) {
+            complain(&format!("note: {}: {words}", path.display()));
+        }
+        Ok(())
+    }
+
+    /// What a flight whose speed was found for an incoherence notes of the picture it was found for.
+    pub(super) fn notes(self) -> [(String, String); 3] {
+        let [wide, high] = self.viewport.size_px();
+        [
+            (TOLERANCE_NOTE.into(), self.tolerance_px.to_string()),
+            (VIEWPORT_NOTE.into(), format!("{wide}x{high}")),
+            (EXAGGERATION_NOTE.into(), self.exaggeration.to_string()),
+        ]
+    }
+
+    /// In words, what a flight's speed was found for, if that is not these.
+    fn differs_from(self, flight: &Flight) -> Option<String> {
+        let note =
+            |name: &str| flight.notes.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str());
+        let own = self.notes();
+        let differing: Vec<&(String, String)> =
+            own.iter().filter(|(name, value)| note(name).is_some_and(|noted| noted != value)).collect();
+        let percent =
+            note("incoherence-percent").map(|percent| format!(" of {percent} %")).unwrap_or_default();
+        let told = |(name, value): &&(String, String)| {
+            format!(
+                "a {} of {} (here {value})",
+                name.trim_start_matches("solved-"),
+                note(name).unwrap_or_default()
+            )
+        };
+        (!differing.is_empty()).then(|| {
+            format!(
+                "its speed was found for an incoherence{percent} at {}; it is another here",
+                differing.iter().map(told).collect::<Vec<_>>().join(" and ")
+            )
+        })
+    }
 }
 
 /// Flies `frames` with one engine, showing progress under `title`.
@@ -103,6 +159,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let terrain = Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
+    args.quality.look_at(&terrain, &flight, &args.flight)?;
     let progress = Meter::new("frames");
     let name = args.engine.name();
     let mut quality = args.quality.quality();
@@ -116,7 +173,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let frames = match &args.edits {
         None => fly(&terrain, &flight.frames, quality, args.engine, name, &progress)?,
         Some(script) => {
-            let batches = batches_of(script, &flight.frames)?;
+            let batches = batches_of(script, &flight.frames, &terrain)?;
             progress.begin(name, 2 * flight.frames.len() as u64);
             let done = &mut |done| progress.set(done);
             replay_edited(&terrain, &flight.frames, quality, args.engine, &batches, done)
@@ -132,8 +189,14 @@ pub(super) fn run(args: &Args) -> Result<()> {
 }
 
 /// A script's batches at their frames. Those whose moment never comes are told.
-pub(super) fn batches_of(script: &Path, frames: &[FlightFrame]) -> Result<Vec<TimedBatch>> {
+pub(super) fn batches_of(
+    script: &Path,
+    frames: &[FlightFrame],
+    terrain: &Terrain,
+) -> Result<Vec<TimedBatch>> {
     let batches = Loader::new(script, terrasoar_import::open_file).script(&Script::read(script)?)?;
+    let warning = within::edits(&batches, terrain.grid(), Some(script))?;
+    warning.iter().for_each(|words| complain(words));
     let late = batches.iter().filter(|batch| batch.frame(frames).is_none()).count();
     if late > 0 {
         complain(&format!(
@@ -158,15 +221,17 @@ fn text(s: &ReplaySummary) -> String {
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let head = format!("{}, {} frames\n", s.engine, grouped(s.frames));
     let t = s.update_ms;
+    // What an engine does not have.
+    let none = || "-".to_owned();
     head + &columns(&[
         row("triangles a frame", format!("{:.0}", s.triangles_mean)),
         row("incoherence", format!("{:.3} %", s.incoherence_percent)),
         row("vertex tests", grouped(s.vertex_tests_total)),
         row("splits", grouped(s.splits_total)),
         row("merges", grouped(s.merges_total)),
-        row("live ranges over", grouped(s.expired_total)),
-        row("triangle slots written", grouped(s.slots_written_total)),
-        row("patch bytes", grouped(s.patch_bytes_total)),
+        row("live ranges over", s.expired_total.map_or_else(none, grouped)),
+        row("triangle slots written", s.slots_written_total.map_or_else(none, grouped)),
+        row("patch bytes", s.patch_bytes_total.map_or_else(none, grouped)),
         row("late, sum over frames", grouped(s.late_total)),
         row("largest late error", format!("{:.2} px", s.late_error_px_max)),
         row("pages touched", grouped(s.pages_touched_total)),
@@ -176,9 +241,9 @@ fn text(s: &ReplaySummary) -> String {
         row("update, 99 %", format!("{:.3} ms", t.p99)),
         row("update, worst", format!("{:.3} ms", t.max)),
         row("update, mean", format!("{:.3} ms", t.mean)),
-        row("scan, median", format!("{:.1} us", s.scan_us_p50)),
-        row("test, median", format!("{:.1} us", s.test_us_p50)),
-        row("apply, median", format!("{:.1} us", s.apply_us_p50)),
+        row("scan, median", s.scan_us_p50.map_or_else(none, |us| format!("{us:.1} us"))),
+        row("test, median", s.test_us_p50.map_or_else(none, |us| format!("{us:.1} us"))),
+        row("apply, median", s.apply_us_p50.map_or_else(none, |us| format!("{us:.1} us"))),
         row("records edited", grouped(s.edited_records_total)),
         row("edits of a frame, worst", format!("{:.3} ms", s.edit_ms_max)),
         row("mesh hash", s.mesh_hash.clone()),

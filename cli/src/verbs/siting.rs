@@ -2,10 +2,13 @@
 //!
 //! Cost: some thousand projections, for the bounds in longitude and latitude.
 
-use super::output::decimal;
+use super::output::{complain, decimal};
 use super::terrain;
+use anyhow::{Context, Result};
 use serde::Serialize;
 use terrasoar_import::places::{Crs, Frame};
+use terrasoar_lab::mesh_file::Placing;
+use terrasoar_layout::dem::HorizontalUnit;
 use terrasoar_layout::file::header::Header;
 
 /// How the samples lie on the ground.
@@ -95,6 +98,42 @@ pub(super) fn notes(header: &Header) -> Vec<(&'static str, String)> {
     notes
 }
 
+/// How metres from the south-west sample become coordinates of the elevation model, heights in their unit where that is a length; and whether they are angles. `None` where nothing is known.
+pub(super) fn placing(header: &Header) -> Option<(Placing, bool)> {
+    let [x, a, b, y, d, e] = header.sample_to_crs?;
+    let [east_m, north_m] = header.grid.spacing_m();
+    let (is_angle, unit_m) = match (&header.about.horizontal_unit, header.crs_unit) {
+        (Some(unit), _) => (unit.is_angle, if unit.is_angle { 1.0 } else { unit.size }),
+        (None, HorizontalUnit::Degree) => (true, 1.0),
+        (None, HorizontalUnit::Foot) => (false, 0.3048),
+        (None, HorizontalUnit::UsSurveyFoot) => (false, 1200.0 / 3937.0),
+        (None, HorizontalUnit::Unknown | HorizontalUnit::Metre) => (false, 1.0),
+    };
+    let map = [x, a / east_m, b / north_m, y, d / east_m, e / north_m];
+    Some((Placing { map, height_factor: 1.0 / unit_m }, is_angle))
+}
+
+/// [`notes`] for a mesh, in local coordinates or in those of the elevation model.
+pub(super) fn mesh_notes(header: &Header, is_dem: bool) -> Vec<(&'static str, String)> {
+    let mut notes = notes(header);
+    if !is_dem {
+        return notes;
+    }
+    notes.retain(|(name, _)| *name != "Coordinates");
+    let (unit, heights) = (terrain::horizontal_unit(header), placing(header));
+    let unit = match heights {
+        Some((placing, false)) if placing.height_factor != 1.0 => {
+            unit.unwrap_or_else(|| "the unit of x and y".into())
+        }
+        _ => "metres".into(),
+    };
+    match notes.iter_mut().find(|(name, _)| *name == "Heights") {
+        Some((_, words)) => *words = words.replacen("metres", &unit, 1),
+        None => notes.push(("Heights", unit)),
+    }
+    notes
+}
+
 /// The system in full, where it is known by text or code.
 pub(super) fn crs_text(header: &Header) -> Option<String> {
     let kept = &header.about.crs_text;
@@ -102,4 +141,38 @@ pub(super) fn crs_text(header: &Header) -> Option<String> {
         return Some(kept.clone());
     }
     Crs::of(header).map(|crs| crs.text().to_owned()).filter(|text| !text.is_empty())
+}
+
+/// The terrain in the system that places are given in; nothing for metres from its corner. Says what may be off.
+pub(super) fn frame(header: &Header, crs: Option<&str>) -> Result<Option<Frame>> {
+    let Some(text) = crs else { return Ok(None) };
+    let frame = if text.trim().eq_ignore_ascii_case("dem") {
+        Frame::own(header).context(
+            "the terrain does not know where on the ground it lies, for its elevation model did not say; leave --crs away and give metres from its corner",
+        )?
+    } else {
+        Frame::of(header, &Crs::named(text)?)?
+    };
+    if frame.is_rough() {
+        complain(
+            "note: the shift between the two datums is a grid that is not here; places may be off by up to some hundred metres",
+        );
+    }
+    Ok(Some(frame))
+}
+
+/// The system of a frame in words.
+pub(super) fn system_name(frame: &Frame) -> String {
+    frame.crs().map_or_else(|| "its own coordinates".into(), Crs::name)
+}
+
+/// From where to where the terrain extends, in a system, or in metres from its corner: "from 0,0 to 5000,4000 metres".
+pub(super) fn reach(header: &Header, frame: Option<&Frame>) -> Option<String> {
+    let Some(frame) = frame else {
+        let [east, north] = header.grid.extent_m().map(|m| decimal(m, 4));
+        return Some(format!("from 0,0 to {east},{north} metres"));
+    };
+    let digits = if frame.crs().is_some_and(Crs::is_geographic) { 7 } else { 3 };
+    let [x0, y0, x1, y1] = frame.bounds()?.map(|value| decimal(value, digits));
+    Some(format!("from {x0},{y0} to {x1},{y1} in {}", system_name(frame)))
 }

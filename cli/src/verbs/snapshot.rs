@@ -1,12 +1,12 @@
 //! `terrasoar snapshot`: one picture.
 
-use super::output::{decimal, grouped, print, print_json};
+use super::output::{complain, decimal, grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::picture::{PictureArgs, angles, png_with};
 use super::progress::Meter;
 use super::siting;
 use super::terrain::TerrainArgs;
-use super::{WrongUsage, parse};
+use super::{WrongUsage, parse, within};
 use anyhow::{Context, Result};
 use glam::DVec3;
 use serde::Serialize;
@@ -18,19 +18,24 @@ use terrasoar::sink::FileSink;
 use terrasoar::view::View;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::Haze;
-use terrasoar_scene::overview::{FOV_DEG, overview, towards_middle, view_from};
+use terrasoar_scene::overview::{FOV_DEG, from_above, overview, towards_middle, view_from};
 
 /// Draw a picture of a terrain as PNG.
 ///
 /// Of a frame of a flight, of a view that is given, or of the whole terrain from obliquely above. With a flight the engine flies all frames before it.
-/// Needs a graphics driver; one in software does. The same input gives the same bytes on the same driver.
+/// --ortho looks straight down from so far above that a pixel is as many metres everywhere, north at the top; the picture then has the terrain's shape and ends where the ground ends.
+/// An eye that is below the ground is refused, with a height that does; that of a flight is raised above it, and said. Needs a graphics driver; one in software does. The same input gives the same bytes on the same driver.
 /// Texts in the PNG say in which reference system the terrain lies.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   terrasoar snapshot alps.iqt -o alps.png
   terrasoar snapshot alps.iqt --flight low.flight --frame 99 --style wireframe -o frame.png
-  terrasoar snapshot alps.iqt --at 1500,820.5,3000 --look 45,-20 --ramp atlas --contours 100 -o view.png")]
+  terrasoar snapshot alps.iqt --at 1500,820.5,3000 --look 45,-20 --ramp atlas --contours 100 -o view.png
+  terrasoar snapshot alps.iqt --ortho --size 4000x4000 --ramp-range 0,4500 --contours 100 --contour-width 2 -o map.png
+
+Fields of --json: output, size_px, style, ramp, ramp_range_m (heights of the ramp's ends), frame (null without a flight), eye_m, raised_m (by how much the eye was raised above the ground),
+metres_per_px (null without --ortho), yaw_deg, pitch_deg, vertical_fov_deg, tolerance_px, exaggeration, engine, triangles, adapter, backend.")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
@@ -46,6 +51,9 @@ pub(super) struct Args {
     /// Where it looks: degrees clockwise from north, and above the horizon; to the terrain's middle without it
     #[arg(long, value_name = "YAW,PITCH", value_parser = look, allow_hyphen_values = true, requires = "at")]
     look: Option<[f64; 2]>,
+    /// Show the whole terrain from straight above as a map, north at the top; --size is the most that the picture may have
+    #[arg(long, conflicts_with_all = ["flight", "at", "look", "fov"])]
+    ortho: bool,
     /// Vertical field of view in degrees, 45 without it
     #[arg(long, value_name = "DEG", value_parser = field_of_view, conflicts_with = "flight")]
     fov: Option<f64>,
@@ -89,9 +97,14 @@ struct Answer {
     size_px: [u32; 2],
     style: String,
     ramp: &'static str,
+    ramp_range_m: [f32; 2],
     /// Null without a flight.
     frame: Option<usize>,
     eye_m: [f64; 3],
+    /// By how much the eye was raised above the ground.
+    raised_m: f64,
+    /// Null without --ortho.
+    metres_per_px: Option<f64>,
     yaw_deg: f64,
     pitch_deg: f64,
     vertical_fov_deg: f64,
@@ -104,11 +117,11 @@ struct Answer {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
+    args.picture.check()?;
     let flight: Vec<_> = args.flight.as_deref().into_iter().collect();
     args.force.file(&args.output, Kind::Picture, &args.terrain.inputs(&flight))?;
     let terrain = args.terrain.open()?;
-    let views = args.views(&terrain)?;
-    let picture = &args.picture;
+    let (views, picture, raised_m, metres_per_px) = args.views(&terrain)?;
     let mut studio = picture.studio(&terrain)?;
     let progress = Meter::new("frames");
     progress.begin("flying", views.len() as u64);
@@ -120,10 +133,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     drop(progress);
     let Some(view) = views.last() else { return Err(WrongUsage("a flight without frames".into()).into()) };
     let has_image = studio.has_image();
-    let mut look = picture.look(has_image);
-    if args.is_overview() {
+    let mut look = picture.look(has_image, terrain.header().height_range_m);
+    if args.ortho {
+        look.haze = picture.haze.unwrap_or(Haze::Off);
+    } else if args.is_overview() {
         // A block on a table: no air between it and the eye.
-        look.haze = Haze::Off;
+        look.haze = picture.haze.unwrap_or(Haze::Off);
         studio.raise_walls(block_bottom_m(&terrain, picture.exaggeration))?;
     }
     let rgb = studio.picture(view, &look)?;
@@ -140,8 +155,11 @@ pub(super) fn run(args: &Args) -> Result<()> {
             size_px: [width, height],
             style: picture.style(has_image).to_owned(),
             ramp: look.ramp.name,
+            ramp_range_m: look.tint_range_m.unwrap_or_default(),
             frame: args.frame,
             eye_m: view.eye_m.to_array(),
+            raised_m,
+            metres_per_px,
             yaw_deg: view.yaw_rad.to_degrees(),
             pitch_deg: view.pitch_rad.to_degrees(),
             vertical_fov_deg: view.vertical_fov_rad.to_degrees(),
@@ -153,9 +171,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
             backend: adapter.backend.clone(),
         });
     }
-    let at = view.eye_m.to_array().map(|m| decimal(m, 1)).join(",");
+    let from = match metres_per_px {
+        Some(metres) => format!("straight above, {} m a pixel", decimal(metres, 4)),
+        None => view.eye_m.to_array().map(|m| decimal(m, 1)).join(","),
+    };
     print(&format!(
-        "{}: {width} x {height} pixels, {} triangles, seen from {at}; drawn by {} ({})",
+        "{}: {width} x {height} pixels, {} triangles, seen from {from}; drawn by {} ({})",
         args.output.display(),
         grouped(triangles),
         adapter.adapter,
@@ -175,19 +196,41 @@ impl Args {
         self.flight.is_none() && self.at.is_none()
     }
 
-    /// The views to fly through; the last is the picture's.
-    fn views(&self, terrain: &Terrain) -> Result<Vec<View>> {
+    /// The views to fly through; the last is the picture's. How it is made; by how much its eye was raised; metres a pixel where that is the same everywhere.
+    fn views(&self, terrain: &Terrain) -> Result<(Vec<View>, PictureArgs, f64, Option<f64>)> {
+        let mut picture = self.picture.clone();
         let (size, exaggeration) = (self.picture.size, self.picture.exaggeration);
         let fov_deg = self.fov.unwrap_or(FOV_DEG);
         if let Some(path) = &self.flight {
-            let mut frames = Flight::read(path)?.frames;
+            let flight = Flight::read(path)?;
+            within::flight(terrain, &flight, path, size)?;
+            let mut frames = flight.frames;
             let asked = self.frame.unwrap_or_default();
             if asked >= frames.len() {
                 return Err(ReplayError::NoSuchFrame { asked, last: frames.len() - 1 }.into());
             }
             frames.truncate(asked + 1);
             let view = |frame: &terrasoar::flight::FlightFrame| frame.view(size, self.picture.tolerance_px);
-            return Ok(frames.iter().map(|frame| self.picture.refine(view(frame))).collect());
+            let mut views: Vec<View> = frames.iter().map(|frame| self.picture.refine(view(frame))).collect();
+            let mut raised_m = 0.0;
+            if let Some(last) = views.last_mut() {
+                let (lifted, by_m) = within::lifted(&mut within::Ground::new(terrain), *last);
+                if let Some(by_m) = by_m {
+                    let words = decimal(by_m, 1);
+                    complain(&format!(
+                        "note: {}: in frame {asked} the eye is below the ground; it was raised by {words} m",
+                        path.display()
+                    ));
+                    raised_m = by_m;
+                }
+                *last = lifted;
+            }
+            return Ok((views, picture, raised_m, None));
+        }
+        if self.ortho {
+            let (view, metres) = from_above(terrain, exaggeration, size);
+            picture.size = view.viewport;
+            return Ok((vec![self.picture.refine(view)], picture, 0.0, Some(metres)));
         }
         let view = match self.at {
             None => overview(terrain, exaggeration, fov_deg, size),
@@ -199,6 +242,10 @@ impl Args {
                 view_from(eye_m, angles, fov_deg, size)
             }
         };
-        Ok(vec![self.picture.refine(view)])
+        let view = self.picture.refine(view);
+        if self.at.is_some() {
+            within::eye(terrain, &view)?;
+        }
+        Ok((vec![view], picture, 0.0, None))
     }
 }

@@ -36,7 +36,7 @@ fn heights_of(bench: &Bench, name: &str) -> Vec<f64> {
 fn a_script_is_applied_told_undone_and_done_again() {
     let bench = with_script(
         "batch a dam\nset rect 10,10,20,20 to 100\nraise at 900,900 radius 80 by 10\nend\n\
-         crater at 2400,2400 radius 60 depth 5\n\nlower at 1e6,1e6 radius 5 by 1\nrestore rect 10,10,20,20\n",
+         crater at 2400,2400 radius 60 depth 5\n\nlower at 1290,1290 radius 5 by 1\nrestore rect 10,10,20,20\n",
     );
     let built = heights_of(&bench, "land.iqt");
     let told = bench.json(&["edit", "land.iqt", "--script", "a.edits", "--json"]);

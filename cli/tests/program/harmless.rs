@@ -169,6 +169,8 @@ fn outputs_need_no_names_that_are_text() {
     made(&["flight", "straight", "land.iqt", "--frames", "3", "--speed", "5"], "flight");
     made(&["mesh", "land.iqt", "--flight", "land.flight", "--frame", "1"], "ply");
     made(&["mesh", "land.iqt", "--flight", "land.flight", "--frame", "1"], "obj");
+    made(&["mesh", "land.iqt", "--max-error", "5"], "glb");
+    made(&["export", "land.iqt"], "tiff");
     made(&["compact", "land.iqt"], "iqt");
     let output = bench.command(&["info", "--json"]).arg(&terrain).output().unwrap();
     assert!(serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["path"].is_string());

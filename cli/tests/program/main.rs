@@ -21,7 +21,9 @@ mod outputs;
 mod pictures;
 mod places;
 mod support;
+mod taken_out;
 #[path = "../../../layout/tests/import_support/tiff.rs"]
 mod tiff;
 mod usage;
 mod verbs;
+mod within;

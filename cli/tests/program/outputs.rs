@@ -13,6 +13,8 @@ const WRITERS: &[(&[&str], &str)] = &[
     (&["flight", "orbit", "land.iqt", "--frames", "9", "--speed", "5", "-o"], "flight"),
     (&["crater", "land.iqt", "--rain", "9", "--seed", "1", "-o"], "script"),
     (&["mesh", "land.iqt", "--flight", "land.flight", "--frame", "3", "-o"], "mesh"),
+    (&["mesh", "land.iqt", "--max-error", "9", "--format", "glb", "-o"], "mesh"),
+    (&["export", "land.iqt", "-o"], "elevation"),
     (&["replay", "land.iqt", "--flight", "land.flight", "--stats"], "frames"),
     (
         &[
@@ -33,7 +35,7 @@ const WRITERS: &[(&[&str], &str)] = &[
 /// A name that the verb accepts.
 fn name_for(verb: &[&str]) -> &'static str {
     match verb[0] {
-        "synth" => "out.tif",
+        "synth" | "export" => "out.tif",
         "mesh" => "out.ply",
         _ => "out",
     }
@@ -52,7 +54,9 @@ fn treasures(bench: &Bench) -> Vec<(&'static str, Vec<u8>, &'static str)> {
     for (verb, makes) in WRITERS {
         let name = match name_for(verb) {
             "out.tif" if verb[1] == "--size" => "synth.tif".to_owned(),
-            "out.tif" => "colour.tif".to_owned(),
+            "out.tif" if verb[0] == "synth" => "colour.tif".to_owned(),
+            "out.tif" => format!("{makes}.tif"),
+            "out.ply" if verb.contains(&"glb") => "mesh.glb".to_owned(),
             "out.ply" => "mesh.ply".to_owned(),
             _ => (*makes).to_owned(),
         };
@@ -91,6 +95,8 @@ fn treasures(bench: &Bench) -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("script", read(bench, "script"), "a script of edits"),
         ("by-hand", read(bench, "by-hand"), "a script of edits"),
         ("mesh", read(bench, "mesh.ply"), "a PLY mesh"),
+        ("mesh", read(bench, "mesh.glb"), "a glTF scene"),
+        ("elevation", read(bench, "elevation.tif"), "a TIFF file"),
         ("frames", read(bench, "frames"), "a text file"),
         ("io-frames", read(bench, "io-frames"), "a text file"),
     ]

@@ -2,9 +2,26 @@
 
 use crate::support::{Bench, text};
 
-const VERBS: [&str; 17] = [
-    "build", "drape", "edit", "crater", "undo", "redo", "history", "compact", "info", "verify", "height",
-    "synth", "flight", "replay", "compare", "iobench", "mesh",
+const VERBS: [&str; 19] = [
+    "build",
+    "drape",
+    "edit",
+    "crater",
+    "undo",
+    "redo",
+    "history",
+    "compact",
+    "info",
+    "verify",
+    "height",
+    "export",
+    "compare-ground",
+    "synth",
+    "flight",
+    "replay",
+    "compare",
+    "iobench",
+    "mesh",
 ];
 /// Verbs of the feature `pictures`.
 const DRAWING: &[&str] = if cfg!(feature = "pictures") { &["snapshot", "movie"] } else { &[] };
@@ -26,7 +43,7 @@ fn every_verb_has_help_with_an_example() {
 #[test]
 fn wrong_command_lines_end_with_2() {
     let bench = Bench::with_terrain();
-    let wrong: [&[&str]; 27] = [
+    let wrong: [&[&str]; 46] = [
         &["fly"],
         &["info"],
         &["info", "a.iqt", "b.iqt"],
@@ -53,7 +70,26 @@ fn wrong_command_lines_end_with_2() {
         &["replay", "land.iqt", "--flight", "f", "--engine", "roam"],
         &["replay", "land.iqt", "--flight", "f", "--engine", "soar", "--viewport", "800"],
         &["compare", "land.iqt", "--flight", "f", "--engines", "soar,soar", "-o", "r"],
-        &["mesh", "land.iqt", "--flight", "f", "--frame", "0", "--engine", "soar", "-o", "x.stl"],
+        &["mesh", "land.iqt", "--flight", "f", "--frame", "0", "--engine", "soar", "-o", "x.3ds"],
+        &["mesh", "land.iqt", "-o", "x.ply"],
+        &["mesh", "land.iqt", "--max-error", "nan", "-o", "x.ply"],
+        &["mesh", "land.iqt", "--max-error", "-1", "-o", "x.ply"],
+        &["mesh", "land.iqt", "--max-error", "1", "--flight", "f", "--frame", "0", "-o", "x.ply"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--format", "dwg"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--coordinates", "utm"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--max-triangles", "0"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--edits", "e"],
+        &["export", "land.iqt"],
+        &["export", "land.iqt", "-o", "x.png"],
+        &["export", "land.iqt", "-o", "x.tif", "--step", "3"],
+        &["export", "land.iqt", "-o", "x.tif", "--window", "0,0,nan,9"],
+        &["export", "land.iqt", "-o", "x.tif", "--window", "9,9,0,0"],
+        &["export", "land.iqt", "-o", "x.tif", "--crs", "dem"],
+        &["export", "land.iqt", "-o", "x.tif", "--type", "int8"],
+        &["compare-ground"],
+        &["compare-ground", "land.iqt", "land.iqt", "--range", "5"],
+        &["compare-ground", "land.iqt", "land.iqt", "--picture", "x.jpg"],
     ];
     for args in wrong {
         bench.bad(2, args);

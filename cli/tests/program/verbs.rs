@@ -36,7 +36,7 @@ fn info_has_the_fields_that_programs_read() {
 fn every_verb_refuses_what_is_no_terrain() {
     let bench = Bench::with_flight();
     std::fs::write(bench.path("text"), "hello").unwrap();
-    let verbs: [&[&str]; 7] = [
+    let verbs: [&[&str]; 11] = [
         &["info"],
         &["verify"],
         &["height", "--at", "1,1"],
@@ -44,6 +44,10 @@ fn every_verb_refuses_what_is_no_terrain() {
         &["replay", "--flight", "land.flight", "--engine", "soar"],
         &["compare", "--flight", "land.flight", "-o", "x"],
         &["mesh", "--flight", "land.flight", "--frame", "0", "--engine", "soar", "-o", "x.ply"],
+        &["mesh", "--max-error", "1", "-o", "x.ply"],
+        &["export", "-o", "x.tif"],
+        &["compare-ground"],
+        &["compare-ground", "land.iqt"],
     ];
     for verb in verbs {
         for (file, words) in
@@ -55,7 +59,7 @@ fn every_verb_refuses_what_is_no_terrain() {
     }
     // What could be built is not what is to be verified.
     assert!(bench.bad(1, &["verify", "land.tif"]).contains("not a terrain file"));
-    assert!(!bench.path("x").exists() && !bench.path("x.ply").exists());
+    assert!(["x", "x.ply", "x.tif"].iter().all(|name| !bench.path(name).exists()));
 }
 
 #[test]

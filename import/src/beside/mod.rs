@@ -32,6 +32,11 @@ impl Beside {
         Self { looks: paths.len() == 1 && path.is_file(), path, has_mask: reader.mask().is_some() }
     }
 
+    /// Beside a picture, which may have a mask of its own.
+    pub(crate) fn of_picture(path: &Path, has_mask: bool) -> Self {
+        Self { looks: path.is_file(), path: path.to_owned(), has_mask }
+    }
+
     /// Adds what is said beside the file to `declared`, and finds the mask.
     ///
     /// # Errors
@@ -67,7 +72,7 @@ impl Beside {
         if reader.declared().samples != declared.samples {
             let [columns, rows] = reader.declared().samples;
             declared.warnings.push(Warning::new(format!(
-                "the mask {} is of {columns} x {rows} samples, other than the elevation model, and was passed over",
+                "the mask {} is of {columns} x {rows} samples, unlike what it masks, and was passed over",
                 name_of(&mask)
             )));
             return Ok(None);
@@ -110,20 +115,22 @@ fn with_extension(
 
 /// Name and text of a file, if it is there and no longer than `most` bytes.
 fn text(path: &Path, most: u64) -> Result<Option<(String, String)>, LayoutError> {
-    if !path.is_file() {
+    // A name that leads nowhere is none; one that leads to something else than a file is refused, for who put it there counts on it.
+    let is_there = path.try_exists();
+    if !is_there
+        .map_err(|source| LayoutError::io(path, "cannot look for the file beside the data", source))?
+    {
         return Ok(None);
     }
     let mut bytes = Vec::new();
-    crate::input::open(path, "cannot open the file beside the elevation data")?
+    crate::input::open(path, "cannot open the file beside the data")?
         .take(most + 1)
         .read_to_end(&mut bytes)
-        .map_err(|source| LayoutError::io(path, "cannot read the file beside the elevation data", source))?;
+        .map_err(|source| LayoutError::io(path, "cannot read the file beside the data", source))?;
     if bytes.len() as u64 > most {
         return Err(LayoutError::unsupported(
             path,
-            format!(
-                "it is longer than the {most} bytes that such a file beside elevation data takes; put it elsewhere"
-            ),
+            format!("it is longer than the {most} bytes that such a file takes; put it elsewhere"),
         ));
     }
     Ok(Some((name_of(path), String::from_utf8_lossy(&bytes).into_owned())))

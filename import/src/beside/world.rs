@@ -3,9 +3,10 @@
 use crate::reader::Said;
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::remedy::Remedy;
 
-/// Longest world file; six numbers are some 150 bytes.
-const MAX_BYTES: u64 = 4096;
+/// Longest text that is looked at; six numbers are some 150 bytes.
+const MAX_BYTES: u64 = 1 << 16;
 
 /// The place that a world file gives, if there is one.
 ///
@@ -30,6 +31,7 @@ pub(super) fn place(path: &Path) -> Result<Option<Said<[f64; 6]>>, LayoutError> 
                 "the world file {name} beside it is a text of six numbers, and this one is not; mend it, or put it elsewhere"
             ),
         )
+        .mended_by(Remedy::Extent)
     };
     // Some writers put a comma for the point.
     let numbers: Vec<f64> = text

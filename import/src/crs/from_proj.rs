@@ -22,7 +22,7 @@ const RADII_M: [(&str, f64); 12] = [
 ];
 
 /// The value of a word, "" for one without.
-pub(super) fn word<'t>(text: &'t str, name: &str) -> Option<&'t str> {
+pub(crate) fn word<'t>(text: &'t str, name: &str) -> Option<&'t str> {
     text.split_whitespace().find_map(|word| {
         let word = word.strip_prefix('+').unwrap_or(word);
         match word.split_once('=') {

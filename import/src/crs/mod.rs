@@ -11,15 +11,14 @@ mod resolve;
 mod system;
 mod wkt;
 
-pub(crate) use from_proj::unit_name as unit_in_words;
+pub(crate) use from_proj::{unit_name as unit_in_words, word as proj_word};
 pub(crate) use ground::{Ground, is_earth};
 pub(crate) use keywords::Keywords;
-pub(crate) use registry::unit as unit_of_code;
+pub(crate) use registry::{unit as unit_of_code, vertical_in_metres};
 pub(crate) use resolve::by_text;
 pub(crate) use resolve::resolve;
 pub(crate) use system::{Kind, System, Unit, exact_metres};
 
-use crate::reader::CrsSaid;
 pub(crate) use crate::reader::HorizontalSize;
 use crate::value::US_SURVEY_FOOT_M;
 use terrasoar_layout::dem::{Georeference, HorizontalUnit};
@@ -50,10 +49,4 @@ pub(crate) fn georeference(system: &System, map: Option<[f64; 6]>) -> Georeferen
         body_radius_m: system.radius_m.filter(|radius| !is_earth(*radius)),
         ..Georeference::default()
     }
-}
-
-/// The georeference of a picture.
-pub(crate) fn of_picture(said: &CrsSaid, map: Option<[f64; 6]>) -> Georeference {
-    let system = resolve(said, None, &mut Vec::new()).unwrap_or_else(|_| System::unknown());
-    georeference(&system, map)
 }

@@ -59,6 +59,21 @@ pub(super) fn vertical(code: u32) -> Option<VerticalEntry> {
     Some(VerticalEntry { name, unit_name, metres: metres.parse().ok()?, is_down: direction == "down" })
 }
 
+/// The code of the vertical system that counts heights in metres from where that of `code` counts them: itself, or the one that differs in its unit alone.
+pub(crate) fn vertical_in_metres(code: u32) -> Option<u32> {
+    let given = vertical(code)?;
+    if given.metres == 1.0 && !given.is_down {
+        return Some(code);
+    }
+    // "NAVD88 height (ftUS)" and "NAVD88 height".
+    let plain = given.name.rsplit_once(" (").filter(|(_, unit)| unit.ends_with(')'))?.0;
+    VERTICAL.lines().find_map(|line| {
+        let (code, rest) = line.split_once('|')?;
+        let code = code.parse().ok().filter(|_| rest.split('|').next() == Some(plain))?;
+        vertical(code).filter(|entry| entry.metres == 1.0 && !entry.is_down).map(|_| code)
+    })
+}
+
 /// Name and size of the unit of a code.
 pub(crate) fn unit(code: u32) -> Option<(&'static str, HorizontalSize)> {
     let [name, kind, size] = line(UNITS, code)?;
@@ -82,6 +97,11 @@ mod tests {
         let feet = vertical(6360).unwrap();
         assert!((feet.metres - 1200.0 / 3937.0).abs() < 1e-15 && !feet.is_down);
         assert_eq!(vertical(8228).unwrap().metres, 0.3048);
+        assert_eq!(
+            [6360, 8228, 5703, 5773].map(vertical_in_metres),
+            [Some(5703), Some(5703), Some(5703), Some(5773)]
+        );
+        assert_eq!([5715, 32632].map(vertical_in_metres), [None, None]);
         assert!(vertical(5715).unwrap().is_down && vertical(32632).is_none());
         assert_eq!(unit(9005).unwrap().1, HorizontalSize::Metres(0.3047972654));
         assert_eq!(unit(9001).unwrap().1, HorizontalSize::Metres(1.0));

@@ -3,21 +3,23 @@
 //! [`super::colour_table`] says where the chunks are and how they are packed; here they become rows. As many chunks as make one row of tiles, or some
 //! 64 rows of strips, are unpacked in parallel and handed out row by row. Memory: those chunks, 4 bytes a texel.
 //!
-//! A texel whose channels all equal the declared void value is transparent, as is a chunk the file left out. Masks in images of their own
-//! are not applied.
+//! A texel whose channels all equal the declared void value is transparent, as is a chunk the file left out. A mask in an image of its own is handed on.
 
 use super::colour_table::{Packing, Paint, Table};
 use super::span::turn_bits;
-use super::{codec, failure, geokeys, predictor, tags};
-use crate::crs::of_picture;
+use super::{TiffMask, codec, failure, geokeys, predictor, tags};
 use crate::guard::guard;
 use crate::input;
 use crate::jpeg_frame::JpegFrame;
+use crate::reader::{CrsSaid, Orientation, Picture, Reader};
 use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU16, Ordering};
+use terrasoar_layout::dem::Georeference;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::disk::read_at;
 use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
@@ -33,6 +35,12 @@ pub(crate) struct TiffImage {
     path: PathBuf,
     info: ImageInfo,
     table: Table,
+    map: Option<[f64; 6]>,
+    crs: CrsSaid,
+    mask: Option<TiffMask>,
+    orientation: Orientation,
+    /// Largest number of the colours of 16 bits, once it was looked for.
+    peak: OnceLock<u16>,
 }
 
 impl TiffImage {
@@ -42,15 +50,46 @@ impl TiffImage {
         let directory = file.first_full_image()?;
         let table = Table::read(&mut file, &directory)?;
         let place = geokeys::read(&mut file, &directory)?;
-        let georeference = of_picture(&place.crs, place.map);
+        let mask = match file.mask_of([table.grid.width, table.grid.height])? {
+            Some(directory) => Some(TiffMask::of(&mut file, &directory)?),
+            None => None,
+        };
+        let orientation = Orientation::of_tag(file.number(&directory, tags::ORIENTATION)?.unwrap_or(1));
         let info = ImageInfo {
             texels: [table.grid.width, table.grid.height],
-            georeference,
+            georeference: Georeference::default(),
             format: format!("{}{}", if file.is_big() { "BigTIFF" } else { "TIFF" }, table.describe()),
             notes: table.notes.clone(),
             memory_bytes: memory_bytes(&table),
         };
-        Ok(Self { path: path.to_owned(), info, table })
+        Ok(Self {
+            path: path.to_owned(),
+            info,
+            table,
+            map: place.map,
+            crs: place.crs,
+            mask,
+            orientation,
+            peak: OnceLock::new(),
+        })
+    }
+}
+
+impl Picture for TiffImage {
+    fn said(&self) -> (Option<[f64; 6]>, CrsSaid) {
+        (self.map, self.crs.clone())
+    }
+
+    fn mask(&self) -> Option<&dyn Reader> {
+        self.mask.as_ref().map(|mask| mask as &dyn Reader)
+    }
+
+    fn orientation(&self) -> Orientation {
+        self.orientation
+    }
+
+    fn has_bytes(&self) -> bool {
+        self.table.sample_bytes == 1
     }
 }
 
@@ -80,8 +119,17 @@ impl ImageSource for TiffImage {
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
         let file = input::open(&self.path, "cannot open the TIFF file")?;
-        Ok(Box::new(Rows { image: self, file, y: 0, first_chunk: 0, chunks: Vec::new() }))
+        let mut rows = Rows { image: self, file, y: 0, first_chunk: 0, chunks: Vec::new(), bits: 16 };
+        if self.table.sample_bytes == 2 {
+            rows.bits = bits_of(rows.peak()?);
+        }
+        Ok(Box::new(rows))
     }
+}
+
+/// Bits that numbers up to this one take, at least the eight that are shown.
+fn bits_of(peak: u16) -> u32 {
+    (16 - peak.leading_zeros()).max(8)
 }
 
 /// Rows as they are asked for, from the chunks at hand.
@@ -93,6 +141,8 @@ struct Rows<'i> {
     first_chunk: u32,
     /// Their texels, `chunk_width` a row.
     chunks: Vec<Vec<u8>>,
+    /// Bits that numbers of 16 make use of: cameras and satellites count to 10, 12 or 14 of them.
+    bits: u32,
 }
 
 impl RowReader for Rows<'_> {
@@ -116,11 +166,32 @@ impl RowReader for Rows<'_> {
 }
 
 impl Rows<'_> {
+    /// The largest number of the colours. Reads the whole picture the first time.
+    fn peak(&self) -> Result<u16, LayoutError> {
+        let image = self.image;
+        if let Some(peak) = image.peak.get() {
+            return Ok(*peak);
+        }
+        let table = &image.table;
+        let found = AtomicU16::new(0);
+        (0..table.grid.count() as u32).into_par_iter().try_for_each_init(
+            || (Scratch::default(), table.grid.places(&image.path, &self.file)),
+            |(scratch, places), chunk| {
+                let place = table.place(u64::from(chunk), places)?;
+                let look = |samples: &[u8], channels: usize, _: &mut [u8]| {
+                    found.fetch_max(table.peak_of(samples, channels), Ordering::Relaxed);
+                };
+                image.unpack(&self.file, (chunk, place), scratch, &mut Vec::new(), &look)
+            },
+        )?;
+        Ok(*image.peak.get_or_init(|| found.into_inner()))
+    }
+
     fn unpack(&mut self, first: u32) -> Result<(), LayoutError> {
         let table = &self.image.table;
         let end = (table.grid.count() as u32).min(first + group_chunks(table) * table.grid.across);
         self.chunks.resize((end - first) as usize, Vec::new());
-        let image = self.image;
+        let (image, bits) = (self.image, self.bits);
         let file = &self.file;
         let mut places = table.grid.places(&image.path, file);
         let places: Vec<Option<(u64, u64)>> = (first..end)
@@ -131,7 +202,10 @@ impl Rows<'_> {
             .zip(first..end)
             .zip(places)
             .map_init(Scratch::default, |scratch, ((texels, chunk), place)| {
-                image.unpack(file, (chunk, place), scratch, texels)
+                let paint = |samples: &[u8], channels: usize, rgba: &mut [u8]| {
+                    table.paint_chunk(samples, channels, bits, rgba);
+                };
+                image.unpack(file, (chunk, place), scratch, texels, &paint)
             })
             .collect::<Result<(), LayoutError>>()?;
         self.first_chunk = first;
@@ -146,13 +220,14 @@ struct Scratch {
 }
 
 impl TiffImage {
-    /// One chunk as RGBA, from its place.
+    /// One chunk from its place: `paint` makes RGBA of its samples.
     fn unpack(
         &self,
         file: &File,
         (chunk, place): (u32, Option<(u64, u64)>),
         scratch: &mut Scratch,
         texels: &mut Vec<u8>,
+        paint: &dyn Fn(&[u8], usize, &mut [u8]),
     ) -> Result<(), LayoutError> {
         let table = &self.table;
         let rows = table.grid.window(u64::from(chunk)).height;
@@ -187,7 +262,7 @@ impl TiffImage {
                 Packing::Jpeg { tables } => {
                     let image = join_tables(tables, &scratch.packed);
                     let (bytes, channels) = self.decode_jpeg(&image, rows).map_err(damaged)?;
-                    table.paint_chunk(&bytes, channels, texels);
+                    paint(&bytes, channels, texels);
                     Ok(())
                 }
                 Packing::Bytes(compression) => {
@@ -212,7 +287,7 @@ impl TiffImage {
                             table.big_endian,
                         );
                     }
-                    table.paint_chunk(&scratch.bytes, table.bands as usize, texels);
+                    paint(&scratch.bytes, table.bands as usize, texels);
                     Ok(())
                 }
             },

@@ -77,13 +77,23 @@ impl Table {
         }
         let bands = file.number(directory, tags::SAMPLES_PER_PIXEL)?.unwrap_or(1);
         let code = file.number(directory, tags::COMPRESSION)?.unwrap_or(1);
-        let paint = paint(file, directory, bands, code == 7)?;
+        let named = paint(file, directory, bands, code == 7)?;
         let mut notes = Vec::new();
         let sample_bytes = sample_bytes(file, directory, &mut notes)?;
-        let colours = if matches!(paint, Paint::Rgb | Paint::YCbCr) { 3 } else { 1 };
+        let colours = if matches!(named, Paint::Rgb | Paint::YCbCr) { 3 } else { 1 };
         let extra = file.numbers(directory, tags::EXTRA_SAMPLES, MAX_BANDS)?.unwrap_or_default();
         let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2)).map(|at| colours + at);
         let alpha = alpha.filter(|at| (*at as u64) < bands);
+        // Programs of maps call the first of three bands grey and say nothing of the others.
+        let (paint, colours) = match named {
+            Paint::Grey if bands >= 3 && alpha.is_none_or(|at| at >= 3) => {
+                notes.push(format!(
+                    "the first three of its {bands} bands, which it does not name, are taken as red, green and blue"
+                ));
+                (Paint::Rgb, 3)
+            }
+            named => (named, colours),
+        };
         let unused = bands - colours as u64 - u64::from(alpha.is_some());
         if unused > 0 {
             notes
@@ -261,8 +271,21 @@ impl Table {
         )
     }
 
-    /// Turns the samples of a chunk, `channels` a texel, into RGBA.
-    pub(super) fn paint_chunk(&self, samples: &[u8], channels: usize, rgba: &mut [u8]) {
+    /// The largest number of the colours in a chunk of 16-bit samples, but for those that mean nothing.
+    pub(super) fn peak_of(&self, samples: &[u8], channels: usize) -> u16 {
+        let colours = self.colours().min(channels);
+        let texels = samples.chunks_exact(channels * self.sample_bytes as usize);
+        let numbers = texels.flat_map(|texel| (0..colours).map(|channel| self.sample(texel, channel)));
+        numbers.filter(|number| Some(*number) != self.void).max().unwrap_or(0)
+    }
+
+    /// Channels of colour.
+    fn colours(&self) -> usize {
+        if matches!(self.paint, Paint::Rgb | Paint::YCbCr) { 3 } else { 1 }
+    }
+
+    /// Turns the samples of a chunk, `channels` a texel, into RGBA. Those of 16 bits make use of `bits` of them.
+    pub(super) fn paint_chunk(&self, samples: &[u8], channels: usize, bits: u32, rgba: &mut [u8]) {
         let (rgba, _) = rgba.as_chunks_mut::<4>();
         if channels == 3 && self.sample_bytes == 1 && self.void.is_none() {
             let (samples, _) = samples.as_chunks::<3>();
@@ -272,24 +295,27 @@ impl Table {
             return;
         }
         let size = self.sample_bytes as usize;
-        let upper = if self.big_endian { 0 } else { size - 1 };
         for (to, from) in rgba.iter_mut().zip(samples.chunks_exact(channels * size)) {
-            let byte = |channel: usize| from[channel * size + upper];
+            // What lies beyond is alpha of all 16 bits, or "no data".
+            let shown = |channel: usize, bits: u32| match size {
+                1 => from[channel],
+                _ => (self.sample(from, channel) >> (bits - 8)).min(255) as u8,
+            };
+            let byte = |channel: usize| shown(channel, bits);
             *to = match &self.paint {
                 Paint::Grey => [byte(0), byte(0), byte(0), 255],
                 Paint::InverseGrey => [255 - byte(0), 255 - byte(0), 255 - byte(0), 255],
                 Paint::Rgb | Paint::YCbCr => [byte(0), byte(1), byte(2), 255],
-                Paint::Palette(colours) => match colours.get(usize::from(byte(0))) {
+                Paint::Palette(colours) => match colours.get(usize::from(self.sample(from, 0))) {
                     Some([r, g, b]) => [*r, *g, *b, 255],
                     None => [0; 4],
                 },
             };
             if let Some(alpha) = self.alpha {
-                to[3] = byte(alpha);
+                to[3] = shown(alpha, 16);
             }
-            let colours = if matches!(self.paint, Paint::Rgb | Paint::YCbCr) { 3 } else { 1 };
             if let Some(void) = self.void
-                && (0..colours).all(|channel| self.sample(from, channel) == void)
+                && (0..self.colours()).all(|channel| self.sample(from, channel) == void)
             {
                 to[3] = 0;
             }
@@ -355,7 +381,7 @@ fn sample_bytes(
     match (format, bits.first()) {
         (1, Some(8)) if bits.iter().all(|b| *b == 8) => Ok(1),
         (1, Some(16)) if bits.iter().all(|b| *b == 16) => {
-            notes.push("16 bits a channel are cut to 8".into());
+            notes.push("16 bits a channel are cut to the upper 8 of those in use".into());
             Ok(2)
         }
         _ => Err(unsupported(

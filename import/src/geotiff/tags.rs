@@ -23,6 +23,7 @@ pub(super) const BITS_PER_SAMPLE: u16 = 258;
 pub(super) const COMPRESSION: u16 = 259;
 pub(super) const PHOTOMETRIC: u16 = 262;
 pub(super) const FILL_ORDER: u16 = 266;
+pub(super) const ORIENTATION: u16 = 274;
 pub(super) const STRIP_OFFSETS: u16 = 273;
 pub(super) const SAMPLES_PER_PIXEL: u16 = 277;
 pub(super) const ROWS_PER_STRIP: u16 = 278;
@@ -49,7 +50,7 @@ pub(super) const GDAL_NODATA: u16 = 42113;
 pub(super) const LERC_PARAMETERS: u16 = 50674;
 
 /// The tags that mean something here; what others hold is never looked at.
-const KNOWN: [u16; 32] = [
+const KNOWN: [u16; 33] = [
     NEW_SUBFILE_TYPE,
     SUBFILE_TYPE,
     IMAGE_WIDTH,
@@ -58,6 +59,7 @@ const KNOWN: [u16; 32] = [
     COMPRESSION,
     PHOTOMETRIC,
     FILL_ORDER,
+    ORIENTATION,
     STRIP_OFFSETS,
     SAMPLES_PER_PIXEL,
     ROWS_PER_STRIP,

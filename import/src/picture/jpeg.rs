@@ -4,13 +4,14 @@
 //! texel of the usual kind, 7.5 of a progressive one. That counts against the memory budget; larger pictures go through a tiled GeoTIFF.
 
 use super::png::spread;
-use super::world;
 use crate::jpeg_frame::JpegFrame;
+use crate::reader::{Orientation, Picture};
 use crate::{guard, input};
 use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat, UnsupportedFeature};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use terrasoar_layout::dem::Georeference;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
 
@@ -20,6 +21,7 @@ pub(super) struct JpegImage {
     path: PathBuf,
     info: ImageInfo,
     channels: usize,
+    orientation: Orientation,
 }
 
 impl JpegImage {
@@ -41,7 +43,7 @@ impl JpegImage {
         let progressive = header.coding_process == CodingProcess::DctProgressive;
         let info = ImageInfo {
             texels,
-            georeference: world::georeference(path, &["jgw", "jpgw", "jpegw", "wld"])?,
+            georeference: Georeference::default(),
             format: format!(
                 "{}{} JPEG",
                 if progressive { "progressive " } else { "" },
@@ -50,7 +52,19 @@ impl JpegImage {
             notes: Vec::new(),
             memory_bytes: frame.memory_bytes(),
         };
-        Ok(Self { path: path.to_owned(), info, channels })
+        let orientation = decoder.exif_data().map(Orientation::of_exif);
+        let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
+        Ok(Self { path: path.to_owned(), info, channels, orientation })
+    }
+}
+
+impl Picture for JpegImage {
+    fn orientation(&self) -> Orientation {
+        self.orientation
+    }
+
+    fn has_bytes(&self) -> bool {
+        true
     }
 }
 

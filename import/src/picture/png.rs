@@ -3,12 +3,13 @@
 //! A PNG is one compressed stream, decoded by one thread from the first row to the last. Sixteen bits a channel are cut to eight; an interlaced
 //! file, whose rows come in seven passes, is refused.
 
-use super::world;
 use crate::guard;
 use crate::png_stream;
 use crate::png_stream::{PngRows, Texts, decoding_error};
+use crate::reader::{Orientation, Picture};
 use ::png::{BitDepth, ColorType, Transformations};
 use std::path::{Path, PathBuf};
+use terrasoar_layout::dem::Georeference;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
 
@@ -20,6 +21,8 @@ const AS_COLOURS: Transformations = Transformations::EXPAND.union(Transformation
 pub(super) struct PngImage {
     path: PathBuf,
     info: ImageInfo,
+    orientation: Orientation,
+    has_bytes: bool,
 }
 
 impl PngImage {
@@ -47,7 +50,7 @@ impl PngImage {
         }
         let info = ImageInfo {
             texels: [header.width, header.height],
-            georeference: world::georeference(path, &["pgw", "pngw", "wld"])?,
+            georeference: Georeference::default(),
             format: format!(
                 "{}-bit {color} PNG{}",
                 header.bit_depth as u8,
@@ -56,7 +59,20 @@ impl PngImage {
             notes,
             memory_bytes: png_stream::memory_bytes(header),
         };
-        Ok(Self { path: path.to_owned(), info })
+        let orientation = header.exif_metadata.as_deref().map(Orientation::of_exif);
+        let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
+        let has_bytes = header.bit_depth != BitDepth::Sixteen;
+        Ok(Self { path: path.to_owned(), info, orientation, has_bytes })
+    }
+}
+
+impl Picture for PngImage {
+    fn orientation(&self) -> Orientation {
+        self.orientation
+    }
+
+    fn has_bytes(&self) -> bool {
+        self.has_bytes
     }
 }
 

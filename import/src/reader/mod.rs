@@ -5,8 +5,10 @@
 //! finding out what a system or a unit is, comparing voids, scaling, and asking the person who typed the command.
 
 mod declared;
+mod picture;
 
 pub(crate) use declared::{CrsSaid, Declared, HorizontalSize, Said, ValueSaid, VerticalUnit};
+pub(crate) use picture::{Orientation, Picture};
 
 use terrasoar_layout::dem::SampleSink;
 use terrasoar_layout::error::LayoutError;

@@ -4,14 +4,9 @@
 //! Files beyond 4 GiB are BigTIFF. Layout: header, directory, values that do not fit into it, rows or tiles.
 
 use super::HEIGHT_SCALE;
+use crate::tiff_tags::{CLASSIC_BYTES, LONG, LONG8, SHORT, Tags};
 use terrasoar_layout::dem::HorizontalUnit;
 use terrasoar_layout::file::header::Header;
-
-const SHORT: u16 = 3;
-const LONG: u16 = 4;
-const DOUBLE: u16 = 12;
-const ASCII: u16 = 2;
-const LONG8: u16 = 16;
 
 /// What heights call their reference system.
 const CITATION: &str = "Terrasoar synthetic terrain, local metres|";
@@ -20,8 +15,6 @@ const COLOUR_CITATION: &str = "Terrasoar synthetic colour|";
 
 /// Bytes of a strip, about.
 const STRIP_BYTES: u64 = 1 << 17;
-/// Largest classic TIFF, with room for the header.
-const CLASSIC_BYTES: u64 = (1 << 32) - (1 << 24);
 
 /// The bytes before the first row of a grid of `size` x `size` 16-bit samples.
 pub(super) fn header(size: u32, spacing_m: f64) -> Vec<u8> {
@@ -33,7 +26,7 @@ pub(super) fn header(size: u32, spacing_m: f64) -> Vec<u8> {
     let place = if big { LONG8 } else { LONG };
     let sizes: Vec<u64> = (0..strips).map(|strip| strip_rows(strip) * row_bytes).collect();
 
-    let mut tags = Tags { big, entries: Vec::new() };
+    let mut tags = Tags::new(big);
     tags.numbers(256, LONG, &[u64::from(size)]);
     tags.numbers(257, LONG, &[u64::from(size)]);
     tags.numbers(258, SHORT, &[16]);
@@ -68,8 +61,7 @@ pub(super) fn header(size: u32, spacing_m: f64) -> Vec<u8> {
         ),
     );
 
-    tags.places(273, &sizes);
-    tags.bytes()
+    with_places(tags, 273, &sizes)
 }
 
 /// The bytes before the first tile of an RGB picture of `texels` (east, north) in tiles of `side` texels: it covers the terrain of `terrain`, `fine`
@@ -111,7 +103,7 @@ pub(super) fn placed_colour_header(texels: [u32; 2], side: u32, place: &[f64], k
     let sizes = vec![u64::from(side).pow(2) * 3; (tiles[0] * tiles[1]) as usize];
     let big = sizes.iter().sum::<u64>() > CLASSIC_BYTES;
 
-    let mut tags = Tags { big, entries: Vec::new() };
+    let mut tags = Tags::new(big);
     tags.numbers(256, LONG, &[u64::from(texels[0])]);
     tags.numbers(257, LONG, &[u64::from(texels[1])]);
     tags.numbers(258, SHORT, &[8, 8, 8]);
@@ -126,86 +118,22 @@ pub(super) fn placed_colour_header(texels: [u32; 2], side: u32, place: &[f64], k
     tags.reals(34264, place);
     tags.numbers(34735, SHORT, keys);
     tags.text(34737, COLOUR_CITATION);
-    tags.places(324, &sizes);
-    tags.bytes()
+    with_places(tags, 324, &sizes)
 }
 
-struct Entry {
-    tag: u16,
-    kind: u16,
-    count: u64,
-    values: Vec<u8>,
-}
-
-struct Tags {
-    big: bool,
-    entries: Vec<Entry>,
-}
-
-impl Tags {
-    fn numbers(&mut self, tag: u16, kind: u16, numbers: &[u64]) {
-        let bytes = match kind {
-            SHORT => 2,
-            LONG => 4,
-            _ => 8,
-        };
-        let values = numbers.iter().flat_map(|number| number.to_le_bytes().into_iter().take(bytes)).collect();
-        self.entries.push(Entry { tag, kind, count: numbers.len() as u64, values });
-    }
-
-    fn reals(&mut self, tag: u16, reals: &[f64]) {
-        let values = reals.iter().flat_map(|real| real.to_le_bytes()).collect();
-        self.entries.push(Entry { tag, kind: DOUBLE, count: reals.len() as u64, values });
-    }
-
-    fn text(&mut self, tag: u16, text: &str) {
-        let values: Vec<u8> = text.bytes().chain([0]).collect();
-        self.entries.push(Entry { tag, kind: ASCII, count: values.len() as u64, values });
-    }
-
-    /// The places of strips or tiles of `sizes`. They follow from the header's length, which they do not change.
-    fn places(&mut self, tag: u16, sizes: &[u64]) {
-        let kind = if self.big { LONG8 } else { LONG };
-        self.numbers(tag, kind, sizes);
-        let start = self.bytes().len() as u64;
-        let places: Vec<u64> = sizes
-            .iter()
-            .scan(start, |next, size| {
-                let place = *next;
-                *next += size;
-                Some(place)
-            })
-            .collect();
-        self.entries.retain(|entry| entry.tag != tag);
-        self.numbers(tag, kind, &places);
-        self.entries.sort_by_key(|entry| entry.tag);
-    }
-
-    /// Header, directory and the values outside it.
-    fn bytes(&self) -> Vec<u8> {
-        let (header, count, entry, word) = if self.big { (16, 8, 20, 8) } else { (8, 2, 12, 4) };
-        let number = |value: u64| value.to_le_bytes().into_iter().take(word);
-        let mut bytes: Vec<u8> = if self.big { b"II+\0\x08\0\0\0".to_vec() } else { b"II*\0".to_vec() };
-        bytes.extend(number(header));
-        bytes.extend((self.entries.len() as u64).to_le_bytes().into_iter().take(count));
-        let outside = header as usize + count + self.entries.len() * entry + word;
-        let mut values: Vec<u8> = Vec::new();
-        for entry in &self.entries {
-            bytes.extend(entry.tag.to_le_bytes());
-            bytes.extend(entry.kind.to_le_bytes());
-            bytes.extend(number(entry.count));
-            if entry.values.len() <= word {
-                let mut value = entry.values.clone();
-                value.resize(word, 0);
-                bytes.extend(value);
-            } else {
-                bytes.extend(number((outside + values.len()) as u64));
-                values.extend(&entry.values);
-                values.resize(values.len().next_multiple_of(8), 0);
-            }
-        }
-        bytes.extend(number(0));
-        bytes.extend(values);
-        bytes
-    }
+/// The bytes of a file before its strips or tiles of `sizes`, whose places go into `tag`. These follow from the length of what stands before, which they do not change.
+fn with_places(mut tags: Tags, tag: u16, sizes: &[u64]) -> Vec<u8> {
+    let kind = if tags.is_big() { LONG8 } else { LONG };
+    tags.numbers(tag, kind, sizes);
+    let start = tags.file().len() as u64;
+    let places: Vec<u64> = sizes
+        .iter()
+        .scan(start, |next, size| {
+            let place = *next;
+            *next += size;
+            Some(place)
+        })
+        .collect();
+    tags.numbers(tag, kind, &places);
+    tags.file()
 }

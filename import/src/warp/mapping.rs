@@ -7,14 +7,14 @@ use crate::crs::Ground;
 
 /// The way between two systems.
 #[derive(Debug, Clone)]
-pub(super) struct Projections {
-    pub(super) old: Ground,
-    pub(super) new: Ground,
+pub(crate) struct Projections {
+    pub(crate) old: Ground,
+    pub(crate) new: Ground,
 }
 
 /// From the new grid to the old one.
 #[derive(Debug, Clone)]
-pub(super) struct Mapping {
+pub(crate) struct Mapping {
     /// Columns and rows of the new grid to coordinates.
     pub(super) new_map: [f64; 6],
     /// Coordinates to columns and rows of the old grid.
@@ -41,7 +41,7 @@ const CELL: usize = 16;
 const OFF_STEPS: f64 = 0.002;
 
 impl Mapping {
-    pub(super) fn new(
+    pub(crate) fn new(
         new_map: [f64; 6],
         old_map: [f64; 6],
         old_columns: u32,
@@ -68,7 +68,7 @@ impl Mapping {
     }
 
     /// The places of a block of the new grid from `first` on, row by row.
-    pub(super) fn places(&self, first: [f64; 2], size: [usize; 2]) -> Vec<[f64; 2]> {
+    pub(crate) fn places(&self, first: [f64; 2], size: [usize; 2]) -> Vec<[f64; 2]> {
         let [wide, high] = size;
         let mut places = vec![[f64::NAN; 2]; wide * high];
         if self.projections.is_none() {

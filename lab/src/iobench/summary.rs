@@ -41,6 +41,8 @@ pub struct IoBench {
     pub kernel_known: bool,
     /// The figures.
     pub runs: Vec<IoRun>,
+    /// How they were made, if that is said.
+    pub made: Option<crate::made::Made>,
 }
 
 /// A cap on memory, page cache included.

@@ -1,6 +1,6 @@
 //! The frames of a replay as CSV: a header with the field names of [`FrameStats`], then a line for each frame.
 //!
-//! Hashes are 16 hexadecimal digits; times have the shortest digits that read back the same.
+//! Hashes are 16 hexadecimal digits; times have the shortest digits that read back the same. A field that does not apply to the engine is empty.
 
 use super::ReportError;
 use std::io::Write;
@@ -46,6 +46,8 @@ pub(super) fn write_frames(to: &mut dyn Write, frames: &[FrameStats]) -> std::io
             edit_ms,
             mesh_hash,
         } = f;
+        let [expired, slots_written, patch_bytes] = [expired, slots_written, patch_bytes].map(|v| known(*v));
+        let [scan_us, test_us, apply_us] = [scan_us, test_us, apply_us].map(|v| known(*v));
         writeln!(
             to,
             "{frame},{triangles},{new_triangles},{vertex_tests},{splits},{merges},{expired},{slots_written},{patch_bytes},{late},{late_error_px},\
@@ -53,6 +55,11 @@ pub(super) fn write_frames(to: &mut dyn Write, frames: &[FrameStats]) -> std::io
         )?;
     }
     Ok(())
+}
+
+/// A figure, or nothing where there is none.
+fn known(value: Option<impl ToString>) -> String {
+    value.map(|value| value.to_string()).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -73,7 +80,7 @@ mod tests {
         let mut text = Vec::new();
         write_frames(&mut text, &[frame]).unwrap();
         let text = String::from_utf8(text).unwrap();
-        assert_eq!(text.lines().nth(1), Some("7,5,0,0,0,0,0,0,0,0,0,0,0,0.1,0,0,0,0,0,00000000000000ab"));
+        assert_eq!(text.lines().nth(1), Some("7,5,0,0,0,0,,,,0,0,0,0,0.1,,,,0,0,00000000000000ab"));
     }
 
     #[test]

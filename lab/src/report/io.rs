@@ -170,6 +170,7 @@ pub(super) mod tests {
             cap_note: None,
             kernel_known: true,
             runs: runs.iter().map(sums).collect(),
+            made: None,
         };
         (bench, runs)
     }

@@ -18,10 +18,12 @@ mod figures;
 mod files;
 mod html;
 mod io;
+
 mod number;
 #[cfg(feature = "plots")]
 mod plot;
 
+pub use crate::made::Made;
 pub use csv::write_frames_csv;
 pub use files::{ReportFile, START_BYTES};
 pub use html::FLIGHT_PICTURE;
@@ -104,6 +106,8 @@ pub struct ReportTitle {
     pub tolerance_px: f64,
     /// Size of the picture.
     pub viewport: Viewport,
+    /// How it was made, if that is said.
+    pub made: Option<Made>,
 }
 
 /// One engine's figures at one value of what a sweep varies.
@@ -170,6 +174,7 @@ struct Summary<'a> {
     comparison: &'a Comparison,
     tolerance_sweep: &'a [SweepPoint],
     incoherence_sweep: &'a [SweepPoint],
+    made: Option<&'a Made>,
 }
 
 impl ComparisonReport<'_> {
@@ -204,6 +209,7 @@ impl ComparisonReport<'_> {
             comparison: self.comparison,
             tolerance_sweep: self.tolerance_sweep,
             incoherence_sweep: self.incoherence_sweep,
+            made: self.title.made.as_ref(),
         };
         match serde_json::to_string_pretty(&summary) {
             Ok(text) => Ok(text + "\n"),
@@ -324,6 +330,7 @@ mod tests {
             flight: "straight, 12 m a frame".into(),
             tolerance_px: 1.0,
             viewport: Viewport::default(),
+            made: None,
         }
     }
 

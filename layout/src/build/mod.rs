@@ -8,6 +8,7 @@
 //! Invariant: neither threads nor the memory budget change a byte of the file.
 
 mod band;
+mod fill;
 mod gather;
 mod levels;
 mod memory;
@@ -35,6 +36,7 @@ use crate::publish::publish_terrain;
 use crate::remedy::Remedy;
 use crate::words::{harmless, number};
 use band::{Band, Fills, RowReader};
+pub use fill::MAX_FILL;
 use levels::{LevelShape, Levels};
 use memory::MemoryPlan;
 pub use options::BuildOptions;
@@ -89,6 +91,12 @@ pub fn build_on(
         ))
         .mended_by(Remedy::HeightFactor));
     }
+    if options.fill_voids > MAX_FILL {
+        return Err(LayoutError::Usage(format!(
+            "holes up to {} samples across are too large to be filled; the largest is {MAX_FILL}",
+            options.fill_voids
+        )));
+    }
     let (spacing_m, spacing_origin) = spacing::resolve(info, options.spacing_m)?;
     let grid = Grid::new([info.samples_wide, info.samples_high], spacing_m)?;
     let samples = u64::from(info.samples_wide) * u64::from(info.samples_high);
@@ -107,10 +115,24 @@ pub fn build_on(
         .about
         .warnings
         .extend(dem.warnings().into_iter().map(|warning| harmless(&warning.words, MAX_WARNING_CHARS)));
-    let stats = spool.stats();
-    if stats.voids == samples {
+    if spool.stats().voids == samples {
         return Err(LayoutError::Usage("the elevation model has no heights: every sample is void".into()));
     }
+    if options.fill_voids > 0 && spool.stats().voids > 0 {
+        progress.stage("filling voids", samples);
+        let filled = fill::fill_holes(&spool, grid.samples(), options.fill_voids, &advance)?;
+        header.about.origins.push((
+            "voids".into(),
+            format!(
+                "{} of {} void samples were filled, {} holes of up to {most} x {most} samples, smoothly from their rims",
+                filled.samples,
+                spool.stats().voids + filled.samples,
+                filled.holes,
+                most = options.fill_voids
+            ),
+        ));
+    }
+    let stats = spool.stats();
 
     progress.stage("surveying", samples);
     let code = HeightCode::choose(info, options.z_scale, &stats, options.record);

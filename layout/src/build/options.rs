@@ -22,6 +22,8 @@ pub struct BuildOptions {
     pub error: ErrorKind,
     /// Raw value that means "no data", beside what the DEM declares.
     pub nodata: Option<f64>,
+    /// Holes up to so many samples across, either way, are filled from their rims; 0, the default, for none, at most 256.
+    pub fill_voids: u32,
     /// Largest side of a tile in steps, a power of two from 2 to 256. Smaller tiles save memory and cost time; the file is the same.
     pub largest_tile: u32,
 }
@@ -35,6 +37,7 @@ impl Default for BuildOptions {
             record: None,
             error: ErrorKind::Bounded,
             nodata: None,
+            fill_voids: 0,
             largest_tile: LARGEST_TILE,
         }
     }
@@ -69,6 +72,11 @@ impl BuildOptions {
     /// These options with a raw value that means "no data", beside what the DEM declares.
     pub fn nodata(self, nodata: impl Into<Option<f64>>) -> Self {
         Self { nodata: nodata.into(), ..self }
+    }
+
+    /// These options with holes up to so many samples across filled from their rims.
+    pub fn fill_voids(self, fill_voids: u32) -> Self {
+        Self { fill_voids, ..self }
     }
 
     /// These options with another largest side of a tile in steps.

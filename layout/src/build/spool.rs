@@ -144,11 +144,16 @@ impl<'a> Spool<'a> {
 
     /// Row `y`, counted from the south, of raw samples.
     pub(super) fn read_row(&self, y: u32, row: &mut [f64]) -> Result<(), LayoutError> {
+        self.read_part(y, 0, row)
+    }
+
+    /// Raw samples of row `y`, counted from the south, from a column on.
+    pub(super) fn read_part(&self, y: u32, col: u32, row: &mut [f64]) -> Result<(), LayoutError> {
         if self.is_void_row(y) {
             row.fill(f64::NAN);
             return Ok(());
         }
-        let offset = u64::from(y) * u64::from(self.wide) * self.sample_bytes();
+        let offset = (u64::from(y) * u64::from(self.wide) + u64::from(col)) * self.sample_bytes();
         let length = row.len() * self.sample_bytes() as usize;
         match &self.storage {
             Storage::Memory(bytes) => {
@@ -165,6 +170,49 @@ impl<'a> Spool<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Puts raw samples in the place of voids, from a column of row `y` on, counted from the south; each is rounded to the steps that all samples keep. They
+    /// must lie within the range of the samples.
+    pub(super) fn fill(&self, y: u32, col: u32, samples: &[f64]) -> Result<(), LayoutError> {
+        let stats = self.stats();
+        let step = if self.sample_type.is_integer() {
+            Some(1.0)
+        } else {
+            CANDIDATE_STEPS.into_iter().zip(stats.steps).find(|(_, holds)| *holds).map(|(step, _)| step)
+        };
+        let rounded = |value: f64| {
+            let value = step.map_or(value, |step| (value / step).round() * step);
+            // A step's multiple is to its type what those of the file are.
+            if stats.fits_f32 || self.sample_type == SampleType::F32 {
+                f64::from(value as f32)
+            } else {
+                value
+            }
+        };
+        let samples: Vec<f64> = samples.iter().map(|value| rounded(*value)).collect();
+        let mut bytes = Vec::new();
+        self.encode(&samples, &mut bytes);
+        self.write(y, col, &bytes)?;
+        self.stats.lock().unwrap_or_else(PoisonError::into_inner).voids -= samples.len() as u64;
+        Ok(())
+    }
+
+    /// Stores encoded samples of row `y`, counted from the south, from a column on.
+    fn write(&self, y: u32, col: u32, bytes: &[u8]) -> Result<(), LayoutError> {
+        self.has_heights[y as usize].store(true, Ordering::Relaxed);
+        let offset = (u64::from(y) * u64::from(self.wide) + u64::from(col)) * self.sample_bytes();
+        match &self.storage {
+            Storage::Memory(all) => {
+                let mut all = all.write().unwrap_or_else(PoisonError::into_inner);
+                all[offset as usize..offset as usize + bytes.len()].copy_from_slice(bytes);
+                Ok(())
+            }
+            Storage::File(file) => self
+                .disk
+                .write_at(file, bytes, offset)
+                .map_err(|e| failed(&self.target, "cannot write the temporary file beside it", e)),
+        }
     }
 
     fn decode(&self, bytes: &[u8], row: &mut [f64]) {
@@ -256,18 +304,7 @@ impl SampleSink for Spool<'_> {
             }
             self.encode(row, &mut bytes);
             let y = self.high - 1 - (window.row + i as u32);
-            self.has_heights[y as usize].store(true, Ordering::Relaxed);
-            let offset = (u64::from(y) * u64::from(self.wide) + u64::from(window.col)) * self.sample_bytes();
-            match &self.storage {
-                Storage::Memory(all) => {
-                    let mut all = all.write().unwrap_or_else(PoisonError::into_inner);
-                    all[offset as usize..offset as usize + bytes.len()].copy_from_slice(&bytes);
-                }
-                Storage::File(file) => self
-                    .disk
-                    .write_at(file, &bytes, offset)
-                    .map_err(|e| failed(&self.target, "cannot write the temporary file beside it", e))?,
-            }
+            self.write(y, window.col, &bytes)?;
         }
         self.stats.lock().unwrap_or_else(PoisonError::into_inner).merge(&stats);
         (self.advance)(samples.len() as u64);

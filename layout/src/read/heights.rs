@@ -4,6 +4,7 @@
 //! number of places into such an order first and shares them out to threads. Cost: some tens of nanoseconds a sample whose page is kept; else a read of 4 KiB and its checksum.
 
 use super::terrain::Terrain;
+use super::window::SampleWindow;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page};
 use crate::grid::GridPoint;
@@ -54,6 +55,23 @@ impl<'t> Heights<'t> {
             }
         }
         Ok(Some(height))
+    }
+
+    /// Heights in metres of the samples of `window`, rows from the south, in `into`, whatever was in it; NaN where there is none.
+    ///
+    /// # Errors
+    /// As [`Terrain::checked_page`]; [`LayoutError::Usage`] for a window that does not lie in the terrain.
+    pub fn samples(&mut self, window: &SampleWindow, into: &mut Vec<f64>) -> Result<(), LayoutError> {
+        window.check(self.terrain.grid())?;
+        into.clear();
+        into.reserve(window.size[0] as usize * window.size[1] as usize);
+        for row in 0..window.size[1] {
+            for column in 0..window.size[0] {
+                let vertex = self.vertex(window.point(column, row))?;
+                into.push(if vertex.class.is_void() { f64::NAN } else { vertex.height_m });
+            }
+        }
+        Ok(())
     }
 
     /// The vertex at a grid point of the square.

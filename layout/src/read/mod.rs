@@ -13,3 +13,4 @@ pub mod prefetch;
 pub mod records;
 pub mod store;
 pub mod terrain;
+pub mod window;

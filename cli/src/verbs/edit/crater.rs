@@ -4,7 +4,7 @@ use super::work::Target;
 use super::{HowArgs, TargetArgs, apply};
 use crate::verbs::output::{complain, decimal, grouped, print};
 use crate::verbs::outputs::{Force, Kind};
-use crate::verbs::{WrongUsage, parse};
+use crate::verbs::{WrongUsage, parse, within};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 use terrasoar::edits::rain::Rain;
@@ -79,7 +79,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let script = args.script()?;
     let Some(out) = &args.output else {
-        return apply(args.target.target(), &script, &args.target.file, &args.how);
+        return apply(args.target.target(), &script, None, &args.how);
     };
     script.write(out)?;
     let told = format!(
@@ -137,6 +137,7 @@ impl Args {
                 decimal(extent_m[1], 4)
             );
         }
+        within::warn_of(&crater, terrain.grid());
         Ok(Script { batches: vec![Batch::of([crater])] })
     }
 }

@@ -18,7 +18,7 @@ use work::{Target, Work};
 /// A script of edits (EDITS.md in the repository specifies it) has craters, brushes, stamps of other elevation data, and areas set to a height or back to the one they were built with. Each of its
 /// batches is applied whole or not at all and becomes durable before the next; `terrasoar undo` takes it back. Programs that have the file open go on reading it as
 /// it was. With --overlay, the edits go to a file of their own and the terrain is not touched. Heights that the file's records cannot hold make it rewrite the file with
-/// room for them, which ends its history; it says so. Where a picture is draped, craters scorch it, in the same commits.
+/// room for them, which ends its history; it says so. An edit that lies wholly outside the terrain is refused, before anything is done; of one that lies partly outside it warns. Where a picture is draped, craters scorch it, in the same commits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -26,7 +26,7 @@ Examples:
   terrasoar edit alps.iqt --script dam.edits --dry-run
   terrasoar edit alps.iqt --script dam.edits --overlay what-if.iqo
 
-Fields of --json: file, overlay, dry_run, batches, edits, edits_outside (that lie beyond the terrain), samples (of the rectangles that hold all changed heights), records_changed,
+Fields of --json: file, overlay, dry_run, batches, edits, edits_outside (that reach no sample), samples (of the rectangles that hold all changed heights), records_changed,
 voids_passed, tiles_painted, pages_written, bytes_appended, widenings (times the file was rewritten), needs_widening (a dry run that got no further), seconds.")]
 pub(super) struct Args {
     #[command(flatten)]
@@ -70,14 +70,14 @@ struct HowArgs {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let script = Script::read(&args.script)?;
-    apply(args.target.target(), &script, &args.script, &args.how)
+    apply(args.target.target(), &script, Some(&args.script), &args.how)
 }
 
-/// Applies a script, which lies at `path`, and tells what became of it.
-fn apply(target: Target<'_>, script: &Script, path: &Path, how: &HowArgs) -> Result<()> {
+/// Applies a script, which was read from `path` or made here, and tells what became of it.
+fn apply(target: Target<'_>, script: &Script, path: Option<&Path>, how: &HowArgs) -> Result<()> {
     let progress = Meter::new("edits");
-    let batches = Loader::new(path, terrasoar_import::open_file).script(script)?;
-    let work = Work { target, batches: &batches, paints: !how.no_scorch, progress: &progress };
+    let batches = Loader::new(path.unwrap_or(target.file), terrasoar_import::open_file).script(script)?;
+    let work = Work { target, batches: &batches, script: path, paints: !how.no_scorch, progress: &progress };
     let told = if how.dry_run { work.rehearse()? } else { work.perform()? };
     drop(progress);
     if how.json { print_json(&told) } else { super::output::print(&told.text()) }

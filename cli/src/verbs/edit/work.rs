@@ -3,6 +3,7 @@
 use super::paint::paints_of;
 use crate::verbs::output::{complain, decimal, grouped};
 use crate::verbs::progress::{Meter, short};
+use crate::verbs::within;
 use anyhow::{Context, Result, anyhow, bail};
 use serde::Serialize;
 use std::path::Path;
@@ -101,7 +102,7 @@ impl Told {
             text += &format!("\n{} of the picture painted", plural(self.tiles_painted, "tile", "tiles"));
         }
         if self.edits_outside > 0 {
-            text += &format!("\n{} beyond the terrain", plural(self.edits_outside, "edit lies", "edits lie"));
+            text += &format!("\n{} no sample", plural(self.edits_outside, "edit reaches", "edits reach"));
         }
         text += &match (self.dry_run, self.needs_widening) {
             (true, false) => "\na dry run: nothing was written".to_owned(),
@@ -122,6 +123,8 @@ impl Told {
 pub(super) struct Work<'a> {
     pub(super) target: Target<'a>,
     pub(super) batches: &'a [LoadedBatch],
+    /// Where they were read; `None` where they were made here.
+    pub(super) script: Option<&'a Path>,
     /// Whether the picture follows, where there is one.
     pub(super) paints: bool,
     pub(super) progress: &'a Meter,
@@ -172,6 +175,8 @@ impl Work<'_> {
                 edit.check(grid).with_context(|| self.named(number, batch))?;
             }
         }
+        let warning = within::edits(self.batches, grid, self.script)?;
+        warning.iter().for_each(|words| self.progress.note(words));
         Ok(())
     }
 

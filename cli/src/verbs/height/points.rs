@@ -3,9 +3,10 @@
 //! A batch is a million rows or 64 MiB of their text, so that a page is read once for all places on it. Cost a row: reading and writing it, a projection where the system is
 //! another, and `heights_m`.
 
+use super::is_inside;
 use super::table::Table;
-use super::{frame, is_inside};
 use crate::verbs::output::{complain, grouped, print_rows};
+use crate::verbs::siting::frame;
 use anyhow::{Context, Result, anyhow};
 use csv::{ByteRecord, Terminator, Writer, WriterBuilder};
 use rayon::prelude::*;

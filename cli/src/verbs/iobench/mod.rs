@@ -248,6 +248,7 @@ fn bench_of(args: &Args, block_m: f64, standing: Standing, runs: Vec<IoRun>) -> 
         cap_note: standing.note,
         kernel_known: kernel::thread_faults().is_some() && kernel::read_bytes().is_some(),
         runs,
+        made: Some(crate::verbs::made::made()),
     }
 }
 

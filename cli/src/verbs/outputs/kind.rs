@@ -5,9 +5,10 @@ use std::io;
 use std::path::Path;
 use terrasoar::edits::{Script, Step};
 use terrasoar::flight::generate::is_generated;
+use terrasoar_import::export::is_exported;
 use terrasoar_import::synth::is_synthetic;
-use terrasoar_lab::picture;
 use terrasoar_lab::report::ReportFile;
+use terrasoar_lab::{mesh_file, picture};
 use terrasoar_layout::edit::Edit;
 
 /// What a verb writes under a name.
@@ -17,6 +18,8 @@ pub(in crate::verbs) enum Kind {
     Terrain,
     /// Synthetic elevation data, or a picture of synthetic colours.
     Synthetic,
+    /// Heights of a terrain, or differences of them, as GeoTIFF.
+    Elevation,
     /// A flight that was generated.
     Flight,
     /// A script of craters.
@@ -33,16 +36,15 @@ pub(in crate::verbs) enum Kind {
     Report(ReportFile),
 }
 
-/// What says in a mesh that it is ours; both formats have it near their beginning.
-pub(in crate::verbs) const MESH_NOTE: &str = "metres east, north and up of the terrain's south-west sample";
-/// What says so in a film.
+/// What says in a film that it is ours.
 pub(in crate::verbs) const FILM_NOTE: &str = "made with Terrasoar";
 
 impl Kind {
     #[cfg(test)]
-    pub(super) const ALL: [Self; 13] = [
+    pub(super) const ALL: [Self; 14] = [
         Self::Terrain,
         Self::Synthetic,
+        Self::Elevation,
         Self::Flight,
         Self::Craters,
         Self::Mesh,
@@ -68,9 +70,10 @@ impl Kind {
                 None => false,
             },
             Self::Synthetic => is_synthetic(path)?,
+            Self::Elevation => is_exported(&start),
             Self::Flight => is_generated(&start),
             Self::Craters => is_craters(path, &start)?,
-            Self::Mesh => is_mesh(&start),
+            Self::Mesh => mesh_file::is_ours(&start),
             Self::Picture => picture::is_ours(&start),
             Self::Film => is_film(&start),
             Self::Report(file) => file.is_ours(&start),
@@ -97,15 +100,6 @@ fn is_craters(path: &Path, start: &[u8]) -> io::Result<bool> {
     let mut steps = script.batches.iter().flat_map(|batch| &batch.steps);
     let only_craters = steps.all(|step| matches!(step, Step::Edit(Edit::Crater(_))));
     Ok(only_craters && script.to_text(path).is_ok_and(|text| text.as_bytes() == bytes))
-}
-
-fn is_mesh(start: &[u8]) -> bool {
-    let mut lines = start.split(|byte| *byte == b'\n');
-    match lines.next() {
-        Some(b"ply") => lines.nth(1) == Some(format!("comment {MESH_NOTE}").as_bytes()),
-        Some(first) => first == format!("# {MESH_NOTE}").as_bytes(),
-        None => false,
-    }
 }
 
 fn is_film(start: &[u8]) -> bool {

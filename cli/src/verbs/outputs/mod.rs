@@ -9,7 +9,7 @@ mod there;
 
 #[cfg(feature = "pictures")]
 pub(super) use kind::FILM_NOTE;
-pub(super) use kind::{Kind, MESH_NOTE};
+pub(super) use kind::Kind;
 
 use anyhow::{Result, bail};
 use std::io;

@@ -62,6 +62,7 @@ const STARTS: &[(usize, &[u8], &str)] = &[
     (0, b"GIF8", "a GIF picture"),
     (4, b"ftyp", "a film"),
     (0, b"ply", "a PLY mesh"),
+    (0, b"glTF", "a glTF scene"),
     (0, b"<svg", "an SVG drawing"),
     (0, b"PK\x03\x04", "a zip archive"),
     (0, b"\x1f\x8b", "a gzip archive"),

@@ -72,7 +72,9 @@ impl Viewer {
     }
 
     fn draw(&mut self, encoder: &mut wgpu::CommandEncoder, target: Target<'_>, view: &View) -> Result<Drawn> {
-        let look = self.settings.look();
+        let mut look = self.settings.look();
+        let heights_m = self.stage.terrain().header().height_range_m.map(|metres| metres as f32);
+        look.tint_range_m = Some(look.ramp.range_m(heights_m));
         let frozen = self.frozen;
         self.stage.draw(encoder, target, view, &look, frozen.as_ref())
     }

@@ -20,7 +20,15 @@ pub enum Area {
         /// Metres.
         radius_m: f64,
     },
+    /// All samples of a rectangle in metres, those on its sides included. It may reach beyond the data.
+    Extent {
+        /// Its west, south, east and north side in metres of the south-west sample.
+        sides_m: [f64; 4],
+    },
 }
+
+/// By how much of a step a sample may lie beside a rectangle in metres and still be on its side: numbers such as 0.3 are no multiples of 0.1.
+const ON_A_SIDE: f64 = 1e-6;
 
 impl Area {
     /// Whether the numbers are usable; `what` names the edit.
@@ -37,6 +45,31 @@ impl Area {
                 checked_centre(what, *centre_m)?;
                 checked_radius(what, *radius_m)
             }
+            Self::Extent { sides_m: [west, south, east, north] } => {
+                checked_centre(what, [*west, *south])?;
+                checked_centre(what, [*east, *north])?;
+                if west <= east && south <= north {
+                    return Ok(());
+                }
+                Err(LayoutError::Usage(format!(
+                    "{what}: the rectangle from {west},{south} to {east},{north} metres is inside out; give west, south, east and north"
+                )))
+            }
+        }
+    }
+
+    /// What it covers, whether or not there are data: west, south, east and north in metres.
+    pub fn reach_m(&self, grid: &Grid) -> [f64; 4] {
+        let [dx, dy] = grid.spacing_m();
+        match *self {
+            Self::Rect(r) => [
+                f64::from(r.west) * dx,
+                f64::from(r.south) * dy,
+                f64::from(r.east) * dx,
+                f64::from(r.north) * dy,
+            ],
+            Self::Disc { centre_m, radius_m } => around(centre_m, radius_m),
+            Self::Extent { sides_m } => sides_m,
         }
     }
 
@@ -45,6 +78,13 @@ impl Area {
         match *self {
             Self::Rect(rect) => clipped(rect, grid),
             Self::Disc { centre_m, radius_m } => disc_samples(centre_m, radius_m, grid),
+            Self::Extent { sides_m: [west, south, east, north] } => {
+                let [dx, dy] = grid.spacing_m();
+                let [wide, high] = grid.samples();
+                let [west, east] = steps_between(west / dx, east / dx, wide)?;
+                let [south, north] = steps_between(south / dy, north / dy, high)?;
+                Some(SampleRect { west, south, east, north })
+            }
         }
     }
 
@@ -57,8 +97,28 @@ impl Area {
                 let [east, north] = offset_m(grid, centre_m, x, y);
                 east * east + north * north <= radius_m * radius_m
             }
+            Self::Extent { sides_m: [west, south, east, north] } => {
+                let [dx, dy] = grid.spacing_m();
+                let is_between = |at: u32, low: f64, high: f64| {
+                    (low - ON_A_SIDE..=high + ON_A_SIDE).contains(&f64::from(at))
+                };
+                is_between(x, west / dx, east / dx) && is_between(y, south / dy, north / dy)
+            }
         }
     }
+}
+
+/// The first and the last of `count` samples from one side to another, both in steps.
+fn steps_between(low: f64, high: f64, count: u32) -> Option<[u32; 2]> {
+    let first = (low - ON_A_SIDE).ceil().max(0.0);
+    let last = (high + ON_A_SIDE).floor().min(f64::from(count - 1));
+    // Not-a-numbers compare as nothing does: there are no samples between them.
+    (first <= last).then_some([first as u32, last as u32])
+}
+
+/// West, south, east and north of a disc in metres.
+pub(crate) fn around([east_m, north_m]: [f64; 2], radius_m: f64) -> [f64; 4] {
+    [east_m - radius_m, north_m - radius_m, east_m + radius_m, north_m + radius_m]
 }
 
 /// Metres east and north from `centre_m` to a sample.
@@ -144,6 +204,33 @@ mod tests {
                     if bounds.is_some_and(|b| b.contains(x, y)) {
                         prop_assert!(east.abs().max(north.abs()) <= radius_m * (1.0 + 1e-12));
                     }
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn an_extents_samples_are_those_between_its_sides(
+            steps in prop::array::uniform4(-4..20i32),
+            spacing_m in prop::sample::select(vec![[0.1, 0.3], [10.0, 30.0], [28.3, 30.9]]),
+            aside in prop::sample::select(vec![0.0, 0.25, -0.25]),
+        ) {
+            let grid = Grid::new([9, 14], spacing_m).unwrap();
+            let [a, b, c, d] = steps.map(f64::from);
+            let [west, south, east, north] = [a.min(c), b.min(d), a.max(c), b.max(d)];
+            let [dx, dy] = spacing_m;
+            let extent = Area::Extent {
+                sides_m: [west * dx, south * dy, (east + aside) * dx, (north + aside) * dy],
+            };
+            let bounds = extent.samples(&grid);
+            for y in 0..14 {
+                for x in 0..9 {
+                    let (at_x, at_y) = (f64::from(x), f64::from(y));
+                    // By steps, which are whole numbers or quarters: nothing is rounded.
+                    let is_in = west <= at_x && at_x <= east + aside && south <= at_y && at_y <= north + aside;
+                    prop_assert_eq!(extent.contains(&grid, x, y), is_in, "{} {}", x, y);
+                    prop_assert_eq!(bounds.is_some_and(|b| b.contains(x, y)), is_in, "{} {}", x, y);
                 }
             }
         }

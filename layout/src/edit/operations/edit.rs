@@ -3,7 +3,7 @@
 //! **A sample's new height depends on the edit, the sample's place and old heights within the margin.** It never depends on the window through which it is looked at, and
 //! nothing outside the bounds changes. Voids stay voids. Cost: O(samples of the bounds), nothing allocated but by smoothing, which copies the window.
 
-use super::area::{Area, each_sample};
+use super::area::{Area, around, each_sample};
 use super::brush::Brush;
 use super::check::checked_size;
 use super::crater::Crater;
@@ -86,6 +86,16 @@ impl Edit {
             Self::Brush(brush) => brush.bounds(grid),
             Self::Stamp(stamp) => stamp.bounds(grid),
             Self::Set { area, .. } | Self::Restore(area) => area.samples(grid),
+        }
+    }
+
+    /// What it covers, whether or not there are data: west, south, east and north in metres of the south-west sample.
+    pub fn reach_m(&self, grid: &Grid) -> [f64; 4] {
+        match self {
+            Self::Crater(crater) => around(crater.centre_m, 2.0 * crater.radius_m),
+            Self::Brush(brush) => around(brush.centre_m, brush.radius_m),
+            Self::Stamp(stamp) => stamp.reach_m(grid),
+            Self::Set { area, .. } | Self::Restore(area) => area.reach_m(grid),
         }
     }
 

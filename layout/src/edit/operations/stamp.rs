@@ -68,6 +68,14 @@ impl Stamp {
         Ok(Self { at, mode, samples, heights_m })
     }
 
+    /// What it covers, whether or not there are data: west, south, east and north in metres.
+    pub(crate) fn reach_m(&self, grid: &Grid) -> [f64; 4] {
+        let [dx, dy] = grid.spacing_m();
+        let [west, south] = self.at.map(|at| at as f64);
+        let [wide, high] = self.samples.map(|count| f64::from(count.saturating_sub(1)));
+        [west * dx, south * dy, (west + wide) * dx, (south + high) * dy]
+    }
+
     /// The heights of a window set as they are.
     pub fn of_window(window: &HeightWindow) -> Self {
         let rect = window.rect();

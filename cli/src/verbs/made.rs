@@ -1,0 +1,43 @@
+//! By which program, where, when and by which words figures are made, for reports. **The one place that reads the calendar for them.**
+
+use terrasoar_lab::made::Made;
+
+/// How the figures of this run come about.
+pub(super) fn made() -> Made {
+    let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    let program = concat!("terrasoar ", env!("CARGO_PKG_VERSION"));
+    // To the second.
+    let now = jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string();
+    Made::new(program, machine(), now)
+        .commit(option_env!("TERRASOAR_COMMIT").map(str::to_owned))
+        .command(&words)
+}
+
+/// The machine in words: "linux x86_64, Intel(R) Xeon(R), 2 cores".
+fn machine() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let system = format!("{} {}", std::env::consts::OS, std::env::consts::ARCH);
+    let processor = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| model(&text));
+    let processor = processor.map(|name| format!(", {name}")).unwrap_or_default();
+    format!("{system}{processor}, {cores} {}", if cores == 1 { "core" } else { "cores" })
+}
+
+/// The processor's name in what Linux says of it.
+fn model(text: &str) -> Option<String> {
+    let line = text.lines().find(|line| line.starts_with("model name"))?;
+    line.split_once(':').map(|(_, name)| name.trim().to_owned()).filter(|name| !name.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_processor_is_named_where_the_system_names_it() {
+        assert_eq!(model("processor\t: 0\nmodel name\t: Fast 3000\n").as_deref(), Some("Fast 3000"));
+        assert_eq!(model("processor : 0\n"), None);
+        assert!(machine().contains(std::env::consts::ARCH));
+        let date = made().date;
+        assert!(date.len() == 20 && date.ends_with('Z') && date.starts_with("20"), "{date}");
+    }
+}

@@ -1,0 +1,58 @@
+//! The seam between formats of pictures and everything else: what a file says of its place, its mask and how its camera was held, and its texels.
+
+use super::{CrsSaid, Reader};
+use terrasoar_layout::imagery::ImageSource;
+
+/// How the camera was held: where row 0 and column 0 of the file are in what is shown (EXIF 2.32, 4.6.4, tag 274).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Orientation(u8);
+
+impl Orientation {
+    /// Row 0 is the top and column 0 the left.
+    pub(crate) const UPRIGHT: Self = Self(1);
+
+    /// The tag's value, from 1 to 8; what is none means upright.
+    pub(crate) fn of_tag(tag: u64) -> Self {
+        u8::try_from(tag).ok().filter(|tag| (1..=8).contains(tag)).map_or(Self::UPRIGHT, Self)
+    }
+
+    /// The tag in a block of EXIF, if it is there.
+    pub(crate) fn of_exif(block: &[u8]) -> Self {
+        let read = exif::Reader::new().read_raw(block.to_vec());
+        let tag = read
+            .ok()
+            .and_then(|exif| exif.get_field(exif::Tag::Orientation, exif::In::PRIMARY)?.value.get_uint(0));
+        tag.map_or(Self::UPRIGHT, |tag| Self::of_tag(tag.into()))
+    }
+
+    /// The tag's value.
+    pub(crate) fn tag(self) -> u8 {
+        self.0
+    }
+
+    /// Whether columns and rows change places.
+    pub(crate) fn is_sideways(self) -> bool {
+        self.0 >= 5
+    }
+}
+
+/// A picture of one format, as its file has it.
+pub(crate) trait Picture: ImageSource {
+    /// The map from centres of texels to coordinates, and their system, as the file says them.
+    fn said(&self) -> (Option<[f64; 6]>, CrsSaid) {
+        (None, CrsSaid::default())
+    }
+
+    /// A mask in the file, of which 0 means that there is no picture.
+    fn mask(&self) -> Option<&dyn Reader> {
+        None
+    }
+
+    /// How the camera was held.
+    fn orientation(&self) -> Orientation {
+        Orientation::UPRIGHT
+    }
+
+    /// Whether its channels are bytes in the file.
+    fn has_bytes(&self) -> bool;
+}
