@@ -1,4 +1,4 @@
-//! How a report came about: by which program, where, when, by which words. Whoever writes a report says so; nothing here reads a clock.
+//! How a report was made: by which program, on which machine, when, by which command. The caller fills this in; nothing here reads a clock.
 
 use serde::Serialize;
 

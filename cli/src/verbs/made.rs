@@ -1,4 +1,4 @@
-//! By which program, where, when and by which words figures are made, for reports. **The one place that reads the calendar for them.**
+//! How figures are made, for reports: by which program, on which machine, when, by which command. **The one place that reads the calendar for them.**
 
 use terrasoar_lab::made::Made;
 

@@ -35,6 +35,8 @@ fn verbs() -> Vec<String> {
     let help = shell::help("");
     let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1);
     let listed = listed.take_while(|line| line.starts_with("  "));
+    // What is indented further goes on with what the verb does.
+    let listed = listed.filter(|line| !line.starts_with("   "));
     let names = listed.filter_map(|line| line.split_whitespace().next());
     let names: Vec<String> = names.filter(|name| *name != "help").map(str::to_owned).collect();
     assert!(names.len() > 10, "{help}");
@@ -138,7 +140,9 @@ pub fn wrong_typed(pages: &[Page]) -> Wrong {
     let mut wrong = Vec::new();
     for page in pages.iter().filter(|page| !page.is_history()) {
         if page.is_run() {
-            for word in page.spans.iter().flat_map(|span| span.split_whitespace()) {
+            // Those of other programs are theirs.
+            let is_ours = |span: &&String| span.starts_with("--") || span.starts_with("terrasoar ");
+            for word in page.spans.iter().filter(is_ours).flat_map(|span| span.split_whitespace()) {
                 if word.starts_with("--") && !all.contains(word) {
                     wrong.push(format!("{}: no verb has {word}", page.name));
                 }

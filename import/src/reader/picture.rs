@@ -1,4 +1,4 @@
-//! The seam between formats of pictures and everything else: what a file says of its place, its mask and how its camera was held, and its texels.
+//! The border between formats of pictures and everything else: what a file says of its place, its mask and how its camera was held, and its texels.
 
 use super::{CrsSaid, Reader};
 use terrasoar_layout::imagery::ImageSource;
