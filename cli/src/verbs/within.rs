@@ -246,7 +246,7 @@ impl<'t> Ground<'t> {
         let [dx, dy] = self.grid.spacing_m();
         // To a decimetre, upwards, so that what is said is clear too.
         let clear_m = ((ground_m + CLEARANCE * dx.min(dy)) * 10.0).ceil() / 10.0;
-        (view.eye_m.z <= ground_m).then(|| Below { ground_m, depth_m: ground_m - view.eye_m.z, clear_m })
+        (view.eye_m.z <= ground_m).then_some(Below { ground_m, depth_m: ground_m - view.eye_m.z, clear_m })
     }
 
     /// The ground's height before exaggeration, by whichever diagonal of the cell is higher: either may be drawn.
