@@ -40,7 +40,8 @@ impl Truth {
             return Err(format!("the file does not hold what it is to: GDAL finds the unit \"{unit}\""));
         }
         // Numbers, then the mask, as doubles; and without a place, for ENVI has none for grids that are mirrored.
-        let unplaced = ["-q", "-of", "ENVI", "-a_ullr", "0", "1", "1", "0", "-ot", "Float64"];
+        let unplaced =
+            ["-q", "-of", "ENVI", "-co", "INTERLEAVE=BSQ", "-a_ullr", "0", "1", "1", "0", "-ot", "Float64"];
         run(
             folder,
             "gdal_translate",
