@@ -4,7 +4,8 @@ use crate::land::PLAIN;
 use crate::seeds::{self, Inputs};
 use crate::words::{refused, told};
 use std::path::Path;
-use terrasoar_import::open_image;
+use terrasoar_import::{open_image, open_images_on};
+use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::imagery::{DrapeOptions, Extent, ImageSource, Imagery, TileFormat, decode_tile, drape};
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
@@ -35,6 +36,16 @@ pub(crate) fn body(data: &[u8]) {
     if let Some(image) = told(open_image(&path)) {
         reads_and_drapes(image, folder.path());
     }
+    brings(&path);
+}
+
+/// Brings a picture onto the terrain, from wherever it says it lies.
+pub(crate) fn brings(path: &Path) {
+    let source = MemorySource::new("plain", PLAIN.clone());
+    let terrain = Terrain::from_source(Box::new(source)).unwrap_or_else(|error| panic!("{error}"));
+    let folder = path.parent().unwrap_or(path);
+    let brought = told(open_images_on(std::slice::from_ref(&path.to_owned()), terrain.header()));
+    brought.into_iter().flatten().for_each(|image| reads_and_drapes(image, folder));
 }
 
 /// Reads a picture and drapes it, wherever it says it lies or, if that is nowhere, over the terrain.

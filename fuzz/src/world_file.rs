@@ -1,6 +1,6 @@
 //! A world file beside a picture that is sound.
 
-use crate::image::reads_and_drapes;
+use crate::image::{brings, reads_and_drapes};
 use crate::seeds::{self, Inputs};
 use crate::words::told;
 use terrasoar_import::open_image;
@@ -22,4 +22,5 @@ pub(crate) fn body(data: &[u8]) {
     let map = image.info().georeference.pixel_to_crs;
     assert!(map.is_none_or(|map| map.iter().all(|number| number.is_finite())), "{map:?}");
     reads_and_drapes(image, folder.path());
+    brings(&path);
 }

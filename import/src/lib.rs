@@ -38,6 +38,7 @@ mod hgt;
 mod identify;
 pub(crate) mod input;
 pub(crate) mod jpeg_frame;
+mod kept;
 mod labelled;
 mod mask;
 mod netcdf;

@@ -3,14 +3,13 @@
 //! The mask is read first, a bit for each sample: in memory where the budget allows it, else in a nameless temporary file. Then samples are read, and those whose bit is 0
 //! become NaN. Cost: one pass over the mask, a copy of each window with such samples.
 
+use crate::kept::Kept;
 use crate::options::OpenOptions;
 use crate::reader::Reader;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::file::disk::{read_at, write_at};
 
 /// Share of the memory allowed that a mask may take.
 const SHARE: u64 = 8;
@@ -25,10 +24,10 @@ pub(crate) struct Masking {
     scratch: PathBuf,
 }
 
-/// A bit a sample, rows padded to whole bytes.
-enum Bits {
-    Memory(Mutex<Vec<u8>>),
-    File(Mutex<File>),
+/// A mask that was read: a bit a sample, rows padded to whole bytes.
+pub(crate) struct Bits {
+    kept: Kept,
+    writing: Mutex<()>,
 }
 
 impl Masking {
@@ -59,31 +58,24 @@ impl Masking {
     }
 
     /// Reads the mask: that of its file, or else `own`. `None` where there is none.
-    pub(crate) fn keep(&self, own: Option<&dyn Reader>) -> Result<Option<Kept>, LayoutError> {
+    pub(crate) fn keep(&self, own: Option<&dyn Reader>) -> Result<Option<Bits>, LayoutError> {
         let Some(mask) = self.file.as_deref().or(own) else { return Ok(None) };
-        let bytes = Self::bytes_of(self.samples);
-        let failed =
-            |source| LayoutError::io(&self.scratch, "cannot keep the mask in a temporary file in", source);
-        let bits = if self.in_memory {
-            Bits::Memory(Mutex::new(vec![0; usize::try_from(bytes).unwrap_or(usize::MAX)]))
-        } else {
-            let file = tempfile::tempfile_in(&self.scratch).map_err(failed)?;
-            file.set_len(bytes).map_err(failed)?;
-            Bits::File(Mutex::new(file))
-        };
+        let action = "cannot keep the mask in a temporary file in";
+        let kept = Kept::new(Self::bytes_of(self.samples), self.in_memory, &self.scratch, action)?;
+        let bits = Bits { kept, writing: Mutex::new(()) };
         mask.stream(&Keeping { masking: self, bits: &bits })?;
-        Ok(Some(Kept(bits)))
+        Ok(Some(bits))
     }
 
     /// Calls `hide` with every texel of a row that the mask calls void.
     pub(crate) fn hide_row(
         &self,
-        kept: &Kept,
+        bits: &Bits,
         row: u32,
         mut hide: impl FnMut(usize),
     ) -> Result<(), LayoutError> {
         let window = Window { col: 0, row, width: self.samples[0], height: 1 };
-        self.rows(&kept.0, window, false, |_, bytes, bit| {
+        self.rows(bits, window, false, |_, bytes, bit| {
             for at in 0..self.samples[0] as usize {
                 if bytes[(bit + at) / 8] >> ((bit + at) % 8) & 1 == 0 {
                     hide(at);
@@ -94,7 +86,7 @@ impl Masking {
 
     /// Streams `reader` into `sink` with what is masked as NaN.
     pub(crate) fn stream(&self, reader: &dyn Reader, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        let Some(Kept(bits)) = self.keep(reader.mask())? else { return reader.stream(sink) };
+        let Some(bits) = self.keep(reader.mask())? else { return reader.stream(sink) };
         reader.stream(&Masked { masking: self, bits: &bits, sink })
     }
 
@@ -119,36 +111,20 @@ impl Masking {
         let (first, last) = (u64::from(window.col / 8), u64::from((window.col + window.width).div_ceil(8)));
         let bit = (window.col % 8) as usize;
         let length = (last - first) as usize;
-        match bits {
-            Bits::Memory(bytes) => {
-                let mut bytes = bytes.lock().unwrap_or_else(PoisonError::into_inner);
-                for row in 0..window.height {
-                    let at = (u64::from(window.row + row) * pitch + first) as usize;
-                    each(row as usize, &mut bytes[at..at + length], bit);
-                }
-            }
-            Bits::File(file) => {
-                let file = file.lock().unwrap_or_else(PoisonError::into_inner);
-                let failed = |source| {
-                    LayoutError::io(&self.scratch, "cannot use the temporary file of the mask in", source)
-                };
-                let mut bytes = vec![0; length];
-                for row in 0..window.height {
-                    let at = u64::from(window.row + row) * pitch + first;
-                    read_at(&file, &mut bytes, at).map_err(failed)?;
-                    each(row as usize, &mut bytes, bit);
-                    if write {
-                        write_at(&file, &bytes, at).map_err(failed)?;
-                    }
-                }
+        // Windows share bytes where they meet.
+        let _alone = write.then(|| bits.writing.lock().unwrap_or_else(PoisonError::into_inner));
+        let (mut bytes, mut buffer) = (vec![0; length], Vec::new());
+        for row in 0..window.height {
+            let at = u64::from(window.row + row) * pitch + first;
+            bits.kept.read(at, length, &mut buffer, |kept| bytes.copy_from_slice(kept))?;
+            each(row as usize, &mut bytes, bit);
+            if write {
+                bits.kept.write(at, &bytes)?;
             }
         }
         Ok(())
     }
 }
-
-/// A mask that has been read.
-pub(crate) struct Kept(Bits);
 
 /// Keeps a mask as it streams.
 struct Keeping<'a> {

@@ -174,6 +174,14 @@ impl Crs {
     }
 }
 
+/// Metres a unit of the terrain's own coordinates; `None` where they are angles, or their unit is not known.
+pub fn coordinate_unit_m(header: &Header) -> Option<f64> {
+    match unit_of(header)?.size {
+        HorizontalSize::Metres(metres) => Some(metres),
+        HorizontalSize::Radians(_) => None,
+    }
+}
+
 /// The unit that a header states.
 fn unit_of(header: &Header) -> Option<Unit> {
     if let Some(unit) = &header.about.horizontal_unit {

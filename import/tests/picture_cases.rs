@@ -5,7 +5,7 @@ use terrasoar_import::{open_file, open_image, open_images_on};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::header::Header;
-use terrasoar_layout::imagery::ImageSource;
+use terrasoar_layout::imagery::{DrapeOptions, ImageSource, drape};
 use terrasoar_layout::progress::Silent;
 
 const RED: [u8; 3] = [220, 30, 30];
@@ -111,6 +111,73 @@ fn a_camera_held_sideways_shows_upright() {
     std::fs::write(folder.path().join("p.jgw"), "1\n0\n0\n-1\n5,5\n3\n").unwrap();
     let placed = Shown::of(&*open_image(&path).unwrap());
     assert_eq!((placed.texels, placed.map), ([310, 410], Some([5.5, 1.0, 0.0, 3.0, 0.0, -1.0])));
+}
+
+#[test]
+fn a_scan_of_tiff_that_lies_sideways_shows_upright() {
+    let mut bytes = std::fs::read(case("d03-tfw.tif")).unwrap();
+    assert!(bytes.starts_with(b"II*\0"));
+    let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    // Its planar configuration, which is the usual one, becomes the tag of its orientation.
+    let first = number(4);
+    let count = usize::from(u16::from_le_bytes([bytes[first], bytes[first + 1]]));
+    let mut entries = (0..count).map(|i| first + 2 + 12 * i);
+    let entry = entries.find(|at| bytes[*at..*at + 2] == 284u16.to_le_bytes()).unwrap();
+    bytes[entry..entry + 2].copy_from_slice(&274u16.to_le_bytes());
+    bytes[entry + 8] = 6;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.tif");
+    std::fs::write(&path, bytes).unwrap();
+    let picture = Shown::of(&*open_image(&path).unwrap());
+    assert_eq!(picture.texels, [310, 205]);
+    // The file's rows from the top are columns from the right: green above yellow is yellow beside green.
+    assert!(picture.is([0.2, 0.5], YELLOW) && picture.is([0.8, 0.5], GREEN), "{:?}", picture.at([0.2, 0.5]));
+}
+
+/// A grey PNG of 16 bits, and the world file that places it.
+fn deep(path: &std::path::Path, size: [u32; 2], numbers: impl Fn(u32, u32) -> u16, world: &str) {
+    let mut encoder = png::Encoder::new(std::fs::File::create(path).unwrap(), size[0], size[1]);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let places = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
+    let bytes: Vec<u8> = places.flat_map(|(x, y)| numbers(x, y).to_be_bytes()).collect();
+    encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+    std::fs::write(path.with_extension("pgw"), world).unwrap();
+}
+
+#[test]
+fn pictures_beside_each_other_are_as_bright_and_of_texels_as_fine() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("t.iqt");
+    let dem = open_file(&case("d00-flat.tif")).unwrap();
+    let header = build(&*dem, &out, &BuildOptions::default(), &Silent).unwrap();
+    let [left, right] = ["left.png", "right.png"].map(|name| folder.path().join(name));
+    // Of 10 bits in use, and of 12; the second of texels twice as large, half a texel off the first's.
+    deep(&left, [40, 60], |x, y| 100 * (1 + (x + y) as u16 % 9), "2\n0\n0\n-2\n500101\n5000199\n");
+    deep(&right, [20, 30], |_, _| 3600, "4\n0\n0\n-4\n500183\n5000199\n");
+    let one = Shown::of(&*open_image(&left).unwrap());
+    assert_eq!(one.rgba[0], (100u16 >> 2) as u8, "the upper 8 of 10 bits");
+    let both = open_images_on(&[left, right], &header).unwrap();
+    let shown: Vec<Shown> = both.iter().map(|image| Shown::of(&**image)).collect();
+    assert_eq!(shown[0].rgba[0], (100u16 >> 4) as u8, "the upper 8 of 12 bits");
+    assert_eq!(shown[1].at([0.5, 0.5]), [225, 225, 225, 255], "3,600 of 12 bits");
+    let steps = shown.iter().map(|shown| shown.map.unwrap()).collect::<Vec<_>>();
+    assert_eq!([steps[1][1], steps[1][5]], [2.0, -2.0]);
+    let apart = [(steps[1][0] - steps[0][0]) / 2.0, (steps[1][3] - steps[0][3]) / 2.0];
+    assert_eq!(apart, apart.map(f64::round), "texels of one lattice");
+    assert!(
+        shown[1].texels[0].abs_diff(40) <= 1 && shown[1].texels[1].abs_diff(60) <= 1,
+        "{:?}",
+        shown[1].texels
+    );
+    let draped = drape(&out, &both, &DrapeOptions::default(), &Silent).unwrap();
+    assert_eq!(draped.shape.texel_m, [2.0, 2.0]);
+    // What would become too fine is refused.
+    let [drone, scene] = ["drone.png", "scene.png"].map(|name| folder.path().join(name));
+    deep(&drone, [9, 9], |_, _| 9, "0.01\n0\n0\n-0.01\n500101\n5000199\n");
+    deep(&scene, [40, 30], |_, _| 9, "10\n0\n0\n-10\n500005\n5000305\n");
+    let refused = open_images_on(&[drone, scene], &header).err().unwrap().to_string();
+    assert!(refused.contains("scene.png") && refused.contains("gdalwarp -tr"), "{refused}");
 }
 
 #[test]

@@ -6,9 +6,8 @@ use super::output::{complain, decimal};
 use super::terrain;
 use anyhow::{Context, Result};
 use serde::Serialize;
-use terrasoar_import::places::{Crs, Frame};
+use terrasoar_import::places::{Crs, Frame, coordinate_unit_m};
 use terrasoar_lab::mesh_file::Placing;
-use terrasoar_layout::dem::HorizontalUnit;
 use terrasoar_layout::file::header::Header;
 
 /// How the samples lie on the ground.
@@ -128,15 +127,10 @@ pub(super) fn notes(header: &Header) -> Vec<(&'static str, String)> {
 pub(super) fn placing(header: &Header) -> Option<(Placing, bool)> {
     let [x, a, b, y, d, e] = header.sample_to_crs?;
     let [east_m, north_m] = header.grid.spacing_m();
-    let (is_angle, unit_m) = match (&header.about.horizontal_unit, header.crs_unit) {
-        (Some(unit), _) => (unit.is_angle, if unit.is_angle { 1.0 } else { unit.size }),
-        (None, HorizontalUnit::Degree) => (true, 1.0),
-        (None, HorizontalUnit::Foot) => (false, 0.3048),
-        (None, HorizontalUnit::UsSurveyFoot) => (false, 1200.0 / 3937.0),
-        (None, HorizontalUnit::Unknown | HorizontalUnit::Metre) => (false, 1.0),
-    };
+    let unit_m = coordinate_unit_m(header);
+    let is_angle = unit_m.is_none() && Crs::of(header).is_some_and(|crs| crs.is_geographic());
     let map = [x, a / east_m, b / north_m, y, d / east_m, e / north_m];
-    Some((Placing { map, height_factor: 1.0 / unit_m }, is_angle))
+    Some((Placing { map, height_factor: 1.0 / unit_m.unwrap_or(1.0) }, is_angle))
 }
 
 /// [`notes`] for a mesh, in local coordinates or in those of the elevation model.

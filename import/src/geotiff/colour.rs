@@ -11,7 +11,7 @@ use super::{TiffMask, codec, failure, geokeys, predictor, tags};
 use crate::guard::guard;
 use crate::input;
 use crate::jpeg_frame::JpegFrame;
-use crate::reader::{CrsSaid, Orientation, Picture, Reader};
+use crate::reader::{CrsSaid, Orientation, Picture, Reader, bits_of};
 use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 use rayon::prelude::*;
 use std::fs::File;
@@ -39,8 +39,8 @@ pub(crate) struct TiffImage {
     crs: CrsSaid,
     mask: Option<TiffMask>,
     orientation: Orientation,
-    /// Largest number of the colours of 16 bits, once it was looked for.
-    peak: OnceLock<u16>,
+    /// Bits in use of 16, once they were looked for or said.
+    bits: OnceLock<u32>,
 }
 
 impl TiffImage {
@@ -70,7 +70,7 @@ impl TiffImage {
             crs: place.crs,
             mask,
             orientation,
-            peak: OnceLock::new(),
+            bits: OnceLock::new(),
         })
     }
 }
@@ -90,6 +90,21 @@ impl Picture for TiffImage {
 
     fn has_bytes(&self) -> bool {
         self.table.sample_bytes == 1
+    }
+
+    fn bits(&self) -> Result<u32, LayoutError> {
+        if self.has_bytes() {
+            return Ok(8);
+        }
+        if let Some(bits) = self.bits.get() {
+            return Ok(*bits);
+        }
+        let bits = bits_of(self.peak()?);
+        Ok(*self.bits.get_or_init(|| bits))
+    }
+
+    fn use_bits(&mut self, bits: u32) {
+        self.bits = OnceLock::from(bits);
     }
 }
 
@@ -119,17 +134,8 @@ impl ImageSource for TiffImage {
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
         let file = input::open(&self.path, "cannot open the TIFF file")?;
-        let mut rows = Rows { image: self, file, y: 0, first_chunk: 0, chunks: Vec::new(), bits: 16 };
-        if self.table.sample_bytes == 2 {
-            rows.bits = bits_of(rows.peak()?);
-        }
-        Ok(Box::new(rows))
+        Ok(Box::new(Rows { image: self, file, y: 0, first_chunk: 0, chunks: Vec::new(), bits: self.bits()? }))
     }
-}
-
-/// Bits that numbers up to this one take, at least the eight that are shown.
-fn bits_of(peak: u16) -> u32 {
-    (16 - peak.leading_zeros()).max(8)
 }
 
 /// Rows as they are asked for, from the chunks at hand.
@@ -141,7 +147,7 @@ struct Rows<'i> {
     first_chunk: u32,
     /// Their texels, `chunk_width` a row.
     chunks: Vec<Vec<u8>>,
-    /// Bits that numbers of 16 make use of: cameras and satellites count to 10, 12 or 14 of them.
+    /// Bits in use.
     bits: u32,
 }
 
@@ -166,27 +172,6 @@ impl RowReader for Rows<'_> {
 }
 
 impl Rows<'_> {
-    /// The largest number of the colours. Reads the whole picture the first time.
-    fn peak(&self) -> Result<u16, LayoutError> {
-        let image = self.image;
-        if let Some(peak) = image.peak.get() {
-            return Ok(*peak);
-        }
-        let table = &image.table;
-        let found = AtomicU16::new(0);
-        (0..table.grid.count() as u32).into_par_iter().try_for_each_init(
-            || (Scratch::default(), table.grid.places(&image.path, &self.file)),
-            |(scratch, places), chunk| {
-                let place = table.place(u64::from(chunk), places)?;
-                let look = |samples: &[u8], channels: usize, _: &mut [u8]| {
-                    found.fetch_max(table.peak_of(samples, channels), Ordering::Relaxed);
-                };
-                image.unpack(&self.file, (chunk, place), scratch, &mut Vec::new(), &look)
-            },
-        )?;
-        Ok(*image.peak.get_or_init(|| found.into_inner()))
-    }
-
     fn unpack(&mut self, first: u32) -> Result<(), LayoutError> {
         let table = &self.image.table;
         let end = (table.grid.count() as u32).min(first + group_chunks(table) * table.grid.across);
@@ -223,6 +208,24 @@ struct Scratch {
 }
 
 impl TiffImage {
+    /// The largest number of the colours, of the whole picture.
+    fn peak(&self) -> Result<u16, LayoutError> {
+        let table = &self.table;
+        let file = input::open(&self.path, "cannot open the TIFF file")?;
+        let found = AtomicU16::new(0);
+        (0..table.grid.count() as u32).into_par_iter().try_for_each_init(
+            || (Scratch::default(), Vec::new(), table.grid.places(&self.path, &file)),
+            |(scratch, texels, places), chunk| {
+                let place = table.place(u64::from(chunk), places)?;
+                let look = |samples: &[u8], channels: usize, _: &mut [u8]| {
+                    found.fetch_max(table.peak_of(samples, channels), Ordering::Relaxed);
+                };
+                self.unpack(&file, (chunk, place), scratch, texels, &look)
+            },
+        )?;
+        Ok(found.into_inner())
+    }
+
     /// One chunk from its place: `paint` makes RGBA of its samples.
     fn unpack(
         &self,

@@ -7,6 +7,7 @@ use super::chunk_grid::{ChunkGrid, side};
 use super::chunks::{Compression, compression_of};
 use super::listing::Places;
 use super::tags::{self, Directory, TiffFile};
+use crate::reader::upper_eight;
 use terrasoar_layout::error::LayoutError;
 
 /// Rows that uncompressed chunks are cut to where that comes out even.
@@ -275,7 +276,9 @@ impl Table {
     pub(super) fn peak_of(&self, samples: &[u8], channels: usize) -> u16 {
         let colours = self.colours().min(channels);
         let texels = samples.chunks_exact(channels * self.sample_bytes as usize);
-        let numbers = texels.flat_map(|texel| (0..colours).map(|channel| self.sample(texel, channel)));
+        // What nobody sees does not count.
+        let seen = texels.filter(|texel| self.alpha.is_none_or(|alpha| self.sample(texel, alpha) > 0));
+        let numbers = seen.flat_map(|texel| (0..colours).map(|channel| self.sample(texel, channel)));
         numbers.filter(|number| Some(*number) != self.void).max().unwrap_or(0)
     }
 
@@ -296,10 +299,10 @@ impl Table {
         }
         let size = self.sample_bytes as usize;
         for (to, from) in rgba.iter_mut().zip(samples.chunks_exact(channels * size)) {
-            // What lies beyond is alpha of all 16 bits, or "no data".
+            // Beyond the bits in use lies what is hidden anyway.
             let shown = |channel: usize, bits: u32| match size {
                 1 => from[channel],
-                _ => (self.sample(from, channel) >> (bits - 8)).min(255) as u8,
+                _ => upper_eight(self.sample(from, channel), bits),
             };
             let byte = |channel: usize| shown(channel, bits);
             *to = match &self.paint {

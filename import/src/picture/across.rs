@@ -7,12 +7,12 @@
 use super::completed::Completed;
 use super::texels::Texels;
 use crate::places::Crs;
-use crate::warp::{Mapping, Projections};
+use crate::warp::{Mapping, Projections, apply};
 use rayon::prelude::*;
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::header::Header;
-use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
+use terrasoar_layout::imagery::{ImageInfo, ImageSource, MAX_TEXELS, RowReader};
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::number;
 
@@ -24,8 +24,8 @@ const MOST_OLD: usize = 1 << 20;
 const MESH: u32 = 32;
 /// Farthest that texels may be off the common ones, in texels.
 const NEAR: f64 = 0.1;
-/// Texels a side, at most; of the file format.
-const MOST_TEXELS: f64 = 4_194_304.0;
+/// New texels that one old one may become, at most, where a picture lies beside a finer one: 16 each way.
+const MOST_PARTS: f64 = 256.0;
 
 /// New texels: the outer corner of one, and the step east and north, both in the terrain's coordinates.
 #[derive(Debug, Clone, Copy)]
@@ -47,10 +47,6 @@ struct Across {
     wraps: bool,
 }
 
-fn apply(map: &[f64; 6], [u, v]: [f64; 2]) -> [f64; 2] {
-    [map[0] + map[1] * u + map[2] * v, map[3] + map[4] * u + map[5] * v]
-}
-
 /// West, south, east and north of the terrain's samples.
 fn rim(header: &Header, map: &[f64; 6]) -> [f64; 4] {
     let [wide, high] = header.grid.samples().map(|count| f64::from(count - 1));
@@ -70,102 +66,99 @@ fn shared([w, s, e, n]: [f64; 4], [w2, s2, e2, n2]: [f64; 4]) -> Option<[f64; 4]
     (both[0] < both[2] && both[1] < both[3]).then_some(both)
 }
 
+/// Whether the picture's coordinates are the terrain's, and the way from one system to the other where there is one. What says no system is in the terrain's.
+///
+/// # Errors
+/// [`LayoutError::Unsupported`] where there is no way, or one of the two is on another body.
+fn way_between(picture: &Completed, ours: Option<&Crs>) -> Result<(bool, Option<Projections>), LayoutError> {
+    let theirs = Crs::of_system(picture.system().clone());
+    let Some(ours) = ours.filter(|_| theirs.is_said()) else { return Ok((true, None)) };
+    let both = ours.ground().zip(theirs.ground());
+    // Two sites' own systems are taken for one, for nothing tells them apart but names that people give.
+    let is_same = ours.is_same(&theirs) || (both.is_none() && ours.is_site() && theirs.is_site());
+    let refused =
+        |problem: String| LayoutError::unsupported(picture.path(), problem).mended_by(Remedy::Extent);
+    if !is_same && both.is_none() {
+        return Err(refused(format!(
+            "the picture is in {} and the terrain in {}, and there is no way from one to the other here; bring it over with gdalwarp, or state where it lies",
+            theirs.name(),
+            ours.name()
+        )));
+    }
+    if !is_same && ours.is_on_earth() != theirs.is_on_earth() {
+        return Err(refused(format!(
+            "the picture is in {} and the terrain on another body; give it the system it is in, or state where it lies",
+            theirs.name()
+        )));
+    }
+    Ok((is_same, both.map(|(new, old)| Projections { old: old.clone(), new: new.clone() })))
+}
+
+/// Bounds in a system of longitudes, turned to where they meet the terrain: around all that meets it after some turns, and whether any turn was needed.
+fn turned(bounds: [f64; 4], terrain: [f64; 4], turn: f64) -> ([f64; 4], bool) {
+    let [west, south, east, north] = bounds;
+    let meets: Vec<(i32, [f64; 4])> = (-2..=2)
+        .filter_map(|turns| {
+            let by = f64::from(turns) * turn;
+            shared([west + by, south, east + by, north], terrain).map(|both| (turns, both))
+        })
+        .collect();
+    if meets.iter().all(|(turns, _)| *turns == 0) {
+        return (bounds, false);
+    }
+    (around(meets.iter().flat_map(|(_, [w, s, e, n])| [[*w, *s], [*e, *n]])), true)
+}
+
 impl Across {
-    /// How a picture lies on the terrain of `header`; `None` where that is not known or needs no look: it is then laid as it is.
+    /// How a picture lies on the terrain of `header`; `None` where that is not known: it is then laid as it is.
     fn of(picture: &Completed, header: &Header) -> Result<Option<Self>, LayoutError> {
         let (Some(map), Some(samples)) = (picture.info().georeference.pixel_to_crs, header.sample_to_crs)
         else {
             return Ok(None);
         };
-        let system = Crs::of_system(picture.system().clone());
-        // What says no system is in the terrain's.
         let ours = Crs::of(header);
-        let (is_same, projections) = match &ours {
-            Some(ours) if system.is_said() => {
-                let both = ours.ground().zip(system.ground());
-                let projections = both.map(|(new, old)| Projections { old: old.clone(), new: new.clone() });
-                // Two sites' own systems are taken for one, for nothing tells them apart but names that people give.
-                let are_sites = both.is_none() && ours.is_site() && system.is_site();
-                let is_same = ours.is_same(&system) || are_sites;
-                if !is_same && both.is_none() {
-                    return Err(LayoutError::unsupported(
-                        picture.path(),
-                        format!(
-                            "the picture is in {} and the terrain in {}, and there is no way from one to the other here; bring it over with gdalwarp, or state where it lies",
-                            system.name(),
-                            ours.name()
-                        ),
-                    )
-                    .mended_by(Remedy::Extent));
-                }
-                (is_same, projections)
-            }
-            _ => (true, None),
-        };
-        if !is_same && ours.as_ref().is_some_and(|ours| ours.is_on_earth() != system.is_on_earth()) {
-            return Err(LayoutError::unsupported(
-                picture.path(),
-                format!(
-                    "the picture is in {} and the terrain on another body; give it the system it is in, or state where it lies",
-                    system.name()
-                ),
-            ));
-        }
-        let is_geographic = ours.as_ref().is_some_and(Crs::is_geographic);
+        let (is_same, projections) = way_between(picture, ours.as_ref())?;
+        let turn = ours.as_ref().filter(|ours| ours.is_geographic()).and_then(Crs::turn);
         // Coordinates that are the same numbers need no way but around the globe.
-        let projections = projections.filter(|_| !is_same || is_geographic);
-        let [wide, high] = picture.info().texels.map(f64::from);
-        let over = |at: [f64; 2]| -> Option<[f64; 2]> {
-            let point = apply(&map, at);
-            match &projections {
-                Some(both) if !is_same => both.old.across_to(&both.new, point),
-                _ => Some(point),
-            }
+        let projections = projections.filter(|_| !is_same || turn.is_some());
+        let size = picture.info().texels.map(f64::from);
+        let over = |at: [f64; 2]| match &projections {
+            Some(both) if !is_same => both.old.across_to(&both.new, apply(&map, at)),
+            _ => Some(apply(&map, at)),
         };
-        let mesh =
-            (0..=MESH).flat_map(|i| (0..=MESH).map(move |j| [i, j].map(|k| f64::from(k) / f64::from(MESH))));
-        let places = mesh.filter_map(|[s, t]| over([s * wide - 0.5, t * high - 0.5]));
-        let mut bounds = around(places.filter(|point| point.iter().all(|value| value.is_finite())));
-        let terrain = rim(header, &samples);
-        let turn = ours.as_ref().filter(|_| is_geographic).and_then(Crs::turn);
-        let mut is_turned = false;
-        if let Some(turn) = turn {
-            // Where it meets the terrain after some turns.
-            let meets = (-2..=2).filter_map(|turns| {
-                let [w, s, e, n] = bounds;
-                let by = f64::from(turns) * turn;
-                shared([w + by, s, e + by, n], terrain).map(|both| (turns, both))
-            });
-            let meets: Vec<_> = meets.collect();
-            is_turned = meets.iter().any(|(turns, _)| *turns != 0);
-            let all = meets.iter().flat_map(|(_, [w, s, e, n])| [[*w, *s], [*e, *n]]);
-            if is_turned {
-                bounds = around(all);
-            }
-        }
-        let is_along = map[2] == 0.0 && map[4] == 0.0;
+        let nodes = (0..=MESH).flat_map(|i| (0..=MESH).map(move |j| [i, j]));
+        let places = nodes
+            .filter_map(|node| over([0, 1].map(|i| f64::from(node[i]) / f64::from(MESH) * size[i] - 0.5)));
+        let bounds = around(places.filter(|point| point.iter().all(|value| value.is_finite())));
+        let (bounds, is_turned) =
+            turn.map_or((bounds, false), |turn| turned(bounds, rim(header, &samples), turn));
         let step = if is_same {
             [map[1].hypot(map[4]), map[2].hypot(map[5])]
         } else {
-            let centre = [wide / 2.0 - 0.5, high / 2.0 - 0.5];
-            let near = |dx: f64, dy: f64| over([centre[0] + dx, centre[1] + dy]);
-            let (Some(w), Some(e), Some(n), Some(s)) =
-                (near(-0.5, 0.0), near(0.5, 0.0), near(0.0, -0.5), near(0.0, 0.5))
-            else {
-                return Err(LayoutError::Usage(format!(
+            let step = step_at_centre(size, over).ok_or_else(|| {
+                LayoutError::Usage(format!(
                     "{}: its centre has no place in the terrain's reference system; check the systems, or state where the picture lies",
                     picture.path().display()
-                )));
-            };
-            let area = (e[0] - w[0]) * (s[1] - n[1]) - (e[1] - w[1]) * (s[0] - n[0]);
-            [area.abs().sqrt(); 2]
+                ))
+                .mended_by(Remedy::Extent)
+            })?;
+            [step; 2]
         };
-        let wraps = turn.is_some_and(|turn| {
-            is_same && is_along && (wide * map[1].abs() - turn).abs() < 0.5 * map[1].abs()
-        });
+        let is_along = map[2] == 0.0 && map[4] == 0.0;
+        let goes_round = |turn: f64| (size[0] * map[1].abs() - turn).abs() < 0.5 * map[1].abs();
+        let wraps = is_same && is_along && turn.is_some_and(goes_round);
         let is_straight = is_same && is_along && map[1] > 0.0 && map[5] < 0.0 && !is_turned;
         Ok(Some(Self { map, projections, step, bounds, is_straight, wraps }))
     }
+}
+
+/// The side of a square that is as large as a texel in the middle of a picture of `size`.
+fn step_at_centre(size: [f64; 2], over: impl Fn([f64; 2]) -> Option<[f64; 2]>) -> Option<f64> {
+    let near = |dx: f64, dy: f64| over([size[0] / 2.0 - 0.5 + dx, size[1] / 2.0 - 0.5 + dy]);
+    let (west, east) = (near(-0.5, 0.0)?, near(0.5, 0.0)?);
+    let (north, south) = (near(0.0, -0.5)?, near(0.0, 0.5)?);
+    let area = (east[0] - west[0]) * (south[1] - north[1]) - (east[1] - west[1]) * (south[0] - north[0]);
+    Some(area.abs().sqrt()).filter(|step| step.is_normal())
 }
 
 /// The pictures as they lie on the terrain of `header`: north-up in its reference system, of texels on one lattice.
@@ -224,13 +217,16 @@ impl Brought {
         let high =
             [((east - corner[0]) / step[0] - 1e-6).ceil(), ((corner[1] - south) / step[1] - 1e-6).ceil()];
         let sides = [0, 1].map(|i| (high[i] - low[i]).max(1.0));
-        if !sides.iter().all(|side| *side <= MOST_TEXELS) {
+        let old = picture.info().texels.map(f64::from);
+        let is_fine = sides.iter().all(|side| *side <= f64::from(MAX_TEXELS));
+        if !is_fine || sides[0] * sides[1] > MOST_PARTS * old[0] * old[1] {
             return Err(LayoutError::Usage(format!(
-                "{}: {} x {} texels would come of it, and a side has at most {}; drape a part, or coarser pictures",
+                "{}: its {} x {} texels would become {} x {}, as fine as those of the finest picture; drape pictures of similar texels, or bring them to one size before: gdalwarp -tr",
                 picture.path().display(),
+                old[0],
+                old[1],
                 number(sides[0]),
-                number(sides[1]),
-                number(MOST_TEXELS)
+                number(sides[1])
             )));
         }
         let new_map = [

@@ -6,7 +6,7 @@
 use crate::OpenOptions;
 use crate::beside::Beside;
 use crate::crs::{self, System};
-use crate::mask::{Kept, Masking};
+use crate::mask::{Bits, Masking};
 use crate::reader::{Declared, Picture, Said};
 use std::path::Path;
 use terrasoar_layout::dem::SampleType;
@@ -56,6 +56,16 @@ impl Completed {
         Ok(Self { picture, info, system, masking, void })
     }
 
+    /// Bits in use of its channels, as [`Picture::bits`].
+    pub(super) fn bits(&self) -> Result<u32, LayoutError> {
+        self.picture.bits()
+    }
+
+    /// As [`Picture::use_bits`].
+    pub(super) fn use_bits(&mut self, bits: u32) {
+        self.picture.use_bits(bits);
+    }
+
     /// The reference system that it lies in.
     pub(super) fn system(&self) -> &System {
         &self.system
@@ -74,7 +84,7 @@ impl ImageSource for Completed {
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
         let mut mask = None;
         if let Some(masking) = &self.masking {
-            mask = masking.keep(self.picture.mask())?.map(|kept| (masking, kept));
+            mask = masking.keep(self.picture.mask())?.map(|bits| (masking, bits));
         }
         let rows = self.picture.rows()?;
         if mask.is_none() && self.void.is_none() {
@@ -86,7 +96,7 @@ impl ImageSource for Completed {
 
 struct Rows<'p> {
     rows: Box<dyn RowReader + 'p>,
-    mask: Option<(&'p Masking, Kept)>,
+    mask: Option<(&'p Masking, Bits)>,
     void: Option<u8>,
     wide: usize,
     y: u32,
@@ -100,8 +110,8 @@ impl RowReader for Rows<'_> {
             if let Some(void) = self.void {
                 texels.iter_mut().filter(|texel| texel[..3] == [void; 3]).for_each(|texel| texel[3] = 0);
             }
-            if let Some((masking, kept)) = &self.mask {
-                masking.hide_row(kept, self.y, |at| texels[at][3] = 0)?;
+            if let Some((masking, bits)) = &self.mask {
+                masking.hide_row(bits, self.y, |at| texels[at][3] = 0)?;
             }
             self.y += 1;
         }

@@ -38,7 +38,13 @@ pub fn open_image(path: &Path) -> Result<Box<dyn ImageSource>, LayoutError> {
 /// # Errors
 /// As [`open_image`]; [`LayoutError::Usage`] for a picture that has no place in the terrain's system, or would become too large.
 pub fn open_images_on(paths: &[PathBuf], header: &Header) -> Result<Vec<Box<dyn ImageSource>>, LayoutError> {
-    let opened = paths.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
+    let mut opened = paths.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
+    if opened.len() > 1 {
+        let bits = opened.iter().map(|(completed, _)| completed.bits()).collect::<Result<Vec<_>, _>>()?;
+        // Those of bytes take none of it.
+        let most = bits.into_iter().max().unwrap_or(8);
+        opened.iter_mut().for_each(|(completed, _)| completed.use_bits(most));
+    }
     if opened.iter().any(|(completed, _)| completed.info().georeference.pixel_to_crs.is_none()) {
         return Ok(opened
             .into_iter()

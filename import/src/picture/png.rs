@@ -1,20 +1,21 @@
 //! Pictures as PNG, one row at a time: grey, RGB, palette, with or without alpha.
 //!
-//! A PNG is one compressed stream, decoded by one thread from the first row to the last. Sixteen bits a channel are cut to eight; an interlaced
+//! A PNG is one compressed stream, decoded by one thread from the first row to the last; one of 16 bits twice, for the bits in use are looked for first. An interlaced
 //! file, whose rows come in seven passes, is refused.
 
 use crate::guard;
 use crate::png_stream;
 use crate::png_stream::{PngRows, Texts, decoding_error};
-use crate::reader::{Orientation, Picture};
+use crate::reader::{Orientation, Picture, bits_of, upper_eight};
 use ::png::{BitDepth, ColorType, Transformations};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use terrasoar_layout::dem::Georeference;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::imagery::{ImageInfo, ImageSource, RowReader};
 
-/// Whatever the file holds comes as grey, grey and alpha, RGB or RGBA of 8 bits.
-const AS_COLOURS: Transformations = Transformations::EXPAND.union(Transformations::STRIP_16);
+/// Whatever the file holds comes as grey, grey and alpha, RGB or RGBA.
+const AS_COLOURS: Transformations = Transformations::EXPAND;
 
 /// A PNG picture.
 #[derive(Debug)]
@@ -23,6 +24,8 @@ pub(super) struct PngImage {
     info: ImageInfo,
     orientation: Orientation,
     has_bytes: bool,
+    /// Bits in use of 16, once they were looked for or said.
+    bits: OnceLock<u32>,
 }
 
 impl PngImage {
@@ -46,7 +49,7 @@ impl PngImage {
             header.trns.is_some() || matches!(header.color_type, ColorType::GrayscaleAlpha | ColorType::Rgba);
         let mut notes = Vec::new();
         if header.bit_depth == BitDepth::Sixteen {
-            notes.push("16 bits a channel are cut to 8".into());
+            notes.push("16 bits a channel are cut to the upper 8 of those in use".into());
         }
         let info = ImageInfo {
             texels: [header.width, header.height],
@@ -62,7 +65,7 @@ impl PngImage {
         let orientation = header.exif_metadata.as_deref().map(Orientation::of_exif);
         let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
         let has_bytes = header.bit_depth != BitDepth::Sixteen;
-        Ok(Self { path: path.to_owned(), info, orientation, has_bytes })
+        Ok(Self { path: path.to_owned(), info, orientation, has_bytes, bits: OnceLock::new() })
     }
 }
 
@@ -73,6 +76,50 @@ impl Picture for PngImage {
 
     fn has_bytes(&self) -> bool {
         self.has_bytes
+    }
+
+    fn bits(&self) -> Result<u32, LayoutError> {
+        if self.has_bytes {
+            return Ok(8);
+        }
+        if let Some(bits) = self.bits.get() {
+            return Ok(*bits);
+        }
+        let mut rows = self.begin()?;
+        let mut peak = 0;
+        for _ in 0..self.info.texels[1] {
+            rows.next_row(|row, channels| {
+                for texel in row.chunks_exact(2 * channels) {
+                    let (numbers, _) = texel.as_chunks::<2>();
+                    // Two and four channels end with alpha; what nobody sees does not count.
+                    let colours = if channels % 2 == 0 { channels - 1 } else { channels };
+                    if colours == channels || numbers[colours] != [0; 2] {
+                        peak = numbers[..colours].iter().map(|n| u16::from_be_bytes(*n)).fold(peak, u16::max);
+                    }
+                }
+            })?;
+        }
+        Ok(*self.bits.get_or_init(|| bits_of(peak)))
+    }
+
+    fn use_bits(&mut self, bits: u32) {
+        self.bits = OnceLock::from(bits);
+    }
+}
+
+impl PngImage {
+    /// The first row is next.
+    fn begin(&self) -> Result<Rows<'_>, LayoutError> {
+        let reader = png_stream::open(&self.path, AS_COLOURS, Texts::PassedOver)?;
+        let header = reader.info();
+        if [header.width, header.height] != self.info.texels {
+            return Err(LayoutError::damaged(
+                &self.path,
+                "header",
+                "the file changed while it was read; start again",
+            ));
+        }
+        Ok(Rows { image: self, reader, y: 0, bits: 8, bytes: Vec::new() })
     }
 }
 
@@ -86,16 +133,7 @@ impl ImageSource for PngImage {
     }
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
-        let reader = png_stream::open(&self.path, AS_COLOURS, Texts::PassedOver)?;
-        let header = reader.info();
-        if [header.width, header.height] != self.info.texels {
-            return Err(LayoutError::damaged(
-                &self.path,
-                "header",
-                "the file changed while it was read; start again",
-            ));
-        }
-        Ok(Box::new(Rows { image: self, reader, y: 0 }))
+        Ok(Box::new(Rows { bits: self.bits()?, ..self.begin()? }))
     }
 }
 
@@ -103,32 +141,59 @@ struct Rows<'i> {
     image: &'i PngImage,
     reader: PngRows,
     y: u32,
+    /// Bits in use, of channels of 16.
+    bits: u32,
+    /// A row of these as bytes.
+    bytes: Vec<u8>,
+}
+
+impl Rows<'_> {
+    /// Gives the next row to `take`, as the file has it, and the channels of a texel.
+    fn next_row(&mut self, take: impl FnOnce(&[u8], usize)) -> Result<(), LayoutError> {
+        let path = &self.image.path;
+        let [wide, high] = self.image.info.texels;
+        let y = self.y;
+        let place = || format!("row {y} of {high}");
+        let (color, depth) = self.reader.output_color_type();
+        let channels = color.samples();
+        let length = wide as usize * channels * if depth == BitDepth::Sixteen { 2 } else { 1 };
+        let reader = &mut self.reader;
+        guard(path, place, || {
+            let decoded = reader.next_row().map_err(|error| decoding_error(path, place(), error))?;
+            let data = decoded.as_ref().map_or(&[][..], |row| row.data());
+            if data.len() < length {
+                return Err(LayoutError::damaged(
+                    path,
+                    place(),
+                    "the image data ends early; fetch the file again",
+                ));
+            }
+            take(&data[..length], channels);
+            Ok(())
+        })?;
+        self.y += 1;
+        Ok(())
+    }
 }
 
 impl RowReader for Rows<'_> {
     fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
-        let path = &self.image.path;
-        let [wide, high] = self.image.info.texels;
-        for row in rgba.chunks_exact_mut(wide as usize * 4) {
-            let y = self.y;
-            let place = || format!("row {y} of {high}");
-            let (color, _) = self.reader.output_color_type();
-            let channels = color.samples();
-            let reader = &mut self.reader;
-            guard(path, place, || {
-                let decoded = reader.next_row().map_err(|error| decoding_error(path, place(), error))?;
-                let data = decoded.as_ref().map_or(&[][..], |row| row.data());
-                if data.len() < wide as usize * channels {
-                    return Err(LayoutError::damaged(
-                        path,
-                        place(),
-                        "the image data ends early; fetch the file again",
-                    ));
+        let (has_bytes, bits) = (self.image.has_bytes, self.bits);
+        for row in rgba.chunks_exact_mut(self.image.info.texels[0] as usize * 4) {
+            let mut bytes = std::mem::take(&mut self.bytes);
+            self.next_row(|data, channels| {
+                if has_bytes {
+                    spread(data, channels, row);
+                    return;
                 }
-                spread(data, channels, row);
-                Ok(())
+                bytes.clear();
+                for (i, number) in data.as_chunks::<2>().0.iter().enumerate() {
+                    let is_alpha = channels % 2 == 0 && i % channels == channels - 1;
+                    bytes.push(upper_eight(u16::from_be_bytes(*number), if is_alpha { 16 } else { bits }));
+                }
+                spread(&bytes, channels, row);
             })?;
-            self.y += 1;
+            self.bytes = bytes;
         }
         Ok(())
     }

@@ -2,10 +2,8 @@
 //!
 //! Cost: each texel written once, and read once for each window that it lies in.
 
-use std::fs::File;
-use std::path::PathBuf;
+use crate::kept::Kept;
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::file::disk::{read_at, write_at};
 use terrasoar_layout::imagery::RowReader;
 
 /// Most bytes kept in memory.
@@ -13,48 +11,38 @@ const MOST_HELD: u64 = 64 << 20;
 /// Rows read at once.
 const ROWS: usize = 64;
 
-enum Place {
-    Memory(Vec<u8>),
-    File(File, PathBuf),
-}
-
 /// All texels of a picture.
 pub(super) struct Texels {
     wide: u32,
     high: u32,
-    place: Place,
+    kept: Kept,
 }
 
 impl Texels {
     /// Memory that so many texels take.
     pub(super) fn memory_bytes([wide, high]: [u32; 2]) -> u64 {
         let all = u64::from(wide) * u64::from(high) * 4;
-        if all <= MOST_HELD { all } else { u64::from(wide) * 4 * ROWS as u64 }
+        let band = u64::from(wide) * 4 * ROWS as u64;
+        if all <= MOST_HELD { all + band } else { band }
     }
 
     /// Reads all rows.
     pub(super) fn keep(rows: &mut dyn RowReader, [wide, high]: [u32; 2]) -> Result<Self, LayoutError> {
         let row_bytes = wide as usize * 4;
         let all = row_bytes as u64 * u64::from(high);
-        if all <= MOST_HELD {
-            let mut held = vec![0; all as usize];
-            for band in held.chunks_mut(row_bytes * ROWS) {
-                rows.read(band)?;
-            }
-            return Ok(Self { wide, high, place: Place::Memory(held) });
-        }
-        let folder = std::env::temp_dir();
-        let failed =
-            |source| LayoutError::io(&folder, "cannot keep the picture in a temporary file in", source);
-        let file = tempfile::tempfile_in(&folder).map_err(failed)?;
+        let kept = Kept::new(
+            all,
+            all <= MOST_HELD,
+            &std::env::temp_dir(),
+            "cannot keep the picture in a temporary file in",
+        )?;
         let mut band = vec![0; row_bytes * ROWS];
         for first in (0..high as usize).step_by(ROWS) {
-            let count = ROWS.min(high as usize - first);
-            let band = &mut band[..row_bytes * count];
+            let band = &mut band[..row_bytes * ROWS.min(high as usize - first)];
             rows.read(band)?;
-            write_at(&file, band, (first * row_bytes) as u64).map_err(failed)?;
+            kept.write((first * row_bytes) as u64, band)?;
         }
-        Ok(Self { wide, high, place: Place::File(file, folder) })
+        Ok(Self { wide, high, kept })
     }
 
     /// Columns `first[0]` on and rows `first[1]` on, `size` of them; columns are counted around the picture if it `wraps`, and what is outside is transparent.
@@ -66,28 +54,21 @@ impl Texels {
     ) -> Result<Window, LayoutError> {
         let (wide, high) = (i64::from(self.wide), i64::from(self.high));
         let mut texels = vec![[0; 4]; size[0] * size[1]];
-        let mut bytes = vec![0; self.wide as usize * 4];
+        let mut buffer = Vec::new();
         for (line, row) in texels.chunks_exact_mut(size[0].max(1)).zip(first[1]..) {
             if !(0..high).contains(&row) {
                 continue;
             }
             let at = row as u64 * u64::from(self.wide) * 4;
-            let stored = match &self.place {
-                Place::Memory(all) => &all[at as usize..at as usize + bytes.len()],
-                Place::File(file, folder) => {
-                    read_at(file, &mut bytes, at).map_err(|source| {
-                        LayoutError::io(folder, "cannot use the temporary file of the picture in", source)
-                    })?;
-                    &bytes[..]
+            self.kept.read(at, self.wide as usize * 4, &mut buffer, |stored| {
+                let (stored, _) = stored.as_chunks::<4>();
+                for (to, col) in line.iter_mut().zip(first[0]..) {
+                    let col = if wraps { col.rem_euclid(wide) } else { col };
+                    if (0..wide).contains(&col) {
+                        *to = stored[col as usize];
+                    }
                 }
-            };
-            let (stored, _) = stored.as_chunks::<4>();
-            for (to, col) in line.iter_mut().zip(first[0]..) {
-                let col = if wraps { col.rem_euclid(wide) } else { col };
-                if (0..wide).contains(&col) {
-                    *to = stored[col as usize];
-                }
-            }
+            })?;
         }
         Ok(Window { first, size, texels })
     }

@@ -1,6 +1,7 @@
 //! The border between formats of pictures and everything else: what a file says of its place, its mask and how its camera was held, and its texels.
 
 use super::{CrsSaid, Reader};
+use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::imagery::ImageSource;
 
 /// How the camera was held: where row 0 and column 0 of the file are in what is shown (EXIF 2.32, 4.6.4, tag 274).
@@ -55,4 +56,25 @@ pub(crate) trait Picture: ImageSource {
 
     /// Whether its channels are bytes in the file.
     fn has_bytes(&self) -> bool;
+
+    /// Bits that its channels make use of: of 16 cameras and satellites use 10, 12 or 14. May read the whole picture once.
+    ///
+    /// # Errors
+    /// As reading its rows.
+    fn bits(&self) -> Result<u32, LayoutError> {
+        Ok(8)
+    }
+
+    /// Shows it as one whose channels make use of so many bits, from 8 to 16, so that pictures beside each other are as bright.
+    fn use_bits(&mut self, _bits: u32) {}
+}
+
+/// Bits that numbers up to this one take, at least the eight that are shown.
+pub(crate) fn bits_of(peak: u16) -> u32 {
+    (16 - peak.leading_zeros()).max(8)
+}
+
+/// The upper eight of so many bits.
+pub(crate) fn upper_eight(number: u16, bits: u32) -> u8 {
+    (number >> (bits - 8)).min(255) as u8
 }

@@ -31,7 +31,7 @@ pub(super) fn inverse([x, a, b, y, d, e]: [f64; 6]) -> [f64; 6] {
     [-(ia * x + ib * y), ia, ib, -(id * x + ie * y), id, ie]
 }
 
-pub(super) fn apply(map: &[f64; 6], [u, v]: [f64; 2]) -> [f64; 2] {
+pub(crate) fn apply(map: &[f64; 6], [u, v]: [f64; 2]) -> [f64; 2] {
     [map[0] + map[1] * u + map[2] * v, map[3] + map[4] * u + map[5] * v]
 }
 

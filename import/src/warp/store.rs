@@ -4,24 +4,16 @@
 //! Cost: each sample written once, and read once for each window that it lies in.
 
 use super::kernel::Samples;
-use std::fs::File;
-use std::path::{Path, PathBuf};
-use std::sync::{PoisonError, RwLock};
+use crate::kept::Kept;
+use std::path::Path;
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::file::disk::{read_at, write_at};
-
-enum Place {
-    Memory(RwLock<Vec<u8>>),
-    File(File),
-}
 
 /// Samples of a grid.
 pub(super) struct Store {
     samples: [u32; 2],
     sample_bytes: u64,
-    place: Place,
-    folder: PathBuf,
+    kept: Kept,
 }
 
 impl Store {
@@ -37,21 +29,13 @@ impl Store {
         in_memory: bool,
         folder: &Path,
     ) -> Result<Self, LayoutError> {
-        let bytes = Self::bytes(samples, sample_bytes);
-        let place = match usize::try_from(bytes).ok().filter(|_| in_memory) {
-            Some(bytes) => Place::Memory(RwLock::new(vec![0; bytes])),
-            None => {
-                let made = tempfile::tempfile_in(folder).and_then(|file| file.set_len(bytes).map(|()| file));
-                Place::File(made.map_err(|source| {
-                    LayoutError::io(folder, "cannot make a temporary file for the samples in", source)
-                })?)
-            }
-        };
-        Ok(Self { samples, sample_bytes, place, folder: folder.to_owned() })
-    }
-
-    fn failed(&self, source: std::io::Error) -> LayoutError {
-        LayoutError::io(&self.folder, "cannot use the temporary file of the samples in", source)
+        let kept = Kept::new(
+            Self::bytes(samples, sample_bytes),
+            in_memory,
+            folder,
+            "cannot keep the samples in a temporary file in",
+        )?;
+        Ok(Self { samples, sample_bytes, kept })
     }
 
     /// Columns `first.0` on and rows `first.1` on, `size` of them; columns are counted around the grid if it `wraps`, and what is outside is void.
@@ -87,20 +71,8 @@ impl Store {
                 let run = run.min(size[0] - done);
                 let offset = (row as u64 * columns as u64 + at as u64) * self.sample_bytes;
                 let length = run * self.sample_bytes as usize;
-                match &self.place {
-                    Place::Memory(all) => {
-                        let all = all.read().unwrap_or_else(PoisonError::into_inner);
-                        self.decode(
-                            &all[offset as usize..offset as usize + length],
-                            &mut values[done..done + run],
-                        );
-                    }
-                    Place::File(file) => {
-                        bytes.resize(length, 0);
-                        read_at(file, &mut bytes, offset).map_err(|source| self.failed(source))?;
-                        self.decode(&bytes, &mut values[done..done + run]);
-                    }
-                }
+                let values = &mut values[done..done + run];
+                self.kept.read(offset, length, &mut bytes, |raw| self.decode(raw, values))?;
                 done += run;
             }
         }
@@ -145,13 +117,7 @@ impl SampleSink for Store {
             self.encode(values, &mut bytes);
             let row = u64::from(window.row) + line as u64;
             let offset = (row * u64::from(self.samples[0]) + u64::from(window.col)) * self.sample_bytes;
-            match &self.place {
-                Place::Memory(all) => {
-                    let mut all = all.write().unwrap_or_else(PoisonError::into_inner);
-                    all[offset as usize..offset as usize + bytes.len()].copy_from_slice(&bytes);
-                }
-                Place::File(file) => write_at(file, &bytes, offset).map_err(|source| self.failed(source))?,
-            }
+            self.kept.write(offset, &bytes)?;
         }
         Ok(())
     }

@@ -309,11 +309,16 @@ impl Combination {
         self.void != Void::None && [(5, 6), (6, 6), (20, 0), (wide - 1, high - 1)].contains(&(col, row))
     }
 
+    /// Metres a unit of heights: of the band's, else of the system's.
+    pub(crate) fn height_unit_m(&self) -> f64 {
+        let Meaning { unit, unit_m, .. } = self.meaning;
+        if unit.is_empty() { self.system.height_unit_m.unwrap_or(1.0) } else { unit_m }
+    }
+
     /// Metres of height at a place between samples, whatever is void.
     pub(crate) fn height_m(&self, col: f64, row: f64) -> f64 {
-        let Meaning { unit, unit_m, scale, offset } = self.meaning;
-        let unit_m = if unit.is_empty() { self.system.height_unit_m.unwrap_or(1.0) } else { unit_m };
-        (self.kind.number(col, row) * scale + offset) * unit_m
+        let Meaning { scale, offset, .. } = self.meaning;
+        (self.kind.number(col, row) * scale + offset) * self.height_unit_m()
     }
 
     /// Its name in messages.

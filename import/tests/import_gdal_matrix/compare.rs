@@ -158,11 +158,7 @@ fn exact(terrain: &Terrain, truth: &Truth, combination: &Combination) -> Result<
             return Err(format!("spacing {got:?} m, GDAL says {wanted:?}, arithmetic {by_arithmetic:?}"));
         }
     }
-    // What GDAL knows no unit of has metres.
-    let unit_m = {
-        let meaning = combination.meaning;
-        if meaning.unit.is_empty() { combination.system.height_unit_m.unwrap_or(1.0) } else { meaning.unit_m }
-    };
+    let unit_m = combination.height_unit_m();
     let mut agreed = Agreed { heights: 0, voids: 0 };
     // All samples of small grids; of large ones some, in all columns.
     let stride = wide * high / 20_000 + 1;

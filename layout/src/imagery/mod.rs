@@ -35,5 +35,5 @@ pub(crate) use pyramid::MadeTile;
 pub use reader::Imagery;
 #[cfg(feature = "files")]
 pub(crate) use reader::tile_name;
-pub use shape::{BORDER_TEXELS, INNER_TEXELS, ImageryShape, TILE_TEXELS, TileFormat, TileId};
+pub use shape::{BORDER_TEXELS, INNER_TEXELS, ImageryShape, MAX_TEXELS, TILE_TEXELS, TileFormat, TileId};
 pub use source::{ImageInfo, ImageSource, MemoryImage, RowReader};

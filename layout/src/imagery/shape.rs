@@ -12,7 +12,7 @@ pub const BORDER_TEXELS: u32 = 4;
 pub const INNER_TEXELS: u32 = TILE_TEXELS - 2 * BORDER_TEXELS;
 
 /// Longest side of an image in texels.
-pub(super) const MAX_TEXELS: u32 = 1 << 22;
+pub const MAX_TEXELS: u32 = 1 << 22;
 
 /// How the texels of a tile are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
