@@ -1,6 +1,6 @@
 //! Warps against a live `gdalwarp`, kernel by kernel: every sample within what a twentieth of a sample's shift would change.
 //!
-//! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-import --test warp_gdal -- --ignored`.
+//! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-import --test import_gdal_warp -- --ignored`.
 
 mod import_support;
 #[path = "import_support/tools.rs"]
