@@ -8,7 +8,7 @@ use terrasoar::ground::{Ground, PictureEngine, Refined};
 use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::{Capabilities, Gpu, Look, Offscreen, RenderError};
+use terrasoar_render::{Capabilities, Gpu, Look, Material, Offscreen, RenderError};
 
 /// Takes pictures of one terrain, all of one size.
 pub struct Studio<'a> {
@@ -50,6 +50,14 @@ impl<'a> Studio<'a> {
     /// As [`Scene::raise_walls`].
     pub fn raise_walls(&mut self, bottom_m: f64) -> Result<(), SceneError> {
         self.scene.raise_walls(&self.ground, bottom_m as f32)
+    }
+
+    /// Gives the ground a material of your own, or takes it off.
+    ///
+    /// # Errors
+    /// As [`Scene::set_material`].
+    pub fn set_material(&mut self, material: Option<Material>) -> Result<(), SceneError> {
+        self.scene.set_material(material)
     }
 
     /// A picture of the mesh as it is: three bytes a pixel, row by row from the top.

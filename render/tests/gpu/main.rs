@@ -7,6 +7,7 @@ mod adapter;
 mod cover;
 mod device;
 mod imagery;
+mod materials;
 mod patches;
 mod places;
 mod shading;
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         cover::tests(),
         device::tests(),
         imagery::tests(),
+        materials::tests(),
         patches::tests(),
         places::tests(),
         shading::tests(),
