@@ -80,7 +80,10 @@ fn a_wrong_material_is_told_its_line_and_fault() {
     ];
     for (text, line, words) in wrong {
         let said = said(text);
-        assert!(said.starts_with(line) && said.to_lowercase().contains(words), "{text}\n{said}");
+        assert!(
+            said.starts_with(line) && said.to_lowercase().contains(&words.to_lowercase()),
+            "{text}\n{said}"
+        );
         assert!(
             said.contains(" of the material: ") && !said.contains('\n') && !said.contains('['),
             "{text}\n{said}"

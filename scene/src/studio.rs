@@ -93,6 +93,11 @@ impl<'a> Studio<'a> {
         self.scene.has_image()
     }
 
+    /// The device, to make buffers and textures for a material on it. After its loss [`Studio::picture`] goes on with another.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
     /// The device's adapter.
     pub fn capabilities(&self) -> &Capabilities {
         &self.gpu.capabilities

@@ -7,6 +7,7 @@ mod adapter;
 mod cover;
 mod device;
 mod imagery;
+mod lines;
 mod materials;
 mod patches;
 mod places;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         cover::tests(),
         device::tests(),
         imagery::tests(),
+        lines::tests(),
         materials::tests(),
         patches::tests(),
         places::tests(),
