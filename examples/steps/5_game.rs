@@ -7,6 +7,7 @@
 use std::error::Error;
 use std::sync::Arc;
 use std::time::Instant;
+use terrasoar::refine::Culling;
 use terrasoar::{Crater, Edit, Ground, StreamOptions, Terrain, View};
 use terrasoar_render::{Gpu, Layer, Layers, Look, Material, PassFormat, RenderError, wgpu};
 use terrasoar_scene::scene::{Scene, SceneOptions, TileService};
@@ -22,7 +23,9 @@ fn main() -> Result<(), Failure> {
     let mut words = std::env::args().skip(1);
     let path = words.next().unwrap_or("land.iqt".into());
     let frames = words.next().map_or(Ok(u32::MAX), |word| word.parse())?;
-    let ground = Terrain::open(&path)?.stream(StreamOptions::default().cache_mib(64))?;
+    // Refined all around: who walks sees the ground between two samples of which one is behind the eye.
+    let options = StreamOptions::default().cache_mib(64).culling(Culling::Clusters);
+    let ground = Terrain::open(&path)?.stream(options)?;
     let mut app = App { ground: Some(ground), frames, shown: None, failure: None };
     EventLoop::new()?.run_app(&mut app)?;
     app.failure.map_or(Ok(()), Err)
@@ -105,7 +108,7 @@ impl Shown {
         // A few tiles of light a frame: no frame waits.
         let mut scene = Scene::new(&ground, &gpu, SceneOptions::default().tiles(TileService::AFrame(3)))?;
         scene.set_material(Some(textures()?))?;
-        let walker = Walker::new(&ground);
+        let walker = Walker::new(&ground)?;
         let depth = depth_of(&gpu, &config);
         window.request_redraw();
         Ok(Self { window, surface, config, depth, gpu, ground, scene, walker, mouse_px: [0.0; 2], frame: 0 })
@@ -192,10 +195,18 @@ struct Walker {
 }
 
 impl Walker {
-    fn new(ground: &Ground<'_>) -> Self {
+    /// On a summit: the highest of some places, read from the file.
+    fn new(ground: &Ground<'_>) -> Result<Self, terrasoar::Error> {
         let [east_m, north_m] = ground.extent_m();
-        let eye_m = [0.5 * east_m, 0.3 * north_m, ground.height_range_m()[1] + EYE_M];
-        Self { eye_m, heading_deg: 0.0, ahead: 0.0, turn: 0.0, last: Instant::now() }
+        let mut eye_m = [0.5 * east_m, 0.5 * north_m, f64::NEG_INFINITY];
+        for place in 0..64 * 64 {
+            let [x, y] = [place % 64, place / 64].map(|i| (f64::from(i) + 0.5) / 64.0);
+            let height_m = ground.terrain().height_m(x * east_m, y * north_m)?;
+            if let Some(height_m) = height_m.filter(|height_m| height_m + EYE_M > eye_m[2]) {
+                eye_m = [x * east_m, y * north_m, height_m + EYE_M];
+            }
+        }
+        Ok(Self { eye_m, heading_deg: 0.0, ahead: 0.0, turn: 0.0, last: Instant::now() })
     }
 
     fn key(&mut self, key: KeyCode, is_down: bool) {
@@ -250,8 +261,8 @@ fn textures() -> Result<Material, RenderError> {
     };
     // Each is so many metres wide, and lies over those before it.
     let grass = Layer::new(speckled([52, 78, 30], [96, 120, 58]), 16.0);
-    let snow = Layer::new(speckled([214, 224, 236], [250, 252, 255]), 16.0)
-        .heights_m([1250.0, f32::INFINITY], 120.0);
+    let snow =
+        Layer::new(speckled([214, 224, 236], [250, 252, 255]), 16.0).heights_m([1100.0, f32::INFINITY], 80.0);
     let rock = Layer::new(speckled([78, 72, 66], [142, 134, 124]), 32.0).slopes_deg([35.0, 90.0], 10.0);
     Layers::new(side).over(grass).over(snow).over(rock).material()
 }

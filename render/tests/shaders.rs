@@ -57,26 +57,32 @@ fn a_wrong_material_is_told_its_line_and_fault() {
         (String::new(), "line 1", "needs a function `fn material(at: GroundPoint) -> vec4<f32>`"),
         ("fn surface() -> f32 { return 1.0; }".into(), "line 1", "needs a function"),
         ("fn material() -> vec4<f32> { return vec4(0.0); }".into(), "line 1", "needs a function"),
-        ("fn material(at: GroundPoint) -> vec3<f32> { return vec3(0.0); }".into(), "line 1", "needs a function"),
+        (
+            "fn material(at: GroundPoint) -> vec3<f32> { return vec3(0.0); }".into(),
+            "line 1",
+            "needs a function",
+        ),
         (format!("override own_a: f32 = 1.0;\n{function}"), "line 1", "const"),
         (format!("\n@group(0) @binding(60) var own_t: texture_2d<f32>;\n{function}"), "line 2", "group 1"),
         (format!("@group(2) @binding(0) var own_t: texture_2d<f32>;\n{function}"), "line 1", "group 2"),
         (
-            format!("@group(1) @binding(0) var own_t: texture_2d<f32>;\n@group(1) @binding(0) var own_u: texture_2d<f32>;\n{function}"),
+            format!(
+                "@group(1) @binding(0) var own_t: texture_2d<f32>;\n@group(1) @binding(0) var own_u: texture_2d<f32>;\n{function}"
+            ),
             "line 2",
             "twice",
         ),
-        (format!("@group(1) @binding(0) var<storage, read_write> own_b: array<f32>;\n{function}"), "line 1", "read-only"),
-        (format!("@group(1) @binding(0) var own_t: texture_storage_2d<r32float, write>;\n{function}"), "line 1", "read-only"),
-        (format!("var<workgroup> own_w: f32;\n{function}"), "line 1", "not possible"),
-        // Derivatives in a branch that neighbours may not take.
         (
-            "@group(1) @binding(0) var own_t: texture_2d<f32>;\n@group(1) @binding(1) var own_s: sampler;\nfn material(at: GroundPoint) -> vec4<f32> {\n    \
-             if at.height_m > 5.0 {\n        return textureSample(own_t, own_s, tiled(at, 4.0));\n    }\n    return vec4(0.5);\n}"
-                .into(),
-            "line ",
-            "uniform",
+            format!("@group(1) @binding(0) var<storage, read_write> own_b: array<f32>;\n{function}"),
+            "line 1",
+            "read-only",
         ),
+        (
+            format!("@group(1) @binding(0) var own_t: texture_storage_2d<r32float, write>;\n{function}"),
+            "line 1",
+            "read-only",
+        ),
+        (format!("var<workgroup> own_w: f32;\n{function}"), "line 1", "not possible"),
     ];
     for (text, line, words) in wrong {
         let said = said(text);

@@ -64,7 +64,7 @@ pub fn wrong() -> Wrong {
     );
     let source = "a\n    // begin: part\n    b\n        // end: part\n    c\n    // begin: other\n    d\n    // end: other\n    // end: part\n";
     ensure(code::part(source, Some("part")).is_none(), "a part that ends twice");
-    ensure(code::part(&source[..44], Some("part")).as_deref() == Some("b\n"), "a part of a file");
+    ensure(code::part(&source[..48], Some("part")).as_deref() == Some("b\n"), "a part of a file");
     ensure(code::part(source, None).as_deref() == Some("a\n    b\n    c\n    d\n"), "a file without marks");
     ensure(code::part(source, Some("none")).is_none(), "a part that is not there");
     ensure(script.words == ["sh"] && script.not_run.as_deref() == Some("it takes a year"), "what is not run");
