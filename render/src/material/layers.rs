@@ -12,6 +12,8 @@ use wgpu::util::DeviceExt;
 const MOST_LAYERS: usize = 16;
 /// Largest texture: every device has these.
 const MOST_TEXELS: u32 = 4096;
+/// Most samples along what a pixel covers, where ground is looked at flatly.
+const ANISOTROPY: u16 = 8;
 /// Stands for no end of a band, in metres or degrees.
 const NO_END: f32 = 1e9;
 
@@ -202,6 +204,8 @@ fn bind(
         dimension: Some(wgpu::TextureViewDimension::D2Array),
         ..Default::default()
     });
+    // A software driver adds up every texel that a pixel covers, be it ten thousand.
+    let is_software = device.adapter_info().device_type == wgpu::DeviceType::Cpu;
     let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
         label: Some("layers"),
         address_mode_u: wgpu::AddressMode::Repeat,
@@ -209,7 +213,7 @@ fn bind(
         mag_filter: wgpu::FilterMode::Linear,
         min_filter: wgpu::FilterMode::Linear,
         mipmap_filter: wgpu::MipmapFilterMode::Linear,
-        anisotropy_clamp: 8,
+        anisotropy_clamp: if is_software { 1 } else { ANISOTROPY },
         ..Default::default()
     });
     let numbers = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
