@@ -134,7 +134,7 @@ fn bands(gpu: &Gpu) -> Outcome {
         let inside = (20.0..620.0).contains(&east_m) && (20.0..620.0).contains(&north_m);
         // Slopes are of samples; between two of them they pass from level to steep.
         let is_clear = (east_m - 320.0).abs() > 1.5 * SPACING_M && (east_m - 520.0).abs() > 6.0;
-        (inside && is_clear).then(|| match east_m {
+        (inside && is_clear).then_some(match east_m {
             e if e < 320.0 => BLUE,
             e if e < 520.0 => RED,
             _ => GREEN,
