@@ -6,7 +6,7 @@ use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
 use crate::{
-    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz,
+    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, tiles, usgs_dem, xyz,
 };
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
@@ -59,14 +59,24 @@ const SIGNED: &[Format] = &[
         open: |path, _| boxed(pnm::PnmDem::open(path)),
     },
     Format {
+        name: "MBTiles",
+        is: |look| tiles::is_mbtiles(look.path, &look.head),
+        open: |path, options| boxed(tiles::TileDem::open(path, options)),
+    },
+    Format {
+        name: "PMTiles",
+        is: |look| tiles::is_pmtiles(&look.head),
+        open: |path, options| boxed(tiles::TileDem::open(path, options)),
+    },
+    Format {
         name: ".hgt archive",
         is: |look| look.begins(b"PK\x03\x04") && hgt::has_tiles(look.path),
-        open: |path, options| tiles(&[path.to_owned()], options),
+        open: |path, options| hgt_tiles(&[path.to_owned()], options),
     },
     Format {
         name: ".hgt.gz",
         is: |look| look.begins(b"\x1f\x8b") && look.is_called("hgt.gz"),
-        open: |path, options| tiles(&[path.to_owned()], options),
+        open: |path, options| hgt_tiles(&[path.to_owned()], options),
     },
     Format {
         name: "Esri ASCII grid",
@@ -80,7 +90,7 @@ const NAMED: &[Format] = &[
     Format {
         name: ".hgt",
         is: |look| hgt::is_tile(look.path),
-        open: |path, options| tiles(&[path.to_owned()], options),
+        open: |path, options| hgt_tiles(&[path.to_owned()], options),
     },
     Format {
         name: "labelled (.hdr)",
@@ -96,14 +106,14 @@ const NAMED: &[Format] = &[
 ];
 
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))
 }
 
 /// Opens tiles, in the shape that a person states if they do.
-fn tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+fn hgt_tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
     let stated = options.raw.as_deref().map(raw::tile_shape).transpose()?;
     boxed(hgt::HgtDem::open(paths, stated))
 }
@@ -115,7 +125,8 @@ fn tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, La
 pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
     match paths {
         [] => Err(LayoutError::Usage("no elevation file was named; name one, or several .hgt tiles".into())),
-        [path] if path.is_dir() => tiles(&hgt::tiles_in(path)?, options),
+        [path] if path.is_dir() && tiles::is_folder(path) => boxed(tiles::TileDem::open(path, options)),
+        [path] if path.is_dir() => hgt_tiles(&hgt::tiles_in(path)?, options),
         [path] => open_file(path, options),
         paths => open_tiles(paths, options),
     }
@@ -187,5 +198,5 @@ fn open_tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader
             path.display(),
         )));
     }
-    tiles(paths, options)
+    hgt_tiles(paths, options)
 }

@@ -58,10 +58,12 @@ mod reader;
 mod strangers;
 pub mod synth;
 mod text;
+mod tiles;
 mod tiff_tags;
 mod usgs_dem;
 mod value;
 mod warp;
+mod webp;
 mod xyz;
 
 use std::path::{Path, PathBuf};
@@ -73,8 +75,8 @@ pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
-pub use options::{Direction, OpenOptions, Resampling};
-pub use picture::{open_image, open_images_on};
+pub use options::{Direction, OpenOptions, Resampling, TileOptions};
+pub use picture::{PictureOptions, open_image, open_images, open_images_on};
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 pub use strangers::strangers;
 

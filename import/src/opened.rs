@@ -205,6 +205,9 @@ fn describe(
     for words in placed {
         say("placement", words);
     }
+    for words in &declared.aloud {
+        say("tiles", words.clone());
+    }
     for note in notes {
         say("note", note);
     }

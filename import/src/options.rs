@@ -77,4 +77,17 @@ pub struct OpenOptions {
     pub scratch: Option<std::path::PathBuf>,
     /// Whether samples stay in the rows and columns of the file, where they would be turned north-up.
     pub as_stored: bool,
+    /// What of a pyramid of map tiles is read.
+    pub tiles: TileOptions,
+}
+
+/// What of a pyramid of map tiles is read.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TileOptions {
+    /// The zoom; without it the deepest complete one.
+    pub zoom: Option<u8>,
+    /// West, south, east and north in degrees; without them those that the pyramid states, as far as there are tiles.
+    pub bounds_deg: Option<[f64; 4]>,
+    /// Whether the rows of a folder of tiles are counted from the south (TMS), where nothing in it says so.
+    pub from_south: bool,
 }

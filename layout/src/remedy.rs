@@ -19,6 +19,10 @@ pub enum Remedy {
     Band,
     /// How heights are packed into colours.
     Decode,
+    /// Which zoom of a pyramid of map tiles is read.
+    Zoom,
+    /// Which part of a pyramid of map tiles is read.
+    Bounds,
     /// The reference system, stated when elevation data is opened.
     ReferenceSystem,
     /// The shape of a file that does not tell it.

@@ -3,6 +3,7 @@
 use super::output::{complain, grouped, print};
 use super::outputs::{Force, Kind};
 use super::progress::{Meter, short};
+use super::tiles::Tiles;
 use super::{parse, remedy, terrain};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
@@ -16,8 +17,8 @@ use terrasoar_layout::grid::record::RecordKind;
 /// Make a terrain file (.iqt) from elevation data.
 ///
 /// Reads GeoTIFF, PNG (grey, or heights packed into colours), PGM, .hgt (a tile, several that border each other, packed ones, or a folder of
-/// them), Esri ASCII grids, XYZ grids, .flt and .bil with their .hdr, ENVI, netCDF, DTED, USGS DEM, VTP BT and headerless heightmaps, of any size
-/// and any rectangle. The output appears when it is complete; a build that fails or is killed leaves nothing, and the next one starts from the
+/// them), Esri ASCII grids, XYZ grids, .flt and .bil with their .hdr, ENVI, netCDF, DTED, USGS DEM, VTP BT, pyramids of map tiles (folders, MBTiles,
+/// PMTiles) and headerless heightmaps, of any size and any rectangle. The output appears when it is complete; a build that fails or is killed leaves nothing, and the next one starts from the
 /// beginning. The same input gives the same bytes whatever --threads and --memory.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -28,6 +29,7 @@ Examples:
   terrasoar build island.raw --raw 1025x1025:u16le --spacing 10 -o island.iqt
   terrasoar build puget.png --spacing 160 --z-scale 0.1 -o puget.iqt
   terrasoar build huge.tif --memory 2048 -o huge.iqt
+  terrasoar build terrain.pmtiles --bounds 7,46,8,47 --reproject utm -o valais.iqt
   terrasoar build world.tif --reproject utm --resolution 30 -o metric.iqt
   terrasoar build srtm-folder --fill-voids 20 -o whole.iqt
 
@@ -76,6 +78,8 @@ pub(super) struct Args {
     fill_voids: u32,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    tiles: Tiles,
 }
 
 /// What the elevation data does not say, or says wrongly.
@@ -95,7 +99,7 @@ struct Reading {
     #[arg(long, value_name = "BAND")]
     band: Option<String>,
     /// How heights are packed into colours: mapbox (Terrain-RGB), terrarium, or factors R,G,B,BASE
-    #[arg(long, value_name = "PACKING", allow_hyphen_values = true)]
+    #[arg(long, alias = "encoding", value_name = "PACKING", allow_hyphen_values = true)]
     decode: Option<String>,
     /// Shape of a file without a header: width x height : type, such as 1025x1025:u16le
     #[arg(long, value_name = "WxH:TYPE")]
@@ -193,6 +197,7 @@ impl Args {
             }),
             memory_mib: Some(self.memory),
             scratch: Some(folder.unwrap_or(Path::new(".")).to_owned()),
+            tiles: self.tiles.options(),
             ..OpenOptions::default()
         }
     }
@@ -214,6 +219,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
     })?;
     let seconds = start.elapsed().as_secs_f64();
     warnings.iter().for_each(|warning| complain(&remedy::warned(warning)));
+    for (_, words) in header.about.origins.iter().filter(|(what, _)| what == "tiles") {
+        complain(&format!("note: {words}"));
+    }
     warn_about_spacing(&header);
     print(&summary(&args.output, &header, seconds))
 }

@@ -3,17 +3,18 @@
 use super::output::{complain, decimal, grouped, print};
 use super::parse;
 use super::progress::{Meter, short};
+use super::tiles::Tiles;
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use terrasoar_import::{open_image, open_images_on};
-use terrasoar_layout::imagery::{DrapeOptions, Draped, Extent, ImageSource, PlaceOrigin, TileFormat, drape};
+use terrasoar_import::{PictureOptions, open_images};
+use terrasoar_layout::imagery::{DrapeOptions, Draped, Extent, PlaceOrigin, TileFormat, drape};
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Drape an image over a terrain file.
 ///
-/// Reads PNG, JPEG and GeoTIFF of any size (JPEG only as far as memory allows), grey, RGB or palette, with or without alpha, masks and "no data". Pictures in another reference
+/// Reads PNG, JPEG and GeoTIFF of any size (JPEG only as far as memory allows), grey, RGB or palette, with or without alpha, masks and "no data"; and pyramids of map tiles. Pictures in another reference
 /// system, turned, mirrored or of other texels than the first are brought onto the terrain by bilinear interpolation. Appends a pyramid of
 /// compressed tiles to the file; until it is complete the file reads as before, whatever happens, and programs that have it open are not
 /// disturbed. Draping again puts other imagery in the place of the first, whose space is not used again.
@@ -22,6 +23,7 @@ use terrasoar_layout::read::terrain::Terrain;
 Examples:
   terrasoar drape alps.iqt --image alps-photo.tif
   terrasoar drape alps.iqt --image west.tif east.tif
+  terrasoar drape alps.iqt --image world.mbtiles
   terrasoar drape alps.iqt --image photo.png --extent 0,0,20480,15360
   terrasoar drape alps.iqt --image photo.jpg --extent-crs 600000,180000,620480,195360
 
@@ -30,7 +32,7 @@ terrain has one too; else it is laid over the whole terrain, upright as its EXIF
 pub(super) struct Args {
     /// Terrain file (.iqt)
     file: PathBuf,
-    /// Image: one, or several that make a mosaic
+    /// Image: one, or several that make a mosaic; or pyramids of map tiles: a folder, MBTiles, PMTiles
     #[arg(long = "image", required = true, num_args = 1.., value_name = "IMG")]
     images: Vec<PathBuf>,
     /// Where the image lies: west, south, east, north in metres from the terrain's south-west sample
@@ -48,6 +50,8 @@ pub(super) struct Args {
     /// Threads to use; all cores without it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    #[command(flatten)]
+    tiles: Tiles,
 }
 
 /// West, south, east, north.
@@ -64,6 +68,10 @@ enum FormatWord {
 }
 
 impl Args {
+    fn picture(&self) -> PictureOptions {
+        PictureOptions { tiles: self.tiles.options() }
+    }
+
     fn options(&self) -> DrapeOptions {
         DrapeOptions::default()
             .format(match self.format {
@@ -84,11 +92,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let pool = pool.build().context("cannot start the threads; give fewer with --threads")?;
     let start = Instant::now();
     let draped = pool.install(|| -> Result<Draped> {
-        let images: Vec<Box<dyn ImageSource>> = if args.extent.is_some() || args.extent_crs.is_some() {
-            args.images.iter().map(|path| open_image(path)).collect::<Result<_, _>>()?
-        } else {
-            open_images_on(&args.images, Terrain::open(&args.file)?.header())?
-        };
+        let is_placed = args.extent.is_some() || args.extent_crs.is_some();
+        let terrain = if is_placed { None } else { Some(Terrain::open(&args.file)?) };
+        let header = terrain.as_ref().map(Terrain::header);
+        let images = open_images(&args.images, header, &args.picture())?;
         for image in &images {
             for note in &image.info().notes {
                 complain(&format!("note: {}: {note}", image.path().display()));

@@ -48,6 +48,7 @@ use zstd_plain as zstd_codec;
 use std::path::{Path, PathBuf};
 
 use chunks::Chunks;
+pub(crate) use codec::unpack_zstd;
 pub(crate) use colour::TiffImage;
 use convert::{Convert, Pick};
 use planes::Planes;

@@ -10,7 +10,10 @@ mod oriented;
 mod png;
 mod texels;
 
+use crate::options::TileOptions;
+use crate::places::Frame;
 use crate::reader::{Orientation, Picture};
+use crate::tiles::{TileImage, is_pyramid};
 use crate::{TiffImage, input, is_tiff};
 use completed::Completed;
 use oriented::Oriented;
@@ -28,8 +31,8 @@ use terrasoar_layout::imagery::ImageSource;
 /// [`LayoutError::Io`] for a file that is missing or cannot be read; [`LayoutError::NotThisFormat`] for none of these formats;
 /// [`LayoutError::Unsupported`] and [`LayoutError::Damaged`] from the reader.
 pub fn open_image(path: &Path) -> Result<Box<dyn ImageSource>, LayoutError> {
-    let (completed, orientation) = open(path)?;
-    Ok(upright(completed, orientation))
+    let mut images = open_images(std::slice::from_ref(&path.to_owned()), None, &PictureOptions::default())?;
+    Ok(images.remove(0))
 }
 
 /// As [`open_image`], of pictures for the terrain of `header`: they are brought into its reference system, turned north-up and onto texels of one size, those of the finest,
@@ -38,20 +41,44 @@ pub fn open_image(path: &Path) -> Result<Box<dyn ImageSource>, LayoutError> {
 /// # Errors
 /// As [`open_image`]; [`LayoutError::Usage`] for a picture that has no place in the terrain's system, or would become too large.
 pub fn open_images_on(paths: &[PathBuf], header: &Header) -> Result<Vec<Box<dyn ImageSource>>, LayoutError> {
-    let mut opened = paths.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
-    if opened.len() > 1 {
+    open_images(paths, Some(header), &PictureOptions::default())
+}
+
+/// How pictures are read.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PictureOptions {
+    /// What of a pyramid of map tiles is read; without bounds it is what lies on the terrain.
+    pub tiles: TileOptions,
+}
+
+/// As [`open_images_on`], read as `options` state; without a terrain each picture stays as it is, as of [`open_image`].
+///
+/// # Errors
+/// As [`open_images_on`].
+pub fn open_images(
+    paths: &[PathBuf],
+    header: Option<&Header>,
+    options: &PictureOptions,
+) -> Result<Vec<Box<dyn ImageSource>>, LayoutError> {
+    let around = header.and_then(Frame::wgs84).and_then(|frame| frame.bounds_deg());
+    let mut opened =
+        paths.iter().map(|path| open(path, options, around)).collect::<Result<Vec<_>, _>>()?;
+    if opened.len() > 1 && header.is_some() {
         let bits = opened.iter().map(|(completed, _)| completed.bits()).collect::<Result<Vec<_>, _>>()?;
         // Those of bytes take none of it.
         let most = bits.into_iter().max().unwrap_or(8);
         opened.iter_mut().for_each(|(completed, _)| completed.use_bits(most));
     }
-    if opened.iter().any(|(completed, _)| completed.info().georeference.pixel_to_crs.is_none()) {
-        return Ok(opened
+    let has_place = |completed: &Completed| completed.info().georeference.pixel_to_crs.is_some();
+    match header {
+        Some(header) if opened.iter().all(|(completed, _)| has_place(completed)) => {
+            across::bring(opened.into_iter().map(|(completed, _)| completed).collect(), header)
+        }
+        _ => Ok(opened
             .into_iter()
             .map(|(completed, orientation)| upright(completed, orientation))
-            .collect());
+            .collect()),
     }
-    across::bring(opened.into_iter().map(|(completed, _)| completed).collect(), header)
 }
 
 /// Undoes how the camera was held, of a picture that lies nowhere: programs of maps place the rows of the file, whatever was done to them.
@@ -62,7 +89,16 @@ fn upright(completed: Completed, orientation: Orientation) -> Box<dyn ImageSourc
     Box::new(Oriented::new(completed, orientation))
 }
 
-fn open(path: &Path) -> Result<(Completed, Orientation), LayoutError> {
+/// Opens a picture; `around` is where it is needed: west, south, east and north in degrees.
+fn open(
+    path: &Path,
+    options: &PictureOptions,
+    around: Option<[f64; 4]>,
+) -> Result<(Completed, Orientation), LayoutError> {
+    if is_pyramid(path) {
+        let image = TileImage::open(path, &options.tiles, around)?;
+        return Ok((Completed::new(Box::new(image))?, Orientation::UPRIGHT));
+    }
     let mut head = Vec::with_capacity(16);
     if path.is_dir() {
         return Err(LayoutError::not_this_format(path, "this is a directory; name the images in it"));
