@@ -61,8 +61,7 @@ pub fn open_images(
     options: &PictureOptions,
 ) -> Result<Vec<Box<dyn ImageSource>>, LayoutError> {
     let around = header.and_then(Frame::wgs84).and_then(|frame| frame.bounds_deg());
-    let mut opened =
-        paths.iter().map(|path| open(path, options, around)).collect::<Result<Vec<_>, _>>()?;
+    let mut opened = paths.iter().map(|path| open(path, options, around)).collect::<Result<Vec<_>, _>>()?;
     if opened.len() > 1 && header.is_some() {
         let bits = opened.iter().map(|(completed, _)| completed.bits()).collect::<Result<Vec<_>, _>>()?;
         // Those of bytes take none of it.
@@ -74,10 +73,7 @@ pub fn open_images(
         Some(header) if opened.iter().all(|(completed, _)| has_place(completed)) => {
             across::bring(opened.into_iter().map(|(completed, _)| completed).collect(), header)
         }
-        _ => Ok(opened
-            .into_iter()
-            .map(|(completed, orientation)| upright(completed, orientation))
-            .collect()),
+        _ => Ok(opened.into_iter().map(|(completed, orientation)| upright(completed, orientation)).collect()),
     }
 }
 

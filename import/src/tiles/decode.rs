@@ -50,23 +50,31 @@ pub(super) struct Texels {
 /// Damage; a format or size that is not read.
 pub(super) fn decode(path: &Path, place: &str, bytes: &[u8]) -> Result<Texels, LayoutError> {
     let problem = |words: &str| LayoutError::damaged(path, place, words);
-    guard(path, || place.to_owned(), || {
-        if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
-            of_png(bytes).map_err(|words| problem(&words))
-        } else if bytes.starts_with(b"\xff\xd8\xff") {
-            of_jpeg(bytes).map_err(|words| problem(&words))
-        } else if is_webp(bytes) {
-            of_webp(bytes).map_err(|words| problem(&words))
-        } else {
-            Err(other(path, place, bytes))
-        }
-    })
+    guard(
+        path,
+        || place.to_owned(),
+        || {
+            if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+                of_png(bytes).map_err(|words| problem(&words))
+            } else if bytes.starts_with(b"\xff\xd8\xff") {
+                of_jpeg(bytes).map_err(|words| problem(&words))
+            } else if is_webp(bytes) {
+                of_webp(bytes).map_err(|words| problem(&words))
+            } else {
+                Err(other(path, place, bytes))
+            }
+        },
+    )
 }
 
 /// What is no tile of pictures.
 fn other(path: &Path, place: &str, bytes: &[u8]) -> LayoutError {
     if bytes.is_empty() {
-        return LayoutError::damaged(path, place, "it is empty; fetch it again, or delete it, and it counts as missing");
+        return LayoutError::damaged(
+            path,
+            place,
+            "it is empty; fetch it again, or delete it, and it counts as missing",
+        );
     }
     let what = match bytes {
         [0x1f, 0x8b, ..] => "vector tiles, or packed ones",

@@ -16,6 +16,9 @@ use terrasoar_layout::dem::{SampleSink, Warning, Window};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
 
+/// Samples on a side of a terrain.
+const MAX_SIDE: u32 = 65_537;
+
 /// Elevation data in tiles.
 pub(crate) struct TileDem {
     pyramid: Pyramid,
@@ -37,6 +40,9 @@ impl TileDem {
         let pyramid = Pyramid::open(path, &options.tiles, None)?;
         let found = find(&pyramid, options.decode.as_deref())?;
         let plan = &pyramid.plan;
+        if options.reproject.is_none() {
+            refuse_large(path, plan.zoom, plan.size)?;
+        }
         let mut declared = Declared::new(plan.size, Decode::SAMPLE_TYPE, pyramid.format());
         declared.place = Some(Said::new(pyramid.place, "the tiles"));
         declared.crs = pyramid.crs();
@@ -99,9 +105,27 @@ impl TileDem {
     }
 }
 
+/// Refuses what no terrain can hold, with the zoom that one can.
+fn refuse_large(path: &Path, zoom: u8, size: [u32; 2]) -> Result<(), LayoutError> {
+    let over = size[0].max(size[1]).div_ceil(MAX_SIDE);
+    if over <= 1 {
+        return Ok(());
+    }
+    let levels = over.next_power_of_two().trailing_zeros() as u8;
+    Err(LayoutError::Usage(format!(
+        "{}: zoom {zoom} has {} x {} samples here, and a terrain has {MAX_SIDE} at most a side; state bounds, or zoom {}",
+        path.display(),
+        size[0],
+        size[1],
+        zoom.saturating_sub(levels)
+    ))
+    .mended_by(Remedy::Zoom))
+}
+
 /// A part of a tile's samples.
 fn cut(samples: &[f64], side: u32, part: Part) -> Vec<f64> {
-    let ([left, top], [width, height]) = (part.from.map(|at| at as usize), part.size.map(|count| count as usize));
+    let ([left, top], [width, height]) =
+        (part.from.map(|at| at as usize), part.size.map(|count| count as usize));
     let rows = samples.chunks_exact(side as usize).skip(top).take(height);
     rows.flat_map(|row| &row[left..left + width]).copied().collect()
 }

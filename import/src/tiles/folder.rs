@@ -79,7 +79,10 @@ pub(super) fn is_folder(path: &Path) -> bool {
     };
     let is_tile = |entry: DirEntry| entry.file_name().to_str().and_then(row_of).is_some();
     let zooms = in_numbers(path);
-    zooms.iter().flat_map(|zoom| in_numbers(zoom).into_iter().take(16)).any(|column| some(&column).any(is_tile))
+    zooms
+        .iter()
+        .flat_map(|zoom| in_numbers(zoom).into_iter().take(16))
+        .any(|column| some(&column).any(is_tile))
 }
 
 impl Folder {
@@ -219,7 +222,8 @@ mod tests {
     fn names_of_tiles_are_numbers() {
         assert_eq!(row_of("17.png"), Some((17, ".png")));
         assert_eq!(row_of("0@2x.WebP"), Some((0, "@2x.WebP")));
-        for other in ["17", "17.png.aux.xml", "017.png", "-1.png", "a.png", ".png", "4294967296.png", "1.tif"] {
+        for other in ["17", "17.png.aux.xml", "017.png", "-1.png", "a.png", ".png", "4294967296.png", "1.tif"]
+        {
             assert_eq!(row_of(other), None, "{other}");
         }
         assert_eq!(numbered("00"), None);

@@ -85,7 +85,8 @@ impl Mbtiles {
     /// Opens the database and reads its metadata.
     pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
         let file = input::open(path, "cannot open the MBTiles file")?;
-        let bytes = file.metadata().map_err(|e| LayoutError::io(path, "cannot read the MBTiles file", e))?.len();
+        let bytes =
+            file.metadata().map_err(|e| LayoutError::io(path, "cannot read the MBTiles file", e))?.len();
         for ending in ["-wal", "-journal"] {
             let mut beside = path.as_os_str().to_owned();
             beside.push(ending);
@@ -99,8 +100,10 @@ impl Mbtiles {
                 ));
             }
         }
-        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let allowance = STEPS.saturating_add(STEPS_A_BYTE.saturating_mul(i64::try_from(bytes).unwrap_or(i64::MAX)));
+        let flags =
+            OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let allowance =
+            STEPS.saturating_add(STEPS_A_BYTE.saturating_mul(i64::try_from(bytes).unwrap_or(i64::MAX)));
         let left = Arc::new(AtomicI64::new(allowance));
         let opened = Connection::open_with_flags(uri(path), flags).and_then(|mut database| {
             guard(&mut database, Arc::clone(&left))?;
@@ -260,13 +263,21 @@ fn told(path: &Path, place: &str, error: Error) -> LayoutError {
                 "{place}: looking for tiles takes far more steps than a file of its size should; it may lack an index: CREATE UNIQUE INDEX tile_index ON tiles (zoom_level, tile_column, tile_row)"
             ),
         ),
-        (_, Some(ErrorCode::NotADatabase)) => {
-            LayoutError::not_this_format(path, "this is no SQLite database, or it is encrypted; fetch it again")
-        }
-        (_, Some(ErrorCode::AuthorizationForStatementDenied)) => LayoutError::unsupported(
+        (_, Some(ErrorCode::NotADatabase)) => LayoutError::not_this_format(
             path,
-            format!("{place}: its views do more than to join tables, which is not done for safety; write the tiles into a plain table"),
+            "this is no SQLite database, or it is encrypted; fetch it again",
         ),
+        (Error::SqlInputError { msg: words, .. } | Error::SqliteFailure(_, Some(words)), _)
+            if words.contains("not authorized")
+                || code == Some(ErrorCode::AuthorizationForStatementDenied) =>
+        {
+            LayoutError::unsupported(
+                path,
+                format!(
+                    "{place}: its views do more than to join tables, which is not done for safety; write the tiles into a plain table"
+                ),
+            )
+        }
         (_, Some(ErrorCode::TooBig)) => damaged("it holds more bytes than a tile can have; fetch it again"),
         (_, Some(ErrorCode::SystemIoFailure | ErrorCode::CannotOpen | ErrorCode::PermissionDenied)) => {
             damaged("it cannot be read; check the disk, and fetch the file again")
@@ -274,7 +285,10 @@ fn told(path: &Path, place: &str, error: Error) -> LayoutError {
         (Error::SqlInputError { .. } | Error::SqliteFailure(..), Some(ErrorCode::Unknown)) => {
             LayoutError::not_this_format(
                 path,
-                format!("this SQLite database has no {} as MBTiles have; if GDAL knows it, convert it: gdal_translate INPUT output.tif", if place.starts_with("table") { place } else { "table tiles" }),
+                format!(
+                    "this SQLite database has no {} as MBTiles have; if GDAL knows it, convert it: gdal_translate INPUT output.tif",
+                    if place.starts_with("table") { place } else { "table tiles" }
+                ),
             )
         }
         _ => damaged("the database is damaged; fetch it again"),

@@ -115,7 +115,9 @@ impl Pyramid {
         if let Some(system) = &about.other_system {
             return Err(LayoutError::unsupported(
                 path,
-                format!("its tiles are in {system}, and read are those of web maps, in EPSG:3857; make them again, for example with: gdal2tiles.py --profile=mercator"),
+                format!(
+                    "its tiles are in {system}, and read are those of web maps, in EPSG:3857; make them again, for example with: gdal2tiles.py --profile=mercator"
+                ),
             ));
         }
         let plan = Plan::new(&*archive, options, around)?;

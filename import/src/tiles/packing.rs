@@ -43,7 +43,12 @@ pub(super) fn find(pyramid: &Pyramid, typed: Option<&str>) -> Result<Found, Layo
             );
             LayoutError::unsupported(pyramid.path(), problem).mended_by(Remedy::Decode)
         })?;
-        return Ok(Found { packing, guessed: None, by: format!("{} from {}", said.value, said.by), warning: None });
+        return Ok(Found {
+            packing,
+            guessed: None,
+            by: format!("{} from {}", said.value, said.by),
+            warning: None,
+        });
     }
     guess(pyramid)
 }

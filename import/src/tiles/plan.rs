@@ -71,10 +71,14 @@ impl Plan {
         else {
             let anywhere = archive.survey(&|zoom| Some(Area::WORLD.tiles(zoom)))?;
             if anywhere.is_empty() {
-                return Err(LayoutError::not_this_format(archive.path(), "there are no tiles in it; fetch it again"));
+                return Err(LayoutError::not_this_format(
+                    archive.path(),
+                    "there are no tiles in it; fetch it again",
+                ));
             }
             return Err(refused(if bounds.typed {
-                "none of its tiles lies in these bounds; check them: west, south, east, north in degrees".into()
+                "none of its tiles lies in these bounds; check them: west, south, east, north in degrees"
+                    .into()
             } else if around.is_some() {
                 "none of its tiles lies on the terrain; check that both are of one place".into()
             } else {
@@ -87,12 +91,17 @@ impl Plan {
             Some(zoom) if levels.contains_key(&zoom) => zoom,
             Some(zoom) => {
                 let there: Vec<String> = levels.keys().map(u8::to_string).collect();
-                return Err(refused(format!("it has no tiles of zoom {zoom} here; it has {}", there.join(", ")))
-                    .mended_by(Remedy::Zoom));
+                return Err(refused(format!(
+                    "it has no tiles of zoom {zoom} here; it has {}",
+                    there.join(", ")
+                ))
+                .mended_by(Remedy::Zoom));
             }
             None => chosen(&levels),
         };
-        let Some(level) = levels.get(&zoom) else { return Err(refused("its tiles changed while it was read; start again".into())) };
+        let Some(level) = levels.get(&zoom) else {
+            return Err(refused("its tiles changed while it was read; start again".into()));
+        };
         if level.span.count() > PLACES_A_TILE.saturating_mul(level.count) {
             let [wide, high] = level.span.sides();
             return Err(refused(format!(
@@ -118,8 +127,14 @@ impl Plan {
             .mended_by(Remedy::Bounds));
         }
         let tile = |at: u64| (at / u64::from(side)) as u32;
-        let span = Span { x: [tile(across.start), tile(across.end - 1)], y: [tile(down.start), tile(down.end - 1)] };
-        let above: Vec<u8> = levels.keys().rev().copied().filter(|above| *above < zoom && zoom - above <= MOST_ABOVE).collect();
+        let span =
+            Span { x: [tile(across.start), tile(across.end - 1)], y: [tile(down.start), tile(down.end - 1)] };
+        let above: Vec<u8> = levels
+            .keys()
+            .rev()
+            .copied()
+            .filter(|above| *above < zoom && zoom - above <= MOST_ABOVE)
+            .collect();
         let mut plan = Self {
             zoom,
             side,
@@ -214,7 +229,9 @@ impl Plan {
         Ok(Some(match made {
             0 => format!("{of}they are void"),
             _ if made == missing => format!("{of}they are {made_of}"),
-            _ => format!("{of}{} are {made_of}, the other {} are void", counted(made), counted(missing - made)),
+            _ => {
+                format!("{of}{} are {made_of}, the other {} are void", counted(made), counted(missing - made))
+            }
         }))
     }
 

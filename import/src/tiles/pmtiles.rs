@@ -6,7 +6,7 @@
 
 use super::about::{About, MAX_TEXT_BYTES, sound};
 use super::archive::{Archive, Level, Levels};
-use super::curve::{FIRST, Block, id_of, blocks};
+use super::curve::{Block, FIRST, blocks, id_of};
 use super::directory::{Directory, Entry};
 use super::grid::{MAX_ZOOM, Span, Tile};
 use crate::geotiff::unpack_zstd;
@@ -65,7 +65,9 @@ fn packing(path: &Path, what: &str, code: u8) -> Result<Packing, LayoutError> {
     };
     Err(LayoutError::unsupported(
         path,
-        format!("its {what} are packed {other}, and read are gzip, Zstandard and none; write it again, for example with: pmtiles convert"),
+        format!(
+            "its {what} are packed {other}, and read are gzip, Zstandard and none; write it again, for example with: pmtiles convert"
+        ),
     ))
 }
 
@@ -84,17 +86,20 @@ impl Pmtiles {
         if header[7] != 3 {
             return Err(LayoutError::unsupported(
                 path,
-                format!("it is PMTiles of version {}, and version 3 is read; convert it with: pmtiles convert", header[7]),
+                format!(
+                    "it is PMTiles of version {}, and version 3 is read; convert it with: pmtiles convert",
+                    header[7]
+                ),
             ));
         }
         let number = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
-        let degrees = |at: usize| f64::from(i32::from_le_bytes(std::array::from_fn(|i| header[at + i]))) / 1e7;
+        let degrees =
+            |at: usize| f64::from(i32::from_le_bytes(std::array::from_fn(|i| header[at + i]))) / 1e7;
         let part = |at: usize, name: &str| {
             let part = [number(at), number(at + 8)];
             let ends = part[0].checked_add(part[1]).filter(|end| *end <= length);
-            ends.map(|_| part).ok_or_else(|| {
-                damaged(&format!("its {name} lie beyond the end of the file; fetch it again"))
-            })
+            ends.map(|_| part)
+                .ok_or_else(|| damaged(&format!("its {name} lie beyond the end of the file; fetch it again")))
         };
         let format = match header[99] {
             1 => "vector tiles",
@@ -233,7 +238,11 @@ impl Pmtiles {
 }
 
 fn too_long(path: &Path, place: &str, most: u64) -> LayoutError {
-    LayoutError::damaged(path, place, format!("it takes more than the {most} bytes that it may; fetch the file again"))
+    LayoutError::damaged(
+        path,
+        place,
+        format!("it takes more than the {most} bytes that it may; fetch the file again"),
+    )
 }
 
 fn unpack(
@@ -254,9 +263,9 @@ fn unpack(
                 .map_err(|_| damaged())?;
             bytes
         }
-        Packing::Zstd => guard(path, || place.to_owned(), || {
-            unpack_zstd(&packed, most as usize + 1).ok_or_else(damaged)
-        })?,
+        Packing::Zstd => {
+            guard(path, || place.to_owned(), || unpack_zstd(&packed, most as usize + 1).ok_or_else(damaged))?
+        }
     };
     if unpacked.len() as u64 > most { Err(too_long(path, place, most)) } else { Ok(unpacked) }
 }
@@ -281,11 +290,8 @@ impl Archive for Pmtiles {
             let shared = spans[usize::from(block.zoom)].and_then(|span| span.shared(block.span));
             let Some(span) = shared else { return };
             let first = span.tile(block.zoom, 0);
-            let level = levels.entry(block.zoom).or_insert_with(|| Level {
-                count: 0,
-                span,
-                samples: Vec::new(),
-            });
+            let level =
+                levels.entry(block.zoom).or_insert_with(|| Level { count: 0, span, samples: Vec::new() });
             level.count = level.count.saturating_add(span.count());
             level.span = level.span.around(span);
             level.look_at(first);

@@ -73,7 +73,8 @@ fn every_archive_has_the_same_heights() {
     for (name, tms) in [("xyz", false), ("tms", true)] {
         let path = folder(&folder_of.path().join(name), &made, ".png", tms);
         if tms {
-            std::fs::write(path.join("tilemapresource.xml"), "<TileMap><SRS>EPSG:3857</SRS></TileMap>").unwrap();
+            std::fs::write(path.join("tilemapresource.xml"), "<TileMap><SRS>EPSG:3857</SRS></TileMap>")
+                .unwrap();
         }
         archives.push((name.into(), path));
     }
@@ -90,10 +91,12 @@ fn every_archive_has_the_same_heights() {
     #[cfg(feature = "mbtiles")]
     for is_view in [false, true] {
         let path = folder_of.path().join(format!("{is_view}.mbtiles"));
-        archives.push((format!("view: {is_view}"), make::mbtiles(&path, &made, &[("format", "png")], is_view)));
+        archives
+            .push((format!("view: {is_view}"), make::mbtiles(&path, &made, &[("format", "png")], is_view)));
     }
     for (name, path) in &archives {
-        let grid = read(path, Some("mapbox"), TileOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let grid =
+            read(path, Some("mapbox"), TileOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
         is_alps(&grid, 64, name);
         assert_eq!(grid.voids(), 0);
     }
@@ -147,7 +150,11 @@ fn how_heights_are_packed_is_typed_stated_told_or_asked_for() {
     assert!(warnings.iter().any(|warning| warning.words.contains("can only be terrarium's")), "{warnings:?}");
 
     for (name, text, says) in [
-        ("tiles.json", r#"{"encoding": "terrarium", "bounds": [0, 40, 20, 60]}"#, "terrarium from tiles.json"),
+        (
+            "tiles.json",
+            r#"{"encoding": "terrarium", "bounds": [0, 40, 20, 60]}"#,
+            "terrarium from tiles.json",
+        ),
         (
             "metadata.json",
             r#"{"encoding": "custom", "redFactor": 256, "greenFactor": 1, "blueFactor": 0.00390625, "baseShift": 32768}"#,
@@ -185,9 +192,16 @@ fn how_heights_are_packed_is_typed_stated_told_or_asked_for() {
 #[test]
 fn transparent_texels_are_voids_and_so_are_missing_tiles() {
     let folder_of = tempdir().unwrap();
-    let mut made = tiles(10, COLUMNS, ROWS, 64, |col, row| {
-        if (col + row) % 5 == 0 { [0; 4] } else { mapbox(hills(col, row)) }
-    });
+    let mut made =
+        tiles(
+            10,
+            COLUMNS,
+            ROWS,
+            64,
+            |col, row| {
+                if (col + row) % 5 == 0 { [0; 4] } else { mapbox(hills(col, row)) }
+            },
+        );
     made.remove(&(10, 531, 360));
     let path = folder(&folder_of.path().join("holes"), &made, ".png", false);
     let options = OpenOptions { decode: Some("mapbox".into()), ..OpenOptions::default() };

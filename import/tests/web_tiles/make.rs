@@ -35,7 +35,9 @@ pub(crate) fn png_of([wide, high]: [u32; 2], texel: impl Fn(u32, u32) -> [u8; 4]
 pub(crate) fn webp(side: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Vec<u8> {
     let texels: Vec<u8> = (0..side * side).flat_map(|i| texel(i % side, i / side)).collect();
     let mut bytes = Vec::new();
-    image_webp::WebPEncoder::new(&mut bytes).encode(&texels, side, side, image_webp::ColorType::Rgba8).unwrap();
+    image_webp::WebPEncoder::new(&mut bytes)
+        .encode(&texels, side, side, image_webp::ColorType::Rgba8)
+        .unwrap();
     bytes
 }
 
@@ -112,7 +114,9 @@ pub(crate) fn mbtiles(path: &Path, tiles: &Tiles, metadata: &[(&str, &str)], is_
             database
                 .execute("INSERT INTO map VALUES (?1, ?2, ?3, ?4)", rusqlite::params![zoom, x, row, id])
                 .unwrap();
-            database.execute("INSERT OR IGNORE INTO images VALUES (?1, ?2)", rusqlite::params![bytes, id]).unwrap();
+            database
+                .execute("INSERT OR IGNORE INTO images VALUES (?1, ?2)", rusqlite::params![bytes, id])
+                .unwrap();
         } else {
             database
                 .execute("INSERT INTO tiles VALUES (?1, ?2, ?3, ?4)", rusqlite::params![zoom, x, row, bytes])

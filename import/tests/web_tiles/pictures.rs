@@ -42,7 +42,12 @@ fn every_archive_has_the_same_colours() {
         pmtiles(&folder_of.path().join("a.pmtiles"), &packed, "{}", bounds, Pm::PLAIN),
     ];
     #[cfg(feature = "mbtiles")]
-    archives.push(crate::make::mbtiles(&folder_of.path().join("a.mbtiles"), &made, &[("format", "png")], true));
+    archives.push(crate::make::mbtiles(
+        &folder_of.path().join("a.mbtiles"),
+        &made,
+        &[("format", "png")],
+        true,
+    ));
     archives.push(folder(&folder_of.path().join("mixed"), &made, ".PNG", false));
     for path in archives {
         let image = open_image(&path).unwrap_or_else(|error| panic!("{error}"));
@@ -67,7 +72,8 @@ fn missing_tiles_are_coarser_ones_or_transparent() {
     let path = folder(&folder_of.path().join("gaps"), &made, ".png", false);
     let image = open_image(&path).unwrap();
     let notes = &image.info().notes;
-    let words = "2 of 8 tiles are missing: 1 are made of coarser tiles, of zoom 8 at least, the other 1 are void";
+    let words =
+        "2 of 8 tiles are missing: 1 are made of coarser tiles, of zoom 8 at least, the other 1 are void";
     assert!(notes.iter().any(|note| note == words), "{notes:?}");
     let all = texels(&*image);
     let at = |col: u32, row: u32| all[(row * 4 * SIDE + col) as usize];
@@ -75,7 +81,10 @@ fn missing_tiles_are_coarser_ones_or_transparent() {
         let coarse = colour(u64::from((261 * SIDE + col) / 2), u64::from((171 * SIDE + row) / 2));
         assert_eq!(at(SIDE + col, SIDE + row), coarse);
         assert_eq!(at(3 * SIDE + col, SIDE + row), [0; 4]);
-        assert_eq!(at(2 * SIDE + col, SIDE + row), colour(u64::from(262 * SIDE + col), u64::from(171 * SIDE + row)));
+        assert_eq!(
+            at(2 * SIDE + col, SIDE + row),
+            colour(u64::from(262 * SIDE + col), u64::from(171 * SIDE + row))
+        );
     }
 }
 
@@ -98,7 +107,13 @@ fn of_a_world_only_what_lies_on_the_terrain_is_read() {
     let mut made = tiles(4, 0..16, 0..16, SIDE, colour);
     made.extend(tiles(10, 518..526, 338..346, SIDE, colour));
     made.insert((10, 3, 3), b"<html>not found</html>".to_vec());
-    let path = pmtiles(&folder_of.path().join("world.pmtiles"), &made, "{}", [-180.0, -85.0, 180.0, 85.0], Pm::PLAIN);
+    let path = pmtiles(
+        &folder_of.path().join("world.pmtiles"),
+        &made,
+        "{}",
+        [-180.0, -85.0, 180.0, 85.0],
+        Pm::PLAIN,
+    );
     let open = |options: TileOptions| {
         let options = PictureOptions { tiles: options };
         open_images(std::slice::from_ref(&path), Some(terrain.header()), &options).unwrap().remove(0)
@@ -116,6 +131,7 @@ fn of_a_world_only_what_lies_on_the_terrain_is_read() {
 
     let elsewhere = tiles(9, 100..102, 100..102, SIDE, colour);
     let elsewhere = folder(&folder_of.path().join("elsewhere"), &elsewhere, ".png", false);
-    let refused = open_images(&[elsewhere], Some(terrain.header()), &PictureOptions::default()).err().unwrap();
+    let refused =
+        open_images(&[elsewhere], Some(terrain.header()), &PictureOptions::default()).err().unwrap();
     assert!(refused.to_string().contains("none of its tiles lies on the terrain"), "{refused}");
 }

@@ -114,12 +114,13 @@ fn a_missing_tile_is_made_of_the_one_above() {
     let grid = super::collect(&*dem).unwrap();
     let warned: Vec<String> = dem.warnings().into_iter().map(|warning| warning.words).collect();
     assert!(
-        warned.contains(&"3 of 16 tiles are missing: they are made of coarser tiles, of zoom 5 at least".to_owned()),
+        warned.contains(
+            &"3 of 16 tiles are missing: they are made of coarser tiles, of zoom 5 at least".to_owned()
+        ),
         "{warned:?}"
     );
-    let wanted = |col: u32, row: u32| {
-        f64::from(100 * SIDE + col) / 10.0 + f64::from(60 * SIDE + row) / 5.0 - 1000.0
-    };
+    let wanted =
+        |col: u32, row: u32| f64::from(100 * SIDE + col) / 10.0 + f64::from(60 * SIDE + row) / 5.0 - 1000.0;
     for (col, row) in (0..4 * SIDE).flat_map(|col| (0..4 * SIDE).map(move |row| (col, row))) {
         let [x, y] = [col / SIDE, row / SIDE];
         let off = (grid.at(col, row) - wanted(col, row)).abs();
