@@ -38,15 +38,21 @@ pub(crate) fn read(files: &[(&str, &[u8])], options: &OpenOptions) {
     files.iter().for_each(|(name, bytes)| seeds::write(&folder.path().join(name), bytes));
     let path = folder.path().join(files.first().map_or("dem", |(name, _)| name));
     let Some(dem) = told(terrasoar_import::open_with(std::slice::from_ref(&path), options)) else { return };
+    streams(&*dem);
+    let info = dem.info();
+    if u64::from(info.samples_wide) * u64::from(info.samples_high) <= MOST_SAMPLES {
+        builds(&*dem, folder.path(), files.len());
+    }
+}
+
+/// Streams elevation data; what ends well has given every sample.
+pub(crate) fn streams(dem: &dyn DemSource) {
     let info = dem.info();
     assert!(info.samples_wide >= 2 && info.samples_high >= 2, "{info:?}");
     let sink = Sink::new(info);
     let streamed = dem.stream(&sink);
     if told(streamed).is_some() {
         sink.check_whole();
-    }
-    if u64::from(info.samples_wide) * u64::from(info.samples_high) <= MOST_SAMPLES {
-        builds(&*dem, folder.path(), files.len());
     }
 }
 

@@ -20,6 +20,7 @@ mod seeds;
 mod take_out;
 mod terrain_sealed;
 mod use_files;
+mod web_tiles;
 mod words;
 mod world_file;
 
@@ -27,6 +28,7 @@ use beside::{aux_xml, reference_system};
 use gridded::{dted, netcdf, usgs_dem};
 use grids::{ascii_grid, labelled, netpbm, packed_png, raw, tiles, xyz};
 pub use seeds::Inputs;
+use web_tiles::{map_tile, mbtiles, pmtiles};
 
 use std::panic::{PanicHookInfo, resume_unwind};
 use std::path::Path;
@@ -103,6 +105,12 @@ targets! {
     raw { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// An `.hgt` tile, packed or in an archive.
     tiles { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A pyramid of map tiles in PMTiles: as heights, as a picture by itself and on a terrain.
+    pmtiles { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// The same in MBTiles.
+    mbtiles { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A tile in a folder of map tiles.
+    map_tile { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A PNG whose colours are heights, or in seven passes.
     packed_png { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// NetCDF, classic and over HDF5.

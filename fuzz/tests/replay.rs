@@ -89,6 +89,21 @@ fn packed_tiles() {
 }
 
 #[test]
+fn map_tiles_in_pmtiles() {
+    replay("pmtiles");
+}
+
+#[test]
+fn map_tiles_in_mbtiles() {
+    replay("mbtiles");
+}
+
+#[test]
+fn map_tiles_in_folders() {
+    replay("map_tile");
+}
+
+#[test]
 fn packed_png() {
     replay("packed_png");
 }

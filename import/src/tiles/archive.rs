@@ -67,6 +67,9 @@ pub(super) trait Archive: Send + Sync {
 
     fn about(&self) -> &About;
 
+    /// Memory that looking tiles up takes.
+    fn memory_bytes(&self) -> u64;
+
     /// Counts the tiles of each zoom; `within` gives the columns and rows of a zoom that count.
     ///
     /// # Errors

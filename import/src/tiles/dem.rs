@@ -154,8 +154,7 @@ impl Reader for TileDem {
     }
 
     fn memory_bytes(&self) -> u64 {
-        let threads = rayon::current_num_threads() as u64;
-        Pyramid::SHARED_BYTES + threads * self.pyramid.memory_bytes()
+        self.pyramid.memory_bytes()
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {

@@ -161,6 +161,10 @@ impl Archive for Folder {
         &self.about
     }
 
+    fn memory_bytes(&self) -> u64 {
+        1 << 20
+    }
+
     fn survey(&self, within: &dyn Fn(u8) -> Option<Span>) -> Result<Levels, LayoutError> {
         let mut levels = Levels::new();
         let mut endings = BTreeSet::new();

@@ -49,15 +49,12 @@ impl TileImage {
             notes.push("16 bits a channel are cut to the upper 8".into());
         }
         let band = band_bytes(&pyramid);
-        let threads = rayon::current_num_threads() as u64;
         let info = ImageInfo {
             texels: plan.size,
             georeference: Georeference::default(),
             format: pyramid.format(),
             notes,
-            memory_bytes: Pyramid::SHARED_BYTES
-                + threads * pyramid.memory_bytes()
-                + if band <= MOST_HELD { band } else { 0 },
+            memory_bytes: pyramid.memory_bytes() + if band <= MOST_HELD { band } else { 0 },
         };
         Ok(Self { pyramid, info })
     }

@@ -308,6 +308,11 @@ impl Archive for Mbtiles {
         &self.about
     }
 
+    fn memory_bytes(&self) -> u64 {
+        // Pages, and a tile.
+        8 << 20
+    }
+
     fn survey(&self, within: &dyn Fn(u8) -> Option<Span>) -> Result<Levels, LayoutError> {
         let mut levels = Levels::new();
         for zoom in 0..=MAX_ZOOM {

@@ -138,16 +138,14 @@ impl Pyramid {
         CrsSaid { code: Some(Said::new(3857, "the tiles")), ..CrsSaid::default() }
     }
 
-    /// Memory that a thread takes.
+    /// Memory that reading takes on the threads of now.
     fn memory_bytes(&self) -> u64 {
         let texels = u64::from(self.plan.side) * u64::from(self.plan.side);
         // The bytes, what the decoder makes of them, colours and heights; and the same of a coarser tile.
         let tile = texels * (4 + 8 + 4 + 8);
-        2 * tile + (1 << 20)
+        let thread = 2 * tile + (1 << 20);
+        self.archive.memory_bytes() + rayon::current_num_threads() as u64 * thread
     }
-
-    /// Memory beside that of threads: pages of a database, directories.
-    const SHARED_BYTES: u64 = 48 << 20;
 
     /// A tile of the zoom that is read; `None` where it is missing.
     fn tile(&self, tile: Tile, bytes: &mut Vec<u8>) -> Result<Option<Texels>, LayoutError> {

@@ -28,7 +28,7 @@ const MAX_DIRECTORY_BYTES: u64 = 16 << 20;
 /// How deep leaves lie in leaves.
 const DEEPEST: u32 = 4;
 /// Entries of leaves that are kept.
-const KEPT_ENTRIES: usize = 1 << 19;
+const KEPT_ENTRIES: usize = 1 << 17;
 /// Entries that a survey goes through: a world of zoom 15 has some hundred million.
 const MOST_ENTRIES: u64 = 1 << 29;
 
@@ -281,6 +281,12 @@ impl Archive for Pmtiles {
 
     fn about(&self) -> &About {
         &self.about
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        let entries = (self.root.len() + KEPT_ENTRIES) as u64;
+        // And a leaf that is being unpacked.
+        entries * size_of::<Entry>() as u64 + (8 << 20)
     }
 
     fn survey(&self, within: &dyn Fn(u8) -> Option<Span>) -> Result<Levels, LayoutError> {

@@ -41,11 +41,6 @@ fn views_that_do_more_than_join_are_refused() {
             format!("CREATE TABLE t (x); CREATE VIEW tiles AS {columns} FROM (SELECT a.x FROM t a, t b ORDER BY b.x LIMIT 1000)"),
             "sorts or copies rows",
         ),
-        (
-            "distinct",
-            format!("CREATE TABLE t (x); CREATE VIEW tiles AS {columns} FROM (SELECT DISTINCT x FROM t)"),
-            "sorts or copies rows",
-        ),
         ("itself", "CREATE VIEW tiles AS SELECT * FROM b; CREATE VIEW b AS SELECT * FROM tiles".into(), ""),
         ("no tiles", "CREATE TABLE other (x)".into(), "no table tiles as MBTiles have"),
         ("no column", "CREATE TABLE tiles (zoom_level, tile_column)".into(), "no table tiles as MBTiles have"),
