@@ -282,7 +282,7 @@ fn told(path: &Path, place: &str, error: Error) -> LayoutError {
         (_, Some(ErrorCode::SystemIoFailure | ErrorCode::CannotOpen | ErrorCode::PermissionDenied)) => {
             damaged("it cannot be read; check the disk, and fetch the file again")
         }
-        (Error::SqlInputError { .. } | Error::SqliteFailure(..), Some(ErrorCode::Unknown)) => {
+        (Error::SqlInputError { .. }, _) | (Error::SqliteFailure(..), Some(ErrorCode::Unknown)) => {
             LayoutError::not_this_format(
                 path,
                 format!(

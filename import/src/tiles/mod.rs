@@ -37,9 +37,10 @@ const SQLITE: &[u8] = b"SQLite format 3\0";
 
 /// Whether the file that begins so may be MBTiles: an SQLite database that does not say it is something else.
 pub(crate) fn is_mbtiles(path: &Path, head: &[u8]) -> bool {
-    head.starts_with(SQLITE)
-        && (head.get(68..72) == Some(b"MPBX")
-            || (head.get(68..72) == Some(&[0; 4]) && crate::identify::is_called(path, "mbtiles")))
+    // The number of the application that made it.
+    let is_another = head.get(68..72).is_some_and(|id| id.starts_with(b"GP"));
+    let is_ours = head.get(68..72) == Some(b"MPBX") || crate::identify::is_called(path, "mbtiles");
+    head.starts_with(SQLITE) && is_ours && !is_another
 }
 
 /// Whether the file that begins so is PMTiles.

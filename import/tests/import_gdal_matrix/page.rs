@@ -78,7 +78,8 @@ pub(crate) fn page() -> String {
         );
     }
     page.push_str(
-        "| headerless heightmap | - | any, stated as `--raw WxH:TYPE`; square `.r16`, `.r32` and `.raw` by their length | `--nodata` |\n\n\
+        "| headerless heightmap | - | any, stated as `--raw WxH:TYPE`; square `.r16`, `.r32` and `.raw` by their length | `--nodata` |\n\
+         | map tiles: folders, MBTiles, PMTiles | - | packed into colours | transparent, missing |\n\n\
          `--nodata` adds a mark of voids to any format. All formats are read in bounded memory (`--memory`).\n\n",
     );
     for format in FORMATS {
@@ -89,6 +90,12 @@ pub(crate) fn page() -> String {
             let _ = writeln!(page, "Stored as: {}.\n", joined("; ", storage.iter().copied()));
         }
     }
+    page.push_str(
+        "### Map tiles\n\n\
+         Pyramids of web-map tiles in EPSG:3857: folders of `zoom/column/row.png` (XYZ, and TMS), MBTiles, and PMTiles of version 3. Heights are packed into PNG or lossless WebP, as \
+         `--decode` or the pyramid's metadata say. One zoom is read, by `--zoom` and `--bounds`. Tiles of AVIF and vector tiles are refused, and so are directories packed by Brotli. GDAL's reading is the truth \
+         here too, in the test `import_gdal_tiles`.\n\n",
+    );
     page.push_str(
         "## Which way rows and columns go\n\n| grid | files compared | what is done |\n|---|---|---|\n",
     );
