@@ -22,6 +22,7 @@ use terrasoar_layout::read::terrain::Terrain;
 use tools::run;
 
 /// A DEM of heights in tenths of metres, as a picture of colours that they are packed into, in EPSG:3857 off any tile's rim.
+#[cfg(feature = "mbtiles")]
 fn packed_tiff(folder_of: &Path, size: [u32; 2]) -> PathBuf {
     let path = folder_of.join("packed.ppm");
     let mut bytes = format!("P6\n{} {}\n255\n", size[0], size[1]).into_bytes();

@@ -27,6 +27,7 @@ pub(super) struct About {
 
 impl About {
     /// Takes a pair of MBTiles' metadata.
+    #[cfg(any(test, feature = "mbtiles"))]
     pub(super) fn take_pair(&mut self, name: &str, value: &str, by: &str) {
         match name {
             "json" => {
