@@ -109,6 +109,7 @@ pub(crate) mod pmtiles {
             ("gzip", file(2, &directory(&all), b"", &data)),
             ("leaf", file(1, &root, &leaf, &data)),
             ("missing", file(1, &directory(&[all[0], [7, 1, 0, first], [9, 3, first, second]]), b"", &data)),
+            ("bomb", file(2, &vec![0; 8 << 20], b"", b"")),
             ("one", file(1, &directory(&[[0, 1, 0, first]]), b"", &data)),
         ])
     }

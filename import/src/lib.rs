@@ -83,7 +83,7 @@ pub use strangers::strangers;
 /// Samples handed to a sink in one window, at most, unless a row has more: half a mebibyte of `f64`.
 const WINDOW_SAMPLES: u64 = 1 << 16;
 
-/// Opens the elevation data in `paths`: one file; several `.hgt` tiles, or a folder of them, as one mosaic.
+/// Opens the elevation data in `paths`: one file; several `.hgt` tiles, or a folder of them, as one mosaic; a pyramid of map tiles in a folder.
 ///
 /// The formats are those of `formats.rs`. Cost: the headers, and for GeoTIFF 16 bytes a chunk; no samples, but an XYZ grid is read once to find its grid, and of a
 /// colour PNG the beginning to see whether heights are packed into it.

@@ -23,7 +23,7 @@ use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::header::Header;
 use terrasoar_layout::imagery::ImageSource;
 
-/// Opens the image at `path`: PNG, JPEG or GeoTIFF, of 8 bits a channel (16 are cut to 8 with a word), grey, RGB or a palette, with or
+/// Opens the image at `path`: a pyramid of map tiles, PNG, JPEG or GeoTIFF, of 8 bits a channel (16 are cut to 8 with a word), grey, RGB or a palette, with or
 /// without alpha, with or without a mask. Where it lies is said in it, or by a world file, `.prj` or `.aux.xml` beside it. A picture that lies nowhere is turned as its EXIF
 /// tag says.
 ///

@@ -203,6 +203,7 @@ impl Pmtiles {
         directory: &Directory,
         end: u64,
         depth: u32,
+        spans: &[Option<Span>],
         seen: &mut u64,
         each: &mut dyn FnMut(Block),
     ) -> Result<(), LayoutError> {
@@ -218,10 +219,10 @@ impl Pmtiles {
                 blocks(entry.id, entry.run, each);
             } else if depth == 0 {
                 return Err(self.too_deep());
-            } else {
+            } else if touches(spans, entry.id, next.min(end)) {
                 let end = next.min(end);
                 let leaf = self.leaf(&entry, end)?;
-                self.walk(&leaf, end, depth - 1, seen, each)?;
+                self.walk(&leaf, end, depth - 1, spans, seen, each)?;
             }
         }
         Ok(())
@@ -235,6 +236,16 @@ impl Pmtiles {
             LayoutError::damaged(&self.path, self.label(tile), problem)
         })
     }
+}
+
+/// Whether tiles of numbers from `id` to before `end` can be among those of the columns and rows of each zoom.
+fn touches(spans: &[Option<Span>], id: u64, end: u64) -> bool {
+    let mut some = false;
+    blocks(id, end.saturating_sub(id), &mut |block| {
+        let span = spans.get(usize::from(block.zoom)).copied().flatten();
+        some |= span.and_then(|span| span.shared(block.span)).is_some();
+    });
+    some
 }
 
 fn too_long(path: &Path, place: &str, most: u64) -> LayoutError {
@@ -302,7 +313,7 @@ impl Archive for Pmtiles {
             level.span = level.span.around(span);
             level.look_at(first);
         };
-        self.walk(&self.root, FIRST[usize::from(MAX_ZOOM) + 1], DEEPEST, &mut 0, &mut count)?;
+        self.walk(&self.root, FIRST[usize::from(MAX_ZOOM) + 1], DEEPEST, &spans, &mut 0, &mut count)?;
         Ok(levels)
     }
 
