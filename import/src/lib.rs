@@ -63,7 +63,6 @@ mod tiles;
 mod usgs_dem;
 mod value;
 mod warp;
-mod webp;
 mod xyz;
 
 use std::path::{Path, PathBuf};

@@ -2,9 +2,9 @@
 //!
 //! A tile is a square whose size is read before anything is decoded. Whatever it holds comes as red, green, blue, alpha of 8 bits. Cost: 4 bytes a texel, and the decoder's own.
 
+use super::webp::{Webp, is_webp};
 use crate::guard::guard;
 use crate::jpeg_frame::JpegFrame;
-use crate::webp::{Webp, is_webp};
 use jpeg_decoder::{Decoder as JpegDecoder, PixelFormat};
 use png::{BitDepth, Decoder as PngDecoder, Limits, Transformations};
 use std::io::Cursor;

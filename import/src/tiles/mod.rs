@@ -17,6 +17,7 @@ mod mbtiles;
 mod packing;
 mod plan;
 mod pmtiles;
+mod webp;
 
 use crate::input;
 use crate::options::TileOptions;

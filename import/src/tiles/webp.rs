@@ -7,22 +7,22 @@ use image_webp::WebPDecoder;
 use std::io::Cursor;
 
 /// The head of a WebP file.
-pub(crate) const HEAD_BYTES: usize = 12;
+pub(super) const HEAD_BYTES: usize = 12;
 
 /// Whether bytes begin as WebP does.
-pub(crate) fn is_webp(head: &[u8]) -> bool {
+pub(super) fn is_webp(head: &[u8]) -> bool {
     head.len() >= HEAD_BYTES && head.starts_with(b"RIFF") && head[8..12] == *b"WEBP"
 }
 
 /// A WebP picture whose head was read.
-pub(crate) struct Webp<'b> {
+pub(super) struct Webp<'b> {
     decoder: WebPDecoder<Cursor<&'b [u8]>>,
     /// Width and height in texels.
-    pub(crate) size: [u32; 2],
+    pub(super) size: [u32; 2],
     /// 3 or 4.
-    pub(crate) channels: usize,
+    pub(super) channels: usize,
     /// Whether colours were changed to take less room.
-    pub(crate) is_lossy: bool,
+    pub(super) is_lossy: bool,
 }
 
 impl<'b> Webp<'b> {
@@ -30,7 +30,7 @@ impl<'b> Webp<'b> {
     ///
     /// # Errors
     /// What is wrong with it, in words.
-    pub(crate) fn new(bytes: &'b [u8]) -> Result<Self, &'static str> {
+    pub(super) fn new(bytes: &'b [u8]) -> Result<Self, &'static str> {
         const DAMAGED: &str = "the WebP picture is damaged; fetch it again";
         let mut decoder = WebPDecoder::new(Cursor::new(bytes)).map_err(|_| DAMAGED)?;
         if decoder.is_animated() {
@@ -49,7 +49,7 @@ impl<'b> Webp<'b> {
     ///
     /// # Errors
     /// Damage, in words.
-    pub(crate) fn texels(mut self) -> Result<Vec<u8>, &'static str> {
+    pub(super) fn texels(mut self) -> Result<Vec<u8>, &'static str> {
         let count = self.size.iter().map(|side| *side as usize).product::<usize>() * self.channels;
         let mut texels = vec![0; count];
         self.decoder
