@@ -74,7 +74,7 @@ pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
 pub use options::{Direction, OpenOptions, Resampling};
-pub use picture::{open_image, open_images_on};
+pub use picture::{PictureOptions, Stretch, open_image, open_images, open_images_on};
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 pub use strangers::strangers;
 

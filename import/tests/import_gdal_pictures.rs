@@ -2,6 +2,8 @@
 //!
 //! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-import --test import_gdal_pictures -- --ignored`. One by itself: `TERRASOAR_ONLY='JPEG'`.
 
+#[path = "gdal_pictures/shown.rs"]
+mod shown;
 #[path = "import_support/tools.rs"]
 mod tools;
 

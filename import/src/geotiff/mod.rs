@@ -17,6 +17,7 @@ mod chunk_grid;
 mod chunks;
 mod codec;
 mod colour;
+mod colour_paint;
 mod colour_table;
 mod convert;
 mod failure;

@@ -66,6 +66,10 @@ impl Picture for JpegImage {
     fn has_bytes(&self) -> bool {
         true
     }
+
+    fn colours(&self) -> usize {
+        if self.channels == 1 { 1 } else { 3 }
+    }
 }
 
 impl ImageSource for JpegImage {
