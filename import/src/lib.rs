@@ -37,6 +37,7 @@ mod heights;
 mod hgt;
 mod identify;
 pub(crate) mod input;
+mod jpeg2000;
 pub(crate) mod jpeg_frame;
 mod kept;
 mod labelled;
@@ -62,6 +63,7 @@ mod tiff_tags;
 mod usgs_dem;
 mod value;
 mod warp;
+mod webp;
 mod xyz;
 
 use std::path::{Path, PathBuf};

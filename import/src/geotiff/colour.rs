@@ -11,13 +11,11 @@ use super::colour_paint::Paint;
 use super::colour_table::{Packing, Table};
 use super::listing::Places;
 use super::span::turn_bits;
-use super::{TiffMask, codec, failure, geokeys, predictor, tags};
+use super::{TiffMask, codec, colour_codecs, failure, geokeys, predictor, tags};
 use crate::guard::guard;
 use crate::input;
-use crate::jpeg_frame::JpegFrame;
 use crate::picture::PictureOptions;
 use crate::reader::{CrsSaid, NumberRows, Numbers, Orientation, Picture, Reader, bits_of};
-use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::ErrorKind;
@@ -374,9 +372,9 @@ impl TiffImage {
             LayoutError::damaged(&self.path, name(), format!("{problem}; fetch or write the file again"))
         };
         guard(&self.path, name, || match &table.packing {
-            Packing::Jpeg { tables } => {
-                let image = join_tables(tables, &scratch.packed);
-                let (bytes, channels) = self.decode_jpeg(&image, rows).map_err(damaged)?;
+            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 => {
+                let packed = &scratch.packed;
+                let (bytes, channels) = colour_codecs::decode(table, packed, rows).map_err(damaged)?;
                 scratch.bytes = bytes;
                 Ok(channels)
             }
@@ -411,47 +409,5 @@ impl TiffImage {
                 Ok(bands)
             }
         })
-    }
-
-    fn decode_jpeg(&self, image: &[u8], rows: u32) -> Result<(Vec<u8>, usize), String> {
-        let damaged = |_| "its JPEG stream is damaged".to_owned();
-        // Reading from memory does not fail.
-        let frame = JpegFrame::read(image).map_err(|_| "its JPEG stream is damaged".to_owned())?;
-        frame.check()?;
-        if frame.memory_bytes() > self.table.jpeg_bytes() {
-            return Err("its JPEG stream is of another size or sampling than its tiles".into());
-        }
-        let mut decoder = Decoder::new(image);
-        decoder.read_info().map_err(damaged)?;
-        let Some(info) = decoder.info() else { return Err("its JPEG stream has no size".into()) };
-        let size = (u32::from(info.width), u32::from(info.height));
-        if size.0 != self.table.grid.chunk_width || size.1 < rows || size.1 > self.table.grid.chunk_height {
-            return Err(format!("its JPEG stream is of {} x {} texels", size.0, size.1));
-        }
-        let channels = match info.pixel_format {
-            PixelFormat::L8 => 1,
-            PixelFormat::RGB24 => 3,
-            _ => return Err("its JPEG stream has neither one nor three channels of 8 bits".into()),
-        };
-        let declared = self.table.side_by_side();
-        if channels as u64 != declared {
-            return Err(format!("its JPEG stream has {channels} channels and the image {declared}"));
-        }
-        if channels == 3 {
-            decoder.set_color_transform(if self.table.is_rgb {
-                ColorTransform::RGB
-            } else {
-                ColorTransform::YCbCr
-            });
-        }
-        Ok((decoder.decode().map_err(damaged)?, channels))
-    }
-}
-
-/// A stream that a decoder reads: the tables that all chunks share, without their end mark, and the chunk without its begin mark.
-fn join_tables(tables: &[u8], chunk: &[u8]) -> Vec<u8> {
-    match (tables.strip_suffix(&[0xff, 0xd9]), chunk.strip_prefix(&[0xff, 0xd8])) {
-        (Some(tables), Some(chunk)) => [tables, chunk].concat(),
-        _ => chunk.to_vec(),
     }
 }

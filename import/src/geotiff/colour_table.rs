@@ -8,7 +8,7 @@ use super::chunks::{Compression, Predictor, compression_of};
 use super::colour_paint::{Channels, MAX_BANDS, Paint, Samples};
 use super::listing::Places;
 use super::tags::{self, Directory, TiffFile};
-use crate::picture::{PictureOptions, chosen};
+use crate::picture::{PRESS_NOTE, PictureOptions, chosen};
 use std::num::NonZero;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::error::LayoutError;
@@ -27,6 +27,63 @@ pub(super) enum Packing {
     Jpeg {
         tables: Vec<u8>,
     },
+    /// Chunks are files of WebP.
+    Webp,
+    /// Chunks are streams of JPEG 2000.
+    Jpeg2000,
+}
+
+impl Packing {
+    /// Of the image `directory`.
+    fn read(
+        file: &mut TiffFile,
+        directory: &Directory,
+        samples: &Samples,
+        (bands, is_planar): (u64, bool),
+    ) -> Result<Self, LayoutError> {
+        let code = file.number(directory, tags::COMPRESSION)?.unwrap_or(1);
+        let has_bytes = samples.sample_type == SampleType::U8 && samples.odd.is_none();
+        match code {
+            7 if !has_bytes || (!is_planar && !matches!(bands, 1 | 3)) => Err(unsupported(
+                file,
+                "its chunks are JPEG with more than three channels or 8 bits; convert it: gdal_translate -co TILED=YES \
+                 -co COMPRESS=DEFLATE INPUT output.tif",
+            )),
+            7 => {
+                let tables = file.bytes_of(directory, tags::JPEG_TABLES, MAX_TABLE_BYTES)?;
+                Ok(Self::Jpeg { tables: tables.unwrap_or_default() })
+            }
+            50001 if has_bytes && !is_planar && matches!(bands, 3 | 4) => Ok(Self::Webp),
+            34712
+                if matches!(samples.sample_type, SampleType::U8 | SampleType::U16)
+                    && samples.odd.is_none() =>
+            {
+                Ok(Self::Jpeg2000)
+            }
+            _ => match compression_of(file, directory)? {
+                Compression::Lerc(_) => Err(unsupported(
+                    file,
+                    "its chunks are LERC, which is read of heights and not of pictures; convert it: gdal_translate -co TILED=YES \
+                     -co COMPRESS=DEFLATE INPUT output.tif",
+                )),
+                compression => Ok(Self::Bytes(compression)),
+            },
+        }
+    }
+
+    /// Whether chunks are pictures of their own, which are no rows of samples.
+    fn is_picture(&self) -> bool {
+        !matches!(self, Self::Bytes(_))
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Bytes(compression) => compression.name(),
+            Self::Jpeg { .. } => "JPEG",
+            Self::Webp => "WebP",
+            Self::Jpeg2000 => "JPEG 2000",
+        }
+    }
 }
 
 /// How a picture is stored.
@@ -96,36 +153,12 @@ impl Table {
         if let (Some(odd), true) = (samples.odd.filter(|odd| odd.bits() < 8), is_shades) {
             channels.void = channels.void.map(|void| void * 255.0 / ((1u32 << odd.bits()) - 1) as f64);
         }
-        let packing = if code == 7 {
-            if samples.sample_type != SampleType::U8
-                || samples.odd.is_some()
-                || (!is_planar && !matches!(bands, 1 | 3))
-            {
-                return Err(unsupported(
-                    file,
-                    "its chunks are JPEG with more than three channels or 8 bits; convert it: gdal_translate -co TILED=YES \
-                     -co COMPRESS=DEFLATE INPUT output.tif",
-                ));
-            }
-            let tables = file.bytes_of(directory, tags::JPEG_TABLES, MAX_TABLE_BYTES)?;
-            Packing::Jpeg { tables: tables.unwrap_or_default() }
-        } else {
-            match compression_of(file, directory)? {
-                Compression::Lerc(_) => {
-                    return Err(unsupported(
-                        file,
-                        "its chunks are LERC, which is read of heights and not of pictures; convert it: gdal_translate -co TILED=YES \
-                         -co COMPRESS=DEFLATE INPUT output.tif",
-                    ));
-                }
-                compression => Packing::Bytes(compression),
-            }
-        };
+        let packing = Packing::read(file, directory, &samples, (bands, is_planar))?;
         let predictor = file.number(directory, tags::PREDICTOR)?.unwrap_or(1);
         let is_raw = matches!(packing, Packing::Bytes(Compression::None));
         let predictor = match predictor {
             1 => Predictor::None,
-            _ if is_raw || code == 7 => Predictor::None,
+            _ if is_raw || packing.is_picture() => Predictor::None,
             2 if samples.odd.is_none() => Predictor::Horizontal,
             3 if !samples.sample_type.is_integer() => Predictor::Floating,
             _ => {
@@ -145,7 +178,7 @@ impl Table {
             bands,
             planes,
             samples,
-            is_reversed: code != 7 && file.number(directory, tags::FILL_ORDER)? == Some(2),
+            is_reversed: !packing.is_picture() && file.number(directory, tags::FILL_ORDER)? == Some(2),
             paint,
             channels,
             is_rgb,
@@ -248,17 +281,24 @@ impl Table {
         // Strips are no higher than the image, cut ones lower than the longest.
         let packed = if self.is_raw() { samples.min(self.longest) } else { self.longest };
         let codec = match &self.packing {
-            Packing::Jpeg { .. } => self.jpeg_bytes().saturating_add(packed),
+            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 => {
+                self.picture_bytes().saturating_add(packed)
+            }
             Packing::Bytes(Compression::Zstd) => samples.saturating_mul(2),
             Packing::Bytes(_) => 0,
         };
         packed.saturating_add(samples).saturating_add(moved).saturating_add(codec).saturating_add(1 << 18)
     }
 
-    /// Memory that unpacking a chunk of JPEG may take.
-    pub(super) fn jpeg_bytes(&self) -> u64 {
+    /// Memory that unpacking a chunk that is a picture of its own may take.
+    pub(super) fn picture_bytes(&self) -> u64 {
         let padded = [self.grid.chunk_width, self.grid.chunk_height].map(|side| u64::from(side) + 64);
-        padded[0].saturating_mul(padded[1]).saturating_mul(5 * self.side_by_side())
+        let texels = padded[0].saturating_mul(padded[1]);
+        match &self.packing {
+            Packing::Jpeg2000 => texels.saturating_mul(10 * self.side_by_side() + 24).saturating_add(1 << 17),
+            Packing::Webp => texels.saturating_mul(12).saturating_add(8 << 20),
+            _ => texels.saturating_mul(5 * self.side_by_side()),
+        }
     }
 
     /// Bytes of a whole chunk when unpacked, as RGBA if that is more.
@@ -271,10 +311,7 @@ impl Table {
     /// ", tiles of 512 x 512 RGB with alpha, DEFLATE".
     pub(super) fn describe(&self) -> String {
         let colour = self.paint.name();
-        let packing = match &self.packing {
-            Packing::Bytes(compression) => compression.name(),
-            Packing::Jpeg { .. } => "JPEG",
-        };
+        let packing = self.packing.name();
         format!(
             ", {} of {} x {} {}-bit {colour}{}, {packing}",
             self.grid.kind(),
@@ -331,6 +368,9 @@ fn colours(
         }
         named => named,
     };
+    if matches!(paint, Paint::Cmyk) {
+        notes.push(PRESS_NOTE.into());
+    }
     let colours: Vec<usize> = (0..paint.channels()).collect();
     let unused = bands - colours.len() as u64 - u64::from(alpha.is_some());
     if unused > 0 {

@@ -7,17 +7,22 @@ mod across;
 mod bands;
 mod completed;
 mod counts;
+mod jp2;
 mod jpeg;
 mod oriented;
 mod png;
 mod show;
 mod stretched;
 mod texels;
+mod webp;
 
 pub(crate) use bands::chosen;
+pub(crate) use jpeg::PRESS_NOTE;
 pub use show::{PictureOptions, Stretch};
 
+use crate::jpeg2000::is_jpeg2000;
 use crate::reader::{Orientation, Picture};
+use crate::webp::is_webp;
 use crate::{TiffImage, input, is_tiff};
 use completed::Completed;
 use oriented::Oriented;
@@ -127,12 +132,16 @@ fn open(path: &Path, options: &PictureOptions) -> Result<(Completed, Orientation
         Box::new(png::PngImage::open(path, options)?)
     } else if head.starts_with(b"\xff\xd8\xff") {
         Box::new(jpeg::JpegImage::open(path)?)
+    } else if is_webp(&head) {
+        Box::new(webp::WebpImage::open(path)?)
+    } else if is_jpeg2000(&head) {
+        Box::new(jp2::Jp2Image::open(path, options)?)
     } else if is_tiff(&head) {
         Box::new(TiffImage::open(path, options)?)
     } else {
         return Err(LayoutError::not_this_format(
             path,
-            "this is no PNG, JPEG or TIFF; if GDAL knows it, convert it: gdal_translate -co TILED=YES INPUT output.tif",
+            "this is no PNG, JPEG, WebP, JPEG 2000 or TIFF; if GDAL knows it, convert it: gdal_translate -co TILED=YES INPUT output.tif",
         ));
     };
     let orientation = picture.orientation();
