@@ -56,6 +56,7 @@ mod pnm;
 mod raster;
 mod raw;
 mod reader;
+mod shown;
 mod strangers;
 pub mod synth;
 mod text;
@@ -76,8 +77,9 @@ pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
 pub use options::{Direction, OpenOptions, Resampling};
-pub use picture::{PictureOptions, Stretch, open_image, open_images, open_images_on};
+pub use picture::{open_image, open_images, open_images_on};
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
+pub use shown::{PictureOptions, Stretch};
 pub use strangers::strangers;
 
 /// Samples handed to a sink in one window, at most, unless a row has more: half a mebibyte of `f64`.

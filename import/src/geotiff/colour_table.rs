@@ -8,7 +8,7 @@ use super::chunks::{Compression, Predictor, compression_of};
 use super::colour_paint::{Channels, MAX_BANDS, Paint, Samples};
 use super::listing::Places;
 use super::tags::{self, Directory, TiffFile};
-use crate::picture::{PRESS_NOTE, PictureOptions, chosen};
+use crate::shown::{PRESS_NOTE, PictureOptions, chosen_bands};
 use std::num::NonZero;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::error::LayoutError;
@@ -346,7 +346,7 @@ fn colours(
     wanted: &[NonZero<u32>],
     notes: &mut Vec<String>,
 ) -> Result<(Paint, Vec<usize>), LayoutError> {
-    let chosen = chosen(file.path(), bands, wanted)?;
+    let chosen = chosen_bands(file.path(), bands, wanted)?;
     if !chosen.is_empty() {
         let paint = match named {
             // One band that is places in a palette is these.

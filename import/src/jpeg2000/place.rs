@@ -3,10 +3,8 @@
 //! The GeoTIFF counts before GML. Of GML a rectified grid is read whose system is told by its code. Cost: a parse of some kilobytes.
 
 use crate::crs;
-use crate::geotiff;
 use crate::reader::{CrsSaid, Said};
 use roxmltree::{Document, Node};
-use std::path::Path;
 
 /// Longest box that is looked at.
 pub(super) const MAX_BYTES: u64 = 4 << 20;
@@ -54,29 +52,19 @@ fn find(bytes: &[u8], seen: &mut usize, depth: usize) -> Option<String> {
 }
 
 impl Ground {
-    /// The map from texel centres, and the system; what was not understood, in words.
-    pub(crate) fn said(&self, path: &Path) -> (Option<[f64; 6]>, CrsSaid, Option<String>) {
-        let mut note = None;
-        if let Some(tiff) = &self.tiff {
-            match geotiff::place_of(path, tiff) {
-                Ok((Some(map), crs)) => return (Some(map), crs, None),
-                Ok((None, _)) => {}
-                Err(_) => {
-                    note = Some("its box of a GeoTIFF (GeoJP2) is damaged and was passed over".to_owned())
-                }
-            }
-        }
-        let Some(text) = &self.gml else { return (None, CrsSaid::default(), note) };
-        match grid(text) {
-            Some((map, code)) => {
-                let crs = CrsSaid { code: Some(Said::new(code, "GML in it")), ..CrsSaid::default() };
-                (Some(map), crs, note)
-            }
-            None => {
-                let words = "what it says of its place in GML (GMLJP2) is not understood and was passed over";
-                (None, CrsSaid::default(), Some(words.to_owned()))
-            }
-        }
+    /// The GeoTIFF without a picture, if there is one.
+    pub(crate) fn tiff(&self) -> Option<&[u8]> {
+        self.tiff.as_deref()
+    }
+
+    /// The map from texel centres and the system that GML says; `Err` where it says something that is not understood.
+    pub(crate) fn gml(&self) -> Option<Result<([f64; 6], CrsSaid), ()>> {
+        let text = self.gml.as_deref()?;
+        let said = grid(text).map(|(map, code)| {
+            let crs = CrsSaid { code: Some(Said::new(code, "GML in it")), ..CrsSaid::default() };
+            (map, crs)
+        });
+        Some(said.ok_or(()))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Bands of a picture chosen by their numbers, among its colours. A format with more bands than colours chooses by itself.
 
-use super::show::PictureOptions;
 use crate::reader::{NumberRows, Numbers};
+use crate::shown::chosen_bands;
 use std::num::NonZero;
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
@@ -18,7 +18,7 @@ impl Chosen {
         colours: usize,
         bands: &[NonZero<u32>],
     ) -> Result<Option<Self>, LayoutError> {
-        Ok(match chosen(path, colours as u64, bands)?[..] {
+        Ok(match chosen_bands(path, colours as u64, bands)?[..] {
             [grey] if colours > 1 => Some(Self([grey; 3])),
             [red, green, blue] if [red, green, blue] != [0, 1, 2] => Some(Self([red, green, blue])),
             _ => None,
@@ -34,25 +34,6 @@ impl Chosen {
         let [red, green, blue] = self.0;
         [texel[red], texel[green], texel[blue], texel[3]]
     }
-}
-
-/// The bands chosen, counted from 0, of a picture that has so many.
-///
-/// # Errors
-/// [`LayoutError::Usage`] for neither one nor three, and for one that the picture does not have.
-pub(crate) fn chosen(path: &Path, has: u64, bands: &[NonZero<u32>]) -> Result<Vec<usize>, LayoutError> {
-    let path = path.display();
-    if !matches!(bands.len(), 0 | 1 | 3) {
-        return Err(LayoutError::Usage(format!(
-            "{} bands make no colours; name three, for red, green and blue, or one for grey",
-            bands.len()
-        )));
-    }
-    if let Some(band) = bands.iter().find(|band| u64::from(band.get()) > has) {
-        let all = if has == 1 { "one band".to_owned() } else { format!("bands 1 to {has}") };
-        return Err(LayoutError::Usage(format!("{path}: there is no band {band}; the picture has {all}")));
-    }
-    Ok(bands.iter().map(|band| band.get() as usize - 1).collect())
 }
 
 /// Bytes of the bands chosen.
@@ -80,14 +61,5 @@ impl NumberRows for ChosenNumbers<'_> {
         self.rows.read(texels)?;
         texels.iter_mut().for_each(|texel| *texel = self.chosen.of(*texel));
         Ok(())
-    }
-}
-
-impl PictureOptions {
-    /// Those of these bands.
-    #[must_use]
-    pub fn bands(mut self, bands: &[NonZero<u32>]) -> Self {
-        self.bands = bands.to_vec();
-        self
     }
 }

@@ -4,13 +4,12 @@
 //! read before the first row, into a bit a texel. With a stretch rows are made of the picture's numbers, else of its bytes.
 
 use super::bands::{Chosen, ChosenBytes, ChosenNumbers};
-use super::counts::Limits;
-use super::show::PictureOptions;
-use super::stretched::{Shades, Stretched};
+use super::stretched::{Limits, Shades, Stretched};
 use crate::beside::Beside;
 use crate::crs::{self, System};
 use crate::mask::{Bits, Masking};
 use crate::reader::{Declared, NumberRows, Numbers, Picture, Said};
+use crate::shown::PictureOptions;
 use std::path::Path;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::error::LayoutError;

@@ -6,8 +6,9 @@
 //! The percentile `p` of `n` numbers is the smallest of them that at least `p` percent of all do not exceed (the nearest rank; 0 is the smallest).
 
 use super::completed::Completed;
-use super::show::Stretch;
+use super::stretched::Limits;
 use crate::reader::Numbers;
+use crate::shown::Stretch;
 use rayon::prelude::*;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::imagery::ImageSource;
@@ -16,9 +17,6 @@ use terrasoar_layout::imagery::ImageSource;
 const SLOTS: usize = 1 << 16;
 /// Texels looked at together.
 const TEXELS: usize = 1 << 18;
-
-/// Black and white of red, green and blue.
-pub(super) type Limits = [[f64; 2]; 3];
 
 /// How a number becomes a slot.
 #[derive(Debug, Clone, Copy)]

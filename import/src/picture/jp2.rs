@@ -3,11 +3,10 @@
 //! Which channels are colours is said by the file; without a word of it one is grey and three are red, green and blue, of which others are left out. Of more than 8 bits the upper 8
 //! of those in use are shown, which costs a pass more, or what a person states. Memory: a row of tiles as texels, and the work on as many tiles as there are threads.
 
-use super::bands::chosen;
-use super::show::PictureOptions;
 use crate::jpeg2000::{self, Channel, Colours, Jp2, Source, Trouble, limits};
 use crate::reader::{CrsSaid, NumberRows, Numbers, Picture, bits_of, upper_eight};
-use crate::{guard, input};
+use crate::shown::{PRESS_NOTE, PictureOptions, chosen_bands};
+use crate::{geotiff, guard, input};
 use rayon::prelude::*;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -39,13 +38,13 @@ impl Jp2Image {
         let file = input::open(path, "cannot open the JPEG 2000 file")?;
         let length = file.metadata().map_err(|e| refused(path, "header", Trouble::Io(e)))?.len();
         let jp2 = Jp2::read(Source::File(&file), length).map_err(|t| refused(path, "header", t))?;
-        let (map, crs, note) = jp2.ground.said(path);
+        let (map, crs, note) = said(path, &jp2);
         let stream = &jp2.stream;
         let (channels, bits) = (jp2.palette.unwrap_or(stream.channels()), stream.bits());
         let colours = channels - usize::from(jp2.has_alpha && channels > 1);
         let mut notes: Vec<String> = note.into_iter().collect();
         let mut is_cmyk = jp2.colours == Colours::Cmyk && colours >= 4;
-        let mut shown = chosen(path, channels as u64, &options.bands)?;
+        let mut shown = chosen_bands(path, channels as u64, &options.bands)?;
         if shown.is_empty() {
             let count = match colours {
                 _ if is_cmyk => 4,
@@ -63,7 +62,7 @@ impl Jp2Image {
             is_cmyk = false;
         }
         if is_cmyk {
-            notes.push(super::PRESS_NOTE.into());
+            notes.push(PRESS_NOTE.into());
         }
         let has_bytes = jp2.palette.is_some() || (bits <= 8 && !stream.is_signed());
         if options.stretch.is_none() && !has_bytes {
@@ -289,6 +288,26 @@ impl RowReader for Rows<'_, [u8; 4]> {
 impl NumberRows for Rows<'_, Numbers> {
     fn read(&mut self, texels: &mut [Numbers]) -> Result<(), LayoutError> {
         self.fill(texels)
+    }
+}
+
+/// The map from texel centres, and the system; what was not understood, in words. The GeoTIFF in it counts before GML.
+fn said(path: &Path, jp2: &Jp2) -> (Option<[f64; 6]>, CrsSaid, Option<String>) {
+    let mut note = None;
+    if let Some(tiff) = jp2.ground.tiff() {
+        match geotiff::place_of(path, tiff) {
+            Ok((Some(map), crs)) => return (Some(map), crs, None),
+            Ok((None, _)) => {}
+            Err(_) => note = Some("its box of a GeoTIFF (GeoJP2) is damaged and was passed over".to_owned()),
+        }
+    }
+    match jp2.ground.gml() {
+        Some(Ok((map, crs))) => (Some(map), crs, note),
+        Some(Err(())) => {
+            let words = "what it says of its place in GML (GMLJP2) is not understood and was passed over";
+            (None, CrsSaid::default(), Some(words.to_owned()))
+        }
+        None => (None, CrsSaid::default(), note),
     }
 }
 

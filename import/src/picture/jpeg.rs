@@ -6,6 +6,7 @@
 use super::webp::Whole;
 use crate::jpeg_frame::JpegFrame;
 use crate::reader::{Orientation, Picture};
+use crate::shown::PRESS_NOTE;
 use crate::{guard, input};
 use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat, UnsupportedFeature};
 use std::fs::File;
@@ -106,9 +107,6 @@ impl ImageSource for JpegImage {
         Ok(Box::new(Whole { texels, channels: if self.channels == 4 { 3 } else { self.channels }, at: 0 }))
     }
 }
-
-/// What is lost where inks become light without a colour profile.
-pub(crate) const PRESS_NOTE: &str = "its inks (CMYK) are shown as light by arithmetic, without a colour profile, so colours are brighter than in print";
 
 /// Four inks a texel into red, green and blue, in place.
 fn press_to_light(texels: &mut Vec<u8>) {

@@ -11,17 +11,13 @@ mod jp2;
 mod jpeg;
 mod oriented;
 mod png;
-mod show;
 mod stretched;
 mod texels;
 mod webp;
 
-pub(crate) use bands::chosen;
-pub(crate) use jpeg::PRESS_NOTE;
-pub use show::{PictureOptions, Stretch};
-
 use crate::jpeg2000::is_jpeg2000;
 use crate::reader::{Orientation, Picture};
+use crate::shown::{PictureOptions, Stretch};
 use crate::webp::is_webp;
 use crate::{TiffImage, input, is_tiff};
 use completed::Completed;

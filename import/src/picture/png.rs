@@ -3,11 +3,11 @@
 //! A PNG is one compressed stream, decoded by one thread from the first row to the last; one of 16 bits twice, for the bits in use are looked for first. An interlaced
 //! file, whose rows come in seven passes, is refused.
 
-use super::show::PictureOptions;
 use crate::guard;
 use crate::png_stream;
 use crate::png_stream::{PngRows, Texts, decoding_error};
 use crate::reader::{NumberRows, Numbers, Orientation, Picture, bits_of, upper_eight};
+use crate::shown::PictureOptions;
 use ::png::{BitDepth, ColorType, Transformations};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

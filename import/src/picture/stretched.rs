@@ -3,11 +3,13 @@
 //! A number at or below black is 0, one at or above white 255, one between lies on the straight line, rounded: what gdal_translate -scale makes. Where black is white, what lies
 //! above is white. A texel of which a colour is no number is transparent. Cost: some nanoseconds a texel, and 16 bytes for each of a row.
 
-use super::counts::Limits;
 use crate::reader::{NumberRows, Numbers};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::imagery::RowReader;
 use terrasoar_layout::words::number;
+
+/// Black and white of red, green and blue.
+pub(super) type Limits = [[f64; 2]; 3];
 
 /// Black and white of each colour.
 #[derive(Debug, Clone, Copy)]
