@@ -58,6 +58,7 @@ mod raw;
 mod reader;
 mod shown;
 mod strangers;
+mod surfer;
 pub mod synth;
 mod text;
 mod tiff_tags;
