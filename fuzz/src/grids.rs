@@ -51,7 +51,7 @@ pub(crate) mod surfer {
         let section = |name: &[u8; 4], content: Vec<u8>| {
             [&name[..], &(content.len() as u32).to_le_bytes(), &content].concat()
         };
-        let counts = [5i32, 6].iter().flat_map(|count| count.to_le_bytes());
+        let counts = [5i32, 6].into_iter().flat_map(|count| count.to_le_bytes());
         let reals = [100.0f64, 200.0, 10.0, 10.0, 0.0, 9.0, 0.0, 1.70141e38];
         let grid = counts.chain(reals.iter().flat_map(|real| real.to_le_bytes())).collect();
         let data = (0..30).flat_map(|i| f64::from(i).to_le_bytes()).collect();

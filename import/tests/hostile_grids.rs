@@ -173,7 +173,7 @@ fn surfer_grids_of_any_claim_end_in_words() {
         [0.0f64, 1.0, 0.0, 1.0, 0.0, 1.0].iter().flat_map(|side| side.to_le_bytes()).collect::<Vec<_>>();
     let binary_6 = [&b"DSBB\xff\x7f\xff\x7f"[..], &sides].concat();
     let grid = |rows: i32, columns: i32| {
-        let counts = [rows, columns].iter().flat_map(|count| count.to_le_bytes());
+        let counts = [rows, columns].into_iter().flat_map(|count| count.to_le_bytes());
         let reals = [0.0f64, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1e38];
         let content: Vec<u8> = counts.chain(reals.iter().flat_map(|real| real.to_le_bytes())).collect();
         [&b"DSRB\x04\0\0\0\x01\0\0\0GRID\x48\0\0\0"[..], &content, b"DATA\xff\xff\xff\x7f"].concat()
@@ -201,7 +201,7 @@ fn surfer_grids_of_any_claim_end_in_words() {
     }
     // What is there is read, and the rest of a text is not held.
     let rows = "7 ".repeat(1 << 20);
-    let text = format!("DSAA 1024 1024 0 1 0 1 0 9 {rows}");
+    let text = format!("DSAA 1024 1024 0 20460 0 20460 0 9 {rows}");
     let (_folder, path) = files(&[("b.grd", text.as_bytes(), 0)]);
     let (count, bytes) = read(&path, &options);
     assert!(count.unwrap() == 1 << 20 && bytes < 24 * MIB, "{bytes}");
