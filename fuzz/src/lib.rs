@@ -26,7 +26,7 @@ mod world_file;
 
 use beside::{aux_xml, reference_system};
 use gridded::{dted, netcdf, usgs_dem};
-use grids::{ascii_grid, labelled, netpbm, packed_png, raw, tiles, xyz};
+use grids::{ascii_grid, labelled, netpbm, packed_png, raw, surfer, tiles, xyz};
 pub use seeds::Inputs;
 use web_tiles::{map_tile, mbtiles, pmtiles};
 
@@ -95,6 +95,8 @@ targets! {
     import { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// An Esri ASCII grid.
     ascii_grid { is_text: true, fixed_mib: 160, per_byte: 64 }
+    /// A Surfer grid.
+    surfer { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// An XYZ grid.
     xyz { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// Plain numbers with a label of ESRI's or ENVI's beside them.

@@ -59,6 +59,11 @@ fn elevation_data() {
 }
 
 #[test]
+fn surfer_grids() {
+    replay("surfer");
+}
+
+#[test]
 fn ascii_grids() {
     replay("ascii_grid");
 }

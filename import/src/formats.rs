@@ -6,7 +6,8 @@ use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
 use crate::{
-    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, tiles, usgs_dem, xyz,
+    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, surfer, tiles,
+    usgs_dem, xyz,
 };
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
@@ -69,6 +70,11 @@ const SIGNED: &[Format] = &[
         open: |path, options| boxed(tiles::TileDem::open(path, options)),
     },
     Format {
+        name: "Surfer",
+        is: |look| surfer::is_surfer(&look.head),
+        open: |path, _| boxed(surfer::SurferDem::open(path)),
+    },
+    Format {
         name: ".hgt archive",
         is: |look| look.begins(b"PK\x03\x04") && hgt::has_tiles(look.path),
         open: |path, options| hgt_tiles(&[path.to_owned()], options),
@@ -106,7 +112,7 @@ const NAMED: &[Format] = &[
 ];
 
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))

@@ -37,6 +37,7 @@ mod heights;
 mod hgt;
 mod identify;
 pub(crate) mod input;
+mod jpeg2000;
 pub(crate) mod jpeg_frame;
 mod kept;
 mod labelled;
@@ -55,7 +56,9 @@ mod pnm;
 mod raster;
 mod raw;
 mod reader;
+mod shown;
 mod strangers;
+mod surfer;
 pub mod synth;
 mod text;
 mod tiff_tags;
@@ -63,6 +66,7 @@ mod tiles;
 mod usgs_dem;
 mod value;
 mod warp;
+mod webp;
 mod xyz;
 
 use std::path::{Path, PathBuf};
@@ -75,8 +79,9 @@ pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
 pub use options::{Direction, OpenOptions, Resampling, TileOptions};
-pub use picture::{PictureOptions, open_image, open_images, open_images_on};
+pub use picture::{open_image, open_images, open_images_on};
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
+pub use shown::{PictureOptions, Stretch};
 pub use strangers::strangers;
 
 /// Samples handed to a sink in one window, at most, unless a row has more: half a mebibyte of `f64`.

@@ -40,6 +40,8 @@ pub enum Remedy {
     },
     /// An image to drape.
     Image,
+    /// Which numbers of an image are black and white.
+    Stretch,
     /// The place of an image, stated: [`DrapeOptions::extent`](crate::imagery::DrapeOptions::extent).
     Extent,
     /// Another format of tiles: [`DrapeOptions::format`](crate::imagery::DrapeOptions::format).

@@ -2,9 +2,9 @@
 //!
 //! A tile is a square whose size is read before anything is decoded. Whatever it holds comes as red, green, blue, alpha of 8 bits. Cost: 4 bytes a texel, and the decoder's own.
 
-use super::webp::{Webp, is_webp};
 use crate::guard::guard;
 use crate::jpeg_frame::JpegFrame;
+use crate::webp::{self, Frame, Trouble, is_webp};
 use jpeg_decoder::{Decoder as JpegDecoder, PixelFormat};
 use png::{BitDepth, Decoder as PngDecoder, Limits, Transformations};
 use std::io::Cursor;
@@ -151,9 +151,17 @@ fn of_jpeg(bytes: &[u8]) -> Result<Texels, String> {
 }
 
 fn of_webp(bytes: &[u8]) -> Result<Texels, String> {
-    let picture = Webp::new(bytes)?;
-    let side = check(picture.size)?;
-    let stored = if picture.is_lossy { Stored::About("lossy WebP") } else { Stored::Exactly { bits: 8 } };
-    let channels = picture.channels;
-    Ok(square(side, &picture.texels()?, channels, stored))
+    let words = |trouble| match trouble {
+        Trouble::Io(_) => "the WebP picture cannot be read; fetch it again".to_owned(),
+        Trouble::Damaged(what) => format!("the WebP picture is damaged: {what}; fetch it again"),
+        Trouble::Unsupported(what) => format!("the WebP picture is not read: {what}; write it again"),
+    };
+    let frame = Frame::read(Cursor::new(bytes)).map_err(words)?;
+    if frame.is_animated {
+        return Err("the WebP picture moves, and pictures that stand still are read".to_owned());
+    }
+    let side = check(frame.size)?;
+    let texels = webp::decode(Cursor::new(bytes), &frame).map_err(words)?;
+    let stored = if frame.is_lossy { Stored::About("lossy WebP") } else { Stored::Exactly { bits: 8 } };
+    Ok(square(side, &texels, frame.channels(), stored))
 }

@@ -17,7 +17,6 @@ mod mbtiles;
 mod packing;
 mod plan;
 mod pmtiles;
-mod webp;
 
 use crate::input;
 use crate::options::TileOptions;

@@ -15,10 +15,29 @@ pub(crate) const BT: Format = Format { name: "VTP BT", driver: "BT", ending: "bt
 pub(crate) const DTED: Format = Format { name: "DTED", driver: "DTED", ending: "dt0" };
 pub(crate) const HGT: Format = Format { name: ".hgt tile", driver: "SRTMHGT", ending: "hgt" };
 pub(crate) const USGS: Format = Format { name: "USGS DEM", driver: "USGSDEM", ending: "dem" };
+pub(crate) const SURFER_TEXT: Format = Format { name: "Surfer, text", driver: "GSAG", ending: "grd" };
+pub(crate) const SURFER_6: Format = Format { name: "Surfer 6", driver: "GSBG", ending: "grd" };
+pub(crate) const SURFER_7: Format = Format { name: "Surfer 7", driver: "GS7BG", ending: "grd" };
 
 /// Formats in the order of the page.
-pub(crate) const FORMATS: [Format; 13] =
-    [GEOTIFF, COG, NETCDF, ASCII, ESRI, ENVI, XYZ, PNG, PNM, BT, DTED, HGT, USGS];
+pub(crate) const FORMATS: [Format; 16] = [
+    GEOTIFF,
+    COG,
+    NETCDF,
+    ASCII,
+    ESRI,
+    ENVI,
+    XYZ,
+    PNG,
+    PNM,
+    BT,
+    SURFER_TEXT,
+    SURFER_6,
+    SURFER_7,
+    DTED,
+    HGT,
+    USGS,
+];
 
 const fn system(name: &'static str, text: &'static str, unit: Unit, corner: [f64; 2], step: f64) -> System {
     System { name, text, unit, corner, step: [step, step], height_unit_m: None }
@@ -327,6 +346,14 @@ fn tiles_and_sheets(list: &mut Vec<Combination>) {
     for kind in [Kind::Int16, Kind::Int32, Kind::Float32] {
         for system in [UTM, SYSTEMS[1], DEGREES] {
             list.push(Combination::new(BT, kind, system));
+        }
+    }
+    for system in [UTM, SYSTEMS[1], DEGREES] {
+        // GDAL writes its own mark of voids into the text, where Surfer's belongs.
+        list.push(Combination::new(SURFER_TEXT, Kind::Float32, system));
+        for void in [Void::None, Void::Declared] {
+            list.push(Combination::new(SURFER_6, Kind::Float32, system).with(void));
+            list.push(Combination::new(SURFER_7, Kind::Float64, system).with(void));
         }
     }
     // One degree, samples on its rim.

@@ -6,11 +6,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// How a format is known, what is said beside it, and what no table shows.
-const NOTES: [(&str, &str); 13] = [
+const NOTES: [(&str, &str); 16] = [
     (
         "GeoTIFF",
         "Known by its first bytes, BigTIFF too. Keys, world files, `.prj`, `.aux.xml` and `.msk` are read. Chunks are decoded in parallel and never more than a few at a time; \
-         files may be sparse, planar, and of bits from 1 to 64. Of several bands `--band` names one. Sub-images and overviews are passed over. JPEG, WebP, LZMA and JPEG XL chunks are refused with a command that \
+         files may be sparse, planar, and of bits from 1 to 64. Of several bands `--band` names one. Sub-images and overviews are passed over. JPEG, WebP, JPEG 2000, LZMA and JPEG XL chunks are refused with a command that \
          converts them.",
     ),
     ("Cloud-optimised GeoTIFF", "A GeoTIFF with overviews; the full image is read."),
@@ -42,6 +42,15 @@ const NOTES: [(&str, &str); 13] = [
     ),
     ("Netpbm (PGM)", "Plain and raw greymaps of up to 16 bits, and `Pf` floats."),
     ("VTP BT", "Versions 1.0 to 1.3. The `.prj` beside it is the system where the header points to it."),
+    (
+        "Surfer, text",
+        "`.grd` that begins with `DSAA`. 1.70141e38 is a void. A `.prj` or `.aux.xml` beside it says the system.",
+    ),
+    ("Surfer 6", "`.grd` that begins with `DSBB`; as the text."),
+    (
+        "Surfer 7",
+        "`.grd` that begins with `DSRB`; its own value of voids. Sections of faults are passed over.",
+    ),
     ("DTED", "Levels 0 to 2; columns of any length."),
     (
         ".hgt tile",

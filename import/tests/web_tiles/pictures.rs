@@ -115,7 +115,7 @@ fn of_a_world_only_what_lies_on_the_terrain_is_read() {
         Pm::PLAIN,
     );
     let open = |options: TileOptions| {
-        let options = PictureOptions { tiles: options };
+        let options = PictureOptions { tiles: options, ..PictureOptions::default() };
         open_images(std::slice::from_ref(&path), Some(terrain.header()), &options).unwrap().remove(0)
     };
     let image = open(TileOptions::default());
