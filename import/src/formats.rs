@@ -95,6 +95,18 @@ const NAMED: &[Format] = &[
     Format { name: "XYZ", is: xyz::is_xyz, open: |path, _| boxed(xyz::XyzDem::open(path)) },
 ];
 
+/// Whether the file at `path` is elevation data of a format that says where it lies. Masks, overviews and labels beside data are none.
+pub(crate) fn is_placed(path: &Path) -> bool {
+    const BESIDE: [&str; 4] = ["ovr", "msk", "hdr", "xml"];
+    const UNPLACED: [&str; 3] = ["PNG", "Netpbm", "headerless heightmap"];
+    if BESIDE.iter().any(|name| identify::is_called(path, name)) {
+        return false;
+    }
+    let Ok(look) = Look::at(path) else { return false };
+    let format = SIGNED.iter().chain(NAMED).find(|format| (format.is)(&look));
+    format.is_some_and(|format| !UNPLACED.contains(&format.name))
+}
+
 /// What is read, in a few words for messages.
 pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT and headerless heightmaps";
 
@@ -108,7 +120,7 @@ fn tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, La
     boxed(hgt::HgtDem::open(paths, stated))
 }
 
-/// Opens what a person names: a file, a folder of tiles, or several tiles.
+/// Opens what is one grid: a file, a folder of `.hgt` tiles, or several such tiles.
 ///
 /// # Errors
 /// As [`crate::open_with`].
@@ -117,7 +129,7 @@ pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn R
         [] => Err(LayoutError::Usage("no elevation file was named; name one, or several .hgt tiles".into())),
         [path] if path.is_dir() => tiles(&hgt::tiles_in(path)?, options),
         [path] => open_file(path, options),
-        paths => open_tiles(paths, options),
+        paths => tiles(paths, options),
     }
 }
 
@@ -167,25 +179,4 @@ fn stranger(path: &Path, options: &OpenOptions, refusal: String) -> Result<Box<d
         )),
         opened => boxed(opened),
     }
-}
-
-/// Several files make one data set only if every one is an `.hgt` tile, whose name says where it lies.
-fn open_tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
-    for path in paths {
-        if hgt::is_tile(path) {
-            continue;
-        }
-        let look = Look::at(path)?;
-        let format = SIGNED
-            .iter()
-            .chain(NAMED)
-            .find(|format| (format.is)(&look))
-            .map_or("other", |format| format.name);
-        return Err(LayoutError::Usage(format!(
-            "{}: several inputs are read together only if all of them are .hgt tiles, and this is a {format} file; \
-             merge the files first, for example with: gdalbuildvrt all.vrt FILES && gdal_translate all.vrt all.tif",
-            path.display(),
-        )));
-    }
-    tiles(paths, options)
 }

@@ -41,6 +41,7 @@ pub(crate) mod jpeg_frame;
 mod kept;
 mod labelled;
 mod mask;
+mod mosaic;
 mod netcdf;
 mod opened;
 mod options;
@@ -73,7 +74,7 @@ pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
-pub use options::{Direction, OpenOptions, Resampling};
+pub use options::{Direction, OpenOptions, Priority, Resampling};
 pub use picture::{open_image, open_images_on};
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
 pub use strangers::strangers;
@@ -100,10 +101,17 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
 /// # Errors
 /// As [`open`]; [`LayoutError::Usage`] for options that do not go with the data.
 pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn DemSource>, LayoutError> {
-    let reader = formats::open(paths, options)?;
-    let path = paths.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
-    let beside = beside::Beside::of(paths, &*reader);
-    Ok(Box::new(opened::OpenedDem::new(path, reader, beside, options)?))
+    match mosaic::Inputs::of(paths)? {
+        mosaic::Inputs::Alone(files) => {
+            let opened = mosaic::open_one(&files, options);
+            match opened {
+                // Tiles of unlike shape, or of which some cannot be read.
+                Err(_) if files.len() > 1 => mosaic::open(&files, options),
+                opened => Ok(Box::new(opened?)),
+            }
+        }
+        mosaic::Inputs::Several(files) => mosaic::open(&files, options),
+    }
 }
 
 /// As [`open`], of one file.
