@@ -6,7 +6,7 @@ use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
 use crate::{
-    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz,
+    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, vrt, xyz,
 };
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
@@ -37,6 +37,11 @@ const SIGNED: &[Format] = &[
         name: "TIFF",
         is: |look| identify::is_tiff(&look.head),
         open: |path, options| boxed(geotiff::TiffDem::open(path, options)),
+    },
+    Format {
+        name: "virtual raster (.vrt)",
+        is: |look| vrt::is_vrt(&look.head),
+        open: |path, options| boxed(vrt::VrtDem::open(path, options, open_file)),
     },
     Format {
         name: "netCDF",
@@ -108,7 +113,7 @@ pub(crate) fn is_placed(path: &Path) -> bool {
 }
 
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))

@@ -62,6 +62,7 @@ mod text;
 mod tiff_tags;
 mod usgs_dem;
 mod value;
+mod vrt;
 mod warp;
 mod xyz;
 
@@ -69,6 +70,7 @@ use std::path::{Path, PathBuf};
 
 use terrasoar_layout::dem::DemSource;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::remedy::Remedy;
 
 pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
@@ -101,16 +103,19 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
 /// # Errors
 /// As [`open`]; [`LayoutError::Usage`] for options that do not go with the data.
 pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn DemSource>, LayoutError> {
-    match mosaic::Inputs::of(paths)? {
-        mosaic::Inputs::Alone(files) => {
-            let opened = mosaic::open_one(&files, options);
-            match opened {
-                // Tiles of unlike shape, or of which some cannot be read.
-                Err(_) if files.len() > 1 => mosaic::open(&files, options),
-                opened => Ok(Box::new(opened?)),
-            }
-        }
-        mosaic::Inputs::Several(files) => mosaic::open(&files, options),
+    let files = match mosaic::Inputs::of(paths)? {
+        mosaic::Inputs::Several(files) => return mosaic::open(&files, options),
+        mosaic::Inputs::Alone(files) => files,
+    };
+    match mosaic::open_one(&files, options) {
+        // Tiles of unlike shape, or of which some cannot be read.
+        Err(_) if files.len() > 1 => mosaic::open(&files, options),
+        Ok(_) if options.resolution.is_some() && options.reproject.is_none() => Err(LayoutError::Usage(
+            "a resolution is for data that is brought into another system, and for several files; say which system"
+                .into(),
+        )
+        .mended_by(Remedy::Reproject)),
+        opened => Ok(Box::new(opened?)),
     }
 }
 

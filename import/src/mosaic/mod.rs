@@ -16,6 +16,7 @@ mod told;
 mod values;
 
 use crate::crs::System;
+use crate::guard::is_ours;
 use crate::opened::{Known, OpenedDem};
 use crate::options::{OpenOptions, Priority, Resampling};
 use crate::reader::{Declared, Reader, Said};
@@ -26,7 +27,7 @@ pub(crate) use names::Inputs;
 use plan::Placed;
 use sheet::{BLENDED, Laying, Sheet, replace};
 pub(crate) use source::open_one;
-use source::{Source, is_ours, options_of_each};
+use source::{Source, options_of_each};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};

@@ -10,7 +10,6 @@ use crate::crs::{HorizontalSize, Kind};
 use crate::options::Priority;
 use std::path::PathBuf;
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::words::number;
 
 /// Samples on a side of a sheet, at most: files that lie farther apart are a mistake, or several data sets.
 const MOST_SIDE: i64 = 1 << 22;
@@ -193,10 +192,4 @@ pub(super) fn names(paths: &[PathBuf]) -> String {
         [one, other] => format!("{} and {}", name(one), name(other)),
         [first, .., last] => format!("{} to {}", name(first), name(last)),
     }
-}
-
-/// Degrees or metres with few digits.
-pub(super) fn short(step: f64) -> String {
-    let digit = 10f64.powf(step.abs().log10().floor() - 5.0);
-    number(((step.abs() / digit).round() * digit * 1e12).round() / 1e12)
 }

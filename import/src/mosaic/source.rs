@@ -6,6 +6,7 @@
 use crate::beside::Beside;
 use crate::crs::System;
 use crate::formats;
+use crate::guard::is_ours;
 use crate::opened::OpenedDem;
 use crate::options::OpenOptions;
 use crate::warp::Store;
@@ -141,24 +142,6 @@ pub(super) enum Failure {
     Ours(LayoutError),
     /// The file is missing, damaged, or not what it was taken for.
     File(LayoutError),
-}
-
-/// Whether an error is of the machine and not of the file.
-pub(super) fn is_ours(error: &LayoutError) -> bool {
-    // Too many open files, in the process or the system; no memory.
-    const OURS: [i32; 3] = [24, 23, 12];
-    match error {
-        LayoutError::Io { source, .. } => {
-            source.raw_os_error().is_some_and(|code| OURS.contains(&code))
-                || matches!(
-                    source.kind(),
-                    std::io::ErrorKind::StorageFull
-                        | std::io::ErrorKind::QuotaExceeded
-                        | std::io::ErrorKind::FileTooLarge
-                )
-        }
-        _ => false,
-    }
 }
 
 /// Passes samples on to a store and remembers whether that failed.
