@@ -3,7 +3,7 @@
 use super::output::{complain, grouped, print};
 use super::outputs::{Force, Kind};
 use super::progress::{Meter, short};
-use super::{parse, remedy, terrain};
+use super::{WrongUsage, parse, remedy, terrain};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -241,7 +241,27 @@ impl Args {
     }
 }
 
+impl Args {
+    /// Flags that say something of several files alone go with several.
+    fn check(&self) -> Result<(), WrongUsage> {
+        if !matches!(self.inputs.as_slice(), [one] if one.is_file()) {
+            return Ok(());
+        }
+        if self.reading.resolution.is_some() && self.reading.reproject.is_none() {
+            return Err(WrongUsage(
+                "--resolution goes with --reproject, or with several files; one file alone keeps its own steps"
+                    .into(),
+            ));
+        }
+        if self.several.feather.is_some() {
+            return Err(WrongUsage("--feather blends seams between several files, and one was named".into()));
+        }
+        Ok(())
+    }
+}
+
 pub(super) fn run(args: &Args) -> Result<()> {
+    args.check()?;
     let inputs: Vec<&Path> = args.inputs.iter().map(PathBuf::as_path).collect();
     args.force.file(&args.output, Kind::Terrain, &inputs)?;
     let mut pool = rayon::ThreadPoolBuilder::new();

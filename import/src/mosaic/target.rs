@@ -170,9 +170,17 @@ impl Target {
             if from[0] > to[0] {
                 return Err(outside(named));
             }
+            // Coarser samples of the same system add no rim of half a step, where finer ones would be made of nothing beyond.
+            let may_be_inner = way.grounds.is_none() && options.resolution.is_none();
             for i in 0..2 {
-                low[i] = low[i].min(from[i]);
-                high[i] = high[i].max(to[i]);
+                let half = 0.5 * (sheet.map[[1, 5][i]] / lattice.step[i]).abs();
+                let (mut begin, mut end) = (from[i], to[i]);
+                if may_be_inner && half > 0.5 + NEAR {
+                    begin = (from[i] + half - NEAR).ceil() - 0.5;
+                    end = (to[i] - half + NEAR).floor() + 0.5;
+                }
+                low[i] = low[i].min(begin);
+                high[i] = high[i].max(end);
             }
             spans.push((from, to));
         }
