@@ -219,9 +219,14 @@ fn virtual_rasters_of_gdal_translate_are_read() {
         };
         agrees(&vrt, &grid, off, marks);
     }
-    // Nested, over files of another folder, by name from here.
+    // Nested, over files of another folder.
     std::fs::create_dir(here.join("deep")).unwrap();
-    run(here, "gdalbuildvrt", &["-q", "deep/nested.vrt", "window.vrt", "smaller.vrt", "larger.vrt"]);
+    let names = ["window.vrt", "smaller.vrt", "larger.vrt"].map(|name| here.join(name).display().to_string());
+    run(
+        here,
+        "gdalbuildvrt",
+        &[&["-q", "deep/nested.vrt"], &names.each_ref().map(String::as_str)[..]].concat(),
+    );
     let nested = here.join("deep/nested.vrt");
     agrees(&nested, &read(&[nested.clone()], &OpenOptions::default()), 0.0, -9999.0);
     // What GDAL warps on the way is refused.
