@@ -102,7 +102,8 @@ const NAMED: &[Format] = &[
 
 /// Whether the file at `path` is elevation data of a format that says where it lies. Masks, overviews and labels beside data are none.
 pub(crate) fn is_placed(path: &Path) -> bool {
-    const BESIDE: [&str; 4] = ["ovr", "msk", "hdr", "xml"];
+    const BESIDE: [&str; 12] =
+        ["ovr", "msk", "hdr", "xml", "prj", "aux", "clr", "stx", "sta", "blw", "wld", "qml"];
     const UNPLACED: [&str; 3] = ["PNG", "Netpbm", "headerless heightmap"];
     if BESIDE.iter().any(|name| identify::is_called(path, name)) {
         return false;

@@ -84,14 +84,15 @@ pub use strangers::strangers;
 /// Samples handed to a sink in one window, at most, unless a row has more: half a mebibyte of `f64`.
 const WINDOW_SAMPLES: u64 = 1 << 16;
 
-/// Opens the elevation data in `paths`: one file; several `.hgt` tiles, or a folder of them, as one mosaic.
+/// Opens the elevation data in `paths`: one file; several, folders and patterns as one mosaic.
+///
+/// A file of several that is missing or damaged is left out, and the warnings name it.
 ///
 /// The formats are those of `formats.rs`. Cost: the headers, and for GeoTIFF 16 bytes a chunk; no samples, but an XYZ grid is read once to find its grid, and of a
 /// colour PNG the beginning to see whether heights are packed into it.
 ///
 /// # Errors
-/// [`LayoutError::Usage`] for no path, or for several that are not all `.hgt` tiles of one
-/// resolution; [`LayoutError::Io`] for a file that is missing or cannot be read;
+/// [`LayoutError::Usage`] for no path, a pattern that fits nothing, or several files that make no grid together; [`LayoutError::Io`] for a file that is missing or cannot be read;
 /// [`LayoutError::NotThisFormat`] for a file of none of these formats, saying what it is where that
 /// can be told; [`LayoutError::Unsupported`] and [`LayoutError::Damaged`] from the reader.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
@@ -117,6 +118,11 @@ pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Dem
         .mended_by(Remedy::Reproject)),
         opened => Ok(Box::new(opened?)),
     }
+}
+
+/// Other files that the elevation data at `path` is made of: those that a virtual raster names. What cannot be read names none.
+pub fn files_of(path: &Path) -> Vec<PathBuf> {
+    vrt::files_of(path)
 }
 
 /// As [`open`], of one file.

@@ -75,7 +75,7 @@ pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn D
     }
     let placed = comparable(looked, options, &mut told)?;
     placed.sources.iter().for_each(|source| told.look(source));
-    let name = PathBuf::from(format!("the mosaic of {} files", placed.sources.len()));
+    let name = PathBuf::from(format!("the mosaic of {}", plan::counted(placed.sources.len())));
     let (mosaic, known, later) = Mosaic::new(&name, placed, each, options, told)?;
     let declared = mosaic.declared.clone();
     Ok(Box::new(OpenedDem::known(&name, Box::new(mosaic), declared, known, &later)?))
@@ -316,7 +316,7 @@ fn format_of(sources: &[Source]) -> String {
     formats.sort_unstable();
     formats.dedup();
     let listed = if formats.len() <= 3 { formats.join(", ") } else { format!("{} formats", formats.len()) };
-    format!("mosaic of {} files ({listed})", sources.len())
+    format!("mosaic of {} ({listed})", plan::counted(sources.len()))
 }
 
 /// What is kept of how it was put together.
@@ -329,8 +329,8 @@ fn note(
 ) -> String {
     let paths: Vec<PathBuf> = placed.sources.iter().map(|source| source.path.clone()).collect();
     let mut words = format!(
-        "mosaic of {} files, {}, priority {}",
-        paths.len(),
+        "mosaic of {}, {}, priority {}",
+        plan::counted(paths.len()),
         plan::names(&paths),
         options.priority.name()
     );

@@ -180,6 +180,11 @@ fn join_across_antimeridian(sources: &mut [Source], systems: &[Tied], of: &[usiz
     }
 }
 
+/// So many files, in words.
+pub(super) fn counted(files: usize) -> String {
+    if files == 1 { "1 file".into() } else { format!("{files} files") }
+}
+
 /// The names of files, a few of them, for messages and what is kept.
 pub(super) fn names(paths: &[PathBuf]) -> String {
     let name = |path: &PathBuf| {

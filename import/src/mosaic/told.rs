@@ -10,8 +10,12 @@ use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::harmless;
 
-/// Files that are named one by one, and kinds of warnings, at most.
-const MOST_NAMED: usize = 40;
+/// Files of which is said why they were left out, others that are named, and kinds of warnings, at most.
+const MOST_EXPLAINED: usize = 6;
+const MOST_NAMED: usize = 2000;
+const MOST_KINDS: usize = 12;
+/// What follows from it.
+const LEFT_OUT: &str = "the file was left out: its ground is that of other files, or void";
 
 /// What was seen of files.
 #[derive(Debug, Clone, Default)]
@@ -46,13 +50,14 @@ impl Told {
     }
 
     fn warn(&mut self, path: &Path, warning: &Warning) {
-        let (_, first, count) = self
-            .warnings
-            .entry(warning.words.clone())
-            .or_insert_with(|| (warning.clone(), path.to_owned(), 0));
+        // Words that name the file, or one beside it, are the same words of another file.
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let key = if stem.len() > 2 { warning.words.replace(&*stem, "*") } else { warning.words.clone() };
+        let (kept, first, count) =
+            self.warnings.entry(key).or_insert_with(|| (warning.clone(), path.to_owned(), 0));
         *count += 1;
         if path < first.as_path() {
-            *first = path.to_owned();
+            (*first, *kept) = (path.to_owned(), warning.clone());
         }
     }
 
@@ -74,31 +79,33 @@ impl Told {
     /// All of it as warnings, of so many files.
     pub(super) fn warnings(&self, files: usize) -> Vec<Warning> {
         let mut all = Vec::new();
-        for why in self.lost.values().take(MOST_NAMED) {
+        for why in self.lost.values().take(MOST_EXPLAINED) {
+            all.push(Warning::new(format!("{}; {LEFT_OUT}", harmless(why, 360))));
+        }
+        if let Some(more) = self.lost.len().checked_sub(MOST_EXPLAINED).filter(|more| *more > 0) {
+            let names = self.lost.keys().skip(MOST_EXPLAINED).take(MOST_NAMED);
+            let names: Vec<String> = names.map(|path| harmless(&path.display().to_string(), 120)).collect();
+            let rest =
+                if more > MOST_NAMED { format!(", and {} more", more - MOST_NAMED) } else { String::new() };
+            let all_of = self.lost.len();
             all.push(Warning::new(format!(
-                "{}; the file was left out: its ground is that of other files, or void",
-                harmless(why, 360)
+                "{all_of} files in all were left out, these as well: {}{rest}",
+                names.join(", ")
             )));
         }
-        if self.lost.len() > MOST_NAMED {
-            all.push(Warning::new(format!(
-                "{} more files were left out; their ground is that of other files, or void",
-                self.lost.len() - MOST_NAMED
-            )));
-        }
-        for (warning, first, count) in self.warnings.values().take(MOST_NAMED) {
+        for (warning, first, count) in self.warnings.values().take(MOST_KINDS) {
             let name = harmless(&first.display().to_string(), 120);
             let words = match count {
                 1 => format!("{name}: {}", warning.words),
                 count if *count >= files => format!("all files: {}", warning.words),
-                count => format!("{name} and {} more: {}", count - 1, warning.words),
+                count => format!("{} of {files} files, {name} the first: {}", count, warning.words),
             };
             all.push(Warning { words, mended_by: warning.mended_by.clone() });
         }
-        if self.warnings.len() > MOST_NAMED {
+        if self.warnings.len() > MOST_KINDS {
             all.push(Warning::new(format!(
                 "{} more warnings are of single files; build these alone to see them",
-                self.warnings.len() - MOST_NAMED
+                self.warnings.len() - MOST_KINDS
             )));
         }
         for (value, _) in self.unmatched.iter().filter(|(_, count)| self.read > 0 && **count >= self.read) {

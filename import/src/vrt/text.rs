@@ -27,6 +27,13 @@ pub(crate) fn is_vrt(head: &[u8]) -> bool {
             && head.windows(11).any(|part| part == b"<VRTDataset")
 }
 
+/// Whether the file at `path` can be read and is a virtual raster.
+pub(super) fn is_virtual(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let opened = crate::input::open(path, "cannot open the file");
+    opened.is_ok_and(|file| file.take(4096).read_to_end(&mut head).is_ok()) && is_vrt(&head)
+}
+
 /// The text of the file at `path`.
 ///
 /// # Errors
