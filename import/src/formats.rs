@@ -38,11 +38,7 @@ const SIGNED: &[Format] = &[
         is: |look| identify::is_tiff(&look.head),
         open: |path, options| boxed(geotiff::TiffDem::open(path, options)),
     },
-    Format {
-        name: "virtual raster (.vrt)",
-        is: |look| vrt::is_vrt(&look.head),
-        open: |path, options| boxed(vrt::VrtDem::open(path, options, open_file)),
-    },
+    Format { name: "virtual raster (.vrt)", is: |look| vrt::is_vrt(&look.head), open: virtual_raster },
     Format {
         name: "netCDF",
         is: |look| netcdf::is_netcdf(&look.head),
@@ -166,6 +162,17 @@ fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, Layo
     match NAMED.iter().find(|format| (format.is)(&look)) {
         Some(format) => (format.open)(path, options),
         None => stranger(path, options, strangers::unknown(&look)),
+    }
+}
+
+/// Opens a virtual raster; one that GDAL computes is GDAL's, where that is there.
+fn virtual_raster(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    match vrt::VrtDem::open(path, options, open_file) {
+        #[cfg(feature = "gdal")]
+        Err(LayoutError::Unsupported { remedy: None, .. }) => {
+            boxed(crate::gdal::GdalDem::open(path, options))
+        }
+        opened => boxed(opened),
     }
 }
 

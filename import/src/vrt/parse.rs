@@ -68,8 +68,9 @@ pub(super) fn vrt(path: &Path, tree: &Document<'_>, options: &OpenOptions) -> Re
             return Err(LayoutError::unsupported(
                 path,
                 format!(
-                    "it has {} bands, each with data of its own, as gdalbuildvrt -separate makes them; say which one holds the heights, or let one band have all files: gdalbuildvrt FILE.vrt FILES",
-                    several.len()
+                    "it has {} bands{}, each with data of its own, as gdalbuildvrt -separate makes them; say which one holds the heights, or let one band have all files: gdalbuildvrt FILE.vrt FILES",
+                    several.len(),
+                    listed(&names)
                 ),
             )
             .mended_by(Remedy::Band));
@@ -105,6 +106,14 @@ pub(super) fn vrt(path: &Path, tree: &Document<'_>, options: &OpenOptions) -> Re
         band: band(path, bands[chosen], chosen as u32 + 1)?,
         mask: mask.map(|node| band(path, node, 0)).transpose()?,
     })
+}
+
+/// The names of bands, as far as there are some, for a message.
+fn listed(names: &[&str]) -> String {
+    let known = (1..).zip(names).filter(|(_, name)| !name.is_empty());
+    let known: Vec<String> =
+        known.take(12).map(|(number, name)| format!("{number} \"{}\"", harmless(name, 40))).collect();
+    if known.is_empty() { String::new() } else { format!(" ({})", known.join(", ")) }
 }
 
 /// A refusal of what GDAL computes.

@@ -10,6 +10,7 @@ pub(crate) const ENVI: Format = Format { name: "ENVI with .hdr", driver: "ENVI",
 pub(crate) const XYZ: Format = Format { name: "XYZ", driver: "XYZ", ending: "xyz" };
 pub(crate) const PNG: Format = Format { name: "PNG", driver: "PNG", ending: "png" };
 pub(crate) const PNM: Format = Format { name: "Netpbm (PGM)", driver: "PNM", ending: "pgm" };
+pub(crate) const VRT: Format = Format { name: "Virtual raster (.vrt)", driver: "VRT", ending: "vrt" };
 pub(crate) const NETCDF: Format = Format { name: "netCDF", driver: "netCDF", ending: "nc" };
 pub(crate) const BT: Format = Format { name: "VTP BT", driver: "BT", ending: "bt" };
 pub(crate) const DTED: Format = Format { name: "DTED", driver: "DTED", ending: "dt0" };
@@ -17,8 +18,8 @@ pub(crate) const HGT: Format = Format { name: ".hgt tile", driver: "SRTMHGT", en
 pub(crate) const USGS: Format = Format { name: "USGS DEM", driver: "USGSDEM", ending: "dem" };
 
 /// Formats in the order of the page.
-pub(crate) const FORMATS: [Format; 13] =
-    [GEOTIFF, COG, NETCDF, ASCII, ESRI, ENVI, XYZ, PNG, PNM, BT, DTED, HGT, USGS];
+pub(crate) const FORMATS: [Format; 14] =
+    [GEOTIFF, COG, VRT, NETCDF, ASCII, ESRI, ENVI, XYZ, PNG, PNM, BT, DTED, HGT, USGS];
 
 const fn system(name: &'static str, text: &'static str, unit: Unit, corner: [f64; 2], step: f64) -> System {
     System { name, text, unit, corner, step: [step, step], height_unit_m: None }
@@ -106,6 +107,7 @@ pub(crate) fn all() -> Vec<Combination> {
     meanings(&mut list);
     labelled_and_text(&mut list);
     netcdf(&mut list);
+    virtual_rasters(&mut list);
     pictures(&mut list);
     tiles_and_sheets(&mut list);
     list
@@ -306,6 +308,24 @@ fn netcdf(list: &mut Vec<Combination>) {
                 .stored("version 4, DEFLATE", &["FORMAT=NC4", "COMPRESS=DEFLATE"])
                 .with(Void::Declared),
         );
+    }
+}
+
+/// Virtual rasters of a GeoTIFF.
+fn virtual_rasters(list: &mut Vec<Combination>) {
+    for kind in Kind::WHOLE[1..].iter().copied().chain([Kind::Float32, Kind::Float64]) {
+        for void in [Void::None, Void::Declared, Void::InsideMask] {
+            for system in [UTM, DEGREES] {
+                list.push(Combination::new(VRT, kind, system).with(void));
+            }
+        }
+    }
+    for turn in Turn::ALL {
+        list.push(Combination::new(VRT, Kind::Int16, SYSTEMS[1]).turned(turn).with(Void::Declared));
+    }
+    for (scale, offset) in SCALES {
+        let meaning = Meaning { unit: "ft", unit_m: 0.3048, scale, offset };
+        list.push(Combination::new(VRT, Kind::Int16, UTM).meaning(meaning).with(Void::Declared));
     }
 }
 
