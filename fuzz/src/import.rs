@@ -34,10 +34,19 @@ pub(crate) fn body(data: &[u8]) {
 
 /// Opens the first of some files that lie in one folder, streams it and builds it.
 pub(crate) fn read(files: &[(&str, &[u8])], options: &OpenOptions) {
+    read_named(files, files.iter().take(1).map(|(name, _)| *name), options);
+}
+
+/// Opens files that lie in one folder as one, streams it and builds it.
+pub(crate) fn read_several(files: &[(&str, &[u8])], options: &OpenOptions) {
+    read_named(files, files.iter().map(|(name, _)| *name), options);
+}
+
+fn read_named<'n>(files: &[(&str, &[u8])], names: impl Iterator<Item = &'n str>, options: &OpenOptions) {
     let folder = crate::scratch::folder();
     files.iter().for_each(|(name, bytes)| seeds::write(&folder.path().join(name), bytes));
-    let path = folder.path().join(files.first().map_or("dem", |(name, _)| name));
-    let Some(dem) = told(terrasoar_import::open_with(std::slice::from_ref(&path), options)) else { return };
+    let paths: Vec<_> = names.map(|name| folder.path().join(name)).collect();
+    let Some(dem) = told(terrasoar_import::open_with(&paths, options)) else { return };
     streams(&*dem);
     let info = dem.info();
     if u64::from(info.samples_wide) * u64::from(info.samples_high) <= MOST_SAMPLES {

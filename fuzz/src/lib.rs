@@ -20,6 +20,7 @@ mod seeds;
 mod take_out;
 mod terrain_sealed;
 mod use_files;
+mod vrt;
 mod web_tiles;
 mod words;
 mod world_file;
@@ -125,6 +126,8 @@ targets! {
     reference_system { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// What GDAL keeps beside a DEM.
     aux_xml { is_text: true, fixed_mib: 160, per_byte: 64 }
+    /// A virtual raster over files beside it, alone and as one of several files.
+    vrt { is_text: true, fixed_mib: 160, per_byte: 256 }
     /// A picture: opened, read, draped, its tiles read.
     image { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A world file beside a picture: draped where it says.

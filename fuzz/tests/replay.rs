@@ -129,6 +129,11 @@ fn sheets_of_the_usgs() {
 }
 
 #[test]
+fn virtual_rasters() {
+    replay("vrt");
+}
+
+#[test]
 fn pictures() {
     replay("image");
 }

@@ -57,7 +57,6 @@ const SIGNED: &[Stranger] = &[
     stranger(0, b"LASF", "a LAS or LAZ point cloud", POINTS),
     stranger(0, b"ASTM-E57", "an E57 point cloud", POINTS),
     stranger(0, b"EHFA_HEADER_TAG", "an Erdas Imagine file", CONVERT),
-    stranger(0, b"<VRTDataset", "a GDAL virtual raster", CONVERT),
     stranger(0, b"SDTS", "an SDTS file", CONVERT),
     stranger(5, b"SDTS", "an SDTS file", CONVERT),
     stranger(0, b"TERRAGEN", "a Terragen terrain", CONVERT),
@@ -203,15 +202,13 @@ fn archive(look: &Look<'_>) -> Option<String> {
     Some(told("a zip archive without .hgt tiles in it", UNPACK))
 }
 
-/// XML: virtual rasters with a declaration, KML.
+/// XML: KML, for virtual rasters are read.
 fn markup(look: &Look<'_>) -> Option<String> {
     if !look.begins(b"<?xml") && !look.begins(b"\xef\xbb\xbf<?xml") {
         return None;
     }
     let has = |word: &[u8]| look.head.windows(word.len()).any(|window| window == word);
-    Some(if has(b"<VRTDataset") {
-        told("a GDAL virtual raster", CONVERT)
-    } else if has(b"<kml") {
+    Some(if has(b"<kml") {
         told("a KML file", VECTORS)
     } else {
         told("an XML text", "name the elevation file that it describes")

@@ -1,6 +1,10 @@
 //! Grids of numbers made to exhaust memory or time: words, or the heights, in little memory, whatever they claim.
 
+#[path = "mosaics/ground.rs"]
+mod ground;
 mod import_support;
+#[path = "mosaics/hostile.rs"]
+mod mosaics;
 #[path = "import_support/peak.rs"]
 mod peak;
 

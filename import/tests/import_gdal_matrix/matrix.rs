@@ -10,6 +10,7 @@ pub(crate) const ENVI: Format = Format { name: "ENVI with .hdr", driver: "ENVI",
 pub(crate) const XYZ: Format = Format { name: "XYZ", driver: "XYZ", ending: "xyz" };
 pub(crate) const PNG: Format = Format { name: "PNG", driver: "PNG", ending: "png" };
 pub(crate) const PNM: Format = Format { name: "Netpbm (PGM)", driver: "PNM", ending: "pgm" };
+pub(crate) const VRT: Format = Format { name: "Virtual raster (.vrt)", driver: "VRT", ending: "vrt" };
 pub(crate) const NETCDF: Format = Format { name: "netCDF", driver: "netCDF", ending: "nc" };
 pub(crate) const BT: Format = Format { name: "VTP BT", driver: "BT", ending: "bt" };
 pub(crate) const DTED: Format = Format { name: "DTED", driver: "DTED", ending: "dt0" };
@@ -20,9 +21,10 @@ pub(crate) const SURFER_6: Format = Format { name: "Surfer 6", driver: "GSBG", e
 pub(crate) const SURFER_7: Format = Format { name: "Surfer 7", driver: "GS7BG", ending: "grd" };
 
 /// Formats in the order of the page.
-pub(crate) const FORMATS: [Format; 16] = [
+pub(crate) const FORMATS: [Format; 17] = [
     GEOTIFF,
     COG,
+    VRT,
     NETCDF,
     ASCII,
     ESRI,
@@ -125,6 +127,7 @@ pub(crate) fn all() -> Vec<Combination> {
     meanings(&mut list);
     labelled_and_text(&mut list);
     netcdf(&mut list);
+    virtual_rasters(&mut list);
     pictures(&mut list);
     tiles_and_sheets(&mut list);
     list
@@ -325,6 +328,24 @@ fn netcdf(list: &mut Vec<Combination>) {
                 .stored("version 4, DEFLATE", &["FORMAT=NC4", "COMPRESS=DEFLATE"])
                 .with(Void::Declared),
         );
+    }
+}
+
+/// Virtual rasters of a GeoTIFF.
+fn virtual_rasters(list: &mut Vec<Combination>) {
+    for kind in Kind::WHOLE[1..].iter().copied().chain([Kind::Float32, Kind::Float64]) {
+        for void in [Void::None, Void::Declared, Void::InsideMask] {
+            for system in [UTM, DEGREES] {
+                list.push(Combination::new(VRT, kind, system).with(void));
+            }
+        }
+    }
+    for turn in Turn::ALL {
+        list.push(Combination::new(VRT, Kind::Int16, SYSTEMS[1]).turned(turn).with(Void::Declared));
+    }
+    for (scale, offset) in SCALES {
+        let meaning = Meaning { unit: "ft", unit_m: 0.3048, scale, offset };
+        list.push(Combination::new(VRT, Kind::Int16, UTM).meaning(meaning).with(Void::Declared));
     }
 }
 

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// How a format is known, what is said beside it, and what no table shows.
-const NOTES: [(&str, &str); 16] = [
+const NOTES: [(&str, &str); 17] = [
     (
         "GeoTIFF",
         "Known by its first bytes, BigTIFF too. Keys, world files, `.prj`, `.aux.xml` and `.msk` are read. Chunks are decoded in parallel and never more than a few at a time; \
@@ -14,6 +14,12 @@ const NOTES: [(&str, &str); 16] = [
          converts them.",
     ),
     ("Cloud-optimised GeoTIFF", "A GeoTIFF with overviews; the full image is read."),
+    (
+        "Virtual raster (.vrt)",
+        "As gdalbuildvrt and gdal_translate write them: simple and complex sources with scale, offset, exponent, table and \"no data\", pieces with fractions of samples, the kernels nearest, bilinear, cubic, lanczos and \
+         average, masks, alpha, hidden \"no data\", virtual rasters in each other. What no file covers is void, where GDAL gives a number. A file that is missing or damaged is named and left out. \
+         Pixel functions and other derived bands, warped, pansharpened and raw ones are refused with the command that writes them out. What gdalbuildvrt makes of several files is compared in a test of its own, import_gdal_mosaics.",
+    ),
     (
         "netCDF",
         "Classic files, those with 64-bit offsets, and version 4 (HDF5). COARDS and CF: coordinates, `_FillValue`, `missing_value`, `scale_factor`, `add_offset`, `units`, `positive`, grid \
@@ -54,7 +60,7 @@ const NOTES: [(&str, &str); 16] = [
     ("DTED", "Levels 0 to 2; columns of any length."),
     (
         ".hgt tile",
-        "Of any size, also 1801 x 3601; packed by gzip or zip; a folder or several tiles are one mosaic. The name says the place. GDAL's tool is the truth here too, in a test of its own.",
+        "Of any size, also 1801 x 3601; packed by gzip or zip. The name says the place. GDAL's tool is the truth here too, in a test of its own.",
     ),
     ("USGS DEM", "Whole sheets of types A and B, in degrees or UTM, in metres or feet."),
 ];
@@ -90,6 +96,10 @@ pub(crate) fn page() -> String {
         "| headerless heightmap | - | any, stated as `--raw WxH:TYPE`; square `.r16`, `.r32` and `.raw` by their length | `--nodata` |\n\
          | map tiles: folders, MBTiles, PMTiles | - | packed into colours | transparent, missing |\n\n\
          `--nodata` adds a mark of voids to any format. All formats are read in bounded memory (`--memory`).\n\n",
+    );
+    page.push_str(
+        "Several files, folders and patterns of any of these formats are one mosaic: of unlike resolution, system, type, unit, \"no data\" and overlap. They are compared with gdalbuildvrt sample by sample where they lie on one \
+         grid, and with gdalwarp where they do not, in the test import_gdal_mosaics. [build](manual/build.md#several-files) tells the rules.\n\n",
     );
     for format in FORMATS {
         let notes = NOTES.iter().find(|(name, _)| *name == format.name).map_or("", |(_, notes)| notes);
