@@ -135,7 +135,7 @@ fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn 
 /// Opens tiles, in the shape that a person states if they do.
 fn hgt_tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
     let stated = options.raw.as_deref().map(raw::tile_shape).transpose()?;
-    boxed(hgt::HgtDem::open(paths, stated))
+    boxed(hgt::HgtDem::open(paths, stated, options.strict))
 }
 
 /// Opens what is one grid: a file, a folder of `.hgt` tiles, or several such tiles.

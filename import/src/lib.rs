@@ -116,7 +116,7 @@ pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Dem
     };
     match mosaic::open_one(&files, options) {
         // Tiles of unlike shape, or of which some cannot be read.
-        Err(_) if files.len() > 1 => mosaic::open(&files, options),
+        Err(error) if files.len() > 1 && !is_usage(&error) => mosaic::open(&files, options),
         Ok(_) if options.resolution.is_some() && options.reproject.is_none() => Err(LayoutError::Usage(
             "a resolution is for data that is brought into another system, and for several files; say which system"
                 .into(),
@@ -124,6 +124,11 @@ pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Dem
         .mended_by(Remedy::Reproject)),
         opened => Ok(Box::new(opened?)),
     }
+}
+
+/// Whether the request was wrong, and not a file.
+fn is_usage(error: &LayoutError) -> bool {
+    matches!(error, LayoutError::Usage(_) | LayoutError::Unmet { .. })
 }
 
 /// Other files that the elevation data at `path` is made of: those that a virtual raster names. What cannot be read names none.

@@ -173,6 +173,29 @@ fn tiles_of_unlike_shape_become_one_grid() {
     assert_eq!(read(&[wide, small, narrow]).unwrap().info.samples_high, 3601);
 }
 
+/// A packed tile is read whole or not at all.
+#[test]
+fn a_damaged_tile_of_several_is_void_and_named() {
+    let folder = tempdir().unwrap();
+    let west = put(folder.path().join("N00E010.hgt"), &tile([33, 33], |_, _| 5));
+    let mut packed = gzipped(&tile([33, 33], ground));
+    let middle = packed.len() / 2;
+    packed[middle..middle + 8].fill(0xff);
+    let east = put(folder.path().join("N00E011.hgt.gz"), &packed);
+    let open = |strict| {
+        let options = OpenOptions { strict, ..OpenOptions::default() };
+        terrasoar_import::open_with(&[west.clone(), east.clone()], &options).unwrap()
+    };
+    let dem = open(false);
+    let grid = collect(&*dem).unwrap();
+    assert!((0..33).all(|row| {
+        (0..33).all(|col| grid.at(col, row) == 5.0 && grid.at(col + 32, row).is_nan() == (col > 0))
+    }));
+    let said: Vec<String> = dem.warnings().into_iter().map(|warning| warning.words).collect();
+    assert!(said.len() == 1 && said[0].contains("N00E011.hgt.gz") && said[0].contains("void"), "{said:?}");
+    assert!(collect(&*open(true)).err().unwrap().to_string().contains("N00E011.hgt.gz"));
+}
+
 #[test]
 fn packed_tiles_that_lie_are_told() {
     let folder = tempdir().unwrap();
