@@ -2,6 +2,8 @@
 
 #[path = "../../layout/tests/common/mod.rs"]
 mod common;
+#[path = "pictures/hostile_formats.rs"]
+mod hostile_formats;
 #[path = "import_support/packing.rs"]
 mod packing;
 #[path = "import_support/peak.rs"]

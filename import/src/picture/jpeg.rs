@@ -3,9 +3,10 @@
 //! No Rust decoder gives a JPEG row by row, so its texels are held as a whole while it is read, and more while it is decoded ([`JpegFrame::memory_bytes`]): 4.5 bytes a
 //! texel of the usual kind, 7.5 of a progressive one. That counts against the memory budget; larger pictures go through a tiled GeoTIFF.
 
-use super::png::spread;
+use super::webp::Whole;
 use crate::jpeg_frame::JpegFrame;
 use crate::reader::{Orientation, Picture};
+use crate::shown::PRESS_NOTE;
 use crate::{guard, input};
 use jpeg_decoder::{CodingProcess, Decoder, Error, PixelFormat, UnsupportedFeature};
 use std::fs::File;
@@ -47,9 +48,13 @@ impl JpegImage {
             format: format!(
                 "{}{} JPEG",
                 if progressive { "progressive " } else { "" },
-                if channels == 1 { "grey" } else { "RGB" }
+                match channels {
+                    1 => "grey",
+                    3 => "RGB",
+                    _ => "CMYK",
+                }
             ),
-            notes: Vec::new(),
+            notes: if channels == 4 { vec![PRESS_NOTE.into()] } else { Vec::new() },
             memory_bytes: frame.memory_bytes(),
         };
         let orientation = decoder.exif_data().map(Orientation::of_exif);
@@ -66,6 +71,10 @@ impl Picture for JpegImage {
     fn has_bytes(&self) -> bool {
         true
     }
+
+    fn colours(&self) -> usize {
+        if self.channels == 1 { 1 } else { 3 }
+    }
 }
 
 impl ImageSource for JpegImage {
@@ -79,7 +88,7 @@ impl ImageSource for JpegImage {
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
         let mut decoder = Decoder::new(reader(&self.path)?);
-        let texels = guard(
+        let mut texels = guard(
             &self.path,
             || "image data".into(),
             || decoder.decode().map_err(|e| decoding_error(&self.path, e)),
@@ -92,23 +101,24 @@ impl ImageSource for JpegImage {
                 "it has another size than its header says",
             ));
         }
-        Ok(Box::new(Rows { texels, channels: self.channels, at: 0 }))
+        if self.channels == 4 {
+            press_to_light(&mut texels);
+        }
+        Ok(Box::new(Whole { texels, channels: if self.channels == 4 { 3 } else { self.channels }, at: 0 }))
     }
 }
 
-struct Rows {
-    texels: Vec<u8>,
-    channels: usize,
-    at: usize,
-}
-
-impl RowReader for Rows {
-    fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
-        let end = (self.at + rgba.len() / 4 * self.channels).min(self.texels.len());
-        spread(&self.texels[self.at..end], self.channels, rgba);
-        self.at = end;
-        Ok(())
+/// Four inks a texel into red, green and blue, in place.
+fn press_to_light(texels: &mut Vec<u8>) {
+    let mut light = 0;
+    for at in (0..texels.len()).step_by(4) {
+        let [c, m, y, k] = [0, 1, 2, 3].map(|i| 255 - u32::from(texels[at + i]));
+        for ink in [c, m, y] {
+            texels[light] = (ink * k / 255) as u8;
+            light += 1;
+        }
     }
+    texels.truncate(light);
 }
 
 fn reader(path: &Path) -> Result<BufReader<File>, LayoutError> {
@@ -119,11 +129,8 @@ fn channels(path: &Path, format: PixelFormat) -> Result<usize, LayoutError> {
     match format {
         PixelFormat::L8 => Ok(1),
         PixelFormat::RGB24 => Ok(3),
-        PixelFormat::CMYK32 => Err(LayoutError::unsupported(
-            path,
-            "the JPEG is in CMYK, the inks of a press, and textures are RGB; convert it with its colour profile, for example: \
-             magick INPUT -colorspace sRGB output.jpg",
-        )),
+        // The decoder undoes what Adobe's programs turn round: 0 is no ink.
+        PixelFormat::CMYK32 => Ok(4),
         PixelFormat::L16 => Err(LayoutError::unsupported(
             path,
             "the JPEG is lossless of more than 8 bits, which is not read; convert it: gdal_translate -ot Byte -scale INPUT output.tif",
