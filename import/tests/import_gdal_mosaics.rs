@@ -166,7 +166,7 @@ fn virtual_rasters_of_gdalbuildvrt_are_read() {
             "hidden.vrt" => 77.0,
             _ => -9999.0,
         };
-        agrees(&vrt, &read(&[vrt.clone()], &OpenOptions::default()), off, uncovered);
+        agrees(&vrt, &read(std::slice::from_ref(&vrt), &OpenOptions::default()), off, uncovered);
     }
     let vrt = here.join("separate.vrt");
     run(here, "gdalbuildvrt", &[&["-q", "-separate", vrt.to_str().unwrap()], &names[..3]].concat());
@@ -211,7 +211,10 @@ fn virtual_rasters_of_gdal_translate_are_read() {
     ] {
         let vrt = here.join(name);
         run(here, "gdal_translate", &[&["-q", "-of", "VRT"], more, &[from, name]].concat());
-        let grid = read(&[vrt.clone()], &OpenOptions { spacing_is_stated: true, ..OpenOptions::default() });
+        let grid = read(
+            std::slice::from_ref(&vrt),
+            &OpenOptions { spacing_is_stated: true, ..OpenOptions::default() },
+        );
         let marks = match name {
             "marked.vrt" => 500.0,
             "whole-scaled.vrt" => -1.0,
@@ -228,7 +231,7 @@ fn virtual_rasters_of_gdal_translate_are_read() {
         &[&["-q", "deep/nested.vrt"], &names.each_ref().map(String::as_str)[..]].concat(),
     );
     let nested = here.join("deep/nested.vrt");
-    agrees(&nested, &read(&[nested.clone()], &OpenOptions::default()), 0.0, -9999.0);
+    agrees(&nested, &read(std::slice::from_ref(&nested), &OpenOptions::default()), 0.0, -9999.0);
     // What GDAL warps on the way is refused.
     run(here, "gdalwarp", &["-q", "-of", "VRT", "-t_srs", "EPSG:3035", "whole.tif", "warped.vrt"]);
     let refused = open_with(&[here.join("warped.vrt")], &OpenOptions::default()).err().unwrap().to_string();

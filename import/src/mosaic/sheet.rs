@@ -153,7 +153,8 @@ impl Laying<'_> {
 
 /// Puts a sample in the place of one below it.
 pub(super) fn replace(value: &mut f64, new: f64, highest: bool) {
-    if !new.is_nan() && !(highest && *value >= new) {
+    let stays = new.is_nan() || highest && *value >= new;
+    if !stays {
         *value = new;
     }
 }

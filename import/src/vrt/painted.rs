@@ -29,12 +29,15 @@ const BLOCK: [u32; 2] = [2048, 32];
 /// What opens a file that is no virtual raster.
 pub(crate) type Opens = fn(&Path, &OpenOptions) -> Result<Box<dyn Reader>, LayoutError>;
 
+/// What opens a virtual raster that lies in another.
+type OpensVirtual = fn(&Path, Within) -> Result<Box<dyn Reader>, LayoutError>;
+
 /// What all virtual rasters share that lie in each other.
 #[derive(Clone)]
 pub(super) struct Within {
     pub(super) opens: Opens,
     /// What opens a virtual raster within these.
-    pub(super) opens_virtual: fn(&Path, Within) -> Result<Box<dyn Reader>, LayoutError>,
+    pub(super) opens_virtual: OpensVirtual,
     pub(super) options: OpenOptions,
     /// From the outermost to this one, as the system knows them.
     pub(super) chain: Vec<PathBuf>,

@@ -108,7 +108,9 @@ fn virtual_rasters_in_each_other_and_lost_files() {
     let said: Vec<String> = dem.warnings().into_iter().map(|warning| warning.words).collect();
     assert!(said.len() == 1 && said[0].contains("none.asc") && said[0].contains("left out"), "{said:?}");
     let strict = OpenOptions { strict: true, ..OpenOptions::default() };
-    let error = open_with(&[outer.clone()], &strict).and_then(|dem| collect(&*dem).map(|_| ())).unwrap_err();
+    let error = open_with(std::slice::from_ref(&outer), &strict)
+        .and_then(|dem| collect(&*dem).map(|_| ()))
+        .unwrap_err();
     assert!(error.to_string().contains("none.asc"), "{error}");
     // As one file of several.
     let more = at(1000.0, 1000.0, 10.0).write(inside(folder.path(), "more.asc"), "EPSG:32632", |_, _| 9.0);
