@@ -29,7 +29,7 @@
 //! Space is metres east, north and up of the terrain's south-west sample at height zero. Package `terrasoar-scene` draws ground with wgpu, into a render pass of its own or of
 //! yours. To draw by other means, use [`Ground::change_since`]. [`Ground::edit`] changes heights at once, [`Ground::commit`] brings them to the disk in the background. Terrain files are made
 //! by [`terrasoar_layout::build`](mod@terrasoar_layout::build) from data in memory, and by package `terrasoar-import` or the program from elevation files.
-//! EMBEDDING.md goes through it step by step, with programs that run.
+//! docs/embedding in the repository goes through it step by step, with programs that run.
 //!
 //! # Below the front door
 //!
@@ -73,7 +73,7 @@ pub use view::View;
 /// The vectors and matrices of the version that this crate's types are of.
 pub use glam;
 
-/// The programs in EMBEDDING.md, run as tests.
+/// The program in EMBEDDING.md, run as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../EMBEDDING.md")]
 struct Embedding;

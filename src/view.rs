@@ -4,6 +4,7 @@
 //! boundary are radians; flights and flags speak degrees.
 
 use glam::DVec3;
+use terrasoar_layout::portable;
 
 /// A size in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,8 +109,8 @@ impl View {
         let to = at_m - eye_m;
         Self {
             eye_m,
-            yaw_rad: to.x.atan2(to.y),
-            pitch_rad: to.z.atan2(to.x.hypot(to.y)),
+            yaw_rad: portable::atan2(to.x, to.y),
+            pitch_rad: portable::atan2(to.z, portable::hypot(to.x, to.y)),
             roll_rad: 0.0,
             vertical_fov_rad: 0.8,
             viewport,
@@ -120,12 +121,12 @@ impl View {
 
     /// Unit vectors to the right, up and forward of the eye.
     pub fn axes(&self) -> [DVec3; 3] {
-        let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
-        let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
+        let (sin_yaw, cos_yaw) = portable::sin_cos(self.yaw_rad);
+        let (sin_pitch, cos_pitch) = portable::sin_cos(self.pitch_rad);
         let forward = DVec3::new(sin_yaw * cos_pitch, cos_yaw * cos_pitch, sin_pitch);
         let level_right = DVec3::new(cos_yaw, -sin_yaw, 0.0);
         let level_up = level_right.cross(forward);
-        let (sin_roll, cos_roll) = self.roll_rad.sin_cos();
+        let (sin_roll, cos_roll) = portable::sin_cos(self.roll_rad);
         let right = level_right * cos_roll - level_up * sin_roll;
         let up = level_right * sin_roll + level_up * cos_roll;
         [right, up, forward]
@@ -143,7 +144,7 @@ impl View {
 
     /// Tangents of half the horizontal and half the vertical field of view.
     pub fn half_tangents(&self) -> [f64; 2] {
-        let vertical = (0.5 * self.vertical_fov_rad).tan();
+        let vertical = portable::tan(0.5 * self.vertical_fov_rad);
         [vertical * f64::from(self.viewport.width_px) / f64::from(self.viewport.height_px), vertical]
     }
 

@@ -20,7 +20,11 @@ fn built(name: &str) -> PathBuf {
 }
 
 fn run(name: &str, terrain: &Path) -> String {
-    let Output { status, stdout, stderr } = Command::new(built(name)).arg(terrain).output().unwrap();
+    run_with(name, &[terrain])
+}
+
+fn run_with(name: &str, files: &[&Path]) -> String {
+    let Output { status, stdout, stderr } = Command::new(built(name)).args(files).output().unwrap();
     assert!(status.success(), "{name}: {}", String::from_utf8_lossy(&stderr));
     assert!(stderr.is_empty(), "{name}: {}", String::from_utf8_lossy(&stderr));
     String::from_utf8(stdout).unwrap()
@@ -74,4 +78,30 @@ fn edits_while_flying_are_made_saved_and_taken_back() {
     assert!(said.lines().filter(|line| line.contains("now Some(")).count() > 5, "{said}");
     assert!(said.contains(" commits taken back") && !said.contains("\n0 commits taken back"), "{said}");
     assert_eq!(heights(), before);
+}
+
+#[test]
+fn the_steps_make_land_fly_over_it_and_save_craters() {
+    let folder = tempfile::tempdir().unwrap();
+    let [land, save] = ["land.iqt", "save.iqo"].map(|name| folder.path().join(name));
+    let said = run("step_1_terrain", &land);
+    assert!(said.contains("land.iqt: heights from "), "{said}");
+    assert_eq!(terrasoar::Terrain::open(&land).unwrap().extent_m(), [10_240.0; 2]);
+
+    let said = run("step_2_fly", &land);
+    let lines: Vec<&str> = said.lines().collect();
+    let [triangles, foot, far, shot] = lines[..] else { panic!("{said}") };
+    assert!(triangles.split(' ').next().unwrap().parse::<u32>().unwrap() > 1000, "{said}");
+    let exact_m = terrasoar::Terrain::open(&land).unwrap().height_m(5120.0, 7168.0).unwrap().unwrap();
+    assert_eq!(foot, format!("the ground is {exact_m:.2} m high"));
+    assert_eq!(far, "a far place is exact: true");
+    assert!(shot.starts_with("the shot lands ") && !shot.ends_with("nowhere"), "{said}");
+
+    let said = run_with("step_6_save", &[&land, &save]);
+    assert!(said.contains(" pages written") && said.contains("with the overlay Some("), "{said}");
+    // The crater was committed and taken back; the overlay has it for good.
+    let height_m = |terrain: terrasoar::Terrain| terrain.height_m(5120.0, 5120.0).unwrap().unwrap();
+    let was_m = height_m(terrasoar::Terrain::open(&land).unwrap());
+    let is_m = height_m(terrasoar::Terrain::open_with_overlay(&land, &save).unwrap());
+    assert!((was_m - is_m - 10.0).abs() < 0.1, "{was_m} {is_m}");
 }

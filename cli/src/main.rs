@@ -1,5 +1,7 @@
 //! The program `terrasoar`. The work is done in libraries; the command line is in [`verbs`].
 
+mod fit;
+mod numbers;
 mod verbs;
 #[cfg(feature = "view")]
 mod window;

@@ -84,6 +84,22 @@ pub enum RenderError {
         /// Level and position.
         tile: String,
     },
+    /// A material's text is no WGSL, or does not fit the ground.
+    #[error("line {line} of the material: {message}")]
+    Material {
+        /// Line of the text, from 1.
+        line: u32,
+        /// What is wrong, and what to do, in words.
+        message: String,
+    },
+    /// Layers of a material that cannot be drawn.
+    #[error("layer {layer} of the material: {message}")]
+    Layer {
+        /// Which, from 0.
+        layer: usize,
+        /// What is wrong, in words.
+        message: String,
+    },
     /// Wrong use that is none of the above.
     #[error("{0}")]
     Usage(&'static str),

@@ -176,6 +176,8 @@ pub struct Look {
     pub rock: f32,
     /// Share of the image, where one is set ([`crate::Renderer::set_imagery`]), in the ground's colour: 0 (off) to 1.
     pub imagery: f32,
+    /// Share of the material, where one is set ([`crate::Renderer::set_material`]), in the ground's colour: 0 (off) to 1, the default.
+    pub material: f32,
     /// Share of light and shade, 0 (bare colours) to 1.
     pub shading: f32,
     /// The sun.
@@ -204,6 +206,7 @@ impl Default for Look {
             tint_range_m: None,
             rock: 0.7,
             imagery: 0.0,
+            material: 1.0,
             shading: 1.0,
             sun: Sun::default(),
             sky: [linear_of(0x2f68b0), linear_of(0xcfdce8)],
@@ -241,6 +244,11 @@ impl Look {
     /// This look with another share of the image in the ground's colour, 0 to 1.
     pub fn imagery(self, imagery: f32) -> Self {
         Self { imagery, ..self }
+    }
+
+    /// This look with another share of the material in the ground's colour, 0 to 1.
+    pub fn material(self, material: f32) -> Self {
+        Self { material, ..self }
     }
 
     /// This look with another share of light and shade, 0 to 1.

@@ -57,10 +57,12 @@ pub(crate) struct Variant {
     pub tiles: bool,
     pub image: bool,
     pub morph: bool,
+    /// Number of the material that shows; 0 for none.
+    pub material: u64,
 }
 
 impl Variant {
-    pub(crate) fn of(look: &Look, has_image: bool, pass: PassFormat) -> Self {
+    pub(crate) fn of(look: &Look, has_image: bool, material: u64, pass: PassFormat) -> Self {
         Self {
             pass,
             surface: look.surface,
@@ -68,11 +70,12 @@ impl Variant {
             tiles: look.tile_normals,
             image: has_image && look.imagery > 0.0,
             morph: look.morph,
+            material: if look.material > 0.0 { material } else { 0 },
         }
     }
 
     /// Values for the shaders' overrides.
-    fn constants(&self) -> [(&'static str, f64); 7] {
+    fn constants(&self) -> [(&'static str, f64); 8] {
         let surface = match self.surface {
             Surface::Tint => 0,
             Surface::Plain => 1,
@@ -85,6 +88,7 @@ impl Variant {
             ("CONTOURS", f64::from(u8::from(self.contours))),
             ("TILES", f64::from(u8::from(self.tiles))),
             ("IMAGE", f64::from(u8::from(self.image))),
+            ("MATERIAL", f64::from(u8::from(self.material != 0))),
             ("MORPH", f64::from(u8::from(self.morph))),
             ("ENCODES", f64::from(u8::from(self.pass.colour.is_srgb()))),
             ("FARTHEST", f64::from(self.pass.depth_range.clear())),
@@ -98,6 +102,13 @@ pub(crate) struct Modules {
     terrain: wgpu::ShaderModule,
     sky: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
+}
+
+/// A compiled program and what it binds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Compiled<'a> {
+    pub module: &'a wgpu::ShaderModule,
+    pub layout: &'a wgpu::PipelineLayout,
 }
 
 impl Modules {
@@ -128,7 +139,15 @@ pub(crate) struct Pipelines {
 }
 
 impl Pipelines {
-    pub(crate) fn new(device: &wgpu::Device, modules: &Modules, variant: Variant) -> Self {
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        modules: &Modules,
+        with_material: Option<Compiled<'_>>,
+        variant: Variant,
+    ) -> Self {
+        let plain = |module| Compiled { module, layout: &modules.layout };
+        let terrain = plain(&modules.terrain);
+        let ground_program = with_material.unwrap_or(terrain);
         let wall_edges = [Some(wgpu::VertexBufferLayout {
             array_stride: 8,
             step_mode: wgpu::VertexStepMode::Instance,
@@ -136,47 +155,50 @@ impl Pipelines {
         })];
         let constants = variant.constants();
         let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
-        let pipeline =
-            |name: &str, module, buffers: &[Option<wgpu::VertexBufferLayout<'_>>], ground: bool| {
-                device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                    label: Some(name),
-                    layout: Some(&modules.layout),
-                    vertex: wgpu::VertexState {
-                        module,
-                        entry_point: Some(&format!("{name}_vertex")),
-                        compilation_options: options.clone(),
-                        buffers,
-                    },
-                    // Nothing is culled by its winding: triangles deformed at the data's edge may turn over.
-                    primitive: wgpu::PrimitiveState::default(),
-                    depth_stencil: Some(wgpu::DepthStencilState {
-                        format: variant.pass.depth,
-                        depth_write_enabled: Some(ground),
-                        // The sky is infinitely far, where only untouched pixels are.
-                        depth_compare: Some(if ground {
-                            variant.pass.depth_range.compare()
-                        } else {
-                            wgpu::CompareFunction::Equal
-                        }),
-                        stencil: Default::default(),
-                        bias: Default::default(),
+        let pipeline = |name: &str,
+                        program: Compiled<'_>,
+                        buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
+                        ground: bool| {
+            let module = program.module;
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(name),
+                layout: Some(program.layout),
+                vertex: wgpu::VertexState {
+                    module,
+                    entry_point: Some(&format!("{name}_vertex")),
+                    compilation_options: options.clone(),
+                    buffers,
+                },
+                // Nothing is culled by its winding: triangles deformed at the data's edge may turn over.
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: variant.pass.depth,
+                    depth_write_enabled: Some(ground),
+                    // The sky is infinitely far, where only untouched pixels are.
+                    depth_compare: Some(if ground {
+                        variant.pass.depth_range.compare()
+                    } else {
+                        wgpu::CompareFunction::Equal
                     }),
-                    multisample: wgpu::MultisampleState { count: variant.pass.samples, ..Default::default() },
-                    fragment: Some(wgpu::FragmentState {
-                        module,
-                        entry_point: Some(&format!("{name}_fragment")),
-                        compilation_options: options.clone(),
-                        targets: &[Some(variant.pass.colour.into())],
-                    }),
-                    multiview_mask: None,
-                    cache: None,
-                })
-            };
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                }),
+                multisample: wgpu::MultisampleState { count: variant.pass.samples, ..Default::default() },
+                fragment: Some(wgpu::FragmentState {
+                    module,
+                    entry_point: Some(&format!("{name}_fragment")),
+                    compilation_options: options.clone(),
+                    targets: &[Some(variant.pass.colour.into())],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
         Self {
-            shared: pipeline("shared", &modules.terrain, &[], true),
-            own: pipeline("own", &modules.terrain, &[], true),
-            wall: pipeline("wall", &modules.terrain, &wall_edges, true),
-            sky: pipeline("sky", &modules.sky, &[], false),
+            shared: pipeline("shared", ground_program, &[], true),
+            own: pipeline("own", ground_program, &[], true),
+            wall: pipeline("wall", terrain, &wall_edges, true),
+            sky: pipeline("sky", plain(&modules.sky), &[], false),
         }
     }
 }

@@ -2,6 +2,22 @@
 
 use std::borrow::Cow;
 
+/// Mesh and walls, but for the function `material`.
+macro_rules! ground_parts {
+    () => {
+        concat!(
+            include_str!("shaders/frame.wgsl"),
+            include_str!("shaders/atmosphere.wgsl"),
+            include_str!("shaders/mesh.wgsl"),
+            include_str!("shaders/tiles.wgsl"),
+            include_str!("shaders/imagery.wgsl"),
+            include_str!("shaders/material.wgsl"),
+            include_str!("shaders/surface.wgsl"),
+            include_str!("shaders/terrain.wgsl"),
+        )
+    };
+}
+
 /// A program for the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Program {
@@ -22,15 +38,7 @@ impl Program {
     /// Its text.
     pub fn source(self) -> &'static str {
         match self {
-            Self::Terrain => concat!(
-                include_str!("shaders/frame.wgsl"),
-                include_str!("shaders/atmosphere.wgsl"),
-                include_str!("shaders/mesh.wgsl"),
-                include_str!("shaders/tiles.wgsl"),
-                include_str!("shaders/imagery.wgsl"),
-                include_str!("shaders/surface.wgsl"),
-                include_str!("shaders/terrain.wgsl"),
-            ),
+            Self::Terrain => concat!(ground_parts!(), include_str!("shaders/no_material.wgsl")),
             Self::Sky => concat!(
                 include_str!("shaders/frame.wgsl"),
                 include_str!("shaders/atmosphere.wgsl"),
@@ -45,6 +53,9 @@ impl Program {
         }
     }
 }
+
+/// Mesh and walls without the function `material`, which a material's text brings.
+pub(crate) const GROUND: &str = ground_parts!();
 
 pub(crate) fn module(device: &wgpu::Device, program: Program) -> wgpu::ShaderModule {
     device.create_shader_module(wgpu::ShaderModuleDescriptor {

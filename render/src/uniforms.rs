@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use crate::frame::DepthRange;
 use crate::look::{Haze, Look};
+use crate::material::TILED_M;
 use crate::ramps::linear_of;
 use crate::tiles::{Imagery, Pyramid, TILE_CELLS};
 use crate::view::{LocalView, TerrainShape, clip_from_eye, near_m, whole_and_rest};
@@ -41,6 +42,8 @@ pub(crate) struct Uniforms {
     image_eye: [i32; 4],
     image_scale: [f32; 4],
     image_share: [f32; 4],
+    eye_m: [f32; 4],
+    material: [f32; 4],
 }
 
 /// What the uniforms are made of.
@@ -134,6 +137,13 @@ impl Uniforms {
             image_eye: image.eye,
             image_scale: image.scale,
             image_share: [look.imagery.clamp(0.0, 1.0), image.straight, 0.0, 0.0],
+            eye_m: [
+                view.eye_m.x.rem_euclid(TILED_M) as f32,
+                view.eye_m.y.rem_euclid(TILED_M) as f32,
+                view.eye_m.x as f32,
+                view.eye_m.y as f32,
+            ],
+            material: [look.material.clamp(0.0, 1.0), 0.0, 0.0, 0.0],
         }
     }
 }

@@ -16,7 +16,7 @@ pub struct SceneFrame<'s> {
 
 impl SceneFrame<'_> {
     /// Draws ground and walls into a pass like the one that the frame was made for. Clears nothing, and writes the pass's depth, so what was or will be drawn
-    /// there hides and is hidden as it should. Changes the pass's pipeline, bind group 0, index buffer and vertex buffer 0.
+    /// there hides and is hidden as it should. Changes the pass's pipeline, bind group 0 (and 1 with a material), index buffer and vertex buffer 0.
     ///
     /// # Errors
     /// None is known; a frame that does not fit its renderer would be one.

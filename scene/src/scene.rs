@@ -29,8 +29,8 @@ use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::Edit;
 use terrasoar_layout::imagery::{Imagery, Paint, TileFormat, TileId};
 use terrasoar_render::{
-    DrawStats, Frame, Gpu, Look, MeshPatch, PassFormat, RenderError, Renderer, RendererOptions, Target,
-    TerrainShape, TileStats, UploadStats, height_tile, wgpu,
+    DrawStats, Frame, Gpu, Look, Material, MeshPatch, PassFormat, RenderError, Renderer, RendererOptions,
+    Target, TerrainShape, TileStats, UploadStats, height_tile, wgpu,
 };
 
 /// Tiles that are asked for, for each that is given in a frame.
@@ -61,6 +61,7 @@ pub struct Scene {
     heights_m: Vec<f32>,
     wanted: Vec<TileId>,
     drape: Option<Drape>,
+    material: Option<Material>,
     /// Whether the last picture had the image in it.
     shows_image: bool,
     /// What the device takes of images.
@@ -96,6 +97,7 @@ impl Scene {
             heights_m: Vec::new(),
             wanted: Vec::new(),
             drape,
+            material: None,
             shows_image: false,
             formats,
         })
@@ -331,6 +333,16 @@ impl Scene {
         }
     }
 
+    /// Gives the ground a material of your own, or takes it off. Looks show it by default ([`Look::material`]). It stays after the loss of a device.
+    ///
+    /// # Errors
+    /// As [`Renderer::set_material`]; the material before stays then.
+    pub fn set_material(&mut self, material: Option<Material>) -> Result<(), SceneError> {
+        self.renderer.set_material(material.as_ref())?;
+        self.material = material;
+        Ok(())
+    }
+
     /// What craters among these edits burn into the image: nothing where there is none, or none that this build can paint, and by none that is too wide to follow the hand.
     pub fn scorches_of(&self, edits: &[Edit]) -> Vec<Paint> {
         let Some(drape) = self.drape.as_ref().filter(|drape| drape.can_be_painted()) else {
@@ -389,6 +401,7 @@ impl Scene {
             drape.suit(self.formats);
         }
         self.renderer = new_renderer(*self.renderer.terrain(), self.drape.as_ref(), gpu, self.options)?;
+        self.renderer.set_material(self.material.as_ref())?;
         (self.device, self.queue) = (gpu.device.clone(), gpu.queue.clone());
         (self.seen, self.end) = (None, 0);
         if let Some((edges, bottom_m)) = &self.walls {

@@ -8,7 +8,7 @@ use terrasoar::ground::{Ground, PictureEngine, Refined};
 use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::{Capabilities, Gpu, Look, Offscreen, RenderError};
+use terrasoar_render::{Capabilities, Gpu, Look, Material, Offscreen, RenderError};
 
 /// Takes pictures of one terrain, all of one size.
 pub struct Studio<'a> {
@@ -52,6 +52,14 @@ impl<'a> Studio<'a> {
         self.scene.raise_walls(&self.ground, bottom_m as f32)
     }
 
+    /// Gives the ground a material of your own, or takes it off.
+    ///
+    /// # Errors
+    /// As [`Scene::set_material`].
+    pub fn set_material(&mut self, material: Option<Material>) -> Result<(), SceneError> {
+        self.scene.set_material(material)
+    }
+
     /// A picture of the mesh as it is: three bytes a pixel, row by row from the top.
     ///
     /// # Errors
@@ -83,6 +91,11 @@ impl<'a> Studio<'a> {
     /// Whether an image is draped over the terrain.
     pub fn has_image(&self) -> bool {
         self.scene.has_image()
+    }
+
+    /// The device, to make buffers and textures for a material on it. After its loss [`Studio::picture`] goes on with another.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
     }
 
     /// The device's adapter.

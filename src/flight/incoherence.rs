@@ -8,6 +8,7 @@
 
 use super::generate::{FlightPlan, GenerateError, Ground, generate};
 use super::{Flight, FlightFrame};
+use terrasoar_layout::portable::{exp, ln, ln_1p};
 
 /// Most trial speeds.
 pub const MAX_TRIALS: usize = 24;
@@ -203,25 +204,25 @@ struct Search {
 
 impl Search {
     fn new(extent_m: f64, wanted_percent: f64) -> Self {
-        let limits = SPEEDS.map(|part| (part * extent_m).ln());
+        let limits = SPEEDS.map(|part| ln(part * extent_m));
         Self {
             limits,
-            wanted: wanted_percent.ln(),
+            wanted: ln(wanted_percent),
             low: None,
             high: None,
-            next: Some((FIRST_SPEED * extent_m).ln()),
+            next: Some(ln(FIRST_SPEED * extent_m)),
             side: None,
         }
     }
 
     /// The next speed to try in metres a frame; `None` when there is nothing left to learn.
     fn next_speed(&self) -> Option<f64> {
-        self.next.map(f64::exp)
+        self.next.map(exp)
     }
 
     /// Slowest and fastest speed that may be tried, in metres a frame.
     fn limits_m(&self) -> [f64; 2] {
-        self.limits.map(f64::exp)
+        self.limits.map(exp)
     }
 
     /// Whether all speeds tried were on the same side of the wanted percentage.
@@ -230,8 +231,8 @@ impl Search {
     }
 
     fn learn(&mut self, speed_m: f64, percent: f64) {
-        let end = End { speed: speed_m.ln(), excess: percent.max(LEAST_PERCENT).ln() - self.wanted };
-        if end.excess.abs() <= TOLERANCE.ln_1p() {
+        let end = End { speed: ln(speed_m), excess: ln(percent.max(LEAST_PERCENT)) - self.wanted };
+        if end.excess.abs() <= ln_1p(TOLERANCE) {
             self.next = None;
             return;
         }
@@ -275,7 +276,7 @@ impl Search {
         };
         match (closest(false), closest(true), self.low) {
             (Some(below_percent), Some(above_percent), Some(low)) => {
-                SolveError::Jumps { wanted_percent, below_percent, above_percent, speed_m: low.speed.exp() }
+                SolveError::Jumps { wanted_percent, below_percent, above_percent, speed_m: exp(low.speed) }
             }
             _ => SolveError::Unreachable {
                 wanted_percent,

@@ -7,6 +7,8 @@
 //! implies it still holds. Proof: a rounding rho of the total has rho(x) - rho(y) > x - y - 1, so the path since is shorter than
 //! floor((d - guard) / q) ticks.
 
+use terrasoar_layout::portable;
+
 /// Fixed-point units a metre: 2^20.
 const UNITS_PER_M: f64 = (1u64 << 20) as f64;
 /// Expiries are counted in so many bits; the rest of a word are status bits.
@@ -31,7 +33,7 @@ pub(super) struct PathClock {
 impl PathClock {
     /// A clock that ticks about every `tick_m` metres.
     pub(super) fn new(tick_m: f64) -> Self {
-        let shift = (tick_m * UNITS_PER_M).log2().floor().clamp(0.0, 40.0) as u32;
+        let shift = portable::log2(tick_m * UNITS_PER_M).floor().clamp(0.0, 40.0) as u32;
         Self { total: 0, shift, base: 0, last_eye_m: None }
     }
 

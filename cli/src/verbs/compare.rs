@@ -1,6 +1,6 @@
 //! `terrasoar compare`: engines on the same flight, side by side, and a report.
 
-use super::made::made;
+use super::made::title;
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
@@ -8,11 +8,11 @@ use super::replay::{QualityArgs, fly};
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse, sweep};
 use anyhow::{Result, bail};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
 use terrasoar::stats::{Comparison, FrameStats};
-use terrasoar_lab::report::{ComparisonReport, FLIGHT_PICTURE, FlightPicture, ReportTitle};
+use terrasoar_lab::report::{ComparisonReport, FLIGHT_PICTURE, FlightPicture};
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Fly a recorded flight with several engines, compare them and write a report.
@@ -101,13 +101,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     drop(progress);
     let picture = middle_frame(args, &terrain, &flight);
-    let title = ReportTitle {
-        terrain: name(&args.terrain.file),
-        flight: name(&args.flight),
-        tolerance_px: quality.tolerance_px,
-        viewport: quality.viewport,
-        made: Some(made()),
-    };
+    let title = title(&args.terrain.file, &args.flight, quality);
     let report = ComparisonReport {
         title: &title,
         runs: &runs,
@@ -155,10 +149,6 @@ fn middle_frame(args: &Args, terrain: &Terrain, flight: &Flight) -> Result<(Vec<
 #[cfg(not(feature = "pictures"))]
 fn middle_frame(_: &Args, _: &Terrain, _: &Flight) -> Result<(Vec<u8>, String), String> {
     Err("this program was built without the feature pictures".into())
-}
-
-fn name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// The first engine, and its first frame, whose mesh is not the first engine's.

@@ -5,7 +5,7 @@ use super::outputs::{Force, Kind};
 use super::progress::Meter;
 use super::replay::QualityArgs;
 use super::terrain::TerrainArgs;
-use super::{WrongUsage, parse, within};
+use super::{WrongUsage, parse};
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
@@ -119,7 +119,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     ground.check()?;
     note_terrain(&mut flight, args);
-    flight.notes.push(within::note_of(terrain.grid()));
+    flight.notes.push(crate::fit::note_of(terrain.grid()));
     flight.write(&args.output)?;
     let told =
         format!("{}: {} flight of {} frames{told}", args.output.display(), args.kind.name(), args.frames);

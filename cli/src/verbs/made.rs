@@ -1,6 +1,9 @@
 //! How figures are made, for reports: by which program, on which machine, when, by which command. **The one place that reads the calendar for them.**
 
+use std::path::Path;
+use terrasoar::flyover::Quality;
 use terrasoar_lab::made::Made;
+use terrasoar_lab::report::ReportTitle;
 
 /// How the figures of this run come about.
 pub(super) fn made() -> Made {
@@ -11,6 +14,22 @@ pub(super) fn made() -> Made {
     Made::new(program, machine(), now)
         .commit(option_env!("TERRASOAR_COMMIT").map(str::to_owned))
         .command(&words)
+}
+
+/// What was flown, and how the figures come about.
+pub(super) fn title(terrain: &Path, flight: &Path, quality: Quality) -> ReportTitle {
+    ReportTitle {
+        terrain: name(terrain),
+        flight: name(flight),
+        tolerance_px: quality.tolerance_px,
+        viewport: quality.viewport,
+        made: Some(made()),
+    }
+}
+
+/// A file's name without its folders.
+pub(super) fn name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// The machine in words: "linux x86_64, Intel(R) Xeon(R), 2 cores".

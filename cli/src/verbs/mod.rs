@@ -10,6 +10,7 @@ mod cache;
 mod cap;
 mod compare;
 mod compare_ground;
+mod completions;
 mod defect;
 mod drape;
 mod edit;
@@ -19,6 +20,7 @@ mod height;
 mod info;
 mod iobench;
 mod made;
+mod man;
 mod mesh;
 #[cfg(feature = "pictures")]
 mod movie;
@@ -54,7 +56,7 @@ use pictureless::view;
 #[cfg(not(feature = "pictures"))]
 use pictureless::{movie, snapshot};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use std::borrow::Cow;
 use std::fmt;
 use std::process::ExitCode;
@@ -113,6 +115,15 @@ enum Verb {
     View(view::Args),
     Snapshot(snapshot::Args),
     Movie(movie::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// The whole command line, for what is made of it: completions and pages of the manual.
+fn command() -> clap::Command {
+    let mut command = Typed::command();
+    command.build();
+    command
 }
 
 /// A command line that clap accepts and that still makes no sense.
@@ -189,6 +200,8 @@ fn carry_out() -> ExitCode {
         Verb::View(args) => view::run(&args),
         Verb::Snapshot(args) => snapshot::run(&args),
         Verb::Movie(args) => movie::run(&args),
+        Verb::Completions(args) => completions::run(&args),
+        Verb::Man(args) => man::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -6,7 +6,8 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use std::io::{self, IsTerminal, Write};
 use terrasoar_layout::printable;
-use terrasoar_layout::words::thousands;
+
+pub(super) use crate::numbers::{decimal, grouped};
 
 /// What fails when standard output does.
 const TO_STDOUT: &str = "cannot write to standard output";
@@ -90,36 +91,9 @@ pub(super) fn columns(rows: &[Vec<String>]) -> String {
     rows.iter().map(line).collect()
 }
 
-/// A whole number with its thousands set apart.
-pub(super) fn grouped(value: u64) -> String {
-    thousands(&value.to_string())
-}
-
-/// A number of at most `digits` decimals, without zeros at its end.
-pub(super) fn decimal(value: f64, digits: usize) -> String {
-    let text = format!("{value:.digits$}");
-    if !text.contains('.') {
-        return text;
-    }
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_read_well() {
-        assert_eq!(
-            [0, 12, 999, 1000, 1_234_567].map(grouped),
-            ["0", "12", "999", "1,000", "1,234,567"].map(String::from)
-        );
-        assert_eq!(decimal(1234.5, 3), "1234.5");
-        assert_eq!(decimal(-0.0001, 3), "0");
-        assert_eq!(decimal(20.0, 0), "20");
-        assert_eq!(decimal(12.000_000_1, 6), "12");
-    }
 
     #[test]
     fn columns_line_up() {

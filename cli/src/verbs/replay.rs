@@ -1,5 +1,6 @@
 //! `terrasoar replay`: a recorded flight through one engine.
 
+use super::made::title;
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
@@ -182,7 +183,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     drop(progress);
     if let Some(path) = &args.stats {
-        write_frames_csv(path, &frames)?;
+        write_frames_csv(path, &title(&args.terrain.file, &args.flight, quality), &frames)?;
     }
     let summary = ReplaySummary::of(name, &frames);
     if args.json { print_json(&summary) } else { print(&text(&summary)) }

@@ -4,7 +4,8 @@
 //! is no mistake. Cost: for a flight four heights a frame, of pages that are kept.
 
 use super::output::{complain, decimal, grouped};
-use anyhow::{Result, bail};
+use crate::fit::{self, extent, is_over};
+use anyhow::{Error, Result, bail};
 use glam::DVec3;
 use std::path::Path;
 use terrasoar::edits::LoadedBatch;
@@ -15,27 +16,10 @@ use terrasoar_layout::grid::Grid;
 use terrasoar_layout::read::heights::Heights;
 use terrasoar_layout::read::terrain::Terrain;
 
-/// Name of the note in which a flight says how large the ground is that it was made over.
-pub(super) const EXTENT_NOTE: &str = "terrain-extent-m";
 /// Of a step between samples, how far above the ground an eye is put that was below it. More than to the near plane, beyond which nothing is drawn.
 const CLEARANCE: f64 = 0.1;
 /// Of the terrain, how far something may reach beyond it and be taken to end at its border.
 const AT_THE_BORDER: f64 = 1e-9;
-
-/// The terrain's extent in words: "which extends from 0,0 to 2560,2560 metres".
-pub(super) fn extent(grid: &Grid) -> String {
-    let [east, north] = extent_note(grid);
-    format!("which extends from 0,0 to {east},{north} metres")
-}
-
-fn extent_note(grid: &Grid) -> [String; 2] {
-    grid.extent_m().map(|m| decimal(m, 4))
-}
-
-/// What a flight notes of the ground that it was made over.
-pub(super) fn note_of(grid: &Grid) -> (String, String) {
-    (EXTENT_NOTE.into(), extent_note(grid).join(" "))
-}
 
 /// Where an edit lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,22 +99,6 @@ pub(super) fn warn_of(edit: &Edit, grid: &Grid) {
     }
 }
 
-/// Whether an eye is over the terrain.
-fn is_over(grid: &Grid, eye_m: DVec3) -> bool {
-    let [east_m, north_m] = grid.extent_m();
-    (0.0..=east_m).contains(&eye_m.x) && (0.0..=north_m).contains(&eye_m.y)
-}
-
-/// Whether a view has anything of the terrain in it that is larger than a pixel. The terrain counts as the ball around it: in doubt it is in view.
-fn sees(terrain: &Terrain, view: &View) -> bool {
-    let [east_m, north_m] = terrain.grid().extent_m();
-    let [low_m, high_m] = terrain.header().height_range_m.map(|h| h * view.vertical_exaggeration);
-    let half = 0.5 * DVec3::new(east_m, north_m, high_m - low_m);
-    let (radius_m, to_middle) = (half.length(), half + DVec3::Z * low_m - view.eye_m);
-    let is_in_view = view.side_normals().iter().all(|normal| normal.dot(to_middle) <= radius_m);
-    is_in_view && 2.0 * radius_m * view.pixels_per_radian() >= to_middle.length()
-}
-
 #[cfg(feature = "pictures")]
 /// Refuses an eye outside the terrain that does not see it, and one below the ground.
 ///
@@ -138,7 +106,7 @@ fn sees(terrain: &Terrain, view: &View) -> bool {
 /// As said.
 pub(super) fn eye(terrain: &Terrain, view: &View) -> Result<()> {
     let [east, north, up] = view.eye_m.to_array().map(|m| decimal(m, 2));
-    if !is_over(terrain.grid(), view.eye_m) && !sees(terrain, view) {
+    if !is_over(terrain.grid(), view.eye_m) && !fit::sees(terrain, view) {
         bail!(
             "from {east},{north},{up} nothing of the terrain is seen, {}; the eye is outside it and looks elsewhere",
             extent(terrain.grid())
@@ -161,33 +129,8 @@ pub(super) fn eye(terrain: &Terrain, view: &View) -> Result<()> {
 /// # Errors
 /// A flight that lies wholly outside.
 pub(super) fn flight(terrain: &Terrain, flight: &Flight, path: &Path, viewport: Viewport) -> Result<()> {
-    let (grid, frames) = (terrain.grid(), &flight.frames);
-    let view = |frame: &terrasoar::flight::FlightFrame| frame.view(viewport, 1.0);
-    let outside = frames.iter().filter(|frame| !is_over(grid, frame.eye_m.into())).count();
-    if outside == frames.len() && !frames.iter().any(|frame| sees(terrain, &view(frame))) {
-        bail!(
-            "{}: the flight lies wholly outside the terrain, {}; it is a flight of another terrain",
-            path.display(),
-            extent(grid)
-        );
-    }
-    let note = |name: &str| flight.notes.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str());
-    let made_over = note("terrain").map(|name| format!(" ({name})")).unwrap_or_default();
-    let is_others = note(EXTENT_NOTE).is_some_and(|value| value != extent_note(grid).join(" "));
-    let path = path.display();
-    if is_others {
-        let was = note(EXTENT_NOTE).unwrap_or_default().replace(' ', " x ");
-        complain(&format!(
-            "note: {path} was made over another terrain{made_over}, of {was} metres; this one is of {} metres",
-            extent_note(grid).join(" x ")
-        ));
-    }
-    if 2 * outside > frames.len() {
-        let [outside, all] = [outside, frames.len()].map(|count| grouped(count as u64));
-        complain(&format!(
-            "note: {path}: the eye is outside the terrain, {}, in {outside} of {all} frames; it may be a flight of another terrain{made_over}",
-            extent(grid)
-        ));
+    for words in fit::strange(terrain, flight, path, viewport).map_err(Error::msg)? {
+        complain(&format!("note: {words}"));
     }
     Ok(())
 }

@@ -27,9 +27,11 @@ mod viewer;
 mod wake;
 mod workshop;
 
+use crate::fit;
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
+use terrasoar::view::Viewport;
 use terrasoar_layout::read::terrain::Terrain;
 
 pub(crate) use keys::list as list_of_keys;
@@ -77,6 +79,10 @@ pub(crate) fn run(plan: Plan) -> Result<()> {
         None => Terrain::open_unmapped(&plan.file)?,
     };
     let flight = plan.flight.as_deref().map(Flight::read).transpose()?;
+    // What is only strange is said in the window.
+    if let (Some(flight), Some(path)) = (&flight, &plan.flight) {
+        fit::strange(&terrain, flight, path, Viewport::default()).map_err(anyhow::Error::msg)?;
+    }
     let event_loop =
         winit::event_loop::EventLoop::with_user_event().build().map_err(|e| display::refusal(&e))?;
     events::run(event_loop, plan, terrain, flight)

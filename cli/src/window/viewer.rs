@@ -160,7 +160,8 @@ impl Viewer {
             viewer.news(words);
         }
         if let Some(flight) = flight {
-            viewer.take_flight(flight);
+            let path = viewer.plan.flight.clone().unwrap_or_default();
+            viewer.take_flight_of(flight, &path);
         }
         std::mem::take(&mut viewer.plan.drop).into_iter().for_each(|path| viewer.open(path));
         Ok(viewer)

@@ -121,8 +121,8 @@ fn of_help(help: &str) -> BTreeSet<Flag> {
             flags.last_mut().unwrap().default = Some(default.to_owned());
         }
     }
+    assert!(flags.iter().any(|flag| flag.long == "--help"), "{help}");
     flags.retain(|flag| flag.long != "--help");
-    assert!(!flags.is_empty(), "{help}");
     flags.into_iter().collect()
 }
 

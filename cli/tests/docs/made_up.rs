@@ -2,7 +2,7 @@
 
 use crate::page::Page;
 use crate::shown::shows;
-use crate::{Wrong, fields, links, text};
+use crate::{Wrong, code, fields, links, text};
 
 const PAGE: &str = "\
 # One heading: `--flags` & more
@@ -19,6 +19,11 @@ const PAGE: &str = "\
 | field | meaning |
 |---|---|
 | `a` | of `b` |
+
+<!-- code: examples/none.rs part -->
+```rust
+fn a() {}
+```
 
 <!-- not run: it takes a year -->
 ```sh
@@ -50,9 +55,18 @@ pub fn wrong() -> Wrong {
     ensure(page.dangling == ["gone"], "references");
     ensure(page.tables.len() == 2 && page.tables[1].section == "flags-1", "tables");
     ensure(page.tables[0].rows[0][0].codes == ["-o", "--output <A|B>"], "cells");
-    let [script, console, indented] = &page.blocks[..] else {
+    let [rust, script, console, indented] = &page.blocks[..] else {
         return vec!["blocks of a made-up page".into()];
     };
+    ensure(
+        rust.code.as_deref() == Some("examples/none.rs part") && script.code.is_none(),
+        "the file that a block shows",
+    );
+    let source = "a\n    // begin: part\n    b\n        // end: part\n    c\n    // begin: other\n    d\n    // end: other\n    // end: part\n";
+    ensure(code::part(source, Some("part")).is_none(), "a part that ends twice");
+    ensure(code::part(&source[..48], Some("part")).as_deref() == Some("b\n"), "a part of a file");
+    ensure(code::part(source, None).as_deref() == Some("a\n    b\n    c\n    d\n"), "a file without marks");
+    ensure(code::part(source, Some("none")).is_none(), "a part that is not there");
     ensure(script.words == ["sh"] && script.not_run.as_deref() == Some("it takes a year"), "what is not run");
     ensure(console.words == ["console", "figures"] && console.not_run.is_none(), "what is run");
     ensure(&page.text[console.body.clone()] == "$ terrasoar info\n1\n", "the text of a block");

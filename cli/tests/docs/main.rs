@@ -3,11 +3,13 @@
 //! * Every command in README.md and in `docs/` is run, in order, and what a page shows of its output is what it prints.
 //! * The flags of a verb's page are those of its `--help`; the fields and columns it explains are those of real output. Both ways round.
 //! * Every link in every Markdown file leads somewhere, and every path in code spans is there.
+//! * Rust and WGSL in `docs/` is that of programs in `examples/`, which compile and run in other tests; dependency lines say the versions that are used here.
 //! * README.md is short; every page of `docs/` is in the book.
 //!
 //! Pages are run side by side, each in a copy of the folder that `docs/first-steps.md` makes. CONTRIBUTING.md says how blocks are marked.
 //! `TERRASOAR_BLESS=1` writes what is printed into the pages. Verbs that draw are left out where there is no graphics adapter.
 
+mod code;
 mod commands;
 mod fields;
 mod flags;
@@ -32,6 +34,8 @@ fn main() -> ExitCode {
         trial("paths", || links::wrong_paths(&page::all())),
         trial("book", || text::wrong_book(&page::all())),
         trial("readme", || text::wrong_readme(&page::all())),
+        trial("code", || code::wrong(&page::all())),
+        trial("lines", || code::wrong_lines(&page::all())),
         trial("blocks", || text::wrong_blocks(&page::all())),
         trial("flags", || flags::wrong(&page::all())),
         trial("typed", || flags::wrong_typed(&page::all())),

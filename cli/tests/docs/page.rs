@@ -1,6 +1,6 @@
 //! The Markdown files of the repository, taken apart: headings, links, blocks of code, tables, and what hidden comments say.
 //!
-//! A comment `<!-- not run: why -->` before a block keeps it from being run. `<!-- fields: command -->` and `<!-- columns: command ; file -->` say
+//! A comment `<!-- not run: why -->` before a block keeps it from being run, `<!-- code: file part -->` says which file it shows. `<!-- fields: command -->` and `<!-- columns: command ; file -->` say
 //! which output the section that they stand in explains.
 
 use pulldown_cmark::{BrokenLink, CodeBlockKind, CowStr, Event, LinkType, Options, Parser, Tag, TagEnd};
@@ -42,6 +42,8 @@ pub struct Block {
     pub body: Range<usize>,
     /// Why it is not run.
     pub not_run: Option<String>,
+    /// The file, and perhaps the part of it, that it shows.
+    pub code: Option<String>,
 }
 
 #[derive(Debug, Default)]
@@ -156,6 +158,8 @@ struct Reader {
     cell: Option<Cell>,
     /// What a comment said of the block that follows.
     not_run: Option<String>,
+    /// Which file a comment said that the block that follows shows.
+    code: Option<String>,
     is_in_block: bool,
 }
 
@@ -210,7 +214,7 @@ impl Reader {
     }
 
     fn begin(&mut self, tag: Tag<'_>) {
-        let not_run = self.not_run.take();
+        let (not_run, code) = (self.not_run.take(), self.code.take());
         match tag {
             Tag::Heading { .. } => self.heading = Some(String::new()),
             Tag::CodeBlock(kind) => {
@@ -220,7 +224,7 @@ impl Reader {
                     }
                     CodeBlockKind::Indented => Vec::new(),
                 };
-                self.page.blocks.push(Block { words, body: 0..0, not_run });
+                self.page.blocks.push(Block { words, body: 0..0, not_run, code });
                 self.is_in_block = true;
             }
             Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. } => {
@@ -265,6 +269,8 @@ impl Reader {
         let Some((what, said)) = said.trim().split_once(": ") else { return };
         if what == "not run" {
             self.not_run = Some(said.to_owned());
+        } else if what == "code" {
+            self.code = Some(said.to_owned());
         } else if ["fields", "columns"].contains(&what) {
             let (command, file) = match said.rsplit_once(" ; ") {
                 Some((command, file)) => (command, Some(file.trim().to_owned())),

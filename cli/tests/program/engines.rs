@@ -115,7 +115,14 @@ fn engines_replay_the_same_mesh() {
         "frames.csv",
     ]);
     assert!(human.contains("vertex tests"), "{human}");
-    assert_eq!(std::fs::read_to_string(bench.path("frames.csv")).unwrap().lines().count(), 41);
+    let (remarks, table) = bench.table("frames.csv");
+    assert_eq!(table.lines().count(), 41);
+    for remark in
+        ["# terrain: land.iqt", "# flight: land.flight", "# tolerance_px: 1", "# viewport_px: 800x600"]
+    {
+        assert!(remarks.lines().any(|line| line == remark), "{remark}: {remarks}");
+    }
+    assert!(remarks.contains("--engine smart --stats frames.csv"), "{remarks}");
 }
 
 #[test]

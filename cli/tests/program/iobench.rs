@@ -132,7 +132,8 @@ fn frames_report_and_table_are_written() {
         ["iobench", "land.iqt", "--flight", "land.flight", "--engines", "kinetic", "--layouts", "row,ours"];
     let table = bench.good(&[&args[..], &["--frames", "f.csv", "-o", "report"]].concat());
     assert!(table.contains("kinetic") && table.contains("mesh") && table.contains("report.html"), "{table}");
-    let csv = std::fs::read_to_string(bench.path("f.csv")).unwrap();
+    let (remarks, csv) = bench.table("f.csv");
+    assert!(remarks.contains("# terrain: land.iqt\n# flight: land.flight\n"), "{remarks}");
     assert_eq!(csv.lines().count(), 1 + 6 * 40);
     assert!(csv.starts_with("engine,layout,source,prefetch,frame,reads,"));
     for file in ["report.html", "summary.json", "frames.csv"] {

@@ -2,6 +2,8 @@
 
 #[cfg(target_os = "linux")]
 mod aliases;
+#[cfg(target_os = "linux")]
+mod bare;
 mod build;
 mod cache;
 mod drape;

@@ -61,6 +61,14 @@ impl Bench {
         names
     }
 
+    /// A CSV file: the remarks before it, and the table.
+    pub fn table(&self, name: &str) -> (String, String) {
+        let text = std::fs::read_to_string(self.path(name)).unwrap();
+        let remarks = text.lines().take_while(|line| line.starts_with("# ")).map(|line| line.len() + 1).sum();
+        let (remarks, table) = text.split_at(remarks);
+        (remarks.into(), table.into())
+    }
+
     pub fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_terrasoar"));
         // Where this is not set drivers in software complain on standard error, unless they are kept from it.

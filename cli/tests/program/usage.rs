@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, text};
 
-const VERBS: [&str; 19] = [
+const VERBS: [&str; 21] = [
     "build",
     "drape",
     "edit",
@@ -22,6 +22,8 @@ const VERBS: [&str; 19] = [
     "compare",
     "iobench",
     "mesh",
+    "completions",
+    "man",
 ];
 /// Verbs of the feature `pictures`.
 const DRAWING: &[&str] = if cfg!(feature = "pictures") { &["snapshot", "movie"] } else { &[] };
@@ -38,6 +40,68 @@ fn every_verb_has_help_with_an_example() {
         }
     }
     assert!(bench.good(&["--version"]).starts_with("terrasoar "));
+}
+
+#[test]
+fn every_verb_has_a_page_of_the_manual_with_its_flags() {
+    let bench = Bench::new();
+    let listed = bench.good(&["man", "--list"]);
+    let verbs: Vec<&str> = listed.lines().collect();
+    for verb in VERBS.iter().chain(DRAWING) {
+        assert!(verbs.contains(verb), "{verb}: {listed}");
+    }
+    let program = bench.good(&["man"]);
+    for verb in verbs {
+        let page = bench.good(&["man", verb]);
+        let name = verb.replace('-', "\\-");
+        let title = format!(".TH terrasoar-{verb} 1  \"terrasoar {}\"", env!("CARGO_PKG_VERSION"));
+        assert!(page.contains(&title), "{page}");
+        assert!(program.contains(&format!("terrasoar\\-{name}(1)")), "{verb}");
+        // The names of its flags in its help stand in the page too.
+        let help = bench.good(&[verb, "--help"]);
+        // What a flag does is indented further, and what is said of the verb is not.
+        let words = help
+            .lines()
+            .filter(|line| line.starts_with("  ") && !line.starts_with("       "))
+            .filter_map(|line| {
+                let flag = line.trim_start();
+                let flag = flag
+                    .strip_prefix("-")
+                    .filter(|f| f.as_bytes().get(1) == Some(&b','))
+                    .map_or(flag, |f| &f[3..]);
+                flag.strip_prefix("--")?.split_whitespace().next()
+            });
+        for flag in words {
+            assert!(page.contains(&format!("\\fB\\-\\-{}\\fR", flag.replace('-', "\\-"))), "{verb}: {flag}");
+        }
+    }
+    assert!(bench.bad(2, &["man", "fly"]).contains("no verb \"fly\""));
+}
+
+#[test]
+fn completions_know_verbs_and_flags_and_are_sound() {
+    let bench = Bench::new();
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = bench.good(&["completions", shell]);
+        for word in ["compare-ground", "tolerance-px", "fill-voids"] {
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+    assert!(bench.bad(2, &["completions", "csh"]).contains("zsh"));
+    // Bash itself completes a verb, a flag and a value.
+    std::fs::write(bench.path("c.bash"), bench.good(&["completions", "bash"])).unwrap();
+    let complete = |words: &str, at: usize| {
+        let script = format!(
+            "source c.bash; COMP_WORDS=({words}); COMP_CWORD={at}; _terrasoar terrasoar \"${{COMP_WORDS[{at}]}}\" \"${{COMP_WORDS[{at}-1]}}\"; echo \"${{COMPREPLY[@]}}\""
+        );
+        let run =
+            std::process::Command::new("bash").args(["-c", &script]).current_dir(bench.folder()).output();
+        run.ok().map(|output| text(&output.stdout).trim().to_owned())
+    };
+    let Some(verbs) = complete("terrasoar ver", 1) else { return };
+    assert_eq!(verbs, "verify");
+    assert_eq!(complete("terrasoar replay --tol", 2).unwrap(), "--tolerance-px");
+    assert_eq!(complete("terrasoar replay --engine ki", 3).unwrap(), "kinetic");
 }
 
 #[test]

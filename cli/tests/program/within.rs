@@ -99,6 +99,9 @@ fn a_flight_of_another_terrain_is_said() {
         &["replay", "land.iqt", "--flight", "far.flight"][..],
         &["compare", "land.iqt", "--flight", "far.flight", "--no-sweeps", "-o", "r"],
         &["mesh", "land.iqt", "--flight", "far.flight", "--frame", "0", "-o", "a.ply"],
+        &["iobench", "land.iqt", "--flight", "far.flight"],
+        #[cfg(feature = "view")]
+        &["view", "land.iqt", "--flight", "far.flight"],
     ] {
         let said = bench.bad(1, verb);
         assert!(
@@ -246,7 +249,7 @@ fn a_report_says_how_it_was_made_and_what_does_not_apply() {
         assert!(engines[0][field].is_null() && engines[1][field].is_number(), "{field}");
     }
     for (engine, figures) in ["soar", "kinetic"].into_iter().zip(engines) {
-        let table = std::fs::read_to_string(bench.path(&format!("r/frames-{engine}.csv"))).unwrap();
+        let (_, table) = bench.table(&format!("r/frames-{engine}.csv"));
         let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
         let names = rows.next().unwrap();
         let rows: Vec<_> = rows.collect();

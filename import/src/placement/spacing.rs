@@ -10,6 +10,7 @@ use crate::reader::HorizontalSize;
 use std::path::Path;
 use terrasoar_layout::dem::Warning;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::hypot;
 use terrasoar_layout::remedy::Remedy;
 
 /// How far a map may be from the ground before it is measured, and how far the step may change within a grid before this is said.
@@ -42,7 +43,7 @@ pub(crate) fn spacing(
 ) -> Result<Spacing, LayoutError> {
     let Some(map) = map else { return Ok(Spacing::default()) };
     let steps = [[map[1], map[4]], [map[2], map[5]]];
-    let lengths = steps.map(|[x, y]| x.hypot(y));
+    let lengths = steps.map(|[x, y]| hypot(x, y));
     if system.unit.is_none() {
         let guess = Guess::of(&map, samples);
         if !stated {

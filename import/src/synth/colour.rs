@@ -13,6 +13,7 @@ use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::atomic::AtomicFile;
 use terrasoar_layout::file::disk::write_at;
 use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::portable::hypot;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -231,6 +232,6 @@ impl Heights {
                 north += weight * (self.sample(x, y + 1) - self.sample(x, south));
             }
         }
-        (height, (east / (2.0 * spacing_m[0])).hypot(north / (2.0 * spacing_m[1])))
+        (height, hypot(east / (2.0 * spacing_m[0]), north / (2.0 * spacing_m[1])))
     }
 }

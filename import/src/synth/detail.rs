@@ -10,6 +10,7 @@
 use super::HEIGHT_SCALE;
 use super::landscape::{CELLS, Landscape, POINTS};
 use super::noise::{hash, signed_unit};
+use terrasoar_layout::portable::pow;
 
 /// Hurst exponent: dimension 2.15, as rough mountains are.
 const H: f64 = 0.85;
@@ -44,7 +45,7 @@ impl Terrain {
     pub(super) fn new(size: u32, seed: u64, spacing_m: f64) -> Self {
         let seed = hash(seed as u32, (seed >> 32) as u32, 0);
         let extent_m = f64::from(size - 1) * spacing_m;
-        let height_factor = (extent_m / FULL_EXTENT_M).powf(H).min(1.0) as f32;
+        let height_factor = pow(extent_m / FULL_EXTENT_M, H).min(1.0) as f32;
         Self { size, seed, landscape: Landscape::new(seed), height_factor, extent_m }
     }
 
@@ -63,7 +64,7 @@ impl Terrain {
         let mut cells = CELLS * 2;
         while cells < self.size {
             let wavelength_m = self.extent_m / f64::from(cells);
-            let amplitude_m = (AMPLITUDE_M * (wavelength_m / REFERENCE_M).powf(H)) as f32;
+            let amplitude_m = (AMPLITUDE_M * pow(wavelength_m / REFERENCE_M, H)) as f32;
             self.octave(cells, first, width, octave, lattice, column);
             if cells <= CELLS * 4 {
                 // The crests of the large forms go on into the first octaves, and make the next ones stronger.

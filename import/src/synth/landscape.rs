@@ -5,6 +5,7 @@
 //! plains. Cost: 0.3 s of one core, whatever the size of the terrain.
 
 use rayon::prelude::*;
+use terrasoar_layout::portable::{atan2, exp, hypot, pow, sin_cos};
 
 use super::noise::{fractal, hash, ridged, signed_unit, smoothstep};
 
@@ -83,7 +84,7 @@ impl Plan {
 
         let range = smoothstep(self.range_west, self.range_west + 0.34, x + 0.06 * bend_y);
         let (dx, dy) = ((x - self.island.0) / 0.19, (y - self.island.1) / 0.24);
-        let island = smoothstep(1.1, 0.1, dx.hypot(dy) + 0.2 * bend_x);
+        let island = smoothstep(1.1, 0.1, hypot(dx, dy) + 0.2 * bend_x);
         let mountains = range.max(0.85 * island);
 
         let crests = ridged(seed(3), x * 11.0, y * 11.0, 6, 0.5);
@@ -92,19 +93,19 @@ impl Plan {
 
         // An inlet winds from north to south between the ranges, with arms.
         let arms = ridged(seed(6), x * 6.0, y * 2.5, 4, 0.5);
-        let inlet =
-            smoothstep(0.16, 0.02, (x - 0.44 + 0.05 * (y * 9.0).sin()).abs()) * smoothstep(0.35, 0.75, arms);
+        let inlet = smoothstep(0.16, 0.02, (x - 0.44 + 0.05 * sin_cos(y * 9.0).0).abs())
+            * smoothstep(0.35, 0.75, arms);
         let plain = 130.0 + 110.0 * broad + 85.0 * hills - 330.0 * inlet * (1.0 - mountains);
 
-        let relief = mountains * (150.0 + 450.0 * (broad + 0.3).max(0.0) + 1500.0 * crests.powf(1.2));
+        let relief = mountains * (150.0 + 450.0 * (broad + 0.3).max(0.0) + 1500.0 * pow(crests, 1.2));
         let mut height = plain + relief;
         let mut cones = 0.0;
         for (number, (vx, vy, tall_m)) in (0..).zip(self.volcanoes) {
             let (dx, dy) = (x - vx, y - vy);
-            let ribs = fractal(seed(20 + number), dy.atan2(dx) * 2.2, dx.hypot(dy) * 30.0, 3, 0.6);
-            let distance = dx.hypot(dy) * (1.0 + 0.25 * ribs);
-            let near = (-distance / 0.035).exp();
-            height = height * (1.0 - 0.45 * near) + tall_m * (-distance / 0.024).exp();
+            let ribs = fractal(seed(20 + number), atan2(dy, dx) * 2.2, hypot(dx, dy) * 30.0, 3, 0.6);
+            let distance = hypot(dx, dy) * (1.0 + 0.25 * ribs);
+            let near = exp(-distance / 0.035);
+            height = height * (1.0 - 0.45 * near) + tall_m * exp(-distance / 0.024);
             cones += near;
         }
         let roughness = 0.30 + mountains * (0.30 + 0.9 * crests) + 0.3 * cones.min(1.0);

@@ -3,6 +3,7 @@
 //! Invariant: pure functions of seed and place. Cost: a gradient sample is four hashes, about 10 ns.
 
 use terrasoar_layout::mix::mixed_32;
+use terrasoar_layout::portable::sin_cos;
 
 /// Mixes a lattice point into 32 well-spread bits.
 #[inline]
@@ -24,7 +25,8 @@ pub(super) fn gradient(seed: u32, x: f64, y: f64) -> f64 {
     let corner = |dx: u32, dy: u32| {
         let turn = f64::from(hash(seed, ix.wrapping_add(dx), iy.wrapping_add(dy)))
             * (std::f64::consts::TAU / 4_294_967_296.0);
-        turn.cos() * (fx - f64::from(dx)) + turn.sin() * (fy - f64::from(dy))
+        let (sin, cos) = sin_cos(turn);
+        cos * (fx - f64::from(dx)) + sin * (fy - f64::from(dy))
     };
     let (wx, wy) = (fade(fx), fade(fy));
     let top = corner(0, 0) + wx * (corner(1, 0) - corner(0, 0));

@@ -44,6 +44,8 @@ pub(crate) fn reset_peak_memory() -> bool {
 #[cfg(target_os = "linux")]
 pub(crate) fn forget_file(path: &Path) -> std::io::Result<bool> {
     let file = std::fs::File::open(path)?;
+    // What has not reached the disk cannot be dropped.
+    file.sync_data()?;
     rustix::fs::fadvise(&file, 0, None, rustix::fs::Advice::DontNeed)?;
     Ok(true)
 }

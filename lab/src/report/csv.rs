@@ -1,8 +1,8 @@
-//! The frames of a replay as CSV: a header with the field names of [`FrameStats`], then a line for each frame.
+//! The frames of a replay as CSV: remarks on how they came about, the field names of [`FrameStats`], then a line for each frame.
 //!
 //! Hashes are 16 hexadecimal digits; times have the shortest digits that read back the same. A field that does not apply to the engine is empty.
 
-use super::ReportError;
+use super::{ReportError, ReportTitle};
 use std::io::Write;
 use std::path::Path;
 use terrasoar::sink::FileSink;
@@ -10,17 +10,23 @@ use terrasoar::stats::FrameStats;
 
 pub(super) const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,update_ms,scan_us,test_us,apply_us,edited_records,edit_ms,mesh_hash";
 
-/// Writes `frames` to `path`: a file appears when it is complete, a stream such as a pipe is written to directly.
+/// Writes `frames` to `path`, behind remarks that say how they came about: a file appears when it is complete, a stream such as a pipe is written to directly.
 ///
 /// # Errors
 /// [`ReportError::Write`] or [`ReportError::Output`].
-pub fn write_frames_csv(path: &Path, frames: &[FrameStats]) -> Result<(), ReportError> {
+pub fn write_frames_csv(path: &Path, title: &ReportTitle, frames: &[FrameStats]) -> Result<(), ReportError> {
     let mut sink = FileSink::create(path).map_err(ReportError::of_output)?;
-    write_frames(&mut sink, frames).map_err(|source| ReportError::Write { path: path.into(), source })?;
+    write_frames(&mut sink, title, frames)
+        .map_err(|source| ReportError::Write { path: path.into(), source })?;
     sink.publish().map_err(ReportError::of_output)
 }
 
-pub(super) fn write_frames(to: &mut dyn Write, frames: &[FrameStats]) -> std::io::Result<()> {
+pub(super) fn write_frames(
+    to: &mut dyn Write,
+    title: &ReportTitle,
+    frames: &[FrameStats],
+) -> std::io::Result<()> {
+    title.preamble().write(to)?;
     writeln!(to, "{HEADER}")?;
     for f in frames {
         // Named one by one, so that a new field cannot be forgotten.
@@ -64,6 +70,7 @@ fn known(value: Option<impl ToString>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::title;
     use super::*;
 
     #[test]
@@ -78,14 +85,17 @@ mod tests {
         let frame =
             FrameStats { frame: 7, triangles: 5, update_ms: 0.1, mesh_hash: 0xab, ..Default::default() };
         let mut text = Vec::new();
-        write_frames(&mut text, &[frame]).unwrap();
+        write_frames(&mut text, &title(), &[frame]).unwrap();
         let text = String::from_utf8(text).unwrap();
-        assert_eq!(text.lines().nth(1), Some("7,5,0,0,0,0,,,,0,0,0,0,0.1,,,,0,0,00000000000000ab"));
+        assert!(text.starts_with("# "), "{text}");
+        let mut table = text.lines().skip_while(|line| line.starts_with('#'));
+        assert_eq!(table.next(), Some(HEADER));
+        assert_eq!(table.next(), Some("7,5,0,0,0,0,,,,0,0,0,0,0.1,,,,0,0,00000000000000ab"));
     }
 
     #[test]
     fn a_file_that_cannot_be_made_is_named() {
-        let error = write_frames_csv(Path::new("/no/such/a.csv"), &[]).unwrap_err().to_string();
+        let error = write_frames_csv(Path::new("/no/such/a.csv"), &title(), &[]).unwrap_err().to_string();
         assert!(error.contains("/no/such/a.csv"), "{error}");
     }
 }

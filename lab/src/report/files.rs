@@ -3,7 +3,7 @@
 //! Code that is about to replace a file asks this first. **The answer depends on how the file starts**, so that another program's table or page is recognised as such whatever it is called.
 
 use super::html::FLIGHT_PICTURE;
-use super::{ComparisonReport, csv, file_parts, html, io};
+use super::{ComparisonReport, csv, file_parts, html, io, preamble};
 use crate::picture;
 
 /// Bytes from a file's start that are enough to tell.
@@ -31,11 +31,14 @@ impl ReportFile {
     /// Whether a file that starts with `start`, its first [`START_BYTES`] or all of it, could be one of this kind.
     pub fn is_ours(self, start: &[u8]) -> bool {
         let holds = |text: &str| start.windows(text.len()).any(|window| window == text.as_bytes());
-        let is_line =
-            |line: &str| start.strip_prefix(line.as_bytes()).is_some_and(|rest| rest.starts_with(b"\n"));
+        let is_table = |names: &str| {
+            preamble::skipped(start)
+                .strip_prefix(names.as_bytes())
+                .is_some_and(|rest| rest.starts_with(b"\n"))
+        };
         match self {
-            Self::Frames => is_line(csv::HEADER),
-            Self::IoFrames => is_line(io::HEADER),
+            Self::Frames => is_table(csv::HEADER),
+            Self::IoFrames => is_table(io::HEADER),
             Self::Summary => start.starts_with(b"{\n  \"terrain\": ") && holds("\n  \"tolerance_px\": "),
             Self::Drawing => {
                 start.starts_with(b"<svg width=\"1200\" height=\"700\" viewBox=\"0 0 3600 2100\"")
@@ -131,6 +134,7 @@ mod tests {
             for start in [
                 "",
                 "frame,triangles\n1,2\n",
+                "# terrain: a\nframe,triangles\n1,2\n",
                 "{}",
                 "{\n  \"terrain\": \"a\"\n}",
                 "<svg width=\"1200\" height=\"700\">",

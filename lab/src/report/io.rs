@@ -11,6 +11,7 @@
 mod figures;
 mod page;
 
+use super::preamble::Preamble;
 use super::{PlotFile, ReportError};
 use crate::iobench::{FrameIo, IoBench, Run, Timed, UpdateCost};
 use std::io::Write;
@@ -36,7 +37,8 @@ impl IoReport<'_> {
     /// [`ReportError`], which names the file. A new directory is not there then; in one that was, the files before it are complete.
     pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
         let mut out = FolderSink::create(dir).map_err(|error| ReportError::of_folder(dir, error))?;
-        out.add("frames.csv", |to| write_io_frames(to, self.runs)).map_err(ReportError::of_output)?;
+        out.add("frames.csv", |to| write_io_frames(to, self.bench, self.runs))
+            .map_err(ReportError::of_output)?;
         let json = serde_json::to_string_pretty(self.bench)
             .map_err(|source| ReportError::Json { path: dir.join("summary.json"), source })?;
         super::add_text(&mut out, "summary.json", &(json + "\n"))?;
@@ -56,17 +58,34 @@ impl IoReport<'_> {
     }
 }
 
-/// Writes every frame of `runs` to `path`: a file appears when it is complete, a stream such as a pipe is written to directly. What was not measured or is not known is empty.
+/// Writes every frame of `runs` to `path`, behind remarks that say how they came about: a file appears when it is complete, a stream such as a pipe is written to directly. What was not measured or is not known is empty.
 ///
 /// # Errors
 /// [`ReportError::Write`] or [`ReportError::Output`].
-pub fn write_io_frames_csv(path: &Path, runs: &[(Run, Option<Timed>)]) -> Result<(), ReportError> {
+pub fn write_io_frames_csv(
+    path: &Path,
+    bench: &IoBench,
+    runs: &[(Run, Option<Timed>)],
+) -> Result<(), ReportError> {
     let mut sink = FileSink::create(path).map_err(ReportError::of_output)?;
-    write_io_frames(&mut sink, runs).map_err(|source| ReportError::Write { path: path.into(), source })?;
+    write_io_frames(&mut sink, bench, runs)
+        .map_err(|source| ReportError::Write { path: path.into(), source })?;
     sink.publish().map_err(ReportError::of_output)
 }
 
-fn write_io_frames(to: &mut dyn Write, runs: &[(Run, Option<Timed>)]) -> std::io::Result<()> {
+fn write_io_frames(
+    to: &mut dyn Write,
+    bench: &IoBench,
+    runs: &[(Run, Option<Timed>)],
+) -> std::io::Result<()> {
+    let preamble = Preamble {
+        terrain: &bench.terrain,
+        flight: &bench.flight,
+        tolerance_px: bench.tolerance_px,
+        viewport_px: bench.viewport_px,
+        made: bench.made.as_ref(),
+    };
+    preamble.write(to)?;
     writeln!(to, "{HEADER}")?;
     runs.iter().try_for_each(|(run, timed)| write_run(to, run, timed.as_ref()))
 }
@@ -194,12 +213,13 @@ pub(super) mod tests {
 
     #[test]
     fn every_frame_has_a_line_and_every_name_a_cell() {
-        let (_, runs) = made_up();
+        let (bench, runs) = made_up();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("f.csv");
-        write_io_frames_csv(&path, &runs).unwrap();
+        write_io_frames_csv(&path, &bench, &runs).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
-        let lines: Vec<&str> = text.lines().collect();
+        assert!(text.starts_with("# terrain: "), "{text}");
+        let lines: Vec<&str> = text.lines().skip_while(|line| line.starts_with('#')).collect();
         assert_eq!(lines.len(), 1 + 5 * runs.len());
         assert!(lines.iter().all(|l| l.split(',').count() == HEADER.split(',').count()));
         assert_eq!(lines[1], "soar,row,map,none,0,1000,4000,400,4000,40,400,1,,,,,");
@@ -207,7 +227,7 @@ pub(super) mod tests {
         let named = serde_json::to_string(&FrameIo::default()).unwrap();
         let fields: Vec<&str> = named.split('"').skip(1).step_by(2).collect();
         assert!(HEADER.contains(&fields.join(",")));
-        let error = write_io_frames_csv(Path::new("/no/such/a.csv"), &runs).unwrap_err().to_string();
+        let error = write_io_frames_csv(Path::new("/no/such/a.csv"), &bench, &runs).unwrap_err().to_string();
         assert!(error.contains("/no/such/a.csv"), "{error}");
     }
 }

@@ -18,10 +18,10 @@ mod figures;
 mod files;
 mod html;
 mod io;
-
 mod number;
 #[cfg(feature = "plots")]
 mod plot;
+mod preamble;
 
 pub use crate::made::Made;
 pub use csv::write_frames_csv;
@@ -29,6 +29,7 @@ pub use files::{ReportFile, START_BYTES};
 pub use html::FLIGHT_PICTURE;
 pub use io::{IoReport, write_io_frames_csv};
 
+use preamble::Preamble;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use terrasoar::sink::FolderSink;
@@ -110,6 +111,18 @@ pub struct ReportTitle {
     pub made: Option<Made>,
 }
 
+impl ReportTitle {
+    fn preamble(&self) -> Preamble<'_> {
+        Preamble {
+            terrain: &self.terrain,
+            flight: &self.flight,
+            tolerance_px: self.tolerance_px,
+            viewport_px: self.viewport.size_px(),
+            made: self.made.as_ref(),
+        }
+    }
+}
+
 /// One engine's figures at one value of what a sweep varies.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SweepPoint {
@@ -189,7 +202,7 @@ impl ComparisonReport<'_> {
         let frame_files: Vec<String> =
             file_parts(&names).iter().map(|part| files::frames_name(part)).collect();
         for ((_, frames), name) in self.runs.iter().zip(&frame_files) {
-            out.add(name, |to| csv::write_frames(to, frames)).map_err(ReportError::of_output)?;
+            out.add(name, |to| csv::write_frames(to, self.title, frames)).map_err(ReportError::of_output)?;
         }
         if let FlightPicture::Png { file, .. } = self.picture {
             out.add(FLIGHT_PICTURE, |to| to.write_all(file)).map_err(ReportError::of_output)?;

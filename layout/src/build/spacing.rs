@@ -3,6 +3,7 @@
 use crate::dem::{DemInfo, Georeference, HorizontalUnit};
 use crate::error::LayoutError;
 use crate::file::header::SpacingOrigin;
+use crate::portable::{hypot, sin_cos};
 use crate::remedy::Remedy;
 use crate::words::number;
 
@@ -27,7 +28,7 @@ pub(super) fn resolve(
         return Ok((spacing, origin.unwrap_or(SpacingOrigin::Dem)));
     }
     let Some(map) = reference.pixel_to_crs else { return Ok(([1.0; 2], SpacingOrigin::Assumed)) };
-    let step = [map[1].hypot(map[4]), map[2].hypot(map[5])];
+    let step = [hypot(map[1], map[4]), hypot(map[2], map[5])];
     let metres = |unit_m: f64| Ok((step.map(|s| s * unit_m), SpacingOrigin::Dem));
     let unit = match reference.unit {
         HorizontalUnit::Unknown if looks_like_degrees(info, &map) => HorizontalUnit::Degree,
@@ -50,7 +51,7 @@ pub(super) fn resolve(
                 .mended_by(Remedy::Spacing));
             }
             let [lon_m, lat_m] = degree_m(latitude, reference);
-            let spacing = [(map[1] * lon_m).hypot(map[4] * lat_m), (map[2] * lon_m).hypot(map[5] * lat_m)];
+            let spacing = [hypot(map[1] * lon_m, map[4] * lat_m), hypot(map[2] * lon_m, map[5] * lat_m)];
             Ok((spacing, SpacingOrigin::Degrees { centre_latitude_deg: latitude }))
         }
     }
@@ -65,12 +66,12 @@ fn looks_like_degrees(info: &DemInfo, map: &[f64; 6]) -> bool {
         (-181.0..=361.0).contains(&(map[0] + map[1] * col + map[2] * row))
             && (-91.0..=91.0).contains(&(map[3] + map[4] * col + map[5] * row))
     });
-    on_globe && map[1].hypot(map[4]).max(map[2].hypot(map[5])) <= 0.05
+    on_globe && hypot(map[1], map[4]).max(hypot(map[2], map[5])) <= 0.05
 }
 
 /// Metres a degree of longitude and of latitude: on the WGS 84 ellipsoid, or on a sphere of the body's radius.
 fn degree_m(latitude_deg: f64, reference: &Georeference) -> [f64; 2] {
-    let (sin, cos) = latitude_deg.to_radians().sin_cos();
+    let (sin, cos) = sin_cos(latitude_deg.to_radians());
     let degree = 1f64.to_radians();
     match reference.body_radius_m {
         // Every ellipsoid of the Earth is within a fraction of a percent of WGS 84.

@@ -6,6 +6,7 @@ use crate::dem::DemInfo;
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::grid::record::{RecordKind, RecordScale};
+use crate::portable::{hypot, log2, pow};
 use crate::remedy::Remedy;
 use crate::words::number;
 use rayon::prelude::*;
@@ -169,18 +170,18 @@ pub(super) fn record_scale(
     let [dx, dy] = grid.spacing_m();
     let [gx, gy] = steepest_m;
     // Largest |p_v - p_c| over its flat counterpart, for black and for white vertices.
-    let black = 1f64.hypot((gx + gy) / dx.hypot(dy));
-    let white = dx.hypot(gx).max(dy.hypot(gy)) / dx.max(dy);
+    let black = hypot(1.0, (gx + gy) / hypot(dx, dy));
+    let white = hypot(dx, gx).max(hypot(dy, gy)) / dx.max(dy);
     let stretch = black.max(white);
     let steps = [64, 32, 16]
         .into_iter()
         .find(|steps| {
             // Rounding up by q at each level adds up to the sum of a geometric series over levels that shrink by sqrt(2).
-            let q = 2f64.powf(1.0 / f64::from(*steps)) * 1.001;
+            let q = pow(2.0, 1.0 / f64::from(*steps)) * 1.001;
             let shrink = std::f64::consts::FRAC_1_SQRT_2;
             let growth = q * (1.0 - shrink) / (1.0 - q * shrink);
             // Levels of uneven spacing shrink unevenly; a factor of two covers them.
-            (stretch * growth * 2.0).log2() * f64::from(*steps) <= 254.0
+            log2(stretch * growth * 2.0) * f64::from(*steps) <= 254.0
         })
         .unwrap_or(8);
     RecordScale {

@@ -13,6 +13,7 @@ pub mod order;
 pub mod record;
 
 use crate::error::LayoutError;
+use crate::portable::hypot;
 use crate::remedy::Remedy;
 use crate::words::number;
 
@@ -167,7 +168,7 @@ impl Grid {
     pub fn edge_m(&self, level: u32) -> f64 {
         let step = f64::from(1u32 << (level / 2));
         let [dx, dy] = self.spacing_m;
-        2.0 * step * if level & 1 == 1 { dx.hypot(dy) } else { dx.max(dy) }
+        2.0 * step * if level & 1 == 1 { hypot(dx, dy) } else { dx.max(dy) }
     }
 
     /// Metres from a vertex of `level` to its farthest child over flat ground; 0 at level 0.
@@ -177,7 +178,7 @@ impl Grid {
         match level {
             0 => 0.0,
             white if white & 1 == 1 => step * dx.max(dy),
-            _ => 0.5 * step * dx.hypot(dy),
+            _ => 0.5 * step * hypot(dx, dy),
         }
     }
 

@@ -3,6 +3,7 @@
 //! A texel in linear light is red, green, blue multiplied by alpha, and alpha, each 0..=65535. The darkest step of sRGB is 20 of these
 //! units, so the rounding of a level costs a fortieth of a step and never adds up. Integers, hence the same on every machine. Cost: a load a value.
 
+use crate::portable::pow;
 use std::sync::LazyLock;
 
 /// A texel in linear light, colour multiplied by alpha.
@@ -77,12 +78,12 @@ fn scaled(value: u32, factor: u32, divisor: u32) -> u16 {
 
 /// Intensity 0..=1 of a value 0..=1 of sRGB.
 pub(super) fn linear(value: f64) -> f64 {
-    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+    if value <= 0.04045 { value / 12.92 } else { pow((value + 0.055) / 1.055, 2.4) }
 }
 
 /// Value 0..=1 of sRGB of an intensity 0..=1.
 pub(super) fn srgb(intensity: f64) -> f64 {
-    if intensity <= 0.003_130_8 { intensity * 12.92 } else { 1.055 * intensity.powf(1.0 / 2.4) - 0.055 }
+    if intensity <= 0.003_130_8 { intensity * 12.92 } else { 1.055 * pow(intensity, 1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The parts of a frame, in order: what the device must have, the frame's numbers, the pass, what is drawn in it.
 
+use super::material::OnDevice;
 use super::{INDIRECT_FROM, Renderer, UNIFORM_PLACES};
 use crate::attachments::Attachments;
 use crate::error::{RenderError, Result};
@@ -22,6 +23,8 @@ pub struct Prepared {
     own_vertices: bool,
     /// The bindings that it was prepared with.
     group: wgpu::BindGroup,
+    /// What its material binds.
+    own_group: Option<wgpu::BindGroup>,
     /// Visible ranges for the device to draw by itself.
     arguments: Option<wgpu::Buffer>,
     /// State of the mesh.
@@ -41,8 +44,13 @@ impl Renderer {
         let refined_for = frame.refined_for.unwrap_or(frame.view);
         view::check(frame.view)?;
         view::check(refined_for)?;
-        let variant = Variant::of(frame.look, self.imagery.is_some(), *format);
-        self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(&self.device, &self.modules, variant));
+        let material = self.material.as_ref().map_or(0, |material| material.number);
+        let variant = Variant::of(frame.look, self.imagery.is_some(), material, *format);
+        let with_material = self.material.as_ref().filter(|_| variant.material != 0);
+        self.pipelines.entry(variant).or_insert_with(|| {
+            Pipelines::new(&self.device, &self.modules, with_material.map(OnDevice::compiled), variant)
+        });
+        let own_group = with_material.and_then(|material| material.group.clone());
         self.set_ramp(frame.look.ramp);
         self.bind();
         let Some((generation, group)) = self.bind_group.clone() else {
@@ -65,6 +73,7 @@ impl Renderer {
             variant,
             own_vertices,
             group,
+            own_group,
             arguments,
             generation,
             draws: self.mesh.draws.number,
@@ -83,10 +92,13 @@ impl Renderer {
             && self.mesh.draws.number == prepared.draws;
         let (true, Some(pipelines)) = (is_of_now, self.pipelines.get(&prepared.variant)) else {
             return Err(RenderError::Usage(
-                "the frame was prepared before the mesh changed, or by another renderer",
+                "the frame was prepared before the mesh or the material changed, or by another renderer",
             ));
         };
         pass.set_bind_group(0, &prepared.group, &[prepared.place as u32]);
+        if let Some(own) = &prepared.own_group {
+            pass.set_bind_group(1, own, &[]);
+        }
         let arguments = prepared.arguments.as_ref();
         let draw_calls = self.draw_parts(pass, pipelines, prepared.own_vertices, arguments, sky);
         Ok(DrawStats {

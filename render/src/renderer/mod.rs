@@ -6,6 +6,7 @@
 
 mod draw;
 mod imagery;
+mod material;
 
 pub use draw::Prepared;
 use draw::begin_pass;
@@ -51,6 +52,7 @@ pub struct Renderer {
     tiles: TilePool,
     wanted: WantedTiles,
     imagery: Option<Imagery>,
+    material: Option<material::OnDevice>,
     layout: wgpu::BindGroupLayout,
     modules: Modules,
     pipelines: HashMap<Variant, Pipelines>,
@@ -104,6 +106,7 @@ impl Renderer {
             ),
             wanted: WantedTiles::default(),
             imagery: None,
+            material: None,
             modules: Modules::new(device, &layout),
             layout,
             pipelines: HashMap::new(),
@@ -214,7 +217,7 @@ impl Renderer {
     }
 
     /// Draws a frame that was prepared last into the caller's pass: ground, walls and, if asked for, the sky where nothing was drawn yet. Clears nothing. Leaves pipeline, bind group 0, index and
-    /// vertex buffer of the pass changed.
+    /// vertex buffer of the pass changed, and bind group 1 where a material binds something.
     ///
     /// # Errors
     ///

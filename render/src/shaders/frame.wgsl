@@ -47,15 +47,22 @@ struct Frame {
     image_scale: vec4<f32>,
     // Share of the image in the ground's colour; 1 where its colours are not yet multiplied by alpha.
     image_share: vec4<f32>,
+    // The eye, metres east and north: what is left beyond whole stretches of TILED_M; from the south-west sample.
+    eye_m: vec4<f32>,
+    // Share of the material in the ground's colour.
+    material: vec4<f32>,
 }
 
 const PI: f32 = 3.14159265;
+// Metres after which tiled textures are where they were; material/mod.rs has the same.
+const TILED_M: f32 = 4096.0;
 
 // Fixed when a pipeline is made, so that what a look does not show costs nothing: software drivers run both sides of a branch.
 override SURFACE: u32 = 0u;
 override CONTOURS: bool = false;
 override TILES: bool = true;
 override IMAGE: bool = false;
+override MATERIAL: bool = false;
 override MORPH: bool = true;
 // Whether the target encodes sRGB itself.
 override ENCODES: bool = true;

@@ -76,12 +76,35 @@ fn lit_again(photo: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
     return photo * mix(vec3(1.0), relief * min(level, vec3(1.0)), frame.ambient.w);
 }
 
+// 1 where the height changes from pixel to pixel by more than rounding, else 0: level ground at the height of a line is no line.
+fn rises(height_m: f32, step_m: f32) -> f32 {
+    let rounding_m = 1e-6 * abs(height_m - frame.height.x) + 1.2e-7 * abs(height_m) + 1e-9;
+    return clamp(step_m / rounding_m - 1.0, 0.0, 1.0);
+}
+
 // Coverage of the nearest line among multiples of `interval`, fading where lines would run together.
 fn line(height_m: f32, step_m: f32, interval_m: f32, width_px: f32) -> f32 {
     let in_intervals = height_m / interval_m;
     let away_px = abs(fract(in_intervals + 0.5) - 0.5) * interval_m / max(step_m, 1e-9);
     let crowded = smoothstep(0.12, 0.45, step_m * width_px / interval_m);
-    return clamp(0.5 * width_px + 0.5 - away_px, 0.0, 1.0) * (1.0 - crowded);
+    return clamp(0.5 * width_px + 0.5 - away_px, 0.0, 1.0) * (1.0 - crowded) * rises(height_m, step_m);
+}
+
+// What a material is told. The normal that light sees is of exaggerated ground, and a material's is not.
+fn ground_point(g: Ground, normal: vec3<f32>, colour: vec3<f32>, photo: vec4<f32>) -> GroundPoint {
+    let own = normalize(vec3(normal.xy, normal.z * max(frame.height.z, 1e-6)));
+    let picture = vec4(photo.rgb / max(photo.a, 1e-6), photo.a);
+    let east_north = g.from_eye_m.xy;
+    return GroundPoint(
+        frame.eye_m.zw + east_north,
+        frame.eye_m.xy + east_north,
+        g.height_m,
+        degrees(atan2(length(own.xy), own.z)),
+        own,
+        length(g.from_eye_m),
+        colour,
+        picture,
+    );
 }
 
 fn ground(g: Ground, at: vec2<f32>) -> vec4<f32> {
@@ -90,6 +113,12 @@ fn ground(g: Ground, at: vec2<f32>) -> vec4<f32> {
     let normal = select(g.facet, drape, slopes.z > 0.5);
     var colour = bare_colour(g, normal);
     var photo = image_at(g.from_eye_m, normal) * frame.image_share.x;
+    if MATERIAL {
+        let own = material(ground_point(g, normal, colour, photo));
+        let share = clamp(own.a, 0.0, 1.0) * frame.material.x;
+        colour = mix(colour, max(own.rgb, vec3(0.0)), share);
+        photo = photo * (1.0 - share);
+    }
     if CONTOURS {
         let plain = line(g.height_m, g.height_step_m, frame.contour.x, frame.contour.z);
         let index = line(g.height_m, g.height_step_m, frame.contour.x * frame.contour.y, 2.0 * frame.contour.z);

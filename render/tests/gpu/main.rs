@@ -7,6 +7,8 @@ mod adapter;
 mod cover;
 mod device;
 mod imagery;
+mod lines;
+mod materials;
 mod patches;
 mod places;
 mod shading;
@@ -28,6 +30,8 @@ fn main() -> ExitCode {
         cover::tests(),
         device::tests(),
         imagery::tests(),
+        lines::tests(),
+        materials::tests(),
         patches::tests(),
         places::tests(),
         shading::tests(),

@@ -11,6 +11,7 @@ mod loss;
 mod own_pass;
 mod paint;
 mod rig;
+mod steps;
 
 use adapter::{Drawn, Outcome, ensure};
 use std::process::ExitCode;
@@ -22,8 +23,16 @@ type Test = (&'static str, fn(&Gpu) -> Outcome);
 const READ_DEPTH: [&str; 3] = ["cracks::", "depth::", "own_pass::things"];
 
 fn main() -> ExitCode {
-    let tests =
-        [cracks::TESTS, depth::TESTS, engines::TESTS, loss::TESTS, own_pass::TESTS, paint::TESTS].concat();
+    let tests = [
+        cracks::TESTS,
+        depth::TESTS,
+        engines::TESTS,
+        loss::TESTS,
+        own_pass::TESTS,
+        paint::TESTS,
+        steps::TESTS,
+    ]
+    .concat();
     adapter::run(tests.into_iter().map(|(name, test): Test| Drawn {
         name: name.into(),
         lacks,

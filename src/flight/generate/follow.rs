@@ -5,6 +5,7 @@
 //! average is never below it: the profile is smooth and keeps the clearance. Over a void the last height before it counts.
 
 use super::{FlightPlan, Ground, Pose, Stage};
+use terrasoar_layout::portable::{atan2, hypot, sin_cos};
 
 /// Entries of the table; on 160 km of terrain they stand 25 m apart.
 const ENTRIES: usize = 16_384;
@@ -32,8 +33,8 @@ pub(super) fn path(stage: &Stage, plan: &FlightPlan, ground: &dyn Ground) -> imp
         let [de, dn, du] = [0, 1, 2].map(|axis| ahead[axis] - behind[axis]);
         Pose {
             eye_m: [east, north, (profile + clearance).max(least)],
-            yaw_deg: de.atan2(dn).to_degrees(),
-            pitch_deg: du.atan2(de.hypot(dn)).to_degrees(),
+            yaw_deg: atan2(de, dn).to_degrees(),
+            pitch_deg: atan2(du, hypot(de, dn)).to_degrees(),
         }
     }
 }
@@ -50,8 +51,8 @@ impl Track {
         let (middle, [width, length]) = (stage.middle_m(), stage.extent_m);
         let oval = |t: f64| {
             let angle = std::f64::consts::TAU * t;
-            let radius = OVAL * (1.0 + BULGE * (3.0 * angle).cos());
-            let (sin, cos) = angle.sin_cos();
+            let radius = OVAL * (1.0 + BULGE * sin_cos(3.0 * angle).1);
+            let (sin, cos) = sin_cos(angle);
             [middle[0] + radius * width * sin, middle[1] + radius * length * cos]
         };
         // Lengths along the curve at equal steps of its parameter, four to an entry.
@@ -60,7 +61,7 @@ impl Track {
         let mut sum = 0.0;
         way_m.push(sum);
         for pair in fine.windows(2) {
-            sum += (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+            sum += hypot(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]);
             way_m.push(sum);
         }
         let spacing_m = sum / ENTRIES as f64;

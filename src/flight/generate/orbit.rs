@@ -3,18 +3,19 @@
 //! The eye is a quarter of the shorter extent away from the middle in every frame.
 
 use super::{FlightPlan, Pose, Stage};
+use terrasoar_layout::portable::{atan2, sin_cos};
 
 pub(super) fn path(stage: &Stage, plan: &FlightPlan) -> impl Fn(u64) -> Pose + use<> {
     let middle = stage.middle_m();
     let radius = 0.25 * stage.shorter_m();
     let up = stage.highest_m + 0.05 * stage.shorter_m();
     let target = 0.5 * (stage.lowest_m + stage.highest_m);
-    let pitch_deg = (target - up).atan2(radius).to_degrees();
+    let pitch_deg = atan2(target - up, radius).to_degrees();
     let step_rad = plan.speed_m_per_frame / radius;
     move |i| {
         // Bearing of the eye from the middle.
         let bearing = (step_rad * i as f64).rem_euclid(std::f64::consts::TAU);
-        let (sin, cos) = bearing.sin_cos();
+        let (sin, cos) = sin_cos(bearing);
         let eye_m = [middle[0] + radius * sin, middle[1] + radius * cos, up];
         Pose { eye_m, yaw_deg: bearing.to_degrees() + 180.0, pitch_deg }
     }

@@ -6,6 +6,7 @@
 
 use super::straight::PITCH_DEG;
 use super::{FlightPlan, Pose, Stage, folded};
+use terrasoar_layout::portable::sin_cos;
 
 /// Headings tried for the start, and places looked at along the arc.
 const HEADINGS: u32 = 36;
@@ -39,8 +40,9 @@ impl Arc {
     /// Metres east and north of the start after `i` frames.
     fn offset_m(&self, start_deg: f64, i: f64) -> [f64; 2] {
         let half_deg = (0.5 * self.rate_deg * i) % 360.0;
-        let chord = self.speed_m * half_deg.to_radians().sin() / (0.5 * self.rate_deg).to_radians().sin();
-        let (sin, cos) = (start_deg + half_deg).to_radians().sin_cos();
+        let chord =
+            self.speed_m * sin_cos(half_deg.to_radians()).0 / sin_cos((0.5 * self.rate_deg).to_radians()).0;
+        let (sin, cos) = sin_cos((start_deg + half_deg).to_radians());
         [chord * sin, chord * cos]
     }
 

@@ -8,16 +8,17 @@ use super::output::{print, print_json};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
 use super::replay::QualityArgs;
-use super::{WrongUsage, parse};
+use super::{WrongUsage, made, parse};
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
 use terrasoar::view::View;
 use terrasoar_lab::iobench::{IoBench, IoRun, LayoutKind, Prefetch, ReadBy, Reader, Run, Timed, kernel};
 use terrasoar_lab::report::{IoReport, ReportFile, write_io_frames_csv};
 use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Measure how much of a file a flight touches, by engine and layout.
 ///
@@ -173,6 +174,7 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
     };
     let progress = Meter::new("frames");
     let flight = Flight::read(&args.flight)?;
+    args.quality.look_at(&Terrain::open_unmapped(&args.file)?, &flight, &args.flight)?;
     let quality = args.quality.quality();
     let views: Vec<View> = flight
         .frames
@@ -217,7 +219,7 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
     }
     let bench = bench_of(args, block_m, standing, sums);
     if let Some(path) = &args.frames {
-        write_io_frames_csv(path, &runs)?;
+        write_io_frames_csv(path, &bench, &runs)?;
     }
     let written = match &args.output {
         Some(folder) => IoReport { bench: &bench, runs: &runs }.write(folder)?,
@@ -234,8 +236,8 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
 fn bench_of(args: &Args, block_m: f64, standing: Standing, runs: Vec<IoRun>) -> IoBench {
     let quality = args.quality.quality();
     IoBench {
-        terrain: name(&args.file),
-        flight: name(&args.flight),
+        terrain: made::name(&args.file),
+        flight: made::name(&args.flight),
         tolerance_px: quality.tolerance_px,
         viewport_px: quality.viewport.size_px(),
         page_bytes: PAGE_BYTES as u64,
@@ -248,10 +250,6 @@ fn bench_of(args: &Args, block_m: f64, standing: Standing, runs: Vec<IoRun>) -> 
         cap_note: standing.note,
         kernel_known: kernel::thread_faults().is_some() && kernel::read_bytes().is_some(),
         runs,
-        made: Some(crate::verbs::made::made()),
+        made: Some(made::made()),
     }
-}
-
-fn name(path: &Path) -> String {
-    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

@@ -1,6 +1,7 @@
 //! Does what keys, panels and dropped files ask for.
 
 use super::{Viewer, sight};
+use crate::fit;
 use crate::window::camera::ground_below_m;
 use crate::window::flights::{Player, Recorder};
 use crate::window::job::{self, Job};
@@ -13,6 +14,7 @@ use crate::window::wake::Wake;
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
 use terrasoar::flight::generate::Ground;
+use terrasoar::view::Viewport;
 use winit::window::Fullscreen;
 
 impl Viewer {
@@ -120,7 +122,7 @@ impl Viewer {
             self.open_terrain(&path);
         } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("flight")) {
             match Flight::read(&path) {
-                Ok(flight) => self.take_flight(flight),
+                Ok(flight) => self.take_flight_of(flight, &path),
                 Err(error) => self.trouble(error.to_string()),
             }
         } else if self.job.is_some() {
@@ -166,7 +168,19 @@ impl Viewer {
         }
     }
 
-    pub(super) fn take_flight(&mut self, flight: Flight) {
+    /// Takes a flight of a file, and says what is strange about it over this terrain.
+    pub(super) fn take_flight_of(&mut self, flight: Flight, path: &Path) {
+        let strange = fit::strange(self.stage.terrain(), &flight, path, Viewport::default());
+        match strange {
+            Ok(words) => {
+                words.into_iter().for_each(|words| self.trouble(words));
+                self.take_flight(flight);
+            }
+            Err(words) => self.trouble(words),
+        }
+    }
+
+    fn take_flight(&mut self, flight: Flight) {
         self.player = Player::new(flight);
         if let Some(player) = &self.player {
             self.rig.place(player.camera());

@@ -3,6 +3,8 @@
 //! **No sample is above the rim's highest or below its lowest.** Solved by successive over-relaxation in one fixed order, so the same hole gives the same bits everywhere.
 //! Cost: O(samples x side) operations, some 24 bytes a sample.
 
+use crate::portable;
+
 /// Of the rim's range, a change in a round that ends the work.
 const STILL: f64 = 1e-9;
 
@@ -44,7 +46,7 @@ impl Hole {
         inside.iter().for_each(|i| self.samples[*i] = mean);
         let side = wide.max(high);
         // The best factor for a square; rounds in proportion to its side are enough.
-        let factor = 2.0 / (1.0 + (std::f64::consts::PI / side as f64).sin());
+        let factor = 2.0 / (1.0 + portable::sin_cos(std::f64::consts::PI / side as f64).0);
         for _ in 0..60 * side + 100 {
             let mut largest = 0.0_f64;
             for &i in &inside {

@@ -21,6 +21,7 @@ use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::imagery::{Paint, Scorch};
 use crate::numbers::{checked, checked_amount, checked_centre, checked_radius};
+use crate::portable;
 
 /// How far the rim reaches, in radii.
 pub const REACH: f64 = 2.0;
@@ -71,7 +72,7 @@ impl Crater {
     }
 
     pub(crate) fn apply(&self, grid: &Grid, window: &mut HeightWindow) {
-        let (east, north) = self.direction_deg.to_radians().sin_cos();
+        let (east, north) = portable::sin_cos(self.direction_deg.to_radians());
         each_sample(window, self.bounds(grid), |x, y, height| {
             *height += self.change_m(offset_m(grid, self.centre_m, x, y), [east, north]);
         });

@@ -63,6 +63,13 @@ pub trait Disk: Sync + std::fmt::Debug {
     fn sync_folder(&self, folder: &Path) -> Result<()>;
 }
 
+/// The way to an open file, also to one without a name. It leads nowhere in a system without `/proc`, such as a bare chroot.
+#[cfg(target_os = "linux")]
+pub(super) fn way_to(file: &File) -> std::path::PathBuf {
+    use std::os::fd::AsRawFd;
+    format!("/proc/self/fd/{}", file.as_raw_fd()).into()
+}
+
 /// The system's own.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemDisk;
@@ -98,9 +105,7 @@ impl Disk for SystemDisk {
         #[cfg(target_os = "linux")]
         {
             use rustix::fs::{AtFlags, CWD, linkat};
-            use std::os::fd::AsRawFd;
-            let from = format!("/proc/self/fd/{}", file.as_raw_fd());
-            Ok(linkat(CWD, from, CWD, to, AtFlags::SYMLINK_FOLLOW)?)
+            Ok(linkat(CWD, way_to(file), CWD, to, AtFlags::SYMLINK_FOLLOW)?)
         }
         #[cfg(not(target_os = "linux"))]
         {

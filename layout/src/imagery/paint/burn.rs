@@ -5,6 +5,7 @@
 //! with the scorch's centre, so scorches at different places look different, and the same scorch always looks the same.
 
 use crate::mix::mixed_32;
+use crate::portable;
 
 /// Rays of ejecta all around.
 const RAYS: u32 = 28;
@@ -32,8 +33,7 @@ pub(super) struct Burn {
 
 impl Burn {
     pub(super) fn of(scorch: &Scorch) -> Self {
-        let (east, north) = scorch.direction_deg.to_radians().sin_cos();
-        // The last bits of a sine differ from machine to machine.
+        let (east, north) = portable::sin_cos(scorch.direction_deg.to_radians());
         let ahead = [east, north].map(|v| (v * 65536.0).round() / 65536.0);
         let millimetres = scorch.centre_m.map(|m| (m * 1000.0).round() as i64 as u32);
         let seed = mixed_32(mixed_32(millimetres[0]) ^ millimetres[1]);

@@ -14,6 +14,7 @@
 //! Proof: a rounding down rho of the total has rho(x) - rho(y) > x - y - 1 in ticks. Cost: some hundred additions a frame.
 
 use glam::{DQuat, DVec3};
+use terrasoar_layout::portable;
 
 /// Share of the way along the course that is counted. A smaller one lets words last longer on course and shorter off it.
 pub(crate) const RATE: f64 = 0.1;
@@ -152,7 +153,7 @@ impl Clocks {
 
     /// Clocks for a terrain whose samples are `spacing_m` apart and at most `tallest_m` from height 0.
     pub(crate) fn new(spacing_m: f64, tallest_m: f64) -> Self {
-        let shift = (spacing_m / 256.0 * UNITS_PER_M).log2().floor().clamp(0.0, 40.0) as u32;
+        let shift = portable::log2(spacing_m / 256.0 * UNITS_PER_M).floor().clamp(0.0, 40.0) as u32;
         Self {
             // Expiry 0 is kept for words that are not in the queue.
             totals: [1 << shift; CLOCKS],
@@ -175,7 +176,7 @@ impl Clocks {
         let Some(last) = self.last.replace(pose) else { return Moved::default() };
         let step = pose.eye_m - last.eye_m;
         let raised_m = self.tallest_m * (pose.exaggeration - last.exaggeration).abs();
-        let ratio = |now: f64, then: f64| if now == then { 0.0 } else { (now / then).ln().abs() };
+        let ratio = |now: f64, then: f64| if now == then { 0.0 } else { portable::ln(now / then).abs() };
         let zoomed = EXP_SLOPE * (ratio(pose.nu, last.nu) + ratio(pose.exaggeration, last.exaggeration));
         let turned = pose.normals != last.normals;
         let mut moved = Moved::default();
@@ -286,7 +287,7 @@ impl Course {
             return Self { direction, axis, turn_per_m: 0.0 };
         }
         // Who turns flies a bend: straight ahead of where the trend, which lags behind, will have led in a while.
-        let lead = DQuat::from_axis_angle(axis, turn.length / RECENT + LEAD_RAD);
+        let lead = turn_about(axis, turn.length / RECENT + LEAD_RAD);
         Self { direction: (lead * direction).normalize(), axis, turn_per_m: turn.length / way.length }
     }
 
@@ -301,12 +302,19 @@ impl Course {
         let about = if self.turn_per_m > 0.0 {
             self.turn_per_m * (pose.eye_m - last.eye_m).dot(self.direction).max(0.0)
         } else {
-            last.turn_to(pose).dot(self.axis).clamp(0.0, 1.0).asin()
+            portable::asin(last.turn_to(pose).dot(self.axis).clamp(0.0, 1.0))
         };
-        let expected = DQuat::from_axis_angle(if about > 0.0 { self.axis } else { DVec3::Z }, about);
+        let expected = turn_about(if about > 0.0 { self.axis } else { DVec3::Z }, about);
         let off = |i: usize| (pose.normals[i] - expected * last.normals[i]).length();
         RATE * about + (0..4).map(off).fold(0.0, f64::max)
     }
+}
+
+/// The turn by an angle in radians about an axis of length 1.
+fn turn_about(axis: DVec3, angle_rad: f64) -> DQuat {
+    let (sin, cos) = portable::sin_cos(0.5 * angle_rad);
+    let [x, y, z] = (axis * sin).to_array();
+    DQuat::from_xyzw(x, y, z, cos)
 }
 
 impl Pose {

@@ -1,0 +1,86 @@
+//! Whether an eye or a flight belongs to a terrain.
+//!
+//! **A flight wholly outside is an error; one that was made over another terrain, or is mostly outside, is strange.** An eye outside that has the terrain in view is no mistake.
+
+use crate::numbers::{decimal, grouped};
+use glam::DVec3;
+use std::path::Path;
+use terrasoar::flight::Flight;
+use terrasoar::view::{View, Viewport};
+use terrasoar_layout::grid::Grid;
+use terrasoar_layout::read::terrain::Terrain;
+
+/// Name of the note in which a flight says how large the ground is that it was made over.
+const EXTENT_NOTE: &str = "terrain-extent-m";
+/// The terrain's extent in words: "which extends from 0,0 to 2560,2560 metres".
+pub(crate) fn extent(grid: &Grid) -> String {
+    let [east, north] = extent_note(grid);
+    format!("which extends from 0,0 to {east},{north} metres")
+}
+
+fn extent_note(grid: &Grid) -> [String; 2] {
+    grid.extent_m().map(|m| decimal(m, 4))
+}
+
+/// What a flight notes of the ground that it was made over.
+pub(crate) fn note_of(grid: &Grid) -> (String, String) {
+    (EXTENT_NOTE.into(), extent_note(grid).join(" "))
+}
+
+/// Whether an eye is over the terrain.
+pub(crate) fn is_over(grid: &Grid, eye_m: DVec3) -> bool {
+    let [east_m, north_m] = grid.extent_m();
+    (0.0..=east_m).contains(&eye_m.x) && (0.0..=north_m).contains(&eye_m.y)
+}
+
+/// Whether a view has anything of the terrain in it that is larger than a pixel. The terrain counts as the ball around it: in doubt it is in view.
+pub(crate) fn sees(terrain: &Terrain, view: &View) -> bool {
+    let [east_m, north_m] = terrain.grid().extent_m();
+    let [low_m, high_m] = terrain.header().height_range_m.map(|h| h * view.vertical_exaggeration);
+    let half = 0.5 * DVec3::new(east_m, north_m, high_m - low_m);
+    let (radius_m, to_middle) = (half.length(), half + DVec3::Z * low_m - view.eye_m);
+    let is_in_view = view.side_normals().iter().all(|normal| normal.dot(to_middle) <= radius_m);
+    is_in_view && 2.0 * radius_m * view.pixels_per_radian() >= to_middle.length()
+}
+
+/// What is strange about a flight over this terrain, in sentences; for pictures of some size.
+///
+/// # Errors
+/// In words, if it lies wholly outside.
+pub(crate) fn strange(
+    terrain: &Terrain,
+    flight: &Flight,
+    path: &Path,
+    viewport: Viewport,
+) -> Result<Vec<String>, String> {
+    let (grid, frames) = (terrain.grid(), &flight.frames);
+    let view = |frame: &terrasoar::flight::FlightFrame| frame.view(viewport, 1.0);
+    let outside = frames.iter().filter(|frame| !is_over(grid, frame.eye_m.into())).count();
+    if outside == frames.len() && !frames.iter().any(|frame| sees(terrain, &view(frame))) {
+        return Err(format!(
+            "{}: the flight lies wholly outside the terrain, {}; it is a flight of another terrain",
+            path.display(),
+            extent(grid)
+        ));
+    }
+    let mut strange = Vec::new();
+    let note = |name: &str| flight.notes.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str());
+    let made_over = note("terrain").map(|name| format!(" ({name})")).unwrap_or_default();
+    let is_others = note(EXTENT_NOTE).is_some_and(|value| value != extent_note(grid).join(" "));
+    let path = path.display();
+    if is_others {
+        let was = note(EXTENT_NOTE).unwrap_or_default().replace(' ', " x ");
+        strange.push(format!(
+            "{path} was made over another terrain{made_over}, of {was} metres; this one is of {} metres",
+            extent_note(grid).join(" x ")
+        ));
+    }
+    if 2 * outside > frames.len() {
+        let [outside, all] = [outside, frames.len()].map(|count| grouped(count as u64));
+        strange.push(format!(
+            "{path}: the eye is outside the terrain, {}, in {outside} of {all} frames; it may be a flight of another terrain{made_over}",
+            extent(grid)
+        ));
+    }
+    Ok(strange)
+}

@@ -1,0 +1,56 @@
+//! A material with a number of its own that changes from frame to frame: the height of the snow line, in three pictures.
+//!
+//!     cargo run --release -p terrasoar-scene --example step_7_bindings -- land.iqt
+
+use std::error::Error;
+use terrasoar::ground::PictureEngine;
+use terrasoar::refine::Culling;
+use terrasoar::{MappedTerrain, View};
+use terrasoar_render::{Look, Material, wgpu};
+use terrasoar_scene::studio::Studio;
+
+const SIZE_PX: [u32; 2] = [320, 180];
+
+// begin: bindings
+const SNOW: &str = "
+@group(1) @binding(0) var<uniform> own_snow_line: vec4<f32>;
+
+fn material(at: GroundPoint) -> vec4<f32> {
+    let is_level = band(at.slope_deg, -1.0, 40.0, 10.0);
+    return vec4(vec3(0.8), is_level * smoothstep(-30.0, 30.0, at.height_m - own_snow_line.x));
+}";
+
+/// Snow from a height on. The buffer holds the height in metres as its first number.
+fn snow(snow_line: &wgpu::Buffer) -> Result<Material, terrasoar_render::RenderError> {
+    let snow_line = snow_line.clone();
+    Ok(Material::new(SNOW)?.bindings(move |device, _queue, layout| {
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("snow"),
+            layout,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: snow_line.as_entire_binding() }],
+        })
+    }))
+}
+// end: bindings
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = std::env::args().nth(1).unwrap_or("land.iqt".into());
+    let terrain = MappedTerrain::open(&path)?;
+    let mut studio = Studio::new(terrain.file(), PictureEngine::Kinetic, Culling::Vertices, SIZE_PX.into())?;
+    let snow_line = studio.gpu().device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("snow line"),
+        size: 16,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    studio.set_material(Some(snow(&snow_line)?))?;
+    let view = View::new([5000.0, 800.0, 2300.0], 10.0, -18.0).viewport(SIZE_PX);
+    studio.fly(&view);
+    for height_m in [1500.0_f32, 1000.0, 500.0] {
+        studio.gpu().queue.write_buffer(&snow_line, 0, &height_m.to_le_bytes());
+        let rgb = studio.picture(&view, &Look::default())?;
+        let light = rgb.iter().map(|value| u64::from(*value)).sum::<u64>() / rgb.len() as u64;
+        println!("snow from {height_m:.0} m: a mean of {light}");
+    }
+    Ok(())
+}
