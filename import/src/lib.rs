@@ -39,6 +39,7 @@ mod identify;
 pub(crate) mod input;
 mod jpeg2000;
 pub(crate) mod jpeg_frame;
+mod jpeg_rows;
 mod kept;
 mod labelled;
 mod mask;

@@ -1,10 +1,13 @@
 //! Pictures as JPEG, baseline and progressive, decoded by jpeg-decoder.
 //!
-//! No Rust decoder gives a JPEG row by row, so its texels are held as a whole while it is read, and more while it is decoded ([`JpegFrame::memory_bytes`]): 4.5 bytes a
-//! texel of the usual kind, 7.5 of a progressive one. That counts against the memory budget; larger pictures go through a tiled GeoTIFF.
+//! The decoder gives a picture as a whole: its texels are held while it is read, and more while it is decoded ([`JpegFrame::memory_bytes`]): 4.5 bytes a texel of the usual kind, 7.5 of a
+//! progressive one. That counts against the memory budget. A large baseline picture is handed to it in bands ([`crate::jpeg_rows`]), and takes memory for these alone; a large progressive one
+//! goes through a tiled GeoTIFF.
 
+use super::png::spread;
 use super::webp::Whole;
 use crate::jpeg_frame::JpegFrame;
+use crate::jpeg_rows::{JpegRows, NoRows, Shape};
 use crate::reader::{Orientation, Picture};
 use crate::shown::PRESS_NOTE;
 use crate::{guard, input};
@@ -23,7 +26,12 @@ pub(super) struct JpegImage {
     info: ImageInfo,
     channels: usize,
     orientation: Orientation,
+    /// Its shape, if it is read in bands.
+    bands: Option<Shape>,
 }
+
+/// Memory from which on a picture is read in bands.
+const MUCH: u64 = 64 << 20;
 
 impl JpegImage {
     /// Reads the header.
@@ -41,6 +49,9 @@ impl JpegImage {
         if texels.contains(&0) {
             return Err(LayoutError::damaged(path, "header", "it has no texels; fetch the file again"));
         }
+        let bands = frame.in_rows().filter(|_| frame.memory_bytes() > MUCH);
+        let bands =
+            bands.filter(|shape| reader(path).is_ok_and(|file| JpegRows::begin(file, *shape).is_ok()));
         let progressive = header.coding_process == CodingProcess::DctProgressive;
         let info = ImageInfo {
             texels,
@@ -55,11 +66,11 @@ impl JpegImage {
                 }
             ),
             notes: if channels == 4 { vec![PRESS_NOTE.into()] } else { Vec::new() },
-            memory_bytes: frame.memory_bytes(),
+            memory_bytes: bands.map_or(frame.memory_bytes(), |shape| shape.memory_bytes()),
         };
         let orientation = decoder.exif_data().map(Orientation::of_exif);
         let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
-        Ok(Self { path: path.to_owned(), info, channels, orientation })
+        Ok(Self { path: path.to_owned(), info, channels, orientation, bands })
     }
 }
 
@@ -87,6 +98,10 @@ impl ImageSource for JpegImage {
     }
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
+        if let Some(shape) = self.bands {
+            let rows = JpegRows::begin(reader(&self.path)?, shape).map_err(|e| no_rows(&self.path, e))?;
+            return Ok(Box::new(InBands { image: self, rows, texels: Vec::new() }));
+        }
         let mut decoder = Decoder::new(reader(&self.path)?);
         let mut texels = guard(
             &self.path,
@@ -119,6 +134,40 @@ fn press_to_light(texels: &mut Vec<u8>) {
         }
     }
     texels.truncate(light);
+}
+
+/// Rows of a picture that is read in bands.
+struct InBands<'i> {
+    image: &'i JpegImage,
+    rows: JpegRows<BufReader<File>>,
+    texels: Vec<u8>,
+}
+
+impl RowReader for InBands<'_> {
+    fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
+        let JpegImage { path, info, channels, .. } = self.image;
+        for row in rgba.chunks_exact_mut(4 * info.texels[0] as usize) {
+            self.texels.resize(info.texels[0] as usize * channels, 0);
+            let (rows, texels) = (&mut self.rows, &mut self.texels);
+            guard(path, || "image data".into(), || rows.read(texels).map_err(|e| no_rows(path, e)))?;
+            if *channels == 4 {
+                press_to_light(texels);
+            }
+            spread(texels, if *channels == 4 { 3 } else { *channels }, row);
+        }
+        Ok(())
+    }
+}
+
+fn no_rows(path: &Path, trouble: NoRows) -> LayoutError {
+    match trouble {
+        NoRows::Io(source) => LayoutError::io(path, "cannot read the JPEG file", source),
+        _ => LayoutError::damaged(
+            path,
+            "image data",
+            "its JPEG stream is damaged or cut short; fetch the file again",
+        ),
+    }
 }
 
 fn reader(path: &Path) -> Result<BufReader<File>, LayoutError> {
