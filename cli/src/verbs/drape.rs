@@ -5,20 +5,22 @@ use super::output::{complain, decimal, grouped, print};
 use super::parse;
 use super::progress::{Meter, short};
 use super::siting::{reach, system_name};
+use super::tiles::Tiles;
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use terrasoar_import::places::{Crs, Frame};
-use terrasoar_import::{open_image, open_images_on};
+use terrasoar_import::{PictureOptions, Stretch, open_image, open_images};
 use terrasoar_layout::file::header::Header;
-use terrasoar_layout::imagery::{DrapeOptions, Draped, Extent, ImageSource, PlaceOrigin, TileFormat, drape};
+use terrasoar_layout::imagery::{DrapeOptions, Draped, Extent, PlaceOrigin, TileFormat, drape};
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Drape an image over a terrain file.
 ///
-/// Reads PNG, JPEG and GeoTIFF of any size (JPEG only as far as memory allows), grey, RGB or palette, with or without alpha, masks and "no data". Pictures in another reference
-/// system, turned, mirrored or of other texels than the first are brought onto the terrain by bilinear interpolation. Appends a pyramid of
+/// Reads PNG, JPEG, WebP, JPEG 2000 and GeoTIFF (progressive JPEG, WebP and JPEG 2000 of one tile only as far as memory allows), grey, RGB, CMYK or palette, with or without
+/// alpha, masks and "no data"; with --stretch GeoTIFF of any numbers; and pyramids of map tiles. Pictures in another reference system, turned, mirrored or of other texels than the first are brought onto the terrain by bilinear interpolation. Appends a pyramid of
 /// compressed tiles to the file; until it is complete the file reads as before, whatever happens, and programs that have it open are not
 /// disturbed. Draping again puts other imagery in the place of the first, whose space is not used again.
 #[derive(Debug, clap::Args)]
@@ -26,6 +28,8 @@ use terrasoar_layout::read::terrain::Terrain;
 Examples:
   terrasoar drape alps.iqt --image alps-photo.tif
   terrasoar drape alps.iqt --image west.tif east.tif
+  terrasoar drape alps.iqt --image world.mbtiles
+  terrasoar drape alps.iqt --image scene.tif --bands 4,3,2 --stretch 2,98
   terrasoar drape alps.iqt --image photo.png --extent 0,0,20480,15360
   terrasoar drape alps.iqt --image photo.jpg --extent-crs 600000,180000,620480,195360
 
@@ -34,7 +38,7 @@ terrain has one too; else it is laid over the whole terrain, upright as its EXIF
 pub(super) struct Args {
     /// Terrain file (.iqt)
     file: PathBuf,
-    /// Image: one, or several that make a mosaic
+    /// Image: one, or several that make a mosaic; or pyramids of map tiles: a folder, MBTiles, PMTiles
     #[arg(long = "image", required = true, num_args = 1.., value_name = "IMG")]
     images: Vec<PathBuf>,
     /// Where the image lies: west, south, east, north in metres from the terrain's south-west sample
@@ -43,6 +47,12 @@ pub(super) struct Args {
     /// Where the image lies: west, south, east, north in units of the terrain's reference system
     #[arg(long, value_name = "W,S,E,N", value_parser = parse::extent, allow_hyphen_values = true)]
     extent_crs: Option<Extents>,
+    /// Which numbers are black and white: 2,98 is the darkest and the brightest 2 percent of each band, of all images together; 200..3000 is these numbers
+    #[arg(long, value_name = "LOW,HIGH", value_parser = parse::stretch, allow_hyphen_values = true)]
+    stretch: Option<Stretch>,
+    /// Bands for red, green and blue, or one for grey, counted from 1
+    #[arg(long, value_name = "R,G,B", value_parser = parse::bands)]
+    bands: Option<Bands>,
     /// How texels are stored
     #[arg(long, value_name = "FORMAT", default_value = "bc1")]
     format: FormatWord,
@@ -52,12 +62,16 @@ pub(super) struct Args {
     /// Threads to use; all cores without it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    #[command(flatten)]
+    tiles: Tiles,
 }
 
 /// Points on each side of an image whose places are looked at.
 const EDGE: u32 = 32;
 /// West, south, east, north.
 type Extents = [f64; 4];
+/// Numbers of bands; a name of its own, for a list would be a flag of several values.
+type Bands = Vec<NonZero<u32>>;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum FormatWord {
@@ -70,6 +84,15 @@ enum FormatWord {
 }
 
 impl Args {
+    fn picture(&self) -> PictureOptions {
+        PictureOptions {
+            bands: self.bands.clone().unwrap_or_default(),
+            stretch: self.stretch,
+            memory_mib: Some(self.memory),
+            tiles: self.tiles.options(),
+        }
+    }
+
     fn options(&self) -> DrapeOptions {
         DrapeOptions::default()
             .format(match self.format {
@@ -91,16 +114,17 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let start = Instant::now();
     if args.extent.is_none() && args.extent_crs.is_none() {
         let terrain = Terrain::open(&args.file)?;
-        for path in &args.images {
-            meets(path, terrain.header())?;
+        let looked: Vec<Result<()>> = args.images.iter().map(|path| meets(path, terrain.header())).collect();
+        // Of a mosaic some may lie elsewhere.
+        if looked.iter().all(Result::is_err) {
+            looked.into_iter().collect::<Result<()>>()?;
         }
     }
     let draped = pool.install(|| -> Result<Draped> {
-        let images: Vec<Box<dyn ImageSource>> = if args.extent.is_some() || args.extent_crs.is_some() {
-            args.images.iter().map(|path| open_image(path)).collect::<Result<_, _>>()?
-        } else {
-            open_images_on(&args.images, Terrain::open(&args.file)?.header())?
-        };
+        let is_placed = args.extent.is_some() || args.extent_crs.is_some();
+        let terrain = if is_placed { None } else { Some(Terrain::open(&args.file)?) };
+        let header = terrain.as_ref().map(Terrain::header);
+        let images = open_images(&args.images, header, &args.picture())?;
         for image in &images {
             for note in &image.info().notes {
                 complain(&format!("note: {}: {note}", image.path().display()));

@@ -22,6 +22,7 @@ use terrasoar::view::View;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::Haze;
 use terrasoar_scene::overview::{FOV_DEG, from_above_part, overview, towards_middle, view_from};
+use terrasoar_scene::scene::SceneError;
 
 /// Draw a picture of a terrain as PNG.
 ///
@@ -178,10 +179,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.flight.is_some() || args.at.is_some() {
         within::air(&terrain, view, look.haze, &args.hint(&terrain, view.eye_m)?)?;
     }
-    let rgb = studio.picture(view, &look).with_context(|| {
-        let [wide, high] = picture.size.size_px();
-        format!("no picture of {wide} x {high} pixels was drawn")
-    })?;
+    let rgb = studio.picture(view, &look).map_err(|error| smaller(error, picture.size.size_px()))?;
     let mut file = FileSink::create(&args.output)?;
     file.write_all(&png_with(&rgb, picture.size, &siting::notes(terrain.header()), args.dpi)?).with_context(
         || format!("{}: cannot write the picture; check the free space", args.output.display()),
@@ -232,6 +230,20 @@ pub(super) fn run(args: &Args) -> Result<()> {
         grouped(triangles),
         adapter.adapter,
         adapter.backend
+    ))
+}
+
+/// Why there is no picture; where it was too large for the memory, with a size to try.
+fn smaller(error: SceneError, [wide, high]: [u32; 2]) -> anyhow::Error {
+    let is_memory = error.to_string().contains("memory");
+    let error = anyhow::Error::from(error);
+    if !is_memory {
+        return error;
+    }
+    error.context(format!(
+        "no picture of {wide} x {high} pixels was drawn; half of them each way take a quarter of the memory (--size {}x{}), and --window draws a part",
+        wide.div_ceil(2),
+        high.div_ceil(2)
     ))
 }
 

@@ -19,6 +19,7 @@ mod killed;
 #[cfg(unix)]
 mod kills;
 mod misread;
+mod mosaics;
 mod outputs;
 mod pictures;
 mod places;

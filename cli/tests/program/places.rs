@@ -259,7 +259,7 @@ fn degrees_read_as_metres_are_told() {
         assert!(words.contains(flag), "{place}: {words}");
     }
     for place in ["9428.43,7914.87", "50,60", "100,29000"] {
-        assert_eq!(at(place, &[]).1.contains("note"), false, "{place}");
+        assert!(!at(place, &[]).1.contains("note"), "{place}");
     }
     let (out, words) = at(LON_LAT, &["--crs", "EPSG:4326"]);
     assert_eq!((out.as_str(), words.as_str()), ("313.641 m\n", ""));

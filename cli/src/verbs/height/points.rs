@@ -176,7 +176,10 @@ fn answer(
                 remember(&mut missed.inside_at, at);
                 write_height(&mut out, height_m)?;
             }
-            None if is_inside(terrain, *at_m) => missed.void += 1,
+            None if is_inside(terrain, *at_m) => {
+                remember(&mut missed.inside_at, at);
+                missed.void += 1;
+            }
             None => missed.is_outside(at),
         }
         out.push(b'\n');
