@@ -64,7 +64,7 @@ fn refusals_change_nothing_and_say_what_to_do() {
     let bench = with_picture();
     let before = std::fs::read(bench.path("land.iqt")).unwrap();
     for (args, code, words) in [
-        (&["drape", "land.iqt", "--image", "land.iqt"][..], 1, "no PNG, JPEG or TIFF"),
+        (&["drape", "land.iqt", "--image", "land.iqt"][..], 1, "or TIFF; if GDAL knows it"),
         (&["drape", "land.tif", "--image", "photo.tif"], 1, "terrasoar build"),
         (
             &["drape", "land.iqt", "--image", "photo.tif", "--extent", "1,2,3"],
