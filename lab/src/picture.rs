@@ -23,6 +23,19 @@ pub fn encode(rgb: &[u8], size_px: [u32; 2]) -> io::Result<Vec<u8>> {
 /// # Errors
 /// As [`encode`]; a keyword that PNG does not take.
 pub fn encode_with(rgb: &[u8], size_px: [u32; 2], texts: &[(&'static str, String)]) -> io::Result<Vec<u8>> {
+    encode_for_print(rgb, size_px, texts, None)
+}
+
+/// As [`encode_with`], with how many pixels a metre it has when it is printed.
+///
+/// # Errors
+/// As [`encode_with`].
+pub fn encode_for_print(
+    rgb: &[u8],
+    size_px: [u32; 2],
+    texts: &[(&'static str, String)],
+    pixels_per_m: Option<u32>,
+) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, size_px[0], size_px[1]);
     encoder.set_color(ColorType::Rgb);
@@ -37,6 +50,11 @@ pub fn encode_with(rgb: &[u8], size_px: [u32; 2], texts: &[(&'static str, String
         }
     }
     let mut writer = encoder.write_header()?;
+    if let Some(count) = pixels_per_m {
+        // After the maker, by which a picture of ours is known.
+        let [a, b, c, d] = count.to_be_bytes();
+        writer.write_chunk(png::chunk::pHYs, &[a, b, c, d, a, b, c, d, 1])?;
+    }
     writer.write_image_data(rgb)?;
     writer.finish()?;
     Ok(bytes)

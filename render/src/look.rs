@@ -78,6 +78,18 @@ pub enum Haze {
     Distance(f32),
 }
 
+impl Haze {
+    /// Metres after which about a third of a thing's own light is left, over a terrain of some diagonal in metres; `None` where there is no haze.
+    pub fn distance_m(self, diagonal_m: f64) -> Option<f64> {
+        match self {
+            Self::Off => None,
+            // A small terrain keeps its far side; a large one ends in the air of a clear day.
+            Self::Auto => Some((3.0 * diagonal_m).min(110_000.0)),
+            Self::Distance(metres) => Some(f64::from(metres)),
+        }
+    }
+}
+
 /// Contour lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]

@@ -82,14 +82,9 @@ impl Uniforms {
         // The sky's light is its colour, half as saturated, at the given strength.
         let strongest = zenith.iter().fold(1e-6_f32, |m, c| m.max(*c));
         let sky_light = zenith.map(|c| look.sun.ambient * day * (0.74 + 0.26 * c / strongest));
-        // A small terrain keeps its far side; a large one ends in the air of a clear day.
-        let auto_m = (3.0 * terrain.diagonal_m()).min(110_000.0);
-        let (haze, haze_m) = match look.haze {
-            Haze::Off => (0.0, auto_m),
-            Haze::Auto => (1.0, auto_m),
-            Haze::Distance(m) => (1.0, f64::from(m)),
-        };
-        let haze_m = haze_m.max(1e-3);
+        let hazy_m = |haze: Haze| haze.distance_m(terrain.diagonal_m());
+        let haze = if look.haze == Haze::Off { 0.0 } else { 1.0 };
+        let haze_m = hazy_m(look.haze).or(hazy_m(Haze::Auto)).unwrap_or(f64::INFINITY).max(1e-3);
         // Thin enough that a map seen from above is clear, thick enough that valleys are hazier than summits; never
         // thicker than the Earth's.
         let scale_height_m = (0.12 * haze_m).min(8000.0);

@@ -74,7 +74,18 @@ pub fn overview(terrain: &Terrain, exaggeration: f64, fov_deg: f64, viewport: Vi
 ///
 /// The eye is so far away that the highest ground stands a twentieth of a pixel aside at most.
 pub fn from_above(terrain: &Terrain, exaggeration: f64, most: Viewport) -> (View, f64) {
-    let extent_m = terrain.grid().extent_m();
+    let [east_m, north_m] = terrain.grid().extent_m();
+    from_above_part(terrain, [0.0, 0.0, east_m, north_m], exaggeration, most)
+}
+
+/// As [`from_above`], of a part: west, south, east and north in metres from the south-west sample, west below east and south below north.
+pub fn from_above_part(
+    terrain: &Terrain,
+    [west_m, south_m, east_m, north_m]: [f64; 4],
+    exaggeration: f64,
+    most: Viewport,
+) -> (View, f64) {
+    let extent_m = [east_m - west_m, north_m - south_m];
     let [low_m, high_m] = terrain.header().height_range_m.map(|h| h * exaggeration);
     let [most_wide, most_high] = most.size_px().map(f64::from);
     let pixel_m = (extent_m[0] / most_wide).max(extent_m[1] / most_high);
@@ -83,7 +94,7 @@ pub fn from_above(terrain: &Terrain, exaggeration: f64, most: Viewport) -> (View
     let pixel_m = (extent_m[0] / size[0]).min(extent_m[1] / size[1]);
     let away_m =
         ((10.0 * size[0].max(size[1]) + 1.0) * (high_m - low_m)).max(10.0 * extent_m[0].hypot(extent_m[1]));
-    let eye_m = DVec3::new(0.5 * extent_m[0], 0.5 * extent_m[1], low_m + away_m);
+    let eye_m = DVec3::new(0.5 * (west_m + east_m), 0.5 * (south_m + north_m), low_m + away_m);
     let fov_deg = (2.0 * (0.5 * pixel_m * size[1] / away_m).atan()).to_degrees();
     let viewport = Viewport::from(size.map(|side| side as u32));
     let down = [0.0, -std::f64::consts::FRAC_PI_2];

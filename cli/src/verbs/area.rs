@@ -3,6 +3,7 @@
 //! What lies beyond the terrain is left out, which is said; a rectangle that lies wholly outside is an error that tells where the terrain is. Cost: for another system than the terrain's own
 //! some hundred projections.
 
+use super::guess;
 use super::output::complain;
 use super::parse;
 use super::siting::{frame, reach};
@@ -28,6 +29,32 @@ pub(super) struct AreaArgs {
 }
 
 impl AreaArgs {
+    /// As it would be typed.
+    #[cfg(feature = "pictures")]
+    pub(super) fn new(window: Option<[f64; 4]>, crs: Option<String>) -> Self {
+        Self { window, crs }
+    }
+
+    /// West, south, east and north of the part in metres from the south-west sample, without what lies beyond the terrain. `file` is the terrain's name in messages.
+    #[cfg(feature = "pictures")]
+    pub(super) fn sides_m(&self, terrain: &Terrain, file: &Path) -> Result<[f64; 4]> {
+        let header = terrain.header();
+        let sides = self.sides(header).with_context(|| file.display().to_string())?;
+        let (extent_m, spacing_m) = (header.grid.extent_m(), header.grid.spacing_m());
+        let sides: [f64; 4] =
+            std::array::from_fn(|i| (sides[i] * spacing_m[i % 2]).clamp(0.0, extent_m[i % 2]));
+        if sides[0] >= sides[2] || sides[1] >= sides[3] {
+            bail!("{}: the window only touches the terrain{}", file.display(), self.likely(header));
+        }
+        let likely = self.likely(header);
+        if !likely.is_empty() {
+            complain(&format!(
+                "note: the window was read as metres from the terrain's south-west sample{likely}"
+            ));
+        }
+        Ok(sides)
+    }
+
     /// Every `step`-th sample of the part, at least 2 x 2. `file` is the terrain's name in messages.
     pub(super) fn window(&self, terrain: &Terrain, file: &Path, step: u32) -> Result<SampleWindow> {
         let header = terrain.header();
@@ -36,13 +63,25 @@ impl AreaArgs {
             let [wide, high] = window.map_or([0; 2], |window| window.size);
             if wide.min(high) < 2 {
                 bail!(
-                    "there are {wide} x {high} samples in it, and at least 2 x 2 are needed; take a larger window or a smaller step"
+                    "there are {wide} x {high} samples in it, and at least 2 x 2 are needed; take a larger window or a smaller step{}",
+                    self.likely(header)
                 );
             }
             Ok(window)
         });
         let window = found.with_context(|| file.display().to_string())?;
         window.context("the window holds no samples")
+    }
+
+    /// What a window in metres looks more like, as a clause.
+    fn likely(&self, header: &Header) -> String {
+        let Some(sides) = self.window.filter(|_| self.crs.is_none()) else { return String::new() };
+        guess::of_local(header, &corners(sides))
+            .map(|(guess, is_inside)| {
+                let would = if is_inside { "it would lie inside" } else { "it may be meant" };
+                format!("; {} {would}", guess.words())
+            })
+            .unwrap_or_default()
     }
 
     /// The part's sides in samples from the south-west one.
@@ -71,7 +110,12 @@ impl AreaArgs {
             *east < -1e-6 || *north < -1e-6 || *west > last[0] + 1e-6 || *south > last[1] + 1e-6
         };
         let Some(sides) = sides.filter(|sides| !is_apart(sides)) else {
-            bail!("the window lies outside the terrain{}", extent());
+            let hint = if in_samples {
+                String::new()
+            } else {
+                guess::clause_of_outside(header, frame.as_ref(), &corners(asked))
+            };
+            bail!("the window lies outside the terrain{}{hint}", extent());
         };
         let is_beyond = |side: f64, last: f64| side < -1e-6 || side > last + 1e-6;
         if (0..4).any(|side| is_beyond(sides[side], last[side % 2])) {
@@ -82,6 +126,12 @@ impl AreaArgs {
         }
         Ok(sides)
     }
+}
+
+/// Corners and middle of a rectangle.
+fn corners([west, south, east, north]: [f64; 4]) -> [[f64; 2]; 5] {
+    let middle = [0.5 * (west + east), 0.5 * (south + north)];
+    [[west, south], [east, south], [west, north], [east, north], middle]
 }
 
 /// The least rectangle of samples that holds a rectangle of a system; `None` where none of it has a place.

@@ -21,6 +21,9 @@ use terrasoar_layout::words::number;
 /// Pixels a side of the picture, at most.
 const MOST_PIXELS: u32 = 2048;
 
+/// Pixels a side of an enlarged picture, at most.
+const MOST_ENLARGED: u32 = 8192;
+
 /// Compare two terrains: differences of heights, and what was cut and filled.
 ///
 /// Differences are second less first, at the samples of the first. With --overlay the second terrain is seen with those edits; without a second terrain it is the first one with them. A terrain alone is
@@ -52,6 +55,9 @@ pub(super) struct Args {
     /// Difference in metres with the picture's deepest colours, instead of the largest there is
     #[arg(long, value_name = "M", value_parser = parse::positive, requires = "picture")]
     range: Option<f64>,
+    /// Enlarge the picture so many times each way, from 1 to 64: with 1 a sample is a pixel
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "picture", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pixels: u32,
     #[command(flatten)]
     area: AreaArgs,
     #[command(flatten)]
@@ -153,7 +159,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     drop(progress);
     let range_m = args.range.unwrap_or_else(|| largest(&summary));
     if let Some(out) = &args.picture {
-        draw(out, &reduced, range_m, &name)?;
+        draw(args, out, &reduced, range_m, &name)?;
     }
     let answer = Answer::of(args, &first, name, &difference, &summary, &reduced, range_m);
     if args.json {
@@ -166,12 +172,13 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     if let Some(out) = &args.picture {
         text.push_str(&format!(
-            "{}: {} x {} pixels of {} x {} samples, colours to {} m\n",
+            "{}: {} x {} pixels of {} x {} samples{}, colours to {} m\n",
             out.display(),
-            reduced.size[0],
-            reduced.size[1],
+            reduced.size[0] * args.pixels,
+            reduced.size[1] * args.pixels,
             reduced.samples,
             reduced.samples,
+            if args.pixels == 1 { String::new() } else { format!(", {0} x {0} times enlarged", args.pixels) },
             decimal(range_m, 4)
         ));
     }
@@ -200,11 +207,25 @@ fn largest(summary: &Summary) -> f64 {
     if largest > 0.0 { largest } else { 1.0 }
 }
 
-fn draw(out: &Path, reduced: &Reduced, range_m: f64, name: &str) -> Result<()> {
-    let rgb = diverging::pixels(&reduced.differences_m, range_m as f32);
+fn draw(args: &Args, out: &Path, reduced: &Reduced, range_m: f64, name: &str) -> Result<()> {
+    let (times, size) = (args.pixels, reduced.size);
+    if size.iter().any(|side| side * times > MOST_ENLARGED) {
+        bail!(
+            "{}: the picture would have {} x {} pixels, and {MOST_ENLARGED} a side are the most; give fewer --pixels, or a smaller --window",
+            out.display(),
+            size[0] * times,
+            size[1] * times
+        );
+    }
+    let small = diverging::pixels(&reduced.differences_m, range_m as f32);
+    let mut rgb = Vec::with_capacity(small.len() * (times * times) as usize);
+    for row in small.chunks(3 * size[0] as usize) {
+        let wide: Vec<u8> = row.chunks(3).flat_map(|pixel| pixel.repeat(times as usize)).collect();
+        rgb.extend(wide.repeat(times as usize));
+    }
     let texts = [("Differences", format!("{name}: red {} m, blue {} m", number(-range_m), number(range_m)))];
     let failed = || format!("{}: cannot write the picture; check the free space", out.display());
-    let png = picture::encode_with(&rgb, reduced.size, &texts).with_context(failed)?;
+    let png = picture::encode_with(&rgb, size.map(|side| side * times), &texts).with_context(failed)?;
     let file = AtomicFile::create(out)?;
     std::io::Write::write_all(&mut file.file(), &png).with_context(failed)?;
     Ok(file.publish()?)
@@ -283,8 +304,11 @@ impl Answer {
         if self.changed_samples == 0 {
             rows.insert(3, ("difference", "none".into()));
         } else {
-            rows.extend(self.lowest.as_ref().map(|place| ("lowest", place.text())));
-            rows.extend(self.highest.as_ref().map(|place| ("highest", place.text())));
+            // Where nothing was cut, or nothing filled, there is no such place.
+            let cut = self.lowest.as_ref().filter(|place| place.difference_m < 0.0);
+            let filled = self.highest.as_ref().filter(|place| place.difference_m > 0.0);
+            rows.extend(cut.map(|place| ("lowest", place.text())));
+            rows.extend(filled.map(|place| ("highest", place.text())));
         }
         for (name, count) in
             [("only in first", self.only_first_samples), ("only in second", self.only_second_samples)]

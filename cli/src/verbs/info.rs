@@ -1,5 +1,6 @@
 //! `terrasoar info`: what a terrain file says about itself.
 
+use super::drape::{covered, sides_m};
 use super::output::{decimal, grouped, print, print_json, table};
 use super::siting::{self, Siting};
 use super::terrain::{self, TerrainArgs};
@@ -104,6 +105,9 @@ struct Pictures {
     bytes: u64,
     /// Bytes over those of the texels of level 0 as raw RGB.
     raw_ratio: f64,
+    /// Where it lies, in words.
+    #[serde(skip)]
+    covers: String,
 }
 
 impl Pictures {
@@ -123,6 +127,7 @@ impl Pictures {
             logical_tiles: shape.tiles(),
             bytes,
             raw_ratio: bytes as f64 / (3.0 * wide * high),
+            covers: covered(terrain.header(), sides_m(shape.origin_m, shape.texel_m, shape.texels)),
         }))
     }
 }
@@ -224,6 +229,7 @@ impl Info {
                 ("imagery", format!("{wide} x {high} texels, made from {}", imagery.source)),
                 ("texel", format!("{} m", pair(imagery.texel_m, 4))),
                 ("imagery from", format!("{east} m east, {north} m north")),
+                ("covers", imagery.covers.clone()),
                 (
                     "tiles",
                     format!(

@@ -16,6 +16,7 @@ mod drape;
 mod edit;
 mod export;
 mod flight;
+mod guess;
 mod height;
 mod info;
 mod iobench;
@@ -51,6 +52,8 @@ mod verify;
 #[cfg(feature = "view")]
 mod view;
 mod within;
+#[cfg(feature = "pictures")]
+mod world_file;
 
 #[cfg(not(feature = "view"))]
 use pictureless::view;
@@ -155,6 +158,26 @@ impl fmt::Display for Lines {
 
 impl std::error::Error for Lines {}
 
+/// Advice that fits: to give an unknown flag as the name of a file never does, and numbers left over are those of a place.
+fn advised(mut error: clap::Error) -> clap::Error {
+    use clap::error::{ContextKind, ContextValue, ErrorKind};
+    if error.kind() != ErrorKind::UnknownArgument {
+        return error;
+    }
+    let mut tips = match error.get(ContextKind::Suggested) {
+        Some(ContextValue::StyledStrs(tips)) => tips.clone(),
+        _ => Vec::new(),
+    };
+    tips.retain(|tip| !tip.to_string().contains("as a value"));
+    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg)
+        && word.trim_end_matches(',').parse::<f64>().is_ok()
+    {
+        tips.push("the numbers of a place are joined by commas, without spaces, such as 1500,820.5".into());
+    }
+    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
+    error
+}
+
 /// Ends the program with what is wrong with the command line, or with help.
 fn refuse(error: &clap::Error) -> ! {
     if std::env::args_os().all(|arg| matches!(printable::line(&arg.to_string_lossy()), Cow::Borrowed(_))) {
@@ -173,7 +196,7 @@ pub(crate) fn run() -> ExitCode {
 }
 
 fn carry_out() -> ExitCode {
-    let verb = Typed::try_parse().unwrap_or_else(|error| refuse(&error)).verb;
+    let verb = Typed::try_parse().unwrap_or_else(|error| refuse(&advised(error))).verb;
     #[cfg(feature = "pictures")]
     if matches!(verb, Verb::Compare(_) | Verb::Snapshot(_) | Verb::Movie(_) | Verb::View(_)) {
         quiet::begin();

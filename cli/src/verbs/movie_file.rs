@@ -107,7 +107,7 @@ impl MovieFile {
     pub(super) fn add(&mut self, rgb: &[u8]) -> Result<()> {
         match &mut self.sink {
             Sink::Folder { pictures, next } => {
-                let file = png_with(rgb, self.size, &self.notes)?;
+                let file = png_with(rgb, self.size, &self.notes, None)?;
                 pictures.add(&frame_name(*next), |out| out.write_all(&file))?;
                 *next += 1;
                 Ok(())

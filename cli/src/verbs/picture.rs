@@ -9,13 +9,15 @@ use terrasoar::flyover::Quality;
 use terrasoar::ground::PictureEngine;
 use terrasoar::refine::Culling;
 use terrasoar::view::{View, Viewport};
-use terrasoar_lab::picture::encode_with;
+use terrasoar_lab::picture::encode_for_print;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
 use terrasoar_render::{Haze, LOOKS, Look};
 use terrasoar_scene::scene::SceneError;
 use terrasoar_scene::studio::Studio;
 
+/// Metres of an inch.
+pub(super) const INCH_M: f64 = 0.0254;
 /// The style of a terrain with an image.
 const PHOTO: &str = "photo";
 
@@ -217,12 +219,18 @@ pub(super) fn angles(text: &str) -> Result<[f64; 2], String> {
 
 /// Three bytes a pixel as the bytes of a PNG file.
 pub(super) fn png(rgb: &[u8], size: Viewport) -> Result<Vec<u8>> {
-    png_with(rgb, size, &[])
+    png_with(rgb, size, &[], None)
 }
 
-/// As [`png`], with texts in it.
-pub(super) fn png_with(rgb: &[u8], size: Viewport, texts: &[(&'static str, String)]) -> Result<Vec<u8>> {
-    encode_with(rgb, size.size_px(), texts).context("the picture is incomplete")
+/// As [`png`], with texts in it, and how many pixels an inch has when it is printed.
+pub(super) fn png_with(
+    rgb: &[u8],
+    size: Viewport,
+    texts: &[(&'static str, String)],
+    dpi: Option<f64>,
+) -> Result<Vec<u8>> {
+    let pixels_per_m = dpi.map(|dpi| (dpi / INCH_M).round() as u32);
+    encode_for_print(rgb, size.size_px(), texts, pixels_per_m).context("the picture is incomplete")
 }
 
 /// Draws a frame of a flight, flown to it; gives the bytes of a PNG file and the adapter's name.

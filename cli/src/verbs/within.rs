@@ -6,6 +6,8 @@
 use super::output::{complain, decimal, grouped};
 use crate::fit::{self, extent, is_over};
 use anyhow::{Error, Result, bail};
+#[cfg(feature = "pictures")]
+use glam::DVec2;
 use glam::DVec3;
 use std::path::Path;
 use terrasoar::edits::LoadedBatch;
@@ -15,6 +17,8 @@ use terrasoar_layout::edit::Edit;
 use terrasoar_layout::grid::Grid;
 use terrasoar_layout::read::heights::Heights;
 use terrasoar_layout::read::terrain::Terrain;
+#[cfg(feature = "pictures")]
+use terrasoar_render::Haze;
 
 /// Of a step between samples, how far above the ground an eye is put that was below it. More than to the near plane, beyond which nothing is drawn.
 const CLEARANCE: f64 = 0.1;
@@ -100,15 +104,43 @@ pub(super) fn warn_of(edit: &Edit, grid: &Grid) {
 }
 
 #[cfg(feature = "pictures")]
-/// Refuses an eye outside the terrain that does not see it, and one below the ground.
+/// Refuses an eye beside the terrain to which the air hides all of it. `hint` is what the place may be meant as, a clause.
 ///
 /// # Errors
 /// As said.
-pub(super) fn eye(terrain: &Terrain, view: &View) -> Result<()> {
+pub(super) fn air(terrain: &Terrain, view: &View, haze: Haze, hint: &str) -> Result<()> {
+    let grid = terrain.grid();
+    let [east_m, north_m] = grid.extent_m();
+    let Some(haze_m) = haze.distance_m(east_m.hypot(north_m)) else { return Ok(()) };
+    let nearest = view.eye_m.truncate().clamp(DVec2::ZERO, DVec2::new(east_m, north_m));
+    let away_m = (view.eye_m.truncate() - nearest).length();
+    let [low_m, high_m] = terrain.header().height_range_m.map(|h| h * view.vertical_exaggeration);
+    // At least so much air: all of the way as thin as at its higher end, as the shader's air thins.
+    let scale_height_m = (0.12 * haze_m).min(8000.0);
+    let thinnest = (-(view.eye_m.z.max(high_m) - low_m) / scale_height_m).exp();
+    // Of the colour that is scattered least.
+    let left = (-0.75 * away_m * thinnest / haze_m).exp();
+    if left < 1.0 / 512.0 {
+        let [east, north, up] = view.eye_m.to_array().map(|m| decimal(m, 2));
+        bail!(
+            "from {east},{north},{up} nothing of the terrain is seen, {}; it is {} km away, and the air hides what is so far (--haze off shows it){hint}",
+            extent(grid),
+            decimal(away_m / 1000.0, 1)
+        );
+    }
+    Ok(())
+}
+
+#[cfg(feature = "pictures")]
+/// Refuses an eye outside the terrain that does not see it, and one below the ground. `hint` is what the place may be meant as, a clause.
+///
+/// # Errors
+/// As said.
+pub(super) fn eye(terrain: &Terrain, view: &View, hint: &str) -> Result<()> {
     let [east, north, up] = view.eye_m.to_array().map(|m| decimal(m, 2));
     if !is_over(terrain.grid(), view.eye_m) && !fit::sees(terrain, view) {
         bail!(
-            "from {east},{north},{up} nothing of the terrain is seen, {}; the eye is outside it and looks elsewhere",
+            "from {east},{north},{up} nothing of the terrain is seen, {}; the eye is outside it and looks elsewhere{hint}",
             extent(terrain.grid())
         );
     }

@@ -9,6 +9,7 @@ mod adapter;
 #[allow(dead_code, reason = "shared with the tests of the other verbs")]
 mod killed;
 mod looks;
+mod maps;
 mod outputs;
 mod program;
 #[path = "../program/support.rs"]
@@ -22,7 +23,7 @@ use terrasoar_render::Gpu;
 type Test = (&'static str, fn(&Gpu) -> Outcome);
 
 fn main() -> ExitCode {
-    let tests = [looks::TESTS, outputs::TESTS, program::TESTS].concat().into_iter();
+    let tests = [looks::TESTS, maps::TESTS, outputs::TESTS, program::TESTS].concat().into_iter();
     adapter::run(tests.map(|(name, test): Test| Drawn {
         name: name.into(),
         lacks: |_, _| None,

@@ -64,7 +64,7 @@ fn refusals_change_nothing_and_say_what_to_do() {
     let bench = with_picture();
     let before = std::fs::read(bench.path("land.iqt")).unwrap();
     for (args, code, words) in [
-        (&["drape", "land.iqt", "--image", "land.iqt"][..], 1, "no PNG, JPEG or TIFF"),
+        (&["drape", "land.iqt", "--image", "land.iqt"][..], 1, "or TIFF; if GDAL knows it"),
         (&["drape", "land.tif", "--image", "photo.tif"], 1, "terrasoar build"),
         (
             &["drape", "land.iqt", "--image", "photo.tif", "--extent", "1,2,3"],
@@ -127,4 +127,40 @@ fn a_second_writer_is_told() {
     assert!(text(&output.stderr).contains("another program is writing"), "{}", text(&output.stderr));
     drop(writer);
     bench.good(&["drape", "land.iqt", "--image", "photo.tif"]);
+}
+
+/// A terrain in UTM and pictures of it in degrees: one that lies elsewhere is refused in its own system, one that reaches beyond is told.
+#[test]
+fn where_a_picture_lies_is_told() {
+    use terrasoar_layout::build::{BuildOptions, build};
+    use terrasoar_layout::dem::{MemoryDem, SampleType};
+    let bench = Bench::new();
+    let mut dem = MemoryDem::from_fn([101, 101], SampleType::I16, |x, _| f64::from(x));
+    dem.info_mut().georeference.pixel_to_crs = Some([563_000.0, 30.0, 0.0, 3_303_000.0, 0.0, -30.0]);
+    dem.info_mut().georeference.epsg = Some(32644);
+    build(&dem, &bench.path("land.iqt"), &BuildOptions::default(), &terrasoar_layout::progress::Silent)
+        .unwrap();
+    let bounds = bench.json(&["info", "land.iqt", "--json"])["bounds_wgs84"].clone();
+    let [west, south, east, north] = [0, 1, 2, 3].map(|i| bounds[i].as_f64().unwrap());
+    let picture = |name: &str, [w, s, e, n]: [f64; 4]| {
+        image::RgbImage::from_pixel(64, 64, image::Rgb([200, 100, 50])).save(bench.path(name)).unwrap();
+        let [dx, dy] = [(e - w) / 64.0, (n - s) / 64.0];
+        let world = format!("{dx}\n0\n0\n{}\n{}\n{}\n", -dy, w + 0.5 * dx, n - 0.5 * dy);
+        std::fs::write(bench.path(name).with_extension("pgw"), world).unwrap();
+        let wgs84 = r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433],AUTHORITY["EPSG","4326"]]"#;
+        std::fs::write(bench.path(name).with_extension("prj"), wgs84).unwrap();
+    };
+    picture("off.png", [west - 1.0, south, east - 1.0, north]);
+    let said = bench.bad(1, &["drape", "land.iqt", "--image", "off.png"]);
+    assert!(said.contains("they do not meet") && said.contains("(EPSG:4326)"), "{said}");
+    assert!(!said.contains("gdalwarp") && said.contains("and the terrain from 81.6"), "{said}");
+    let middle = 0.5 * (west + east);
+    picture("half.png", [middle, south, 2.0 * east - middle, north]);
+    let output = bench.run(&["drape", "land.iqt", "--image", "half.png"]);
+    let (out, said) = (text(&output.stdout), text(&output.stderr));
+    assert!(output.status.success() && said.contains("what lies outside is left out"), "{said}");
+    assert!(out.contains("covers 5644") && out.contains("% of the terrain"), "{out}");
+    let share: f64 = out.split(", ").find_map(|word| word.split_once(" % of")?.0.parse().ok()).unwrap();
+    assert!((48.0..53.0).contains(&share), "{out}");
+    assert!(bench.good(&["info", "land.iqt"]).contains("% of the terrain"));
 }

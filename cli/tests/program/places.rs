@@ -224,3 +224,124 @@ fn heights_are_where_gdal_says() {
         assert_eq!(out.lines().count(), own.len());
     }
 }
+
+/// `wide.iqt`: 1001 x 801 samples 30 m apart from 563000,3300000 on in EPSG:32644, so 30 x 24 km; height is the sample's column.
+fn wide(bench: &Bench) {
+    let mut dem = MemoryDem::from_fn([1001, 801], SampleType::I16, |x, _| f64::from(x));
+    dem.info_mut().georeference = Georeference {
+        epsg: Some(32644),
+        crs_name: "WGS 84 / UTM zone 44N".into(),
+        unit: HorizontalUnit::Metre,
+        pixel_to_crs: Some([563_000.0, 30.0, 0.0, 3_324_000.0, 0.0, -30.0]),
+        ..Georeference::default()
+    };
+    make(bench, &dem, "wide.iqt");
+}
+
+/// 81.75,29.9 by `gdaltransform -s_srs EPSG:4326 -t_srs EPSG:32644` is 572409.2,3307940.9.
+const LON_LAT: &str = "81.75,29.9";
+
+#[test]
+fn degrees_read_as_metres_are_told() {
+    let bench = Bench::new();
+    wide(&bench);
+    let at = |place: &str, more: &[&str]| {
+        let output = bench.run(&[&["height", "wide.iqt", "--at", place][..], more].concat());
+        (text(&output.stdout), text(&output.stderr))
+    };
+    for (place, flag) in [
+        (LON_LAT, "--crs EPSG:4326) it lies inside too"),
+        ("29.9,81.75", "swapped"),
+        ("7.65861,45.97634", "it looks like degrees; type --crs EPSG:4326"),
+    ] {
+        let (out, words) = at(place, &[]);
+        assert!(out.ends_with(" m\n") && words.starts_with("note: the place was read as metres"), "{words}");
+        assert!(words.contains(flag), "{place}: {words}");
+    }
+    for place in ["9428.43,7914.87", "50,60", "100,29000"] {
+        assert!(!at(place, &[]).1.contains("note"), "{place}");
+    }
+    let (out, words) = at(LON_LAT, &["--crs", "EPSG:4326"]);
+    assert_eq!((out.as_str(), words.as_str()), ("313.641 m\n", ""));
+    assert_eq!(bench.json(&["height", "wide.iqt", "--at", LON_LAT, "--json"])["likely_crs"], "EPSG:4326");
+    assert!(bench.json(&["height", "wide.iqt", "--at", "5,5", "--json"])["likely_crs"].is_null());
+
+    let table = "name,X,Y\nhut,81.75,29.9\ncol,81.8,29.95\n";
+    let (code, out, words) = feed(&bench, &["height", "wide.iqt", "--points", "-"], table);
+    assert_eq!((code, out.lines().count()), (Some(0), 3));
+    assert!(words.contains("note: the places were read as metres"), "{words}");
+    assert!(words.contains("(--crs EPSG:4326) they lie inside too"), "{words}");
+    let table = "10,20\n1000,2000\n";
+    assert_eq!(feed(&bench, &["height", "wide.iqt", "--points", "-"], table).2, "");
+}
+
+#[test]
+fn places_outside_are_tried_in_other_systems() {
+    let bench = Bench::new();
+    wide(&bench);
+    for (place, crs, words) in [
+        ("572428,3307915", None, "; in the elevation model's coordinates (--crs dem) it would lie inside"),
+        ("3307915,572428", None, "(--crs dem), with the two numbers swapped"),
+        ("29.9,81.75", Some("EPSG:4326"), "; with the two numbers swapped"),
+        (LON_LAT, Some("dem"), "(--crs EPSG:4326) it would lie inside"),
+        ("5000,5000", Some("dem"), "in metres from the terrain's south-west sample (without --crs)"),
+    ] {
+        let mut args = vec!["height", "wide.iqt", "--at", place];
+        args.extend(crs.map(|crs| ["--crs", crs]).iter().flatten());
+        let said = bench.bad(1, &args);
+        assert!(said.contains(words) && said.contains("which extends from"), "{place} in {crs:?}: {said}");
+        let table = format!("hut;x;y\na;{0}\nb;{0}\n", place.replace(',', ";"));
+        let mut args = vec!["height", "wide.iqt", "--points", "-"];
+        args.extend(crs.map(|crs| ["--crs", crs]).iter().flatten());
+        let (code, _, said) = feed(&bench, &args, &table);
+        assert!(code == Some(0) && said.contains("of 2 places 2 lie outside"), "{said}");
+        assert!(said.contains(&words.replace("it would", "they would")), "{place} in {crs:?}: {said}");
+    }
+    let far = bench.bad(1, &["height", "wide.iqt", "--at", "9e7,9e7"]);
+    assert!(!far.contains("would lie inside"), "{far}");
+    for (window, words) in [
+        ("81.7,29.85,81.8,29.95", "samples in it, and at least 2 x 2 are needed"),
+        ("81.7,29.85,81.8,29.95", "(--crs EPSG:4326) it would lie inside"),
+        ("570000,3305000,575000,3310000", "(--crs dem) it would lie inside"),
+    ] {
+        let said = bench.bad(1, &["export", "wide.iqt", "--window", window, "-o", "a.tif"]);
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+#[test]
+fn tables_without_names_of_columns_and_tables_to_files() {
+    let bench = Bench::new();
+    utm(&bench);
+    let points = ["height", "utm.iqt", "--points", "-"];
+    let (code, out, said) = feed(&bench, &points, "hut1,10,20\nhut2,11,21\n");
+    assert_eq!((code, out.as_str()), (Some(1), ""));
+    assert!(said.contains("line 1") && said.contains("`hut1`") && said.contains("name,lon,lat"), "{said}");
+    let to_file = [&points[..], &["-o", "t.csv"]].concat();
+    for _ in 0..2 {
+        // The second time it replaces its own.
+        let (code, out, said) = feed(&bench, &to_file, "x,y\n10,20\n");
+        assert_eq!((code, out.as_str(), said.as_str()), (Some(0), "", ""));
+        assert_eq!(std::fs::read_to_string(bench.path("t.csv")).unwrap(), "x,y,height_m\n10,20,5\n");
+    }
+    // A wrong row leaves what was there.
+    let (code, _, said) = feed(&bench, &to_file, "x,y\n0,20\n7,abc\n");
+    assert!(code == Some(1) && said.contains("no table was written") && said.contains("line 3"), "{said}");
+    assert_eq!(std::fs::read_to_string(bench.path("t.csv")).unwrap(), "x,y,height_m\n10,20,5\n");
+    std::fs::write(bench.path("mine.csv"), "x,y\n1,2\n").unwrap();
+    let points = ["height", "utm.iqt", "--points", "mine.csv", "-o"];
+    assert!(bench.bad(1, &[&points[..], &["mine.csv"]].concat()).contains("the output is the input"));
+    std::fs::write(bench.path("theirs.csv"), "a,b\n1,2\n").unwrap();
+    assert!(bench.bad(1, &[&points[..], &["theirs.csv"]].concat()).contains("--force"));
+    let said = bench.bad(1, &[&points[..], &["none/a.csv"]].concat());
+    assert!(said.contains("the folder none does not exist"), "{said}");
+    let said = bench.bad(1, &["export", "utm.iqt", "-o", "none/a.tif"]);
+    assert!(said.contains("the folder none does not exist"), "{said}");
+    assert!(bench.bad(2, &["height", "utm.iqt"]).contains("--points"));
+    let said = bench.bad(2, &["height", "utm.iqt", "--at", "10", "20"]);
+    assert!(said.contains("joined by commas") || said.contains("two numbers"), "{said}");
+    let said = bench.bad(2, &["height", "utm.iqt", "--at", "10,", "20"]);
+    assert!(said.contains("commas") || said.contains("number"), "{said}");
+    let said = bench.bad(2, &["height", "utm.iqt", "--at", "10,20", "--window", "1,2,3,4"]);
+    assert!(said.contains("--window") && !said.contains("as a value"), "{said}");
+}

@@ -82,12 +82,16 @@ fn rises(height_m: f32, step_m: f32) -> f32 {
     return clamp(step_m / rounding_m - 1.0, 0.0, 1.0);
 }
 
-// Coverage of the nearest line among multiples of `interval`, fading where lines would run together.
-fn line(height_m: f32, step_m: f32, interval_m: f32, width_px: f32) -> f32 {
+// Coverage of the nearest line among multiples of `interval`, fading where lines would run together. Where they fade does not depend on the width, but for lines thinner than
+// `plain_px`: wide lines become narrower instead, so that two fifths of the room between two is theirs at most, and `plain_px` at least.
+fn line(height_m: f32, step_m: f32, interval_m: f32, width_px: f32, plain_px: f32) -> f32 {
     let in_intervals = height_m / interval_m;
-    let away_px = abs(fract(in_intervals + 0.5) - 0.5) * interval_m / max(step_m, 1e-9);
-    let crowded = smoothstep(0.12, 0.45, step_m * width_px / interval_m);
-    return clamp(0.5 * width_px + 0.5 - away_px, 0.0, 1.0) * (1.0 - crowded) * rises(height_m, step_m);
+    let apart_px = interval_m / max(step_m, 1e-9);
+    let away_px = abs(fract(in_intervals + 0.5) - 0.5) * apart_px;
+    let least_px = min(width_px, plain_px);
+    let drawn_px = clamp(0.4 * apart_px, least_px, width_px);
+    let crowded = smoothstep(0.12, 0.45, step_m * least_px / interval_m);
+    return clamp(0.5 * drawn_px + 0.5 - away_px, 0.0, 1.0) * (1.0 - crowded) * rises(height_m, step_m);
 }
 
 // What a material is told. The normal that light sees is of exaggerated ground, and a material's is not.
@@ -120,8 +124,8 @@ fn ground(g: Ground, at: vec2<f32>) -> vec4<f32> {
         photo = photo * (1.0 - share);
     }
     if CONTOURS {
-        let plain = line(g.height_m, g.height_step_m, frame.contour.x, frame.contour.z);
-        let index = line(g.height_m, g.height_step_m, frame.contour.x * frame.contour.y, 2.0 * frame.contour.z);
+        let plain = line(g.height_m, g.height_step_m, frame.contour.x, frame.contour.z, 1.0);
+        let index = line(g.height_m, g.height_step_m, frame.contour.x * frame.contour.y, 2.0 * frame.contour.z, 2.0);
         let opacity = max(0.7 * plain, index) * frame.contour.w;
         colour = mix(colour, frame.contour_colour.rgb, opacity);
         photo = vec4(mix(photo.rgb, frame.contour_colour.rgb * photo.a, opacity), photo.a);

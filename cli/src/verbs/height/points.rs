@@ -5,15 +5,17 @@
 
 use super::is_inside;
 use super::table::Table;
-use crate::verbs::output::{complain, grouped, print_rows};
-use crate::verbs::siting::frame;
+use crate::verbs::guess;
+use crate::verbs::output::{complain, decimal, grouped, print_rows};
+use crate::verbs::siting::{frame, reach};
 use anyhow::{Context, Result, anyhow};
 use csv::{ByteRecord, Terminator, Writer, WriterBuilder};
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
-use terrasoar_import::places::{Crs, Frame};
+use terrasoar::sink::FileSink;
+use terrasoar_import::places::Frame;
 use terrasoar_layout::read::heights::heights_m;
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -54,15 +56,49 @@ impl Batch {
     }
 }
 
-/// Places without a height.
+/// Places without a height, and the first of those inside and outside as they were given.
 #[derive(Default)]
 struct Missed {
     rows: u64,
     outside: u64,
     void: u64,
+    inside_at: Vec<[f64; 2]>,
+    outside_at: Vec<[f64; 2]>,
+    /// Least and greatest coordinates of those outside.
+    outside_reach: Option<[f64; 4]>,
 }
 
-pub(super) fn run(terrain: &Terrain, path: &Path, crs: Option<&str>) -> Result<()> {
+impl Missed {
+    fn is_outside(&mut self, at: [f64; 2]) {
+        self.outside += 1;
+        remember(&mut self.outside_at, at);
+        let [x0, y0, x1, y1] = self.outside_reach.unwrap_or([at[0], at[1], at[0], at[1]]);
+        self.outside_reach = Some([x0.min(at[0]), y0.min(at[1]), x1.max(at[0]), y1.max(at[1])]);
+    }
+}
+
+fn remember(places: &mut Vec<[f64; 2]>, at: [f64; 2]) {
+    if places.len() < guess::PLACES {
+        places.push(at);
+    }
+}
+
+/// Where rows go.
+enum Out {
+    Standard,
+    File(FileSink),
+}
+
+impl Out {
+    fn rows(&mut self, rows: &[u8]) -> Result<()> {
+        match self {
+            Self::Standard => print_rows(rows),
+            Self::File(file) => file.write_all(rows).context("cannot write the table; check the free space"),
+        }
+    }
+}
+
+pub(super) fn run(terrain: &Terrain, path: &Path, crs: Option<&str>, output: Option<&Path>) -> Result<()> {
     let from: Box<dyn Read> = if path == Path::new("-") {
         Box::new(io::stdin().lock())
     } else {
@@ -72,18 +108,22 @@ pub(super) fn run(terrain: &Terrain, path: &Path, crs: Option<&str>) -> Result<(
     };
     let header = terrain.header();
     let mut seen = frame(header, crs)?;
-    let wants_degrees = crs.map(|_| seen.as_ref().and_then(Frame::crs).is_some_and(Crs::is_geographic));
+    let wants_degrees = crs.map(|_| guess::is_degrees(seen.as_ref()));
     let mut table = Table::new(path, from, wants_degrees)?;
     if crs.is_none() && table.is_lon_lat {
         seen = frame(header, Some("EPSG:4326"))
             .context("the columns lon and lat are taken for degrees of WGS 84; another system is --crs's")?;
     }
     let separator = table.separator;
+    let mut out = match output {
+        Some(path) => Out::File(FileSink::create(path)?),
+        None => Out::Standard,
+    };
     if let Some(names) = &mut table.header {
         names.push_field(COLUMN);
         let mut line = Batch::new(separator);
         line.push(names, [0.0; 2])?;
-        print_rows(line.text.get_ref())?;
+        out.rows(line.text.get_ref())?;
     }
     let (mut missed, mut row) = (Missed::default(), ByteRecord::new());
     loop {
@@ -99,11 +139,14 @@ pub(super) fn run(terrain: &Terrain, path: &Path, crs: Option<&str>) -> Result<(
             }
         };
         // What comes before a wrong row is right.
-        answer(terrain, seen.as_ref(), separator, batch, &mut missed)?;
-        if let Some(end) = end {
-            tell(&missed);
-            return end;
-        }
+        answer(terrain, seen.as_ref(), separator, batch, &mut missed, &mut out)?;
+        let Some(end) = end else { continue };
+        tell(terrain, seen.as_ref(), &missed);
+        return match (end, out) {
+            (Ok(()), Out::File(file)) => Ok(file.publish()?),
+            (Err(error), Out::File(_)) => Err(error.context("no table was written")),
+            (end, Out::Standard) => end,
+        };
     }
 }
 
@@ -114,30 +157,38 @@ fn answer(
     separator: u8,
     mut batch: Batch,
     missed: &mut Missed,
+    to: &mut Out,
 ) -> Result<()> {
+    let given = batch.places.clone();
     if let Some(frame) = seen {
         // What has no place in the terrain's system lies outside.
         batch.places.par_iter_mut().for_each(|at| *at = frame.place_m(*at).unwrap_or([f64::NAN; 2]));
     }
     let heights = heights_m(terrain, &batch.places, PAGES_BYTES)?;
     let (text, mut out, mut start) = (batch.text.get_ref(), Vec::with_capacity(1 << 17), 0);
-    for ((end, height_m), at_m) in batch.ends.iter().zip(heights).zip(&batch.places) {
+    for (((end, height_m), at_m), at) in batch.ends.iter().zip(heights).zip(&batch.places).zip(given) {
         out.extend_from_slice(&text[start..*end]);
         out.push(separator);
         start = end + 1;
         missed.rows += 1;
         match height_m {
-            Some(height_m) => write_height(&mut out, height_m)?,
-            None if is_inside(terrain, *at_m) => missed.void += 1,
-            None => missed.outside += 1,
+            Some(height_m) => {
+                remember(&mut missed.inside_at, at);
+                write_height(&mut out, height_m)?;
+            }
+            None if is_inside(terrain, *at_m) => {
+                remember(&mut missed.inside_at, at);
+                missed.void += 1;
+            }
+            None => missed.is_outside(at),
         }
         out.push(b'\n');
         if out.len() >= 1 << 16 {
-            print_rows(&out)?;
+            to.rows(&out)?;
             out.clear();
         }
     }
-    print_rows(&out)
+    to.rows(&out)
 }
 
 /// A height with as many decimals as it has, up to six.
@@ -153,7 +204,8 @@ fn write_height(out: &mut Vec<u8>, height_m: f64) -> io::Result<()> {
     Ok(())
 }
 
-fn tell(missed: &Missed) {
+fn tell(terrain: &Terrain, seen: Option<&Frame>, missed: &Missed) {
+    let header = terrain.header();
     if missed.outside + missed.void > 0 {
         complain(&format!(
             "note: of {} places {} lie outside the terrain and {} where it has no data; their heights are empty",
@@ -161,6 +213,21 @@ fn tell(missed: &Missed) {
             grouped(missed.outside),
             grouped(missed.void)
         ));
+    }
+    if let (Some(sides), Some(reach)) = (missed.outside_reach, reach(header, seen)) {
+        let [x0, y0, x1, y1] = sides.map(|side| decimal(side, 7));
+        let otherwise = guess::of_outside(header, seen, &missed.outside_at)
+            .map(|guess| format!("; {} they would lie inside", guess.words()))
+            .unwrap_or_default();
+        complain(&format!(
+            "note: the terrain extends {reach}, and the places outside go from {x0},{y0} to {x1},{y1}{otherwise}"
+        ));
+    }
+    if seen.is_none()
+        && !missed.inside_at.is_empty()
+        && let Some((note, _)) = guess::note_of_local(header, &missed.inside_at)
+    {
+        complain(&note);
     }
 }
 

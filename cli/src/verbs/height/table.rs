@@ -128,6 +128,18 @@ impl<R: Read> Table<R> {
         if let Some((columns, is_lon_lat)) = named(&first, wants_degrees) {
             (table.columns, table.is_lon_lat, table.header) = (columns, is_lon_lat, Some(first));
         } else if first.len() >= 2 && (0..2).any(|column| table.number(&first[column]).is_none()) {
+            // Names of columns are no numbers; a row with two is a place whose columns nothing names.
+            if first.iter().filter(|field| table.number(field).is_some()).count() >= 2 {
+                let shown = |column: usize| {
+                    String::from_utf8_lossy(&first[column]).chars().take(40).collect::<String>()
+                };
+                bail!(
+                    "{}, line {line}: the first two columns, `{}` and `{}`, are no place, and no row of names says which columns are; add a first row of names, such as name,lon,lat or name,x,y",
+                    table.name,
+                    shown(0),
+                    shown(1)
+                );
+            }
             table.header = Some(first);
         } else {
             table.first = Some((first, line));

@@ -20,6 +20,8 @@ pub(in crate::verbs) enum Kind {
     Synthetic,
     /// Heights of a terrain, or differences of them, as GeoTIFF.
     Elevation,
+    /// A table of places with their heights.
+    Heights,
     /// A flight that was generated.
     Flight,
     /// A script of craters.
@@ -41,10 +43,11 @@ pub(in crate::verbs) const FILM_NOTE: &str = "made with Terrasoar";
 
 impl Kind {
     #[cfg(test)]
-    pub(super) const ALL: [Self; 14] = [
+    pub(super) const ALL: [Self; 15] = [
         Self::Terrain,
         Self::Synthetic,
         Self::Elevation,
+        Self::Heights,
         Self::Flight,
         Self::Craters,
         Self::Mesh,
@@ -71,6 +74,7 @@ impl Kind {
             },
             Self::Synthetic => is_synthetic(path)?,
             Self::Elevation => is_exported(&start),
+            Self::Heights => is_heights(&start),
             Self::Flight => is_generated(&start),
             Self::Craters => is_craters(path, &start)?,
             Self::Mesh => mesh_file::is_ours(&start),
@@ -88,6 +92,12 @@ impl Kind {
         };
         Ok(Some(format!("{what}, which this verb did not make")))
     }
+}
+
+/// Whether a table has heights in its last column, by its first row.
+fn is_heights(start: &[u8]) -> bool {
+    let first = start.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    first.trim_ascii_end().ends_with(b"height_m")
 }
 
 /// Whether a script reads as it was written, and has nothing but craters.

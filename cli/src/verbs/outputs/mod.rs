@@ -44,6 +44,11 @@ impl Force {
         if is_stream(out) {
             return refuse_socket(out);
         }
+        if let Some(folder) = out.parent().filter(|folder| !folder.as_os_str().is_empty())
+            && matches!(std::fs::metadata(folder), Err(error) if error.kind() == io::ErrorKind::NotFound)
+        {
+            bail!("{}: the folder {} does not exist; make it first", out.display(), folder.display());
+        }
         refuse_inputs(out, inputs)?;
         if self.force {
             return Ok(());
@@ -61,7 +66,8 @@ impl Force {
         if folder.exists() && !folder.is_dir() {
             bail!("{}: the report needs a folder and this is a file; name another", folder.display());
         }
-        for (name, kind) in files {
+        // A folder that is not there is made, and holds nothing that could be lost.
+        for (name, kind) in files.iter().filter(|_| folder.is_dir()) {
             self.file(&folder.join(name), *kind, inputs)?;
         }
         Ok(())
