@@ -20,6 +20,7 @@ mod killed;
 mod kills;
 mod misread;
 mod outputs;
+mod overlays;
 mod pictures;
 mod places;
 mod support;

@@ -34,6 +34,9 @@ pub(super) struct Args {
     /// Script of edits
     #[arg(long, value_name = "E.edits")]
     script: PathBuf,
+    /// Rewrite the file for heights that it has no room for, also where overlays beside it would be lost
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     how: HowArgs,
 }
@@ -70,14 +73,27 @@ struct HowArgs {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let script = Script::read(&args.script)?;
-    apply(args.target.target(), &script, Some(&args.script), &args.how)
+    apply(args.target.target(), &script, Some(&args.script), &args.how, args.force)
 }
 
 /// Applies a script, which was read from `path` or made here, and tells what became of it.
-fn apply(target: Target<'_>, script: &Script, path: Option<&Path>, how: &HowArgs) -> Result<()> {
+fn apply(
+    target: Target<'_>,
+    script: &Script,
+    path: Option<&Path>,
+    how: &HowArgs,
+    is_forced: bool,
+) -> Result<()> {
     let progress = Meter::new("edits");
     let batches = Loader::new(path.unwrap_or(target.file), terrasoar_import::open_file).script(script)?;
-    let work = Work { target, batches: &batches, script: path, paints: !how.no_scorch, progress: &progress };
+    let work = Work {
+        target,
+        batches: &batches,
+        script: path,
+        paints: !how.no_scorch,
+        is_forced,
+        progress: &progress,
+    };
     let told = if how.dry_run { work.rehearse()? } else { work.perform()? };
     drop(progress);
     if how.json { print_json(&told) } else { super::output::print(&told.text()) }

@@ -2,6 +2,7 @@
 
 use super::paint::paints_of;
 use crate::verbs::output::{complain, decimal, grouped};
+use crate::verbs::overlays;
 use crate::verbs::progress::{Meter, short};
 use crate::verbs::within;
 use anyhow::{Context, Result, anyhow, bail};
@@ -36,6 +37,17 @@ impl Target<'_> {
         match self.overlay {
             Some(overlay) => EditSession::open_overlay(self.file, overlay),
             None => EditSession::open(self.file),
+        }
+    }
+
+    /// Says what its overlays, or the file under its own, will not show.
+    pub(super) fn tell_of_overlays(self) {
+        match self.overlay {
+            None => overlays::tell_of_growing(self.file),
+            Some(_) => {
+                // What cannot be opened is told by whoever needs it.
+                let _ = self.terrain().map(|terrain| overlays::tell_of_older(&terrain));
+            }
         }
     }
 
@@ -127,6 +139,8 @@ pub(super) struct Work<'a> {
     pub(super) script: Option<&'a Path>,
     /// Whether the picture follows, where there is one.
     pub(super) paints: bool,
+    /// Whether the file may be rewritten under overlays.
+    pub(super) is_forced: bool,
     pub(super) progress: &'a Meter,
 }
 
@@ -220,6 +234,7 @@ impl Work<'_> {
         // The lock first, so that a second writer hears of it before anything else; an overlay is not made for a script that is refused.
         let held = if self.target.overlay.is_none() { Some(self.target.session()?) } else { None };
         let widenings = self.prepare(held)?;
+        self.target.tell_of_overlays();
         let mut session = self.target.session()?;
         let grid = *session.editor().terrain().grid();
         let mut told = self.begin(false);
@@ -281,6 +296,8 @@ impl Work<'_> {
                 overlay.display()
             );
         }
+        overlays::refuse_rewriting(self.target.file, self.is_forced)
+            .with_context(|| format!("{file}: {problem}"))?;
         let room = room_for(header, heights_m);
         let [lowest, highest] = [room.lowest_m, room.highest_m].map(|m| decimal(m, 1));
         let ends = match header.history {

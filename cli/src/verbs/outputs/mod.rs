@@ -68,7 +68,6 @@ impl Force {
     }
 
     /// Whether everything may be replaced.
-    #[cfg(feature = "pictures")]
     pub(super) fn is_given(self) -> bool {
         self.force
     }
