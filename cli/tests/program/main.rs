@@ -9,6 +9,7 @@ mod cache;
 mod drape;
 mod edit;
 mod edit_flights;
+mod edit_lines;
 mod edit_processes;
 mod engines;
 mod harmless;

@@ -68,7 +68,7 @@ fn a_base_is_not_written_anew_under_its_overlays_unless_forced() {
     for args in [
         &["compact", "land.iqt"][..],
         &["edit", "land.iqt", "--script", "high.edits"],
-        &["crater", "land.iqt", "--at", "300,300", "--radius", "200", "--depth", "9000"],
+        &["crater", "land.iqt", "--at", "900,900", "--radius", "200", "--depth", "9000"],
         &["build", "land.tif", "-o", "land.iqt"],
     ] {
         let message = bench.bad(1, args);

@@ -2,15 +2,17 @@
 
 pub(super) mod compact;
 pub(super) mod crater;
+mod effect;
 mod paint;
 pub(super) mod past;
+mod told;
 mod work;
 
 use super::output::print_json;
 use super::progress::Meter;
 use anyhow::Result;
 use std::path::{Path, PathBuf};
-use terrasoar::edits::{Loader, Script};
+use terrasoar::edits::{Loader, Script, Step};
 use work::{Target, Work};
 
 /// Change the ground of a terrain file by a script of edits.
@@ -27,7 +29,8 @@ Examples:
   terrasoar edit alps.iqt --script dam.edits --overlay what-if.iqo
 
 Fields of --json: file, overlay, dry_run, batches, edits, edits_outside (that reach no sample), samples (of the rectangles that hold all changed heights), records_changed,
-voids_passed, tiles_painted, pages_written, bytes_appended, widenings (times the file was rewritten), needs_widening (a dry run that got no further), seconds.")]
+voids_passed, tiles_painted, pages_written, bytes_appended, widenings (times the file was rewritten), needs_widening (a dry run that got no further),
+changed_samples, changed_m2, change_m (lowest and highest change of height; these three null where it was too much to measure), batches_before, seconds.")]
 pub(super) struct Args {
     #[command(flatten)]
     target: TargetArgs,
@@ -85,7 +88,11 @@ fn apply(
     is_forced: bool,
 ) -> Result<()> {
     let progress = Meter::new("edits");
-    let batches = Loader::new(path.unwrap_or(target.file), terrasoar_import::open_file).script(script)?;
+    let mut loader = Loader::new(path.unwrap_or(target.file), terrasoar_import::open_file);
+    if script.batches.iter().flat_map(|batch| &batch.steps).any(|step| matches!(step, Step::Stamp(_))) {
+        loader = loader.over(target.terrain()?.header());
+    }
+    let batches = loader.script(script)?;
     let work = Work {
         target,
         batches: &batches,
