@@ -1,7 +1,7 @@
 //! Overlays of edits that lie beside the terrain file they were made over, and what is said of them before the file changes.
 //!
-//! **A terrain file that is edited, draped or undone keeps what its overlays refer to; one that is written anew does not.** So the first is told, and the second is refused unless `--force` is
-//! given. Only the file's own folder is looked into; of overlays elsewhere nothing is known. Cost: that of opening the terrain once for each overlay in the folder.
+//! **A terrain file that is edited, draped or undone keeps what its overlays refer to; one that is written anew does not.** So the first is told, when they are not to show a new picture, and the second is refused unless
+//! `--force` is given. Only the file's own folder is looked into; of overlays elsewhere nothing is known. Cost: that of opening the terrain once for each overlay in the folder.
 
 use super::output::complain;
 use anyhow::{Result, bail};
@@ -45,11 +45,11 @@ pub(super) fn named_beside(file: &Path) -> Option<String> {
     }
 }
 
-/// Says that overlays beside `file` will not show what is done to it now.
+/// Says that overlays beside `file` will not show the picture that it is given now.
 pub(super) fn tell_of_growing(file: &Path) {
     if let Some(names) = named_beside(file) {
         complain(&format!(
-            "note: {names}: edits kept apart from {}; seen with them, the terrain stays as it was when they were begun, without what is done now",
+            "note: {names}: edits kept apart from {}; seen with them, the terrain stays as it was when they were begun, without this picture",
             file.display()
         ));
     }

@@ -89,7 +89,12 @@ fn apply(
 ) -> Result<()> {
     let progress = Meter::new("edits");
     let mut loader = Loader::new(path.unwrap_or(target.file), terrasoar_import::open_file);
-    if script.batches.iter().flat_map(|batch| &batch.steps).any(|step| matches!(step, Step::Stamp(_))) {
+    if script
+        .batches
+        .iter()
+        .flat_map(|batch| &batch.steps)
+        .any(|step| matches!(step, Step::Stamp(stamp) if stamp.at.is_none()))
+    {
         loader = loader.over(target.terrain()?.header());
     }
     let batches = loader.script(script)?;

@@ -137,7 +137,7 @@ impl TurnArgs {
                 target.path().display()
             );
         }
-        target.tell_of_overlays();
+        target.tell_of_overlay();
         let entries = session.history()?;
         let after = done(&entries);
         let mut labels: Vec<String> =

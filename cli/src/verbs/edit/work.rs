@@ -41,14 +41,11 @@ impl Target<'_> {
         }
     }
 
-    /// Says what its overlays, or the file under its own, will not show.
-    pub(super) fn tell_of_overlays(self) {
-        match self.overlay {
-            None => overlays::tell_of_growing(self.file),
-            Some(_) => {
-                // What cannot be opened is told by whoever needs it.
-                let _ = self.terrain().map(|terrain| overlays::tell_of_older(&terrain));
-            }
+    /// Says so where the file under an overlay was edited or draped since.
+    pub(super) fn tell_of_overlay(self) {
+        if self.overlay.is_some() {
+            // What cannot be opened is told by whoever needs it.
+            let _ = self.terrain().map(|terrain| overlays::tell_of_older(&terrain));
         }
     }
 
@@ -168,7 +165,7 @@ impl Work<'_> {
         // The lock first, so that a second writer hears of it before anything else; an overlay is not made for a script that is refused.
         let held = if self.target.overlay.is_none() { Some(self.target.session()?) } else { None };
         let widenings = self.prepare(held)?;
-        self.target.tell_of_overlays();
+        self.target.tell_of_overlay();
         let (mut ground_before, mut touched) =
             (Some(Editor::new(Arc::new(self.target.terrain()?))), Touched::default());
         let mut session = self.target.session()?;
