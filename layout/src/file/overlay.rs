@@ -116,16 +116,13 @@ impl Overlaid {
         let wanted = Base::read(&slots.current);
         let is_same = wanted == Base::of(&found);
         let name = get_text(&slots.current[..], 0x400).unwrap_or_default();
-        if !is_same && !is_kin(&slots.header, &found.header) {
-            return Err(LayoutError::Usage(format!(
-                "{}: these edits were made over another terrain{}, not over {}; name the terrain they were made over",
-                overlay.path().display(),
-                if name.is_empty() { String::new() } else { format!(", which was called {name}") },
-                base.path().display(),
-            )));
+        if !is_same && !is_same_ground(&slots.header, &found.header) {
+            return Err(over_another(overlay.path(), base.path(), &name));
         }
         let (then, now) = (wanted, &found.header);
-        let has_grown = now.generation > then.generation && now.file_bytes >= then.file_bytes;
+        let has_grown = is_kin(&slots.header, now)
+            && now.generation > then.generation
+            && now.file_bytes >= then.file_bytes;
         if !is_same && !has_grown {
             return Err(written_anew(overlay.path(), base.path()));
         }
@@ -192,6 +189,24 @@ impl Overlaid {
 fn is_kin(a: &Header, b: &Header) -> bool {
     let b = State::of(a).put_into(b);
     *a == Header { generation: a.generation, file_bytes: a.file_bytes, history: a.history, ..b }
+}
+
+/// Whether two headers are those of terrains with the same samples, for the words of a refusal.
+fn is_same_ground(a: &Header, b: &Header) -> bool {
+    let of = |h: &Header| (h.grid, h.sample_to_crs, h.epsg, h.crs_name.clone());
+    of(a) == of(b)
+}
+
+fn over_another(overlay: &Path, base: &Path, name: &str) -> LayoutError {
+    let (overlay, base) = (overlay.display(), base.display().to_string());
+    let called = match name {
+        "" => String::new(),
+        name if name == base => ", which had the same name".into(),
+        name => format!(", which was called {name}"),
+    };
+    LayoutError::Usage(format!(
+        "{overlay}: these edits were made over another terrain{called}, not over {base}; name the terrain they were made over"
+    ))
 }
 
 fn written_anew(overlay: &Path, base: &Path) -> LayoutError {
