@@ -10,7 +10,7 @@ import pathlib
 import subprocess
 import tempfile
 
-OUT = pathlib.Path(__file__).resolve().parent.parent / "layout" / "tests" / "image_fixtures"
+OUT = pathlib.Path(__file__).resolve().parent.parent / "import" / "tests" / "image_fixtures"
 WIDTH, HEIGHT = 72, 56
 PLACE = ["-a_ullr", "1000", "5000", "1144", "4888"]
 
@@ -70,8 +70,8 @@ def main():
         tiff("jpeg-ycbcr", rgb, *tiles, "-co", "COMPRESS=JPEG", "-co", "PHOTOMETRIC=YCBCR", "-co", "JPEG_QUALITY=95")
         tiff("jpeg-rgb", rgb, "-co", "COMPRESS=JPEG", "-co", "JPEG_QUALITY=95")
         tiff("jpeg-grey", grey, *tiles, "-co", "COMPRESS=JPEG", "-co", "JPEG_QUALITY=95")
-        tiff("refused-planes", rgb, "-co", "INTERLEAVE=BAND")
-        tiff("refused-cmyk", rgba, "-co", "PHOTOMETRIC=CMYK", "-co", "COMPRESS=DEFLATE")
+        tiff("rgb-planes", rgb, "-co", "INTERLEAVE=BAND")
+        tiff("cmyk", rgba, "-co", "PHOTOMETRIC=CMYK", "-co", "COMPRESS=DEFLATE")
         run("gdal_translate", "-q", "-of", "PNG", "-co", "WORLDFILE=YES", *PLACE, rgba, folder / "rgba.png")
         (OUT / "rgba.png").write_bytes((folder / "rgba.png").read_bytes())
         (OUT / "rgba.pgw").write_bytes((folder / "rgba.wld").read_bytes())
@@ -79,7 +79,18 @@ def main():
         for name, options in [("baseline", []), ("progressive", ["-co", "PROGRESSIVE=YES"])]:
             run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", *options, rgb, OUT / f"{name}.jpg")
         run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", grey, OUT / "grey.jpg")
-        run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=90", rgba, OUT / "refused-cmyk.jpg")
+        run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=90", rgba, OUT / "cmyk.jpg")
+        def jp2(name, source, *options):
+            lossless = ["-co", "REVERSIBLE=YES", "-co", "QUALITY=100", "-co", "RESOLUTIONS=2"]
+            run("gdal_translate", "-q", "-of", "JP2OpenJPEG", *lossless, *options, source, OUT / name)
+
+        jp2("rgb-tiles.jp2", OUT / "rgb-strips.tif", "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=32", "-co", "GMLJP2=NO")
+        jp2("rgb-gml.jp2", OUT / "rgb-strips.tif", "-a_srs", "EPSG:32632", "-co", "GEOJP2=NO")
+        jp2("grey.j2k", grey, "-co", "CODEC=J2K")
+        run("gdal_translate", "-q", "-of", "WEBP", "-co", "LOSSLESS=YES", rgba, OUT / "rgba.webp")
+        run("gdal_translate", "-q", "-of", "WEBP", "-co", "QUALITY=90", rgb, OUT / "rgb.webp")
+        webp = ["-co", "TILED=YES", "-co", "BLOCKXSIZE=48", "-co", "BLOCKYSIZE=32", "-co", "COMPRESS=WEBP"]
+        tiff("rgb-tiles-webp", rgb, *webp, "-co", "WEBP_LOSSLESS=YES")
         turned = folder / "turned.vrt"
         turned.write_text(
             f'<VRTDataset rasterXSize="{WIDTH}" rasterYSize="{HEIGHT}"><GeoTransform>1000, 2, 1, 5000, 1, -2</GeoTransform>'

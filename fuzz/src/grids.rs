@@ -35,6 +35,50 @@ pub(crate) mod ascii_grid {
     }
 }
 
+/// Surfer grids, as text and binary.
+pub(crate) mod surfer {
+    use super::*;
+
+    /// Counts and sides, then samples.
+    fn binary_6() -> Vec<u8> {
+        let mut bytes = b"DSBB\x06\0\x05\0".to_vec();
+        bytes.extend([100.0f64, 150.0, 200.0, 240.0, 0.0, 9.0].iter().flat_map(|side| side.to_le_bytes()));
+        bytes.extend((0..30).flat_map(|i| if i == 7 { 1.70141e38f32 } else { i as f32 }.to_le_bytes()));
+        bytes
+    }
+
+    fn binary_7() -> Vec<u8> {
+        let section = |name: &[u8; 4], content: Vec<u8>| {
+            [&name[..], &(content.len() as u32).to_le_bytes(), &content].concat()
+        };
+        let counts = [5i32, 6].into_iter().flat_map(|count| count.to_le_bytes());
+        let reals = [100.0f64, 200.0, 10.0, 10.0, 0.0, 9.0, 0.0, 1.70141e38];
+        let grid = counts.chain(reals.iter().flat_map(|real| real.to_le_bytes())).collect();
+        let data = (0..30).flat_map(|i| f64::from(i).to_le_bytes()).collect();
+        [
+            section(b"DSRB", vec![1, 0, 0, 0]),
+            section(b"FLTI", vec![0; 8]),
+            section(b"GRID", grid),
+            section(b"DATA", data),
+        ]
+        .concat()
+    }
+
+    pub(crate) fn seeds() -> Inputs {
+        let head = "DSAA\r\n6 5\r\n100 150\r\n200 240\r\n0 9\r\n";
+        named([
+            ("text", format!("{head}{}", heights(30, " ")).into_bytes()),
+            ("blanks", format!("{head}{}", "1.70141e+038 1,5 -1e3 7.25 2 nan\n".repeat(5)).into_bytes()),
+            ("binary 6", binary_6()),
+            ("binary 7", binary_7()),
+        ])
+    }
+
+    pub(crate) fn body(data: &[u8]) {
+        read(&[("dem.grd", data)], &OpenOptions::default());
+    }
+}
+
 /// XYZ grids.
 pub(crate) mod xyz {
     use super::*;

@@ -19,7 +19,8 @@ const MOST_BYTES: usize = 1 << 20;
 const MEMORY_MIB: u64 = 64;
 
 pub(crate) fn seeds() -> Inputs {
-    let mut seeds = seeds::folder("import/tests/image_fixtures", &["png", "jpg", "tif"]);
+    let mut seeds =
+        seeds::folder("import/tests/image_fixtures", &["png", "jpg", "tif", "webp", "jp2", "j2k"]);
     // Elevation data are pictures too, as far as one can tell.
     seeds.extend(
         seeds::folder("import/tests/fixtures", &["tif"])

@@ -34,19 +34,34 @@ pub(crate) fn body(data: &[u8]) {
 
 /// Opens the first of some files that lie in one folder, streams it and builds it.
 pub(crate) fn read(files: &[(&str, &[u8])], options: &OpenOptions) {
+    read_named(files, files.iter().take(1).map(|(name, _)| *name), options);
+}
+
+/// Opens files that lie in one folder as one, streams it and builds it.
+pub(crate) fn read_several(files: &[(&str, &[u8])], options: &OpenOptions) {
+    read_named(files, files.iter().map(|(name, _)| *name), options);
+}
+
+fn read_named<'n>(files: &[(&str, &[u8])], names: impl Iterator<Item = &'n str>, options: &OpenOptions) {
     let folder = crate::scratch::folder();
     files.iter().for_each(|(name, bytes)| seeds::write(&folder.path().join(name), bytes));
-    let path = folder.path().join(files.first().map_or("dem", |(name, _)| name));
-    let Some(dem) = told(terrasoar_import::open_with(std::slice::from_ref(&path), options)) else { return };
+    let paths: Vec<_> = names.map(|name| folder.path().join(name)).collect();
+    let Some(dem) = told(terrasoar_import::open_with(&paths, options)) else { return };
+    streams(&*dem);
+    let info = dem.info();
+    if u64::from(info.samples_wide) * u64::from(info.samples_high) <= MOST_SAMPLES {
+        builds(&*dem, folder.path(), files.len());
+    }
+}
+
+/// Streams elevation data; what ends well has given every sample.
+pub(crate) fn streams(dem: &dyn DemSource) {
     let info = dem.info();
     assert!(info.samples_wide >= 2 && info.samples_high >= 2, "{info:?}");
     let sink = Sink::new(info);
     let streamed = dem.stream(&sink);
     if told(streamed).is_some() {
         sink.check_whole();
-    }
-    if u64::from(info.samples_wide) * u64::from(info.samples_high) <= MOST_SAMPLES {
-        builds(&*dem, folder.path(), files.len());
     }
 }
 

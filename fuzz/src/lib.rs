@@ -20,13 +20,16 @@ mod seeds;
 mod take_out;
 mod terrain_sealed;
 mod use_files;
+mod vrt;
+mod web_tiles;
 mod words;
 mod world_file;
 
 use beside::{aux_xml, reference_system};
 use gridded::{dted, netcdf, usgs_dem};
-use grids::{ascii_grid, labelled, netpbm, packed_png, raw, tiles, xyz};
+use grids::{ascii_grid, labelled, netpbm, packed_png, raw, surfer, tiles, xyz};
 pub use seeds::Inputs;
+use web_tiles::{map_tile, mbtiles, pmtiles};
 
 use std::panic::{PanicHookInfo, resume_unwind};
 use std::path::Path;
@@ -93,6 +96,8 @@ targets! {
     import { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// An Esri ASCII grid.
     ascii_grid { is_text: true, fixed_mib: 160, per_byte: 64 }
+    /// A Surfer grid.
+    surfer { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// An XYZ grid.
     xyz { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// Plain numbers with a label of ESRI's or ENVI's beside them.
@@ -103,6 +108,12 @@ targets! {
     raw { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// An `.hgt` tile, packed or in an archive.
     tiles { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A pyramid of map tiles in PMTiles: as heights, as a picture by itself and on a terrain.
+    pmtiles { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// The same in MBTiles.
+    mbtiles { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// A tile in a folder of map tiles.
+    map_tile { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A PNG whose colours are heights, or in seven passes.
     packed_png { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// NetCDF, classic and over HDF5.
@@ -115,6 +126,8 @@ targets! {
     reference_system { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// What GDAL keeps beside a DEM.
     aux_xml { is_text: true, fixed_mib: 160, per_byte: 64 }
+    /// A virtual raster over files beside it, alone and as one of several files.
+    vrt { is_text: true, fixed_mib: 160, per_byte: 256 }
     /// A picture: opened, read, draped, its tiles read.
     image { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A world file beside a picture: draped where it says.

@@ -59,6 +59,11 @@ fn elevation_data() {
 }
 
 #[test]
+fn surfer_grids() {
+    replay("surfer");
+}
+
+#[test]
 fn ascii_grids() {
     replay("ascii_grid");
 }
@@ -89,6 +94,21 @@ fn packed_tiles() {
 }
 
 #[test]
+fn map_tiles_in_pmtiles() {
+    replay("pmtiles");
+}
+
+#[test]
+fn map_tiles_in_mbtiles() {
+    replay("mbtiles");
+}
+
+#[test]
+fn map_tiles_in_folders() {
+    replay("map_tile");
+}
+
+#[test]
 fn packed_png() {
     replay("packed_png");
 }
@@ -106,6 +126,11 @@ fn cells_of_dted() {
 #[test]
 fn sheets_of_the_usgs() {
     replay("usgs_dem");
+}
+
+#[test]
+fn virtual_rasters() {
+    replay("vrt");
 }
 
 #[test]

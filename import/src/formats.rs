@@ -6,7 +6,8 @@ use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
 use crate::{
-    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, usgs_dem, xyz,
+    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, surfer, tiles,
+    usgs_dem, vrt, xyz,
 };
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
@@ -38,6 +39,7 @@ const SIGNED: &[Format] = &[
         is: |look| identify::is_tiff(&look.head),
         open: |path, options| boxed(geotiff::TiffDem::open(path, options)),
     },
+    Format { name: "virtual raster (.vrt)", is: |look| vrt::is_vrt(&look.head), open: virtual_raster },
     Format {
         name: "netCDF",
         is: |look| netcdf::is_netcdf(&look.head),
@@ -59,14 +61,29 @@ const SIGNED: &[Format] = &[
         open: |path, _| boxed(pnm::PnmDem::open(path)),
     },
     Format {
+        name: "MBTiles",
+        is: |look| tiles::is_mbtiles(look.path, &look.head),
+        open: |path, options| boxed(tiles::TileDem::open(path, options)),
+    },
+    Format {
+        name: "PMTiles",
+        is: |look| tiles::is_pmtiles(&look.head),
+        open: |path, options| boxed(tiles::TileDem::open(path, options)),
+    },
+    Format {
+        name: "Surfer",
+        is: |look| surfer::is_surfer(&look.head),
+        open: |path, _| boxed(surfer::SurferDem::open(path)),
+    },
+    Format {
         name: ".hgt archive",
         is: |look| look.begins(b"PK\x03\x04") && hgt::has_tiles(look.path),
-        open: |path, options| tiles(&[path.to_owned()], options),
+        open: |path, options| hgt_tiles(&[path.to_owned()], options),
     },
     Format {
         name: ".hgt.gz",
         is: |look| look.begins(b"\x1f\x8b") && look.is_called("hgt.gz"),
-        open: |path, options| tiles(&[path.to_owned()], options),
+        open: |path, options| hgt_tiles(&[path.to_owned()], options),
     },
     Format {
         name: "Esri ASCII grid",
@@ -80,7 +97,7 @@ const NAMED: &[Format] = &[
     Format {
         name: ".hgt",
         is: |look| hgt::is_tile(look.path),
-        open: |path, options| tiles(&[path.to_owned()], options),
+        open: |path, options| hgt_tiles(&[path.to_owned()], options),
     },
     Format {
         name: "labelled (.hdr)",
@@ -95,29 +112,43 @@ const NAMED: &[Format] = &[
     Format { name: "XYZ", is: xyz::is_xyz, open: |path, _| boxed(xyz::XyzDem::open(path)) },
 ];
 
+/// Whether the file at `path` is elevation data of a format that says where it lies. Masks, overviews and labels beside data are none.
+pub(crate) fn is_placed(path: &Path) -> bool {
+    const BESIDE: [&str; 12] =
+        ["ovr", "msk", "hdr", "xml", "prj", "aux", "clr", "stx", "sta", "blw", "wld", "qml"];
+    const UNPLACED: [&str; 3] = ["PNG", "Netpbm", "headerless heightmap"];
+    if BESIDE.iter().any(|name| identify::is_called(path, name)) {
+        return false;
+    }
+    let Ok(look) = Look::at(path) else { return false };
+    let format = SIGNED.iter().chain(NAMED).find(|format| (format.is)(&look));
+    format.is_some_and(|format| !UNPLACED.contains(&format.name))
+}
+
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))
 }
 
 /// Opens tiles, in the shape that a person states if they do.
-fn tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+fn hgt_tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
     let stated = options.raw.as_deref().map(raw::tile_shape).transpose()?;
-    boxed(hgt::HgtDem::open(paths, stated))
+    boxed(hgt::HgtDem::open(paths, stated, options.strict))
 }
 
-/// Opens what a person names: a file, a folder of tiles, or several tiles.
+/// Opens what is one grid: a file, a folder of `.hgt` tiles, or several such tiles.
 ///
 /// # Errors
 /// As [`crate::open_with`].
 pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
     match paths {
         [] => Err(LayoutError::Usage("no elevation file was named; name one, or several .hgt tiles".into())),
-        [path] if path.is_dir() => tiles(&hgt::tiles_in(path)?, options),
+        [path] if path.is_dir() && tiles::is_folder(path) => boxed(tiles::TileDem::open(path, options)),
+        [path] if path.is_dir() => hgt_tiles(&hgt::tiles_in(path)?, options),
         [path] => open_file(path, options),
-        paths => open_tiles(paths, options),
+        paths => hgt_tiles(paths, options),
     }
 }
 
@@ -151,6 +182,17 @@ fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, Layo
     }
 }
 
+/// Opens a virtual raster; one that GDAL computes is GDAL's, where that is there.
+fn virtual_raster(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    match vrt::VrtDem::open(path, options, open_file) {
+        #[cfg(feature = "gdal")]
+        Err(LayoutError::Unsupported { remedy: None, .. }) => {
+            boxed(crate::gdal::GdalDem::open(path, options))
+        }
+        opened => boxed(opened),
+    }
+}
+
 /// Refuses what no line knows, with the words of its kind.
 #[cfg(not(feature = "gdal"))]
 fn stranger(path: &Path, _: &OpenOptions, refusal: String) -> Result<Box<dyn Reader>, LayoutError> {
@@ -167,25 +209,4 @@ fn stranger(path: &Path, options: &OpenOptions, refusal: String) -> Result<Box<d
         )),
         opened => boxed(opened),
     }
-}
-
-/// Several files make one data set only if every one is an `.hgt` tile, whose name says where it lies.
-fn open_tiles(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
-    for path in paths {
-        if hgt::is_tile(path) {
-            continue;
-        }
-        let look = Look::at(path)?;
-        let format = SIGNED
-            .iter()
-            .chain(NAMED)
-            .find(|format| (format.is)(&look))
-            .map_or("other", |format| format.name);
-        return Err(LayoutError::Usage(format!(
-            "{}: several inputs are read together only if all of them are .hgt tiles, and this is a {format} file; \
-             merge the files first, for example with: gdalbuildvrt all.vrt FILES && gdal_translate all.vrt all.tif",
-            path.display(),
-        )));
-    }
-    tiles(paths, options)
 }

@@ -46,6 +46,24 @@ pub(crate) fn quiet<T>(decode: impl FnOnce() -> T) -> Option<T> {
     decoded.ok()
 }
 
+/// Whether an error is of the machine and not of the file.
+pub(crate) fn is_ours(error: &LayoutError) -> bool {
+    // Too many open files, in the process or the system; no memory.
+    const OURS: [i32; 3] = [24, 23, 12];
+    match error {
+        LayoutError::Io { source, .. } => {
+            source.raw_os_error().is_some_and(|code| OURS.contains(&code))
+                || matches!(
+                    source.kind(),
+                    std::io::ErrorKind::StorageFull
+                        | std::io::ErrorKind::QuotaExceeded
+                        | std::io::ErrorKind::FileTooLarge
+                )
+        }
+        _ => false,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

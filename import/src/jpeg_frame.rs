@@ -3,6 +3,7 @@
 //! A picture may come in any number of scans. For each of them the decoder goes through the whole picture, even if the scan has a few bytes. The memory that it takes follows from
 //! size and sampling alone. Both are known here before the decoder sees a byte (ITU-T T.81, annex B). Cost: one pass over the bytes.
 
+use crate::jpeg_rows::Shape;
 use std::io::BufRead;
 
 /// Scans that any picture may have. Encoders make some ten, one a coefficient and component at the very most.
@@ -90,6 +91,14 @@ impl JpegFrame {
             ));
         }
         Ok(())
+    }
+
+    /// Its shape, where it may be read some rows at a time: baseline, and all channels in one scan.
+    pub(crate) fn in_rows(&self) -> Option<Shape> {
+        let size = self.size.map(|side| side as u32);
+        let is_plain =
+            !self.is_progressive && self.scans == 1 && !size.contains(&0) && !self.sampling.is_empty();
+        is_plain.then(|| Shape::new(size, &self.sampling))
     }
 
     /// Memory that decoding takes at most: planes of samples and the picture made of them; blocks of coefficients that wait for the threads that transform them; and, of a progressive

@@ -37,10 +37,13 @@ mod heights;
 mod hgt;
 mod identify;
 pub(crate) mod input;
+mod jpeg2000;
 pub(crate) mod jpeg_frame;
+mod jpeg_rows;
 mod kept;
 mod labelled;
 mod mask;
+mod mosaic;
 mod netcdf;
 mod opened;
 mod options;
@@ -55,40 +58,48 @@ mod pnm;
 mod raster;
 mod raw;
 mod reader;
+mod shown;
 mod strangers;
+mod surfer;
 pub mod synth;
 mod text;
 mod tiff_tags;
+mod tiles;
 mod usgs_dem;
 mod value;
+mod vrt;
 mod warp;
+mod webp;
 mod xyz;
 
 use std::path::{Path, PathBuf};
 
 use terrasoar_layout::dem::DemSource;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::remedy::Remedy;
 
 pub(crate) use geotiff::TiffImage;
 pub(crate) use guard::guard;
 pub use guard::is_guarded;
 pub(crate) use identify::is_tiff;
-pub use options::{Direction, OpenOptions, Resampling};
-pub use picture::{open_image, open_images_on};
+pub use options::{Direction, OpenOptions, Priority, Resampling, TileOptions};
+pub use picture::{open_image, open_images, open_images_on};
 pub(crate) use png::{HEIGHT_SCALE_KEY as PNG_HEIGHT_SCALE_KEY, SPACING_KEY as PNG_SPACING_KEY};
+pub use shown::{PictureOptions, Stretch};
 pub use strangers::strangers;
 
 /// Samples handed to a sink in one window, at most, unless a row has more: half a mebibyte of `f64`.
 const WINDOW_SAMPLES: u64 = 1 << 16;
 
-/// Opens the elevation data in `paths`: one file; several `.hgt` tiles, or a folder of them, as one mosaic.
+/// Opens the elevation data in `paths`: one file; several, folders and patterns as one mosaic; a pyramid of map tiles.
+///
+/// A file of several that is missing or damaged is left out, and the warnings name it.
 ///
 /// The formats are those of `formats.rs`. Cost: the headers, and for GeoTIFF 16 bytes a chunk; no samples, but an XYZ grid is read once to find its grid, and of a
 /// colour PNG the beginning to see whether heights are packed into it.
 ///
 /// # Errors
-/// [`LayoutError::Usage`] for no path, or for several that are not all `.hgt` tiles of one
-/// resolution; [`LayoutError::Io`] for a file that is missing or cannot be read;
+/// [`LayoutError::Usage`] for no path, a pattern that fits nothing, or several files that make no grid together; [`LayoutError::Io`] for a file that is missing or cannot be read;
 /// [`LayoutError::NotThisFormat`] for a file of none of these formats, saying what it is where that
 /// can be told; [`LayoutError::Unsupported`] and [`LayoutError::Damaged`] from the reader.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
@@ -100,10 +111,30 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
 /// # Errors
 /// As [`open`]; [`LayoutError::Usage`] for options that do not go with the data.
 pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn DemSource>, LayoutError> {
-    let reader = formats::open(paths, options)?;
-    let path = paths.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
-    let beside = beside::Beside::of(paths, &*reader);
-    Ok(Box::new(opened::OpenedDem::new(path, reader, beside, options)?))
+    let files = match mosaic::Inputs::of(paths)? {
+        mosaic::Inputs::Several(files) => return mosaic::open(&files, options),
+        mosaic::Inputs::Alone(files) => files,
+    };
+    match mosaic::open_one(&files, options) {
+        // Tiles of unlike shape, or of which some cannot be read.
+        Err(error) if files.len() > 1 && !is_usage(&error) => mosaic::open(&files, options),
+        Ok(_) if options.resolution.is_some() && options.reproject.is_none() => Err(LayoutError::Usage(
+            "a resolution is for data that is brought into another system, and for several files; say which system"
+                .into(),
+        )
+        .mended_by(Remedy::Reproject)),
+        opened => Ok(Box::new(opened?)),
+    }
+}
+
+/// Whether the request was wrong, and not a file.
+fn is_usage(error: &LayoutError) -> bool {
+    matches!(error, LayoutError::Usage(_) | LayoutError::Unmet { .. })
+}
+
+/// Other files that the elevation data at `path` is made of: those that a virtual raster names. What cannot be read names none.
+pub fn files_of(path: &Path) -> Vec<PathBuf> {
+    vrt::files_of(path)
 }
 
 /// As [`open`], of one file.

@@ -36,6 +36,16 @@ pub(crate) struct OpenedDem {
     is_earth: bool,
     unit_is_known: bool,
     z_scale: f64,
+    system: System,
+}
+
+/// What is known of a data set apart from its place.
+pub(crate) struct Known {
+    pub(crate) system: System,
+    pub(crate) heights: Heights,
+    pub(crate) voids: Voids,
+    pub(crate) mask: Option<Masking>,
+    pub(crate) warnings: Vec<Warning>,
 }
 
 impl OpenedDem {
@@ -48,10 +58,21 @@ impl OpenedDem {
         let mut declared = reader.declared().clone();
         let mask = beside.complete(&mut declared, options)?;
         let mut warnings = declared.warnings.clone();
-        let mut system = crs::resolve(&declared.crs, options.crs.as_deref(), &mut warnings)?;
+        let system = crs::resolve(&declared.crs, options.crs.as_deref(), &mut warnings)?;
         let voids = Voids::new(path, &declared.value.nodata, &options.nodata, declared.sample_type)?;
         let heights = heights(&declared.value, &system, options, options.decode.is_some(), &mut warnings)?;
+        Self::known(path, reader, declared, Known { system, heights, voids, mask, warnings }, options)
+    }
 
+    /// As [`new`](Self::new), of a data set of which all but the place is `known`.
+    pub(crate) fn known(
+        path: &Path,
+        reader: Box<dyn Reader>,
+        declared: Declared,
+        known: Known,
+        options: &OpenOptions,
+    ) -> Result<Self, LayoutError> {
+        let Known { mut system, heights, voids, mask, mut warnings } = known;
         let file_map = declared.place.as_ref().map(|place| place.value);
         let lie = match file_map {
             Some(map) if !options.as_stored => Lie::of(&map, system.signs, declared.samples),
@@ -118,7 +139,33 @@ impl OpenedDem {
             is_earth,
             unit_is_known: heights.unit_is_known,
             z_scale,
+            system,
         })
+    }
+
+    /// The reference system.
+    pub(crate) fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Whether the unit of heights was found, not assumed.
+    pub(crate) fn unit_is_known(&self) -> bool {
+        self.unit_is_known
+    }
+
+    /// What was declared and may be wrong, before any sample was looked at.
+    pub(crate) fn declared_warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Values named as "no data" that no sample had so far.
+    pub(crate) fn unmatched(&self) -> Vec<String> {
+        self.voids.unmatched()
+    }
+
+    /// What the reader saw while it streamed.
+    pub(crate) fn seen_by_reader(&self) -> Vec<Warning> {
+        self.reader.warnings()
     }
 
     /// Raw samples in north-up order, as far as that is exact.
@@ -140,6 +187,7 @@ impl DemSource for OpenedDem {
 
     fn warnings(&self) -> Vec<Warning> {
         let mut warnings = self.warnings.clone();
+        warnings.extend(self.reader.warnings());
         let [scale_m, offset_m] =
             [self.info.height_scale, self.info.height_offset_m].map(|m| m * self.z_scale);
         let unit_is_known = self.unit_is_known || self.z_scale != 1.0;
@@ -204,6 +252,9 @@ fn describe(
     }
     for words in placed {
         say("placement", words);
+    }
+    for words in &declared.aloud {
+        say("tiles", words.clone());
     }
     for note in notes {
         say("note", note);

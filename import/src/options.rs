@@ -43,6 +43,32 @@ impl Resampling {
     }
 }
 
+/// Which of several files counts where they overlap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Priority {
+    /// The file that was named first; in folders and patterns the first by name.
+    First,
+    /// The file that was named last.
+    Last,
+    /// The highest ground, sample by sample.
+    Highest,
+    /// The file with the shortest steps on the ground; of files alike the first by name.
+    #[default]
+    Finest,
+}
+
+impl Priority {
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::First => "first",
+            Self::Last => "last",
+            Self::Highest => "highest",
+            Self::Finest => "finest",
+        }
+    }
+}
+
 /// How to read elevation data.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OpenOptions {
@@ -67,7 +93,7 @@ pub struct OpenOptions {
     pub z_scale: Option<f64>,
     /// The system to bring the data into: "EPSG:n", "utm" (the zone of the centre), "auto" (UTM, or polar stereographic near the poles), WKT or PROJ.
     pub reproject: Option<String>,
-    /// Distance between samples in metres, or units of the new system, when reprojecting; without it that of the data.
+    /// Distance between samples in metres when reprojecting or reading several files; without it that of the data, of the finest file.
     pub resolution: Option<f64>,
     /// How new samples are made of old ones; without it bilinear.
     pub resampling: Option<Resampling>,
@@ -75,6 +101,25 @@ pub struct OpenOptions {
     pub memory_mib: Option<u64>,
     /// Folder for temporary files; without it the system's.
     pub scratch: Option<std::path::PathBuf>,
+    /// Which of several files counts where they overlap.
+    pub priority: Priority,
+    /// Metres over which the seams between several files are blended; without it they are not.
+    pub feather_m: Option<f64>,
+    /// Whether a file of several that is missing or damaged is an error, where it would be left out.
+    pub strict: bool,
     /// Whether samples stay in the rows and columns of the file, where they would be turned north-up.
     pub as_stored: bool,
+    /// What of a pyramid of map tiles is read.
+    pub tiles: TileOptions,
+}
+
+/// What of a pyramid of map tiles is read.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TileOptions {
+    /// The zoom; without it the deepest complete one.
+    pub zoom: Option<u8>,
+    /// West, south, east and north in degrees; without them those that the pyramid states, as far as there are tiles.
+    pub bounds_deg: Option<[f64; 4]>,
+    /// Whether the rows of a folder of tiles are counted from the south (TMS), where nothing in it says so.
+    pub from_south: bool,
 }

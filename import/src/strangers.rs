@@ -57,10 +57,6 @@ const SIGNED: &[Stranger] = &[
     stranger(0, b"LASF", "a LAS or LAZ point cloud", POINTS),
     stranger(0, b"ASTM-E57", "an E57 point cloud", POINTS),
     stranger(0, b"EHFA_HEADER_TAG", "an Erdas Imagine file", CONVERT),
-    stranger(0, b"DSAA", "a Surfer ASCII grid", CONVERT),
-    stranger(0, b"DSBB", "a Surfer grid", CONVERT),
-    stranger(0, b"DSRB", "a Surfer 7 grid", CONVERT),
-    stranger(0, b"<VRTDataset", "a GDAL virtual raster", CONVERT),
     stranger(0, b"SDTS", "an SDTS file", CONVERT),
     stranger(5, b"SDTS", "an SDTS file", CONVERT),
     stranger(0, b"TERRAGEN", "a Terragen terrain", CONVERT),
@@ -89,12 +85,6 @@ const SIGNED: &[Stranger] = &[
     stranger(0, b"ply\n", "a PLY mesh or point cloud", MESH),
     stranger(0, b"ply\r\n", "a PLY mesh or point cloud", MESH),
     stranger(0, b"solid ", "an STL mesh", MESH),
-    stranger(
-        0,
-        b"PMTiles",
-        "an archive of map tiles (PMTiles)",
-        "extract the tiles of one zoom and join them, or look for the elevation data they were made from",
-    ),
     stranger(0, b"<MRF_META", "a Meta Raster Format file", CONVERT),
     stranger(0, b"Lerc2 ", "a stream of LERC", CONVERT),
     stranger(0, b"north:", "a GRASS ASCII grid", CONVERT),
@@ -189,13 +179,11 @@ fn database(look: &Look<'_>) -> Option<String> {
     }
     Some(match look.head.get(68..72) {
         Some(b"GPKG" | b"GP10" | b"GP11") => told("a GeoPackage", CONVERT),
-        Some(b"MPBX") => told("an archive of map tiles (MBTiles)", TILES),
-        _ if look.is_called("mbtiles") => told("an archive of map tiles (MBTiles)", TILES),
-        _ => told("an SQLite database", CONVERT),
+        _ => told("an SQLite database", DATABASE),
     })
 }
 
-const TILES: &str = "if its tiles are heights packed into colours, convert it and state the packing (mapbox or terrarium) when you build; convert it with: gdal_translate INPUT output.tif";
+const DATABASE: &str = "if it holds map tiles (MBTiles), let its name end with .mbtiles; if GDAL knows it, convert it: gdal_translate INPUT output.tif";
 
 /// A zip archive without `.hgt` tiles, told by the name of its first file.
 fn archive(look: &Look<'_>) -> Option<String> {
@@ -214,15 +202,13 @@ fn archive(look: &Look<'_>) -> Option<String> {
     Some(told("a zip archive without .hgt tiles in it", UNPACK))
 }
 
-/// XML: virtual rasters with a declaration, KML.
+/// XML: KML, for virtual rasters are read.
 fn markup(look: &Look<'_>) -> Option<String> {
     if !look.begins(b"<?xml") && !look.begins(b"\xef\xbb\xbf<?xml") {
         return None;
     }
     let has = |word: &[u8]| look.head.windows(word.len()).any(|window| window == word);
-    Some(if has(b"<VRTDataset") {
-        told("a GDAL virtual raster", CONVERT)
-    } else if has(b"<kml") {
+    Some(if has(b"<kml") {
         told("a KML file", VECTORS)
     } else {
         told("an XML text", "name the elevation file that it describes")

@@ -12,15 +12,15 @@ fn with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Grid, LayoutErr
     collect(&*open_with(&[path.as_ref().to_owned()], options)?)
 }
 
-/// A Surfer grid in text of 9 x 7 samples, rows from the south.
-fn surfer() -> String {
+/// A GRASS grid in text of 9 x 7 samples.
+fn grass() -> String {
     let rows =
-        (0..7).map(|row| (0..9).map(|col| format!("{} ", 100 + 3 * col + 7 * row)).collect::<String>());
-    let rows = rows.collect::<Vec<_>>().join("\n").replace("127 ", "1.70141e+38 ");
-    format!("DSAA\n9 7\n10 14\n40 43\n100 166\n{rows}\n")
+        (0..7).rev().map(|row| (0..9).map(|col| format!("{} ", 100 + 3 * col + 7 * row)).collect::<String>());
+    let rows = rows.collect::<Vec<_>>().join("\n").replace("127 ", "* ");
+    format!("north: 43.25\nsouth: 39.75\neast: 14.25\nwest: 9.75\nrows: 7\ncols: 9\n{rows}\n")
 }
 
-fn is_surfer(grid: &Grid) {
+fn is_grass(grid: &Grid) {
     let [x0, a, _, y0, _, e] = grid.info.georeference.pixel_to_crs.unwrap();
     for (col, row) in (0..9u32).flat_map(|col| (0..7u32).map(move |row| (col, row))) {
         let at = [(10.0 + 0.5 * f64::from(col) - x0) / a, (40.0 + 0.5 * f64::from(row) - y0) / e];
@@ -34,18 +34,18 @@ fn is_surfer(grid: &Grid) {
 #[test]
 fn a_format_of_gdal_alone_and_virtual_paths() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.grd");
-    std::fs::write(&path, surfer()).unwrap();
+    let path = folder.path().join("a.asc");
+    std::fs::write(&path, grass()).unwrap();
     let degrees = OpenOptions { crs: Some("EPSG:4326".into()), ..OpenOptions::default() };
     let grid = with(&path, &degrees).unwrap();
     assert!(grid.info.format.contains("by GDAL"), "{}", grid.info.format);
-    is_surfer(&grid);
-    let packed = folder.path().join("b.grd.gz");
+    is_grass(&grid);
+    let packed = folder.path().join("b.asc.gz");
     let mut encoder =
         flate2::write::GzEncoder::new(std::fs::File::create(&packed).unwrap(), flate2::Compression::new(6));
-    encoder.write_all(surfer().as_bytes()).unwrap();
+    encoder.write_all(grass().as_bytes()).unwrap();
     encoder.finish().unwrap();
-    is_surfer(&with(format!("/vsigzip/{}", packed.display()), &degrees).unwrap());
+    is_grass(&with(format!("/vsigzip/{}", packed.display()), &degrees).unwrap());
 }
 
 /// A virtual raster of bands of our fixtures.

@@ -1,6 +1,10 @@
 //! Grids of numbers made to exhaust memory or time: words, or the heights, in little memory, whatever they claim.
 
+#[path = "mosaics/ground.rs"]
+mod ground;
 mod import_support;
+#[path = "mosaics/hostile.rs"]
+mod mosaics;
 #[path = "import_support/peak.rs"]
 mod peak;
 
@@ -163,4 +167,46 @@ fn texts_of_millions_of_numbers_take_little_memory() {
     let (done, bytes) = read(&path, &plain);
     assert!(done.unwrap_err().to_string().contains("no grid"));
     assert!(bytes < (32 + 6 * threads) * MIB, "{bytes} bytes");
+}
+
+#[test]
+fn surfer_grids_of_any_claim_end_in_words() {
+    let _alone = alone();
+    let options = OpenOptions::default();
+    let sides =
+        [0.0f64, 1.0, 0.0, 1.0, 0.0, 1.0].iter().flat_map(|side| side.to_le_bytes()).collect::<Vec<_>>();
+    let binary_6 = [&b"DSBB\xff\x7f\xff\x7f"[..], &sides].concat();
+    let grid = |rows: i32, columns: i32| {
+        let counts = [rows, columns].into_iter().flat_map(|count| count.to_le_bytes());
+        let reals = [0.0f64, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1e38];
+        let content: Vec<u8> = counts.chain(reals.iter().flat_map(|real| real.to_le_bytes())).collect();
+        [&b"DSRB\x04\0\0\0\x01\0\0\0GRID\x48\0\0\0"[..], &content, b"DATA\xff\xff\xff\x7f"].concat()
+    };
+    let endless = [&b"DSRB\0\0\0\0"[..], &b"FLTI\0\0\0\0".repeat(1 << 16)].concat();
+    let negative = b"DSRB\x04\0\0\0\x01\0\0\0FLTI\xff\xff\xff\xff".to_vec();
+    for bytes in [
+        b"DSAA 2000000000 2000000000 0 1 0 1 0 1 5 6 7".to_vec(),
+        b"DSAA 3 2 0 1 1 1 0 9 1 2 3 4 5 6".to_vec(),
+        b"DSAA 3 2 nan 1 0 1 0 9 1 2 3 4 5 6".to_vec(),
+        b"DSAA 3 2 0 1 0 1 0 9 1 2 3 4 5 6 7".to_vec(),
+        b"DSAA 3 2 0 1 0 1 0 9 1 2 3 4 x 6".to_vec(),
+        b"DSAA 3 2 0 1 0 1 0".to_vec(),
+        b"DSAA".repeat(3000),
+        b"DSBB".to_vec(),
+        binary_6,
+        grid(i32::MAX, i32::MAX),
+        grid(-1, 5),
+        grid(1, 5),
+        endless,
+        negative,
+    ] {
+        let said = refusal(&[("a.grd", &bytes, 0)], &options);
+        assert!(said.contains("a.grd"), "{said}");
+    }
+    // What is there is read, and the rest of a text is not held.
+    let rows = "7 ".repeat(1 << 20);
+    let text = format!("DSAA 1024 1024 0 20460 0 20460 0 9 {rows}");
+    let (_folder, path) = files(&[("b.grd", text.as_bytes(), 0)]);
+    let (count, bytes) = read(&path, &options);
+    assert!(count.unwrap() == 1 << 20 && bytes < 24 * MIB, "{bytes}");
 }

@@ -154,18 +154,46 @@ fn folders_and_archives_of_tiles() {
     assert!(refusal(&[empty]).contains("gdalbuildvrt"));
 }
 
+/// Towards the poles tiles have fewer columns. Between the columns of the narrower one heights are on straight lines, which `ground` is not, so a plane is laid out.
 #[test]
-fn tiles_that_do_not_go_together_are_told() {
+fn tiles_of_unlike_shape_become_one_grid() {
     let folder = tempdir().unwrap();
-    let wide = put(folder.path().join("N49E010.hgt"), &tile([1201, 1201], ground));
-    let narrow = put(folder.path().join("N50E010.hgt"), &tile([601, 1201], ground));
-    let said = refusal(&[wide.clone(), narrow]);
-    assert!(
-        said.contains("601 x 1201 heights") && said.contains("1201 x 1201") && said.contains("gdalwarp"),
-        "{said}"
-    );
+    let plane = |across: u32, down: u32| move |col: u32, row: u32| (col * across + row * down) as i16;
+    let wide = put(folder.path().join("N49E010.hgt"), &tile([1201, 1201], plane(2, 3)));
+    let narrow = put(folder.path().join("N50E010.hgt"), &tile([601, 1201], plane(4, 3)));
+    let grid = read(&[wide.clone(), narrow.clone()]).unwrap();
+    assert_eq!([grid.info.samples_wide, grid.info.samples_high], [1201, 2401]);
+    for (col, row) in [(0, 0), (3, 0), (777, 500), (1200, 1199), (600, 2), (1199, 700)] {
+        assert_eq!(grid.at(col, row), f64::from(col * 2 + row * 3), "{col} {row}");
+        assert_eq!(grid.at(col, row + 1200), f64::from(col * 2 + row * 3), "{col} {row}");
+    }
+    assert_eq!(grid.voids(), 0);
+    assert!(grid.info.format.starts_with("mosaic of 2 files"), "{}", grid.info.format);
     let small = put(folder.path().join("N48E010.hgt"), &tile([601, 601], ground));
-    assert!(refusal(&[wide, small]).contains("one resolution"));
+    assert_eq!(read(&[wide, small, narrow]).unwrap().info.samples_high, 3601);
+}
+
+/// A packed tile is read whole or not at all.
+#[test]
+fn a_damaged_tile_of_several_is_void_and_named() {
+    let folder = tempdir().unwrap();
+    let west = put(folder.path().join("N00E010.hgt"), &tile([33, 33], |_, _| 5));
+    let mut packed = gzipped(&tile([33, 33], ground));
+    let middle = packed.len() / 2;
+    packed[middle..middle + 8].fill(0xff);
+    let east = put(folder.path().join("N00E011.hgt.gz"), &packed);
+    let open = |strict| {
+        let options = OpenOptions { strict, ..OpenOptions::default() };
+        terrasoar_import::open_with(&[west.clone(), east.clone()], &options).unwrap()
+    };
+    let dem = open(false);
+    let grid = collect(&*dem).unwrap();
+    assert!((0..33).all(|row| {
+        (0..33).all(|col| grid.at(col, row) == 5.0 && grid.at(col + 32, row).is_nan() == (col > 0))
+    }));
+    let said: Vec<String> = dem.warnings().into_iter().map(|warning| warning.words).collect();
+    assert!(said.len() == 1 && said[0].contains("N00E011.hgt.gz") && said[0].contains("void"), "{said:?}");
+    assert!(collect(&*open(true)).err().unwrap().to_string().contains("N00E011.hgt.gz"));
 }
 
 #[test]

@@ -19,6 +19,10 @@ pub enum Remedy {
     Band,
     /// How heights are packed into colours.
     Decode,
+    /// Which zoom of a pyramid of map tiles is read.
+    Zoom,
+    /// Which part of a pyramid of map tiles is read.
+    Bounds,
     /// The reference system, stated when elevation data is opened.
     ReferenceSystem,
     /// The shape of a file that does not tell it.
@@ -36,6 +40,8 @@ pub enum Remedy {
     },
     /// An image to drape.
     Image,
+    /// Which numbers of an image are black and white.
+    Stretch,
     /// The place of an image, stated: [`DrapeOptions::extent`](crate::imagery::DrapeOptions::extent).
     Extent,
     /// Another format of tiles: [`DrapeOptions::format`](crate::imagery::DrapeOptions::format).

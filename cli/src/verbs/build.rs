@@ -3,21 +3,22 @@
 use super::output::{complain, grouped, print};
 use super::outputs::{Force, Kind};
 use super::progress::{Meter, short};
-use super::{parse, remedy, terrain};
+use super::tiles::Tiles;
+use super::{WrongUsage, parse, remedy, terrain};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use terrasoar_import::{Direction, OpenOptions, Resampling};
+use terrasoar_import::{Direction, OpenOptions, Priority, Resampling};
 use terrasoar_layout::build::{BuildOptions, MAX_FILL, build};
 use terrasoar_layout::file::header::{ErrorKind, Header, SpacingOrigin};
 use terrasoar_layout::grid::record::RecordKind;
 
 /// Make a terrain file (.iqt) from elevation data.
 ///
-/// Reads GeoTIFF, PNG (grey, or heights packed into colours), PGM, .hgt (a tile, several that border each other, packed ones, or a folder of
-/// them), Esri ASCII grids, XYZ grids, .flt and .bil with their .hdr, ENVI, netCDF, DTED, USGS DEM, VTP BT and headerless heightmaps, of any size
-/// and any rectangle. The output appears when it is complete; a build that fails or is killed leaves nothing, and the next one starts from the
+/// Reads GeoTIFF, GDAL's virtual rasters (.vrt), PNG (grey, or heights packed into colours), PGM, .hgt (packed ones too), Esri ASCII grids, XYZ
+/// grids, .flt and .bil with their .hdr, ENVI, netCDF, DTED, USGS DEM, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps, of any size and any rectangle; and several
+/// of them, folders and patterns as one mosaic. The output appears when it is complete; a build that fails or is killed leaves nothing, and the next one starts from the
 /// beginning. The same input gives the same bytes whatever --threads and --memory.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -25,9 +26,12 @@ Examples:
   terrasoar build alps.tif -o alps.iqt
   terrasoar build N46E007.hgt N46E008.hgt -o valais.iqt
   terrasoar build srtm-folder -o all.iqt
+  terrasoar build region.tif detail.tif city.vrt -o all.iqt
+  terrasoar build 'tiles/*.tif' --priority last --feather 200 -o all.iqt
   terrasoar build island.raw --raw 1025x1025:u16le --spacing 10 -o island.iqt
   terrasoar build puget.png --spacing 160 --z-scale 0.1 -o puget.iqt
   terrasoar build huge.tif --memory 2048 -o huge.iqt
+  terrasoar build terrain.pmtiles --bounds 7,46,8,47 --reproject utm -o valais.iqt
   terrasoar build world.tif --reproject utm --resolution 30 -o metric.iqt
   terrasoar build srtm-folder --fill-voids 20 -o whole.iqt
 
@@ -38,11 +42,15 @@ A DEM in degrees gets the spacing in metres that degrees have at its centre; `te
 state it, or it is taken to be 1 m. What else the data does not say can be stated: its reference system, its unit of heights, which numbers mean \"no data\".
 What looks wrong is said aloud, with the flag to type.
 
+Several files become one terrain: in the reference system that most samples are in, with the shortest steps of the files in it (--reproject, --resolution
+for others). Files that lie on that grid are copied, others resampled. Where files overlap, --priority says which counts; void samples never do. By finest, the
+default, and highest the order of names changes nothing. A file that is missing or damaged is named and left out, whole; with --strict it is an error.
+
 Voids, samples without data, are counted and left as they are. --fill-voids N fills regions of voids that border each other east, west, north or south and whose box is
 at most N samples wide and high: each sample becomes the mean of its neighbours, as in a soap film over the rim, rounded to the steps of the data. How many is said,
 and kept in the file (terrasoar info).")]
 pub(super) struct Args {
-    /// Elevation data: one file, several .hgt tiles that border each other, or a folder of them
+    /// Elevation data: a file, several, folders, or patterns such as 'tiles/*.tif'
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
     /// Terrain file to write
@@ -75,7 +83,38 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_FILL)), hide_default_value = true)]
     fill_voids: u32,
     #[command(flatten)]
+    several: Several,
+    #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    tiles: Tiles,
+}
+
+/// How several files become one.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Several files")]
+struct Several {
+    /// Which of several files counts where they overlap
+    #[arg(long, value_name = "WHICH", default_value = "finest")]
+    priority: PriorityWord,
+    /// Blend the seams between files over M metres; without it they stay as they are
+    #[arg(long, value_name = "M", value_parser = parse::positive)]
+    feather: Option<f64>,
+    /// Fail where a file is missing or damaged, instead of leaving it out
+    #[arg(long)]
+    strict: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum PriorityWord {
+    /// The one with the shortest steps on the ground; of files alike the first by name
+    Finest,
+    /// The one named first; folders and patterns are sorted by name
+    First,
+    /// The one named last
+    Last,
+    /// The highest ground, sample by sample
+    Highest,
 }
 
 /// What the elevation data does not say, or says wrongly.
@@ -95,7 +134,7 @@ struct Reading {
     #[arg(long, value_name = "BAND")]
     band: Option<String>,
     /// How heights are packed into colours: mapbox (Terrain-RGB), terrarium, or factors R,G,B,BASE
-    #[arg(long, value_name = "PACKING", allow_hyphen_values = true)]
+    #[arg(long, alias = "encoding", value_name = "PACKING", allow_hyphen_values = true)]
     decode: Option<String>,
     /// Shape of a file without a header: width x height : type, such as 1025x1025:u16le
     #[arg(long, value_name = "WxH:TYPE")]
@@ -103,8 +142,8 @@ struct Reading {
     /// Bring the data into another system: EPSG:n, utm (the zone of the centre), auto, WKT or a PROJ string
     #[arg(long, value_name = "SYSTEM")]
     reproject: Option<String>,
-    /// Metres between the new samples; without it those of the data
-    #[arg(long, value_name = "M", value_parser = parse::positive, requires = "reproject")]
+    /// Metres between the new samples, with --reproject or of several files; without it those of the data
+    #[arg(long, value_name = "M", value_parser = parse::positive)]
     resolution: Option<f64>,
     /// How new samples are made of old ones, where they are brought elsewhere or turned north-up
     #[arg(long, value_name = "KERNEL")]
@@ -191,14 +230,43 @@ impl Args {
                 KernelWord::Lanczos => Resampling::Lanczos,
                 KernelWord::Average => Resampling::Average,
             }),
+            priority: match self.several.priority {
+                PriorityWord::First => Priority::First,
+                PriorityWord::Last => Priority::Last,
+                PriorityWord::Highest => Priority::Highest,
+                PriorityWord::Finest => Priority::Finest,
+            },
+            feather_m: self.several.feather,
+            strict: self.several.strict,
             memory_mib: Some(self.memory),
             scratch: Some(folder.unwrap_or(Path::new(".")).to_owned()),
+            tiles: self.tiles.options(),
             ..OpenOptions::default()
         }
     }
 }
 
+impl Args {
+    /// Flags that say something of several files alone go with several.
+    fn check(&self) -> Result<(), WrongUsage> {
+        if !matches!(self.inputs.as_slice(), [one] if one.is_file()) {
+            return Ok(());
+        }
+        if self.reading.resolution.is_some() && self.reading.reproject.is_none() {
+            return Err(WrongUsage(
+                "--resolution goes with --reproject, or with several files; one file alone keeps its own steps"
+                    .into(),
+            ));
+        }
+        if self.several.feather.is_some() {
+            return Err(WrongUsage("--feather blends seams between several files, and one was named".into()));
+        }
+        Ok(())
+    }
+}
+
 pub(super) fn run(args: &Args) -> Result<()> {
+    args.check()?;
     let inputs: Vec<&Path> = args.inputs.iter().map(PathBuf::as_path).collect();
     args.force.file(&args.output, Kind::Terrain, &inputs)?;
     let mut pool = rayon::ThreadPoolBuilder::new();
@@ -214,6 +282,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
     })?;
     let seconds = start.elapsed().as_secs_f64();
     warnings.iter().for_each(|warning| complain(&remedy::warned(warning)));
+    for (_, words) in header.about.origins.iter().filter(|(what, _)| what == "tiles") {
+        complain(&format!("note: {words}"));
+    }
     warn_about_spacing(&header);
     print(&summary(&args.output, &header, seconds))
 }

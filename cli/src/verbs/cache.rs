@@ -124,6 +124,10 @@ fn key(path: &Path) -> std::io::Result<u64> {
         // One that goes away meanwhile is not beside it.
         let _ = describe(&other, &mut key);
     }
+    // What a virtual raster is made of.
+    for part in terrasoar_import::files_of(&path) {
+        let _ = describe(&part, &mut key);
+    }
     Ok(key.finish())
 }
 

@@ -47,6 +47,7 @@ mod snapshot;
 mod sweep;
 mod synth;
 mod terrain;
+mod tiles;
 mod verify;
 #[cfg(feature = "view")]
 mod view;

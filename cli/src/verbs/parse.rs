@@ -1,11 +1,13 @@
 //! Parsers for words of the command line that are more than a number. Each says what it takes when it refuses a word.
 
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
+use std::num::NonZero;
 use std::path::PathBuf;
 use terrasoar::flight::generate::FlightKind;
 use terrasoar::flyover::EngineKind;
 use terrasoar::refine::Culling;
 use terrasoar::view::Viewport;
+use terrasoar_import::Stretch;
 
 fn number(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
@@ -117,6 +119,40 @@ pub(super) fn extent(text: &str) -> Result<[f64; 4], String> {
     }
 }
 
+/// `LOW,HIGH` in percent, or `LOW..HIGH` in values.
+pub(super) fn stretch(text: &str) -> Result<Stretch, String> {
+    if let Some((low, high)) = text.split_once("..") {
+        let (low, high) = (number(low)?, number(high)?);
+        return match low < high {
+            true => Ok(Stretch::Values(low, high)),
+            false => {
+                Err("the first value, which is black, must be less than the second, which is white".into())
+            }
+        };
+    }
+    let (low, high) =
+        text.split_once(',').ok_or("give two percentages, such as 2,98, or two values, such as 200..3000")?;
+    let (low, high) = (number(low)?, number(high)?);
+    match 0.0 <= low && low < high && high <= 100.0 {
+        true => Ok(Stretch::Percentiles(low, high)),
+        false => {
+            Err("percentages are from 0 to 100, the first less than the second; values are written 200..3000"
+                .into())
+        }
+    }
+}
+
+/// One band or three, counted from 1.
+pub(super) fn bands(text: &str) -> Result<Vec<NonZero<u32>>, String> {
+    let wrong = |_| "give three bands counted from 1, such as 4,3,2, or one for grey".to_owned();
+    let bands: Vec<NonZero<u32>> =
+        text.split(',').map(|band| band.trim().parse().map_err(wrong)).collect::<Result<_, _>>()?;
+    match bands.len() {
+        1 | 3 => Ok(bands),
+        count => Err(format!("{count} bands make no colours; give three, such as 4,3,2, or one for grey")),
+    }
+}
+
 /// `WIDTHxHEIGHT` in pixels.
 pub(super) fn viewport(text: &str) -> Result<Viewport, String> {
     let side = |word: &str| match word.parse::<u32>() {
@@ -201,6 +237,17 @@ mod tests {
         assert_eq!(extent("-1,0,5e3,4").unwrap(), [-1.0, 0.0, 5000.0, 4.0]);
         for wrong in ["", "1,2,3", "1,2,3,4,5", "2,0,1,1", "0,1,1,1", "0,0,nan,1"] {
             assert!(extent(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(stretch("2,98").unwrap(), Stretch::Percentiles(2.0, 98.0));
+        assert_eq!(stretch("-0.5..1e3").unwrap(), Stretch::Values(-0.5, 1000.0));
+        for wrong in
+            ["", "2", "98,2", "-1,98", "2,101", "3..3", "3000..200", "nan..1", "1..inf", "1,2,3", "a,b"]
+        {
+            assert!(stretch(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(bands("4, 3,2").unwrap().iter().map(|band| band.get()).collect::<Vec<_>>(), [4, 3, 2]);
+        for wrong in ["", "0", "1,2", "1,2,3,4", "-1", "1,x,3", "4294967296"] {
+            assert!(bands(wrong).is_err(), "{wrong}");
         }
         for wrong in ["800", "0x600", "800x", "800x600x3", "99999999x1"] {
             assert!(viewport(wrong).is_err(), "{wrong}");

@@ -95,12 +95,14 @@ fn inputs_that_cannot_be_read_are_named() {
     let bench = Bench::with_terrain();
     std::fs::write(bench.path("text"), "not elevation").unwrap();
     std::fs::write(bench.path("empty"), "").unwrap();
-    for input in ["missing.tif", "text", "empty", "land.iqt", "."] {
+    std::fs::create_dir(bench.path("bare")).unwrap();
+    std::fs::write(bench.path("bare/notes.md"), "words").unwrap();
+    for input in ["missing.tif", "text", "empty", "land.iqt", "bare"] {
         let message = bench.bad(1, &["build", input, "-o", "x.iqt"]);
         assert!(message.contains(input), "{message}");
     }
-    let message = bench.bad(1, &["build", "land.tif", "land.tif", "-o", "x.iqt"]);
-    assert!(message.contains(".hgt"), "{message}");
+    let message = bench.bad(1, &["build", "text", "empty", "-o", "x.iqt"]);
+    assert!(message.contains("none of the files can be read") && message.contains("empty"), "{message}");
     assert!(!bench.path("x.iqt").exists());
 }
 

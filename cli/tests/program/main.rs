@@ -20,6 +20,7 @@ mod killed;
 #[cfg(unix)]
 mod kills;
 mod misread;
+mod mosaics;
 mod outputs;
 mod overlays;
 mod pictures;

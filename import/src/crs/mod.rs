@@ -14,7 +14,7 @@ mod wkt;
 pub(crate) use from_proj::{unit_name as unit_in_words, word as proj_word};
 pub(crate) use ground::{Ground, is_earth};
 pub(crate) use keywords::Keywords;
-pub(crate) use registry::{unit as unit_of_code, vertical_in_metres};
+pub(crate) use registry::{is_north_first, unit as unit_of_code, vertical_in_metres};
 pub(crate) use resolve::by_text;
 pub(crate) use resolve::resolve;
 pub(crate) use system::{Kind, System, Unit, exact_metres};

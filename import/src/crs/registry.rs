@@ -47,6 +47,13 @@ pub(super) fn horizontal(code: u32) -> Option<Horizontal> {
     Some(Horizontal::Parts { name, unit_name, size, proj })
 }
 
+/// Whether a system's own first axis goes north: so do those of longitudes and latitudes, and projected ones of which the list of definitions leaves the axes out, for such programs of
+/// maps turned round. `None` for what is not in the list.
+pub(crate) fn is_north_first(code: u32) -> Option<bool> {
+    let wkt = u16::try_from(code).ok().and_then(crs_definitions::from_code)?.wkt;
+    Some(wkt.starts_with("GEOGCS") || (wkt.starts_with("PROJCS") && !wkt.contains("AXIS[")))
+}
+
 /// Codes of the horizontal and the vertical part of a compound system.
 pub(super) fn compound(code: u32) -> Option<(u32, u32)> {
     let [horizontal, vertical, _name] = line(COMPOUND, code)?;
@@ -92,6 +99,7 @@ mod tests {
         );
         let Some(Horizontal::Parts { size, .. }) = horizontal(2221) else { panic!("2221 is missing") };
         assert_eq!(size, HorizontalSize::Metres(1.0));
+        assert_eq!([4326, 3035, 32632, 3857].map(is_north_first), [true, true, false, false].map(Some));
         assert!(horizontal(7415).is_none() && horizontal(5709).is_none() && horizontal(1).is_none());
         assert_eq!(compound(7415), Some((28992, 5709)));
         let feet = vertical(6360).unwrap();

@@ -135,6 +135,11 @@ impl<R: BufRead> Unpacker<R> {
     }
 }
 
+/// All that a stream of ZSTD unpacks to, `most` bytes of it at most; `None` where it is damaged or longer.
+pub(crate) fn unpack_zstd(packed: &[u8], most: usize) -> Option<Vec<u8>> {
+    Unpacker::new(Compression::Zstd, packed, most as u64).ok()?.rest(most).ok()
+}
+
 /// Fills `unpacked` with the first bytes of a chunk that is in memory and unpacks to `whole` bytes.
 pub(super) fn unpack(
     compression: Compression,

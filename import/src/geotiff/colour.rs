@@ -1,18 +1,21 @@
-//! GeoTIFF as pictures: grey, palette, RGB, with or without alpha, 8 bits a channel or 16 cut to them, JPEG-compressed chunks included.
+//! GeoTIFF as pictures: grey, palette, RGB, CMYK, with or without alpha, side by side or band after band, 8 bits a channel or 16 cut to them, JPEG-compressed chunks included;
+//! of any numbers where a person states which are black and white.
 //!
 //! [`super::colour_table`] says where the chunks are and how they are packed; here they become rows. As many chunks as make one row of tiles, or some
-//! 64 rows of strips, are unpacked in parallel and handed out row by row. Memory: those chunks, 4 bytes a texel.
+//! 64 rows of strips, are unpacked in parallel and handed out row by row. Memory: those chunks, 4 bytes a texel, as numbers 16.
 //!
 //! A texel whose channels all equal the declared void value is transparent, as is a chunk the file left out. A mask in an image of its own is handed on.
 
-use super::colour_table::{Packing, Paint, Table};
+use super::chunks::Predictor;
+use super::colour_paint::Paint;
+use super::colour_table::{Packing, Table};
+use super::listing::Places;
 use super::span::turn_bits;
-use super::{TiffMask, codec, failure, geokeys, predictor, tags};
+use super::{TiffMask, codec, colour_codecs, failure, geokeys, predictor, tags};
 use crate::guard::guard;
 use crate::input;
-use crate::jpeg_frame::JpegFrame;
-use crate::reader::{CrsSaid, Orientation, Picture, Reader, bits_of};
-use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
+use crate::reader::{CrsSaid, NumberRows, Numbers, Orientation, Picture, Reader, bits_of};
+use crate::shown::PictureOptions;
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::ErrorKind;
@@ -45,10 +48,10 @@ pub(crate) struct TiffImage {
 
 impl TiffImage {
     /// Reads the directory of the first full-resolution image.
-    pub(crate) fn open(path: &Path) -> Result<Self, LayoutError> {
+    pub(crate) fn open(path: &Path, options: &PictureOptions) -> Result<Self, LayoutError> {
         let mut file = tags::TiffFile::open(path)?;
         let directory = file.first_full_image()?;
-        let table = Table::read(&mut file, &directory)?;
+        let table = Table::read(&mut file, &directory, options)?;
         let place = geokeys::read(&mut file, &directory)?;
         let mask = match file.mask_of([table.grid.width, table.grid.height])? {
             Some(directory) => Some(TiffMask::of(&mut file, &directory)?),
@@ -60,7 +63,7 @@ impl TiffImage {
             georeference: Georeference::default(),
             format: format!("{}{}", if file.is_big() { "BigTIFF" } else { "TIFF" }, table.describe()),
             notes: table.notes.clone(),
-            memory_bytes: memory_bytes(&table),
+            memory_bytes: memory_bytes(&table, options.stretch.is_some() && !table.has_bytes()),
         };
         Ok(Self {
             path: path.to_owned(),
@@ -89,7 +92,7 @@ impl Picture for TiffImage {
     }
 
     fn has_bytes(&self) -> bool {
-        self.table.sample_bytes == 1
+        self.table.has_bytes()
     }
 
     fn bits(&self) -> Result<u32, LayoutError> {
@@ -106,15 +109,40 @@ impl Picture for TiffImage {
     fn use_bits(&mut self, bits: u32) {
         self.bits = OnceLock::from(bits);
     }
+
+    fn colours(&self) -> usize {
+        if matches!(self.table.paint, Paint::Grey | Paint::InverseGrey) { 1 } else { 3 }
+    }
+
+    fn has_chosen_bands(&self) -> bool {
+        true
+    }
+
+    fn numbers(&self) -> Result<Option<Box<dyn NumberRows + '_>>, LayoutError> {
+        // Places in a palette and inks are no numbers of light.
+        if self.has_bytes() || !self.has_light() {
+            return Ok(None);
+        }
+        Ok(Some(Box::new(self.begin::<Numbers>(8)?)))
+    }
+
+    fn limits(&self) -> Option<[i32; 2]> {
+        if self.has_light() { self.table.samples.limits() } else { Some([0, 255]) }
+    }
+
+    fn is_inverse(&self) -> bool {
+        matches!(self.table.paint, Paint::InverseGrey) && !self.has_bytes()
+    }
 }
 
 /// Memory for the chunks at hand, what is known of each, and the work on as many as there are threads.
-fn memory_bytes(table: &Table) -> u64 {
+fn memory_bytes(table: &Table, as_numbers: bool) -> u64 {
+    let texel_bytes = if as_numbers { size_of::<Numbers>() as u64 } else { 4 };
     let chunks = u64::from(group_chunks(table)) * u64::from(table.grid.across);
     let texels = u64::from(table.grid.chunk_width) * u64::from(table.grid.chunk_height);
     let threads = (rayon::current_num_threads() as u64).min(chunks);
     chunks
-        .saturating_mul(texels.saturating_mul(4).saturating_add(CHUNK_BYTES))
+        .saturating_mul(texels.saturating_mul(texel_bytes).saturating_add(CHUNK_BYTES))
         .saturating_add(table.worker_bytes().saturating_mul(threads))
 }
 
@@ -133,29 +161,58 @@ impl ImageSource for TiffImage {
     }
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
-        let file = input::open(&self.path, "cannot open the TIFF file")?;
-        Ok(Box::new(Rows { image: self, file, y: 0, first_chunk: 0, chunks: Vec::new(), bits: self.bits()? }))
+        Ok(Box::new(self.begin::<[u8; 4]>(self.bits()?)?))
+    }
+}
+
+/// What samples become.
+trait Texel: Copy + Default + Send + Sync {
+    /// Of the samples of a chunk, so many channels a texel, which make use of so many bits.
+    fn paint(table: &Table, samples: &[u8], channels: usize, bits: u32, texels: &mut [Self]);
+}
+
+impl Texel for [u8; 4] {
+    fn paint(table: &Table, samples: &[u8], channels: usize, bits: u32, texels: &mut [Self]) {
+        table.channels.paint(&table.paint, &table.samples, samples, channels, bits, texels);
+    }
+}
+
+impl Texel for Numbers {
+    fn paint(table: &Table, samples: &[u8], channels: usize, _: u32, texels: &mut [Self]) {
+        table.channels.numbers(&table.samples, samples, channels, texels);
     }
 }
 
 /// Rows as they are asked for, from the chunks at hand.
-struct Rows<'i> {
+struct Rows<'i, T> {
     image: &'i TiffImage,
     file: File,
     y: u32,
     /// First chunk at hand.
     first_chunk: u32,
     /// Their texels, `chunk_width` a row.
-    chunks: Vec<Vec<u8>>,
+    chunks: Vec<Vec<T>>,
     /// Bits in use.
     bits: u32,
 }
 
-impl RowReader for Rows<'_> {
+impl RowReader for Rows<'_, [u8; 4]> {
     fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
+        self.fill(rgba.as_chunks_mut::<4>().0)
+    }
+}
+
+impl NumberRows for Rows<'_, Numbers> {
+    fn read(&mut self, texels: &mut [Numbers]) -> Result<(), LayoutError> {
+        self.fill(texels)
+    }
+}
+
+impl<T: Texel> Rows<'_, T> {
+    fn fill(&mut self, texels: &mut [T]) -> Result<(), LayoutError> {
         let table = &self.image.table;
-        let pitch = table.grid.chunk_width as usize * 4;
-        for row in rgba.chunks_exact_mut(table.grid.width as usize * 4) {
+        let pitch = table.grid.chunk_width as usize;
+        for row in texels.chunks_exact_mut(table.grid.width as usize) {
             let wanted = self.y / table.grid.chunk_height * table.grid.across;
             if !(self.first_chunk..self.first_chunk + self.chunks.len() as u32).contains(&wanted) {
                 self.unpack(wanted)?;
@@ -169,9 +226,7 @@ impl RowReader for Rows<'_> {
         }
         Ok(())
     }
-}
 
-impl Rows<'_> {
     fn unpack(&mut self, first: u32) -> Result<(), LayoutError> {
         let table = &self.image.table;
         let end = (table.grid.count() as u32).min(first + group_chunks(table) * table.grid.across);
@@ -179,18 +234,16 @@ impl Rows<'_> {
         let (image, bits) = (self.image, self.bits);
         let file = &self.file;
         let mut places = table.grid.places(&image.path, file);
-        let places: Vec<Option<(u64, u64)>> = (first..end)
-            .map(|chunk| table.place(u64::from(chunk), &mut places))
-            .collect::<Result<_, LayoutError>>()?;
+        let places: Vec<ChunkPlaces> =
+            (first..end).map(|chunk| image.places(chunk, &mut places)).collect::<Result<_, LayoutError>>()?;
         self.chunks
             .par_iter_mut()
-            .zip(first..end)
             .zip(places)
-            .map_init(Scratch::default, |scratch, ((texels, chunk), place)| {
-                let paint = |samples: &[u8], channels: usize, rgba: &mut [u8]| {
-                    table.paint_chunk(samples, channels, bits, rgba);
+            .map_init(Scratch::default, |scratch, (texels, places)| {
+                let paint = |samples: &[u8], channels: usize, texels: &mut [T]| {
+                    T::paint(table, samples, channels, bits, texels);
                 };
-                image.unpack(file, (chunk, place), scratch, texels, &paint)
+                image.unpack(file, &places, scratch, texels, &paint)
             })
             .collect::<Result<(), LayoutError>>()?;
         self.first_chunk = first;
@@ -198,146 +251,163 @@ impl Rows<'_> {
     }
 }
 
-/// What is done with the samples of a chunk, so many channels a texel: RGBA is made of them.
-type Paints<'a> = dyn Fn(&[u8], usize, &mut [u8]) + 'a;
+/// What is done with the samples of a chunk, so many channels a texel: texels are made of them.
+type Paints<'a, T> = dyn Fn(&[u8], usize, &mut [T]) + 'a;
+
+/// A chunk, and where it lies in the file: that of each plane that is read.
+struct ChunkPlaces {
+    chunk: u32,
+    planes: Vec<Option<(u64, u64)>>,
+}
 
 #[derive(Default)]
 struct Scratch {
     packed: Vec<u8>,
     bytes: Vec<u8>,
+    widened: Vec<u8>,
+    joined: Vec<u8>,
 }
 
 impl TiffImage {
+    /// Whether its samples are amounts of light.
+    fn has_light(&self) -> bool {
+        !matches!(self.table.paint, Paint::Palette(_) | Paint::Cmyk)
+    }
+
+    /// The first row is next.
+    fn begin<T: Texel>(&self, bits: u32) -> Result<Rows<'_, T>, LayoutError> {
+        let file = input::open(&self.path, "cannot open the TIFF file")?;
+        Ok(Rows { image: self, file, y: 0, first_chunk: 0, chunks: Vec::new(), bits })
+    }
+
+    fn places(&self, chunk: u32, places: &mut Places<'_>) -> Result<ChunkPlaces, LayoutError> {
+        let planes = &self.table.planes;
+        let planes = if planes.is_empty() { &[0][..] } else { planes };
+        let planes = planes.iter().map(|plane| self.table.place(*plane, u64::from(chunk), places));
+        Ok(ChunkPlaces { chunk, planes: planes.collect::<Result<_, _>>()? })
+    }
+
     /// The largest number of the colours, of the whole picture.
     fn peak(&self) -> Result<u16, LayoutError> {
         let table = &self.table;
         let file = input::open(&self.path, "cannot open the TIFF file")?;
         let found = AtomicU16::new(0);
         (0..table.grid.count() as u32).into_par_iter().try_for_each_init(
-            || (Scratch::default(), Vec::new(), table.grid.places(&self.path, &file)),
+            || (Scratch::default(), Vec::<[u8; 4]>::new(), table.grid.places(&self.path, &file)),
             |(scratch, texels, places), chunk| {
-                let place = table.place(u64::from(chunk), places)?;
-                let look = |samples: &[u8], channels: usize, _: &mut [u8]| {
-                    found.fetch_max(table.peak_of(samples, channels), Ordering::Relaxed);
+                let places = self.places(chunk, places)?;
+                let look = |samples: &[u8], channels: usize, _: &mut [[u8; 4]]| {
+                    let peak = table.channels.peak_of(&table.samples, samples, channels);
+                    found.fetch_max(peak, Ordering::Relaxed);
                 };
-                self.unpack(&file, (chunk, place), scratch, texels, &look)
+                self.unpack(&file, &places, scratch, texels, &look)
             },
         )?;
         Ok(found.into_inner())
     }
 
-    /// One chunk from its place: `paint` makes RGBA of its samples.
-    fn unpack(
+    /// One chunk: `paint` makes texels of its samples.
+    fn unpack<T: Texel>(
         &self,
         file: &File,
-        (chunk, place): (u32, Option<(u64, u64)>),
+        places: &ChunkPlaces,
         scratch: &mut Scratch,
-        texels: &mut Vec<u8>,
-        paint: &Paints<'_>,
+        texels: &mut Vec<T>,
+        paint: &Paints<'_, T>,
     ) -> Result<(), LayoutError> {
         let table = &self.table;
-        let rows = table.grid.window(u64::from(chunk)).height;
+        let rows = table.grid.window(u64::from(places.chunk)).height;
         let count = table.grid.chunk_width as usize * rows as usize;
-        texels.resize(count * 4, 0);
-        let Some((at, length)) = place else {
-            texels.fill(0);
+        texels.resize(count, T::default());
+        if places.planes.iter().all(Option::is_none) {
+            texels.fill(T::default());
             return Ok(());
-        };
+        }
+        let size = table.samples.bytes();
+        for (at, place) in places.planes.iter().enumerate() {
+            let channels = match place {
+                Some(place) => self.unpack_plane(file, places.chunk, rows, *place, scratch)?,
+                None => {
+                    scratch.bytes.clear();
+                    scratch.bytes.resize(count * size, 0);
+                    1
+                }
+            };
+            if table.planes.is_empty() {
+                paint(&scratch.bytes, channels, texels);
+                return Ok(());
+            }
+            let pixel = size * table.planes.len();
+            scratch.joined.resize(count * pixel, 0);
+            let pixels = scratch.joined.chunks_exact_mut(pixel).zip(scratch.bytes.chunks_exact(size));
+            pixels.for_each(|(to, from)| to[at * size..(at + 1) * size].copy_from_slice(from));
+        }
+        paint(&scratch.joined, table.planes.len(), texels);
+        Ok(())
+    }
+
+    /// The samples of a chunk of one plane, into `scratch.bytes`. Gives how many lie side by side.
+    fn unpack_plane(
+        &self,
+        file: &File,
+        chunk: u32,
+        rows: u32,
+        (at, length): (u64, u64),
+        scratch: &mut Scratch,
+    ) -> Result<usize, LayoutError> {
+        let table = &self.table;
+        let name = || table.grid.name(u64::from(chunk));
         // The table's check has shown that the file is this long.
         scratch.packed.resize(length as usize, 0);
         read_at(file, &mut scratch.packed, at).map_err(|e| match e.kind() {
             ErrorKind::UnexpectedEof => LayoutError::damaged(
                 &self.path,
-                table.grid.name(u64::from(chunk)),
+                name(),
                 "the file was cut short while it was read; start again",
             ),
             _ => LayoutError::io(&self.path, "cannot read the TIFF file", e),
         })?;
         turn_bits(&mut scratch.packed, table.is_reversed);
         let damaged = |problem: String| {
-            LayoutError::damaged(
-                &self.path,
-                table.grid.name(u64::from(chunk)),
-                format!("{problem}; fetch or write the file again"),
-            )
+            LayoutError::damaged(&self.path, name(), format!("{problem}; fetch or write the file again"))
         };
-        guard(
-            &self.path,
-            || table.grid.name(u64::from(chunk)),
-            || match &table.packing {
-                Packing::Jpeg { tables } => {
-                    let image = join_tables(tables, &scratch.packed);
-                    let (bytes, channels) = self.decode_jpeg(&image, rows).map_err(damaged)?;
-                    paint(&bytes, channels, texels);
-                    Ok(())
-                }
-                Packing::Bytes(compression) => {
-                    let pixel = table.bands as usize * table.sample_bytes as usize;
-                    scratch.bytes.resize(count * pixel, 0);
-                    let whole = table.grid.chunk_width as usize * table.grid.chunk_height as usize * pixel;
-                    codec::unpack(*compression, &scratch.packed, &mut scratch.bytes, whole).map_err(
-                        |failure| match failure {
-                            failure::Failure::Damaged(problem) => damaged(problem),
-                            failure::Failure::Io(source) => {
-                                LayoutError::io(&self.path, "cannot read the TIFF file", source)
-                            }
-                        },
-                    )?;
-                    if table.differences {
-                        let stride = table.grid.chunk_width as usize * pixel;
-                        predictor::horizontal(
-                            &mut scratch.bytes,
-                            stride,
-                            table.bands as usize,
-                            table.sample_bytes,
-                            table.big_endian,
-                        );
+        guard(&self.path, name, || match &table.packing {
+            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 => {
+                let packed = &scratch.packed;
+                let (bytes, channels) = colour_codecs::decode(table, packed, rows).map_err(damaged)?;
+                scratch.bytes = bytes;
+                Ok(channels)
+            }
+            Packing::Bytes(compression) => {
+                let stride = table.row_bytes() as usize;
+                scratch.bytes.resize(stride * rows as usize, 0);
+                let whole = stride * table.grid.chunk_height as usize;
+                codec::unpack(*compression, &scratch.packed, &mut scratch.bytes, whole).map_err(
+                    |failure| match failure {
+                        failure::Failure::Damaged(problem) => damaged(problem),
+                        failure::Failure::Io(source) => {
+                            LayoutError::io(&self.path, "cannot read the TIFF file", source)
+                        }
+                    },
+                )?;
+                let (samples, bands) = (&table.samples, table.side_by_side() as usize);
+                let (size, is_big) = (samples.bits() / 8, samples.is_big_endian());
+                match table.predictor {
+                    Predictor::None => {}
+                    Predictor::Horizontal => {
+                        predictor::horizontal(&mut scratch.bytes, stride, bands, size, is_big);
                     }
-                    paint(&scratch.bytes, table.bands as usize, texels);
-                    Ok(())
+                    Predictor::Floating => {
+                        let line = &mut scratch.widened;
+                        predictor::floating(&mut scratch.bytes, stride, bands, size, is_big, line);
+                    }
                 }
-            },
-        )
-    }
-
-    fn decode_jpeg(&self, image: &[u8], rows: u32) -> Result<(Vec<u8>, usize), String> {
-        let damaged = |_| "its JPEG stream is damaged".to_owned();
-        // Reading from memory does not fail.
-        let frame = JpegFrame::read(image).map_err(|_| "its JPEG stream is damaged".to_owned())?;
-        frame.check()?;
-        if frame.memory_bytes() > self.table.jpeg_bytes() {
-            return Err("its JPEG stream is of another size or sampling than its tiles".into());
-        }
-        let mut decoder = Decoder::new(image);
-        decoder.read_info().map_err(damaged)?;
-        let Some(info) = decoder.info() else { return Err("its JPEG stream has no size".into()) };
-        let size = (u32::from(info.width), u32::from(info.height));
-        if size.0 != self.table.grid.chunk_width || size.1 < rows || size.1 > self.table.grid.chunk_height {
-            return Err(format!("its JPEG stream is of {} x {} texels", size.0, size.1));
-        }
-        let channels = match info.pixel_format {
-            PixelFormat::L8 => 1,
-            PixelFormat::RGB24 => 3,
-            _ => return Err("its JPEG stream has neither one nor three channels of 8 bits".into()),
-        };
-        let is_rgb = matches!(self.table.paint, Paint::Rgb);
-        if channels != self.table.bands as usize {
-            return Err(format!(
-                "its JPEG stream has {channels} channels and the image {}",
-                self.table.bands
-            ));
-        }
-        if channels == 3 {
-            decoder.set_color_transform(if is_rgb { ColorTransform::RGB } else { ColorTransform::YCbCr });
-        }
-        Ok((decoder.decode().map_err(damaged)?, channels))
-    }
-}
-
-/// A stream that a decoder reads: the tables that all chunks share, without their end mark, and the chunk without its begin mark.
-fn join_tables(tables: &[u8], chunk: &[u8]) -> Vec<u8> {
-    match (tables.strip_suffix(&[0xff, 0xd9]), chunk.strip_prefix(&[0xff, 0xd8])) {
-        (Some(tables), Some(chunk)) => [tables, chunk].concat(),
-        _ => chunk.to_vec(),
+                if samples.odd.is_some() {
+                    table.widen(&scratch.bytes, &mut scratch.widened);
+                    std::mem::swap(&mut scratch.bytes, &mut scratch.widened);
+                }
+                Ok(bands)
+            }
+        })
     }
 }

@@ -17,6 +17,8 @@ mod chunk_grid;
 mod chunks;
 mod codec;
 mod colour;
+mod colour_codecs;
+mod colour_paint;
 mod colour_table;
 mod convert;
 mod failure;
@@ -48,6 +50,7 @@ use zstd_plain as zstd_codec;
 use std::path::{Path, PathBuf};
 
 use chunks::Chunks;
+pub(crate) use codec::unpack_zstd;
 pub(crate) use colour::TiffImage;
 use convert::{Convert, Pick};
 use planes::Planes;
@@ -57,7 +60,7 @@ use terrasoar_layout::error::LayoutError;
 
 use super::WINDOW_SAMPLES;
 use crate::options::OpenOptions;
-use crate::reader::{Declared, Reader, Said};
+use crate::reader::{CrsSaid, Declared, Reader, Said};
 
 /// Longest text of the void value: a number.
 const MAX_NODATA_BYTES: u64 = 256;
@@ -122,6 +125,17 @@ impl Reader for TiffMask {
         let stream = if self.chunks.is_raw() { raw::stream } else { packed::stream };
         stream(&self.path, &self.chunks, &Planes::one(), &self.convert, sink)
     }
+}
+
+/// The map from sample centres and the system that a TIFF inside of the file `path` says.
+///
+/// # Errors
+/// As of a damaged TIFF.
+pub(crate) fn place_of(path: &Path, tiff: &[u8]) -> Result<(Option<[f64; 6]>, CrsSaid), LayoutError> {
+    let mut file = TiffFile::inside(path, tiff)?;
+    let directory = file.first_full_image()?;
+    let place = geokeys::read(&mut file, &directory)?;
+    Ok((place.map, place.crs))
 }
 
 impl TiffDem {

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::super::input;
@@ -128,6 +128,19 @@ impl TiffFile {
         let cannot_read = |source| LayoutError::io(path, "cannot read the TIFF file", source);
         let file = input::open(path, "cannot open the TIFF file")?;
         let bytes = file.metadata().map_err(cannot_read)?.len();
+        Self::of(path, file, bytes)
+    }
+
+    /// A TIFF that lies inside of another file; for its tags alone.
+    pub(super) fn inside(path: &Path, tiff: &[u8]) -> Result<Self, LayoutError> {
+        let cannot_keep =
+            |source| LayoutError::io(path, "cannot keep a part of the file in a temporary one", source);
+        let mut file = tempfile::tempfile().map_err(cannot_keep)?;
+        file.write_all(tiff).map_err(cannot_keep)?;
+        Self::of(path, file, tiff.len() as u64)
+    }
+
+    fn of(path: &Path, file: File, bytes: u64) -> Result<Self, LayoutError> {
         let mut this = Self {
             path: path.to_owned(),
             file: BufReader::with_capacity(1 << 16, file),

@@ -15,9 +15,7 @@ const MOST_FILES: usize = 200_000;
 /// # Errors
 /// I/O; [`LayoutError::NotThisFormat`] for a folder without tiles, saying what it is where that can be told.
 pub(crate) fn tiles_in(path: &Path) -> Result<Vec<PathBuf>, LayoutError> {
-    let mut files = Vec::new();
-    walk(path, DEEPEST, &mut files)?;
-    files.sort();
+    let files = files_in(path)?;
     // A tile's name up to the first point, and how it is packed.
     let mut tiles: BTreeMap<(PathBuf, String), (u8, PathBuf)> = BTreeMap::new();
     for file in files.iter().filter(|file| is_tile(file)) {
@@ -41,6 +39,17 @@ pub(crate) fn tiles_in(path: &Path) -> Result<Vec<PathBuf>, LayoutError> {
         return Err(LayoutError::not_this_format(path, refusal(&files)));
     }
     Ok(tiles.into_values().map(|(_, file)| file).collect())
+}
+
+/// All files in the folder at `path` and the folders in it, in the order of their names.
+///
+/// # Errors
+/// I/O; [`LayoutError::Usage`] for more files than are looked at.
+pub(crate) fn files_in(path: &Path) -> Result<Vec<PathBuf>, LayoutError> {
+    let mut files = Vec::new();
+    walk(path, DEEPEST, &mut files)?;
+    files.sort();
+    Ok(files)
 }
 
 fn walk(folder: &Path, depth: u32, files: &mut Vec<PathBuf>) -> Result<(), LayoutError> {

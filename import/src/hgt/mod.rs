@@ -14,9 +14,9 @@ mod unpacked;
 use std::path::PathBuf;
 
 use crate::reader::{CrsSaid, Declared, HorizontalSize, Reader, Said};
-pub(crate) use folder::tiles_in;
+pub(crate) use folder::{files_in, tiles_in};
 use mosaic::Mosaic;
-use terrasoar_layout::dem::{SampleSink, SampleType};
+use terrasoar_layout::dem::{SampleSink, SampleType, Warning};
 use terrasoar_layout::error::LayoutError;
 use tile::Tile;
 pub(crate) use tile::{has_tiles, is_tile};
@@ -29,14 +29,20 @@ pub(super) struct HgtDem {
 }
 
 impl HgtDem {
-    /// Places the tiles, which have the `stated` columns and rows if a person states them; reads only their lengths.
-    pub(super) fn open(paths: &[PathBuf], stated: Option<[u32; 2]>) -> Result<Self, LayoutError> {
+    /// Places the tiles, which have the `stated` columns and rows if a person states them; reads only their lengths. A tile of several that cannot be read later is void, or an error where this
+    /// is `strict`.
+    pub(super) fn open(
+        paths: &[PathBuf],
+        stated: Option<[u32; 2]>,
+        strict: bool,
+    ) -> Result<Self, LayoutError> {
         let mut tiles = Vec::new();
         for path in paths {
             tiles.extend(Tile::all_of(path, stated)?);
         }
         let count = tiles.len();
-        let mosaic = Mosaic::place(tiles)?;
+        let mut mosaic = Mosaic::place(tiles)?;
+        mosaic.strict = strict;
         let [wide, high] = mosaic.sides;
         let format = match count {
             1 => format!("SRTM .hgt, {wide} x {high}"),
@@ -63,6 +69,10 @@ impl HgtDem {
 impl Reader for HgtDem {
     fn declared(&self) -> &Declared {
         &self.declared
+    }
+
+    fn warnings(&self) -> Vec<Warning> {
+        self.mosaic.warnings()
     }
 
     fn memory_bytes(&self) -> u64 {

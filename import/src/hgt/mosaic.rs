@@ -10,14 +10,17 @@
 
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::super::WINDOW_SAMPLES;
 use super::super::input;
 use super::super::parallel::each_task;
 use super::tile::Tile;
 use super::unpacked::{Unpacked, WORKERS};
-use terrasoar_layout::dem::{SampleSink, Window};
+use crate::guard::is_ours;
+use terrasoar_layout::dem::{SampleSink, Warning, Window};
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::words::harmless;
 
 const VOID: i16 = -32768;
 
@@ -39,6 +42,10 @@ pub(super) struct Mosaic {
     /// Numbers of tiles by (cell row from the north, cell column from the west).
     places: BTreeMap<(u32, u32), usize>,
     unpacked: Unpacked,
+    /// Whether a tile of several that cannot be read is an error, where it would be void.
+    pub(super) strict: bool,
+    /// Tiles that could not be read, and why.
+    lost: Mutex<BTreeMap<usize, String>>,
 }
 
 impl Mosaic {
@@ -120,6 +127,8 @@ impl Mosaic {
             tiles,
             places,
             unpacked,
+            strict: false,
+            lost: Mutex::default(),
         })
     }
 
@@ -226,14 +235,41 @@ impl Mosaic {
         let Some(number) = self.places.get(&(down, across)) else {
             return Ok(None);
         };
-        let tile = &self.tiles[*number];
+        if self.lost().contains_key(number) {
+            return Ok(None);
+        }
+        match self.rows_in(*number, first, rows) {
+            Ok(rows) => Ok(Some(rows)),
+            Err(error) if self.strict || self.tiles.len() == 1 || is_ours(&error) => Err(error),
+            Err(error) => {
+                self.lost().insert(*number, error.to_string());
+                Ok(None)
+            }
+        }
+    }
+
+    fn lost(&self) -> MutexGuard<'_, BTreeMap<usize, String>> {
+        self.lost.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What to say of tiles that could not be read.
+    pub(super) fn warnings(&self) -> Vec<Warning> {
+        let left_out = |why: &String| {
+            Warning::new(format!("{}; where it could not be read the ground is void", harmless(why, 360)))
+        };
+        self.lost().values().map(left_out).collect()
+    }
+
+    /// Whole rows of a tile.
+    fn rows_in(&self, number: usize, first: u32, rows: u32) -> Result<Vec<i16>, LayoutError> {
+        let tile = &self.tiles[number];
         let row_bytes = self.sides[0] as usize * 2;
         let (begin, length) = (first as usize * row_bytes, rows as usize * row_bytes);
         let heights =
             |bytes: &[u8]| bytes.chunks_exact(2).map(|pair| i16::from_be_bytes([pair[0], pair[1]])).collect();
         if tile.is_packed() {
             // A tile is unpacked to its whole length, or refused.
-            return Ok(Some(heights(&self.unpacked.bytes(*number, tile)?[begin..begin + length])));
+            return Ok(heights(&self.unpacked.bytes(number, tile)?[begin..begin + length]));
         }
         let path = tile.path();
         let mut bytes = vec![0; length];
@@ -247,11 +283,11 @@ impl Mosaic {
             ),
             _ => LayoutError::io(path, "cannot read the .hgt tile", source),
         })?;
-        Ok(Some(heights(&bytes)))
+        Ok(heights(&bytes))
     }
 }
 
-/// Tiles of unlike size, in words.
+/// Tiles of unlike size, in words. It is [`LayoutError::Unsupported`] here, for files of any grids can be joined elsewhere.
 fn unlike(first: &Tile, other: &Tile) -> LayoutError {
     let [[a, b], [c, d]] = [other.samples, first.samples];
     let why = if b == d {
@@ -259,11 +295,13 @@ fn unlike(first: &Tile, other: &Tile) -> LayoutError {
     } else {
         "a mosaic needs tiles of one resolution"
     };
-    LayoutError::Usage(format!(
-        "{}: this tile has {a} x {b} heights and {} has {c} x {d}; {why}: build them apart, or join them first: gdalwarp -r bilinear FILES all.tif",
-        other.shown(),
-        first.shown()
-    ))
+    LayoutError::unsupported(
+        other.path(),
+        format!(
+            "this tile has {a} x {b} heights and {} has {c} x {d}; {why}: build them apart, or join them first: gdalwarp -r bilinear FILES all.tif",
+            first.shown()
+        ),
+    )
 }
 
 /// Takes a neighbour's height where there is none.

@@ -1,13 +1,15 @@
 //! A picture and what stands beside it: world file, `.prj`, `.aux.xml`, `.msk`; and its own mask.
 //!
 //! The place is the file's own, else that of the files beside it, as of elevation data ([`crate::beside`]). What a mask or a "no data" value hides becomes transparent. Cost: a mask is
-//! read before the first row, into a bit a texel.
+//! read before the first row, into a bit a texel. With a stretch rows are made of the picture's numbers, else of its bytes.
 
-use crate::OpenOptions;
+use super::bands::{Chosen, ChosenBytes, ChosenNumbers};
+use super::stretched::{Limits, Shades, Stretched};
 use crate::beside::Beside;
 use crate::crs::{self, System};
 use crate::mask::{Bits, Masking};
-use crate::reader::{Declared, Picture, Said};
+use crate::reader::{Declared, NumberRows, Numbers, Picture, Said};
+use crate::shown::PictureOptions;
 use std::path::Path;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::error::LayoutError;
@@ -21,11 +23,18 @@ pub(super) struct Completed {
     masking: Option<Masking>,
     /// Value of all colours where there is no picture, as a file beside it says.
     void: Option<u8>,
+    /// The same of pictures of any numbers.
+    voids: Vec<f32>,
+    /// Colours that bands were chosen among.
+    chosen: Option<Chosen>,
+    /// Whether numbers are stretched; and how, once that was found.
+    is_stretched: bool,
+    shades: Option<Shades>,
 }
 
 impl Completed {
     /// Looks beside the picture.
-    pub(super) fn new(picture: Box<dyn Picture>) -> Result<Self, LayoutError> {
+    pub(super) fn new(picture: Box<dyn Picture>, options: &PictureOptions) -> Result<Self, LayoutError> {
         let path = picture.path().to_owned();
         let mut info = picture.info().clone();
         let mut declared = Declared::new(info.texels, SampleType::U8, info.format.clone());
@@ -33,17 +42,22 @@ impl Completed {
         declared.place = map.map(|map| Said::new(map, "the picture"));
         declared.crs = crs;
         let beside = Beside::of_picture(&path, picture.mask().is_some());
-        let masking = beside.complete(&mut declared, &OpenOptions::default())?;
+        let masking = beside.complete(&mut declared, &options.open_options())?;
         let system =
             crs::resolve(&declared.crs, None, &mut declared.warnings).unwrap_or_else(|_| System::unknown());
         info.georeference = crs::georeference(&system, declared.place.map(|place| place.value));
         info.notes.extend(declared.warnings.into_iter().map(|warning| warning.words));
         info.notes.extend(declared.notes);
-        let mut void = None;
+        let (mut void, mut voids) = (None, Vec::new());
+        let is_stretched = options.stretch.is_some();
         for said in &declared.value.nodata {
             let value = said.value.trim().parse::<f64>().ok();
+            if let Some(value) = value.filter(|_| is_stretched) {
+                voids.push(value as f32);
+                continue;
+            }
             match value.filter(|value| value.fract() == 0.0 && (0.0..=255.0).contains(value)) {
-                Some(value) if picture.has_bytes() => void = Some(value as u8),
+                Some(value) if picture.has_bytes() && !is_stretched => void = Some(value as u8),
                 _ => info.notes.push(format!(
                     "\"no data\" {} from {} is no value of this picture and was passed over",
                     terrasoar_layout::words::harmless(said.value.trim(), 40),
@@ -53,7 +67,56 @@ impl Completed {
         }
         let masks = masking.as_ref().map_or(0, Masking::memory_bytes);
         info.memory_bytes = info.memory_bytes.saturating_add(masks);
-        Ok(Self { picture, info, system, masking, void })
+        let chosen = match picture.has_chosen_bands() {
+            true => None,
+            false => Chosen::new(&path, picture.colours(), &options.bands)?,
+        };
+        if is_stretched {
+            // Rows of numbers, as they come and as they are counted.
+            info.memory_bytes = info.memory_bytes.saturating_add(u64::from(info.texels[0]) * 64 + (16 << 20));
+        }
+        let shades = None;
+        Ok(Self { picture, info, system, masking, void, voids, chosen, is_stretched, shades })
+    }
+
+    /// Channels of colour that are shown.
+    pub(super) fn colours(&self) -> usize {
+        self.chosen.as_ref().map_or(self.picture.colours(), Chosen::colours)
+    }
+
+    /// As [`Picture::limits`].
+    pub(super) fn limits(&self) -> Option<[i32; 2]> {
+        self.picture.limits()
+    }
+
+    /// Shows its numbers between black and white of `limits`, which were found as `how` says.
+    pub(super) fn stretch(&mut self, limits: Limits, how: &str) {
+        let shades = Shades::new(limits, self.picture.is_inverse());
+        self.info
+            .notes
+            .push(format!("shown from black to white: {}{how}", shades.words(self.colours() == 1)));
+        self.shades = Some(shades);
+    }
+
+    /// Its numbers, NaN where a mask or "no data" hides them.
+    pub(super) fn numbers(&self) -> Result<Box<dyn NumberRows + '_>, LayoutError> {
+        let mask = self.mask()?;
+        let wide = self.info.texels[0] as usize;
+        let rows: Box<dyn NumberRows> = match self.picture.numbers()? {
+            Some(numbers) => numbers,
+            None => Box::new(OfBytes { rows: self.picture.rows()?, bytes: Vec::new() }),
+        };
+        let seen = SeenNumbers { rows, mask, voids: &self.voids, wide, y: 0 };
+        Ok(match &self.chosen {
+            None => Box::new(seen),
+            Some(chosen) => Box::new(ChosenNumbers { rows: Box::new(seen), chosen }),
+        })
+    }
+
+    /// The mask, read.
+    fn mask(&self) -> Result<Option<(&Masking, Bits)>, LayoutError> {
+        let Some(masking) = &self.masking else { return Ok(None) };
+        Ok(masking.keep(self.picture.mask())?.map(|bits| (masking, bits)))
     }
 
     /// Bits in use of its channels, as [`Picture::bits`].
@@ -82,15 +145,63 @@ impl ImageSource for Completed {
     }
 
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
-        let mut mask = None;
-        if let Some(masking) = &self.masking {
-            mask = masking.keep(self.picture.mask())?.map(|bits| (masking, bits));
+        let wide = self.info.texels[0] as usize;
+        if self.is_stretched {
+            let shades = self.shades.unwrap_or(Shades::new([[0.0, 255.0]; 3], false));
+            return Ok(Box::new(Stretched { rows: self.numbers()?, shades, wide, row: Vec::new() }));
         }
-        let rows = self.picture.rows()?;
-        if mask.is_none() && self.void.is_none() {
-            return Ok(rows);
+        let mask = self.mask()?;
+        let mut rows = self.picture.rows()?;
+        if mask.is_some() || self.void.is_some() {
+            rows = Box::new(Rows { rows, mask, void: self.void, wide, y: 0 });
         }
-        Ok(Box::new(Rows { rows, mask, void: self.void, wide: self.info.texels[0] as usize, y: 0 }))
+        Ok(match &self.chosen {
+            None => rows,
+            Some(chosen) => Box::new(ChosenBytes { rows, chosen }),
+        })
+    }
+}
+
+/// Bytes as numbers.
+struct OfBytes<'p> {
+    rows: Box<dyn RowReader + 'p>,
+    bytes: Vec<u8>,
+}
+
+impl NumberRows for OfBytes<'_> {
+    fn read(&mut self, texels: &mut [Numbers]) -> Result<(), LayoutError> {
+        self.bytes.resize(4 * texels.len(), 0);
+        self.rows.read(&mut self.bytes)?;
+        for (to, from) in texels.iter_mut().zip(self.bytes.as_chunks::<4>().0) {
+            *to = from.map(f32::from);
+        }
+        Ok(())
+    }
+}
+
+/// Numbers without those that are hidden.
+struct SeenNumbers<'p> {
+    rows: Box<dyn NumberRows + 'p>,
+    mask: Option<(&'p Masking, Bits)>,
+    voids: &'p [f32],
+    wide: usize,
+    y: u32,
+}
+
+impl NumberRows for SeenNumbers<'_> {
+    fn read(&mut self, texels: &mut [Numbers]) -> Result<(), LayoutError> {
+        self.rows.read(texels)?;
+        for row in texels.chunks_exact_mut(self.wide) {
+            for void in self.voids {
+                let hidden = row.iter_mut().filter(|texel| texel[..3] == [*void; 3]);
+                hidden.for_each(|texel| *texel = [f32::NAN; 4]);
+            }
+            if let Some((masking, bits)) = &self.mask {
+                masking.hide_row(bits, self.y, |at| row[at] = [f32::NAN; 4])?;
+            }
+            self.y += 1;
+        }
+        Ok(())
     }
 }
 

@@ -6,7 +6,8 @@
 use crate::guard;
 use crate::png_stream;
 use crate::png_stream::{PngRows, Texts, decoding_error};
-use crate::reader::{Orientation, Picture, bits_of, upper_eight};
+use crate::reader::{NumberRows, Numbers, Orientation, Picture, bits_of, upper_eight};
+use crate::shown::PictureOptions;
 use ::png::{BitDepth, ColorType, Transformations};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -24,13 +25,14 @@ pub(super) struct PngImage {
     info: ImageInfo,
     orientation: Orientation,
     has_bytes: bool,
+    is_grey: bool,
     /// Bits in use of 16, once they were looked for or said.
     bits: OnceLock<u32>,
 }
 
 impl PngImage {
     /// Reads the header.
-    pub(super) fn open(path: &Path) -> Result<Self, LayoutError> {
+    pub(super) fn open(path: &Path, options: &PictureOptions) -> Result<Self, LayoutError> {
         let reader = png_stream::open(path, AS_COLOURS, Texts::PassedOver)?;
         let header = reader.info();
         if header.interlaced {
@@ -48,7 +50,7 @@ impl PngImage {
         let has_alpha =
             header.trns.is_some() || matches!(header.color_type, ColorType::GrayscaleAlpha | ColorType::Rgba);
         let mut notes = Vec::new();
-        if header.bit_depth == BitDepth::Sixteen {
+        if header.bit_depth == BitDepth::Sixteen && options.stretch.is_none() {
             notes.push("16 bits a channel are cut to the upper 8 of those in use".into());
         }
         let info = ImageInfo {
@@ -65,7 +67,8 @@ impl PngImage {
         let orientation = header.exif_metadata.as_deref().map(Orientation::of_exif);
         let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
         let has_bytes = header.bit_depth != BitDepth::Sixteen;
-        Ok(Self { path: path.to_owned(), info, orientation, has_bytes, bits: OnceLock::new() })
+        let is_grey = color == "grey";
+        Ok(Self { path: path.to_owned(), info, orientation, has_bytes, is_grey, bits: OnceLock::new() })
     }
 }
 
@@ -104,6 +107,18 @@ impl Picture for PngImage {
 
     fn use_bits(&mut self, bits: u32) {
         self.bits = OnceLock::from(bits);
+    }
+
+    fn colours(&self) -> usize {
+        if self.is_grey { 1 } else { 3 }
+    }
+
+    fn numbers(&self) -> Result<Option<Box<dyn NumberRows + '_>>, LayoutError> {
+        Ok(if self.has_bytes { None } else { Some(Box::new(self.begin()?)) })
+    }
+
+    fn limits(&self) -> Option<[i32; 2]> {
+        Some([0, if self.has_bytes { 255 } else { 65_535 }])
     }
 }
 
@@ -194,6 +209,23 @@ impl RowReader for Rows<'_> {
                 spread(&bytes, channels, row);
             })?;
             self.bytes = bytes;
+        }
+        Ok(())
+    }
+}
+
+/// Of 16 bits a channel.
+impl NumberRows for Rows<'_> {
+    fn read(&mut self, texels: &mut [Numbers]) -> Result<(), LayoutError> {
+        for row in texels.chunks_exact_mut(self.image.info.texels[0] as usize) {
+            self.next_row(|data, channels| {
+                for (to, from) in row.iter_mut().zip(data.chunks_exact(2 * channels)) {
+                    let at = |i: usize| f32::from(u16::from_be_bytes([from[2 * i], from[2 * i + 1]]));
+                    let alpha = if channels % 2 == 0 { at(channels - 1) / 257.0 } else { 255.0 };
+                    let [green, blue] = if channels < 3 { [0, 0] } else { [1, 2] };
+                    *to = [at(0), at(green), at(blue), alpha];
+                }
+            })?;
         }
         Ok(())
     }

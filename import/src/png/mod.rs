@@ -18,6 +18,7 @@ use super::png_stream::{self, PngRows, Texts, decoding_error};
 use crate::OpenOptions;
 use crate::reader::{CrsSaid, Declared, HorizontalSize, Reader, Said};
 use crate::value::decode;
+pub(crate) use packing::{Evidence, Packing};
 use pixels::Pixels;
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;

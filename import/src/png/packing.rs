@@ -22,20 +22,20 @@ const LITTLE: i32 = 192;
 
 /// A packing with a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Packing {
+pub(crate) enum Packing {
     Mapbox,
     Terrarium,
 }
 
 impl Packing {
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Mapbox => "mapbox",
             Self::Terrarium => "terrarium",
         }
     }
 
-    pub(super) fn decode(self) -> Decode {
+    pub(crate) fn decode(self) -> Decode {
         match self {
             Self::Mapbox => Decode::MAPBOX,
             Self::Terrarium => Decode::TERRARIUM,
@@ -43,7 +43,7 @@ impl Packing {
     }
 
     /// Whether a height on Earth can have this red.
-    pub(super) fn holds(self, red: u8) -> bool {
+    pub(crate) fn holds(self, red: u8) -> bool {
         match self {
             Self::Mapbox => red <= 2,
             Self::Terrarium => (81..=163).contains(&red),
@@ -61,7 +61,7 @@ impl Packing {
 
 /// What the pixels so far say of a packing.
 #[derive(Debug, Clone, Copy)]
-struct Evidence {
+pub(crate) struct Evidence {
     packing: Packing,
     is_possible: bool,
     changes: u64,
@@ -69,11 +69,17 @@ struct Evidence {
 }
 
 impl Evidence {
-    fn new(packing: Packing) -> Self {
+    /// What its packing is.
+    pub(crate) fn packing(&self) -> Packing {
+        self.packing
+    }
+
+    pub(crate) fn new(packing: Packing) -> Self {
         Self { packing, is_possible: true, changes: 0, carries: 0 }
     }
 
-    fn add(&mut self, before: Option<[u8; 3]>, pixel: [u8; 3]) {
+    /// Takes a pixel, and the one before it in its row.
+    pub(crate) fn add(&mut self, before: Option<[u8; 3]>, pixel: [u8; 3]) {
         self.is_possible &= self.packing.holds(pixel[0]);
         let Some(before) = before else { return };
         let [a, b] = [before, pixel].map(|pixel| self.packing.pair(pixel).map(i32::from));
@@ -83,7 +89,8 @@ impl Evidence {
         }
     }
 
-    fn is_certain(&self) -> bool {
+    /// Whether there is no doubt.
+    pub(crate) fn is_certain(&self) -> bool {
         self.is_possible && self.carries >= CARRIES && self.carries as f64 >= SHARE * self.changes as f64
     }
 }

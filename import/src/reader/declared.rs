@@ -40,6 +40,8 @@ pub(crate) struct Declared {
     pub(crate) value: ValueSaid,
     /// What a person may want to know: which of several bands was read, an overview that was passed over.
     pub(crate) notes: Vec<String>,
+    /// What was chosen and should be said aloud: which zoom of a pyramid is read.
+    pub(crate) aloud: Vec<String>,
     /// What may make the ground wrong, each with what would mend it.
     pub(crate) warnings: Vec<Warning>,
 }
@@ -56,6 +58,7 @@ impl Declared {
             crs: CrsSaid::default(),
             value: ValueSaid::default(),
             notes: Vec::new(),
+            aloud: Vec::new(),
             warnings: Vec::new(),
         }
     }

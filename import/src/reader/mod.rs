@@ -8,9 +8,9 @@ mod declared;
 mod picture;
 
 pub(crate) use declared::{CrsSaid, Declared, HorizontalSize, Said, ValueSaid, VerticalUnit};
-pub(crate) use picture::{Orientation, Picture, bits_of, upper_eight};
+pub(crate) use picture::{NumberRows, Numbers, Orientation, Picture, bits_of, upper_eight};
 
-use terrasoar_layout::dem::SampleSink;
+use terrasoar_layout::dem::{SampleSink, Warning};
 use terrasoar_layout::error::LayoutError;
 
 /// A data set of one format.
@@ -26,6 +26,11 @@ pub(crate) trait Reader: Send + Sync {
     /// Memory in bytes that [`stream`](Reader::stream) takes beyond a megabyte or two a thread.
     fn memory_bytes(&self) -> u64 {
         0
+    }
+
+    /// What was seen while streaming that may make the ground wrong: parts that could not be read.
+    fn warnings(&self) -> Vec<Warning> {
+        Vec::new()
     }
 
     /// Pushes every sample exactly once into `sink`, as raw numbers, in windows counted in the rows and columns *of the file*: row 0 is the first row of the

@@ -67,6 +67,46 @@ pub(crate) trait Picture: ImageSource {
 
     /// Shows it as one whose channels make use of so many bits, from 8 to 16, so that pictures beside each other are as bright.
     fn use_bits(&mut self, _bits: u32) {}
+
+    /// Channels of colour: 1 of a grey picture, else 3.
+    fn colours(&self) -> usize {
+        3
+    }
+
+    /// Whether the bands that were asked for are those that it gives; else they are chosen among its colours.
+    fn has_chosen_bands(&self) -> bool {
+        false
+    }
+
+    /// Its numbers as the file has them, from the first row on; `None` where its rows of bytes are these.
+    ///
+    /// # Errors
+    /// As reading its rows.
+    fn numbers(&self) -> Result<Option<Box<dyn NumberRows + '_>>, LayoutError> {
+        Ok(None)
+    }
+
+    /// The smallest and largest number that its channels can hold, where these are whole numbers.
+    fn limits(&self) -> Option<[i32; 2]> {
+        Some([0, 255])
+    }
+
+    /// Whether its numbers grow towards black.
+    fn is_inverse(&self) -> bool {
+        false
+    }
+}
+
+/// Three colours and alpha (0 to 255) of a texel, as the file has them. A grey texel has its number three times; what is not there is NaN.
+pub(crate) type Numbers = [f32; 4];
+
+/// Gives the numbers of a picture row by row.
+pub(crate) trait NumberRows: Send {
+    /// The next rows, as many as fit.
+    ///
+    /// # Errors
+    /// Damage in the data, naming the file and the place; I/O.
+    fn read(&mut self, texels: &mut [Numbers]) -> Result<(), LayoutError>;
 }
 
 /// Bits that numbers up to this one take, at least the eight that are shown.

@@ -14,8 +14,10 @@ use crate::parallel::each_task;
 use kernel::Kernel;
 pub(crate) use mapping::{Mapping, Projections, apply};
 use std::path::{Path, PathBuf};
-use store::Store;
+pub(crate) use store::Store;
 use target::Grid;
+pub(crate) use target::mesh;
+pub(crate) use target::system as target_system;
 use terrasoar_layout::dem::{SampleSink, SampleType, Window};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
@@ -31,10 +33,7 @@ const BLOCK: [u32; 2] = [256, 128];
 pub(crate) struct Warp {
     system: Option<System>,
     grid: Grid,
-    mapping: Mapping,
-    kernel: Kernel,
-    old_samples: [u32; 2],
-    sample_bytes: u64,
+    resampler: Resampler,
     sample_type: SampleType,
     in_memory: bool,
     folder: PathBuf,
@@ -76,7 +75,7 @@ impl Warp {
         };
         let kernel = Kernel {
             resampling,
-            scale: scale(grid.samples, samples),
+            scale: scale(grid.samples.map(f64::from), samples),
             samples,
             wraps: wraps(system, &map, samples),
         };
@@ -102,10 +101,7 @@ impl Warp {
         );
         Ok(Some(Self {
             system: target,
-            mapping,
-            kernel,
-            old_samples: samples,
-            sample_bytes,
+            resampler: Resampler { mapping, kernel, sample_bytes },
             sample_type,
             in_memory: Store::bytes(samples, sample_bytes) <= allowed,
             folder: options.scratch.clone().unwrap_or_else(std::env::temp_dir),
@@ -136,7 +132,7 @@ impl Warp {
 
     /// The kernel's name.
     pub(crate) fn method(&self) -> &'static str {
-        self.kernel.resampling.name()
+        self.resampler.kernel.resampling.name()
     }
 
     /// What is done, in words.
@@ -146,10 +142,9 @@ impl Warp {
 
     /// Memory that it takes.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let kept = if self.in_memory { Store::bytes(self.old_samples, self.sample_bytes) } else { 0 };
-        let blocks =
-            rayon::current_num_threads() as u64 * (8 * MOST_OLD as u64 + 32 * u64::from(BLOCK[0] * BLOCK[1]));
-        kept + blocks
+        let Resampler { kernel, sample_bytes, .. } = &self.resampler;
+        let kept = if self.in_memory { Store::bytes(kernel.samples, *sample_bytes) } else { 0 };
+        kept + blocks_bytes()
     }
 
     /// Keeps what `old` streams, and streams the new samples into `sink`.
@@ -158,28 +153,78 @@ impl Warp {
         old: &dyn Fn(&dyn SampleSink) -> Result<(), LayoutError>,
         sink: &dyn SampleSink,
     ) -> Result<(), LayoutError> {
-        let store = Store::new(self.old_samples, self.sample_bytes, self.in_memory, &self.folder)?;
+        let Resampler { kernel, sample_bytes, .. } = &self.resampler;
+        let store = Store::new(kernel.samples, *sample_bytes, self.in_memory, &self.folder)?;
         old(&store)?;
-        let [wide, high] = self.grid.samples;
-        let across = u64::from(wide.div_ceil(BLOCK[0]));
-        let blocks = across * u64::from(high.div_ceil(BLOCK[1]));
-        each_task(
-            blocks,
-            usize::MAX,
-            || Ok(()),
-            |(), block| {
-                // Both products stay below the grid's sides.
-                let col = (block % across) as u32 * BLOCK[0];
-                let row = (block / across) as u32 * BLOCK[1];
-                let window =
-                    Window { col, row, width: BLOCK[0].min(wide - col), height: BLOCK[1].min(high - row) };
-                self.block(&store, window, sink)
-            },
-        )
+        each_block(self.grid.samples, BLOCK, |window| {
+            self.resampler.block(&store, window, &mut |window, samples| match samples {
+                Some(samples) => sink.put(window, samples),
+                None => sink.put_void(window),
+            })
+        })
+    }
+}
+
+/// Memory that making blocks takes, on all threads.
+pub(crate) fn blocks_bytes() -> u64 {
+    rayon::current_num_threads() as u64 * (8 * MOST_OLD as u64 + 32 * u64::from(BLOCK[0] * BLOCK[1]))
+}
+
+/// Calls `make` with every block of a grid, of at most `size` columns and rows, on all threads.
+pub(crate) fn each_block(
+    [wide, high]: [u32; 2],
+    size: [u32; 2],
+    make: impl Fn(Window) -> Result<(), LayoutError> + Sync,
+) -> Result<(), LayoutError> {
+    let across = u64::from(wide.div_ceil(size[0]));
+    let blocks = across * u64::from(high.div_ceil(size[1]));
+    each_task(
+        blocks,
+        usize::MAX,
+        || Ok(()),
+        |(), block| {
+            // Both products stay below the grid's sides.
+            let col = (block % across) as u32 * size[0];
+            let row = (block / across) as u32 * size[1];
+            make(Window { col, row, width: size[0].min(wide - col), height: size[1].min(high - row) })
+        },
+    )
+}
+
+/// Takes a window of new samples; none where all are void.
+type Put<'a> = &'a mut dyn FnMut(Window, Option<&[f64]>) -> Result<(), LayoutError>;
+
+/// From old samples to new ones: places and a kernel.
+pub(crate) struct Resampler {
+    mapping: Mapping,
+    kernel: Kernel,
+    sample_bytes: u64,
+}
+
+impl Resampler {
+    /// From a grid of `old` samples in a store to another; `new` is how many new samples lie along its sides.
+    pub(crate) fn new(
+        mapping: Mapping,
+        resampling: Resampling,
+        old: [u32; 2],
+        new: [f64; 2],
+        sample_bytes: u64,
+    ) -> Self {
+        Self {
+            mapping,
+            kernel: Kernel { resampling, scale: scale(new, old), samples: old, wraps: false },
+            sample_bytes,
+        }
+    }
+
+    /// Where the samples of a window of the new grid lie among the old ones: NaN where there is no such place.
+    pub(crate) fn places(&self, window: Window) -> Vec<[f64; 2]> {
+        let first = [f64::from(window.col), f64::from(window.row)];
+        self.mapping.places(first, [window.width as usize, window.height as usize])
     }
 
     /// Makes the samples of a window, in halves where it needs too many old ones.
-    fn block(&self, store: &Store, window: Window, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+    pub(crate) fn block(&self, store: &Store, window: Window, put: Put<'_>) -> Result<(), LayoutError> {
         let size = [window.width as usize, window.height as usize];
         let first = [f64::from(window.col), f64::from(window.row)];
         let is_mean = self.kernel.resampling == Resampling::Average;
@@ -191,10 +236,10 @@ impl Warp {
             Vec::new()
         };
         let Some(([west, north], [east, south])) = rim(places.iter().chain(&corners)) else {
-            return sink.put_void(window);
+            return put(window, None);
         };
         let reach = self.kernel.reach();
-        let limits = self.old_samples.map(f64::from);
+        let limits = self.kernel.samples.map(f64::from);
         let low = |value: f64, i: usize, wraps: bool| {
             let value = (value - reach[i]).floor();
             if wraps { value } else { value.clamp(-1.0, limits[i]) }
@@ -220,7 +265,7 @@ impl Warp {
                     Window { row: window.row + upper, height: window.height - upper, ..window },
                 ]
             };
-            return halves.into_iter().try_for_each(|half| self.block(store, half, sink));
+            return halves.into_iter().try_for_each(|half| self.block(store, half, put));
         }
         let block = store.window(from, old, self.kernel.wraps)?;
         let samples: Vec<f64> = places
@@ -237,7 +282,7 @@ impl Warp {
                 if self.sample_bytes == 4 { f64::from(sample as f32) } else { sample }
             })
             .collect();
-        sink.put(window, &samples)
+        put(window, Some(&samples))
     }
 }
 
@@ -301,9 +346,9 @@ fn reprojected(
 
 /// New samples an old one, at most 1: by how many there are of either, for the new grid covers all of the old one. A whole number of old ones where it is nearly that, as GDAL
 /// has it.
-fn scale(new: [u32; 2], old: [u32; 2]) -> [f64; 2] {
+fn scale(new: [f64; 2], old: [u32; 2]) -> [f64; 2] {
     std::array::from_fn(|i| {
-        let old = f64::from(old[i]) / f64::from(new[i]);
+        let old = f64::from(old[i]) / new[i];
         if old <= 1.05 {
             return 1.0;
         }

@@ -6,24 +6,27 @@
 use super::kernel::Samples;
 use crate::kept::Kept;
 use std::path::Path;
+use std::sync::Arc;
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
 
 /// Samples of a grid.
-pub(super) struct Store {
+pub(crate) struct Store {
     samples: [u32; 2],
     sample_bytes: u64,
-    kept: Kept,
+    kept: Arc<Kept>,
+    /// Where its bytes begin in what is kept.
+    begin: u64,
 }
 
 impl Store {
     /// Bytes that samples take.
-    pub(super) fn bytes(samples: [u32; 2], sample_bytes: u64) -> u64 {
+    pub(crate) fn bytes(samples: [u32; 2], sample_bytes: u64) -> u64 {
         u64::from(samples[0]) * u64::from(samples[1]) * sample_bytes
     }
 
     /// An empty store, in memory or in a file in `folder`.
-    pub(super) fn new(
+    pub(crate) fn new(
         samples: [u32; 2],
         sample_bytes: u64,
         in_memory: bool,
@@ -35,11 +38,30 @@ impl Store {
             folder,
             "cannot keep the samples in a temporary file in",
         )?;
-        Ok(Self { samples, sample_bytes, kept })
+        Ok(Self { samples, sample_bytes, kept: Arc::new(kept), begin: 0 })
+    }
+
+    /// Empty stores of these columns and rows, one behind the other in memory or in one file in `folder`.
+    pub(crate) fn several(
+        samples: &[[u32; 2]],
+        sample_bytes: u64,
+        in_memory: bool,
+        folder: &Path,
+    ) -> Result<Vec<Self>, LayoutError> {
+        let all = samples.iter().map(|samples| Self::bytes(*samples, sample_bytes)).sum();
+        let action = "cannot keep the samples in a temporary file in";
+        let kept = Arc::new(Kept::new(all, in_memory, folder, action)?);
+        let mut end = 0;
+        let stores = samples.iter().map(|samples| {
+            let begin = end;
+            end += Self::bytes(*samples, sample_bytes);
+            Self { samples: *samples, sample_bytes, kept: kept.clone(), begin }
+        });
+        Ok(stores.collect())
     }
 
     /// Columns `first.0` on and rows `first.1` on, `size` of them; columns are counted around the grid if it `wraps`, and what is outside is void.
-    pub(super) fn window(
+    pub(crate) fn window(
         &self,
         first: [i64; 2],
         size: [usize; 2],
@@ -69,7 +91,7 @@ impl Store {
                     (col, (columns - col) as usize)
                 };
                 let run = run.min(size[0] - done);
-                let offset = (row as u64 * columns as u64 + at as u64) * self.sample_bytes;
+                let offset = self.begin + (row as u64 * columns as u64 + at as u64) * self.sample_bytes;
                 let length = run * self.sample_bytes as usize;
                 let values = &mut values[done..done + run];
                 self.kept.read(offset, length, &mut bytes, |raw| self.decode(raw, values))?;
@@ -116,7 +138,8 @@ impl SampleSink for Store {
         for (line, values) in samples.chunks_exact(window.width.max(1) as usize).enumerate() {
             self.encode(values, &mut bytes);
             let row = u64::from(window.row) + line as u64;
-            let offset = (row * u64::from(self.samples[0]) + u64::from(window.col)) * self.sample_bytes;
+            let offset =
+                self.begin + (row * u64::from(self.samples[0]) + u64::from(window.col)) * self.sample_bytes;
             self.kept.write(offset, &bytes)?;
         }
         Ok(())
@@ -128,10 +151,17 @@ impl SampleSink for Store {
 }
 
 /// Old samples around a place.
-pub(super) struct Block {
+pub(crate) struct Block {
     first: [i64; 2],
     size: [usize; 2],
     values: Vec<f64>,
+}
+
+impl Block {
+    /// The samples, row by row.
+    pub(crate) fn into_values(self) -> Vec<f64> {
+        self.values
+    }
 }
 
 impl Samples for Block {

@@ -26,13 +26,13 @@ pub(super) struct Grid {
 }
 
 /// The rim of a grid as points: its outer corners and a mesh between them, in columns and rows.
-fn mesh([columns, rows]: [u32; 2]) -> impl Iterator<Item = [f64; 2]> {
+pub(crate) fn mesh([columns, rows]: [u32; 2]) -> impl Iterator<Item = [f64; 2]> {
     let at = |i: u32, count: u32| -0.5 + f64::from(count) * f64::from(i) / f64::from(MESH);
     (0..=MESH).flat_map(move |j| (0..=MESH).map(move |i| [at(i, columns), at(j, rows)]))
 }
 
 /// The system that `text` asks for, for data that `ground` brings to longitude and latitude.
-pub(super) fn system(
+pub(crate) fn system(
     path: &Path,
     text: &str,
     old: &System,

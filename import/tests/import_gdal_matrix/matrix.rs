@@ -10,15 +10,36 @@ pub(crate) const ENVI: Format = Format { name: "ENVI with .hdr", driver: "ENVI",
 pub(crate) const XYZ: Format = Format { name: "XYZ", driver: "XYZ", ending: "xyz" };
 pub(crate) const PNG: Format = Format { name: "PNG", driver: "PNG", ending: "png" };
 pub(crate) const PNM: Format = Format { name: "Netpbm (PGM)", driver: "PNM", ending: "pgm" };
+pub(crate) const VRT: Format = Format { name: "Virtual raster (.vrt)", driver: "VRT", ending: "vrt" };
 pub(crate) const NETCDF: Format = Format { name: "netCDF", driver: "netCDF", ending: "nc" };
 pub(crate) const BT: Format = Format { name: "VTP BT", driver: "BT", ending: "bt" };
 pub(crate) const DTED: Format = Format { name: "DTED", driver: "DTED", ending: "dt0" };
 pub(crate) const HGT: Format = Format { name: ".hgt tile", driver: "SRTMHGT", ending: "hgt" };
 pub(crate) const USGS: Format = Format { name: "USGS DEM", driver: "USGSDEM", ending: "dem" };
+pub(crate) const SURFER_TEXT: Format = Format { name: "Surfer, text", driver: "GSAG", ending: "grd" };
+pub(crate) const SURFER_6: Format = Format { name: "Surfer 6", driver: "GSBG", ending: "grd" };
+pub(crate) const SURFER_7: Format = Format { name: "Surfer 7", driver: "GS7BG", ending: "grd" };
 
 /// Formats in the order of the page.
-pub(crate) const FORMATS: [Format; 13] =
-    [GEOTIFF, COG, NETCDF, ASCII, ESRI, ENVI, XYZ, PNG, PNM, BT, DTED, HGT, USGS];
+pub(crate) const FORMATS: [Format; 17] = [
+    GEOTIFF,
+    COG,
+    VRT,
+    NETCDF,
+    ASCII,
+    ESRI,
+    ENVI,
+    XYZ,
+    PNG,
+    PNM,
+    BT,
+    SURFER_TEXT,
+    SURFER_6,
+    SURFER_7,
+    DTED,
+    HGT,
+    USGS,
+];
 
 const fn system(name: &'static str, text: &'static str, unit: Unit, corner: [f64; 2], step: f64) -> System {
     System { name, text, unit, corner, step: [step, step], height_unit_m: None }
@@ -106,6 +127,7 @@ pub(crate) fn all() -> Vec<Combination> {
     meanings(&mut list);
     labelled_and_text(&mut list);
     netcdf(&mut list);
+    virtual_rasters(&mut list);
     pictures(&mut list);
     tiles_and_sheets(&mut list);
     list
@@ -309,6 +331,24 @@ fn netcdf(list: &mut Vec<Combination>) {
     }
 }
 
+/// Virtual rasters of a GeoTIFF.
+fn virtual_rasters(list: &mut Vec<Combination>) {
+    for kind in Kind::WHOLE[1..].iter().copied().chain([Kind::Float32, Kind::Float64]) {
+        for void in [Void::None, Void::Declared, Void::InsideMask] {
+            for system in [UTM, DEGREES] {
+                list.push(Combination::new(VRT, kind, system).with(void));
+            }
+        }
+    }
+    for turn in Turn::ALL {
+        list.push(Combination::new(VRT, Kind::Int16, SYSTEMS[1]).turned(turn).with(Void::Declared));
+    }
+    for (scale, offset) in SCALES {
+        let meaning = Meaning { unit: "ft", unit_m: 0.3048, scale, offset };
+        list.push(Combination::new(VRT, Kind::Int16, UTM).meaning(meaning).with(Void::Declared));
+    }
+}
+
 /// Grey pictures, which have their place beside them or none.
 fn pictures(list: &mut Vec<Combination>) {
     for format in [PNG, PNM] {
@@ -327,6 +367,14 @@ fn tiles_and_sheets(list: &mut Vec<Combination>) {
     for kind in [Kind::Int16, Kind::Int32, Kind::Float32] {
         for system in [UTM, SYSTEMS[1], DEGREES] {
             list.push(Combination::new(BT, kind, system));
+        }
+    }
+    for system in [UTM, SYSTEMS[1], DEGREES] {
+        // GDAL writes its own mark of voids into the text, where Surfer's belongs.
+        list.push(Combination::new(SURFER_TEXT, Kind::Float32, system));
+        for void in [Void::None, Void::Declared] {
+            list.push(Combination::new(SURFER_6, Kind::Float32, system).with(void));
+            list.push(Combination::new(SURFER_7, Kind::Float64, system).with(void));
         }
     }
     // One degree, samples on its rim.

@@ -6,14 +6,20 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// How a format is known, what is said beside it, and what no table shows.
-const NOTES: [(&str, &str); 13] = [
+const NOTES: [(&str, &str); 17] = [
     (
         "GeoTIFF",
         "Known by its first bytes, BigTIFF too. Keys, world files, `.prj`, `.aux.xml` and `.msk` are read. Chunks are decoded in parallel and never more than a few at a time; \
-         files may be sparse, planar, and of bits from 1 to 64. Of several bands `--band` names one. Sub-images and overviews are passed over. JPEG, WebP, LZMA and JPEG XL chunks are refused with a command that \
+         files may be sparse, planar, and of bits from 1 to 64. Of several bands `--band` names one. Sub-images and overviews are passed over. JPEG, WebP, JPEG 2000, LZMA and JPEG XL chunks are refused with a command that \
          converts them.",
     ),
     ("Cloud-optimised GeoTIFF", "A GeoTIFF with overviews; the full image is read."),
+    (
+        "Virtual raster (.vrt)",
+        "As gdalbuildvrt and gdal_translate write them: simple and complex sources with scale, offset, exponent, table and \"no data\", pieces with fractions of samples, the kernels nearest, bilinear, cubic, lanczos and \
+         average, masks, alpha, hidden \"no data\", virtual rasters in each other. What no file covers is void, where GDAL gives a number. A file that is missing or damaged is named and left out. \
+         Pixel functions and other derived bands, warped, pansharpened and raw ones are refused with the command that writes them out. What gdalbuildvrt makes of several files is compared in a test of its own, import_gdal_mosaics.",
+    ),
     (
         "netCDF",
         "Classic files, those with 64-bit offsets, and version 4 (HDF5). COARDS and CF: coordinates, `_FillValue`, `missing_value`, `scale_factor`, `add_offset`, `units`, `positive`, grid \
@@ -42,10 +48,19 @@ const NOTES: [(&str, &str); 13] = [
     ),
     ("Netpbm (PGM)", "Plain and raw greymaps of up to 16 bits, and `Pf` floats."),
     ("VTP BT", "Versions 1.0 to 1.3. The `.prj` beside it is the system where the header points to it."),
+    (
+        "Surfer, text",
+        "`.grd` that begins with `DSAA`. 1.70141e38 is a void. A `.prj` or `.aux.xml` beside it says the system.",
+    ),
+    ("Surfer 6", "`.grd` that begins with `DSBB`; as the text."),
+    (
+        "Surfer 7",
+        "`.grd` that begins with `DSRB`; its own value of voids. Sections of faults are passed over.",
+    ),
     ("DTED", "Levels 0 to 2; columns of any length."),
     (
         ".hgt tile",
-        "Of any size, also 1801 x 3601; packed by gzip or zip; a folder or several tiles are one mosaic. The name says the place. GDAL's tool is the truth here too, in a test of its own.",
+        "Of any size, also 1801 x 3601; packed by gzip or zip. The name says the place. GDAL's tool is the truth here too, in a test of its own.",
     ),
     ("USGS DEM", "Whole sheets of types A and B, in degrees or UTM, in metres or feet."),
 ];
@@ -78,8 +93,13 @@ pub(crate) fn page() -> String {
         );
     }
     page.push_str(
-        "| headerless heightmap | - | any, stated as `--raw WxH:TYPE`; square `.r16`, `.r32` and `.raw` by their length | `--nodata` |\n\n\
+        "| headerless heightmap | - | any, stated as `--raw WxH:TYPE`; square `.r16`, `.r32` and `.raw` by their length | `--nodata` |\n\
+         | map tiles: folders, MBTiles, PMTiles | - | packed into colours | transparent, missing |\n\n\
          `--nodata` adds a mark of voids to any format. All formats are read in bounded memory (`--memory`).\n\n",
+    );
+    page.push_str(
+        "Several files, folders and patterns of any of these formats are one mosaic: of unlike resolution, system, type, unit, \"no data\" and overlap. They are compared with gdalbuildvrt sample by sample where they lie on one \
+         grid, and with gdalwarp where they do not, in the test import_gdal_mosaics. [build](manual/build.md#several-files) tells the rules.\n\n",
     );
     for format in FORMATS {
         let notes = NOTES.iter().find(|(name, _)| *name == format.name).map_or("", |(_, notes)| notes);
@@ -89,6 +109,12 @@ pub(crate) fn page() -> String {
             let _ = writeln!(page, "Stored as: {}.\n", joined("; ", storage.iter().copied()));
         }
     }
+    page.push_str(
+        "### Map tiles\n\n\
+         Pyramids of web-map tiles in EPSG:3857: folders of `zoom/column/row.png` (XYZ, and TMS), MBTiles, and PMTiles of version 3. Heights are packed into PNG or lossless WebP, as \
+         `--decode` or the pyramid's metadata say. One zoom is read, by `--zoom` and `--bounds`. Tiles of AVIF and vector tiles are refused, and so are directories packed by Brotli. GDAL's reading is the truth \
+         here too, in the test `import_gdal_tiles`.\n\n",
+    );
     page.push_str(
         "## Which way rows and columns go\n\n| grid | files compared | what is done |\n|---|---|---|\n",
     );

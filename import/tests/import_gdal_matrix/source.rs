@@ -49,7 +49,14 @@ pub(crate) fn make(folder: &Path, combination: &Combination) -> Result<PathBuf, 
         arguments.extend(["-co", option]);
     }
     let inside = if void == Void::InsideMask { "YES" } else { "NO" };
-    arguments.extend(["--config", "GDAL_TIFF_INTERNAL_MASK", inside, "source.vrt", &name]);
+    // A virtual raster is one of a file that is none.
+    let mut source = "source.vrt";
+    if combination.format.driver == "VRT" {
+        source = "between.tif";
+        let between = ["-q", "--config", "GDAL_TIFF_INTERNAL_MASK", inside, "source.vrt", source];
+        run(folder, "gdal_translate", &between)?;
+    }
+    arguments.extend(["--config", "GDAL_TIFF_INTERNAL_MASK", inside, source, &name]);
     run(folder, "gdal_translate", &arguments)?;
     if let (Void::AuxXml, Some(mark)) = (void, void.mark(kind)) {
         let beside = format!(

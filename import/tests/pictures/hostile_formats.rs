@@ -1,0 +1,142 @@
+//! WebP and JPEG 2000 made to exhaust memory or time, bare, in a JP2 file and inside of a TIFF.
+
+use super::*;
+
+const BARE: &[u8] = include_bytes!("../image_fixtures/grey.j2k");
+const TILED: &[u8] = include_bytes!("../image_fixtures/rgb-tiles.jp2");
+const LOSSY: &[u8] = include_bytes!("../image_fixtures/rgb.webp");
+
+fn find(bytes: &[u8], wanted: &[u8]) -> usize {
+    bytes.windows(wanted.len()).position(|window| window == wanted).unwrap()
+}
+
+/// A stream with other sizes of picture and tile.
+fn resized(stream: &[u8], size: [u32; 2], tile: [u32; 2]) -> Vec<u8> {
+    let mut bytes = stream.to_vec();
+    let at = find(&bytes, b"\xff\x51") + 6;
+    for (number, at) in [(size[0], at), (size[1], at + 4), (tile[0], at + 16), (tile[1], at + 20)] {
+        bytes[at..at + 4].copy_from_slice(&number.to_be_bytes());
+    }
+    bytes
+}
+
+fn needs_memory(error: &LayoutError) -> u64 {
+    let Some(Remedy::Memory { enough_mib: Some(enough) }) = error.remedy() else { panic!("{error}") };
+    enough
+}
+
+#[test]
+fn the_memory_of_a_jpeg_2000_is_asked_for_before_it_is_taken() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let side = 40_000;
+    let large = resized(BARE, [side; 2], [side; 2]);
+    assert!(needs_memory(&bench.refusal(&bench.write("a.j2k", &large))) > 10_000);
+    // More tiles than a picture can have, and tiles that are not there.
+    let many = resized(BARE, [side; 2], [8; 2]);
+    assert!(bench.refusal(&bench.write("b.j2k", &many)).to_string().contains("more tiles"));
+    let missing = resized(BARE, [side; 2], [1024; 2]);
+    assert!(bench.refusal(&bench.write("c.j2k", &missing)).to_string().contains("tile 1 of 1600 is missing"));
+    for size in [[0, 9], [u32::MAX, u32::MAX]] {
+        bench.refusal(&bench.write("d.j2k", &resized(BARE, size, [64; 2])));
+    }
+    bench.refusal(&bench.write("e.j2k", &resized(BARE, [72, 56], [0; 2])));
+}
+
+/// Blocks of 4 x 4 samples, each of 32 layers: hundreds of bytes a block.
+#[test]
+fn small_blocks_of_a_jpeg_2000_count_as_memory() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let mut small = resized(BARE, [1500; 2], [1500; 2]);
+    let plain = open_image(&bench.write("a.j2k", &small)).unwrap().info().memory_bytes;
+    let style = find(&small, b"\xff\x52");
+    small[style + 6..style + 8].copy_from_slice(&32u16.to_be_bytes());
+    small[style + 10..style + 12].fill(0);
+    let image = open_image(&bench.write("b.j2k", &small)).unwrap();
+    let told = image.info().memory_bytes;
+    assert!(told > 5 * plain, "{told}, {plain} before");
+    let (_, bytes) = peak(|| image.rows().and_then(|mut rows| rows.read(&mut vec![0; 4 * 1500])));
+    assert!(bytes as u64 <= told + 2 * MIB as u64, "{bytes} taken, {told} told");
+    // The same in the header of a tile, of which the main header says nothing.
+    let mut hidden = resized(BARE, [1000; 2], [1000; 2]);
+    let length = usize::from(u16::from_be_bytes([small[style + 2], small[style + 3]])) + 2;
+    let segment = small[style..style + length].to_vec();
+    let data = find(&hidden, b"\xff\x93");
+    let part = find(&hidden, b"\xff\x90");
+    hidden.splice(data..data, segment);
+    let whole = u32::from_be_bytes(hidden[part + 6..part + 10].try_into().unwrap());
+    if whole > 0 {
+        hidden[part + 6..part + 10].copy_from_slice(&(whole + length as u32).to_be_bytes());
+    }
+    let said = bench.refusal(&bench.write("c.j2k", &hidden)).to_string();
+    assert!(said.contains("smaller blocks"), "{said}");
+}
+
+#[test]
+fn a_jpeg_2000_takes_no_more_memory_than_it_says() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let image = open_image(&bench.write("a.j2k", &resized(BARE, [2048; 2], [2048; 2]))).unwrap();
+    let (_, bytes) = peak(|| image.rows().and_then(|mut rows| rows.read(&mut vec![0; 4 * 2048])));
+    let told = image.info().memory_bytes as usize;
+    assert!(bytes <= told + 2 * MIB, "{bytes} taken, {told} told");
+}
+
+#[test]
+fn boxes_of_a_jp2_end() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let head = &TILED[..find(TILED, b"jp2h") - 4];
+    let boxes = |kind: &[u8; 4], length: u32, count: usize| {
+        [head, &[&length.to_be_bytes()[..], kind].concat().repeat(count)].concat()
+    };
+    for bytes in [
+        boxes(b"free", 8, 1 << 20),
+        boxes(b"free", 0, 3),
+        boxes(b"free", 4, 3),
+        boxes(b"uuid", u32::MAX, 1),
+        boxes(b"jp2h", u32::MAX, 2),
+        boxes(b"asoc", 16, 1 << 16),
+        boxes(b"jp2c", 8, 2),
+    ] {
+        bench.refusal(&bench.write("a.jp2", &bytes));
+    }
+    // A box of a GeoTIFF that is none is passed over, with a word.
+    let mut other = TILED.to_vec();
+    let tiff = find(&other, b"II*\0");
+    other[tiff + 4..tiff + 8].fill(0xff);
+    let image = open_image(&bench.write("b.jp2", &other)).unwrap();
+    assert!(image.info().notes.iter().any(|note| note.contains("GeoJP2")), "{:?}", image.info().notes);
+}
+
+#[test]
+fn a_webp_is_no_larger_than_it_says() {
+    let _alone = alone();
+    let bench = Bench::new();
+    // A frame of 16,383 x 16,383 in a picture of 72 x 56, behind a header of its own.
+    let mut frame = LOSSY[12..].to_vec();
+    frame[14..18].copy_from_slice(&[0xff, 0x3f, 0xff, 0x3f]);
+    let canvas = [b"VP8X\x0a\0\0\0\0\0\0\0".as_slice(), &[71, 0, 0, 55, 0, 0]].concat();
+    let riff = |content: Vec<u8>| {
+        [&b"RIFF"[..], &(content.len() as u32 + 4).to_le_bytes(), b"WEBP", &content].concat()
+    };
+    let said = bench.refusal(&bench.write("a.webp", &riff([canvas, frame.clone()].concat()))).to_string();
+    assert!(said.contains("another size"), "{said}");
+    // By itself it is a picture of two gigabytes.
+    assert!(needs_memory(&bench.refusal(&bench.write("b.webp", &riff(frame)))) > 2000);
+    // Chunks without end, and one that is cut short.
+    let many = riff([&LOSSY[12..12], &b"ABCD\0\0\0\0".repeat(1 << 16)].concat());
+    bench.refusal(&bench.write("c.webp", &many));
+    bench.refusal(&bench.write("d.webp", &LOSSY[..LOSSY.len() / 2]));
+    // Inside of a TIFF whose tiles are of another size.
+    for (size, is_read) in [([72, 56], true), ([80, 56], false)] {
+        let mut tags = picture(size, 50001, size, &[(DATA_AT, LOSSY.len() as u32)]);
+        tags.push(shorts(259, &[50001]));
+        let path = bench.write("e.tif", &tiff(false, tags, LOSSY));
+        match is_read {
+            true => drop(Bench::new().drape(&path, 256).0.unwrap()),
+            false => assert!(bench.refusal(&path).to_string().contains("72 x 56")),
+        }
+    }
+}
