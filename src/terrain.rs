@@ -32,7 +32,7 @@ impl Terrain {
     /// Opens the terrain file `base` with the edits in the file `overlay`. Edits go to the overlay then.
     ///
     /// # Errors
-    /// As [`Terrain::open`] of either; an overlay of another terrain, or of another state of this one.
+    /// As [`Terrain::open`] of either; an overlay of another terrain, or of one that was written anew since.
     #[cfg(feature = "files")]
     pub fn open_with_overlay(base: impl AsRef<Path>, overlay: impl AsRef<Path>) -> Result<Self, LayoutError> {
         let file = TerrainFile::open_with_overlay_unmapped(base.as_ref(), overlay.as_ref())?;

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use terrasoar_layout::edit::{
-    Area, Brush, BrushAction, Crater, Edit, Falloff, HeightWindow, MAX_EDIT_SAMPLES, SampleRect, Stamp,
-    StampMode,
+    Area, Brush, BrushAction, Crater, Crest, Edit, Falloff, HeightWindow, Limit, Line, MAX_EDIT_SAMPLES,
+    SampleRect, Stamp, StampMode,
 };
 use terrasoar_layout::grid::Grid;
 
@@ -141,11 +141,55 @@ fn defined(edit: &Edit, grid: &Grid, old: &HeightWindow, original: &HeightWindow
                 height
             }
         }
+        Edit::Limit { area, height_m, limit } => match limit {
+            _ if !inside(area) => height,
+            Limit::AtLeast => height.max(*height_m),
+            Limit::AtMost => height.min(*height_m),
+        },
+        Edit::Line(line) => {
+            let [px, py] = way([0.0; 2]);
+            let pieces = line.path_m.windows(2);
+            let distance = pieces.map(|ends| nearest(ends[0], ends[1], [px, py])).fold(f64::MAX, f64::min);
+            let fall = line.slope * (distance - line.width_m / 2.0).max(0.0);
+            match line.crest {
+                Crest::Above(by) if fall < by => height + by - fall,
+                Crest::Below(by) if fall < by => height - by + fall,
+                Crest::Level { height_m, limit, sides_m } if fall <= sides_m => match limit {
+                    Some(Limit::AtLeast) => height.max(height_m - fall),
+                    Some(Limit::AtMost) => height.min(height_m + fall),
+                    None => height.clamp(height_m - fall, height_m + fall),
+                },
+                _ => height,
+            }
+        }
         Edit::Restore(area) => {
             let before = original.height_m(x, y);
             if inside(area) && !before.is_nan() { before } else { height }
         }
     }
+}
+
+/// Distance of a place from a piece of a path, by its angles: beside the piece it is that from the straight line (Heron), beyond it that from an end.
+fn nearest(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
+    let between = |u: [f64; 2], v: [f64; 2]| (u[0] - v[0]).hypot(u[1] - v[1]);
+    let (ab, ap, bp) = (between(a, b), between(a, p), between(b, p));
+    if ab == 0.0 || ap * ap >= bp * bp + ab * ab || bp * bp >= ap * ap + ab * ab {
+        return ap.min(bp);
+    }
+    ((b[0] - a[0]) * (a[1] - p[1]) - (a[0] - p[0]) * (b[1] - a[1])).abs() / ab
+}
+
+fn any_line() -> impl Strategy<Value = Edit> {
+    let limit = prop::sample::select(vec![None, Some(Limit::AtLeast), Some(Limit::AtMost)]);
+    let crest = prop_oneof![
+        2 => (-50.0..50.0f64, limit, 0.0..80.0f64)
+            .prop_map(|(height_m, limit, sides_m)| Crest::Level { height_m, limit, sides_m }),
+        1 => (0.0..50.0f64).prop_map(Crest::Above),
+        1 => (0.0..50.0f64).prop_map(Crest::Below),
+    ];
+    let path = prop::collection::vec(any_place(), 2..6);
+    (path, crest, prop_oneof![Just(0.0), 0.0..90.0f64], 0.2..9.0f64)
+        .prop_map(|(path_m, crest, width_m, slope)| Edit::Line(Line { path_m, crest, width_m, slope }))
 }
 
 fn any_place() -> impl Strategy<Value = [f64; 2]> {
@@ -199,6 +243,12 @@ fn any_edit() -> impl Strategy<Value = Edit> {
         }),
         1 => any_stamp(),
         1 => (any_area(), -50.0..50.0f64).prop_map(|(area, height_m)| Edit::Set { area, height_m }),
+        1 => (any_area(), -50.0..50.0f64, any::<bool>()).prop_map(|(area, height_m, up)| Edit::Limit {
+            area,
+            height_m,
+            limit: if up { Limit::AtLeast } else { Limit::AtMost },
+        }),
+        3 => any_line(),
         1 => any_area().prop_map(Edit::Restore),
     ]
 }

@@ -7,7 +7,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::edit::{Crater, Edit, EditSession, compact};
+use terrasoar_layout::build::HeightRoom;
+use terrasoar_layout::edit::{Crater, Edit, EditSession, compact, widen};
 use terrasoar_layout::file::disk::{Disk, FailingDisk, Failure, SystemDisk};
 use terrasoar_layout::imagery::{
     DrapeOptions, Extent, Imagery, MemoryImage, Paint, Region, TileFormat, TileId,
@@ -266,4 +267,138 @@ fn compacting_keeps_the_paint_and_nothing_else() {
     let compacted = open(&out, None);
     assert!(State::of(&compacted) == State::of(&terrain));
     assert_eq!(unused_bytes(&compacted).unwrap(), 0);
+}
+
+/// As [`made`], with room for deep craters.
+fn roomy(folder: &Path) -> PathBuf {
+    let path = made(folder);
+    let room = HeightRoom { lowest_m: 0.0, highest_m: 400.0 };
+    widen(&SystemDisk, &path, room, 64, &Silent).unwrap();
+    path
+}
+
+/// What is done to a base under its overlays.
+fn change(path: &Path, step: u32) {
+    let mut session = EditSession::open(path).unwrap();
+    match step % 5 {
+        0 | 3 => fire(&mut session, &[10 + step]).unwrap(),
+        1 => {
+            drop(session);
+            return drape_over(path, 5 + step);
+        }
+        2 => drop(session.undo().unwrap().unwrap()),
+        // The state that was undone before is left behind.
+        _ => drop(session.undo().unwrap()),
+    }
+    session.commit(&format!("step {step}")).unwrap();
+}
+
+/// A base only grows: overlays begun over any of its states go on showing that state and their own edits, whatever it is given later, and can be edited on.
+#[test]
+fn overlays_outlive_what_their_base_is_given_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = roomy(folder.path());
+    let mut begun: Vec<(PathBuf, State)> = Vec::new();
+    for step in 0..10 {
+        let before = State::of(&open(&path, None));
+        for (kind, edits) in [("plain", &[][..]), ("edited", &[step + 30, step + 31])] {
+            let overlay = folder.path().join(format!("{kind}{step}.iqo"));
+            let mut session = session_on(Arc::new(SystemDisk), &path, Some(&overlay)).unwrap();
+            assert!(!session.editor().terrain().base_has_grown());
+            fire(&mut session, edits).unwrap();
+            session.commit("begun").unwrap();
+            drop(session);
+            let state = State::of(&open(&path, Some(&overlay)));
+            assert_eq!(state == before, edits.is_empty());
+            begun.push((overlay, state));
+        }
+        change(&path, step);
+        let base = std::fs::read(&path).unwrap();
+        for (i, (overlay, state)) in begun.iter_mut().enumerate() {
+            for terrain in [
+                Terrain::open_with_overlay(&path, overlay).unwrap(),
+                Terrain::open_with_overlay_unmapped(&path, overlay).unwrap(),
+            ] {
+                assert!(terrain.base_has_grown());
+                assert!(State::of(&terrain) == *state, "{} after step {step}", overlay.display());
+                assert!(State::of(&terrain.open_again_unmapped().unwrap()) == *state);
+            }
+            // Some are edited on, by one batch that is undone and redone.
+            if (i as u32 + step).is_multiple_of(4) {
+                let mut session = session_on(Arc::new(SystemDisk), &path, Some(overlay)).unwrap();
+                assert!(session.editor().terrain().base_has_grown());
+                fire(&mut session, &[50 + step]).unwrap();
+                session.commit("later").unwrap();
+                let later = State::of(&open(&path, Some(overlay)));
+                assert!(later != *state);
+                session.undo().unwrap().unwrap();
+                assert!(State::of(&open(&path, Some(overlay))) == *state);
+                session.redo().unwrap().unwrap();
+                *state = later;
+            }
+        }
+        assert!(std::fs::read(&path).unwrap() == base);
+    }
+    // The two together, as a file of its own.
+    let out = folder.path().join("out.iqt");
+    for (overlay, state) in &begun {
+        compact(&SystemDisk, &path, Some(overlay), &out, &Silent).unwrap();
+        assert!(State::of(&open(&out, None)) == *state, "{}", overlay.display());
+    }
+    // A base that is written anew holds no older states, however much it grows afterwards.
+    compact(&SystemDisk, &path, None, &path, &Silent).unwrap();
+    for grown in 0..12 {
+        for (overlay, _) in &begun {
+            let error = Terrain::open_with_overlay(&path, overlay).unwrap_err().to_string();
+            assert!(error.contains("was written anew after these edits were begun"), "{grown}: {error}");
+            assert!(EditSession::open_overlay(&path, overlay).is_err());
+        }
+        change(&path, grown % 2);
+    }
+}
+
+/// A base that was taken back to a copy, and edited otherwise than before, has the same beginnings and is another file all the same.
+#[test]
+fn an_overlay_is_refused_over_a_base_that_went_another_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, overlay) = (roomy(folder.path()), folder.path().join("o.iqo"));
+    let copy = std::fs::read(&path).unwrap();
+    change(&path, 0);
+    let mut session = EditSession::open_overlay(&path, &overlay).unwrap();
+    fire(&mut session, &[70]).unwrap();
+    session.commit("over").unwrap();
+    drop(session);
+    let (edited, header) = (std::fs::read(&path).unwrap(), open(&path, None).header().clone());
+
+    std::fs::write(&path, &copy).unwrap();
+    let refused = || {
+        let error = Terrain::open_with_overlay_unmapped(&path, &overlay).unwrap_err().to_string();
+        assert!(error.contains("o.iqo") && error.contains("written anew"), "{error}");
+    };
+    refused();
+    for step in [3, 3, 1] {
+        change(&path, step);
+        refused();
+    }
+    // The pages of the base's last commit are looked at: a directory that outlived them is not enough.
+    std::fs::write(&path, &edited).unwrap();
+    change(&path, 3);
+    let grown = std::fs::read(&path).unwrap();
+    Terrain::open_with_overlay_unmapped(&path, &overlay).unwrap();
+    let newest = open_entries(&edited, folder.path(), header.generation);
+    assert!(!newest.is_empty());
+    for page in newest {
+        let mut damaged = grown.clone();
+        damaged[page as usize * 4096 + 77] ^= 0x20;
+        std::fs::write(&path, damaged).unwrap();
+        refused();
+    }
+}
+
+/// Pages of the record pages that a generation wrote.
+fn open_entries(bytes: &[u8], folder: &Path, generation: u32) -> Vec<u32> {
+    let path = folder.join("look.iqt");
+    std::fs::write(&path, bytes).unwrap();
+    let terrain = Terrain::open_unmapped(&path).unwrap();
+    terrain.entries().iter().filter(|entry| entry.generation == generation).map(|entry| entry.page).collect()
 }

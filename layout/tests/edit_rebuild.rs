@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use std::sync::Arc;
 use terrasoar_layout::build::{BuildOptions, rebuild};
 use terrasoar_layout::dem::SampleType;
-use terrasoar_layout::edit::{Changes, Editor, HeightWindow, SampleRect};
+use terrasoar_layout::edit::{Area, Changes, Crest, Edit, Editor, HeightWindow, Limit, Line, SampleRect};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::bytes::Page;
 use terrasoar_layout::file::disk::SystemDisk;
@@ -127,7 +127,7 @@ struct Stroke {
 }
 
 fn strokes() -> impl Strategy<Value = Vec<Stroke>> {
-    let stroke = ([0u32..=100, 0u32..=100], [1u32..40, 1u32..40], 0u8..4, any::<u64>())
+    let stroke = ([0u32..=100, 0u32..=100], [1u32..40, 1u32..40], 0u8..7, any::<u64>())
         .prop_map(|(corner, size, kind, seed)| Stroke { corner, size, kind, seed });
     prop::collection::vec(stroke, 1..8)
 }
@@ -142,6 +142,9 @@ fn apply(bench: &mut Bench, stroke: Stroke) -> Changes {
         east: (west + stroke.size[0] - 1).min(wide - 1),
         north: (south + stroke.size[1] - 1).min(high - 1),
     };
+    if stroke.kind > 3 {
+        return bench.editor.apply(&[shaped(bench.terrain(), rect, stroke)]).unwrap();
+    }
     let mut window = bench.editor.heights(rect).unwrap();
     for y in rect.south..=rect.north {
         for x in rect.west..=rect.east {
@@ -157,6 +160,21 @@ fn apply(bench: &mut Bench, stroke: Stroke) -> Changes {
         }
     }
     bench.editor.set_heights(&window).unwrap()
+}
+
+/// A dam, a road or a floor over the rectangle, within the heights that the file holds. It may reach beyond the rectangle, not to the corner that is left alone.
+fn shaped(terrain: &Terrain, rect: SampleRect, stroke: Stroke) -> Edit {
+    let [dx, dy] = terrain.grid().spacing_m();
+    let at = |x: u32, y: u32| [f64::from(x) * dx, f64::from(y) * dy];
+    let height_m = (stroke.seed % 1000) as f64;
+    let limit = match stroke.kind {
+        4 => Some(Limit::AtLeast),
+        5 => None,
+        _ => return Edit::Limit { area: Area::Rect(rect), height_m, limit: Limit::AtMost },
+    };
+    let path_m = vec![at(rect.west, rect.south), at(rect.east, rect.south), at(rect.west + 1, rect.north)];
+    let crest = Crest::Level { height_m, limit, sides_m: 0.9 * dy };
+    Edit::Line(Line { path_m, crest, width_m: 0.05 * dy, slope: 1.0 })
 }
 
 fn options(record: Option<RecordKind>, error: ErrorKind, spacing: [f64; 2]) -> BuildOptions {

@@ -2,15 +2,19 @@
 //!
 //! Reader and writer both go through here, so what one accepts the other accepts. Nothing here does I/O.
 
+mod line;
+
 use super::words::{Fields, list, number, quoted, split, whole};
 use super::{Moment, StampFile, Step};
 use crate::flight::format::{excerpt, push_number};
-use terrasoar_layout::edit::{Area, Brush, BrushAction, Crater, Edit, Falloff, SampleRect, StampMode};
+use terrasoar_layout::edit::{Area, Brush, BrushAction, Crater, Edit, Falloff, Limit, SampleRect, StampMode};
 
 /// Highest version of the format that is read.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// The version in which `rect` is metres; before, it counts samples.
 const METRES: u32 = 2;
+/// The version from which there are lines, `mode` for `set`, and stamps without `sample`.
+const LINES: u32 = 3;
 /// Most edits a script may have.
 pub const MAX_EDITS: u64 = 1_000_000;
 /// Most bytes of a line, its end not counted.
@@ -30,6 +34,7 @@ const RESTORE: &str = "restore rect W,S,E,N` or `restore disc X,Y radius M";
 const RESTORE_METRES: &str = "restore rect W,S,E,N`, `restore disc X,Y radius M` or `restore samples W,S,E,N";
 const SET: &str = "set rect W,S,E,N to M` or `set disc X,Y radius M to M";
 const SET_METRES: &str = "set rect W,S,E,N to M`, `set disc X,Y radius M to M` or `set samples W,S,E,N to M";
+const SET_MODES: &str = "set rect W,S,E,N to M mode set|max|min`, `set disc X,Y radius M to M mode set|max|min` or `set samples W,S,E,N to M mode set|max|min";
 const SMOOTH: &str = "smooth at X,Y radius M strength 0..1 falloff hard|linear|smooth";
 const STAMP: &str = "stamp FILE sample COLUMN,ROW mode set|add|max|min";
 
@@ -37,6 +42,10 @@ const FALLOFFS: [(&str, Falloff); 3] =
     [("hard", Falloff::Hard), ("linear", Falloff::Linear), ("smooth", Falloff::Smooth)];
 const MODES: [(&str, StampMode); 4] =
     [("set", StampMode::Set), ("add", StampMode::Add), ("max", StampMode::Max), ("min", StampMode::Min)];
+
+/// Which way ground is moved; nothing said is both.
+const LIMITS: [(&str, Option<Limit>); 3] =
+    [("set", None), ("max", Some(Limit::AtLeast)), ("min", Some(Limit::AtMost))];
 
 /// What a line of a script is.
 #[derive(Debug, PartialEq)]
@@ -106,12 +115,10 @@ fn step(words: &[String], version: u32) -> Result<Step, String> {
             Ok(BrushAction::Flatten { height_m, strength: strength(f)? })
         })?,
         "smooth" => brush(Fields::new(rest, SMOOTH), |f| Ok(BrushAction::Smooth { strength: strength(f)? }))?,
-        "set" => {
-            let mut fields = Fields::new(rest, SET);
-            let form = if version < METRES { SET } else { SET_METRES };
-            let (area, height_m) = (area(&mut fields, version, form)?, fields.required("to", number)?);
-            fields.finish()?;
-            Edit::Set { area, height_m }
+        "set" => set(rest, version)?,
+        "line" if version >= LINES => line::parse(rest)?,
+        "line" => {
+            return Err("a line takes version 3; write `terrasoar-edits 3` in the first line".into());
         }
         "restore" => {
             let mut fields = Fields::new(rest, RESTORE);
@@ -119,10 +126,10 @@ fn step(words: &[String], version: u32) -> Result<Step, String> {
             fields.finish()?;
             Edit::Restore(area)
         }
-        "stamp" => return stamp(rest).map(Step::Stamp),
+        "stamp" => return stamp(rest, version).map(Step::Stamp),
         _ => {
             return Err(format!(
-                "{} is nothing that can be done; write crater, raise, lower, flatten, smooth, stamp, set or restore",
+                "{} is nothing that can be done; write crater, raise, lower, flatten, smooth, line, stamp, set or restore",
                 excerpt(verb)
             ));
         }
@@ -185,7 +192,23 @@ fn area(fields: &mut Fields<'_>, version: u32, form: &str) -> Result<Area, Strin
     }
 }
 
-fn stamp(words: &[String]) -> Result<StampFile, String> {
+fn set(words: &[String], version: u32) -> Result<Edit, String> {
+    let mut fields = Fields::new(words, if version < LINES { SET } else { SET_MODES });
+    let form = match version {
+        ..METRES => SET,
+        METRES => SET_METRES,
+        _ => SET_MODES,
+    };
+    let (area, height_m) = (area(&mut fields, version, form)?, fields.required("to", number)?);
+    let limit = if version < LINES { None } else { fields.optional("mode", |word| named(word, &LIMITS))? };
+    fields.finish()?;
+    Ok(match limit.flatten() {
+        None => Edit::Set { area, height_m },
+        Some(limit) => Edit::Limit { area, height_m, limit },
+    })
+}
+
+fn stamp(words: &[String], version: u32) -> Result<StampFile, String> {
     let Some((file, rest)) = words.split_first() else {
         return Err(format!("the file is missing; write `{STAMP}`"));
     };
@@ -193,7 +216,11 @@ fn stamp(words: &[String]) -> Result<StampFile, String> {
         return Err(format!("the file has no name; write `{STAMP}`"));
     }
     let mut fields = Fields::new(rest, STAMP);
-    let at = fields.required("sample", |word| list(word, "120,-4", whole::<i64>))?;
+    let sample = |word: &str| list(word, "120,-4", whole::<i64>);
+    let at = match version {
+        ..LINES => Some(fields.required("sample", sample)?),
+        _ => fields.optional("sample", sample)?,
+    };
     let mode = fields.optional("mode", |word| named(word, &MODES))?.unwrap_or_default();
     fields.finish()?;
     Ok(StampFile { file: file.clone(), at, mode })
@@ -217,6 +244,7 @@ pub(super) fn version_of(step: &Step) -> u32 {
         Step::Edit(Edit::Set { area: Area::Extent { .. }, .. } | Edit::Restore(Area::Extent { .. })) => {
             METRES
         }
+        Step::Edit(Edit::Line(_) | Edit::Limit { .. }) | Step::Stamp(StampFile { at: None, .. }) => LINES,
         _ => 1,
     }
 }
@@ -230,7 +258,8 @@ pub(super) fn push_step(line: &mut String, step: &Step, version: u32) -> Result<
                 format!("no line can hold the file name {}; rename the file", excerpt(&stamp.file))
             })?;
             let mode = name_of(&stamp.mode, &MODES);
-            line.push_str(&format!("stamp {file} sample {},{} mode {mode}", stamp.at[0], stamp.at[1]));
+            let at = stamp.at.map_or_else(String::new, |[column, row]| format!(" sample {column},{row}"));
+            line.push_str(&format!("stamp {file}{at} mode {mode}"));
         }
         Step::Edit(Edit::Stamp(_)) => {
             return Err("a stamp in memory has no file to be named; write its heights to one".into());
@@ -275,6 +304,13 @@ fn push_edit(line: &mut String, edit: &Edit, version: u32) {
             push_area(line, area, version);
             push_values(line, "to", &[*height_m]);
         }
+        Edit::Limit { area, height_m, limit } => {
+            push_area(line, area, version);
+            push_values(line, "to", &[*height_m]);
+            line.push_str(" mode ");
+            line.push_str(name_of(&Some(*limit), &LIMITS));
+        }
+        Edit::Line(edit) => line::push(line, edit),
         Edit::Restore(area) => push_area(line, area, version),
         // Refused before.
         Edit::Stamp(_) => {}

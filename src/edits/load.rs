@@ -1,12 +1,14 @@
 //! Batches with the heights of their stamps. Elevation data that several stamps name is read once and shared.
 
+use super::place::Place;
 use super::{Batch, Moment, Script, ScriptError, StampFile, Step};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::dem::{DemSource, SampleSink, Window};
+use terrasoar_layout::dem::{DemSource, Georeference, SampleSink, Window};
 use terrasoar_layout::edit::{Edit, MAX_EDIT_SAMPLES, Stamp};
+use terrasoar_layout::file::header::Header;
 
 /// Opens a stamp's elevation data. The program says which formats there are.
 pub type OpenDem = fn(&Path) -> Result<Box<dyn DemSource>, LayoutError>;
@@ -17,7 +19,17 @@ pub struct Loader {
     /// The script, which errors name.
     script: PathBuf,
     open: OpenDem,
-    stamps: HashMap<PathBuf, ([u32; 2], Arc<[f64]>)>,
+    /// The terrain that is edited, for stamps that lie where they say themselves.
+    place: Option<Place>,
+    stamps: HashMap<PathBuf, ReadStamp>,
+}
+
+/// Elevation data in memory.
+#[derive(Debug)]
+struct ReadStamp {
+    samples: [u32; 2],
+    heights_m: Arc<[f64]>,
+    georeference: Georeference,
 }
 
 /// A batch ready to be applied.
@@ -34,7 +46,14 @@ pub struct LoadedBatch {
 impl Loader {
     /// For the batches of the script at `path`, in whose folder relative names of stamps start; `open` opens them.
     pub fn new(path: &Path, open: OpenDem) -> Self {
-        Self { script: path.to_owned(), open, stamps: HashMap::new() }
+        Self { script: path.to_owned(), open, place: None, stamps: HashMap::new() }
+    }
+
+    /// For a terrain with this header, on which stamps without a sample come where their own georeference says.
+    #[must_use]
+    pub fn over(mut self, terrain: &Header) -> Self {
+        self.place = Some(Place::of(terrain));
+        self
     }
 
     /// All batches of a script.
@@ -48,7 +67,7 @@ impl Loader {
     /// A batch with all heights in memory. Each file is read once.
     ///
     /// # Errors
-    /// [`ScriptError::Stamp`] if a stamp's file cannot be read, is no elevation data or is too large.
+    /// [`ScriptError::Stamp`] if a stamp's file cannot be read, is no elevation data or is too large; if it has no place of its own, or its samples do not lie on the terrain's.
     pub fn batch(&mut self, batch: &Batch) -> Result<LoadedBatch, ScriptError> {
         let edits =
             batch.steps.iter().map(|step| match step {
@@ -68,10 +87,22 @@ impl Loader {
         let path = self.script.parent().unwrap_or(Path::new("")).join(&stamp.file);
         if !self.stamps.contains_key(&path) {
             let source = (self.open)(&path)?;
-            self.stamps.insert(path.clone(), heights_of(source.as_ref(), &path)?);
+            let (samples, heights_m) = heights_of(source.as_ref(), &path)?;
+            let georeference = source.info().georeference.clone();
+            self.stamps.insert(path.clone(), ReadStamp { samples, heights_m, georeference });
         }
-        let (samples, heights_m) = &self.stamps[&path];
-        Stamp::new(stamp.at, *samples, Arc::clone(heights_m), stamp.mode)
+        let read = &self.stamps[&path];
+        let at = match (stamp.at, &self.place) {
+            (Some(at), _) => at,
+            (None, Some(place)) => place.of_stamp(&path, &read.georeference, read.samples)?,
+            (None, None) => {
+                return Err(LayoutError::Usage(format!(
+                    "{}: without `sample` a stamp needs a terrain to lie on; write `sample COLUMN,ROW`",
+                    path.display()
+                )));
+            }
+        };
+        Stamp::new(at, read.samples, Arc::clone(&read.heights_m), stamp.mode)
     }
 }
 

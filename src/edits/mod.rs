@@ -7,6 +7,7 @@
 mod error;
 mod format;
 mod load;
+mod place;
 pub mod rain;
 mod reader;
 #[cfg(test)]
@@ -65,8 +66,8 @@ pub enum Step {
 pub struct StampFile {
     /// Elevation data; a relative path starts at the script's folder.
     pub file: String,
-    /// The sample on which its south-west sample comes, columns east and rows north.
-    pub at: [i64; 2],
+    /// The sample on which its south-west sample comes, columns east and rows north; `None`: that on which it lies by its own georeference.
+    pub at: Option<[i64; 2]>,
     /// How its heights meet the ground.
     pub mode: StampMode,
 }

@@ -1,12 +1,14 @@
 //! Scripts as text: the specification's example, refusals at their lines, round trips, damage.
 
-use super::format::{self, Line};
+use super::format::{self, Line as Read};
 use super::*;
 use proptest::prelude::*;
 use std::path::Path;
-use terrasoar_layout::edit::{Area, Brush, BrushAction, Crater, Falloff, SampleRect};
+use terrasoar_layout::edit::{Area, Brush, BrushAction, Crater, Crest, Falloff, Limit, Line, SampleRect};
 
 const HEAD: &str = "terrasoar-edits 1\nunits metres degrees\n";
+
+const HEAD3: &str = "terrasoar-edits 3\nunits metres degrees\n";
 
 fn parse(text: &str) -> Result<Script, ScriptError> {
     Script::parse(text.as_bytes(), Path::new("a.edits"))
@@ -38,7 +40,7 @@ fn the_specifications_example_is_read() {
     );
     assert_eq!(
         script.batches[2].steps[0],
-        Step::Stamp(StampFile { file: "old castle.tif".into(), at: [52, 61], mode: StampMode::Max })
+        Step::Stamp(StampFile { file: "old castle.tif".into(), at: Some([52, 61]), mode: StampMode::Max })
     );
     assert_eq!(script.edits(), 9);
     assert_eq!(parse(&script.to_text(Path::new("x")).unwrap()).unwrap(), script);
@@ -70,7 +72,7 @@ fn what_is_wrong_is_said_at_its_line() {
             "a.edits:1: not a script of edits: it starts with `terrasoar-flight 1`",
         ),
         ("terrasoar-edits 0\n".into(), "a.edits:1: not a script"),
-        ("terrasoar-edits 3\n".into(), "a.edits:1: this is version `3`"),
+        ("terrasoar-edits 4\n".into(), "a.edits:1: this is version `4`"),
         ("terrasoar-edits 1\nunits feet\n".into(), "a.edits:2: found `units feet`; the second line must be"),
         (HEAD.into(), "a.edits: the script has no edits"),
         (format!("{HEAD}dig at 1,2\n"), "a.edits:3: `dig` is nothing that can be done; write crater, raise"),
@@ -94,6 +96,30 @@ fn what_is_wrong_is_said_at_its_line() {
         (format!("{HEAD}set to 4\n"), "where is not said"),
         (format!("{HEAD}set rect 1,2,3,4 disc 1,2 radius 5 to 4\n"), "said twice"),
         (format!("{HEAD}set rect -1,2,3,4 to 4\n"), "`-1` is not a whole number"),
+        (
+            format!("{HEAD}line from 1,2 to 3,4 crest 5 width 6\n"),
+            "a line takes version 3; write `terrasoar-edits 3`",
+        ),
+        (format!("{HEAD}set disc 1,2 radius 5 to 4 mode max\n"), "`mode` does not belong here"),
+        (format!("{HEAD3}set disc 1,2 radius 5 to 4 mode up\n"), "mode: `up` is none of set, max, min"),
+        (
+            format!("{HEAD3}line from 1,2 crest 5 width 6\n"),
+            "`to` is missing; write `line from X,Y via X,Y to",
+        ),
+        (format!("{HEAD3}line from 1,2 to 3,4 width 6\n"), "give `crest` or `by`, and not both"),
+        (format!("{HEAD3}line from 1,2 to 3,4 width 6 crest 1 by 1\n"), "give `crest` or `by`, and not both"),
+        (format!("{HEAD3}line from 1,2 to 3,4 width 6 by 1 mode set\n"), "`by` raises (mode max) or lowers"),
+        (format!("{HEAD3}line from 1,2 to 3,4 width 6 by 1 sides 4\n"), "leave `sides` out"),
+        (format!("{HEAD3}line from 1,2 to 3,4 width 6 by -1\n"), "line: the height is -1"),
+        (format!("{HEAD3}line from 1,2 to 3,4 width -6 crest 1\n"), "line: the width is -6"),
+        (
+            format!("{HEAD3}line from 1,2 to 3,4 width 6 crest 1 slope 0\n"),
+            "line: the slope is 0; give metres of fall",
+        ),
+        (
+            format!("{HEAD3}line from 1,2 {}to 3,4 width 6 crest 1\n", "via 5,6 ".repeat(127)),
+            "line: the path has 129 places; give 2 to 128, or several lines",
+        ),
         (format!("{HEAD}stamp\n"), "the file is missing"),
         (format!("{HEAD}stamp \"a b\n"), "quotation mark is open"),
         (format!("{HEAD}stamp a sample 1\n"), "sample: `1` is not such as 120,-4"),
@@ -113,7 +139,7 @@ fn what_is_wrong_is_said_at_its_line() {
     ] {
         let found = parse(&text).unwrap_err().to_string();
         assert!(found.contains(says), "{found}\nshould say: {says}");
-        assert!(found.contains("a.edits") && found.len() < 260, "{found}");
+        assert!(found.contains("a.edits") && found.len() < 320, "{found}");
     }
     let late = [HEAD.as_bytes(), b"# x\n\xff\xfe\n"].concat();
     let found = Script::parse(&late, Path::new("a.edits")).unwrap_err().to_string();
@@ -131,7 +157,7 @@ fn what_would_not_read_back_is_not_written() {
         Script { batches }.to_text(Path::new("x.edits")).map_err(|error| error.to_string())
     };
     let stamp = |file: &str| Batch {
-        steps: vec![Step::Stamp(StampFile { file: file.into(), at: [0, 0], mode: StampMode::Set })],
+        steps: vec![Step::Stamp(StampFile { file: file.into(), at: Some([0, 0]), mode: StampMode::Set })],
         ..Batch::default()
     };
     let at = |moment| Batch { moment: Some(moment), ..Batch::of([set()]) };
@@ -297,9 +323,31 @@ fn any_step() -> impl Strategy<Value = Step> {
         }),
         (any_area(), -1e7..=1e7f64).prop_map(|(area, height_m)| Step::Edit(Edit::Set { area, height_m })),
         any_area().prop_map(|area| Step::Edit(Edit::Restore(area))),
-        ("[ -!#-~é]{1,30}", any::<[i16; 2]>(), mode)
-            .prop_map(|(file, at, mode)| { Step::Stamp(StampFile { file, at: at.map(i64::from), mode }) }),
+        (any_area(), -1e7..=1e7f64, any::<bool>()).prop_map(|(area, height_m, up)| {
+            let limit = if up { Limit::AtLeast } else { Limit::AtMost };
+            Step::Edit(Edit::Limit { area, height_m, limit })
+        }),
+        any_line(),
+        ("[ -!#-~é]{1,30}", any::<Option<[i16; 2]>>(), mode).prop_map(|(file, at, mode)| {
+            Step::Stamp(StampFile { file, at: at.map(|at: [i16; 2]| at.map(i64::from)), mode })
+        }),
     ]
+}
+
+fn any_line() -> impl Strategy<Value = Step> {
+    let limit = prop::sample::select(vec![None, Some(Limit::AtLeast), Some(Limit::AtMost)]);
+    let crest = prop_oneof![
+        (-1e7..=1e7f64, limit, 0.0..=1e7f64).prop_map(|(height_m, limit, sides_m)| Crest::Level {
+            height_m,
+            limit,
+            sides_m
+        }),
+        (0.0..=1e7f64).prop_map(Crest::Above),
+        (0.0..=1e7f64).prop_map(Crest::Below),
+    ];
+    (prop::collection::vec(any_place(), 2..20), crest, 0.0..=1e7f64, 1e-3..=1e3f64).prop_map(
+        |(path_m, crest, width_m, slope)| Step::Edit(Edit::Line(Line { path_m, crest, width_m, slope })),
+    )
 }
 
 fn any_script() -> impl Strategy<Value = Script> {
@@ -347,13 +395,30 @@ proptest! {
     }
 
     #[test]
-    fn no_text_makes_it_panic(line in "[-a-z0-9.,\"# \t]{0,60}", verb in "(crater|raise|set|restore|stamp|batch|frame|at) ") {
+    fn no_text_makes_it_panic(line in "[-a-z0-9.,\"# \t]{0,60}", verb in "(crater|raise|set|line|restore|stamp|batch|frame|at) ") {
         for version in 1..=format::VERSION {
             let _ = format::parse(&line, version);
-            if let Ok(Line::Step(step)) = format::parse(&format!("{verb}{line}"), version) {
+            if let Ok(Read::Step(step)) = format::parse(&format!("{verb}{line}"), version) {
                 let mut text = String::new();
                 prop_assert!(format::push_step(&mut text, &step, version).is_ok());
             }
         }
     }
+}
+
+#[test]
+fn a_line_is_read_with_its_places_in_order_and_its_defaults() {
+    let text = format!(
+        "{HEAD3}line to 9,9 width 8 via 1,2 crest 430 from 0,0 via 3,4\nline from 0,0 to 1,1 by 3 width 0 mode min\n"
+    );
+    let script = parse(&text).unwrap();
+    let crest = Crest::Level { height_m: 430.0, limit: Some(Limit::AtLeast), sides_m: 200.0 };
+    let path_m = vec![[0.0, 0.0], [1.0, 2.0], [3.0, 4.0], [9.0, 9.0]];
+    let dam = Edit::Line(Line { path_m, crest, width_m: 8.0, slope: 0.5 });
+    let path_m = vec![[0.0, 0.0], [1.0, 1.0]];
+    let ditch = Edit::Line(Line { path_m, crest: Crest::Below(3.0), width_m: 0.0, slope: 0.5 });
+    assert_eq!(script.batches, [Batch::of([dam, ditch])]);
+    let written = script.to_text(Path::new("x")).unwrap();
+    let expected = "line from 0,0 via 1,2 via 3,4 to 9,9 crest 430 width 8 slope 0.5 sides 200 mode max\n";
+    assert!(written.starts_with("terrasoar-edits 3\n") && written.contains(expected), "{written}");
 }

@@ -106,6 +106,7 @@ impl Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
+    super::overlays::tell_of_growing(&args.file);
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         pool = pool.num_threads(usize::from(threads));

@@ -29,6 +29,7 @@ mod movie;
 mod movie_file;
 mod output;
 mod outputs;
+mod overlays;
 mod parse;
 #[cfg(feature = "pictures")]
 mod picture;

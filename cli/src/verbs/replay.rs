@@ -195,7 +195,8 @@ pub(super) fn batches_of(
     frames: &[FlightFrame],
     terrain: &Terrain,
 ) -> Result<Vec<TimedBatch>> {
-    let batches = Loader::new(script, terrasoar_import::open_file).script(&Script::read(script)?)?;
+    let mut loader = Loader::new(script, terrasoar_import::open_file).over(terrain.header());
+    let batches = loader.script(&Script::read(script)?)?;
     let warning = within::edits(&batches, terrain.grid(), Some(script))?;
     warning.iter().for_each(|words| complain(words));
     let late = batches.iter().filter(|batch| batch.frame(frames).is_none()).count();

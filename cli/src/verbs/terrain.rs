@@ -9,6 +9,7 @@ use terrasoar_layout::read::terrain::Terrain;
 
 use super::cache;
 use super::output::decimal;
+use super::overlays;
 
 /// Which terrain is read: a file, and edits of it in another.
 #[derive(Debug, clap::Args)]
@@ -24,7 +25,9 @@ impl TerrainArgs {
     /// Opens it, mapped. Elevation data is built first.
     pub(super) fn open(&self) -> Result<Terrain> {
         if let Some(overlay) = &self.overlay {
-            return Ok(Terrain::open_with_overlay(&self.file, overlay)?);
+            let terrain = Terrain::open_with_overlay(&self.file, overlay)?;
+            overlays::tell_of_older(&terrain);
+            return Ok(terrain);
         }
         match self.kept()? {
             Some(kept) => open(&kept),
@@ -44,10 +47,10 @@ impl TerrainArgs {
 
     /// Opens it without maps: what is cut short while it is read is an error, where a map would be a signal.
     pub(super) fn open_unmapped(&self) -> Result<Terrain> {
-        Ok(match &self.overlay {
-            Some(overlay) => Terrain::open_with_overlay_unmapped(&self.file, overlay)?,
-            None => Terrain::open_unmapped(&self.file)?,
-        })
+        let Some(overlay) = &self.overlay else { return Ok(Terrain::open_unmapped(&self.file)?) };
+        let terrain = Terrain::open_with_overlay_unmapped(&self.file, overlay)?;
+        overlays::tell_of_older(&terrain);
+        Ok(terrain)
     }
 
     /// Its files and others that are read, none of which an output may replace.

@@ -98,10 +98,11 @@ fn overlays_flights_and_scripts_are_spelt_out() {
         overlay[slot + 0xffc..slot + 0x1000].copy_from_slice(&sum.to_le_bytes());
     }
     fs::write(bench.path("o.iqo"), overlay).unwrap();
-    // Of another state of the terrain: its name of it is told.
-    edited(&bench);
-    let told = shown(&bench, &["info", "land.iqt", "--overlay", "o.iqo"]);
-    assert!(told.contains(r"belong to \u{1b}[2J"), "{told}");
+    // Of another terrain: its name of it is told.
+    bench.good(&["synth", "--size", "65", "--seed", "3", "-o", "hills.tif"]);
+    bench.good(&["build", "hills.tif", "-o", "hills.iqt"]);
+    let told = shown(&bench, &["info", "hills.iqt", "--overlay", "o.iqo"]);
+    assert!(told.contains(r"which was called \u{1b}[2J"), "{told}");
     let flight = fs::read_to_string(bench.path("land.flight")).unwrap();
     fs::write(bench.path("h.flight"), format!("{flight}{HOSTILE}\n")).unwrap();
     shown(&bench, &["replay", "land.iqt", "--flight", "h.flight"]);

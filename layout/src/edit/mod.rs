@@ -15,11 +15,12 @@ mod session;
 
 #[cfg(feature = "files")]
 pub use engine::foresight::{Foresight, holds_heights};
-pub use operations::area::Area;
+pub use operations::area::{Area, Limit};
 pub use operations::brush::{Brush, BrushAction, Falloff};
 pub use operations::check::MAX_EDIT_SAMPLES;
 pub use operations::crater::Crater;
 pub use operations::edit::Edit;
+pub use operations::line::{Crest, Line, MAX_LINE_PLACES};
 pub use operations::stamp::{Stamp, StampMode};
 pub use operations::window::{HeightWindow, SampleRect};
 #[cfg(feature = "files")]

@@ -1,12 +1,15 @@
 //! Edits in a file of their own, beside a terrain that stays as it is. What would be written behind the terrain's end is written to the overlay instead (FORMAT.md, section 7.3).
 //!
-//! Page numbers and offsets in an overlay go on where those of the base end, so that both read as one file; only the header slots are the overlay's own. It names
-//! the state of the base that it belongs to, and is refused with any other.
+//! Page numbers and offsets in an overlay go on where those of the base ended when it was made, so that both read as one file; only the header slots are the overlay's own. It names
+//! the state of the base that it was made over. **A base that was edited, draped or undone since still holds that state, for nothing in it is written over, and the overlay shows it.** It is
+//! refused over a base that was written anew, and over another terrain. Cost over a base that has grown: that of opening its older state, and a read of each page of its last commit.
 
-use super::bytes::{PAGE_BYTES, Page, get_text, get_u32, get_u64, put_text, put_u32, put_u64};
+use super::bytes::{PAGE_BYTES, Page, checksum, get_text, get_u32, get_u64, put_text, put_u32, put_u64};
 use super::disk::Disk;
 use super::header::{Header, seal};
-use super::source::{PreadSource, Source, split_of};
+use super::journal::{Lineage, State};
+use super::source::{LayeredSource, MapSource, PreadSource, Source, split_of};
+use super::structure::read_directory;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::slots::Slots;
@@ -87,41 +90,130 @@ fn empty_overlay(base: &Slots, base_name: &str) -> Vec<u8> {
     bytes
 }
 
-/// The header slots of the overlay over `base`, and where in the two together it begins.
-pub(crate) fn overlay_slots(
-    base: &PreadSource,
-    overlay: &mut PreadSource,
-) -> Result<(Slots, u64), LayoutError> {
-    let base_slots = Slots::read(base, 0)?;
-    if overlay.byte_count() < FIRST_PAGES * PAGE_BYTES as u64 {
-        return Err(not_an_overlay(overlay.path()));
-    }
-    let slots = Slots::read_as(&*overlay, 0, MAGIC).map_err(|error| match error {
-        LayoutError::NotThisFormat { .. } => not_an_overlay(overlay.path()),
-        other => other,
-    })?;
-    let (wanted, found) = (Base::read(&slots.current), Base::of(&base_slots));
-    if wanted != found {
+/// An overlay over its base, checked as far as their headers go.
+pub(crate) struct Overlaid {
+    /// The overlay's header slots.
+    pub(crate) slots: Slots,
+    /// Where in the two together it begins.
+    pub(crate) split: u64,
+    /// Whether the base was written to since the overlay was made.
+    has_grown: bool,
+    /// The generation of the base that it was made over.
+    generation: u32,
+}
+
+impl Overlaid {
+    /// Reads the header slots of both.
+    pub(crate) fn read(base: &PreadSource, overlay: &mut PreadSource) -> Result<Self, LayoutError> {
+        let found = Slots::read(base, 0)?;
+        if overlay.byte_count() < FIRST_PAGES * PAGE_BYTES as u64 {
+            return Err(not_an_overlay(overlay.path()));
+        }
+        let slots = Slots::read_as(&*overlay, 0, MAGIC).map_err(|error| match error {
+            LayoutError::NotThisFormat { .. } => not_an_overlay(overlay.path()),
+            other => other,
+        })?;
+        let wanted = Base::read(&slots.current);
+        let is_same = wanted == Base::of(&found);
         let name = get_text(&slots.current[..], 0x400).unwrap_or_default();
-        return Err(LayoutError::Usage(format!(
-            "{}: these edits belong to {}, not to {}; {}",
-            overlay.path().display(),
-            if name.is_empty() { "another terrain" } else { &name },
-            base.path().display(),
-            "name the terrain they were made over, as it was then (an edit or a picture of its own makes it another)"
-        )));
+        if !is_same && !is_same_ground(&slots.header, &found.header) {
+            return Err(over_another(overlay.path(), base.path(), &name));
+        }
+        let (then, now) = (wanted, &found.header);
+        let has_grown = is_kin(&slots.header, now)
+            && now.generation > then.generation
+            && now.file_bytes >= then.file_bytes;
+        if !is_same && !has_grown {
+            return Err(written_anew(overlay.path(), base.path()));
+        }
+        // The header first and then the length: what a header counts was in the file before the header was.
+        overlay.measure_again()?;
+        let split = split_of(wanted.file_bytes);
+        if split.saturating_add(overlay.byte_count()) < slots.header.file_bytes {
+            return Err(LayoutError::damaged(
+                overlay.path(),
+                format!("byte {}", overlay.byte_count()),
+                "the file is cut short; restore a copy of it",
+            ));
+        }
+        Ok(Self { slots, split, has_grown: !is_same, generation: wanted.generation })
     }
-    // The header first and then the length: what a header counts was in the file before the header was.
-    overlay.measure_again()?;
-    let split = split_of(found.file_bytes);
-    if split + overlay.byte_count() < slots.header.file_bytes {
-        return Err(LayoutError::damaged(
-            overlay.path(),
-            format!("byte {}", overlay.byte_count()),
-            "the file is cut short; restore a copy of it",
-        ));
+
+    /// Both as one source, mapped or not.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] if the base no longer holds the state that the overlay was made over; a damaged journal of the overlay, without which that cannot be known; I/O.
+    pub(crate) fn source(
+        &self,
+        base: PreadSource,
+        overlay: PreadSource,
+        is_mapped: bool,
+    ) -> Result<Box<dyn Source>, LayoutError> {
+        if self.has_grown {
+            let both = LayeredSource::new(Box::new(&base), self.split, Box::new(&overlay), true);
+            self.check_older_state(&both, base.path())?;
+        }
+        let [base, overlay]: [Box<dyn Source>; 2] = if is_mapped {
+            [Box::new(MapSource::map(base)?), Box::new(MapSource::map(overlay)?)]
+        } else {
+            [Box::new(base), Box::new(overlay)]
+        };
+        Ok(Box::new(LayeredSource::new(base, self.split, overlay, self.has_grown)))
     }
-    Ok((slots, split))
+
+    /// Whether the base still holds the state that the overlay was made over: its directory by checksums, which those of all its pages are part of, and the pages of the commit that led
+    /// to it, which a power cut could have undone under another program's eyes.
+    fn check_older_state(&self, both: &LayeredSource<'_>, base: &Path) -> Result<(), LayoutError> {
+        let now = &self.slots.header;
+        let original = Lineage::read(both, now)?.original;
+        let header = Header { history: None, ..original.put_into(now) };
+        let anew = |error| match error {
+            LayoutError::Damaged { .. } => written_anew(both.path(), base),
+            other => other,
+        };
+        let entries = read_directory(both, &header).map_err(anew)?;
+        let mut page = [0; PAGE_BYTES];
+        // Pages as built came all at once, with a header behind them.
+        let of_last = |generation| generation == self.generation && generation > 1;
+        for entry in entries.iter().filter(|entry| entry.is_present() && of_last(entry.generation)) {
+            both.read_at(u64::from(entry.page) * PAGE_BYTES as u64, &mut page)?;
+            if checksum(&page) != entry.checksum {
+                return Err(written_anew(both.path(), base));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether two headers may be those of one terrain at different times: whether they agree in all that edits and pictures leave alone.
+fn is_kin(a: &Header, b: &Header) -> bool {
+    let b = State::of(a).put_into(b);
+    *a == Header { generation: a.generation, file_bytes: a.file_bytes, history: a.history, ..b }
+}
+
+/// Whether two headers are those of terrains with the same samples, for the words of a refusal.
+fn is_same_ground(a: &Header, b: &Header) -> bool {
+    let of = |h: &Header| (h.grid, h.sample_to_crs, h.epsg, h.crs_name.clone());
+    of(a) == of(b)
+}
+
+fn over_another(overlay: &Path, base: &Path, name: &str) -> LayoutError {
+    let (overlay, base) = (overlay.display(), base.display().to_string());
+    let called = match name {
+        "" => String::new(),
+        name if name == base => ", which had the same name".into(),
+        name => format!(", which was called {name}"),
+    };
+    LayoutError::Usage(format!(
+        "{overlay}: these edits were made over another terrain{called}, not over {base}; name the terrain they were made over"
+    ))
+}
+
+fn written_anew(overlay: &Path, base: &Path) -> LayoutError {
+    let (overlay, base) = (overlay.display(), base.display());
+    LayoutError::Usage(format!(
+        "{overlay}: {base} was written anew after these edits were begun (built again, compacted, or given room for other heights), and what they refer to is no longer in it; name a copy of {base} from before, or make the edits again in a new overlay"
+    ))
 }
 
 fn not_an_overlay(path: &Path) -> LayoutError {

@@ -2,8 +2,8 @@
 
 use super::terrain::Terrain;
 use crate::error::LayoutError;
-use crate::file::overlay::overlay_slots;
-use crate::file::source::{LayeredSource, MapSource, PreadSource, Source};
+use crate::file::overlay::Overlaid;
+use crate::file::source::PreadSource;
 use crate::file::structure::{read_directory, read_growing};
 use std::path::Path;
 
@@ -11,25 +11,20 @@ use std::path::Path;
 fn open_layers(base: &Path, overlay: &Path, is_mapped: bool) -> Result<Terrain, LayoutError> {
     let mut base_file = PreadSource::open(base)?;
     // The base must be a sound terrain by itself.
-    let (base_header, _) = read_growing(&mut base_file)?;
+    read_growing(&mut base_file)?;
     let mut overlay_file = PreadSource::open(overlay)?;
-    let (slots, _) = overlay_slots(&base_file, &mut overlay_file)?;
-    let source: Box<dyn Source> = if is_mapped {
-        let layers = [Box::new(MapSource::map(base_file)?), Box::new(MapSource::map(overlay_file)?)];
-        let [base, overlay] = layers;
-        Box::new(LayeredSource::new(base, base_header.file_bytes, overlay))
-    } else {
-        Box::new(LayeredSource::new(Box::new(base_file), base_header.file_bytes, Box::new(overlay_file)))
-    };
-    let entries = read_directory(&*source, &slots.header)?;
-    Ok(Terrain::of(source, slots.header, entries))
+    let overlaid = Overlaid::read(&base_file, &mut overlay_file)?;
+    let source = overlaid.source(base_file, overlay_file, is_mapped)?;
+    let entries = read_directory(&*source, &overlaid.slots.header)?;
+    Ok(Terrain::of(source, overlaid.slots.header, entries))
 }
 
 impl Terrain {
     /// Opens the terrain file `base` with the edits in `overlay` (see [`EditSession::open_overlay`](crate::edit::EditSession::open_overlay)). Both are mapped.
     ///
     /// # Errors
-    /// As [`Terrain::open`] of either; [`LayoutError::Usage`] if the overlay belongs to another terrain, or to another state of this one.
+    /// As [`Terrain::open`] of either; [`LayoutError::Usage`] if the overlay was made over another terrain, or if the base was written anew since. One that was edited or draped since is
+    /// seen as it was ([`Terrain::base_has_grown`]).
     pub fn open_with_overlay(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
         open_layers(base, overlay, true)
     }
@@ -45,6 +40,11 @@ impl Terrain {
     /// The terrain file under an overlay; none if there is no overlay, whose name [`Terrain::path`] is then.
     pub fn base_path(&self) -> Option<&Path> {
         self.source().base_path()
+    }
+
+    /// Whether the terrain file under an overlay was edited, draped or undone after the overlay was made. It is seen as it was then.
+    pub fn base_has_grown(&self) -> bool {
+        self.source().base_has_grown()
     }
 
     /// Opens the file, with its overlay if it has one, once more, without maps.

@@ -3,6 +3,7 @@
 use crate::verbs::WrongUsage;
 use crate::verbs::output::{grouped, print, print_json};
 use crate::verbs::outputs::{Force, Kind};
+use crate::verbs::overlays;
 use crate::verbs::progress::Meter;
 use crate::verbs::terrain::TerrainArgs;
 use anyhow::Result;
@@ -54,7 +55,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             args.force.file(out, Kind::Terrain, &args.terrain.inputs(&[]))?;
             out
         }
-        (None, None) => &args.terrain.file,
+        (None, None) => {
+            overlays::refuse_rewriting(&args.terrain.file, args.force.is_given())?;
+            &args.terrain.file
+        }
         (None, Some(_)) => {
             return Err(WrongUsage(
                 "with --overlay, name the file to write with -o; the terrain under an overlay stays as it is"

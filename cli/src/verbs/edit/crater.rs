@@ -79,7 +79,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let script = args.script()?;
     let Some(out) = &args.output else {
-        return apply(args.target.target(), &script, None, &args.how);
+        return apply(args.target.target(), &script, None, &args.how, args.force.is_given());
     };
     script.write(out)?;
     let told = format!(

@@ -2,15 +2,17 @@
 
 pub(super) mod compact;
 pub(super) mod crater;
+mod effect;
 mod paint;
 pub(super) mod past;
+mod told;
 mod work;
 
 use super::output::print_json;
 use super::progress::Meter;
 use anyhow::Result;
 use std::path::{Path, PathBuf};
-use terrasoar::edits::{Loader, Script};
+use terrasoar::edits::{Loader, Script, Step};
 use work::{Target, Work};
 
 /// Change the ground of a terrain file by a script of edits.
@@ -27,13 +29,17 @@ Examples:
   terrasoar edit alps.iqt --script dam.edits --overlay what-if.iqo
 
 Fields of --json: file, overlay, dry_run, batches, edits, edits_outside (that reach no sample), samples (of the rectangles that hold all changed heights), records_changed,
-voids_passed, tiles_painted, pages_written, bytes_appended, widenings (times the file was rewritten), needs_widening (a dry run that got no further), seconds.")]
+voids_passed, tiles_painted, pages_written, bytes_appended, widenings (times the file was rewritten), needs_widening (a dry run that got no further),
+changed_samples, changed_m2, change_m (lowest and highest change of height; these three null where it was too much to measure), batches_before, seconds.")]
 pub(super) struct Args {
     #[command(flatten)]
     target: TargetArgs,
     /// Script of edits
     #[arg(long, value_name = "E.edits")]
     script: PathBuf,
+    /// Rewrite the file for heights that it has no room for, also where overlays beside it would be lost
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     how: HowArgs,
 }
@@ -70,14 +76,36 @@ struct HowArgs {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let script = Script::read(&args.script)?;
-    apply(args.target.target(), &script, Some(&args.script), &args.how)
+    apply(args.target.target(), &script, Some(&args.script), &args.how, args.force)
 }
 
 /// Applies a script, which was read from `path` or made here, and tells what became of it.
-fn apply(target: Target<'_>, script: &Script, path: Option<&Path>, how: &HowArgs) -> Result<()> {
+fn apply(
+    target: Target<'_>,
+    script: &Script,
+    path: Option<&Path>,
+    how: &HowArgs,
+    is_forced: bool,
+) -> Result<()> {
     let progress = Meter::new("edits");
-    let batches = Loader::new(path.unwrap_or(target.file), terrasoar_import::open_file).script(script)?;
-    let work = Work { target, batches: &batches, script: path, paints: !how.no_scorch, progress: &progress };
+    let mut loader = Loader::new(path.unwrap_or(target.file), terrasoar_import::open_file);
+    if script
+        .batches
+        .iter()
+        .flat_map(|batch| &batch.steps)
+        .any(|step| matches!(step, Step::Stamp(stamp) if stamp.at.is_none()))
+    {
+        loader = loader.over(target.terrain()?.header());
+    }
+    let batches = loader.script(script)?;
+    let work = Work {
+        target,
+        batches: &batches,
+        script: path,
+        paints: !how.no_scorch,
+        is_forced,
+        progress: &progress,
+    };
     let told = if how.dry_run { work.rehearse()? } else { work.perform()? };
     drop(progress);
     if how.json { print_json(&told) } else { super::output::print(&told.text()) }

@@ -137,6 +137,7 @@ impl TurnArgs {
                 target.path().display()
             );
         }
+        target.tell_of_overlay();
         let entries = session.history()?;
         let after = done(&entries);
         let mut labels: Vec<String> =
@@ -159,10 +160,9 @@ impl TurnArgs {
             commit => format!("as after commit {commit}"),
         };
         print_line(&format!(
-            "{}: {participle}: {}; {} records changed, the terrain is {state}",
+            "{}: {participle}: {}; the terrain is {state}",
             told.file,
-            told.labels.join(", "),
-            grouped(records_changed)
+            told.labels.join(", ")
         ))
     }
 }

@@ -1,18 +1,20 @@
 //! Batches applied to a file, one durable commit each, or in memory only. Where heights need more room, the file is rewritten.
 
+use super::effect::Touched;
 use super::paint::paints_of;
-use crate::verbs::output::{complain, decimal, grouped};
-use crate::verbs::progress::{Meter, short};
+use super::told::Told;
+use crate::verbs::output::{complain, decimal};
+use crate::verbs::overlays;
+use crate::verbs::progress::Meter;
 use crate::verbs::within;
 use anyhow::{Context, Result, anyhow, bail};
-use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 use terrasoar::edits::LoadedBatch;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::HeightRoom;
-use terrasoar_layout::edit::{Changes, EditSession, Editor, Foresight, holds_heights, widen};
+use terrasoar_layout::edit::{EditSession, Editor, Foresight, holds_heights, widen};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::header::Header;
 use terrasoar_layout::grid::Grid;
@@ -39,83 +41,25 @@ impl Target<'_> {
         }
     }
 
+    /// Says so where the file under an overlay was edited or draped since.
+    pub(super) fn tell_of_overlay(self) {
+        if self.overlay.is_some() {
+            // What cannot be opened is told by whoever needs it.
+            let _ = self.terrain().map(|terrain| overlays::tell_of_older(&terrain));
+        }
+    }
+
     /// The file that edits go to.
     pub(super) fn path(&self) -> &Path {
         self.overlay.unwrap_or(self.file)
     }
 
     /// The terrain as it is, for looking only; an overlay that does not exist yet is an empty one.
-    fn terrain(self) -> Result<Terrain, LayoutError> {
+    pub(super) fn terrain(self) -> Result<Terrain, LayoutError> {
         match self.overlay {
             Some(overlay) if overlay.exists() => Terrain::open_with_overlay_unmapped(self.file, overlay),
             _ => Terrain::open_unmapped(self.file),
         }
-    }
-}
-
-/// What was done.
-#[derive(Debug, Default, Serialize)]
-pub(super) struct Told {
-    file: String,
-    overlay: Option<String>,
-    dry_run: bool,
-    batches: u64,
-    edits: u64,
-    edits_outside: u64,
-    samples: u64,
-    records_changed: u64,
-    voids_passed: u64,
-    tiles_painted: u64,
-    pages_written: u64,
-    bytes_appended: u64,
-    widenings: u32,
-    needs_widening: bool,
-    seconds: f64,
-}
-
-impl Told {
-    fn note(&mut self, batch: &LoadedBatch, grid: &Grid, changes: &Changes) {
-        self.batches += 1;
-        self.edits += batch.edits.len() as u64;
-        self.edits_outside += batch.edits.iter().filter(|edit| edit.bounds(grid).is_none()).count() as u64;
-        self.samples += changes.samples.iter().map(|rect| rect.count() as u64).sum::<u64>();
-        self.records_changed += changes.vertices.len() as u64;
-        self.voids_passed += changes.voids_passed;
-    }
-
-    pub(super) fn text(&self) -> String {
-        let plural = |count: u64, one: &str, more: &str| {
-            format!("{} {}", grouped(count), if count == 1 { one } else { more })
-        };
-        let file = self.overlay.as_ref().unwrap_or(&self.file);
-        let mut text = format!(
-            "{file}: {} in {}, {:.2} s ({} edits/s)\n{} looked at, {} changed, {} passed over",
-            plural(self.edits, "edit", "edits"),
-            plural(self.batches, "batch", "batches"),
-            self.seconds,
-            short(self.edits as f64 / self.seconds.max(1e-9)),
-            plural(self.samples, "sample", "samples"),
-            plural(self.records_changed, "record", "records"),
-            plural(self.voids_passed, "void", "voids"),
-        );
-        if self.tiles_painted > 0 {
-            text += &format!("\n{} of the picture painted", plural(self.tiles_painted, "tile", "tiles"));
-        }
-        if self.edits_outside > 0 {
-            text += &format!("\n{} no sample", plural(self.edits_outside, "edit reaches", "edits reach"));
-        }
-        text += &match (self.dry_run, self.needs_widening) {
-            (true, false) => "\na dry run: nothing was written".to_owned(),
-            (true, true) => {
-                "\na dry run, as far as the file's range of heights goes: nothing was written".to_owned()
-            }
-            _ => format!(
-                "\n{} written, {} bytes appended",
-                plural(self.pages_written, "page", "pages"),
-                grouped(self.bytes_appended)
-            ),
-        };
-        text
     }
 }
 
@@ -127,6 +71,8 @@ pub(super) struct Work<'a> {
     pub(super) script: Option<&'a Path>,
     /// Whether the picture follows, where there is one.
     pub(super) paints: bool,
+    /// Whether the file may be rewritten under overlays.
+    pub(super) is_forced: bool,
     pub(super) progress: &'a Meter,
 }
 
@@ -134,12 +80,7 @@ impl Work<'_> {
     fn begin(&self, dry_run: bool) -> Told {
         let edits = self.batches.iter().map(|batch| batch.edits.len() as u64).sum();
         self.progress.begin(if dry_run { "trying" } else { "editing" }, edits);
-        Told {
-            file: self.target.file.display().to_string(),
-            overlay: self.target.overlay.map(|overlay| overlay.display().to_string()),
-            dry_run,
-            ..Told::default()
-        }
+        Told::begin(self.target.file, self.target.overlay, dry_run)
     }
 
     /// Refuses a script of which not everything can be applied, before anything is; rewrites the file if it has no room for the heights that the script leads to.
@@ -191,13 +132,16 @@ impl Work<'_> {
         let grid = *terrain.grid();
         self.check(&grid)?;
         let mut told = self.begin(true);
-        let mut editor = Editor::new(Arc::clone(&terrain));
+        let (mut editor, mut touched) = (Editor::new(Arc::clone(&terrain)), Touched::default());
         if terrain.header().history.is_some() {
             editor.set_original(Arc::new(terrain.open_again_unmapped()?.into_original()?));
         }
         for (number, batch) in (1_u64..).zip(self.batches) {
             match editor.apply(&batch.edits) {
-                Ok(changes) => told.note(batch, &grid, &changes),
+                Ok(changes) => {
+                    touched.note(&changes);
+                    told.note(batch, &grid, &changes);
+                }
                 Err(LayoutError::OutOfRange { problem, .. }) => {
                     told.needs_widening = true;
                     self.progress.note(&format!(
@@ -210,6 +154,7 @@ impl Work<'_> {
             }
             self.progress.add(batch.edits.len() as u64);
         }
+        told.measured(touched.effect(&mut Editor::new(terrain), &mut editor)?, &grid);
         told.seconds = start.elapsed().as_secs_f64();
         Ok(told)
     }
@@ -220,10 +165,15 @@ impl Work<'_> {
         // The lock first, so that a second writer hears of it before anything else; an overlay is not made for a script that is refused.
         let held = if self.target.overlay.is_none() { Some(self.target.session()?) } else { None };
         let widenings = self.prepare(held)?;
+        self.target.tell_of_overlay();
+        let (mut ground_before, mut touched) =
+            (Some(Editor::new(Arc::new(self.target.terrain()?))), Touched::default());
         let mut session = self.target.session()?;
+        let held = session.history()?;
         let grid = *session.editor().terrain().grid();
         let mut told = self.begin(false);
         told.widenings = widenings;
+        told.batches_before = held.iter().position(|entry| entry.is_current).map_or(0, |at| at as u64 + 1);
         for (number, batch) in (1_u64..).zip(self.batches) {
             let before = told.batches;
             let failed = || match before {
@@ -248,7 +198,8 @@ impl Work<'_> {
                     Err(LayoutError::OutOfRange { heights_m, problem, .. }) if widenings < MOST_WIDENINGS => {
                         widenings += 1;
                         let header = session.header().clone();
-                        // The rewriting takes the lock for itself.
+                        // The rewriting takes the lock for itself, and some systems do not replace what is open.
+                        ground_before = None;
                         drop(session);
                         self.widen(&header, heights_m, &problem).with_context(failed)?;
                         session = self.target.session()?;
@@ -261,10 +212,14 @@ impl Work<'_> {
             };
             told.widenings += widenings;
             let committed = session.commit(&batch.label).with_context(failed)?;
+            touched.note(&changes);
             told.note(batch, &grid, &changes);
             told.pages_written += committed.pages;
             told.bytes_appended += committed.bytes;
             self.progress.set(told.edits);
+        }
+        if let Some(before) = &mut ground_before {
+            told.measured(touched.effect(before, session.editor_mut())?, &grid);
         }
         told.seconds = start.elapsed().as_secs_f64();
         Ok(told)
@@ -281,6 +236,8 @@ impl Work<'_> {
                 overlay.display()
             );
         }
+        overlays::refuse_rewriting(self.target.file, self.is_forced)
+            .with_context(|| format!("{file}: {problem}"))?;
         let room = room_for(header, heights_m);
         let [lowest, highest] = [room.lowest_m, room.highest_m].map(|m| decimal(m, 1));
         let ends = match header.history {

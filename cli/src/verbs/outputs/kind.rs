@@ -1,6 +1,7 @@
 //! What verbs write, and whether a file that is there could be of that kind.
 
 use super::there::{named, start_of, terrain};
+use crate::verbs::overlays::named_beside;
 use std::io;
 use std::path::Path;
 use terrasoar::edits::{Script, Step};
@@ -69,7 +70,11 @@ impl Kind {
         }
         let is_ours = match self {
             Self::Terrain => match terrain(path, &start) {
-                Some(holds) => return Ok(holds),
+                Some(holds) => {
+                    let under =
+                        || named_beside(path).map(|names| format!("a terrain under edits in {names}"));
+                    return Ok(holds.or_else(under));
+                }
                 None => false,
             },
             Self::Synthetic => is_synthetic(path)?,

@@ -74,7 +74,6 @@ impl Force {
     }
 
     /// Whether everything may be replaced.
-    #[cfg(feature = "pictures")]
     pub(super) fn is_given(self) -> bool {
         self.force
     }

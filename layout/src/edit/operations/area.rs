@@ -27,6 +27,26 @@ pub enum Area {
     },
 }
 
+/// Which way ground may be moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limit {
+    /// It is raised where it is lower, and else stays.
+    AtLeast,
+    /// It is lowered where it is higher, and else stays.
+    AtMost,
+}
+
+impl Limit {
+    /// The height in metres of ground that was moved to `height_m` as far as it may be.
+    #[inline(always)]
+    pub(crate) fn moved(self, ground_m: f64, height_m: f64) -> f64 {
+        match self {
+            Self::AtLeast => ground_m.max(height_m),
+            Self::AtMost => ground_m.min(height_m),
+        }
+    }
+}
+
 /// By how much of a step a sample may lie beside a rectangle in metres and still be on its side: numbers such as 0.3 are no multiples of 0.1.
 const ON_A_SIDE: f64 = 1e-6;
 
@@ -78,13 +98,7 @@ impl Area {
         match *self {
             Self::Rect(rect) => clipped(rect, grid),
             Self::Disc { centre_m, radius_m } => disc_samples(centre_m, radius_m, grid),
-            Self::Extent { sides_m: [west, south, east, north] } => {
-                let [dx, dy] = grid.spacing_m();
-                let [wide, high] = grid.samples();
-                let [west, east] = steps_between(west / dx, east / dx, wide)?;
-                let [south, north] = steps_between(south / dy, north / dy, high)?;
-                Some(SampleRect { west, south, east, north })
-            }
+            Self::Extent { sides_m } => extent_samples(sides_m, grid),
         }
     }
 
@@ -106,6 +120,14 @@ impl Area {
             }
         }
     }
+}
+
+/// The samples between sides in metres; `None` if there are none.
+pub(crate) fn extent_samples([west, south, east, north]: [f64; 4], grid: &Grid) -> Option<SampleRect> {
+    let ([dx, dy], [wide, high]) = (grid.spacing_m(), grid.samples());
+    let [west, east] = steps_between(west / dx, east / dx, wide)?;
+    let [south, north] = steps_between(south / dy, north / dy, high)?;
+    Some(SampleRect { west, south, east, north })
 }
 
 /// The first and the last of `count` samples from one side to another, both in steps.

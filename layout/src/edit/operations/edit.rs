@@ -3,10 +3,11 @@
 //! **A sample's new height depends on the edit, the sample's place and old heights within the margin.** It never depends on the window through which it is looked at, and
 //! nothing outside the bounds changes. Voids stay voids. Cost: O(samples of the bounds), nothing allocated but by smoothing, which copies the window.
 
-use super::area::{Area, around, each_sample};
+use super::area::{Area, Limit, around, each_sample};
 use super::brush::Brush;
 use super::check::checked_size;
 use super::crater::Crater;
+use super::line::Line;
 use super::stamp::Stamp;
 use super::window::{HeightWindow, SampleRect};
 use crate::error::LayoutError;
@@ -29,6 +30,17 @@ pub enum Edit {
         /// Their new height in metres.
         height_m: f64,
     },
+    /// The samples of an area that are lower than one height, or those that are higher, to that height.
+    Limit {
+        /// Where.
+        area: Area,
+        /// Their new height in metres.
+        height_m: f64,
+        /// Which of them.
+        limit: Limit,
+    },
+    /// A dam, dike, ditch or road along a path.
+    Line(Line),
     /// All samples of an area back to their heights before all edits.
     Restore(
         /// Where.
@@ -48,7 +60,8 @@ impl Edit {
             Self::Crater(_) => "crater",
             Self::Brush(brush) => brush.action.name(),
             Self::Stamp(_) => "stamp",
-            Self::Set { .. } => "set",
+            Self::Set { .. } | Self::Limit { .. } => "set",
+            Self::Line(_) => "line",
             Self::Restore(_) => "restore",
         }
     }
@@ -71,7 +84,8 @@ impl Edit {
             Self::Crater(crater) => crater.check(),
             Self::Brush(brush) => brush.check(),
             Self::Stamp(stamp) => stamp.check(),
-            Self::Set { area, height_m } => {
+            Self::Line(line) => line.check(),
+            Self::Set { area, height_m } | Self::Limit { area, height_m, .. } => {
                 area.check("set")?;
                 checked_height("set", *height_m)
             }
@@ -85,7 +99,8 @@ impl Edit {
             Self::Crater(crater) => crater.bounds(grid),
             Self::Brush(brush) => brush.bounds(grid),
             Self::Stamp(stamp) => stamp.bounds(grid),
-            Self::Set { area, .. } | Self::Restore(area) => area.samples(grid),
+            Self::Line(line) => line.bounds(grid),
+            Self::Set { area, .. } | Self::Limit { area, .. } | Self::Restore(area) => area.samples(grid),
         }
     }
 
@@ -95,7 +110,8 @@ impl Edit {
             Self::Crater(crater) => around(crater.centre_m, 2.0 * crater.radius_m),
             Self::Brush(brush) => around(brush.centre_m, brush.radius_m),
             Self::Stamp(stamp) => stamp.reach_m(grid),
-            Self::Set { area, .. } | Self::Restore(area) => area.reach_m(grid),
+            Self::Line(line) => line.reach_m(),
+            Self::Set { area, .. } | Self::Limit { area, .. } | Self::Restore(area) => area.reach_m(grid),
         }
     }
 
@@ -124,6 +140,14 @@ impl Edit {
                     *height = *height_m;
                 }
             }),
+            Self::Limit { area, height_m, limit } => {
+                each_sample(window, area.samples(grid), |x, y, height| {
+                    if area.contains(grid, x, y) {
+                        *height = limit.moved(*height, *height_m);
+                    }
+                });
+            }
+            Self::Line(line) => line.apply(grid, window),
             Self::Restore(area) => {
                 let Some(original) = original else { return };
                 each_sample(window, area.samples(grid), |x, y, height| {

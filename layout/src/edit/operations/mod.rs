@@ -5,5 +5,6 @@ pub(crate) mod brush;
 pub(crate) mod check;
 pub(crate) mod crater;
 pub(crate) mod edit;
+pub(crate) mod line;
 pub(crate) mod stamp;
 pub(crate) mod window;

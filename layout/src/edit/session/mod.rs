@@ -21,9 +21,9 @@ use crate::file::entries::{Entry, copy_of};
 use crate::file::header::{Header, ImageryPlace};
 use crate::file::journal::{Lineage, State};
 use crate::file::lock::WriteLock;
-use crate::file::overlay::{create_overlay, overlay_slots};
+use crate::file::overlay::{Overlaid, create_overlay};
 use crate::file::slots::Slots;
-use crate::file::source::{LayeredSource, PreadSource, Source};
+use crate::file::source::{PreadSource, Source};
 use crate::file::structure::{read_directory, read_growing, read_root, read_structure};
 use crate::file::tail::{Attempt, Attempted, Tail};
 use crate::read::terrain::Terrain;
@@ -114,7 +114,8 @@ impl EditSession {
     /// Opens the terrain file `base`, which is not written to, with edits in the file `overlay`, which is made if it does not exist.
     ///
     /// # Errors
-    /// As [`EditSession::open`]; [`LayoutError::Usage`] if the overlay belongs to another terrain, or to another state of this one.
+    /// As [`EditSession::open`]; [`LayoutError::Usage`] if the overlay was made over another terrain, or if the base was written anew since. Over a base that was edited or draped since,
+    /// the edits go on from the ground as it was.
     pub fn open_overlay(base: &Path, overlay: &Path) -> Result<Self, LayoutError> {
         Self::open_overlay_on(Arc::new(SystemDisk), base, overlay)
     }
@@ -129,15 +130,13 @@ impl EditSession {
         overlay: &Path,
     ) -> Result<Self, LayoutError> {
         let mut base_file = PreadSource::open(base)?;
-        let (base_header, _) = read_growing(&mut base_file)?;
+        read_growing(&mut base_file)?;
         create_overlay(&*disk, base, &Slots::read(&base_file, 0)?, overlay)?;
         let lock = take_lock(overlay)?;
-        let (slots, start) = overlay_slots(&base_file, &mut over(overlay, &lock)?)?;
-        let source = Box::new(LayeredSource::new(
-            Box::new(base_file),
-            base_header.file_bytes,
-            Box::new(over(overlay, &lock)?),
-        ));
+        let mut overlay_file = over(overlay, &lock)?;
+        let overlaid = Overlaid::read(&base_file, &mut overlay_file)?;
+        let source = overlaid.source(base_file, overlay_file, false)?;
+        let Overlaid { slots, split: start, .. } = overlaid;
         let entries = read_directory(&*source, &slots.header)?;
         let terrain = Terrain::of(source, slots.header.clone(), entries);
         Self::new(disk, terrain, overlay, start, slots, lock)
@@ -418,6 +417,10 @@ impl Source for Borrowed {
 
     fn byte_count(&self) -> u64 {
         self.0.source().byte_count()
+    }
+
+    fn base_has_grown(&self) -> bool {
+        self.0.base_has_grown()
     }
 
     fn own_start(&self) -> u64 {

@@ -6,11 +6,13 @@ use crate::file::bytes::PAGE_BYTES;
 use std::path::Path;
 
 /// Two sources in one range of offsets.
-pub(crate) struct LayeredSource {
-    base: Box<dyn Source>,
-    overlay: Box<dyn Source>,
+pub(crate) struct LayeredSource<'s> {
+    base: Box<dyn Source + 's>,
+    overlay: Box<dyn Source + 's>,
     /// First offset of the overlay.
     split: u64,
+    /// Whether the base is in another state by now.
+    has_grown: bool,
 }
 
 /// Offset at which an overlay of a base of so many bytes begins.
@@ -18,14 +20,19 @@ pub(crate) fn split_of(base_bytes: u64) -> u64 {
     base_bytes.next_multiple_of(PAGE_BYTES as u64)
 }
 
-impl LayeredSource {
-    /// The overlay begins where the `base_bytes` bytes of the base that count end.
-    pub(crate) fn new(base: Box<dyn Source>, base_bytes: u64, overlay: Box<dyn Source>) -> Self {
-        Self { base, overlay, split: split_of(base_bytes) }
+impl<'s> LayeredSource<'s> {
+    /// The overlay begins at the offset `split`; what the base has behind it, if it has grown since, is not part of this terrain.
+    pub(crate) fn new(
+        base: Box<dyn Source + 's>,
+        split: u64,
+        overlay: Box<dyn Source + 's>,
+        has_grown: bool,
+    ) -> Self {
+        Self { base, overlay, split, has_grown }
     }
 }
 
-impl Source for LayeredSource {
+impl Source for LayeredSource<'_> {
     /// The overlay's: it is what tells this terrain from the base.
     fn path(&self) -> &Path {
         self.overlay.path()
@@ -33,6 +40,10 @@ impl Source for LayeredSource {
 
     fn base_path(&self) -> Option<&Path> {
         Some(self.base.path())
+    }
+
+    fn base_has_grown(&self) -> bool {
+        self.has_grown
     }
 
     fn byte_count(&self) -> u64 {

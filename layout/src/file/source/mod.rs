@@ -60,6 +60,11 @@ pub trait Source: Send + Sync {
         None
     }
 
+    /// Whether that file was edited or draped after the overlay was made, which shows it as it was.
+    fn base_has_grown(&self) -> bool {
+        false
+    }
+
     /// Length in bytes when it was opened.
     fn byte_count(&self) -> u64;
 

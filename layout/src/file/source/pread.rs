@@ -67,6 +67,21 @@ impl PreadSource {
     }
 }
 
+/// For a look through a file that is needed on.
+impl Source for &PreadSource {
+    fn path(&self) -> &Path {
+        (**self).path()
+    }
+
+    fn byte_count(&self) -> u64 {
+        (**self).byte_count()
+    }
+
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
+        (**self).read_at(offset, buffer)
+    }
+}
+
 impl Source for PreadSource {
     fn path(&self) -> &Path {
         &self.path
