@@ -132,6 +132,10 @@ fn frames_report_and_table_are_written() {
         ["iobench", "land.iqt", "--flight", "land.flight", "--engines", "kinetic", "--layouts", "row,ours"];
     let table = bench.good(&[&args[..], &["--frames", "f.csv", "-o", "report"]].concat());
     assert!(table.contains("kinetic") && table.contains("mesh") && table.contains("report.html"), "{table}");
+    assert!(
+        table.contains("late pages, sum") && table.contains("fits into the cache (row, ours)"),
+        "{table}"
+    );
     let (remarks, csv) = bench.table("f.csv");
     assert!(remarks.contains("# terrain: land.iqt\n# flight: land.flight\n"), "{remarks}");
     assert_eq!(csv.lines().count(), 1 + 6 * 40);

@@ -4,7 +4,7 @@
 //! All text that comes from outside is escaped.
 
 use super::number::{exact, grouped, rounded};
-use super::{ComparisonReport, FlightPicture, PlotFile, SweepPoint};
+use super::{ComparisonReport, FlightPicture, Made, PlotFile, SweepPoint};
 use std::fmt::Write as _;
 
 const STYLE: &str = "\
@@ -28,12 +28,15 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
     let title = report.title;
     let heading = escaped(&format!("{}: {}", title.terrain, title.flight));
     let of = format!(
-        "Tolerance {} px, picture {} × {} px",
+        "Tolerance {} px, picture {} × {} px, heights × {}, culling by {}",
         exact(title.tolerance_px),
         title.viewport.width_px,
-        title.viewport.height_px
+        title.viewport.height_px,
+        exact(title.exaggeration),
+        title.culling.name()
     );
     begin(&mut out, &heading, &of);
+    made(&mut out, title.made.as_ref());
     verdict(&mut out, report);
     engines(&mut out, report);
     picture(&mut out, report.picture);
@@ -57,6 +60,14 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
 pub(super) fn begin(out: &mut String, heading: &str, of: &str) {
     push(out, format_args!("{OPENING}{heading}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"));
     push(out, format_args!("<h1>{heading}</h1>\n{OF}{of}</p>\n"));
+}
+
+/// How the figures were made, if that is said.
+pub(super) fn made(out: &mut String, made: Option<&Made>) {
+    let Some(made) = made else { return };
+    let commit = made.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
+    let by = escaped(&format!("{}{commit}, on {}, {}", made.program, made.machine, made.date));
+    push(out, format_args!("<p class=\"of\">Made by {by}:<br><code>{}</code></p>\n", escaped(&made.command)));
 }
 
 /// The plots, or why there are none.
