@@ -106,7 +106,7 @@ pub(crate) fn strange(
         && heights_note(terrain).is_some_and(|own| own != noted)
     {
         strange.push(format!(
-            "{path} was made over another terrain{made_over}, of the same size but with other heights, or over another build of this one"
+            "{path} was made over another terrain{made_over}, of the same size but with other heights; or this one was built or rewritten since"
         ));
     }
     if 2 * outside > frames.len() {

@@ -151,16 +151,17 @@ fn turned_back(flight: &Flight, kind: FlightKind, speed: f64, grid: &Grid) -> Op
     let steps = flight.frames.len().saturating_sub(1) as u64;
     let backwards = flight.frames.windows(2).filter(is_backwards).count() as u64;
     let [wide, long] = grid.extent_m();
-    let way = decimal(speed * steps as f64, 0);
+    let metres = |m: f64| grouped(m.round() as u64);
+    let way = metres(speed * steps as f64);
     let why = match kind {
         FlightKind::Turn => format!(
             "the circle does not fit over the terrain of {} x {} m; its way of {way} m turns back at the border",
-            decimal(wide, 0),
-            decimal(long, 0)
+            metres(wide),
+            metres(long)
         ),
         _ => format!(
             "the way is {way} m long and the terrain {} m; the flight goes there and back",
-            decimal(wide.max(long), 0)
+            metres(wide.max(long))
         ),
     };
     (backwards > 0).then(|| {

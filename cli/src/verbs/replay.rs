@@ -32,7 +32,8 @@ Examples:
 
 Totals (vertex tests, splits, merges and what else is called total in --json) are sums over all frames, the first included, which makes the mesh from nothing; so they
 are the sums of the columns of --stats. Triangles a frame are over all frames too. Incoherence and times leave the first frame out. What an engine does not have is -,
-null in --json and empty in --stats: only kinetic has a queue, slots, patches and parts of an update.")]
+null in --json and empty in --stats: only kinetic has a queue, slots, patches and parts of an update.
+Percentiles are by nearest rank. Incoherence is the mean of the frames' percentages. Times are wall-clock times.")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,

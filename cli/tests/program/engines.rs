@@ -60,8 +60,12 @@ fn every_kind_of_flight_is_made_and_repeats() {
     // 19,980 m do not fit over 2,560: three quarters of them are flown there and back.
     let long = ["flight", "straight", "land.iqt", "-o", "l.flight", "--frames", "1000", "--speed", "20"];
     let said = text(&bench.run(&long).stderr);
-    assert!(said.contains("the way is 19980 m long and the terrain 2560 m"), "{said}");
+    assert!(said.contains("the way is 19,980 m long and the terrain 2,560 m"), "{said}");
     assert!(said.contains("of 999 steps the eye flies backwards"), "{said}");
+    // A circle of 11 km.
+    let wide = ["flight", "turn", "land.iqt", "-o", "w.flight", "--frames", "100", "--speed", "100"];
+    let said = text(&bench.run(&wide).stderr);
+    assert!(said.contains("the circle does not fit over the terrain of 2,560 x 2,560 m"), "{said}");
     let short = ["flight", "straight", "land.iqt", "-o", "l.flight", "--frames", "96", "--speed", "20"];
     assert_eq!(text(&bench.run(&short).stderr), "");
     let turn = [

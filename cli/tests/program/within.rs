@@ -101,7 +101,8 @@ fn a_flight_of_another_terrain_is_said() {
         said.contains("over another terrain (land.iqt), of the same size but with other heights"),
         "{said}"
     );
-    bench.good(&["crater", "land.iqt", "--at", "900,900", "--radius", "60", "--depth", "20"]);
+    write(&bench, "e.edits", "set rect 1,1,5,5 to 90\n");
+    bench.good(&["edit", "land.iqt", "--script", "e.edits"]);
     assert!(replay("land.flight").stderr.is_empty(), "edits make no other terrain");
     // Nothing of the terrain is ever in view.
     fly(&bench, "far.flight", "", &[[1e6, 2e6, 500.0], [1e6, 2.1e6, 500.0]]);

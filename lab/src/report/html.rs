@@ -126,7 +126,7 @@ fn engines(out: &mut String, report: &ComparisonReport<'_>) {
     push(
         out,
         format_args!(
-            "<h2>Engines</h2>\n<p>Ratios are to <b>{base}</b>. Ratios, times and incoherence leave the first frame out.</p>\n"
+            "<h2>Engines</h2>\n<p>Ratios are to <b>{base}</b>. Ratios, times and incoherence leave the first frame out. Times are wall-clock times; percentiles are by nearest rank; the incoherence is the mean of the frames' percentages.</p>\n"
         ),
     );
     push(out, format_args!("<div class=\"wide\"><table>\n<thead><tr><th>Engine</th>"));
@@ -185,11 +185,25 @@ fn sweep(out: &mut String, heading: &str, x_name: &str, points: &[SweepPoint]) {
             "<h2>{heading}</h2>\n<div class=\"wide\"><table>\n<thead><tr><th>{x_name}</th><th>Engine</th>"
         ),
     );
-    push(out, format_args!("<th>Speed-up, median</th><th>Tests, % of base</th></tr></thead>\n<tbody>\n"));
+    push(
+        out,
+        format_args!(
+            "<th>Speed-up, median</th><th>Tests, % of base</th><th>Frames</th><th>Triangles a frame</th><th>Incoherence, %</th><th>Metres a frame</th></tr></thead>\n<tbody>\n"
+        ),
+    );
     for p in points {
         let (x, engine) = (exact(p.x), escaped(&p.engine));
         let (speedup, tests) = (rounded(p.speedup_median), rounded(100.0 * p.vertex_tests_ratio));
-        push(out, format_args!("<tr><td>{x}</td><td>{engine}</td><td>{speedup}</td><td>{tests}</td></tr>\n"));
+        push(out, format_args!("<tr><td>{x}</td><td>{engine}</td><td>{speedup}</td><td>{tests}</td>"));
+        let speed = p.speed_m_per_frame.map_or("–".into(), rounded);
+        let (frames, triangles) = (grouped(p.frames as f64, 0), grouped(p.triangles_mean, 0));
+        let incoherence = grouped(p.incoherence_percent, 2);
+        push(
+            out,
+            format_args!(
+                "<td>{frames}</td><td>{triangles}</td><td>{incoherence}</td><td>{speed}</td></tr>\n"
+            ),
+        );
     }
     push(out, format_args!("</tbody>\n</table></div>\n"));
 }
