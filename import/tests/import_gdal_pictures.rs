@@ -315,7 +315,7 @@ fn cases() -> Vec<Case> {
         }
     }
     // Every second: of five turns each comes to every kind.
-    cases.into_iter().step_by(2).collect()
+    cases.into_iter().step_by(4).collect()
 }
 
 /// A terrain in UTM, 400 by 300 m.

@@ -1,5 +1,6 @@
 //! What goes into a frame and what it cost: plain values.
 
+use crate::error::{RenderError, Result};
 use crate::gpu::Capabilities;
 use crate::look::Look;
 use terrasoar::view::View;
@@ -89,6 +90,28 @@ impl PassFormat {
     pub fn samples(self, samples: u32) -> Self {
         Self { samples, ..self }
     }
+
+    /// Refuses what no pass can have. Whether a device has it, the device says.
+    pub(crate) fn check(&self) -> Result<()> {
+        if !self.colour.has_color_aspect() {
+            return Err(RenderError::Usage("PassFormat's colour is no format of colours"));
+        }
+        if matches!(
+            self.colour.sample_type(None, None),
+            Some(wgpu::TextureSampleType::Sint | wgpu::TextureSampleType::Uint)
+        ) {
+            return Err(RenderError::Usage(
+                "PassFormat's colour holds whole numbers; it needs a format that is drawn to as fractions, such as Rgba8Unorm",
+            ));
+        }
+        if !self.depth.has_depth_aspect() {
+            return Err(RenderError::Usage("PassFormat's depth is no format of a depth buffer"));
+        }
+        if !matches!(self.samples, 1 | 2 | 4 | 8 | 16) {
+            return Err(RenderError::Usage("PassFormat's samples are not 1, 2, 4, 8 or 16"));
+        }
+        Ok(())
+    }
 }
 
 /// Which way depth runs. Both are endless: there is no far plane.
@@ -142,4 +165,28 @@ pub struct DrawStats {
     pub draw_calls: u32,
     /// Bytes of uniforms and draw arguments sent.
     pub bytes: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wgpu::TextureFormat as Format;
+
+    #[test]
+    fn passes_that_cannot_be_are_refused_in_words() {
+        let sound = PassFormat::new(Format::Rgba8UnormSrgb);
+        let floating =
+            PassFormat::new(Format::Rgba16Float).depth(Format::Depth24PlusStencil8, DepthRange::Forward);
+        assert!([sound, sound.samples(4), floating].iter().all(|format| format.check().is_ok()));
+        for (format, word) in [
+            (PassFormat::new(Format::Depth32Float), "colour is no format"),
+            (PassFormat::new(Format::R32Uint), "whole numbers"),
+            (sound.depth(Format::Rgba8Unorm, DepthRange::Reversed), "depth is no format"),
+            (sound.samples(3), "samples are not"),
+            (sound.samples(0), "samples are not"),
+        ] {
+            let said = format.check().unwrap_err().to_string();
+            assert!(said.contains(word), "{said}");
+        }
+    }
 }

@@ -9,7 +9,10 @@ pub(crate) fn of_error(error: &wgpu::Error) -> String {
             "the device has no memory left; close what else draws, or draw a smaller picture or a larger tolerance".into()
         }
         wgpu::Error::Validation { description, .. } => {
-            format!("a command was refused, which is a defect of terrasoar; please report it ({})", last_cause(description))
+            format!(
+                "a command was refused ({}). In a program of its own: is PassFormat what the pass has, and are the bindings those that the material declares? In the program terrasoar it is a defect; please report it",
+                last_cause(description)
+            )
         }
         wgpu::Error::Internal { description, .. } => {
             format!("the driver failed ({}); a newer one may not", last_cause(description))

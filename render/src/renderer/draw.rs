@@ -44,6 +44,7 @@ impl Renderer {
         let refined_for = frame.refined_for.unwrap_or(frame.view);
         view::check(frame.view)?;
         view::check(refined_for)?;
+        format.check()?;
         let material = self.material.as_ref().map_or(0, |material| material.number);
         let variant = Variant::of(frame.look, self.imagery.is_some(), material, *format);
         let with_material = self.material.as_ref().filter(|_| variant.material != 0);
