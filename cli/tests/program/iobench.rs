@@ -172,6 +172,8 @@ fn a_cap_holds_or_is_said_not_to() {
     assert_eq!(runs(&value).len(), 4);
     let capped = value["cap"].is_object();
     assert_eq!(value["cap_note"].is_string(), !capped, "one of both: {value}");
+    let command = value["made"]["command"].as_str().unwrap();
+    assert!(command.contains("--cap 256") && !command.contains("--cap-group"), "{command}");
     if capped {
         assert_eq!(value["cap"]["mib"], 256);
         assert!([1, 2].map(Value::from).contains(&value["cap"]["control_group_version"]));
