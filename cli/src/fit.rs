@@ -12,6 +12,9 @@ use terrasoar_layout::read::terrain::Terrain;
 
 /// Name of the note in which a flight says how large the ground is that it was made over.
 const EXTENT_NOTE: &str = "terrain-extent-m";
+/// Name of the note in which it says which heights that ground has.
+const HEIGHTS_NOTE: &str = "terrain-heights";
+
 /// The terrain's extent in words: "which extends from 0,0 to 2560,2560 metres".
 pub(crate) fn extent(grid: &Grid) -> String {
     let [east, north] = extent_note(grid);
@@ -23,8 +26,33 @@ fn extent_note(grid: &Grid) -> [String; 2] {
 }
 
 /// What a flight notes of the ground that it was made over.
-pub(crate) fn note_of(grid: &Grid) -> (String, String) {
-    (EXTENT_NOTE.into(), extent_note(grid).join(" "))
+pub(crate) fn notes_of(terrain: &Terrain) -> Vec<(String, String)> {
+    let extent = (EXTENT_NOTE.into(), extent_note(terrain.grid()).join(" "));
+    let heights = heights_note(terrain).map(|digest| (HEIGHTS_NOTE.into(), digest));
+    std::iter::once(extent).chain(heights).collect()
+}
+
+/// A digest of the terrain's heights as they were built: edits that its journal or an overlay holds do not change it. `None` if the state before them cannot be read.
+///
+/// Cost: a pass over the directory, a word for each page of records.
+fn heights_note(terrain: &Terrain) -> Option<String> {
+    if terrain.header().history.is_none() && terrain.base_path().is_none() {
+        return Some(digest(terrain));
+    }
+    let file = Terrain::open_unmapped(terrain.base_path().unwrap_or(terrain.path())).ok()?;
+    Some(digest(&file.into_original().ok()?))
+}
+
+/// FNV-1a over the grid and the checksums of the pages of records, in 16 hexadecimal digits.
+fn digest(terrain: &Terrain) -> String {
+    let grid = terrain.grid();
+    let shape = grid.samples().into_iter().map(u64::from).chain(grid.spacing_m().map(f64::to_bits));
+    // Where a page lies in the file says nothing of heights.
+    let pages = terrain.entries().iter().map(|entry| u64::from(entry.checksum));
+    let hash = shape.chain(pages).flat_map(u64::to_le_bytes).fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    });
+    format!("{hash:016x}")
 }
 
 /// Whether an eye is over the terrain.
@@ -73,6 +101,12 @@ pub(crate) fn strange(
         strange.push(format!(
             "{path} was made over another terrain{made_over}, of {was} metres; this one is of {} metres",
             extent_note(grid).join(" x ")
+        ));
+    } else if let Some(noted) = note(HEIGHTS_NOTE)
+        && heights_note(terrain).is_some_and(|own| own != noted)
+    {
+        strange.push(format!(
+            "{path} was made over another terrain{made_over}, of the same size but with other heights; or this one was built or rewritten since"
         ));
     }
     if 2 * outside > frames.len() {

@@ -124,6 +124,11 @@ fn run_in(group: &Group, mib: u64) -> Result<()> {
     let words: Vec<OsString> = std::env::args_os().skip(1).collect();
     let mut copy = Command::new(&program);
     copy.args(words).arg(GROUP_FLAG).arg(&group.path);
+    // Reports tell what was typed.
+    #[cfg(unix)]
+    if let Some(typed) = std::env::args_os().next() {
+        std::os::unix::process::CommandExt::arg0(&mut copy, typed);
+    }
     #[cfg(unix)]
     let ran = super::signals::run_copy(&mut copy, || group.remove());
     #[cfg(not(unix))]

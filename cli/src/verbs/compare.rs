@@ -1,18 +1,19 @@
 //! `terrasoar compare`: engines on the same flight, side by side, and a report.
 
+use super::clock::{self, Clock};
 use super::made::title;
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
-use super::replay::{QualityArgs, fly};
+use super::replay::{QualityArgs, Told, fly};
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse, sweep};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
-use terrasoar::stats::{Comparison, FrameStats};
-use terrasoar_lab::report::{ComparisonReport, FLIGHT_PICTURE, FlightPicture};
+use terrasoar::stats::{Comparison, EngineComparison, FrameStats};
+use terrasoar_lab::report::{ComparisonReport, FLIGHT_PICTURE, FlightPicture, remove_stale};
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Fly a recorded flight with several engines, compare them and write a report.
@@ -81,10 +82,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let quality = args.quality.quality();
     let progress = Meter::new("frames");
     let mut runs: Vec<(String, Vec<FrameStats>)> = Vec::new();
+    let clock = Clock::start();
     for engine in &args.engines {
         let frames = fly(&terrain, &flight.frames, quality, *engine, engine.name(), &progress)?;
         runs.push((engine.name().to_owned(), frames));
     }
+    let processor_percent = clock.processor_percent();
     let comparison = Comparison::of(&runs);
     // Engines that disagree are compared no further.
     let (by_tolerance, by_incoherence) = if args.no_sweeps || !comparison.same_mesh {
@@ -97,6 +100,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
             engines: &args.engines,
             progress: &progress,
         };
+        progress.note(&format!(
+            "sweeps fly about {} more frames; --no-sweeps leaves them out",
+            grouped(sweep.frames())
+        ));
         (sweep.by_tolerance()?, sweep.by_incoherence()?)
     };
     drop(progress);
@@ -114,14 +121,15 @@ pub(super) fn run(args: &Args) -> Result<()> {
         },
     };
     let written = report.write(&args.output)?;
+    remove_stale(&args.output, &written);
     if picture.is_err() {
         // An older report's picture shows another flight. It is one, or may be lost: that was looked at first.
         let _ = std::fs::remove_file(args.output.join(FLIGHT_PICTURE));
     }
     if args.json {
-        print_json(&comparison)?;
+        print_json(&Told { origin: title.origin(), processor_percent, figures: &comparison })?;
     } else {
-        print(&text(&comparison))?;
+        print(&text(&comparison, processor_percent))?;
     }
     if let Some(page) = written.last() {
         // With --json standard output holds the object and nothing else.
@@ -160,8 +168,29 @@ fn first_difference(runs: &[(String, Vec<FrameStats>)]) -> Option<(&str, u64)> {
     })
 }
 
-fn text(comparison: &Comparison) -> String {
-    let head = ["engine", "triangles", "vertex tests", "ratio", "worst", "median ms", "speed-up", "pages"];
+/// The base's median time over the engine's: what the median of ratios is where times are not disturbed.
+fn ratio_of_medians(comparison: &Comparison, engine: &EngineComparison) -> f64 {
+    let base_ms = comparison.engines.first().map_or(0.0, |base| base.summary.update_ms.p50);
+    base_ms / engine.summary.update_ms.p50.max(1e-6)
+}
+
+/// Whether two ratios are further apart than a quarter.
+fn disagree(a: f64, b: f64) -> bool {
+    a > 0.0 && b > 0.0 && (a / b).max(b / a) > 1.25
+}
+
+fn text(comparison: &Comparison, processor_percent: Option<f64>) -> String {
+    let head = [
+        "engine",
+        "triangles",
+        "vertex tests",
+        "ratio",
+        "worst",
+        "median ms",
+        "speed-up",
+        "by medians",
+        "pages",
+    ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for engine in &comparison.engines {
         let s = &engine.summary;
@@ -173,10 +202,27 @@ fn text(comparison: &Comparison) -> String {
             format!("{:.2} %", 100.0 * engine.vertex_tests_ratio_worst_frame),
             format!("{:.3}", s.update_ms.p50),
             format!("{:.2}", engine.speedup_median),
+            format!("{:.2}", ratio_of_medians(comparison, engine)),
             grouped(s.pages_touched_total),
         ]);
     }
     let same = if comparison.same_mesh { "yes, in every frame" } else { "NO" };
     let incoherence = comparison.engines.first().map_or(0.0, |e| e.summary.incoherence_percent);
-    format!("{}same mesh: {same}; incoherence {incoherence:.3} %\n", columns(&rows))
+    let disturbed: Vec<&str> = comparison
+        .engines
+        .iter()
+        .filter(|engine| disagree(engine.speedup_median, ratio_of_medians(comparison, engine)))
+        .map(|engine| engine.summary.engine.as_str())
+        .collect();
+    let disturbed = match disturbed.as_slice() {
+        [] => String::new(),
+        names => {
+            format!("; times were disturbed: the two ratios of {} differ by more than 25 %", names.join(", "))
+        }
+    };
+    format!(
+        "{}same mesh: {same}; incoherence {incoherence:.3} %\n{}{disturbed}\n",
+        columns(&rows),
+        clock::told(processor_percent)
+    )
 }

@@ -1,6 +1,6 @@
 //! `terrasoar flight`: a recorded flight over a terrain, at a speed given or found.
 
-use super::output::{complain, decimal, print};
+use super::output::{complain, decimal, grouped, print};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
 use super::replay::QualityArgs;
@@ -8,11 +8,12 @@ use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
 use anyhow::Result;
 use std::path::PathBuf;
-use terrasoar::flight::Flight;
 use terrasoar::flight::generate::{FlightKind, FlightPlan, TerrainGround, generate};
 use terrasoar::flight::incoherence::{MAX_TRIALS, solve};
+use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::mean_incoherence_percent;
 use terrasoar::sink::is_stream;
+use terrasoar_layout::grid::Grid;
 
 /// Make a recorded flight over a terrain.
 ///
@@ -26,7 +27,7 @@ Examples:
   terrasoar flight terrain alps.iqt -o low.flight --frames 1000 --incoherence 0.6
   terrasoar flight turn alps.iqt -o turn.flight --frames 360 --speed 5 --turn-rate 1
 
---tolerance-px, --viewport and --exaggeration matter for --incoherence only: they decide which triangles a frame has. The flight notes them, and the terrain's extent;
+--tolerance-px, --viewport and --exaggeration matter for --incoherence only: they decide which triangles a frame has. The flight notes them, and of the terrain its extent and a digest of its heights;
 terrasoar replay says when it is flown with others.")]
 pub(super) struct Args {
     /// What the flight does
@@ -94,8 +95,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
     args.force.stream(&args.output, Kind::Flight, &args.terrain.inputs(&[]))?;
     let terrain = args.terrain.open()?;
     let ground = TerrainGround::new(&terrain);
-    let (mut flight, told) = match args.pace.incoherence {
-        None => (generate(&ground, &plan)?, String::new()),
+    let (mut flight, speed, told) = match args.pace.incoherence {
+        None => (generate(&ground, &plan)?, plan.speed_m_per_frame, String::new()),
         Some(wanted) => {
             let progress = Meter::new("trials");
             progress.begin("finding the speed", MAX_TRIALS as u64);
@@ -105,6 +106,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
                 progress.add(1);
                 percent
             })?;
+            let found = solution.best.speed_m_per_frame;
             let [speed, percent, checked] =
                 [solution.best.speed_m_per_frame, solution.best.percent, solution.checked_percent]
                     .map(|v| decimal(v, 4));
@@ -113,14 +115,18 @@ pub(super) fn run(args: &Args) -> Result<()> {
             flight.notes.extend(args.quality.notes());
             (
                 flight,
+                found,
                 format!(", {speed} m a frame for {percent} % new triangles ({checked} % on other frames)"),
             )
         }
     };
     ground.check()?;
     note_terrain(&mut flight, args);
-    flight.notes.push(crate::fit::note_of(terrain.grid()));
+    flight.notes.extend(crate::fit::notes_of(&terrain));
     flight.write(&args.output)?;
+    if let Some(words) = turned_back(&flight, args.kind, speed, terrain.grid()) {
+        complain(&format!("note: {}: {words}", args.output.display()));
+    }
     let told =
         format!("{}: {} flight of {} frames{told}", args.output.display(), args.kind.name(), args.frames);
     // A flight piped on to another program stays alone in the pipe.
@@ -129,6 +135,42 @@ pub(super) fn run(args: &Args) -> Result<()> {
         return Ok(());
     }
     print(&told)
+}
+
+/// In words, that a way does not fit over the terrain: it is folded at the border, and the camera is not turned.
+fn turned_back(flight: &Flight, kind: FlightKind, speed: f64, grid: &Grid) -> Option<String> {
+    if !matches!(kind, FlightKind::Straight | FlightKind::Turn) {
+        return None;
+    }
+    let is_backwards = |pair: &&[FlightFrame]| {
+        let [east, north] = [0, 1].map(|axis| pair[1].eye_m[axis] - pair[0].eye_m[axis]);
+        let yaw = pair[0].yaw_deg.to_radians();
+        // A part in a million of a step is rounding.
+        east * yaw.sin() + north * yaw.cos() < -1e-6 * speed
+    };
+    let steps = flight.frames.len().saturating_sub(1) as u64;
+    let backwards = flight.frames.windows(2).filter(is_backwards).count() as u64;
+    let [wide, long] = grid.extent_m();
+    let metres = |m: f64| grouped(m.round() as u64);
+    let way = metres(speed * steps as f64);
+    let why = match kind {
+        FlightKind::Turn => format!(
+            "the circle does not fit over the terrain of {} x {} m; its way of {way} m turns back at the border",
+            metres(wide),
+            metres(long)
+        ),
+        _ => format!(
+            "the way is {way} m long and the terrain {} m; the flight goes there and back",
+            metres(wide.max(long))
+        ),
+    };
+    (backwards > 0).then(|| {
+        format!(
+            "{why}. In {} of {} steps the eye flies backwards: it looks where it came from. Fewer frames or a lower speed avoid it",
+            grouped(backwards),
+            grouped(steps)
+        )
+    })
 }
 
 /// Adds the terrain's name, if it is one that a note can hold.

@@ -8,6 +8,7 @@ mod area;
 mod build;
 mod cache;
 mod cap;
+mod clock;
 mod compare;
 mod compare_ground;
 mod completions;
@@ -75,6 +76,7 @@ use terrasoar_layout::printable;
 #[command(
     name = "terrasoar",
     version,
+    long_version = made::LONG_VERSION.as_str(),
     after_help = "\
 Examples, in the order of the work:
   terrasoar build alps.tif -o alps.iqt

@@ -1,5 +1,6 @@
 //! `terrasoar replay`: a recorded flight through one engine.
 
+use super::clock::{self, Clock};
 use super::made::title;
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
@@ -15,7 +16,7 @@ use terrasoar::flyover::{EngineKind, Quality, TimedBatch, replay, replay_edited}
 use terrasoar::refine::Culling;
 use terrasoar::stats::{FrameStats, ReplaySummary};
 use terrasoar::view::Viewport;
-use terrasoar_lab::report::{ReportFile, write_frames_csv};
+use terrasoar_lab::report::{Origin, ReportFile, write_frames_csv};
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Fly a recorded flight with one engine and print what it cost.
@@ -31,7 +32,8 @@ Examples:
 
 Totals (vertex tests, splits, merges and what else is called total in --json) are sums over all frames, the first included, which makes the mesh from nothing; so they
 are the sums of the columns of --stats. Triangles a frame are over all frames too. Incoherence and times leave the first frame out. What an engine does not have is -,
-null in --json and empty in --stats: only kinetic has a queue, slots, patches and parts of an update.")]
+null in --json and empty in --stats: only kinetic has a queue, slots, patches and parts of an update.
+Percentiles are by nearest rank. Incoherence is the mean of the frames' percentages. Times are wall-clock times.")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
@@ -63,6 +65,7 @@ pub(super) struct Args {
 const TOLERANCE_NOTE: &str = "solved-tolerance-px";
 const VIEWPORT_NOTE: &str = "solved-viewport";
 const EXAGGERATION_NOTE: &str = "solved-exaggeration";
+const CULLING_NOTE: &str = "solved-culling";
 
 /// Picture and precision.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -104,12 +107,13 @@ impl QualityArgs {
     }
 
     /// What a flight whose speed was found for an incoherence notes of the picture it was found for.
-    pub(super) fn notes(self) -> [(String, String); 3] {
+    pub(super) fn notes(self) -> [(String, String); 4] {
         let [wide, high] = self.viewport.size_px();
         [
             (TOLERANCE_NOTE.into(), self.tolerance_px.to_string()),
             (VIEWPORT_NOTE.into(), format!("{wide}x{high}")),
             (EXAGGERATION_NOTE.into(), self.exaggeration.to_string()),
+            (CULLING_NOTE.into(), self.culling.name().into()),
         ]
     }
 
@@ -120,20 +124,22 @@ impl QualityArgs {
         let own = self.notes();
         let differing: Vec<&(String, String)> =
             own.iter().filter(|(name, value)| note(name).is_some_and(|noted| noted != value)).collect();
-        let percent =
-            note("incoherence-percent").map(|percent| format!(" of {percent} %")).unwrap_or_default();
         let told = |(name, value): &&(String, String)| {
-            format!(
-                "a {} of {} (here {value})",
-                name.trim_start_matches("solved-"),
-                note(name).unwrap_or_default()
-            )
+            let noted = note(name).unwrap_or_default();
+            match name.as_str() {
+                TOLERANCE_NOTE => format!("a tolerance of {noted} px, here it is {value} px"),
+                VIEWPORT_NOTE => format!("a picture of {noted}, here it is {value}"),
+                EXAGGERATION_NOTE => format!("an exaggeration of {noted}, here it is {value}"),
+                _ => format!("culling by {noted}, here it is by {value}"),
+            }
+        };
+        let is_not = match note("incoherence-percent") {
+            Some(percent) => format!("the incoherence is not {percent} % then"),
+            None => "the incoherence is another then".into(),
         };
         (!differing.is_empty()).then(|| {
-            format!(
-                "its speed was found for an incoherence{percent} at {}; it is another here",
-                differing.iter().map(told).collect::<Vec<_>>().join(" and ")
-            )
+            let told: Vec<String> = differing.iter().map(told).collect();
+            format!("its speed was found at {}: {is_not}", told.join(", and at "))
         })
     }
 }
@@ -156,7 +162,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if let Some(stats) = &args.stats {
         let others: Vec<_> =
             [Some(&args.flight), args.edits.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
-        args.force.stream(stats, Kind::Report(ReportFile::Frames), &args.terrain.inputs(&others))?;
+        args.force.table(stats, Kind::Report(ReportFile::Frames), &args.terrain.inputs(&others))?;
     }
     let terrain = Arc::new(args.terrain.open()?);
     let flight = Flight::read(&args.flight)?;
@@ -171,6 +177,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         ))
         .into());
     }
+    let clock = Clock::start();
     let frames = match &args.edits {
         None => fly(&terrain, &flight.frames, quality, args.engine, name, &progress)?,
         Some(script) => {
@@ -182,11 +189,27 @@ pub(super) fn run(args: &Args) -> Result<()> {
         }
     };
     drop(progress);
+    let processor_percent = clock.processor_percent();
+    let title = title(&args.terrain.file, &args.flight, quality);
     if let Some(path) = &args.stats {
-        write_frames_csv(path, &title(&args.terrain.file, &args.flight, quality), &frames)?;
+        write_frames_csv(path, &title, name, &frames)?;
     }
     let summary = ReplaySummary::of(name, &frames);
-    if args.json { print_json(&summary) } else { print(&text(&summary)) }
+    if args.json {
+        return print_json(&Told { origin: title.origin(), processor_percent, figures: &summary });
+    }
+    print(&format!("{}{}\n", text(&summary), clock::told(processor_percent)))
+}
+
+/// Figures, and where they come from.
+#[derive(serde::Serialize)]
+pub(super) struct Told<'a, T> {
+    #[serde(flatten)]
+    pub(super) origin: Origin<'a>,
+    /// Processor time of the thread that flew, in percent of the time that passed.
+    pub(super) processor_percent: Option<f64>,
+    #[serde(flatten)]
+    pub(super) figures: &'a T,
 }
 
 /// A script's batches at their frames. Those whose moment never comes are told.

@@ -31,6 +31,13 @@ pub(super) struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
+    /// About how many frames both sweeps fly: each engine flies each twice. Finding speeds comes on top.
+    pub(super) fn frames(&self) -> u64 {
+        let stretch = self.flight.frames.len().min(FRAMES);
+        let once = TOLERANCES_PX.len() * stretch + INCOHERENCES_PERCENT.len() * FRAMES;
+        (2 * once * self.engines.len()) as u64
+    }
+
     /// The same stretch at each tolerance.
     pub(super) fn by_tolerance(&self) -> Result<Vec<SweepPoint>> {
         let frames = &self.flight.frames;
@@ -39,7 +46,13 @@ impl Sweep<'_> {
         let mut points = Vec::new();
         for tolerance_px in TOLERANCES_PX {
             let quality = self.quality.tolerance_px(tolerance_px);
-            points.extend(self.points(tolerance_px, &format!("{tolerance_px} px"), stretch, quality)?);
+            points.extend(self.points(
+                tolerance_px,
+                &format!("{tolerance_px} px"),
+                stretch,
+                None,
+                quality,
+            )?);
         }
         Ok(points)
     }
@@ -55,15 +68,21 @@ impl Sweep<'_> {
                 mean_incoherence_percent(self.terrain, pairs, self.quality)
             });
             ground.check()?;
-            let frames = match solution {
-                Ok(solution) => solution.flight.frames,
+            let (frames, speed) = match solution {
+                Ok(solution) => (solution.flight.frames, solution.best.speed_m_per_frame),
                 Err(error @ (SolveError::Unreachable { .. } | SolveError::Jumps { .. })) => {
                     self.progress.note(&format!("note: the sweep leaves out {percent} %: {error}"));
                     continue;
                 }
                 Err(error) => return Err(error.into()),
             };
-            points.extend(self.points(percent, &format!("{percent} %"), &frames, self.quality)?);
+            points.extend(self.points(
+                percent,
+                &format!("{percent} %"),
+                &frames,
+                Some(speed),
+                self.quality,
+            )?);
         }
         Ok(points)
     }
@@ -88,6 +107,7 @@ impl Sweep<'_> {
         x: f64,
         title: &str,
         frames: &[FlightFrame],
+        speed_m_per_frame: Option<f64>,
         quality: Quality,
     ) -> Result<Vec<SweepPoint>> {
         let mut runs = Vec::new();
@@ -98,6 +118,10 @@ impl Sweep<'_> {
         }
         let points = Comparison::of(&runs).engines.into_iter().map(|engine| SweepPoint {
             x,
+            frames: engine.summary.frames,
+            triangles_mean: engine.summary.triangles_mean,
+            incoherence_percent: engine.summary.incoherence_percent,
+            speed_m_per_frame,
             engine: engine.summary.engine,
             speedup_median: engine.speedup_median,
             vertex_tests_ratio: engine.vertex_tests_ratio,

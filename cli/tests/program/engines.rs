@@ -27,6 +27,18 @@ const REPLAY_FIELDS: [&str; 21] = [
     "edited_records_total",
 ];
 
+/// What says where figures come from.
+const ORIGIN_FIELDS: [&str; 8] = [
+    "terrain",
+    "flight",
+    "tolerance_px",
+    "viewport_px",
+    "exaggeration",
+    "culling",
+    "made",
+    "processor_percent",
+];
+
 fn sorted(mut names: Vec<&str>) -> Vec<&str> {
     names.sort_unstable();
     names
@@ -45,6 +57,17 @@ fn every_kind_of_flight_is_made_and_repeats() {
         assert_eq!(flight.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit())).count(), 12);
         assert_eq!(flight, make("b.flight"));
     }
+    // 19,980 m do not fit over 2,560: three quarters of them are flown there and back.
+    let long = ["flight", "straight", "land.iqt", "-o", "l.flight", "--frames", "1000", "--speed", "20"];
+    let said = text(&bench.run(&long).stderr);
+    assert!(said.contains("the way is 19,980 m long and the terrain 2,560 m"), "{said}");
+    assert!(said.contains("of 999 steps the eye flies backwards"), "{said}");
+    // A circle of 11 km.
+    let wide = ["flight", "turn", "land.iqt", "-o", "w.flight", "--frames", "100", "--speed", "100"];
+    let said = text(&bench.run(&wide).stderr);
+    assert!(said.contains("the circle does not fit over the terrain of 2,560 x 2,560 m"), "{said}");
+    let short = ["flight", "straight", "land.iqt", "-o", "l.flight", "--frames", "96", "--speed", "20"];
+    assert_eq!(text(&bench.run(&short).stderr), "");
     let turn = [
         "flight",
         "turn",
@@ -89,7 +112,12 @@ fn engines_replay_the_same_mesh() {
     let replay = |engine: &str| -> Value {
         let args = ["replay", "land.iqt", "--flight", "land.flight", "--engine", engine, "--json"];
         let value = bench.json(&args);
-        assert_eq!(sorted(fields(&value)), sorted(REPLAY_FIELDS.to_vec()));
+        assert_eq!(sorted(fields(&value)), sorted([&REPLAY_FIELDS[..], &ORIGIN_FIELDS].concat()));
+        assert_eq!(
+            (value["terrain"].as_str(), value["culling"].as_str()),
+            (Some("land.iqt"), Some("vertices"))
+        );
+        assert!(value["made"]["command"].as_str().unwrap().ends_with(&args.join(" ")));
         assert_eq!(sorted(fields(&value["update_ms"])), ["max", "mean", "p50", "p95", "p99"]);
         assert_eq!((value["engine"].as_str(), value["frames"].as_u64()), (Some(engine), Some(40)));
         value
@@ -117,9 +145,15 @@ fn engines_replay_the_same_mesh() {
     assert!(human.contains("vertex tests"), "{human}");
     let (remarks, table) = bench.table("frames.csv");
     assert_eq!(table.lines().count(), 41);
-    for remark in
-        ["# terrain: land.iqt", "# flight: land.flight", "# tolerance_px: 1", "# viewport_px: 800x600"]
-    {
+    for remark in [
+        "# terrain: land.iqt",
+        "# flight: land.flight",
+        "# engine: smart",
+        "# tolerance_px: 1",
+        "# viewport_px: 800x600",
+        "# exaggeration: 1",
+        "# culling: vertices",
+    ] {
         assert!(remarks.lines().any(|line| line == remark), "{remark}: {remarks}");
     }
     assert!(remarks.contains("--engine smart --stats frames.csv"), "{remarks}");
@@ -181,7 +215,7 @@ fn compare_writes_a_report_and_one_object() {
         "--no-sweeps",
     ];
     let value = bench.json(&[&args[..], &["--json"]].concat());
-    assert_eq!(sorted(fields(&value)), ["engines", "same_mesh"]);
+    assert_eq!(sorted(fields(&value)), sorted([&["engines", "same_mesh"][..], &ORIGIN_FIELDS].concat()));
     assert_eq!(value["same_mesh"], true);
     let engines = value["engines"].as_array().unwrap();
     assert_eq!(engines.len(), 3);
@@ -198,7 +232,11 @@ fn compare_writes_a_report_and_one_object() {
         assert!(bench.path("report").join(file).is_file(), "{file}");
     }
     let output = bench.run(&args);
-    assert!(text(&output.stdout).contains("same mesh: yes"), "{}", text(&output.stdout));
+    let told = text(&output.stdout);
+    assert!(told.contains("same mesh: yes") && told.contains("\nprocessor time "), "{told}");
+    assert!(told.contains("speed-up  by medians"), "{told}");
+    let page = std::fs::read_to_string(bench.path("report/report.html")).unwrap();
+    assert!(page.contains("Made by terrasoar ") && page.contains("culling by vertices"));
     assert_eq!(text(&output.stderr), "");
     assert!(bench.bad(1, &[&args[..7], &["land.tif"], &args[8..]].concat()).contains("folder"));
 }
@@ -206,7 +244,12 @@ fn compare_writes_a_report_and_one_object() {
 #[test]
 fn sweeps_are_in_the_summary() {
     let bench = Bench::with_flight();
-    bench.good(&["compare", "land.iqt", "--flight", "land.flight", "-o", "r", "--viewport", "200x150"]);
+    let output =
+        bench.run(&["compare", "land.iqt", "--flight", "land.flight", "-o", "r", "--viewport", "200x150"]);
+    assert!(output.status.success());
+    // Three engines fly five times 40 frames and three times 120, each twice.
+    let said = text(&output.stderr);
+    assert!(said.contains("sweeps fly about 3,360 more frames; --no-sweeps leaves them out"), "{said}");
     let summary = std::fs::read_to_string(bench.path("r/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();
     let xs = |sweep: &str| -> Vec<f64> {
@@ -214,6 +257,16 @@ fn sweeps_are_in_the_summary() {
         points.iter().filter(|p| p["engine"] == "smart").map(|p| p["x"].as_f64().unwrap()).collect()
     };
     assert_eq!(xs("tolerance_sweep"), [0.5, 1.0, 2.0, 4.0, 8.0]);
+    for (sweep, frames, is_solved) in [("tolerance_sweep", 40, false), ("incoherence_sweep", 120, true)] {
+        for point in summary[sweep].as_array().unwrap() {
+            assert_eq!(
+                (point["frames"].as_u64(), point["speed_m_per_frame"].is_f64()),
+                (Some(frames), is_solved)
+            );
+            assert!(point["triangles_mean"].as_f64() > Some(0.0), "{point}");
+            assert!(point["incoherence_percent"].as_f64() > Some(0.0), "{point}");
+        }
+    }
     // What this small terrain cannot reach is left out with a note.
     assert!(xs("incoherence_sweep").iter().all(|x| [0.6, 1.4, 5.3].contains(x)));
 }

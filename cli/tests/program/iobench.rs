@@ -132,6 +132,10 @@ fn frames_report_and_table_are_written() {
         ["iobench", "land.iqt", "--flight", "land.flight", "--engines", "kinetic", "--layouts", "row,ours"];
     let table = bench.good(&[&args[..], &["--frames", "f.csv", "-o", "report"]].concat());
     assert!(table.contains("kinetic") && table.contains("mesh") && table.contains("report.html"), "{table}");
+    assert!(
+        table.contains("late pages, sum") && table.contains("fits into the cache (row, ours)"),
+        "{table}"
+    );
     let (remarks, csv) = bench.table("f.csv");
     assert!(remarks.contains("# terrain: land.iqt\n# flight: land.flight\n"), "{remarks}");
     assert_eq!(csv.lines().count(), 1 + 6 * 40);
@@ -168,6 +172,8 @@ fn a_cap_holds_or_is_said_not_to() {
     assert_eq!(runs(&value).len(), 4);
     let capped = value["cap"].is_object();
     assert_eq!(value["cap_note"].is_string(), !capped, "one of both: {value}");
+    let command = value["made"]["command"].as_str().unwrap();
+    assert!(command.contains("--cap 256") && !command.contains("--cap-group"), "{command}");
     if capped {
         assert_eq!(value["cap"]["mib"], 256);
         assert!([1, 2].map(Value::from).contains(&value["cap"]["control_group_version"]));

@@ -92,7 +92,18 @@ fn a_flight_of_another_terrain_is_said() {
     let replay = |name: &str| bench.run(&["replay", "land.iqt", "--flight", name]);
     assert!(replay("land.flight").stderr.is_empty(), "its own flight is nothing to speak of");
     let notes = std::fs::read_to_string(bench.path("land.flight")).unwrap();
-    assert!(notes.contains("\n# terrain-extent-m: 2560 2560\n"), "{notes}");
+    assert!(notes.contains("\n# terrain-extent-m: 2560 2560\n# terrain-heights: "), "{notes}");
+    // Another terrain of the same size, and this one with edits.
+    bench.good(&["synth", "--size", "129", "--seed", "2", "-o", "other.tif"]);
+    bench.good(&["build", "other.tif", "-o", "other.iqt"]);
+    let said = text(&bench.run(&["replay", "other.iqt", "--flight", "land.flight"]).stderr);
+    assert!(
+        said.contains("over another terrain (land.iqt), of the same size but with other heights"),
+        "{said}"
+    );
+    write(&bench, "e.edits", "set rect 1,1,5,5 to 90\n");
+    bench.good(&["edit", "land.iqt", "--script", "e.edits"]);
+    assert!(replay("land.flight").stderr.is_empty(), "edits make no other terrain");
     // Nothing of the terrain is ever in view.
     fly(&bench, "far.flight", "", &[[1e6, 2e6, 500.0], [1e6, 2.1e6, 500.0]]);
     for verb in [
@@ -208,7 +219,12 @@ fn a_flight_says_for_which_pictures_its_speed_was_found() {
     let find = ["flight", "straight", "land.iqt", "-o", "s.flight", "--frames", "12", "--incoherence", "2"];
     bench.good(&[&find[..], &["--tolerance-px", "0.5", "--viewport", "640x480"]].concat());
     let notes = std::fs::read_to_string(bench.path("s.flight")).unwrap();
-    for note in ["solved-tolerance-px: 0.5", "solved-viewport: 640x480", "solved-exaggeration: 1"] {
+    for note in [
+        "solved-tolerance-px: 0.5",
+        "solved-viewport: 640x480",
+        "solved-exaggeration: 1",
+        "solved-culling: vertices",
+    ] {
         assert!(notes.contains(&format!("# {note}\n")), "{notes}");
     }
     let replay = |more: &[&str]| {
@@ -217,8 +233,13 @@ fn a_flight_says_for_which_pictures_its_speed_was_found() {
     };
     assert_eq!(replay(&["--tolerance-px", "0.5", "--viewport", "640x480"]), "");
     let said = replay(&["--viewport", "640x480"]);
-    assert!(said.contains("at a tolerance-px of 0.5 (here 1); it is another here"), "{said}");
-    assert!(replay(&["--tolerance-px", "0.5"]).contains("a viewport of 640x480 (here 800x600)"));
+    assert!(
+        said.contains("found at a tolerance of 0.5 px, here it is 1 px: the incoherence is not "),
+        "{said}"
+    );
+    let clusters = ["--tolerance-px", "0.5", "--viewport", "640x480", "--culling", "clusters"];
+    assert!(replay(&clusters).contains("at culling by vertices, here it is by clusters: the incoherence"));
+    assert!(replay(&["--tolerance-px", "0.5"]).contains("a picture of 640x480, here it is 800x600"));
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! file read an answer, some tens of microseconds, so ask outside what is timed.
 
 use std::path::Path;
+use std::time::Duration;
 
 /// Page faults so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,6 +20,19 @@ pub struct Faults {
 /// Faults of the calling thread.
 pub fn thread_faults() -> Option<Faults> {
     parse_faults(&proc_file("thread-self/stat")?)
+}
+
+/// Processor time of the calling thread, in steps of a clock tick, a hundredth of a second.
+#[cfg(target_os = "linux")]
+pub fn thread_time() -> Option<Duration> {
+    let ticks = parse_ticks(&proc_file("thread-self/stat")?)?;
+    Some(Duration::from_secs_f64(ticks as f64 / rustix::param::clock_ticks_per_second() as f64))
+}
+
+/// As on Linux: here it is not known.
+#[cfg(not(target_os = "linux"))]
+pub fn thread_time() -> Option<Duration> {
+    None
 }
 
 /// Bytes that storage delivered for this process, all threads counted.
@@ -98,6 +112,15 @@ pub(crate) fn free_bytes(_: &Path) -> std::io::Result<Option<u64>> {
 
 fn proc_file(name: &str) -> Option<String> {
     if cfg!(target_os = "linux") { std::fs::read_to_string(Path::new("/proc").join(name)).ok() } else { None }
+}
+
+/// Fields 14 and 15 of a `stat` line, together.
+#[cfg_attr(not(target_os = "linux"), allow(dead_code, reason = "only Linux has such lines"))]
+fn parse_ticks(stat: &str) -> Option<u64> {
+    let mut words = stat.get(stat.rfind(')')? + 1..)?.split_ascii_whitespace().skip(11);
+    let user: u64 = words.next()?.parse().ok()?;
+    let system: u64 = words.next()?.parse().ok()?;
+    user.checked_add(system)
 }
 
 /// Fields 10 and 12 of a `stat` line. The second is the program's name in brackets, which may hold anything.

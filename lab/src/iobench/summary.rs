@@ -21,6 +21,10 @@ pub struct IoBench {
     pub tolerance_px: f64,
     /// Size of the picture, wide and high.
     pub viewport_px: [u32; 2],
+    /// Heights were multiplied by this.
+    pub exaggeration: f64,
+    /// What was left out of view.
+    pub culling: String,
     /// Bytes a page.
     pub page_bytes: u64,
     /// The counting run's cache, MiB.

@@ -1,6 +1,6 @@
 //! The frames of a replay as CSV: remarks on how they came about, the field names of [`FrameStats`], then a line for each frame.
 //!
-//! Hashes are 16 hexadecimal digits; times have the shortest digits that read back the same. A field that does not apply to the engine is empty.
+//! Hashes are 16 hexadecimal digits; times are told to the nanosecond. A field that does not apply to the engine is empty.
 
 use super::{ReportError, ReportTitle};
 use std::io::Write;
@@ -10,13 +10,18 @@ use terrasoar::stats::FrameStats;
 
 pub(super) const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,update_ms,scan_us,test_us,apply_us,edited_records,edit_ms,mesh_hash";
 
-/// Writes `frames` to `path`, behind remarks that say how they came about: a file appears when it is complete, a stream such as a pipe is written to directly.
+/// Writes `frames`, flown by `engine`, to `path`, behind remarks that say how they came about: a file appears when it is complete, a stream such as a pipe is written to directly.
 ///
 /// # Errors
 /// [`ReportError::Write`] or [`ReportError::Output`].
-pub fn write_frames_csv(path: &Path, title: &ReportTitle, frames: &[FrameStats]) -> Result<(), ReportError> {
+pub fn write_frames_csv(
+    path: &Path,
+    title: &ReportTitle,
+    engine: &str,
+    frames: &[FrameStats],
+) -> Result<(), ReportError> {
     let mut sink = FileSink::create(path).map_err(ReportError::of_output)?;
-    write_frames(&mut sink, title, frames)
+    write_frames(&mut sink, title, engine, frames)
         .map_err(|source| ReportError::Write { path: path.into(), source })?;
     sink.publish().map_err(ReportError::of_output)
 }
@@ -24,9 +29,10 @@ pub fn write_frames_csv(path: &Path, title: &ReportTitle, frames: &[FrameStats])
 pub(super) fn write_frames(
     to: &mut dyn Write,
     title: &ReportTitle,
+    engine: &str,
     frames: &[FrameStats],
 ) -> std::io::Result<()> {
-    title.preamble().write(to)?;
+    title.origin().write(to, Some(engine))?;
     writeln!(to, "{HEADER}")?;
     for f in frames {
         // Named one by one, so that a new field cannot be forgotten.
@@ -53,7 +59,8 @@ pub(super) fn write_frames(
             mesh_hash,
         } = f;
         let [expired, slots_written, patch_bytes] = [expired, slots_written, patch_bytes].map(|v| known(*v));
-        let [scan_us, test_us, apply_us] = [scan_us, test_us, apply_us].map(|v| known(*v));
+        let [scan_us, test_us, apply_us] = [scan_us, test_us, apply_us].map(|v| known(v.map(neat_us)));
+        let [update_ms, edit_ms] = [update_ms, edit_ms].map(|v| neat_ms(*v));
         writeln!(
             to,
             "{frame},{triangles},{new_triangles},{vertex_tests},{splits},{merges},{expired},{slots_written},{patch_bytes},{late},{late_error_px},\
@@ -61,6 +68,16 @@ pub(super) fn write_frames(
         )?;
     }
     Ok(())
+}
+
+/// Milliseconds to the nanosecond, without what computing them in binary left.
+pub(super) fn neat_ms(ms: f64) -> f64 {
+    (ms * 1e6).round() / 1e6
+}
+
+/// Microseconds to the nanosecond.
+fn neat_us(us: f64) -> f64 {
+    (us * 1e3).round() / 1e3
 }
 
 /// A figure, or nothing where there is none.
@@ -82,10 +99,15 @@ mod tests {
 
     #[test]
     fn a_line_holds_a_frame() {
-        let frame =
-            FrameStats { frame: 7, triangles: 5, update_ms: 0.1, mesh_hash: 0xab, ..Default::default() };
+        let frame = FrameStats {
+            frame: 7,
+            triangles: 5,
+            update_ms: 0.1 + 2e-14,
+            mesh_hash: 0xab,
+            ..Default::default()
+        };
         let mut text = Vec::new();
-        write_frames(&mut text, &title(), &[frame]).unwrap();
+        write_frames(&mut text, &title(), "soar", &[frame]).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert!(text.starts_with("# "), "{text}");
         let mut table = text.lines().skip_while(|line| line.starts_with('#'));
@@ -95,7 +117,8 @@ mod tests {
 
     #[test]
     fn a_file_that_cannot_be_made_is_named() {
-        let error = write_frames_csv(Path::new("/no/such/a.csv"), &title(), &[]).unwrap_err().to_string();
+        let error =
+            write_frames_csv(Path::new("/no/such/a.csv"), &title(), "soar", &[]).unwrap_err().to_string();
         assert!(error.contains("/no/such/a.csv"), "{error}");
     }
 }

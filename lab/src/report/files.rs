@@ -3,8 +3,12 @@
 //! Code that is about to replace a file asks this first. **The answer depends on how the file starts**, so that another program's table or page is recognised as such whatever it is called.
 
 use super::html::FLIGHT_PICTURE;
-use super::{ComparisonReport, csv, file_parts, html, io, preamble};
+use super::{ComparisonReport, csv, file_parts, html, io, origin};
 use crate::picture;
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use terrasoar::flyover::EngineKind;
 
 /// Bytes from a file's start that are enough to tell.
 pub const START_BYTES: usize = 1 << 16;
@@ -32,9 +36,7 @@ impl ReportFile {
     pub fn is_ours(self, start: &[u8]) -> bool {
         let holds = |text: &str| start.windows(text.len()).any(|window| window == text.as_bytes());
         let is_table = |names: &str| {
-            preamble::skipped(start)
-                .strip_prefix(names.as_bytes())
-                .is_some_and(|rest| rest.starts_with(b"\n"))
+            origin::skipped(start).strip_prefix(names.as_bytes()).is_some_and(|rest| rest.starts_with(b"\n"))
         };
         match self {
             Self::Frames => is_table(csv::HEADER),
@@ -87,6 +89,22 @@ impl io::IoReport<'_> {
     }
 }
 
+/// Removes from the directory `dir` what an earlier report of ours left there and this one, whose files are `written`, does not have. Everything else stays, and so does what cannot be removed.
+pub fn remove_stale(dir: &Path, written: &[PathBuf]) {
+    let engines = EngineKind::ALL.map(EngineKind::name);
+    for (name, kind) in ComparisonReport::files(&engines).into_iter().chain(io::IoReport::files()) {
+        let path = dir.join(name);
+        if written.contains(&path) {
+            continue;
+        }
+        let mut start = Vec::new();
+        let read = File::open(&path).and_then(|file| file.take(START_BYTES as u64).read_to_end(&mut start));
+        if read.is_ok() && kind.is_ours(&start) {
+            let _ = std::fs::remove_file(&path);
+        }
+    }
+}
+
 /// The file with the frames of an engine, whose name is this part of it.
 pub(super) fn frames_name(part: &str) -> String {
     format!("frames-{part}.csv")
@@ -96,7 +114,6 @@ pub(super) fn frames_name(part: &str) -> String {
 mod tests {
     use super::super::{io, tests};
     use super::*;
-    use std::path::Path;
 
     fn check(folder: &Path, written: &[std::path::PathBuf], files: &[(String, ReportFile)]) {
         for path in written {
@@ -125,6 +142,20 @@ mod tests {
         let (bench, runs) = io::tests::made_up();
         let written = io::IoReport { bench: &bench, runs: &runs }.write(&b).unwrap();
         check(&b, &written, &io::IoReport::files());
+    }
+
+    #[test]
+    fn what_an_earlier_report_left_is_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let written = tests::with_report(3, |report| report.write(folder.path()).unwrap());
+        let at = |name: &str| folder.path().join(name);
+        std::fs::copy(at("frames-soar.csv"), at("frames-kinetic.csv")).unwrap();
+        std::fs::copy(at("frames-soar.csv"), at("frames-mine.csv")).unwrap();
+        std::fs::write(at("frames-naive.csv"), "mine\n").unwrap();
+        remove_stale(folder.path(), &written);
+        assert!(written.iter().all(|path| path.is_file()));
+        assert!(!at("frames-kinetic.csv").exists());
+        assert!(at("frames-mine.csv").is_file() && at("frames-naive.csv").is_file());
     }
 
     #[test]

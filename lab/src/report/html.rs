@@ -4,7 +4,7 @@
 //! All text that comes from outside is escaped.
 
 use super::number::{exact, grouped, rounded};
-use super::{ComparisonReport, FlightPicture, PlotFile, SweepPoint};
+use super::{ComparisonReport, FlightPicture, Made, PlotFile, SweepPoint};
 use std::fmt::Write as _;
 
 const STYLE: &str = "\
@@ -28,12 +28,15 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
     let title = report.title;
     let heading = escaped(&format!("{}: {}", title.terrain, title.flight));
     let of = format!(
-        "Tolerance {} px, picture {} × {} px",
+        "Tolerance {} px, picture {} × {} px, heights × {}, culling by {}",
         exact(title.tolerance_px),
         title.viewport.width_px,
-        title.viewport.height_px
+        title.viewport.height_px,
+        exact(title.exaggeration),
+        title.culling.name()
     );
     begin(&mut out, &heading, &of);
+    made(&mut out, title.made.as_ref());
     verdict(&mut out, report);
     engines(&mut out, report);
     picture(&mut out, report.picture);
@@ -57,6 +60,14 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
 pub(super) fn begin(out: &mut String, heading: &str, of: &str) {
     push(out, format_args!("{OPENING}{heading}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"));
     push(out, format_args!("<h1>{heading}</h1>\n{OF}{of}</p>\n"));
+}
+
+/// How the figures were made, if that is said.
+pub(super) fn made(out: &mut String, made: Option<&Made>) {
+    let Some(made) = made else { return };
+    let commit = made.commit.as_ref().map(|commit| format!(", commit {commit}")).unwrap_or_default();
+    let by = escaped(&format!("{}{commit}, on {}, {}", made.program, made.machine, made.date));
+    push(out, format_args!("<p class=\"of\">Made by {by}:<br><code>{}</code></p>\n", escaped(&made.command)));
 }
 
 /// The plots, or why there are none.
@@ -115,7 +126,7 @@ fn engines(out: &mut String, report: &ComparisonReport<'_>) {
     push(
         out,
         format_args!(
-            "<h2>Engines</h2>\n<p>Ratios are to <b>{base}</b>. Ratios, times and incoherence leave the first frame out.</p>\n"
+            "<h2>Engines</h2>\n<p>Ratios are to <b>{base}</b>. Ratios, times and incoherence leave the first frame out. Times are wall-clock times; percentiles are by nearest rank; the incoherence is the mean of the frames' percentages.</p>\n"
         ),
     );
     push(out, format_args!("<div class=\"wide\"><table>\n<thead><tr><th>Engine</th>"));
@@ -174,11 +185,25 @@ fn sweep(out: &mut String, heading: &str, x_name: &str, points: &[SweepPoint]) {
             "<h2>{heading}</h2>\n<div class=\"wide\"><table>\n<thead><tr><th>{x_name}</th><th>Engine</th>"
         ),
     );
-    push(out, format_args!("<th>Speed-up, median</th><th>Tests, % of base</th></tr></thead>\n<tbody>\n"));
+    push(
+        out,
+        format_args!(
+            "<th>Speed-up, median</th><th>Tests, % of base</th><th>Frames</th><th>Triangles a frame</th><th>Incoherence, %</th><th>Metres a frame</th></tr></thead>\n<tbody>\n"
+        ),
+    );
     for p in points {
         let (x, engine) = (exact(p.x), escaped(&p.engine));
         let (speedup, tests) = (rounded(p.speedup_median), rounded(100.0 * p.vertex_tests_ratio));
-        push(out, format_args!("<tr><td>{x}</td><td>{engine}</td><td>{speedup}</td><td>{tests}</td></tr>\n"));
+        push(out, format_args!("<tr><td>{x}</td><td>{engine}</td><td>{speedup}</td><td>{tests}</td>"));
+        let speed = p.speed_m_per_frame.map_or("–".into(), rounded);
+        let (frames, triangles) = (grouped(p.frames as f64, 0), grouped(p.triangles_mean, 0));
+        let incoherence = grouped(p.incoherence_percent, 2);
+        push(
+            out,
+            format_args!(
+                "<td>{frames}</td><td>{triangles}</td><td>{incoherence}</td><td>{speed}</td></tr>\n"
+            ),
+        );
     }
     push(out, format_args!("</tbody>\n</table></div>\n"));
 }

@@ -11,8 +11,8 @@
 mod figures;
 mod page;
 
-use super::preamble::Preamble;
-use super::{PlotFile, ReportError};
+use super::csv::neat_ms;
+use super::{Origin, PlotFile, ReportError};
 use crate::iobench::{FrameIo, IoBench, Run, Timed, UpdateCost};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -78,14 +78,16 @@ fn write_io_frames(
     bench: &IoBench,
     runs: &[(Run, Option<Timed>)],
 ) -> std::io::Result<()> {
-    let preamble = Preamble {
+    let origin = Origin {
         terrain: &bench.terrain,
         flight: &bench.flight,
         tolerance_px: bench.tolerance_px,
         viewport_px: bench.viewport_px,
+        exaggeration: bench.exaggeration,
+        culling: &bench.culling,
         made: bench.made.as_ref(),
     };
-    preamble.write(to)?;
+    origin.write(to, None)?;
     writeln!(to, "{HEADER}")?;
     runs.iter().try_for_each(|(run, timed)| write_run(to, run, timed.as_ref()))
 }
@@ -105,8 +107,8 @@ fn write_run(to: &mut dyn Write, run: &Run, timed: Option<&Timed>) -> std::io::R
         writeln!(
             to,
             "{},{},{},{},{}",
-            cell(warm.map(|c: &UpdateCost| c.ms)),
-            cell(cold.map(|c| c.ms)),
+            cell(warm.map(|c: &UpdateCost| neat_ms(c.ms))),
+            cell(cold.map(|c| neat_ms(c.ms))),
             cell(faults.map(|f| f.major)),
             cell(faults.map(|f| f.minor)),
             cell(cold.and_then(|c| c.read_bytes)),
@@ -179,6 +181,8 @@ pub(super) mod tests {
             flight: "f".into(),
             tolerance_px: 1.0,
             viewport_px: [800, 600],
+            exaggeration: 1.0,
+            culling: "vertices".into(),
             page_bytes: 4096,
             cache_mib: 128,
             disk_pages_per_frame: 128,

@@ -8,7 +8,7 @@
 //! | `report.html` | tables and plots in one file that needs no other |
 //!
 //! **Equal input gives equal bytes**: nothing here reads a clock, a locale or a system font. A new directory appears when all of it is there; in one that was there before, files of
-//! the same name are replaced, others left alone, and the page comes last.
+//! the same name are replaced, others left alone, and the page comes last. [`remove_stale`] then removes what an earlier report left.
 
 #[cfg(feature = "plots")]
 mod chart;
@@ -19,22 +19,21 @@ mod files;
 mod html;
 mod io;
 mod number;
+mod origin;
 #[cfg(feature = "plots")]
 mod plot;
-mod preamble;
 
 pub use crate::made::Made;
 pub use csv::write_frames_csv;
-pub use files::{ReportFile, START_BYTES};
+pub use files::{ReportFile, START_BYTES, remove_stale};
 pub use html::FLIGHT_PICTURE;
 pub use io::{IoReport, write_io_frames_csv};
+pub use origin::{Origin, ReportTitle, command_of};
 
-use preamble::Preamble;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use terrasoar::sink::FolderSink;
 use terrasoar::stats::{Comparison, FrameStats};
-use terrasoar::view::Viewport;
 use terrasoar_layout::LayoutError;
 
 /// Why a report cannot be written.
@@ -96,33 +95,6 @@ impl ReportError {
     }
 }
 
-/// What was compared, as it stands in the report's titles.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReportTitle {
-    /// The terrain's name.
-    pub terrain: String,
-    /// The flight's name.
-    pub flight: String,
-    /// Tolerance of the comparison in pixels.
-    pub tolerance_px: f64,
-    /// Size of the picture.
-    pub viewport: Viewport,
-    /// How it was made, if that is said.
-    pub made: Option<Made>,
-}
-
-impl ReportTitle {
-    fn preamble(&self) -> Preamble<'_> {
-        Preamble {
-            terrain: &self.terrain,
-            flight: &self.flight,
-            tolerance_px: self.tolerance_px,
-            viewport_px: self.viewport.size_px(),
-            made: self.made.as_ref(),
-        }
-    }
-}
-
 /// One engine's figures at one value of what a sweep varies.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SweepPoint {
@@ -134,6 +106,14 @@ pub struct SweepPoint {
     pub speedup_median: f64,
     /// Vertex tests over the base engine's.
     pub vertex_tests_ratio: f64,
+    /// Frames flown.
+    pub frames: u64,
+    /// Triangles drawn a frame, averaged over all frames.
+    pub triangles_mean: f64,
+    /// Mean incoherence of the frames but the first, in percent.
+    pub incoherence_percent: f64,
+    /// Speed that was found for the incoherence, metres a frame; `None` where the flight itself was flown.
+    pub speed_m_per_frame: Option<f64>,
 }
 
 /// All that goes into a report. The first run is the base that the others are compared with.
@@ -180,14 +160,11 @@ struct PlotFile {
 
 #[derive(Serialize)]
 struct Summary<'a> {
-    terrain: &'a str,
-    flight: &'a str,
-    tolerance_px: f64,
-    viewport_px: [u32; 2],
+    #[serde(flatten)]
+    origin: Origin<'a>,
     comparison: &'a Comparison,
     tolerance_sweep: &'a [SweepPoint],
     incoherence_sweep: &'a [SweepPoint],
-    made: Option<&'a Made>,
 }
 
 impl ComparisonReport<'_> {
@@ -201,8 +178,9 @@ impl ComparisonReport<'_> {
         let names: Vec<&str> = self.runs.iter().map(|(engine, _)| engine.as_str()).collect();
         let frame_files: Vec<String> =
             file_parts(&names).iter().map(|part| files::frames_name(part)).collect();
-        for ((_, frames), name) in self.runs.iter().zip(&frame_files) {
-            out.add(name, |to| csv::write_frames(to, self.title, frames)).map_err(ReportError::of_output)?;
+        for ((engine, frames), name) in self.runs.iter().zip(&frame_files) {
+            out.add(name, |to| csv::write_frames(to, self.title, engine, frames))
+                .map_err(ReportError::of_output)?;
         }
         if let FlightPicture::Png { file, .. } = self.picture {
             out.add(FLIGHT_PICTURE, |to| to.write_all(file)).map_err(ReportError::of_output)?;
@@ -215,14 +193,10 @@ impl ComparisonReport<'_> {
 
     fn summary_json(&self, path: &Path) -> Result<String, ReportError> {
         let summary = Summary {
-            terrain: &self.title.terrain,
-            flight: &self.title.flight,
-            tolerance_px: self.title.tolerance_px,
-            viewport_px: self.title.viewport.size_px(),
+            origin: self.title.origin(),
             comparison: self.comparison,
             tolerance_sweep: self.tolerance_sweep,
             incoherence_sweep: self.incoherence_sweep,
-            made: self.title.made.as_ref(),
         };
         match serde_json::to_string_pretty(&summary) {
             Ok(text) => Ok(text + "\n"),
@@ -331,6 +305,10 @@ mod tests {
             engine: engine.into(),
             speedup_median: 1.0 + top / (0.6 + x),
             vertex_tests_ratio: 0.05 + 0.01 * x,
+            frames: 120,
+            triangles_mean: 51_000.0,
+            incoherence_percent: 0.6,
+            speed_m_per_frame: None,
         };
         xs.iter()
             .flat_map(|x| [point(*x, "soar", 0.0), point(*x, "smart", 12.0), point(*x, "smart-cache", 17.0)])
@@ -342,7 +320,9 @@ mod tests {
             terrain: "Puget Sound 8193 x 8193".into(),
             flight: "straight, 12 m a frame".into(),
             tolerance_px: 1.0,
-            viewport: Viewport::default(),
+            viewport: terrasoar::view::Viewport::default(),
+            exaggeration: 1.0,
+            culling: terrasoar::refine::Culling::default(),
             made: None,
         }
     }

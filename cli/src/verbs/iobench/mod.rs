@@ -16,7 +16,7 @@ use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
 use terrasoar::view::View;
 use terrasoar_lab::iobench::{IoBench, IoRun, LayoutKind, Prefetch, ReadBy, Reader, Run, Timed, kernel};
-use terrasoar_lab::report::{IoReport, ReportFile, write_io_frames_csv};
+use terrasoar_lab::report::{IoReport, ReportFile, remove_stale, write_io_frames_csv};
 use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -147,7 +147,7 @@ impl Args {
             self.force.folder(folder, &files, &inputs)?;
         }
         if let Some(csv) = &self.frames {
-            self.force.stream(csv, Kind::Report(ReportFile::IoFrames), &inputs)?;
+            self.force.table(csv, Kind::Report(ReportFile::IoFrames), &inputs)?;
         }
         Ok(())
     }
@@ -222,7 +222,11 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
         write_io_frames_csv(path, &bench, &runs)?;
     }
     let written = match &args.output {
-        Some(folder) => IoReport { bench: &bench, runs: &runs }.write(folder)?,
+        Some(folder) => {
+            let written = IoReport { bench: &bench, runs: &runs }.write(folder)?;
+            remove_stale(folder, &written);
+            written
+        }
         None => Vec::new(),
     };
     if args.json {
@@ -240,6 +244,8 @@ fn bench_of(args: &Args, block_m: f64, standing: Standing, runs: Vec<IoRun>) -> 
         flight: made::name(&args.flight),
         tolerance_px: quality.tolerance_px,
         viewport_px: quality.viewport.size_px(),
+        exaggeration: quality.vertical_exaggeration,
+        culling: quality.culling.name().into(),
         page_bytes: PAGE_BYTES as u64,
         cache_mib: args.cache,
         disk_pages_per_frame: args.disk_pages,

@@ -16,13 +16,13 @@ pub(super) fn text(bench: &IoBench) -> String {
             "record KB",
             "needed MB",
             "realtime MB",
-            "late pages",
+            "late pages, sum",
             "update ms",
             "p99",
             "cold ms",
             "cold p99",
             "io ms p99",
-            "major faults",
+            "major faults, sum",
         ]
         .map(str::to_owned)
         .to_vec(),
@@ -34,7 +34,12 @@ pub(super) fn text(bench: &IoBench) -> String {
             r.source.clone(),
             r.prefetch.clone(),
             format!("{:.1}", r.distinct_pages_per_frame_mean),
-            format!("{:.0}", r.distinct_lines_per_frame_mean),
+            // Over a pool they are not counted.
+            if r.source == "pool" {
+                "-".to_owned()
+            } else {
+                format!("{:.0}", r.distinct_lines_per_frame_mean)
+            },
             format!("{:.1}", r.record_bytes_per_frame_mean / 1e3),
             format!("{:.3}", r.needed_mb),
             format!("{:.4}", r.realtime_mb),
@@ -49,7 +54,7 @@ pub(super) fn text(bench: &IoBench) -> String {
     }
     let frames = bench.runs.first().map_or(0, |r| r.frames);
     let mut out = format!(
-        "{}, {}, {} frames; a frame's means, the first left out; cache {} MiB\n",
+        "{}, {}, {} frames; means of a frame but for what is called a sum, the first frame left out; cache {} MiB\n",
         bench.terrain,
         bench.flight,
         grouped(frames),
@@ -60,6 +65,7 @@ pub(super) fn text(bench: &IoBench) -> String {
         out += &scratch_text(bench);
     }
     out += &stream_text(bench);
+    out += &fitting_text(bench);
     if bench.runs.iter().any(|r| r.was_cold == Some(false)) {
         out += "the file was not cold: it lies on no disk, or another program has it mapped; cold figures are of a file in memory\n";
     }
@@ -76,6 +82,24 @@ pub(super) fn text(bench: &IoBench) -> String {
         out += "page faults and bytes read are not known on this system\n";
     }
     out
+}
+
+/// Which layouts fit into the cache whole.
+fn fitting_text(bench: &IoBench) -> String {
+    let cache_mb = bench.cache_mib as f64 * f64::from(1 << 20) / 1e6;
+    let mut fitting: Vec<&str> = Vec::new();
+    for run in bench.runs.iter().filter(|run| run.file_mb <= cache_mb) {
+        if !fitting.contains(&run.layout.as_str()) {
+            fitting.push(&run.layout);
+        }
+    }
+    if fitting.is_empty() {
+        return String::new();
+    }
+    format!(
+        "the whole file fits into the cache ({}): each page is read once at most, and the flight is not out of core; --cache makes the cache smaller\n",
+        fitting.join(", ")
+    )
 }
 
 /// What flights over a pool did, if there are any.

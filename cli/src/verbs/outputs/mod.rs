@@ -15,6 +15,7 @@ use anyhow::{Result, bail};
 use std::io;
 use std::path::Path;
 use terrasoar::sink::is_stream;
+use terrasoar_lab::report::command_of;
 
 /// The flag of verbs that write.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -58,6 +59,22 @@ impl Force {
             Ok(Some(what)) => refuse(out, &what),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             Err(error) => refuse(out, &format!("a file that cannot be looked into ({error})")),
+        }
+    }
+
+    /// As [`Force::stream`], of a table of figures, which says by which command it was made. Another run's table is kept.
+    pub(super) fn table(self, out: &Path, kind: Kind, inputs: &[&Path]) -> Result<()> {
+        self.stream(out, kind, inputs)?;
+        if self.force || is_stream(out) || !out.exists() {
+            return Ok(());
+        }
+        let start = there::start_of(out)?;
+        let bare = |command: &str| command.replace(" --force", "");
+        match command_of(&start) {
+            _ if start.is_empty() => Ok(()),
+            Some(command) if bare(&command) == bare(&super::made::made().command) => Ok(()),
+            Some(command) => refuse(out, &format!("the figures of another run ({command})")),
+            None => refuse(out, "figures that do not say which run they are of"),
         }
     }
 

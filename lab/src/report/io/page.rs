@@ -2,7 +2,7 @@
 
 use crate::iobench::{IoBench, IoRun};
 use crate::report::PlotFile;
-use crate::report::html::{begin, escaped, figures, push};
+use crate::report::html::{begin, escaped, figures, made, push};
 use crate::report::number::{exact, grouped, rounded};
 
 /// The whole page.
@@ -16,6 +16,7 @@ pub(crate) fn page(bench: &IoBench, plots: &[PlotFile]) -> String {
         bench.disk_pages_per_frame
     );
     begin(&mut out, &escaped(&format!("Reading: {}, {}", bench.terrain, bench.flight)), &of);
+    made(&mut out, bench.made.as_ref());
     let cap = match (bench.cap, &bench.cap_note) {
         (Some(cap), _) => format!(
             "Measured with memory capped at {} MiB, page cache included (control group version {}).",
@@ -79,6 +80,8 @@ fn needed(out: &mut String, runs: &[IoRun]) {
         "Late pages, sum",
     ];
     let row = |r: &IoRun| {
+        // Over a pool they are not counted.
+        let counted = |v, decimals| if r.source == "pool" { "–".into() } else { grouped(v, decimals) };
         vec![
             r.engine.clone(),
             r.layout.clone(),
@@ -87,9 +90,9 @@ fn needed(out: &mut String, runs: &[IoRun]) {
             grouped(r.file_mb, 0),
             grouped(r.reads_per_frame_mean, 0),
             grouped(r.record_bytes_per_frame_mean, 0),
-            grouped(r.distinct_lines_per_frame_mean, 0),
+            counted(r.distinct_lines_per_frame_mean, 0),
             grouped(r.distinct_pages_per_frame_mean, 1),
-            grouped(r.distinct_units_per_frame_mean, 1),
+            counted(r.distinct_units_per_frame_mean, 1),
             rounded(r.needed_mb),
             rounded(r.realtime_mb),
             rounded(r.realtime_mb_max),
