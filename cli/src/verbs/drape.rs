@@ -222,10 +222,9 @@ impl Sides {
     const NONE: Self = Self([f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]);
 
     fn take(&mut self, point: [f64; 2]) {
-        for axis in 0..2 {
-            self.0[axis] = self.0[axis].min(point[axis]);
-            self.0[axis + 2] = self.0[axis + 2].max(point[axis]);
-        }
+        let [west, south, east, north] = &mut self.0;
+        (*west, *east) = (west.min(point[0]), east.max(point[0]));
+        (*south, *north) = (south.min(point[1]), north.max(point[1]));
     }
 
     fn meets(self, other: Self) -> bool {
