@@ -215,6 +215,9 @@ fn stamp(words: &[String], version: u32) -> Result<StampFile, String> {
     if file.is_empty() {
         return Err(format!("the file has no name; write `{STAMP}`"));
     }
+    if quoted(file).is_none() {
+        return Err(format!("{} has a quotation mark inside of it; rename the file", excerpt(file)));
+    }
     let mut fields = Fields::new(rest, STAMP);
     let sample = |word: &str| list(word, "120,-4", whole::<i64>);
     let at = match version {

@@ -81,6 +81,8 @@ fn snapshot_repeats(_: &Gpu) -> Outcome {
         "eye_m",
         "raised_m",
         "metres_per_px",
+        "scale",
+        "beside",
         "yaw_deg",
         "pitch_deg",
         "vertical_fov_deg",
@@ -203,8 +205,17 @@ fn quiet(_: &Gpu) -> Outcome {
         "--every",
         "20",
     ];
-    let compare =
-        ["compare", "land.iqt", "--flight", "land.flight", "--engines", "soar,kinetic", "-o", "report"];
+    let compare = [
+        "compare",
+        "land.iqt",
+        "--flight",
+        "land.flight",
+        "--engines",
+        "soar",
+        "--no-sweeps",
+        "-o",
+        "report",
+    ];
     for verb in [&snapshot[..], &movie, &compare] {
         for folder in [None, Some(""), Some("not/absolute"), Some("/no/such/folder")] {
             let mut command = bench.command(verb);

@@ -337,10 +337,10 @@ mod tests {
     use super::*;
     use crate::jpeg_frame::JpegFrame;
 
-    const BASELINE: &[u8] = include_bytes!("../../tests/image_fixtures/baseline.jpg");
-    const GREY: &[u8] = include_bytes!("../../tests/image_fixtures/grey.jpg");
-    const CMYK: &[u8] = include_bytes!("../../tests/image_fixtures/cmyk.jpg");
-    const PROGRESSIVE: &[u8] = include_bytes!("../../tests/image_fixtures/progressive.jpg");
+    fn fixture(name: &str) -> Vec<u8> {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/image_fixtures");
+        std::fs::read(format!("{folder}/{name}.jpg")).unwrap()
+    }
 
     fn shape(jpeg: &[u8], band: u32) -> Option<Shape> {
         Some(Shape { band, ..JpegFrame::read(jpeg).unwrap().in_rows()? })
@@ -355,26 +355,28 @@ mod tests {
 
     #[test]
     fn bands_joined_are_the_picture() {
-        for jpeg in [BASELINE, GREY, CMYK] {
+        for jpeg in ["baseline", "grey", "cmyk"].map(fixture) {
+            let jpeg = &jpeg[..];
             let whole = Decoder::new(jpeg).decode().unwrap();
             for (band, step) in [(1, 7), (2, 1000), (3, 216), (100, 1 << 20)] {
                 let shape = shape(jpeg, band).unwrap();
                 assert!(read(jpeg, shape, step).unwrap() == whole, "{band} {shape:?}");
             }
         }
-        assert!(shape(PROGRESSIVE, 1).is_none());
+        assert!(shape(&fixture("progressive"), 1).is_none());
     }
 
     #[test]
     fn streams_cut_or_changed_end_in_an_answer() {
-        let shape = shape(BASELINE, 1).unwrap();
+        let baseline = fixture("baseline");
+        let shape = shape(&baseline, 1).unwrap();
         let mut wrong = 0;
-        for at in 0..BASELINE.len() {
-            let mut changed = BASELINE.to_vec();
+        for at in 0..baseline.len() {
+            let mut changed = baseline.to_vec();
             changed[at] ^= 0x5a;
             wrong += u32::from(read(&changed, shape, 999).is_err());
-            wrong += u32::from(read(&BASELINE[..at], shape, 999).is_err());
+            wrong += u32::from(read(&baseline[..at], shape, 999).is_err());
         }
-        assert!(wrong > BASELINE.len() as u32, "{wrong}");
+        assert!(wrong > baseline.len() as u32, "{wrong}");
     }
 }

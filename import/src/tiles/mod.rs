@@ -117,7 +117,7 @@ impl Pyramid {
             return Err(LayoutError::unsupported(
                 path,
                 format!(
-                    "its tiles are in {system}, and read are those of web maps, in EPSG:3857; make them again, for example with: gdal2tiles.py --profile=mercator"
+                    "its tiles are in {system}, and read are those of web maps, in EPSG:3857; make them again in that system, for example with gdal2tiles.py and its profile mercator"
                 ),
             ));
         }

@@ -211,7 +211,7 @@ impl Pmtiles {
         if *seen > MOST_ENTRIES {
             return Err(LayoutError::unsupported(
                 &self.path,
-                "it has more tiles than can be counted; take the part you need out of it: pmtiles extract INPUT part.pmtiles --bbox=W,S,E,N",
+                "it has more tiles than can be counted; take the part you need out of it with the program pmtiles (extract)",
             ));
         }
         for (entry, next) in directory.entries() {
