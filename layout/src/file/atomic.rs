@@ -11,7 +11,7 @@
 //! **A nameless file cannot replace another.** Where the target exists it gets a name of its own first, `.NAME.*.terrasoar-new`, and is renamed at once. A process killed between
 //! these two calls leaves a complete file of that name; the next publication to the same target removes it. A file that has a name before it is complete is on the list of [`unfinished`].
 
-use super::disk::{self, Disk, SystemDisk};
+use super::disk::{Disk, SystemDisk};
 use super::lock::{ReplaceLock, WriteLock};
 use super::seen::Seen;
 use crate::error::LayoutError;
@@ -285,7 +285,7 @@ fn nameless(folder: &Path) -> Option<File> {
     use rustix::fs::{CWD, Mode, OFlags, openat};
     let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
     let file = openat(CWD, folder, flags, Mode::from_raw_mode(NEW_FILE_MODE)).ok().map(File::from)?;
-    disk::way_to(&file).exists().then_some(file)
+    super::disk::way_to(&file).exists().then_some(file)
 }
 
 /// A name that is there for longer than the moment between two calls was left by a process that was killed in it.

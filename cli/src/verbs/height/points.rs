@@ -86,7 +86,7 @@ fn remember(places: &mut Vec<[f64; 2]>, at: [f64; 2]) {
 /// Where rows go.
 enum Out {
     Standard,
-    File(FileSink),
+    File(Box<FileSink>),
 }
 
 impl Out {
@@ -116,7 +116,7 @@ pub(super) fn run(terrain: &Terrain, path: &Path, crs: Option<&str>, output: Opt
     }
     let separator = table.separator;
     let mut out = match output {
-        Some(path) => Out::File(FileSink::create(path)?),
+        Some(path) => Out::File(Box::new(FileSink::create(path)?)),
         None => Out::Standard,
     };
     if let Some(names) = &mut table.header {
