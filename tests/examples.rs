@@ -1,30 +1,21 @@
 //! The examples run, and say what they are to say.
 
+#[path = "support/examples.rs"]
+mod examples;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::progress::Silent;
 
-/// An example's program. It is there where all tests are built; where this one was built alone it is built now.
-fn built(name: &str) -> PathBuf {
-    let here = std::env::current_exe().unwrap();
-    let profile = here.parent().unwrap().parent().unwrap();
-    let example = profile.join("examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
-    if !example.exists() {
-        let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["build", "--offline", "-p", "terrasoar", "--example", name]);
-        assert!(cargo.current_dir(env!("CARGO_MANIFEST_DIR")).status().unwrap().success());
-    }
-    example
-}
-
 fn run(name: &str, terrain: &Path) -> String {
     run_with(name, &[terrain])
 }
 
 fn run_with(name: &str, files: &[&Path]) -> String {
-    let Output { status, stdout, stderr } = Command::new(built(name)).args(files).output().unwrap();
+    let Output { status, stdout, stderr } =
+        Command::new(examples::built("terrasoar", name).unwrap()).args(files).output().unwrap();
     assert!(status.success(), "{name}: {}", String::from_utf8_lossy(&stderr));
     assert!(stderr.is_empty(), "{name}: {}", String::from_utf8_lossy(&stderr));
     String::from_utf8(stdout).unwrap()

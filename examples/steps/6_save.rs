@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release --example step_6_save -- land.iqt save.iqo
 //!
-//! The terrain file ends as it began.
+//! The ground in the terrain file ends as it began.
 
 use std::error::Error;
 use std::path::Path;

@@ -3,6 +3,7 @@
 //!     cargo run --release -p terrasoar-scene --example step_7_bindings -- land.iqt
 
 use std::error::Error;
+use std::sync::{Arc, Mutex};
 use terrasoar::ground::PictureEngine;
 use terrasoar::refine::Culling;
 use terrasoar::{MappedTerrain, View};
@@ -20,16 +21,35 @@ fn material(at: GroundPoint) -> vec4<f32> {
     return vec4(vec3(0.8), is_level * smoothstep(-30.0, 30.0, at.height_m - own_snow_line.x));
 }";
 
-/// Snow from a height on. The buffer holds the height in metres as its first number.
-fn snow(snow_line: &wgpu::Buffer) -> Result<Material, terrasoar_render::RenderError> {
-    let snow_line = snow_line.clone();
+/// The buffer of the device that draws now. Its first number is the height of the snow line in metres.
+type SnowLine = Arc<Mutex<Option<wgpu::Buffer>>>;
+
+/// Snow from a height on.
+fn snow(snow_line: &SnowLine) -> Result<Material, terrasoar_render::RenderError> {
+    let snow_line = Arc::clone(snow_line);
+    // Called when the material is set, and again with the next device if this one is lost: so the buffer is made in here.
     Ok(Material::new(SNOW)?.bindings(move |device, _queue, layout| {
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("snow line"),
+            size: 16,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("snow"),
             layout,
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: snow_line.as_entire_binding() }],
-        })
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
+        });
+        *snow_line.lock().expect("nothing panics with it held") = Some(buffer);
+        group
     }))
+}
+
+/// Moves the snow line, in any frame.
+fn set_snow_line(queue: &wgpu::Queue, snow_line: &SnowLine, height_m: f32) {
+    if let Some(buffer) = &*snow_line.lock().expect("nothing panics with it held") {
+        queue.write_buffer(buffer, 0, &height_m.to_le_bytes());
+    }
 }
 // end: bindings
 
@@ -37,17 +57,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).unwrap_or("land.iqt".into());
     let terrain = MappedTerrain::open(&path)?;
     let mut studio = Studio::new(terrain.file(), PictureEngine::Kinetic, Culling::Vertices, SIZE_PX.into())?;
-    let snow_line = studio.gpu().device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("snow line"),
-        size: 16,
-        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
+    let snow_line = SnowLine::default();
     studio.set_material(Some(snow(&snow_line)?))?;
     let view = View::new([5000.0, 800.0, 2300.0], 10.0, -18.0).viewport(SIZE_PX);
     studio.fly(&view);
     for height_m in [1500.0_f32, 1000.0, 500.0] {
-        studio.gpu().queue.write_buffer(&snow_line, 0, &height_m.to_le_bytes());
+        set_snow_line(&studio.gpu().queue, &snow_line, height_m);
         let rgb = studio.picture(&view, &Look::default())?;
         let light = rgb.iter().map(|value| u64::from(*value)).sum::<u64>() / rgb.len() as u64;
         println!("snow from {height_m:.0} m: a mean of {light}");

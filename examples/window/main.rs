@@ -116,10 +116,19 @@ impl Shown {
     }
 
     fn draw(&mut self) -> Result<(), Failure> {
-        let (wgpu::CurrentSurfaceTexture::Success(picture)
-        | wgpu::CurrentSurfaceTexture::Suboptimal(picture)) = self.surface.get_current_texture()
-        else {
-            return Ok(()); // Nothing to draw to at the moment.
+        let picture = match self.surface.get_current_texture() {
+            wgpu::CurrentSurfaceTexture::Success(picture)
+            | wgpu::CurrentSurfaceTexture::Suboptimal(picture) => picture,
+            wgpu::CurrentSurfaceTexture::Outdated => {
+                self.surface.configure(&self.gpu.device, &self.config);
+                return Ok(());
+            }
+            wgpu::CurrentSurfaceTexture::Lost => return Err("the window cannot be drawn on any more".into()),
+            _ => {
+                // Nothing to draw to at the moment: a window that is hidden takes no processor's time.
+                std::thread::sleep(std::time::Duration::from_millis(20));
+                return Ok(());
+            }
         };
         self.frame += 1;
         let [east_m, north_m] = self.ground.extent_m();

@@ -10,7 +10,7 @@ pub(crate) fn of_error(error: &wgpu::Error) -> String {
         }
         wgpu::Error::Validation { description, .. } => {
             format!(
-                "a command was refused ({}). In a program of its own: is PassFormat what the pass has, and are the bindings those that the material declares? In the program terrasoar it is a defect; please report it",
+                "a command was refused ({}). In a program of your own, check that PassFormat is what the pass has, and that the bindings are those that the material declares. In the program terrasoar it is a defect; please report it",
                 last_cause(description)
             )
         }

@@ -15,11 +15,13 @@ pub(super) struct Place {
     /// As [`Header::sample_to_crs`]; `None` if it is not known.
     sample_to_crs: Option<[f64; 6]>,
     epsg: Option<u32>,
+    /// Name of the reference system; empty if unknown.
+    crs_name: String,
 }
 
 impl Place {
     pub(super) fn of(header: &Header) -> Self {
-        Self { sample_to_crs: header.sample_to_crs, epsg: header.epsg }
+        Self { sample_to_crs: header.sample_to_crs, epsg: header.epsg, crs_name: header.crs_name.clone() }
     }
 
     /// The terrain's sample, columns east and rows north, on which the south-west sample of a stamp of `samples` comes.
@@ -47,6 +49,14 @@ impl Place {
             return Err(refused(format!(
                 "it is in EPSG:{theirs} and the terrain in EPSG:{ours}; bring it into the terrain's first: gdalwarp -t_srs EPSG:{ours} {} OUT.tif",
                 path.display()
+            )));
+        }
+        // Zones of one kind of map have alike coordinates: a name that differs is another system, unless codes agree. A file without a name says nothing against it.
+        let is_named = !stamp.crs_name.is_empty() && !self.crs_name.is_empty();
+        if (stamp.epsg.is_none() || self.epsg.is_none()) && is_named && stamp.crs_name != self.crs_name {
+            return Err(refused(format!(
+                "it is in {}, and the terrain in {}, which may be another system; bring it into the terrain's first (gdalwarp -t_srs), or say where it goes with `sample COLUMN,ROW`",
+                stamp.crs_name, self.crs_name
             )));
         }
         let [s0, s1, s2, s3, s4, s5] = ground;
@@ -92,7 +102,11 @@ mod tests {
 
     /// Samples 30 m apart; the south-west one at 400000, 3300000.
     fn place() -> Place {
-        Place { sample_to_crs: Some([400_000.0, 30.0, 0.0, 3_300_000.0, 0.0, 30.0]), epsg: Some(32644) }
+        Place {
+            sample_to_crs: Some([400_000.0, 30.0, 0.0, 3_300_000.0, 0.0, 30.0]),
+            epsg: Some(32644),
+            crs_name: "WGS 84 / UTM zone 44N".into(),
+        }
     }
 
     /// A north-up raster of 5 x 4 samples.
@@ -112,7 +126,11 @@ mod tests {
         let unnamed = Georeference { epsg: None, ..raster(400_300.0, 3_300_060.0, 30.0) };
         assert_eq!(at(&unnamed).unwrap(), [10, 2]);
         // A turned grid, and a stamp on it: steps of (18, 24) east and (-24, 18) north.
-        let turned = Place { sample_to_crs: Some([10.0, 18.0, -24.0, 20.0, 24.0, 18.0]), epsg: None };
+        let turned = Place {
+            sample_to_crs: Some([10.0, 18.0, -24.0, 20.0, 24.0, 18.0]),
+            epsg: None,
+            crs_name: String::new(),
+        };
         let north_west = [10.0 + 7.0 * 18.0 - 24.0 * 5.0, 20.0 + 7.0 * 24.0 + 18.0 * 5.0];
         let pixel_to_crs = Some([north_west[0], 18.0, 24.0, north_west[1], 24.0, -18.0]);
         let stamp = Georeference { pixel_to_crs, ..Georeference::default() };
@@ -128,9 +146,17 @@ mod tests {
         assert!(finer.contains("0.3333 x 0.3333 of the terrain's steps apart"), "{finer}");
         let other = Georeference { epsg: Some(4326), ..raster(81.0, 29.0, 0.1) };
         assert!(at(&other).unwrap_err().contains("gdalwarp -t_srs EPSG:32644 dam.tif"));
+        // The same numbers in the zone beside it, which only its name tells.
+        let zone = Georeference {
+            epsg: None,
+            crs_name: "My zone 43".into(),
+            ..raster(400_300.0, 3_300_060.0, 30.0)
+        };
+        let said = at(&zone).unwrap_err();
+        assert!(said.contains("My zone 43") && said.contains("UTM zone 44N"), "{said}");
         let nowhere = Georeference { pixel_to_crs: None, ..raster(0.0, 0.0, 1.0) };
         assert!(at(&nowhere).unwrap_err().contains("does not say where it lies"));
-        let unplaced = Place { sample_to_crs: None, epsg: None };
+        let unplaced = Place { sample_to_crs: None, ..place() };
         let error =
             unplaced.of_stamp(Path::new("x"), &raster(0.0, 0.0, 1.0), [5, 4]).unwrap_err().to_string();
         assert!(error.contains("the terrain has no coordinates"), "{error}");

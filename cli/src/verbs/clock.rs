@@ -32,7 +32,9 @@ impl Clock {
 /// What is said of it.
 pub(super) fn told(percent: Option<f64>) -> String {
     match percent {
-        None => "processor time not known (Linux tells it, of 0.2 seconds and more)".into(),
+        None => {
+            "processor time not known: only Linux tells it, and only of flights of 0.2 seconds or more".into()
+        }
         Some(percent) if percent < RELIABLE_PERCENT => {
             format!("processor time {percent:.0} % of wall time, times are not reliable")
         }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use terrasoar::flight::Flight;
 use terrasoar::flyover::EngineKind;
 use terrasoar::stats::{Comparison, EngineComparison, FrameStats};
-use terrasoar_lab::report::{ComparisonReport, FLIGHT_PICTURE, FlightPicture, remove_stale};
+use terrasoar_lab::report::{ComparisonReport, FlightPicture, remove_stale};
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Fly a recorded flight with several engines, compare them and write a report.
@@ -121,11 +121,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
         },
     };
     let written = report.write(&args.output)?;
-    remove_stale(&args.output, &written);
-    if picture.is_err() {
-        // An older report's picture shows another flight. It is one, or may be lost: that was looked at first.
-        let _ = std::fs::remove_file(args.output.join(FLIGHT_PICTURE));
-    }
+    let files = ComparisonReport::files(&EngineKind::ALL.map(EngineKind::name));
+    remove_stale(&args.output, &files, "compare", &written);
     if args.json {
         print_json(&Told { origin: title.origin(), processor_percent, figures: &comparison })?;
     } else {

@@ -7,6 +7,8 @@
 mod driver;
 mod edits;
 mod example;
+#[path = "../../../tests/support/examples.rs"]
+mod examples;
 mod tour;
 mod troubles;
 

@@ -3,12 +3,11 @@
 //! Code that is about to replace a file asks this first. **The answer depends on how the file starts**, so that another program's table or page is recognised as such whatever it is called.
 
 use super::html::FLIGHT_PICTURE;
-use super::{ComparisonReport, csv, file_parts, html, io, origin};
+use super::{ComparisonReport, command_of, csv, file_parts, html, io, origin};
 use crate::picture;
 use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
-use terrasoar::flyover::EngineKind;
 
 /// Bytes from a file's start that are enough to tell.
 pub const START_BYTES: usize = 1 << 16;
@@ -89,17 +88,19 @@ impl io::IoReport<'_> {
     }
 }
 
-/// Removes from the directory `dir` what an earlier report of ours left there and this one, whose files are `written`, does not have. Everything else stays, and so does what cannot be removed.
-pub fn remove_stale(dir: &Path, written: &[PathBuf]) {
-    let engines = EngineKind::ALL.map(EngineKind::name);
-    for (name, kind) in ComparisonReport::files(&engines).into_iter().chain(io::IoReport::files()) {
+/// Removes from the directory `dir` what an earlier report with such `files` left there and this one, whose files are `written`, does not have. Tables that were not made by the program's verb
+/// `verb` stay, and so does everything else, and what cannot be removed.
+pub fn remove_stale(dir: &Path, files: &[(String, ReportFile)], verb: &str, written: &[PathBuf]) {
+    for (name, kind) in files {
         let path = dir.join(name);
         if written.contains(&path) {
             continue;
         }
         let mut start = Vec::new();
         let read = File::open(&path).and_then(|file| file.take(START_BYTES as u64).read_to_end(&mut start));
-        if read.is_ok() && kind.is_ours(&start) {
+        let is_table = matches!(kind, ReportFile::Frames | ReportFile::IoFrames);
+        let is_of_verb = || command_of(&start).is_some_and(|command| command.contains(&format!(" {verb} ")));
+        if read.is_ok() && kind.is_ours(&start) && (!is_table || is_of_verb()) {
             let _ = std::fs::remove_file(&path);
         }
     }
@@ -149,13 +150,24 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let written = tests::with_report(3, |report| report.write(folder.path()).unwrap());
         let at = |name: &str| folder.path().join(name);
-        std::fs::copy(at("frames-soar.csv"), at("frames-kinetic.csv")).unwrap();
-        std::fs::copy(at("frames-soar.csv"), at("frames-mine.csv")).unwrap();
+        let table = std::fs::read_to_string(at("frames-soar.csv")).unwrap();
+        let made_by = |verb: &str| format!("# command: terrasoar {verb} a.iqt --flight b.flight\n{table}");
+        std::fs::write(at("frames-kinetic.csv"), made_by("compare")).unwrap();
+        std::fs::write(at("frames-mine.csv"), made_by("compare")).unwrap();
+        std::fs::write(at("frames-smart.csv"), made_by("replay")).unwrap();
         std::fs::write(at("frames-naive.csv"), "mine\n").unwrap();
-        remove_stale(folder.path(), &written);
+        // Of the other report, in the same folder.
+        std::fs::copy(at("plot-pages.svg"), at("plot-io-engines.svg")).ok();
+        let foreseen = ComparisonReport::files(&["soar", "smart", "kinetic", "naive"]);
+        let written: Vec<PathBuf> =
+            written.into_iter().filter(|path| !path.ends_with("frames-smart.csv")).collect();
+        remove_stale(folder.path(), &foreseen, "compare", &written);
         assert!(written.iter().all(|path| path.is_file()));
         assert!(!at("frames-kinetic.csv").exists());
-        assert!(at("frames-mine.csv").is_file() && at("frames-naive.csv").is_file());
+        for kept in ["frames-mine.csv", "frames-smart.csv", "frames-naive.csv"] {
+            assert!(at(kept).is_file(), "{kept}");
+        }
+        assert_eq!(at("plot-io-engines.svg").exists(), at("plot-pages.svg").exists());
     }
 
     #[test]

@@ -90,7 +90,7 @@ impl Material {
     }
 
     /// This material with what fills the bindings that its text declares. `bind` is called when the material is set, and on each further device: it makes buffers and textures there and a bind group of the layout
-    /// that it is given. Keep a buffer's handle (`wgpu::Buffer` is one) to write to it from frame to frame.
+    /// that it is given. Keep the handle of the buffer that was made last (`wgpu::Buffer` is one) to write to it from frame to frame.
     ///
     /// ```no_run
     /// use terrasoar_render::{Material, wgpu};

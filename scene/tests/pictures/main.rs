@@ -7,6 +7,8 @@ mod adapter;
 mod cracks;
 mod depth;
 mod engines;
+#[path = "../../../tests/support/examples.rs"]
+mod examples;
 mod loss;
 mod own_pass;
 mod paint;

@@ -1,7 +1,7 @@
 //! Materials over real ground, through a loss of the device; and the steps for embedders that take pictures.
 
 use super::rig::{Rig, puget_sound, view};
-use super::{Outcome, Test, ensure};
+use super::{Outcome, Test, ensure, examples};
 use std::process::Command;
 use terrasoar_render::{Gpu, Haze, Layer, Layers, Look, Material, wgpu};
 
@@ -60,7 +60,11 @@ fn pictures(_: &Gpu) -> Outcome {
     let land = puget_sound().path();
     let out = folder.path().join("picture.png");
     let run = |name: &str, more: &[&std::path::Path]| {
-        let done = Command::new(built(name)?).arg(land).args(more).output().map_err(|e| e.to_string())?;
+        let done = Command::new(examples::built("terrasoar-scene", name)?)
+            .arg(land)
+            .args(more)
+            .output()
+            .map_err(|e| e.to_string())?;
         let words = String::from_utf8_lossy(&done.stderr).into_owned();
         ensure(done.status.success(), || format!("{name}: {}: {words}", done.status))?;
         Ok::<_, String>(String::from_utf8_lossy(&done.stdout).into_owned())
@@ -71,20 +75,4 @@ fn pictures(_: &Gpu) -> Outcome {
     let said = run("step_7_bindings", &[])?;
     let light: Vec<u32> = said.lines().filter_map(|line| line.rsplit(' ').next()?.parse().ok()).collect();
     ensure(light.len() == 3 && light[0] <= light[1] && light[1] < light[2], || said.clone())
-}
-
-/// The example's program. It is there where all tests are built; where this one was built alone it is built now.
-fn built(name: &str) -> Result<std::path::PathBuf, String> {
-    let here = std::env::current_exe().map_err(|e| e.to_string())?;
-    let profile = here.parent().and_then(|deps| deps.parent()).ok_or("a test without a folder")?;
-    let example = profile.join("examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
-    if !example.exists() {
-        let built = Command::new(env!("CARGO"))
-            .args(["build", "--offline", "-p", "terrasoar-scene", "--example", name])
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .status()
-            .map_err(|e| e.to_string())?;
-        ensure(built.success(), || format!("{name} does not compile"))?;
-    }
-    Ok(example)
 }

@@ -224,7 +224,7 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
     let written = match &args.output {
         Some(folder) => {
             let written = IoReport { bench: &bench, runs: &runs }.write(folder)?;
-            remove_stale(folder, &written);
+            remove_stale(folder, &IoReport::files(), "iobench", &written);
             written
         }
         None => Vec::new(),
