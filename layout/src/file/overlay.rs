@@ -192,7 +192,14 @@ impl Overlaid {
     /// to it, which a power cut could have undone under another program's eyes.
     fn check_older_state(&self, both: &LayeredSource<'_>, base: &Path) -> Result<(), LayoutError> {
         let now = &self.slots.header;
-        let original = Lineage::read(both, now)?.original;
+        let original = Lineage::read(both, now).map_err(|error| match error {
+            LayoutError::Damaged { .. } => LayoutError::damaged(
+                both.path(),
+                "its journal",
+                format!("without it nobody knows whether {}, which was changed since, still holds what these edits refer to; name a copy of it from when they were made, over which they read, or restore a copy of the overlay", base.display()),
+            ),
+            other => other,
+        })?.original;
         let header = Header { history: None, ..original.put_into(now) };
         let anew = |error| match error {
             LayoutError::Damaged { .. } => written_anew(both.path(), base),
