@@ -70,6 +70,7 @@ mod value;
 mod vrt;
 mod warp;
 mod webp;
+mod xml;
 mod xyz;
 
 use std::path::{Path, PathBuf};

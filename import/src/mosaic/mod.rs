@@ -207,8 +207,8 @@ impl Mosaic {
         declared.notes = vec![note(&placed, &sheets, resampled, resampling, options)];
         let mut warnings = Vec::new();
         warn_of_levels(&placed, &mut warnings);
-        let bytes: u64 = sheets.iter().map(|sheet| Store::bytes(sheet.samples, sample_bytes)).sum();
-        let bytes = if blend.is_some() { 2 * bytes } else { bytes };
+        let bytes = Store::all_bytes(sheets.iter().map(|sheet| &sheet.samples), sample_bytes);
+        let bytes = if blend.is_some() { bytes.saturating_mul(2) } else { bytes };
         let allowed = options.memory_mib.unwrap_or(512) << 20;
         let mosaic = Self {
             declared,
@@ -374,8 +374,7 @@ impl Reader for Mosaic {
     }
 
     fn memory_bytes(&self) -> u64 {
-        let stores: u64 =
-            self.sheets.iter().map(|sheet| Store::bytes(sheet.samples, self.sample_bytes)).sum();
+        let stores = Store::all_bytes(self.sheets.iter().map(|sheet| &sheet.samples), self.sample_bytes);
         let planes = if self.blend.is_some() { 2 } else { 1 };
         let kept = if self.sheets_in_memory { planes * stores } else { 0 };
         let files = self.sources.iter().map(|source| Store::bytes(source.samples, self.sample_bytes));
