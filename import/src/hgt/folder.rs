@@ -84,11 +84,5 @@ fn refusal(files: &[PathBuf]) -> String {
     if has("hdr.adf") {
         return "this folder is an ARC/INFO grid, which is not read; convert it with: gdal_translate INPUT output.tif".into();
     }
-    let tiffs: Vec<&PathBuf> =
-        files.iter().filter(|file| is_called(file, "tif") || is_called(file, "tiff")).collect();
-    match tiffs.as_slice() {
-        [] => "there are no .hgt tiles in this folder; name the elevation file in it".into(),
-        [one] => format!("there are no .hgt tiles in this folder; name the file in it: {}", one.display()),
-        _ => "there are no .hgt tiles in this folder; join its GeoTIFF files first: gdalbuildvrt all.vrt FOLDER/*.tif && gdal_translate all.vrt all.tif".into(),
-    }
+    "there is no elevation data in this folder that says where it lies; name the file in it".into()
 }

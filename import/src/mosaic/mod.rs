@@ -66,7 +66,7 @@ pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn D
     let each = options_of_each(options);
     let mut told = Told::default();
     let mut looked = Vec::new();
-    for (rank, path) in in_order(paths) {
+    for (rank, path) in in_order(paths, options.priority) {
         match Source::look(&path, rank, &each) {
             Ok(found) => looked.push(found),
             Err(error) if options.strict || is_ours(&error) => return Err(error),
@@ -81,12 +81,15 @@ pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn D
     Ok(Box::new(OpenedDem::known(&name, Box::new(mosaic), declared, known, &later)?))
 }
 
-/// Each file once, in the order of their paths, with its place among the names.
-fn in_order(paths: &[PathBuf]) -> Vec<(usize, PathBuf)> {
+/// Each file once, in the order of their paths, with its place among the names: of several places the one on top.
+fn in_order(paths: &[PathBuf], priority: Priority) -> Vec<(usize, PathBuf)> {
     let mut seen = HashSet::new();
     let whole = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
     let mut files: Vec<(PathBuf, usize, PathBuf)> =
         paths.iter().enumerate().map(|(rank, path)| (whole(path), rank, path.clone())).collect();
+    if priority == Priority::Last {
+        files.reverse();
+    }
     files.retain(|(whole, ..)| seen.insert(whole.clone()));
     files.sort();
     files.into_iter().map(|(_, rank, path)| (rank, path)).collect()
@@ -242,7 +245,8 @@ impl Mosaic {
     /// The samples of a window of the mosaic, of all sheets.
     fn block(&self, window: Window, stores: &[Store], sink: &dyn SampleSink) -> Result<(), LayoutError> {
         let count = window.width as usize * window.height as usize;
-        let (mut values, mut weights) = (vec![f64::NAN; count], Vec::new());
+        let mut values = vec![f64::NAN; count];
+        let mut weights = if self.blend.is_some() { vec![0.0; count] } else { Vec::new() };
         let highest = self.each.priority == Priority::Highest;
         for (number, (laid, store)) in self.laid.iter().zip(stores).enumerate() {
             let meets = window.col < laid.to[0]
@@ -262,7 +266,6 @@ impl Mosaic {
                         match fresh {
                             None => replace(&mut values[to + i], new, highest),
                             Some(fresh) => {
-                                weights.resize(count, 0.0);
                                 over(&mut values[to + i], &mut weights[to + i], new, fresh[row * wide + i]);
                             }
                         }

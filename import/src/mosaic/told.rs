@@ -3,6 +3,7 @@
 //! Everything is said in the order of paths, whatever the order in which it was found. Cost: some words a file.
 
 use super::source::{Read, Source};
+use crate::guard::left_out;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use terrasoar_layout::dem::Warning;
@@ -14,8 +15,6 @@ use terrasoar_layout::words::harmless;
 const MOST_EXPLAINED: usize = 6;
 const MOST_NAMED: usize = 2000;
 const MOST_KINDS: usize = 12;
-/// What follows from it.
-const LEFT_OUT: &str = "the file was left out: its ground is that of other files, or void";
 
 /// What was seen of files.
 #[derive(Debug, Clone, Default)]
@@ -80,7 +79,7 @@ impl Told {
     pub(super) fn warnings(&self, files: usize) -> Vec<Warning> {
         let mut all = Vec::new();
         for why in self.lost.values().take(MOST_EXPLAINED) {
-            all.push(Warning::new(format!("{}; {LEFT_OUT}", harmless(why, 360))));
+            all.push(left_out(why));
         }
         if let Some(more) = self.lost.len().checked_sub(MOST_EXPLAINED).filter(|more| *more > 0) {
             let names = self.lost.keys().skip(MOST_EXPLAINED).take(MOST_NAMED);

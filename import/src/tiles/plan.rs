@@ -42,8 +42,6 @@ pub(super) struct Plan {
     pub(super) words: String,
     /// What is missing, in words.
     pub(super) missing: Option<String>,
-    /// What was passed over, in words.
-    pub(super) notes: Vec<String>,
 }
 
 /// What may be read of a pyramid: a person's bounds, those around what it is for, those that it states.
@@ -145,7 +143,6 @@ impl Plan {
             samples: level.samples.clone(),
             words: String::new(),
             missing: None,
-            notes: Vec::new(),
         };
         plan.words = plan.say(coarsest, deepest, level, options.zoom.is_some());
         plan.missing = plan.count_missing(archive, level)?;
