@@ -10,6 +10,7 @@ use crate::crs::{HorizontalSize, Kind};
 use crate::options::Priority;
 use std::path::PathBuf;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::ln;
 
 /// Samples on a side of a sheet, at most: files that lie farther apart are a mistake, or several data sets.
 const MOST_SIDE: i64 = 1 << 22;
@@ -135,7 +136,7 @@ impl Placed {
             *area = area.min(x * y);
         }
         // No more than some hundreds, whatever the steps.
-        let rank = |source: usize| (areas[self.at[source].0].ln() / ALIKE.ln()).round() as i64;
+        let rank = |source: usize| (ln(areas[self.at[source].0]) / ln(ALIKE)).round() as i64;
         let mut order: Vec<usize> = (0..self.sources.len()).rev().collect();
         order.sort_by_key(|source| std::cmp::Reverse(rank(*source)));
         order

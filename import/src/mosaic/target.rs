@@ -8,9 +8,10 @@ use super::plan::Placed;
 use super::sheet::Sheet;
 use crate::crs::{Ground, HorizontalSize, is_earth};
 use crate::options::OpenOptions;
-use crate::warp::{Mapping, Projections, Resampler, apply, mesh};
+use crate::warp::{Mapping, Projections, Resampler, apply, mesh, three_digits};
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::hypot;
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::number;
 
@@ -123,15 +124,9 @@ impl<'a> Over<'a> {
         };
         let across = step([x - 0.5, y], [x + 0.5, y])?;
         let down = step([x, y - 0.5], [x, y + 0.5])?;
-        let steps = [across[0].hypot(down[0]), across[1].hypot(down[1])];
+        let steps = [0, 1].map(|i| hypot(across[i], down[i]));
         steps.iter().all(|step| step.is_finite() && *step > 0.0).then_some(steps)
     }
-}
-
-/// Three digits are as good and read better.
-fn rounded(step: f64) -> f64 {
-    let digit = 10f64.powf(step.log10().floor() - 2.0);
-    (step / digit).round() * digit
 }
 
 impl Target {
@@ -306,12 +301,12 @@ fn lattice(
         Some(lattice) if (0..2).all(|i| others[i] >= SHORTER * lattice.step[i].abs()) => lattice,
         Some(lattice) => multiples([0, 1].map(|i| {
             if others[i] < SHORTER * lattice.step[i].abs() {
-                rounded(others[i])
+                three_digits(others[i])
             } else {
                 lattice.step[i].abs()
             }
         })),
-        None => multiples(others.map(rounded)),
+        None => multiples(others.map(three_digits)),
     })
 }
 
