@@ -256,7 +256,7 @@ fn first_tile(archive: &dyn Archive, level: &Level) -> Result<Texels, LayoutErro
     let mut bytes = Vec::new();
     for tile in &level.samples {
         if archive.fetch(*tile, most_of_all(), &mut bytes)? {
-            return decode(archive.path(), &archive.label(*tile), &bytes);
+            return decode(archive.path(), || archive.label(*tile), &bytes);
         }
     }
     Err(LayoutError::damaged(archive.path(), "tiles", "they changed while they were read; start again"))

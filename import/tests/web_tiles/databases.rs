@@ -22,7 +22,7 @@ fn database(folder_of: &Path, name: &str, statements: &str) -> PathBuf {
 }
 
 #[test]
-fn views_that_do_more_than_join_are_refused() {
+fn databases_without_plain_tables_of_pictures_are_refused() {
     let folder_of = tempdir().unwrap();
     let columns = "SELECT x AS zoom_level, x AS tile_column, x AS tile_row, x AS tile_data";
     for (name, statements, wanted) in [
