@@ -5,6 +5,8 @@
 //! One file is open at a time. Memory: a share of what is allowed, a few hundred bytes a file, and what reading one file takes. Cost: two passes over the samples, and that of a warp for sheets on other
 //! grids.
 
+mod across;
+mod aim;
 mod blend;
 mod lattice;
 mod names;
@@ -15,13 +17,13 @@ mod target;
 mod told;
 mod values;
 
-use crate::crs::System;
 use crate::guard::is_ours;
 use crate::opened::{Known, OpenedDem};
 use crate::options::{OpenOptions, Priority, Resampling};
 use crate::reader::{Declared, Reader, Said};
 use crate::value::Voids;
-use crate::warp::{Store, blocks_bytes, each_block, target_system};
+use crate::warp::{Store, blocks_bytes, each_block};
+use aim::{Aim, aimed};
 use blend::{Blend, Edges, over};
 pub(crate) use names::Inputs;
 use plan::Placed;
@@ -31,7 +33,7 @@ use source::{Source, options_of_each};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use target::{Laid, Named, Target, Way, check_way, main_system};
+use target::{Laid, Target, Way};
 use terrasoar_layout::dem::{DemSource, SampleSink, Warning, Window};
 use terrasoar_layout::error::LayoutError;
 use told::Told;
@@ -73,10 +75,13 @@ pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn D
             Err(error) => told.lose(&path, &error),
         }
     }
-    let placed = comparable(looked, options, &mut told)?;
+    if looked.is_empty() {
+        return Err(told.nothing_read());
+    }
+    let (placed, sheets, aim) = aimed(Placed::new(looked), options, &mut told)?;
     placed.sources.iter().for_each(|source| told.look(source));
-    let name = PathBuf::from(format!("the mosaic of {}", plan::counted(placed.sources.len())));
-    let (mosaic, known, later) = Mosaic::new(&name, placed, each, options, told)?;
+    let name = aim::name(&placed);
+    let (mosaic, known, later) = Mosaic::new(&name, (placed, sheets, aim), each, options, told)?;
     let declared = mosaic.declared.clone();
     Ok(Box::new(OpenedDem::known(&name, Box::new(mosaic), declared, known, &later)?))
 }
@@ -93,43 +98,6 @@ fn in_order(paths: &[PathBuf], priority: Priority) -> Vec<(usize, PathBuf)> {
     files.retain(|(whole, ..)| seen.insert(whole.clone()));
     files.sort();
     files.into_iter().map(|(_, rank, path)| (rank, path)).collect()
-}
-
-/// The files without those that cannot be brought to where the others are.
-fn comparable(
-    looked: Vec<(Source, System)>,
-    options: &OpenOptions,
-    told: &mut Told,
-) -> Result<Placed, LayoutError> {
-    if looked.is_empty() {
-        return Err(LayoutError::Usage(format!(
-            "none of the files can be read; the first: {}",
-            told.first_loss().unwrap_or("there is none")
-        )));
-    }
-    let placed = Placed::new(looked);
-    let main = main_system(&placed);
-    let mut are_lost = Vec::new();
-    for (source, at) in placed.sources.iter().zip(&placed.at) {
-        let system = placed.lattices[at.0].system;
-        let way = match system == main {
-            true => Ok(()),
-            false => check_way(&source.path, &placed.systems[system], &placed.systems[main]),
-        };
-        match way {
-            Err(error) if options.strict => return Err(error),
-            Err(error) => told.lose(&source.path, &error),
-            Ok(()) => {}
-        }
-        are_lost.push(told.has_lost(&source.path));
-    }
-    if !are_lost.contains(&true) {
-        return Ok(placed);
-    }
-    let of = |at: &(usize, [i64; 2])| placed.systems[placed.lattices[at.0].system].system.clone();
-    let systems: Vec<System> = placed.at.iter().map(of).collect();
-    let kept = placed.sources.into_iter().zip(systems).zip(are_lost).filter(|(_, is_lost)| !is_lost);
-    Ok(Placed::new(kept.map(|(both, _)| both).collect()))
 }
 
 /// Several files.
@@ -156,38 +124,22 @@ impl Mosaic {
     /// The mosaic, what is known of it, and what is left to be done with it.
     fn new(
         name: &Path,
-        placed: Placed,
+        (placed, sheets, aim): (Placed, Vec<Sheet>, Aim),
         each: OpenOptions,
         options: &OpenOptions,
         told: Told,
     ) -> Result<(Self, Known, OpenOptions), LayoutError> {
         let values = Values::of(&placed.sources);
         let sample_bytes = if values.sample_type.fits_f32() { 4 } else { 8 };
-        let sheets = placed.sheets(options.priority)?;
-        let named = Named(name);
-        let main = main_system(&placed);
-        let mut later = options.clone();
-        later.crs = None;
-        // One grid is brought elsewhere as one file is; unlike ones each at once.
-        let is_one = placed.lattices.len() == 1;
+        let mut later = OpenOptions { crs: None, ..options.clone() };
         let mut asked = options.clone();
-        let (mut tied, mut own) = (placed.systems[main].clone(), Some(main));
-        match &options.reproject {
-            Some(_) if is_one => asked.resolution = None,
-            Some(text) => {
-                let (map, samples) = target::extent(&named, &placed, &sheets, main)?;
-                check_way(name, &tied, &tied)?;
-                let ground = tied.ground.as_ref().ok_or_else(|| target::outside(&named))?;
-                let system = target_system(name, text, &tied.system, ground, &map, samples)?;
-                let wanted = lattice::Tied::new(System { vertical: tied.system.vertical.clone(), ..system });
-                own = placed.systems.iter().position(|known| known.is_same(&wanted, &map, samples));
-                check_way(name, &tied, &wanted)?;
-                tied = wanted;
-                later.reproject = None;
+        if options.reproject.is_some() {
+            match aim.is_later {
+                true => asked.resolution = None,
+                false => later.reproject = None,
             }
-            None => {}
         }
-        let target = Target::new(&named, &placed, &sheets, tied, own, sample_bytes, &asked)?;
+        let target = Target::new(name, &placed, &sheets, aim, sample_bytes, &asked)?;
         if later.reproject.is_none() {
             later.resolution = None;
         }
@@ -420,10 +372,10 @@ impl Reader for Mosaic {
         }
         drop(weights);
         let read = told.count_read();
-        let why = told.first_loss().unwrap_or_default().to_owned();
+        let nothing = told.nothing_read();
         *self.told.lock().unwrap_or_else(PoisonError::into_inner) = told;
         if read == 0 {
-            return Err(LayoutError::Usage(format!("none of the files can be read; the first: {why}")));
+            return Err(nothing);
         }
         let size = if self.is_copied() && self.blend.is_none() { COPIED } else { BLENDED };
         each_block(self.declared.samples, size, |window| self.block(window, &stores, sink))

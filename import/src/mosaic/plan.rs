@@ -57,6 +57,12 @@ impl Placed {
         Self { sources, systems, lattices, at }
     }
 
+    /// What `make` says of each file and the number of its system.
+    pub(super) fn each<T>(&self, make: impl Fn(&Source, usize) -> T) -> Vec<T> {
+        let all = self.sources.iter().zip(&self.at);
+        all.map(|(source, at)| make(source, self.lattices[at.0].system)).collect()
+    }
+
     /// Metres between the samples of a file.
     pub(super) fn steps_m(&self, source: usize) -> [f64; 2] {
         let Source { map, samples, .. } = &self.sources[source];

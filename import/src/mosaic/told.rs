@@ -60,19 +60,15 @@ impl Told {
         }
     }
 
-    /// Whether a file was left out.
-    pub(super) fn has_lost(&self, path: &Path) -> bool {
-        self.lost.contains_key(path)
-    }
-
     /// How many files were read.
     pub(super) fn count_read(&self) -> usize {
         self.read
     }
 
-    /// Why the first of the files that were left out was, if any was.
-    pub(super) fn first_loss(&self) -> Option<&str> {
-        self.lost.values().next().map(String::as_str)
+    /// That no file is left.
+    pub(super) fn nothing_read(&self) -> LayoutError {
+        let why = self.lost.values().next().map_or("there is none", String::as_str);
+        LayoutError::Usage(format!("none of the files can be read; the first: {why}"))
     }
 
     /// All of it as warnings, of so many files.

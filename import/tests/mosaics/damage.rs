@@ -106,8 +106,11 @@ fn what_the_system_does_not_cover_is_named_and_left_out() {
         let refused = open_with(&files, &strict).err().unwrap().to_string();
         assert!(refused.contains("far.asc") && refused.contains("does not cover"), "{refused}");
     }
-    // Where none of them has a place there, nothing is left.
-    let none = OpenOptions { reproject: Some("+proj=utm +zone=2".into()), ..OpenOptions::default() };
+    // A satellite over the Pacific sees none of them.
+    let none = OpenOptions {
+        reproject: Some("+proj=geos +h=35785831 +lon_0=-171 +datum=WGS84".into()),
+        ..OpenOptions::default()
+    };
     let refused = open_with(&files, &none).err().unwrap().to_string();
     assert!(refused.contains("a.asc") && refused.contains("does not cover"), "{refused}");
 }
