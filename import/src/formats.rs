@@ -6,7 +6,7 @@ use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
 use crate::{
-    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, surfer, tiles,
+    OpenOptions, ascii_grid, bt, dted, geotiff, grib, hgt, labelled, netcdf, png, pnm, raw, surfer, tiles,
     usgs_dem, vrt, xyz,
 };
 use std::path::{Path, PathBuf};
@@ -44,6 +44,11 @@ const SIGNED: &[Format] = &[
         name: "netCDF",
         is: |look| netcdf::is_netcdf(&look.head),
         open: |path, options| boxed(netcdf::NetcdfDem::open(path, options)),
+    },
+    Format {
+        name: "GRIB",
+        is: |look| grib::is_grib(&look.head),
+        open: |path, options| boxed(grib::GribDem::open(path, options)),
     },
     Format {
         name: "DTED",

@@ -32,6 +32,7 @@ mod formats;
 #[cfg(feature = "gdal")]
 mod gdal;
 mod geotiff;
+mod grib;
 mod guard;
 mod heights;
 mod hgt;

@@ -226,7 +226,6 @@ fn advice_for_what_is_not_read_works() {
         ("FITS", "a.fits", &["-ot", "Int16"], false),
         ("PCRaster", "a.map", &["-ot", "Float32", "-mo", "PCRASTER_VALUESCALE=VS_SCALAR"], true),
         ("HF2", "a.hf2", &["-ot", "Float32"], false),
-        ("GRIB", "a.grb", &["-ot", "Float64"], false),
         ("GPKG", "a.gpkg", &["-ot", "Float32", "-co", "TILING_SCHEME=CUSTOM"], false),
         ("SAGA", "a.sdat", &[], true),
         ("RST", "a.rst", &["-ot", "Int16"], true),
