@@ -45,11 +45,7 @@ const SIGNED: &[Format] = &[
         is: |look| netcdf::is_netcdf(&look.head),
         open: |path, options| boxed(netcdf::NetcdfDem::open(path, options)),
     },
-    Format {
-        name: "GRIB",
-        is: |look| grib::is_grib(&look.head),
-        open: |path, options| boxed(grib::GribDem::open(path, options)),
-    },
+    Format { name: "GRIB", is: |look| grib::is_grib(&look.head), open: grib },
     Format {
         name: "DTED",
         is: |look| dted::is_dted(&look.head),
@@ -189,7 +185,21 @@ fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, Layo
 
 /// Opens a virtual raster; one that GDAL computes is GDAL's, where that is there.
 fn virtual_raster(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
-    match vrt::VrtDem::open(path, options, open_file) {
+    or_gdal(path, options, vrt::VrtDem::open(path, options, open_file))
+}
+
+/// Opens a GRIB file; an edition, grid or packing that is not read here is GDAL's, where that is there.
+fn grib(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    or_gdal(path, options, grib::GribDem::open(path, options))
+}
+
+/// What was opened; what no option mends is GDAL's, where that is there.
+fn or_gdal<R: Reader + 'static>(
+    #[cfg_attr(not(feature = "gdal"), allow(unused_variables))] path: &Path,
+    #[cfg_attr(not(feature = "gdal"), allow(unused_variables))] options: &OpenOptions,
+    opened: Result<R, LayoutError>,
+) -> Result<Box<dyn Reader>, LayoutError> {
+    match opened {
         #[cfg(feature = "gdal")]
         Err(LayoutError::Unsupported { remedy: None, .. }) => {
             boxed(crate::gdal::GdalDem::open(path, options))

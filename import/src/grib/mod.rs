@@ -128,6 +128,19 @@ impl GribDem {
             return Err(told(Fault::Damaged("its bitmap is too short for its grid")));
         }
         packing.look(&file, field.numbers).map_err(told)?;
+        let [from, to] = field.numbers;
+        let (takes, allowed) = (packing.memory_bytes(to - from), options.memory_mib.unwrap_or(512) << 20);
+        if takes > allowed {
+            let enough = takes.div_ceil(1 << 20);
+            return Err(LayoutError::unsupported(
+                path,
+                format!(
+                    "{place}: unpacking {} takes {enough} MiB, more than is allowed; allow more memory",
+                    packing.name()
+                ),
+            )
+            .mended_by(Remedy::Memory { enough_mib: Some(enough) }));
+        }
         let format = format!("GRIB 2 ({})", packing.name());
         let mut declared = Declared::new(grid.samples, packing.sample_type(), format);
         // Band numbers beside a file are those of GDAL.

@@ -115,6 +115,12 @@ fn bombs_are_refused_at_once() {
         assert!(said.contains("field 1"), "{name}: {said}");
         assert!(begin.elapsed() < Duration::from_secs(5), "{name}: {:?}", begin.elapsed());
     }
+    // A picture of as many numbers is one that memory is not taken for.
+    let picture = grown("jpeg", &|bytes| {
+        let size = bytes.windows(4).position(|four| four == b"\xff\x4f\xff\x51").unwrap();
+        [8, 12, 24, 28].iter().for_each(|at| put(bytes, size + at, 60_000));
+    });
+    assert!(read(folder.path(), &picture).unwrap_err().contains("allow more memory"));
     // Groups without an end and without a number.
     let empty = grown("complex", &|bytes| {
         let packing = section(bytes, 5);
