@@ -9,7 +9,7 @@ use super::plan::{Placed, counted};
 use super::sheet::Sheet;
 use super::source::Source;
 use super::told::Told;
-use crate::crs::{System, is_earth};
+use crate::crs::is_earth;
 use crate::options::OpenOptions;
 use crate::warp::{mesh, target_system};
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ impl Aim {
         };
         let (map, samples) = extent(name, placed, sheets, main)?;
         let system = target_system(name, text, &tied.system, ground, &map, samples)?;
-        let wanted = Tied::new(System { vertical: tied.system.vertical.clone(), ..system });
+        let wanted = Tied::new(system);
         if is_one {
             return Ok(here(true, if wanted.ground.is_some() { wanted } else { tied.clone() }));
         }

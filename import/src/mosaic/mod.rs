@@ -9,6 +9,7 @@ mod across;
 mod aim;
 mod blend;
 mod lattice;
+mod levels;
 mod names;
 mod plan;
 mod sheet;
@@ -17,6 +18,7 @@ mod target;
 mod told;
 mod values;
 
+use crate::crs::System;
 use crate::guard::is_ours;
 use crate::opened::{Known, OpenedDem};
 use crate::options::{OpenOptions, Priority, Resampling};
@@ -160,8 +162,7 @@ impl Mosaic {
         let mut declared = Declared::new(target.samples, sample_type, format_of(&placed.sources));
         declared.place = Some(Said::new(target.map, "the places of the files"));
         declared.notes = vec![note(&placed, &sheets, resampled, resampling, options)];
-        let mut warnings = Vec::new();
-        warn_of_levels(&placed, &mut warnings);
+        let (vertical, unlike) = levels::of(&placed.sources);
         let bytes = Store::all_bytes(sheets.iter().map(|sheet| &sheet.samples), sample_bytes);
         let bytes = if blend.is_some() { bytes.saturating_mul(2) } else { bytes };
         let allowed = options.memory_mib.unwrap_or(512) << 20;
@@ -181,11 +182,11 @@ impl Mosaic {
             told: Mutex::new(told),
         };
         let known = Known {
-            system: target.tied.system,
+            system: System { vertical, ..target.tied.system },
             heights: values.heights,
             voids: Voids::new(name, &[], &[], sample_type)?,
             mask: None,
-            warnings,
+            warnings: unlike.into_iter().collect(),
         };
         Ok((mosaic, known, later))
     }
@@ -299,24 +300,6 @@ fn note(
         words += &format!(", seams blended over {} m", terrasoar_layout::words::number(metres));
     }
     words
-}
-
-/// Says where heights of files are measured from unlike levels.
-fn warn_of_levels(placed: &Placed, warnings: &mut Vec<Warning>) {
-    let mut levels: Vec<&str> = Vec::new();
-    for level in placed.systems.iter().filter_map(|tied| tied.system.vertical.as_ref()) {
-        if !level.name.is_empty() && !levels.contains(&level.name.as_str()) {
-            levels.push(&level.name);
-        }
-    }
-    if levels.len() > 1 {
-        let listed: Vec<String> =
-            levels.iter().take(4).map(|name| terrasoar_layout::words::harmless(name, 60)).collect();
-        warnings.push(Warning::new(format!(
-            "the files measure heights from unlike levels ({}), and none was shifted; bring them to one level first, where steps at seams matter: gdalwarp -t_srs EPSG:n+m",
-            listed.join(", ")
-        )));
-    }
 }
 
 impl Reader for Mosaic {

@@ -207,6 +207,7 @@ fn longitudes_beyond_180_lie_together() {
 }
 
 #[test]
+#[cfg_attr(feature = "gdal", ignore = "GDAL's library reads these")]
 fn what_is_not_read_is_refused_with_the_command() {
     for (name, words) in [
         ("edition-1.grib", "gdal_translate -b N"),

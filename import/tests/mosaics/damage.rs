@@ -9,7 +9,7 @@ use terrasoar_import::{OpenOptions, Priority, open_with};
 
 const UTM: &str = "EPSG:32632";
 
-fn warnings(paths: &[PathBuf], options: &OpenOptions) -> Vec<String> {
+pub(crate) fn warnings(paths: &[PathBuf], options: &OpenOptions) -> Vec<String> {
     let dem = open_with(paths, options).unwrap();
     collect(&*dem).unwrap();
     dem.warnings().into_iter().map(|warning| warning.words).collect()
