@@ -210,6 +210,8 @@ def choices():
     write("reduced.grib2", ec.codes_get_message(reduced))
     rotated = ec.codes_grib_new_from_samples("rotated_ll_sfc_grib2")
     write("rotated.grib2", ec.codes_get_message(rotated))
+    waves = ec.codes_grib_new_from_samples("sh_sfc_grib2")
+    write("waves.grib2", ec.codes_get_message(waves))
     first = ec.codes_grib_new_from_samples("regular_ll_sfc_grib1")
     write("edition-1.grib", ec.codes_get_message(first))
 

@@ -127,7 +127,7 @@ pub(crate) fn is_placed(path: &Path) -> bool {
 }
 
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, GRIB 2, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))

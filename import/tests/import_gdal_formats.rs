@@ -247,6 +247,35 @@ fn advice_for_what_is_not_read_works() {
     }
 }
 
+/// GRIB files that are not read; where CDO is installed, those that it converts as well.
+#[test]
+#[ignore = "needs gdal-bin"]
+fn advice_for_grib_works() {
+    let folder = tempdir().unwrap();
+    let has_cdo = std::process::Command::new("cdo").arg("--version").output().is_ok();
+    for (name, made) in [
+        ("edition-1.grib", "output.tif"),
+        ("rotated.grib2", "output.tif"),
+        ("gaussian.grib2", "output.grib2"),
+        ("reduced.grib2", "output.grib2"),
+        ("waves.grib2", "output.grib2"),
+    ] {
+        if made.ends_with("grib2") && !has_cdo {
+            eprintln!("{name}: CDO is not installed");
+            continue;
+        }
+        let input = import_support::fixtures().with_file_name("grib_fixtures").join(name);
+        let said = refusal(std::slice::from_ref(&input));
+        let command = said.split("convert it with: ").nth(1).unwrap_or_else(|| panic!("{said}"));
+        let command = command.replace("INPUT", input.to_str().unwrap()).replace(" N ", " 1 ");
+        run(folder.path(), "sh", &["-c", &command]);
+        let made = folder.path().join(made);
+        let grid = read(std::slice::from_ref(&made)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(grid.samples.len() > 100, "{name}");
+        std::fs::remove_file(made).unwrap();
+    }
+}
+
 #[test]
 #[ignore = "needs gdal-bin"]
 fn advice_for_pictures_and_labels_works() {

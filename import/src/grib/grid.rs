@@ -60,7 +60,7 @@ impl Grid {
             return Err(Fault::Damaged("its grid is cut short"));
         }
         if section.u8(11) != 0 {
-            return Err(Fault::Grid("its rows are of unlike lengths (a reduced grid)".into()));
+            return Err(Fault::Uneven("its rows are of unlike lengths (a reduced grid)".into()));
         }
         let [across, down] = [31, 35].map(|octet| section.u32(octet));
         if u64::from(across) * u64::from(down) != u64::from(section.u32(7)) {
@@ -73,7 +73,7 @@ impl Grid {
         }
         let mode = section.u8(scanning);
         if mode & 0x0f != 0 {
-            return Err(Fault::Grid("its lines are shifted against each other".into()));
+            return Err(Fault::Uneven("its lines are shifted against each other".into()));
         }
         let laid = match template {
             0 => degrees(section, [across, down])?,
@@ -101,16 +101,15 @@ impl Grid {
 }
 
 fn refused(template: u16) -> Fault {
-    let what = match template {
-        1 => "it is on rotated longitudes and latitudes".into(),
-        4 | 5 => "its steps in longitude and latitude vary".into(),
-        40..=43 => "its rows are those of a Gaussian grid, which are no even steps apart".into(),
-        50..=53 => "it holds waves on the sphere (spherical harmonics)".into(),
-        90 => "it is seen from a satellite".into(),
-        100 | 101 => "its samples lie on triangles".into(),
-        _ => format!("its grid is template 3.{template}"),
-    };
-    Fault::Grid(what)
+    match template {
+        1 => Fault::Warped("it is on rotated longitudes and latitudes".into()),
+        90 => Fault::Warped("it is seen from a satellite".into()),
+        4 | 5 => Fault::Uneven("its steps in longitude and latitude vary".into()),
+        40..=43 => Fault::Uneven("its rows are those of a Gaussian grid".into()),
+        50..=53 => Fault::Spectral,
+        100 | 101 => Fault::Unsupported("its samples lie on triangles".into()),
+        _ => Fault::Unsupported(format!("its grid is template 3.{template}")),
+    }
 }
 
 /// The body as words of a PROJ string.

@@ -40,8 +40,12 @@ enum Fault {
     Io(std::io::Error),
     Damaged(&'static str),
     Unsupported(String),
-    /// A grid that GDAL brings to longitude and latitude.
-    Grid(String),
+    /// A grid of uneven steps on a map that GDAL knows.
+    Warped(String),
+    /// Another grid of uneven steps.
+    Uneven(String),
+    /// Waves on the sphere in place of samples.
+    Spectral,
     FirstEdition,
 }
 
@@ -67,10 +71,22 @@ impl Fault {
                     "{place}: {what}, which is not read; convert it with: gdal_translate -b N INPUT output.tif"
                 ),
             ),
-            Self::Grid(what) => LayoutError::unsupported(
+            Self::Warped(what) => LayoutError::unsupported(
                 path,
                 format!(
-                    "{place}: {what}, and grids of even steps are read; convert it with: gdalwarp -t_srs EPSG:4326 -b N INPUT output.tif"
+                    "{place}: {what}, and even steps are read; convert it with: gdal_translate -b N -of VRT INPUT band.vrt && gdalwarp -t_srs EPSG:4326 band.vrt output.tif"
+                ),
+            ),
+            Self::Uneven(what) => LayoutError::unsupported(
+                path,
+                format!(
+                    "{place}: {what}, and even steps are read; convert it with: cdo remapbil,global_0.25 -setgridtype,regular INPUT output.grib2"
+                ),
+            ),
+            Self::Spectral => LayoutError::unsupported(
+                path,
+                format!(
+                    "{place}: it holds waves on the sphere (spherical harmonics) and no samples; convert it with: cdo remapbil,global_0.25 -sp2gp INPUT output.grib2"
                 ),
             ),
             Self::FirstEdition => LayoutError::unsupported(

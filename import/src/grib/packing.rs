@@ -18,6 +18,10 @@ use terrasoar_layout::portable::pow;
 
 /// Longest packed field of a codec.
 const MOST_PACKED: u64 = 1 << 31;
+/// Rows that a decoder of PNG holds, bytes of a pixel, and bytes beside them, at most.
+const PNG_ROWS: u64 = 8;
+const PNG_PIXEL: u64 = 4;
+const PNG_CHUNKS: u64 = 1 << 20;
 /// Bits of a number that a decoder of JPEG 2000 keeps exactly.
 const MOST_JPEG_BITS: u32 = 24;
 
@@ -29,6 +33,8 @@ pub(super) struct Packing {
     bits: u32,
     /// Where JPEG 2000 has its numbers, once it was looked at.
     stream: Option<Stream>,
+    /// Pixels of a row of PNG, once it was looked at.
+    row: u64,
     /// Numbers that are packed.
     pub(super) points: u64,
 }
@@ -77,7 +83,7 @@ impl Packing {
         if method == Method::Jpeg2000 && bits > MOST_JPEG_BITS {
             return Err(Fault::Unsupported(format!("JPEG 2000 of {bits} bits a number loses some of them")));
         }
-        let this = Self { points: section.u32(6).into(), section, method, bits, stream: None };
+        let this = Self { points: section.u32(6).into(), section, method, bits, stream: None, row: 0 };
         if method != Method::Reals && ![this.reference(), this.scale()].iter().all(|value| value.is_finite())
         {
             return Err(Fault::Damaged("its numbers are scaled beyond what there is"));
@@ -136,7 +142,9 @@ impl Packing {
                 let work = self.stream.as_ref().map_or(0, Stream::tile_bytes);
                 work.saturating_add(self.points.saturating_mul(4))
             }
-            Method::Png => packed.saturating_add(self.points.saturating_mul(16)),
+            Method::Png => packed
+                .saturating_add(self.row.saturating_mul(PNG_ROWS * PNG_PIXEL))
+                .saturating_add(PNG_CHUNKS),
             _ => 0,
         }
     }
@@ -152,6 +160,14 @@ impl Packing {
                 ));
             }
             self.stream = Some(stream);
+        }
+        if self.method == Method::Png {
+            let mut head = [0; 24];
+            if to - from < head.len() as u64 {
+                return Err(ENDED);
+            }
+            read_at(file, &mut head, from)?;
+            self.row = u32::from_be_bytes([16, 17, 18, 19].map(|i: usize| head[i])).into();
         }
         Ok(())
     }
@@ -269,7 +285,7 @@ fn png(packed: Vec<u8>, points: u64, bits: u32) -> Result<Png, Fault> {
     if wide as u64 * u64::from(high) != points || pixel < bits as usize || pixel > 32 || header.interlaced {
         return Err(Fault::Damaged("its PNG is not of such numbers as the field has"));
     }
-    decoder.set_limits(png::Limits { bytes: (1 << 20) + wide * 8 });
+    decoder.set_limits(png::Limits { bytes: PNG_CHUNKS as usize + wide * PNG_PIXEL as usize });
     let reader = decoder.read_info().map_err(fault)?;
     Ok(Png { reader, row: Vec::new(), at: 0, bits: pixel, wide })
 }

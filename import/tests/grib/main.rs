@@ -212,7 +212,8 @@ fn what_is_not_read_is_refused_with_the_command() {
     for (name, words) in [
         ("edition-1.grib", "gdal_translate -b N"),
         ("gaussian.grib2", "Gaussian grid"),
-        ("reduced.grib2", "gdalwarp"),
+        ("reduced.grib2", "-setgridtype,regular"),
+        ("waves.grib2", "spherical harmonics"),
         ("rotated.grib2", "rotated longitudes"),
     ] {
         let said = refused(name, &OpenOptions::default());
