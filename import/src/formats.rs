@@ -193,14 +193,24 @@ fn grib(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutErr
     or_gdal(path, options, grib::GribDem::open(path, options))
 }
 
-/// What was opened; what no option mends is GDAL's, where that is there.
+/// What was opened.
+#[cfg(not(feature = "gdal"))]
 fn or_gdal<R: Reader + 'static>(
-    #[cfg_attr(not(feature = "gdal"), allow(unused_variables))] path: &Path,
-    #[cfg_attr(not(feature = "gdal"), allow(unused_variables))] options: &OpenOptions,
+    _: &Path,
+    _: &OpenOptions,
+    opened: Result<R, LayoutError>,
+) -> Result<Box<dyn Reader>, LayoutError> {
+    boxed(opened)
+}
+
+/// What was opened; what is not read here, and no option mends it, is GDAL's.
+#[cfg(feature = "gdal")]
+fn or_gdal<R: Reader + 'static>(
+    path: &Path,
+    options: &OpenOptions,
     opened: Result<R, LayoutError>,
 ) -> Result<Box<dyn Reader>, LayoutError> {
     match opened {
-        #[cfg(feature = "gdal")]
         Err(LayoutError::Unsupported { remedy: None, .. }) => {
             boxed(crate::gdal::GdalDem::open(path, options))
         }

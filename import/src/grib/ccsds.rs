@@ -123,7 +123,7 @@ impl<'f> Ccsds<'f> {
                 // The pair's sum, and its second number: pairs are counted by their sums.
                 let sum = ((8 * pair + 1).isqrt() - 1) / 2;
                 let second = pair - sum * (sum + 1) / 2;
-                if self.numbers.len() % 2 == 0 {
+                if self.numbers.len().is_multiple_of(2) {
                     self.push(sum - second)?;
                 }
                 self.push(second)?;
@@ -181,7 +181,7 @@ impl<'f> Ccsds<'f> {
         let half = folded.div_ceil(2);
         self.last = if half > room {
             if is_high { most - folded } else { folded }
-        } else if folded % 2 == 0 {
+        } else if folded.is_multiple_of(2) {
             self.last + half
         } else {
             self.last - half

@@ -47,8 +47,8 @@ impl<'a> Over<'a> {
             }
             point.is_some()
         };
-        let are_all = mesh(sheet.samples).fold(true, |all, at| look(at) && all);
-        if !are_all {
+        let missed = mesh(sheet.samples).filter(|at| !look(*at)).count();
+        if missed > 0 {
             for member in &sheet.members {
                 let first = member.at.map(f64::from);
                 for [col, row] in mesh(placed.sources[member.source].samples) {

@@ -43,7 +43,7 @@ fn height(col: u32, row: u32) -> f64 {
 }
 
 fn is_void(col: u32, row: u32) -> bool {
-    (5 * col + 3 * row) % 23 == 0
+    (5 * col + 3 * row).is_multiple_of(23)
 }
 
 /// Checks every sample, to a part of its size, and where voids are.
