@@ -223,7 +223,7 @@ fn transparent_texels_are_voids_and_so_are_missing_tiles() {
 #[test]
 fn black_texels_are_told_and_can_be_named() {
     let folder_of = tempdir().unwrap();
-    let black = |col: u64, row: u64| (col + row) % 7 == 0;
+    let black = |col: u64, row: u64| (col + row).is_multiple_of(7);
     let made =
         tiles(
             10,
