@@ -45,7 +45,14 @@ const SIGNED: &[Format] = &[
         is: |look| netcdf::is_netcdf(&look.head),
         open: |path, options| boxed(netcdf::NetcdfDem::open(path, options)),
     },
-    Format { name: "GRIB", is: |look| grib::is_grib(&look.head), open: grib },
+    Format {
+        name: "GRIB",
+        is: |look| {
+            let is_called = ["grib2", "grib", "grb2", "grb"].iter().any(|name| look.is_called(name));
+            grib::is_grib(&look.head, is_called)
+        },
+        open: grib,
+    },
     Format {
         name: "DTED",
         is: |look| dted::is_dted(&look.head),

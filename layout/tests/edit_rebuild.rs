@@ -283,7 +283,8 @@ fn heights_beyond_the_range_are_refused_and_nothing_changes() {
 #[test]
 fn ground_may_be_dug_and_raised_at_first_try() {
     for (z_scale, low) in [(1.0, 0.0), (1.0, -4000.0), (0.1, 2203.0), (-1.0, 150.0), (0.3048, 32_000.0)] {
-        let ground = MemoryDem::from_fn([65, 61], SampleType::I16, |x, y| low + f64::from((7 * x + 3 * y) % 50));
+        let ground =
+            MemoryDem::from_fn([65, 61], SampleType::I16, |x, y| low + f64::from((7 * x + 3 * y) % 50));
         let step_m = f64::abs(z_scale);
         // So far apart that the slopes stay below those that radii are made for, which are another limit.
         let spacing_m = [4000.0 * step_m; 2];
@@ -296,7 +297,10 @@ fn ground_may_be_dug_and_raised_at_first_try() {
         {
             let west = 5 + 12 * i as u32;
             let rect = SampleRect { west, south: 20, east: west + 2, north: 22 };
-            bench.editor.set_heights(&HeightWindow::new(rect, vec![height_m; rect.count()]).unwrap()).unwrap();
+            bench
+                .editor
+                .set_heights(&HeightWindow::new(rect, vec![height_m; rect.count()]).unwrap())
+                .unwrap();
             bench.check();
         }
         let rect = SampleRect { west: 5, south: 20, east: 6, north: 21 };

@@ -68,7 +68,14 @@ pub(super) fn fields(file: &File, length: u64) -> Result<Vec<Field>, Fault> {
 
 /// Where the next message begins.
 fn find(file: &File, mut at: u64, length: u64) -> Result<Option<u64>, Fault> {
-    let mut buffer = Vec::new();
+    // Most messages follow each other.
+    let mut buffer = vec![0; MAGIC.len()];
+    if at + 16 <= length {
+        read_at(file, &mut buffer, at)?;
+        if buffer == MAGIC {
+            return Ok(Some(at));
+        }
+    }
     while at + 16 <= length {
         buffer.resize((length - at).min(SEARCHED) as usize, 0);
         read_at(file, &mut buffer, at)?;

@@ -218,7 +218,7 @@ fn mercator(section: &Section, across: u32) -> Result<Laid, Fault> {
     let at = first(section, 39);
     let system =
         |middle: f64| format!("+proj=merc +lat_ts={} +lon_0={middle} {body} +units=m", degree(section, 48));
-    let orientation = degree(section, 61);
+    let orientation = if section.u32(61) == MISSING { 0.0 } else { degree(section, 61) };
     let mut found = (system(orientation), on_map(&system(orientation), &body, at)?);
     let edge = on_map(&system(orientation), &body, [orientation + 179.999_999, 0.0])?[0];
     let runs_east = section.u8(60) & 0x80 == 0;
@@ -269,4 +269,47 @@ fn equal_area(section: &Section) -> Result<Laid, Fault> {
     let system = format!("+proj=laea +lat_0={lat} +lon_0={lon} {body} +units=m");
     let first = on_map(&system, &body, first(section, 39))?;
     Ok(Laid { first, steps: steps(section, 56), system, warning: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A section 3 with these octets at these places, counted from 1.
+    fn section(octets: &[(usize, &[u8])]) -> Section {
+        let mut bytes = vec![0; 72];
+        for (at, values) in octets {
+            bytes[at - 1..at - 1 + values.len()].copy_from_slice(values);
+        }
+        Section(bytes)
+    }
+
+    #[test]
+    fn bodies_are_those_of_the_table() {
+        let of = |octets: &[(usize, &[u8])]| body(&section(octets)).map_err(|fault| format!("{fault:?}"));
+        for (code, wanted) in [(0, "+R=6367470"), (4, "+ellps=GRS80"), (5, "+datum=WGS84"), (6, "+R=6371229")]
+        {
+            assert_eq!(of(&[(15, &[code])]).unwrap(), wanted);
+        }
+        // 637,137,000 hundredths of a metre, and thousandths of kilometres.
+        let radius = 637_137_000u32.to_be_bytes();
+        assert_eq!(of(&[(15, &[1, 2]), (17, &radius)]).unwrap(), "+R=6371370");
+        let [a, b] = [6_378_160u32, 6_356_775].map(u32::to_be_bytes);
+        let axes = [(15, &[3][..]), (21, &[3]), (22, &a), (26, &[3]), (27, &b)];
+        assert_eq!(of(&axes).unwrap(), "+a=6378160 +b=6356775");
+        let axes = [(15, &[7][..]), (22, &a), (27, &b)];
+        assert_eq!(of(&axes).unwrap(), "+a=6378160 +b=6356775");
+        assert!(of(&[(15, &[1])]).is_err() && of(&[(15, &[99])]).is_err());
+        // Each is a system that places can be brought out of.
+        for code in [0, 2, 4, 5, 6, 8, 9] {
+            let text = of(&[(15, &[code])]).unwrap();
+            let found = on_map(
+                &format!("+proj=stere +lat_0=90 +lat_ts=60 +lon_0=0 {text} +units=m"),
+                &text,
+                [0.0, 60.0],
+            );
+            let [x, y] = found.unwrap_or_else(|fault| panic!("{text}: {fault:?}"));
+            assert!(x.abs() < 1e-6 && (-3.4e6..-3.1e6).contains(&y), "{text}: {x} {y}");
+        }
+    }
 }

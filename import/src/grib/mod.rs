@@ -97,9 +97,9 @@ impl Fault {
     }
 }
 
-/// Whether a file begins so.
-pub(crate) fn is_grib(head: &[u8]) -> bool {
-    head.starts_with(b"GRIB")
+/// Whether a file begins so; one that is called so may have a line of a bulletin ahead.
+pub(crate) fn is_grib(head: &[u8], is_called: bool) -> bool {
+    head.starts_with(b"GRIB") || is_called && head.windows(4).take(128).any(|four| four == b"GRIB")
 }
 
 /// A field of a GRIB file.

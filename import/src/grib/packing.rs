@@ -84,8 +84,7 @@ impl Packing {
             return Err(Fault::Unsupported(format!("JPEG 2000 of {bits} bits a number loses some of them")));
         }
         let this = Self { points: section.u32(6).into(), section, method, bits, stream: None, row: 0 };
-        if method != Method::Reals && ![this.reference(), this.scale()].iter().all(|value| value.is_finite())
-        {
+        if !this.reference().is_finite() || !this.scale().is_finite() || this.scale() == 0.0 {
             return Err(Fault::Damaged("its numbers are scaled beyond what there is"));
         }
         Ok(this)
@@ -120,7 +119,7 @@ impl Packing {
 
     /// Units a number.
     pub(super) fn scale(&self) -> f64 {
-        if self.method == Method::Reals {
+        if matches!(self.method, Method::Reals | Method::Constant) {
             return 1.0;
         }
         pow(2.0, self.section.i16(16).into()) / self.tens()

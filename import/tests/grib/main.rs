@@ -206,6 +206,44 @@ fn longitudes_beyond_180_lie_together() {
     is_at("third", &opened("third.grib2"), [10.0, 1.0 / 3.0, 50.0, -1.0 / 3.0], 3e-8);
 }
 
+/// Files as they came over the wire, and headers that do not go together.
+#[test]
+fn bulletins_and_contradictions() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+    let sound = std::fs::read(fixture("simple.grib2")).unwrap();
+    let bulletin =
+        put("a.grb2", &[b"\x01\r\r\n123\r\r\nHTXX01 KWBC 260000\r\r\n", &sound[..], b"\r\r\n\x03"].concat());
+    is_usual("bulletin", &with(&bulletin, &OpenOptions::default()).unwrap().0, 0.0, 0.0, false);
+    let grid = sound.windows(4).position(|four| four == [0, 0, 0, 72]).unwrap();
+    let changed = |octet: usize, number: u32| {
+        let mut bytes = sound.clone();
+        bytes[grid + octet - 1..grid + octet + 3].copy_from_slice(&number.to_be_bytes());
+        put("b.grib2", &bytes)
+    };
+    // The last longitude says another step than the step does.
+    let (grid, said) = with(&changed(60, 28_000_000), &OpenOptions::default()).unwrap();
+    assert!(
+        said.iter().any(|warning| warning.words.contains("0.25 degrees, and 0.5 by its corners")),
+        "{said:?}"
+    );
+    is_at("contradiction", &grid, [10.0, 0.25, 50.0, -0.25], 1e-9);
+    for (octet, number, words) in [
+        (47, 95_000_000, "no globe"),
+        (68, 10_000_000, "beyond a pole"),
+        (31, 38, "number of points"),
+        (11, 1 << 24, "unlike lengths"),
+    ] {
+        let path = changed(octet, number);
+        let said = with(&path, &OpenOptions::default()).err().unwrap().to_string();
+        assert!(said.contains(words), "{octet}: {said}");
+    }
+}
+
 #[test]
 #[cfg_attr(feature = "gdal", ignore = "GDAL's library reads these")]
 fn what_is_not_read_is_refused_with_the_command() {

@@ -34,7 +34,9 @@ mod tests {
 
     #[test]
     fn room_is_symmetric_and_inside_the_codes() {
-        for range in [0.0, 1.0, 5.0, 16_000.0, 16_384.0, 30_000.0, 52_427.0, 52_428.0, 60_000.0, 65_534.0, 65_535.0] {
+        for range in
+            [0.0, 1.0, 5.0, 16_000.0, 16_384.0, 30_000.0, 52_427.0, 52_428.0, 60_000.0, 65_534.0, 65_535.0]
+        {
             let (reach, below) = (reach_steps(range), codes_below(range));
             assert!(reach >= range && reach <= LARGEST_CODE, "{range}: {reach}");
             assert!(below >= 0.0 && below + range <= reach, "{range}: {below}");
