@@ -253,9 +253,9 @@ fn views_of_nonsense_change_nothing() {
         good.viewport([800, 0]),
     ];
     let all_engines = [PictureEngine::Kinetic, PictureEngine::Soar];
-    let mapped = all_engines.into_iter().flat_map(|engine| {
-        Culling::ALL.map(|culling| mapped.ground(engine, culling).unwrap())
-    });
+    let mapped = all_engines
+        .into_iter()
+        .flat_map(|engine| Culling::ALL.map(|culling| mapped.ground(engine, culling).unwrap()));
     for mut ground in mapped.chain([streamed(&path)]) {
         for bad in &nonsense {
             assert!(!bad.is_sound(), "{bad:?}");
