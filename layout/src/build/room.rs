@@ -14,7 +14,7 @@ const REACH_FACTOR: f64 = 1.25;
 
 /// The largest range of heights in steps that records are made for, where the terrain's own is `range_steps`, at most [`LARGEST_CODE`].
 pub(super) fn reach_steps(range_steps: f64) -> f64 {
-    (range_steps * REACH_FACTOR).max(REACH_STEPS).min(LARGEST_CODE)
+    (range_steps * REACH_FACTOR).clamp(REACH_STEPS, LARGEST_CODE)
 }
 
 /// Codes that are left free below a terrain whose heights take `range_steps` codes: as many as above, and no more than [`reach_steps`] makes use of.
