@@ -299,7 +299,7 @@ mod tests {
     fn maps_go_round_where_longitudes_do() {
         for (system, turn) in [
             ("EPSG:4326", Some(360.0)),
-            ("EPSG:3857", Some(40_075_016.685_578_488)),
+            ("EPSG:3857", Some(40_075_016.685_578_49)),
             ("+proj=merc +lat_ts=41 +lon_0=150 +x_0=1000000 +datum=WGS84 +units=km", Some(30_288.666_64)),
             ("EPSG:32632", None),
             ("EPSG:3035", None),
