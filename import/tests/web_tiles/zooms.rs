@@ -97,7 +97,7 @@ fn bounds_across_180_degrees_join_both_sides() {
     assert!(grid.info.samples_wide < 90 && grid.samples.len() - grid.voids() > 1000);
     let path = folder(&folder_of.path().join("west"), &west, ".png", false);
     let options = OpenOptions { reproject: None, ..options };
-    let dem = open_with(&[path.clone()], &options).unwrap();
+    let dem = open_with(std::slice::from_ref(&path), &options).unwrap();
     assert_eq!(collect(&*dem).unwrap().info.samples_wide, 32);
     let said: Vec<String> = dem.warnings().into_iter().map(|warning| warning.words).collect();
     assert!(said.iter().any(|words| words.contains("one side of 180 degrees")), "{said:?}");
