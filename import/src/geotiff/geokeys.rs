@@ -35,7 +35,7 @@ pub(super) struct Place {
     pub(super) map: Option<[f64; 6]>,
     pub(super) crs: CrsSaid,
     /// What keys say that is not, or not quite, honoured.
-    warnings: Vec<Warning>,
+    pub(super) warnings: Vec<Warning>,
     /// EPSG's code of the vertical unit.
     pub(super) vertical_unit: Option<u16>,
     /// Scale and offset of heights that the tags of the place give.
