@@ -227,7 +227,7 @@ fn bodies_and_projections_of_the_files_own_are_brought_over() {
         let path = hills(folder.path(), system, corners, [120, 100]);
         let options = OpenOptions {
             reproject: Some("EPSG:4326".into()),
-            resolution: Some(0.001),
+            resolution: Some(100.0),
             ..OpenOptions::default()
         };
         agrees(&path, "EPSG:4326", &options, folder.path());
