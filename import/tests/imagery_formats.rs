@@ -5,6 +5,8 @@
 #[path = "../../layout/tests/common/mod.rs"]
 mod common;
 
+#[path = "pictures/jp2_boxes.rs"]
+mod jp2_boxes;
 #[path = "pictures/stretch.rs"]
 mod stretch;
 

@@ -5,7 +5,7 @@
 use super::colour_paint::Samples;
 use super::colour_table::{Packing, Table};
 use crate::jpeg_frame::JpegFrame;
-use crate::jpeg2000::{self, Source, Stream};
+use crate::jpeg2000::{self, Header, Source, Stream};
 use crate::webp::{self, Frame};
 use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 use std::io::Cursor;
@@ -63,7 +63,7 @@ fn jpeg_2000(table: &Table, packed: &[u8], rows: u32) -> Result<(Vec<u8>, usize)
     let pixel = wanted * samples.bytes();
     let mut bytes = vec![0; wide * stream.texels()[1] as usize * pixel];
     for tile in 0..stream.tiles()[0] * stream.tiles()[1] {
-        let channels = jpeg2000::decode_tile(source, &stream, tile, &[]).map_err(damaged)?;
+        let channels = jpeg2000::decode_tile(source, &stream, tile, &Header::default()).map_err(damaged)?;
         if channels.len() != wanted {
             return Err("its stream has other channels than the image".into());
         }

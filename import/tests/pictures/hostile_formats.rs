@@ -83,6 +83,105 @@ fn a_jpeg_2000_takes_no_more_memory_than_it_says() {
     assert!(bytes <= told + 2 * MIB, "{bytes} taken, {told} told");
 }
 
+/// A stream of so many bits a channel instead of 8.
+fn of_bits(stream: &[u8], bits: u8) -> Vec<u8> {
+    let mut bytes = stream.to_vec();
+    let at = find(&bytes, b"\xff\x51");
+    let channels = usize::from(bytes[at + 39]);
+    (0..channels).for_each(|channel| bytes[at + 40 + 3 * channel] = bits - 1);
+    bytes
+}
+
+/// Bits in use are looked for among numbers, which take more than bytes.
+#[test]
+fn a_jpeg_2000_of_16_bits_takes_no_more_memory_than_it_says() {
+    let _alone = alone();
+    let bench = Bench::new();
+    // All six tiles in a row.
+    let side = 512;
+    let wide = of_bits(&resized(TILED, [6 * side, side], [side; 2]), 16);
+    let image = open_image(&bench.write("a.jp2", &wide)).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let read = || image.rows().and_then(|mut rows| rows.read(&mut vec![0; 4 * 6 * side as usize]));
+    let (done, bytes) = peak(|| pool.install(read));
+    done.unwrap();
+    let told = image.info().memory_bytes as usize;
+    println!("{bytes} taken, {told} told");
+    assert!(bytes <= told + MIB, "{bytes} taken, {told} told");
+}
+
+/// Two pictures of 16 bits: bits in use are looked for before draping, in both.
+#[test]
+fn the_memory_of_bits_in_use_is_asked_for_before_it_is_taken() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let large = of_bits(&resized(BARE, [1500; 2], [1500; 2]), 16);
+    let paths = ["a.j2k", "b.j2k"].map(|name| bench.write(name, &large));
+    let terrain = terrasoar_layout::read::terrain::Terrain::open(&bench.path("a.iqt")).unwrap();
+    let tight = PictureOptions { memory_mib: Some(16), ..PictureOptions::default() };
+    let (refused, bytes) = peak(|| open_images(&paths, Some(terrain.header()), &tight).err());
+    let enough = needs_memory(&refused.expect("an error"));
+    assert!(bytes < 4 * MIB, "{bytes}");
+    let allowed = PictureOptions { memory_mib: Some(enough), ..PictureOptions::default() };
+    let (done, bytes) = peak(|| open_images(&paths, Some(terrain.header()), &allowed).map(drop));
+    assert!(done.is_ok() && bytes < enough as usize * MIB, "{bytes}");
+    // One picture is looked at when it is read.
+    assert!(open_images(&paths[..1], Some(terrain.header()), &tight).is_ok());
+}
+
+/// Headers are held by every tile at work: of the file and of the stream.
+#[test]
+fn headers_of_a_jpeg_2000_count_as_memory() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let memory =
+        |bytes: &[u8]| open_image(&bench.write("a.jp2", bytes)).unwrap().info().memory_bytes as usize;
+    let plain = memory(TILED);
+    let profile = 4 << 20;
+    let at = find(TILED, b"jp2h") + 4;
+    let mut long = TILED.to_vec();
+    let size = u32::from_be_bytes(long[at - 8..at - 4].try_into().unwrap()) + 8 + profile;
+    long[at - 8..at - 4].copy_from_slice(&size.to_be_bytes());
+    // A profile behind the system that counts.
+    let end = at + size as usize - 16 - profile as usize;
+    long.splice(
+        end..end,
+        [&(profile + 8).to_be_bytes()[..], b"colr\x02\0\0", &vec![0; profile as usize - 3]].concat(),
+    );
+    let told = memory(&long);
+    let image = open_image(&bench.path("a.jp2")).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let (done, bytes) =
+        peak(|| pool.install(|| image.rows().and_then(|mut rows| rows.read(&mut vec![0; 4 * 72]))));
+    done.unwrap();
+    assert!(told >= plain + profile as usize && bytes <= told, "{bytes} taken, {told} told, {plain} before");
+    // Segments of a stream's header that nobody reads.
+    let style = find(TILED, b"\xff\x52");
+    let mut long = TILED.to_vec();
+    let segment = [&b"\xff\x5c"[..], &60_000u16.to_be_bytes(), &[0x42; 59_998]].concat();
+    long.splice(style..style, segment.repeat(50));
+    let told = memory(&long);
+    assert!(told >= plain + 3_000_000, "{told}, {plain} before");
+}
+
+/// The header of a JPEG that is read in bands is held by each of them.
+#[test]
+fn a_jpeg_with_a_long_header_is_read_as_a_whole() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let frame = BASELINE.windows(2).position(|p| p == [0xff, 0xc0]).unwrap();
+    let mut large = BASELINE.to_vec();
+    large[frame + 5..frame + 9].copy_from_slice(&[0x20, 0, 0x20, 0]);
+    let plain = open_image(&bench.write("a.jpg", &large)).unwrap().info().memory_bytes;
+    let kept = [&[0xff, 0xe0, 0xff, 0xff][..], &[b'x'; 65_533]].concat();
+    for (count, is_whole) in [(3, false), (5, true)] {
+        let mut long = large.clone();
+        long.splice(2..2, kept.repeat(count));
+        let told = open_image(&bench.write("a.jpg", &long)).unwrap().info().memory_bytes;
+        assert_eq!(told > plain, is_whole, "{count}: {told}, {plain} before");
+    }
+}
+
 #[test]
 fn boxes_of_a_jp2_end() {
     let _alone = alone();
