@@ -395,6 +395,34 @@ fn an_overlay_is_refused_over_a_base_that_went_another_way() {
     }
 }
 
+/// A picture leaves records and directory alone: another one in its place is another base all the same.
+#[test]
+fn an_overlay_is_refused_over_a_base_with_another_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, overlay) = (roomy(folder.path()), folder.path().join("o.iqo"));
+    let bare = std::fs::read(&path).unwrap();
+    drape_over(&path, 3);
+    let mut session = EditSession::open_overlay(&path, &overlay).unwrap();
+    fire(&mut session, &[70]).unwrap();
+    session.commit("over").unwrap();
+    drop(session);
+    let draped = std::fs::read(&path).unwrap();
+    // It is the base, grown.
+    change(&path, 0);
+    Terrain::open_with_overlay_unmapped(&path, &overlay).unwrap();
+    // A copy from before, with a picture of the same size and format, and an edit.
+    std::fs::write(&path, &bare).unwrap();
+    drape_over(&path, 8);
+    assert_eq!(std::fs::read(&path).unwrap().len(), draped.len(), "only colours differ");
+    for _ in 0..2 {
+        let error = Terrain::open_with_overlay_unmapped(&path, &overlay).unwrap_err().to_string();
+        assert!(error.contains("o.iqo") && error.contains("written anew"), "{error}");
+        let refused = EditSession::open_overlay(&path, &overlay).unwrap_err().to_string();
+        assert!(refused.contains("written anew"), "{refused}");
+        change(&path, 0);
+    }
+}
+
 /// Pages of the record pages that a generation wrote.
 fn open_entries(bytes: &[u8], folder: &Path, generation: u32) -> Vec<u32> {
     let path = folder.join("look.iqt");

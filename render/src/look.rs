@@ -88,6 +88,12 @@ impl Haze {
             Self::Distance(metres) => Some(f64::from(metres)),
         }
     }
+
+    /// Metres of height after which air with such a distance of sight has a third of its density: thin enough that a map seen from above is clear, thick enough that valleys are hazier than summits, and
+    /// never thicker than the Earth's.
+    pub fn scale_height_m(distance_m: f64) -> f64 {
+        (0.12 * distance_m).min(8000.0)
+    }
 }
 
 /// Contour lines.

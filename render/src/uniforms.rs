@@ -85,9 +85,7 @@ impl Uniforms {
         let hazy_m = |haze: Haze| haze.distance_m(terrain.diagonal_m());
         let haze = if look.haze == Haze::Off { 0.0 } else { 1.0 };
         let haze_m = hazy_m(look.haze).or(hazy_m(Haze::Auto)).unwrap_or(f64::INFINITY).max(1e-3);
-        // Thin enough that a map seen from above is clear, thick enough that valleys are hazier than summits; never
-        // thicker than the Earth's.
-        let scale_height_m = (0.12 * haze_m).min(8000.0);
+        let scale_height_m = Haze::scale_height_m(haze_m);
         let eye_in_air = ((view.eye_m.z - g * terrain.height_range_m[0]) / scale_height_m).clamp(-2.0, 1e6);
 
         let [low_m, high_m] = look.tint_range_m.unwrap_or(terrain.height_range_m.map(|h| h as f32));

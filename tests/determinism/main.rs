@@ -1,7 +1,7 @@
 //! What is the same on every machine, down to the last bit: terrain files, edits, heights, ray hits, meshes, flights, made-up terrain.
 //!
 //! Each result is put into a number of 64 bits and compared with the one that is written here. The numbers are those of x86-64 with glibc; `scripts/portable` runs the same tests on other
-//! processors and with other C libraries. Beside the numbers, the sources are searched for functions of the system that could bring a difference: sines, logarithms, powers.
+//! processors. Beside the numbers, the sources are searched for functions of the system that could bring a difference: sines, logarithms, powers.
 
 mod results;
 mod sources;

@@ -11,7 +11,7 @@ use terrasoar::view::Viewport;
 use terrasoar::{Area, Brush, Edit, MappedTerrain, StreamOptions, Terrain, View};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{HorizontalUnit, MemoryDem, SampleType};
-use terrasoar_layout::edit::{BrushAction, Falloff, Stamp, StampMode};
+use terrasoar_layout::edit::{BrushAction, Crest, Falloff, Limit, Line, Stamp, StampMode};
 use terrasoar_layout::mix::Random;
 use terrasoar_layout::progress::Silent;
 
@@ -188,6 +188,35 @@ fn edits_heights_and_rays() {
         made.extend([("heights and rays", digest.hex()), ("the mesh", flown(&mut ground))]);
     }
     same(&made, &["841e737b0130caa3", "e8fdf7b97b5f8610", "bc52ef5e7cf41c73", "deec36f0d7032eb5"]);
+}
+
+/// Lines and limits, which came after the edits above: those keep their digests.
+#[test]
+fn dams_ditches_and_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = built(folder.path(), "f32.iqt", SampleType::F32);
+    let mut ground = Terrain::open(&path).unwrap().stream(StreamOptions::default()).unwrap();
+    ground.update(&views()[0]);
+    let line = |crest, path_m: &[[f64; 2]]| {
+        Edit::Line(Line { path_m: path_m.to_vec(), crest, width_m: 61.7, slope: 0.37 })
+    };
+    let level = Crest::Level { height_m: 611.3, limit: Some(Limit::AtLeast), sides_m: 150.0 };
+    let area = Area::Disc { centre_m: [5200.3, 4100.9], radius_m: 333.3 };
+    ground
+        .edit(&[
+            line(level, &[[700.3, 900.1], [2500.7, 1800.9], [4100.1, 1500.3]]),
+            line(Crest::Above(23.7), &[[900.3, 4900.1], [3700.9, 5100.7]]),
+            line(Crest::Below(11.9), &[[4300.3, 2900.1], [4700.9, 6100.7]]),
+            Edit::Limit { area, height_m: 590.1, limit: Limit::AtMost },
+        ])
+        .unwrap();
+    ground.commit("lines").unwrap().wait().unwrap();
+    drop(ground);
+    let terrain = MappedTerrain::open(&path).unwrap();
+    let ground = terrain.ground(PictureEngine::Kinetic, Culling::Vertices).unwrap();
+    let mut digest = Digest::new();
+    heights(&ground, &mut digest);
+    same(&[("heights", digest.hex())], &["97c8c483372c78b8"]);
 }
 
 #[test]

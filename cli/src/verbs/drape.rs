@@ -113,19 +113,17 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let pool = pool.build().context("cannot start the threads; give fewer with --threads")?;
     let start = Instant::now();
-    if args.extent.is_none() && args.extent_crs.is_none() {
-        let terrain = Terrain::open(&args.file)?;
-        let looked: Vec<Result<()>> = args.images.iter().map(|path| meets(path, terrain.header())).collect();
+    let is_placed = args.extent.is_some() || args.extent_crs.is_some();
+    let header = if is_placed { None } else { Some(Terrain::open_unmapped(&args.file)?.header().clone()) };
+    if let Some(header) = &header {
+        let looked: Vec<Result<()>> = args.images.iter().map(|path| meets(path, header)).collect();
         // Of a mosaic some may lie elsewhere.
         if looked.iter().all(Result::is_err) {
             looked.into_iter().collect::<Result<()>>()?;
         }
     }
     let draped = pool.install(|| -> Result<Draped> {
-        let is_placed = args.extent.is_some() || args.extent_crs.is_some();
-        let terrain = if is_placed { None } else { Some(Terrain::open(&args.file)?) };
-        let header = terrain.as_ref().map(Terrain::header);
-        let images = open_images(&args.images, header, &args.picture())?;
+        let images = open_images(&args.images, header.as_ref(), &args.picture())?;
         for image in &images {
             for note in &image.info().notes {
                 complain(&format!("note: {}: {note}", image.path().display()));

@@ -160,8 +160,8 @@ fn turned_back(flight: &Flight, kind: FlightKind, speed: f64, grid: &Grid) -> Op
             metres(long)
         ),
         _ => format!(
-            "the way is {way} m long and the terrain {} m; the flight goes there and back",
-            metres(wide.max(long))
+            "the way is {way} m long, and a straight flight has three quarters of the terrain's longer side, {} m; it goes there and back",
+            metres(0.75 * wide.max(long))
         ),
     };
     (backwards > 0).then(|| {

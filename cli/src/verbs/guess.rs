@@ -94,7 +94,7 @@ pub(super) fn of_local(header: &Header, places: &[[f64; 2]]) -> Option<(Guess, b
         return Some((Guess { system: System::Dem, is_swapped: false }, true));
     }
     // Nobody says metres from a corner to the millimetre.
-    let is_fine = |value: f64| (value * 100.0).fract() != 0.0;
+    let is_fine = |value: f64| (value * 100.0 - (value * 100.0).round()).abs() > 1e-6;
     let is_large = header.grid.extent_m().iter().all(|side| *side >= LARGE_M);
     (look_like_degrees
         && degrees.is_some()

@@ -20,7 +20,7 @@ use terrasoar::flyover::ReplayError;
 use terrasoar::sink::FileSink;
 use terrasoar::view::View;
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_render::Haze;
+use terrasoar_render::{Haze, RenderError};
 use terrasoar_scene::overview::{FOV_DEG, from_above_part, overview, towards_middle, view_from};
 use terrasoar_scene::scene::SceneError;
 
@@ -235,7 +235,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
 
 /// Why there is no picture; where it was too large for the memory, with a size to try.
 fn smaller(error: SceneError, [wide, high]: [u32; 2]) -> anyhow::Error {
-    let is_memory = error.to_string().contains("memory");
+    let is_memory =
+        matches!(&error, SceneError::Render(RenderError::Device { message }) if message.contains("memory"));
     let error = anyhow::Error::from(error);
     if !is_memory {
         return error;

@@ -116,7 +116,7 @@ pub(super) fn air(terrain: &Terrain, view: &View, haze: Haze, hint: &str) -> Res
     let away_m = (view.eye_m.truncate() - nearest).length();
     let [low_m, high_m] = terrain.header().height_range_m.map(|h| h * view.vertical_exaggeration);
     // At least so much air: all of the way as thin as at its higher end, as the shader's air thins.
-    let scale_height_m = (0.12 * haze_m).min(8000.0);
+    let scale_height_m = Haze::scale_height_m(haze_m);
     let thinnest = (-(view.eye_m.z.max(high_m) - low_m) / scale_height_m).exp();
     // Of the colour that is scattered least.
     let left = (-0.75 * away_m * thinnest / haze_m).exp();

@@ -22,7 +22,7 @@ pub(super) struct Map {
 /// What is written beside a picture, and with what in it.
 pub(super) struct Beside(Vec<(PathBuf, String)>);
 
-/// The files beside `picture` over this terrain. None is replaced that this verb has not written: those of a picture that is there already are its own.
+/// The files beside `picture` over this terrain. None is replaced that says something else, but for the world file of a picture that is there already.
 pub(super) fn beside(header: &Header, picture: &Path, force: Force) -> Result<Beside> {
     if header.sample_to_crs.is_none() {
         bail!(
@@ -38,9 +38,15 @@ pub(super) fn beside(header: &Header, picture: &Path, force: Force) -> Result<Be
             text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
         files.push((name.into(), format!("<PAMDataset>\n  <SRS>{text}</SRS>\n</PAMDataset>\n")));
     }
-    if !picture.exists() && !force.is_given() {
-        for (file, _) in &files {
-            if file.exists() {
+    if !force.is_given() {
+        for (i, (file, text)) in files.iter().enumerate() {
+            // A world file beside a picture is that picture's. The others may be of something else with the same name.
+            let is_ours = if i == 0 {
+                picture.exists()
+            } else {
+                std::fs::read_to_string(file).is_ok_and(|there| there == *text)
+            };
+            if file.exists() && !is_ours {
                 bail!(
                     "{}: this would replace a file that this verb did not make; name another output, or replace it with --force",
                     file.display()

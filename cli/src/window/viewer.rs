@@ -159,6 +159,14 @@ impl Viewer {
         if let Some(words) = suited {
             viewer.news(words);
         }
+        if let (Some(overlay), true) = (&viewer.plan.overlay, viewer.stage.terrain().base_has_grown()) {
+            let words = format!(
+                "{} was edited or draped after {} was begun; it is seen as it was then",
+                viewer.plan.file.display(),
+                overlay.display()
+            );
+            viewer.news(words);
+        }
         if let Some(flight) = flight {
             let path = viewer.plan.flight.clone().unwrap_or_default();
             viewer.take_flight_of(flight, &path);

@@ -60,7 +60,7 @@ fn every_kind_of_flight_is_made_and_repeats() {
     // 19,980 m do not fit over 2,560: three quarters of them are flown there and back.
     let long = ["flight", "straight", "land.iqt", "-o", "l.flight", "--frames", "1000", "--speed", "20"];
     let said = text(&bench.run(&long).stderr);
-    assert!(said.contains("the way is 19,980 m long and the terrain 2,560 m"), "{said}");
+    assert!(said.contains("the way is 19,980 m long, and a straight flight has three quarters of the terrain's longer side, 1,920 m"), "{said}");
     assert!(said.contains("of 999 steps the eye flies backwards"), "{said}");
     // A circle of 11 km.
     let wide = ["flight", "turn", "land.iqt", "-o", "w.flight", "--frames", "100", "--speed", "100"];

@@ -175,3 +175,10 @@ pub struct Run {
     /// Pages of each frame in the order they were first read, if asked for; with [`Prefetch::None`] only.
     pub trace: Option<Vec<Vec<u64>>>,
 }
+
+impl Run {
+    /// Whether cache lines and larger units are counted: over a pool, whose pages lie elsewhere in memory, they are not.
+    pub const fn counts_lines(&self) -> bool {
+        !matches!(self.reader, Reader::Pool)
+    }
+}

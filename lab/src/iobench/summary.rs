@@ -81,10 +81,10 @@ pub struct IoRun {
     pub record_bytes_per_frame_mean: f64,
     /// Distinct 4 KiB pages a frame.
     pub distinct_pages_per_frame_mean: f64,
-    /// Distinct 64-byte cache lines a frame.
-    pub distinct_lines_per_frame_mean: f64,
-    /// Distinct 64 KiB units a frame.
-    pub distinct_units_per_frame_mean: f64,
+    /// Distinct 64-byte cache lines a frame; `None` over a pool, where they are not counted.
+    pub distinct_lines_per_frame_mean: Option<f64>,
+    /// Distinct 64 KiB units a frame; `None` over a pool.
+    pub distinct_units_per_frame_mean: Option<f64>,
     /// MB of the distinct pages a frame needs, mean.
     pub needed_mb: f64,
     /// MB of those that were not in the cache when the frame needed them, mean.
@@ -215,8 +215,8 @@ impl IoRun {
             reads_per_frame_mean: mean(|f| f.reads),
             record_bytes_per_frame_mean: mean(|f| f.record_bytes),
             distinct_pages_per_frame_mean: mean(|f| f.pages),
-            distinct_lines_per_frame_mean: mean(|f| f.lines),
-            distinct_units_per_frame_mean: mean(|f| f.units),
+            distinct_lines_per_frame_mean: run.counts_lines().then(|| mean(|f| f.lines)),
+            distinct_units_per_frame_mean: run.counts_lines().then(|| mean(|f| f.units)),
             needed_mb: pages_mb(mean(|f| f.pages)),
             realtime_mb: pages_mb(mean(|f| f.realtime_pages)),
             preloaded_mb: pages_mb(mean(|f| f.preloaded_pages)),

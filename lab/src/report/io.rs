@@ -97,6 +97,7 @@ fn write_run(to: &mut dyn Write, run: &Run, timed: Option<&Timed>) -> std::io::R
     for (i, f) in run.frames.iter().enumerate() {
         // Named one by one, so that a new field cannot be forgotten.
         let FrameIo { frame, reads, record_bytes, pages, lines, units, realtime_pages, preloaded_pages } = f;
+        let [lines, units] = [lines, units].map(|count| cell(run.counts_lines().then_some(*count)));
         write!(
             to,
             "{words},{frame},{reads},{record_bytes},{pages},{lines},{units},{realtime_pages},{preloaded_pages},"

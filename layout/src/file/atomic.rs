@@ -89,7 +89,7 @@ impl AtomicFile {
         check_replaceable(&target, &place)?;
         let seen = Seen::at(&place);
         #[cfg(target_os = "linux")]
-        if let Some(file) = nameless(folder_of(&place)) {
+        if let Some(file) = nameless(folder_of(&place), super::disk::way_to) {
             return Ok(Self { target, place, seen, inner: Inner::Nameless(file) });
         }
         let mut builder = tempfile::Builder::new();
@@ -281,11 +281,11 @@ fn give_name(disk: &dyn Disk, inner: Inner, target: &Path, replaced: Replaced<'_
 
 /// A file without a name that can be given one, where there are such files and `/proc` leads to them.
 #[cfg(target_os = "linux")]
-fn nameless(folder: &Path) -> Option<File> {
+fn nameless(folder: &Path, way_to: impl Fn(&File) -> PathBuf) -> Option<File> {
     use rustix::fs::{CWD, Mode, OFlags, openat};
     let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
     let file = openat(CWD, folder, flags, Mode::from_raw_mode(NEW_FILE_MODE)).ok().map(File::from)?;
-    super::disk::way_to(&file).exists().then_some(file)
+    way_to(&file).exists().then_some(file)
 }
 
 /// A name that is there for longer than the moment between two calls was left by a process that was killed in it.

@@ -107,6 +107,11 @@ impl Lineage {
         Ok(Self { parent: commit_page, sequence: sequence.saturating_add(1), original: tip.original })
     }
 
+    /// Commits that led to the state that is current.
+    pub(crate) fn commits(&self) -> u32 {
+        self.sequence - 1
+    }
+
     /// The commit that follows and leads to `state`.
     pub(crate) fn commit(&self, state: State, edits: u64, label: &str) -> Commit {
         let Self { parent, sequence, original } = *self;

@@ -50,28 +50,29 @@ impl Base {
 /// Makes the overlay `overlay`, without edits, of the terrain file `base` with these header slots, if nothing has its name.
 ///
 /// # Errors
-/// As [`AtomicFile`]'s.
+/// As [`AtomicFile`]'s; damage of the base's picture; I/O.
 pub(crate) fn create_overlay(
     disk: &dyn Disk,
-    base: &Path,
+    base: &PreadSource,
     slots: &Slots,
     overlay: &Path,
 ) -> Result<(), LayoutError> {
     if overlay.exists() {
         return Ok(());
     }
+    let picture = picture_of(base, &slots.header)?;
     let file = AtomicFile::create(overlay)?;
-    let name = base.file_name().unwrap_or_default().to_string_lossy();
+    let name = base.path().file_name().unwrap_or_default().to_string_lossy();
     let when_full =
         "cannot write the overlay, for which there is no room; make some on its disk, or name one on another";
-    disk.write_at(file.file(), &empty_overlay(slots, &name), 0)
+    disk.write_at(file.file(), &empty_overlay(slots, picture, &name), 0)
         .map_err(|e| LayoutError::write(overlay, "cannot write the overlay", when_full, e))?;
     // Another who made one meanwhile was as quick to be right.
     file.publish_new_on(disk).map(drop)
 }
 
 /// The first pages of an overlay without edits over the base with these header slots.
-fn empty_overlay(base: &Slots, base_name: &str) -> Vec<u8> {
+fn empty_overlay(base: &Slots, picture: u32, base_name: &str) -> Vec<u8> {
     let split = split_of(base.header.file_bytes);
     let header =
         Header { file_bytes: split + FIRST_PAGES * PAGE_BYTES as u64, history: None, ..base.header.clone() };
@@ -83,11 +84,28 @@ fn empty_overlay(base: &Slots, base_name: &str) -> Vec<u8> {
     put_u32(&mut page[..], 0x0f0, identity.generation);
     put_u32(&mut page[..], 0x0f4, identity.checksum);
     put_u64(&mut page[..], 0x0f8, identity.file_bytes);
+    put_u32(&mut page[..], 0x100, picture);
     put_text(&mut page[..], 0x400, base_name);
     seal(&mut page);
     let mut bytes = page.to_vec();
     bytes.resize(FIRST_PAGES as usize * PAGE_BYTES, 0);
     bytes
+}
+
+/// The checksum of the first page of the picture that a header leads to, which those of all its tiles are part of; 0 where there is none.
+fn picture_of(source: &dyn Source, header: &Header) -> Result<u32, LayoutError> {
+    let Some(place) = header.imagery else { return Ok(0) };
+    let mut page = [0; PAGE_BYTES];
+    source.read_at(place.offset, &mut page)?;
+    let stored = get_u32(&page, 0xffc);
+    if checksum(&page[..0xffc]) != stored {
+        return Err(LayoutError::damaged(
+            source.path(),
+            format!("byte {}", place.offset),
+            "the picture's first page does not match its checksum; restore a copy of the file, or drape the picture again",
+        ));
+    }
+    Ok(stored)
 }
 
 /// An overlay over its base, checked as far as their headers go.
@@ -100,12 +118,16 @@ pub(crate) struct Overlaid {
     has_grown: bool,
     /// The generation of the base that it was made over.
     generation: u32,
+    /// The checksum of the picture that the base had then.
+    picture: u32,
 }
 
 impl Overlaid {
     /// Reads the header slots of both.
-    pub(crate) fn read(base: &PreadSource, overlay: &mut PreadSource) -> Result<Self, LayoutError> {
-        let found = Slots::read(base, 0)?;
+    pub(crate) fn read(base: &mut PreadSource, overlay: &mut PreadSource) -> Result<Self, LayoutError> {
+        let found = Slots::read(&*base, 0)?;
+        // What the header counts was in the file before the header was, and may not have been when the file was opened.
+        base.measure_again()?;
         if overlay.byte_count() < FIRST_PAGES * PAGE_BYTES as u64 {
             return Err(not_an_overlay(overlay.path()));
         }
@@ -136,7 +158,12 @@ impl Overlaid {
                 "the file is cut short; restore a copy of it",
             ));
         }
-        Ok(Self { slots, split, has_grown: !is_same, generation: wanted.generation })
+        let picture = get_u32(&slots.current[..], 0x100);
+        // A header says where a picture lies and not what is in it. Overlays of before it was noted say 0.
+        if is_same && picture != 0 && picture_of(&*base, &found.header)? != picture {
+            return Err(written_anew(overlay.path(), base.path()));
+        }
+        Ok(Self { slots, split, has_grown: !is_same, generation: wanted.generation, picture })
     }
 
     /// Both as one source, mapped or not.
@@ -165,13 +192,24 @@ impl Overlaid {
     /// to it, which a power cut could have undone under another program's eyes.
     fn check_older_state(&self, both: &LayeredSource<'_>, base: &Path) -> Result<(), LayoutError> {
         let now = &self.slots.header;
-        let original = Lineage::read(both, now)?.original;
+        let original = Lineage::read(both, now).map_err(|error| match error {
+            LayoutError::Damaged { .. } => LayoutError::damaged(
+                both.path(),
+                "its journal",
+                format!("without it nobody knows whether {}, which was changed since, still holds what these edits refer to; name a copy of it from when they were made, over which they read, or restore a copy of the overlay", base.display()),
+            ),
+            other => other,
+        })?.original;
         let header = Header { history: None, ..original.put_into(now) };
         let anew = |error| match error {
             LayoutError::Damaged { .. } => written_anew(both.path(), base),
             other => other,
         };
         let entries = read_directory(both, &header).map_err(anew)?;
+        // A picture changes neither the directory nor any page in it.
+        if picture_of(both, &header).map_err(anew)? != self.picture {
+            return Err(written_anew(both.path(), base));
+        }
         let mut page = [0; PAGE_BYTES];
         // Pages as built came all at once, with a header behind them.
         let of_last = |generation| generation == self.generation && generation > 1;
@@ -212,7 +250,7 @@ fn over_another(overlay: &Path, base: &Path, name: &str) -> LayoutError {
 fn written_anew(overlay: &Path, base: &Path) -> LayoutError {
     let (overlay, base) = (overlay.display(), base.display());
     LayoutError::Usage(format!(
-        "{overlay}: {base} was written anew after these edits were begun (built again, compacted, or given room for other heights), and what they refer to is no longer in it; name a copy of {base} from before, or make the edits again in a new overlay"
+        "{overlay}: {base} was written anew after these edits were begun (built again, compacted, given room for other heights, or put back from an older copy), and what they refer to is no longer in it; name a copy of {base} from before, or make the edits again in a new overlay"
     ))
 }
 

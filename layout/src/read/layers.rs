@@ -13,7 +13,7 @@ fn open_layers(base: &Path, overlay: &Path, is_mapped: bool) -> Result<Terrain, 
     // The base must be a sound terrain by itself.
     read_growing(&mut base_file)?;
     let mut overlay_file = PreadSource::open(overlay)?;
-    let overlaid = Overlaid::read(&base_file, &mut overlay_file)?;
+    let overlaid = Overlaid::read(&mut base_file, &mut overlay_file)?;
     let source = overlaid.source(base_file, overlay_file, is_mapped)?;
     let entries = read_directory(&*source, &overlaid.slots.header)?;
     Ok(Terrain::of(source, overlaid.slots.header, entries))

@@ -2,6 +2,7 @@
 
 use super::TargetArgs;
 use crate::verbs::output::{columns, grouped, print, print_json, print_line};
+use crate::verbs::overlays;
 use crate::verbs::terrain::TerrainArgs;
 use anyhow::{Result, bail};
 use serde::Serialize;
@@ -137,7 +138,7 @@ impl TurnArgs {
                 target.path().display()
             );
         }
-        target.tell_of_overlay();
+        overlays::tell_of_older(session.editor().terrain());
         let entries = session.history()?;
         let after = done(&entries);
         let mut labels: Vec<String> =

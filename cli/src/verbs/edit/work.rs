@@ -41,14 +41,6 @@ impl Target<'_> {
         }
     }
 
-    /// Says so where the file under an overlay was edited or draped since.
-    pub(super) fn tell_of_overlay(self) {
-        if self.overlay.is_some() {
-            // What cannot be opened is told by whoever needs it.
-            let _ = self.terrain().map(|terrain| overlays::tell_of_older(&terrain));
-        }
-    }
-
     /// The file that edits go to.
     pub(super) fn path(&self) -> &Path {
         self.overlay.unwrap_or(self.file)
@@ -165,15 +157,14 @@ impl Work<'_> {
         // The lock first, so that a second writer hears of it before anything else; an overlay is not made for a script that is refused.
         let held = if self.target.overlay.is_none() { Some(self.target.session()?) } else { None };
         let widenings = self.prepare(held)?;
-        self.target.tell_of_overlay();
+        let mut session = self.target.session()?;
+        overlays::tell_of_older(session.editor().terrain());
         let (mut ground_before, mut touched) =
             (Some(Editor::new(Arc::new(self.target.terrain()?))), Touched::default());
-        let mut session = self.target.session()?;
-        let held = session.history()?;
         let grid = *session.editor().terrain().grid();
         let mut told = self.begin(false);
         told.widenings = widenings;
-        told.batches_before = held.iter().position(|entry| entry.is_current).map_or(0, |at| at as u64 + 1);
+        told.batches_before = session.commits_in_force()?.into();
         for (number, batch) in (1_u64..).zip(self.batches) {
             let before = told.batches;
             let failed = || match before {
@@ -219,7 +210,12 @@ impl Work<'_> {
             self.progress.set(told.edits);
         }
         if let Some(before) = &mut ground_before {
-            told.measured(touched.effect(before, session.editor_mut())?, &grid);
+            // The edits are on the disk: what cannot be measured is no reason to do them again.
+            let effect = touched.effect(before, session.editor_mut()).unwrap_or_else(|error| {
+                self.progress.note(&format!("note: how much of the ground changed cannot be told: {error}"));
+                None
+            });
+            told.measured(effect, &grid);
         }
         told.seconds = start.elapsed().as_secs_f64();
         Ok(told)

@@ -34,12 +34,7 @@ pub(super) fn text(bench: &IoBench) -> String {
             r.source.clone(),
             r.prefetch.clone(),
             format!("{:.1}", r.distinct_pages_per_frame_mean),
-            // Over a pool they are not counted.
-            if r.source == "pool" {
-                "-".to_owned()
-            } else {
-                format!("{:.0}", r.distinct_lines_per_frame_mean)
-            },
+            r.distinct_lines_per_frame_mean.map_or_else(|| "-".to_owned(), |lines| format!("{lines:.0}")),
             format!("{:.1}", r.record_bytes_per_frame_mean / 1e3),
             format!("{:.3}", r.needed_mb),
             format!("{:.4}", r.realtime_mb),

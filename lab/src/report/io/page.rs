@@ -80,8 +80,8 @@ fn needed(out: &mut String, runs: &[IoRun]) {
         "Late pages, sum",
     ];
     let row = |r: &IoRun| {
-        // Over a pool they are not counted.
-        let counted = |v, decimals| if r.source == "pool" { "–".into() } else { grouped(v, decimals) };
+        let counted =
+            |value: Option<f64>, decimals| value.map_or_else(|| "–".into(), |v| grouped(v, decimals));
         vec![
             r.engine.clone(),
             r.layout.clone(),

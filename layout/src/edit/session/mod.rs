@@ -131,10 +131,10 @@ impl EditSession {
     ) -> Result<Self, LayoutError> {
         let mut base_file = PreadSource::open(base)?;
         read_growing(&mut base_file)?;
-        create_overlay(&*disk, base, &Slots::read(&base_file, 0)?, overlay)?;
+        create_overlay(&*disk, &base_file, &Slots::read(&base_file, 0)?, overlay)?;
         let lock = take_lock(overlay)?;
         let mut overlay_file = over(overlay, &lock)?;
-        let overlaid = Overlaid::read(&base_file, &mut overlay_file)?;
+        let overlaid = Overlaid::read(&mut base_file, &mut overlay_file)?;
         let source = overlaid.source(base_file, overlay_file, false)?;
         let Overlaid { slots, split: start, .. } = overlaid;
         let entries = read_directory(&*source, &slots.header)?;

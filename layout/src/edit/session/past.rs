@@ -7,7 +7,7 @@ use crate::edit::Changes;
 use crate::error::LayoutError;
 use crate::file::entries::Entry;
 use crate::file::header::{Header, History};
-use crate::file::journal::Commit;
+use crate::file::journal::{Commit, Lineage};
 use crate::file::source::Source;
 use crate::read::terrain::Terrain;
 use std::sync::Arc;
@@ -63,6 +63,14 @@ impl EditSession {
             at = parent;
         }
         Ok(None)
+    }
+
+    /// How many commits led to the state that the file is in: those that can be undone. Reads two pages of the journal at most, however long it is.
+    ///
+    /// # Errors
+    /// Damage of these pages; I/O.
+    pub fn commits_in_force(&self) -> Result<u32, LayoutError> {
+        Ok(Lineage::read(self.source(), &self.slots.header)?.commits())
     }
 
     /// All commits that can be undone or redone, the first one first.

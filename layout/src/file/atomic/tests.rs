@@ -193,3 +193,17 @@ fn a_terrain_that_was_edited_meanwhile_is_not_replaced() {
     // One that is as it was is replaced.
     make();
 }
+
+/// A bare chroot, which has no `/proc`: a file without a name could not be given one there.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_nameless_file_is_only_taken_where_a_way_leads_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(super::nameless(folder.path(), |_| PathBuf::from("/no/such/way")).is_none());
+    let way = |file: &File| crate::file::disk::way_to(file);
+    // Some file systems have no such files.
+    if let Some(file) = super::nameless(folder.path(), way) {
+        assert!(way(&file).exists());
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
