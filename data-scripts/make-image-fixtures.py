@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Makes the small pictures in import/tests/image_fixtures: one for each way of storing one that is read, and those that are refused.
 
-Usage: data-scripts/make-image-fixtures.py        (from anywhere; needs gdal-bin 3.6 or later, no Python packages)
+Usage: data-scripts/make-image-fixtures.py        (from anywhere; needs gdal-bin 3.6 or later and libjpeg-turbo-progs, no Python packages)
 
 All show the same 72 x 56 texels, whose colours `colour` gives; tests compute them again. Fixtures with alpha have a hole where
 x + y < 20. Georeference: 2 m a texel, north-west corner at 1000, 5000.
@@ -80,12 +80,25 @@ def main():
             run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", *options, rgb, OUT / f"{name}.jpg")
         run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=95", grey, OUT / "grey.jpg")
         run("gdal_translate", "-q", "-of", "JPEG", "-co", "QUALITY=90", rgba, OUT / "cmyk.jpg")
+        # A mark after every third unit of blocks.
+        run("jpegtran", "-restart", "3B", "-outfile", OUT / "restart.jpg", OUT / "baseline.jpg")
+
         def jp2(name, source, *options):
             lossless = ["-co", "REVERSIBLE=YES", "-co", "QUALITY=100", "-co", "RESOLUTIONS=2"]
             run("gdal_translate", "-q", "-of", "JP2OpenJPEG", *lossless, *options, source, OUT / name)
 
         jp2("rgb-tiles.jp2", OUT / "rgb-strips.tif", "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=32", "-co", "GMLJP2=NO")
         jp2("rgb-gml.jp2", OUT / "rgb-strips.tif", "-a_srs", "EPSG:32632", "-co", "GEOJP2=NO")
+        jp2("rgba.jp2", rgba, "-co", "BLOCKXSIZE=48", "-co", "BLOCKYSIZE=32")
+        places_of_16, palette = folder / "places.pgm", folder / "palette.vrt"
+        pnm(places_of_16, "P5", ((colour(x, y)[0] // 16,) for x, y in places))
+        entries = "".join(f'<Entry c1="{17 * i}" c2="{255 - 17 * i}" c3="{5 * i}" c4="255"/>' for i in range(16))
+        palette.write_text(
+            f'<VRTDataset rasterXSize="{WIDTH}" rasterYSize="{HEIGHT}"><VRTRasterBand dataType="Byte" band="1"><ColorInterp>Palette</ColorInterp>'
+            f"<ColorTable>{entries}</ColorTable><SimpleSource><SourceFilename>{places_of_16}</SourceFilename><SourceBand>1</SourceBand></SimpleSource>"
+            "</VRTRasterBand></VRTDataset>"
+        )
+        jp2("palette.jp2", palette, "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=32")
         jp2("grey.j2k", grey, "-co", "CODEC=J2K")
         run("gdal_translate", "-q", "-of", "WEBP", "-co", "LOSSLESS=YES", rgba, OUT / "rgba.webp")
         run("gdal_translate", "-q", "-of", "WEBP", "-co", "QUALITY=90", rgb, OUT / "rgb.webp")

@@ -81,13 +81,19 @@ fn lossless_pictures_come_back() {
             assert_eq!(texel, [grey, grey, grey, 255], "{name} {x} {y}");
         });
     }
-    for name in ["rgba-tiles-zstd.tif", "rgb-nodata.tif", "rgba.png", "rgba.webp"] {
+    for name in ["rgba-tiles-zstd.tif", "rgb-nodata.tif", "rgba.png", "rgba.webp", "rgba.jp2"] {
         each(&texels(&fixture(name)).unwrap(), |x, y, texel| {
             let [r, g, b] = colour(x, y);
             assert_eq!(texel[3], if is_hole(x, y) { 0 } else { 255 }, "{name} {x} {y}");
             assert!(texel[3] == 0 || texel == [r, g, b, 255], "{name} {x} {y}: {texel:?}");
         });
     }
+    each(&texels(&fixture("palette.jp2")).unwrap(), |x, y, texel| {
+        let place = colour(x, y)[0] / 16;
+        assert_eq!(texel, [17 * place, 255 - 17 * place, 5 * place, 255], "{x} {y}");
+    });
+    // The same picture with marks of restart.
+    assert!(texels(&fixture("restart.jpg")).unwrap() == texels(&fixture("baseline.jpg")).unwrap());
 }
 
 #[test]
@@ -185,6 +191,9 @@ fn damaged_pictures_are_answered() {
         "rgb.webp",
         "rgb-tiles.jp2",
         "grey.j2k",
+        "rgba.jp2",
+        "palette.jp2",
+        "restart.jpg",
         "rgb-tiles-webp.tif",
         "rgb-planes.tif",
     ] {

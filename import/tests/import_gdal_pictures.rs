@@ -4,6 +4,8 @@
 
 #[path = "gdal_pictures/formats.rs"]
 mod formats;
+#[path = "gdal_pictures/made.rs"]
+mod made;
 #[path = "gdal_pictures/shown.rs"]
 mod shown;
 #[path = "import_support/tools.rs"]

@@ -96,7 +96,7 @@ impl Picture for TiffImage {
     }
 
     fn bits(&self) -> Result<u32, LayoutError> {
-        if self.has_bytes() {
+        if self.has_bytes() || !self.has_light() {
             return Ok(8);
         }
         if let Some(bits) = self.bits.get() {
@@ -108,6 +108,10 @@ impl Picture for TiffImage {
 
     fn use_bits(&mut self, bits: u32) {
         self.bits = OnceLock::from(bits);
+    }
+
+    fn byte_of(&self, number: f64) -> Option<u8> {
+        self.table.shown(number)
     }
 
     fn colours(&self) -> usize {

@@ -131,7 +131,7 @@ impl Table {
         let mut notes = Vec::new();
         let is_stretched = options.stretch.is_some();
         let samples = Samples::read(file, directory, is_stretched)?;
-        if samples.bytes() == 2 && !is_stretched {
+        if samples.bytes() == 2 && !is_stretched && !matches!(named, Paint::Palette(_)) {
             notes.push("16 bits a channel are cut to the upper 8 of those in use".into());
         }
         let extra = file.numbers(directory, tags::EXTRA_SAMPLES, MAX_BANDS)?.unwrap_or_default();
@@ -150,8 +150,8 @@ impl Table {
             channels.colours = (0..channels.colours.len()).collect();
         }
         let is_shades = !is_stretched && !matches!(paint, Paint::Palette(_));
-        if let (Some(odd), true) = (samples.odd.filter(|odd| odd.bits() < 8), is_shades) {
-            channels.void = channels.void.map(|void| void * 255.0 / ((1u32 << odd.bits()) - 1) as f64);
+        if samples.bits() < 8 && is_shades {
+            channels.void = channels.void.and_then(|void| samples.shown(void)).map(f64::from);
         }
         let packing = Packing::read(file, directory, &samples, (bands, is_planar))?;
         let predictor = file.number(directory, tags::PREDICTOR)?.unwrap_or(1);
@@ -325,6 +325,16 @@ impl Table {
     /// Whether its samples are shown as they are, as bytes.
     pub(super) fn has_bytes(&self) -> bool {
         self.samples.sample_type == SampleType::U8
+    }
+
+    /// The byte of each colour as which a number of the file is shown; `None` of one that no sample is, and of inks and places in a palette.
+    pub(super) fn shown(&self, number: f64) -> Option<u8> {
+        let byte = self.samples.shown(number)?;
+        match self.paint {
+            Paint::Palette(_) | Paint::Cmyk => None,
+            Paint::InverseGrey => Some(255 - byte),
+            Paint::Grey | Paint::Rgb | Paint::YCbCr => Some(byte),
+        }
     }
 
     /// The samples of a chunk of one plane as they are worked with, where no machine has those of the file.

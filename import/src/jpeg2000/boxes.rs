@@ -3,6 +3,7 @@
 //! Cost: a read of 16 bytes a box; held are the box of headers and those of the ground.
 
 use super::header::Header;
+use super::part;
 use super::place::{self, Ground};
 use super::{Source, Stream, Trouble, damaged, stream};
 
@@ -25,28 +26,6 @@ pub(crate) struct Jp2 {
     pub(crate) ground: Ground,
 }
 
-/// A box: its kind and where its content lies.
-pub(super) struct Found {
-    pub(super) kind: [u8; 4],
-    pub(super) at: u64,
-    pub(super) end: u64,
-}
-
-/// The box at `at`, of those that end at `end`.
-pub(super) fn next(source: Source<'_>, at: u64, end: u64) -> Result<Found, Trouble> {
-    let head: [u8; 8] = source.array(at)?;
-    let kind = [head[4], head[5], head[6], head[7]];
-    let length = u64::from(u32::from_be_bytes([head[0], head[1], head[2], head[3]]));
-    let (content, length) = match length {
-        0 => (at + 8, end - at),
-        1 => (at + 16, u64::from_be_bytes(source.array(at + 8)?)),
-        length => (at + 8, length),
-    };
-    let last = at.checked_add(length).filter(|last| content <= *last);
-    let last = last.ok_or_else(|| damaged("a box of it has no end"))?;
-    Ok(Found { kind, at: content, end: last.min(end) })
-}
-
 impl Jp2 {
     /// Reads the boxes of a file of `length` bytes.
     pub(crate) fn read(source: Source<'_>, length: u64) -> Result<Self, Trouble> {
@@ -61,7 +40,7 @@ impl Jp2 {
                 break;
             }
             // What stands behind the stream may be anything.
-            let found = match next(source, at, length) {
+            let found = match part::next(source, at, length) {
                 Ok(found) => found,
                 Err(_) if this.is_some() => break,
                 Err(trouble) => return Err(trouble),

@@ -3,7 +3,7 @@
 //! Invariant: outside of this module channels are counted as they stand in the file. The decoder puts them in the order of their colours, and in no order where it does not know a kind; so
 //! it is given a box of kinds ("cdef") that is made here, which it knows, and its order is undone. Cost: a pass over the boxes, and a copy of them.
 
-use super::boxes::next;
+use super::part::next;
 use super::{Source, Stream, Trouble, damaged};
 
 /// Colours of a palette, at most (table I.13 of the standard).
@@ -75,6 +75,9 @@ impl Header {
                 kept.extend(inside);
             }
             at = found.end.max(at + 8);
+        }
+        if this.palette.is_some() && stream.is_signed() {
+            return Err(Trouble::Unsupported("the places in its palette have signs"));
         }
         if let (Some(columns), Some(map)) = (this.palette, map) {
             this.palette = Some(mapped(map, columns, stream)?);

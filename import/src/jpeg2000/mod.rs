@@ -6,6 +6,7 @@
 
 mod boxes;
 mod header;
+mod part;
 mod place;
 mod stream;
 
@@ -96,15 +97,19 @@ pub(crate) fn decode_tile(
     let mut context = DecoderContext::default();
     let decoded = image.decode(&mut context).map_err(failed)?;
     let count = wanted[0] as usize * wanted[1] as usize;
-    let is_signed = stream.is_signed() && header.palette.is_none();
     let mut channels: Vec<Channel> = decoded
         .components()
         .iter()
-        .map(|channel| {
-            // Rounded and within its bits, whatever a lossy stream makes of it.
+        .enumerate()
+        .map(|(place, channel)| {
             let (bits, samples) = (channel.bit_depth(), channel.samples());
+            let is_signed = stream.has_sign(header.order.get(place).copied().unwrap_or(place));
             let [low, high] = limits(bits, is_signed);
-            (samples.iter().map(|sample| sample.round().clamp(low, high)).collect(), bits)
+            // The decoder puts half of the range on all numbers, which the standard does on those without a sign (annex G.1.2).
+            let shift = if is_signed { low } else { 0.0 };
+            // Rounded and within its bits, whatever a lossy stream makes of it.
+            let number = |sample: &f32| (sample + shift).round().clamp(low, high);
+            (samples.iter().map(number).collect(), bits)
         })
         .collect();
     if channels.is_empty() || channels.iter().any(|(samples, _)| samples.len() != count) {

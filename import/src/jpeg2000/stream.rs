@@ -255,9 +255,14 @@ impl Stream {
         self.channels.len() / 3
     }
 
-    /// Whether the first channel has a sign.
+    /// Whether a channel has a sign.
     pub(crate) fn is_signed(&self) -> bool {
-        self.channels[0] & 0x80 != 0
+        (0..self.channels()).any(|channel| self.has_sign(channel))
+    }
+
+    /// Whether this channel has a sign.
+    pub(crate) fn has_sign(&self, channel: usize) -> bool {
+        self.channels.get(3 * channel).is_some_and(|bits| bits & 0x80 != 0)
     }
 
     /// Bits of the widest channel.

@@ -144,11 +144,9 @@ impl Jp2Image {
     }
 
     fn numbers_at(&self, shown: &[&Channel], alpha: Option<&Channel>, at: usize) -> Numbers {
-        // Less than a byte is shown as one.
         let number = |i: usize| {
             let (samples, bits) = shown[i.min(shown.len() - 1)];
-            let whole = if *bits < 8 { 255.0 / limits(*bits, false)[1] } else { 1.0 };
-            if self.has_bytes { (samples[at] * whole).round() } else { samples[at] }
+            if self.has_bytes { as_byte(samples[at], *bits) } else { samples[at] }
         };
         let full = |(_, bits): &Channel| limits(*bits, false)[1];
         let alpha = alpha.map_or(255.0, |alpha| alpha.0[at] / full(alpha) * 255.0);
@@ -161,6 +159,12 @@ impl Jp2Image {
         }
         [number(0), number(1), number(2), alpha]
     }
+}
+
+/// A number of so many bits, of less than 8 as a share of 255.
+fn as_byte(number: f32, bits: u8) -> f32 {
+    let whole = if bits < 8 { 255.0 / limits(bits, false)[1] } else { 1.0 };
+    (number * whole).round()
 }
 
 /// What numbers become.
@@ -189,6 +193,14 @@ impl Picture for Jp2Image {
 
     fn has_bytes(&self) -> bool {
         self.has_bytes
+    }
+
+    fn byte_of(&self, number: f64) -> Option<u8> {
+        let bits = self.jp2.stream.bits();
+        let is_one = number.fract() == 0.0 && (0.0..=f64::from(limits(bits, false)[1])).contains(&number);
+        // Of a palette it is a place, and of inks no light.
+        let is_light = self.jp2.header.palette.is_none() && !self.is_cmyk;
+        (is_one && self.has_bytes && is_light).then(|| as_byte(number as f32, bits) as u8)
     }
 
     fn bits(&self) -> Result<u32, LayoutError> {
@@ -228,9 +240,12 @@ impl Picture for Jp2Image {
     }
 
     fn limits(&self) -> Option<[i32; 2]> {
-        let bits = if self.has_bytes { 8 } else { self.jp2.stream.bits() };
-        (bits <= 16)
-            .then(|| limits(bits, self.jp2.stream.is_signed() && !self.has_bytes).map(|number| number as i32))
+        let stream = &self.jp2.stream;
+        let bits = if self.has_bytes { 8 } else { stream.bits() };
+        let is_signed = stream.has_sign(self.shown[0]);
+        // Signed channels beside others, which no picture has, are counted as any numbers are.
+        let is_alike = self.shown.iter().all(|channel| stream.has_sign(*channel) == is_signed);
+        (bits <= 16 && is_alike).then(|| limits(bits, is_signed).map(|number| number as i32))
     }
 }
 
@@ -299,9 +314,11 @@ impl NumberRows for Rows<'_, Numbers> {
 
 /// What a box says of the ground: the map from texel centres, and the system.
 type Place = (Option<[f64; 6]>, CrsSaid);
+/// The same of all boxes, and what was not understood, in words.
+type Told = (Option<[f64; 6]>, CrsSaid, Option<String>);
 
-/// The map from texel centres, and the system; what was not understood, in words. The GeoTIFF in it counts before GML.
-fn said(path: &Path, jp2: &Jp2) -> Result<(Option<[f64; 6]>, CrsSaid, Option<String>), LayoutError> {
+/// What the boxes say. The GeoTIFF counts before GML.
+fn said(path: &Path, jp2: &Jp2) -> Result<Told, LayoutError> {
     let tiff = jp2.ground.tiff().map(|tiff| geotiff::place_of(path, tiff));
     together(tiff, jp2.ground.gml())
 }
@@ -309,7 +326,7 @@ fn said(path: &Path, jp2: &Jp2) -> Result<(Option<[f64; 6]>, CrsSaid, Option<Str
 fn together(
     tiff: Option<Result<Place, LayoutError>>,
     gml: Option<Result<([f64; 6], CrsSaid), ()>>,
-) -> Result<(Option<[f64; 6]>, CrsSaid, Option<String>), LayoutError> {
+) -> Result<Told, LayoutError> {
     let (mut crs, mut note) = (CrsSaid::default(), None);
     match tiff {
         Some(Ok((Some(map), crs))) => return Ok((Some(map), crs, None)),
@@ -372,9 +389,7 @@ mod tests {
 
     #[test]
     fn a_system_without_a_place_counts_where_gml_says_no_other() {
-        let code = |(map, crs, _): (Option<[f64; 6]>, CrsSaid, Option<String>)| {
-            (map.is_some(), crs.code.map(|code| code.value))
-        };
+        let code = |(map, crs, _): Told| (map.is_some(), crs.code.map(|code| code.value));
         let tiff = || Some(Ok((None, crs(32_632))));
         assert_eq!(code(together(tiff(), None).unwrap()), (false, Some(32_632)));
         assert_eq!(code(together(tiff(), Some(Err(()))).unwrap()), (false, Some(32_632)));

@@ -31,8 +31,8 @@ use terrasoar_layout::file::header::Header;
 use terrasoar_layout::imagery::ImageSource;
 use terrasoar_layout::remedy::Remedy;
 
-/// Opens the image at `path`: a pyramid of map tiles, PNG, JPEG or GeoTIFF, of 8 bits a channel (16 are cut to 8 with a word), grey, RGB or a palette, with or
-/// without alpha, with or without a mask. Where it lies is said in it, or by a world file, `.prj` or `.aux.xml` beside it. A picture that lies nowhere is turned as its EXIF
+/// Opens the image at `path`: a pyramid of map tiles, PNG, JPEG, WebP, JPEG 2000 or GeoTIFF, of up to 8 bits a channel (16 are cut to 8 with a word), grey, RGB, CMYK or a palette,
+/// with or without alpha, with or without a mask. Where it lies is said in it, or by a world file, `.prj` or `.aux.xml` beside it. A picture that lies nowhere is turned as its EXIF
 /// tag says.
 ///
 /// # Errors
@@ -67,6 +67,8 @@ pub fn open_images(
     if let Some(stretch) = options.stretch {
         stretch_all(&mut opened, stretch, options)?;
     } else if opened.len() > 1 && header.is_some() {
+        let sought = opened.iter().filter(|(completed, _)| !completed.has_bytes());
+        fits(sought, "looking for the bits in use", options)?;
         let bits = opened.iter().map(|(completed, _)| completed.bits()).collect::<Result<Vec<_>, _>>()?;
         // Those of bytes take none of it.
         let most = bits.into_iter().max().unwrap_or(8);
@@ -81,21 +83,33 @@ pub fn open_images(
     }
 }
 
+/// Refuses to do something with all of `pictures`, one after the other, for which there is too little memory.
+fn fits<'p>(
+    pictures: impl Iterator<Item = &'p (Completed, Orientation)>,
+    what: &str,
+    options: &PictureOptions,
+) -> Result<(), LayoutError> {
+    let needed = pictures.map(|(completed, _)| completed.info().memory_bytes).max().unwrap_or(0);
+    let allowed = options.memory_mib.unwrap_or(512).saturating_mul(1 << 20);
+    if needed <= allowed {
+        return Ok(());
+    }
+    let enough_mib = needed.div_ceil(1 << 20) + 16;
+    Err(LayoutError::Usage(format!(
+        "{what} takes {enough_mib} MiB, more than the {} MiB allowed",
+        allowed >> 20
+    ))
+    .mended_by(Remedy::Memory { enough_mib: Some(enough_mib) }))
+}
+
 /// Finds black and white of all pictures together.
 fn stretch_all(
     opened: &mut [(Completed, Orientation)],
     stretch: Stretch,
     options: &PictureOptions,
 ) -> Result<(), LayoutError> {
-    let needed = opened.iter().map(|(completed, _)| completed.info().memory_bytes).max().unwrap_or(0);
-    let allowed = options.memory_mib.unwrap_or(512) << 20;
-    if matches!(stretch, Stretch::Percentiles(..)) && needed > allowed {
-        let enough_mib = needed.div_ceil(1 << 20) + 16;
-        return Err(LayoutError::Usage(format!(
-            "looking for black and white takes {enough_mib} MiB, more than the {} MiB allowed",
-            allowed >> 20
-        ))
-        .mended_by(Remedy::Memory { enough_mib: Some(enough_mib) }));
+    if matches!(stretch, Stretch::Percentiles(..)) {
+        fits(opened.iter(), "looking for black and white", options)?;
     }
     let pictures: Vec<&Completed> = opened.iter().map(|(completed, _)| completed).collect();
     let limits = counts::limits(&pictures, stretch)?;

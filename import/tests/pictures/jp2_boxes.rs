@@ -180,19 +180,24 @@ fn palettes_are_of_up_to_eight_bits() {
     assert!(shown([8; 3], &[(0, Some(0)), (1, None), (0, Some(1))]).is_err());
 }
 
-/// Bytes of a colour profile that read as the name of a palette's box.
+/// Numbers with a sign, in front of which stands a colour profile with bytes that read as the name of a palette's box.
 #[test]
-fn a_colour_profile_is_no_palette() {
+fn signed_numbers_are_read_and_a_colour_profile_is_no_palette() {
     let folder = Folder::new();
     let mut signed = stream("grey.j2k");
     let sizes = signed.windows(2).position(|pair| pair == b"\xff\x51").unwrap();
+    // The same numbers without half of the range that is put on those without a sign.
     signed[sizes + 40] |= 0x80;
     let profile = boxed(b"colr", &[&[2, 0, 0][..], &[0; 60], b"pclr", &[0; 60]].concat());
-    let stretch = Some(Stretch::Values(-128.0, 127.0));
-    let texels = folder
-        .shown(&jp2(&[profile], &signed), &PictureOptions { stretch, ..PictureOptions::default() })
-        .unwrap();
-    each(&texels, |x, y, texel| assert_eq!(texel[0], colour(x, y)[0], "{x} {y}"));
+    for (black, white, zero) in [(-128.0, 127.0, 0), (0.0, 127.0, 128)] {
+        let stretch = Some(Stretch::Values(black, white));
+        let options = PictureOptions { stretch, ..PictureOptions::default() };
+        let texels = folder.shown(&jp2(std::slice::from_ref(&profile), &signed), &options).unwrap();
+        each(&texels, |x, y, texel| {
+            let wanted = f64::from(colour(x, y)[0].saturating_sub(zero)) * 255.0 / (white - black);
+            assert!((f64::from(texel[0]) - wanted).abs() <= 0.5, "{x} {y}: {texel:?}, not {wanted}");
+        });
+    }
 }
 
 /// A GeoTIFF of no picture that says a system, and no place.
