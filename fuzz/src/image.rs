@@ -21,7 +21,7 @@ const MEMORY_MIB: u64 = 64;
 
 pub(crate) fn seeds() -> Inputs {
     let mut seeds =
-        seeds::folder("import/tests/image_fixtures", &["png", "jpg", "tif", "webp", "jp2", "j2k"]);
+        seeds::folder("import/tests/image_fixtures", &["png", "jpg", "tif", "webp", "jp2", "j2k", "jxl"]);
     // Elevation data are pictures too, as far as one can tell.
     seeds.extend(
         seeds::folder("import/tests/fixtures", &["tif"])

@@ -40,6 +40,7 @@ pub(crate) mod input;
 mod jpeg2000;
 pub(crate) mod jpeg_frame;
 mod jpeg_rows;
+mod jxl;
 mod kept;
 mod labelled;
 mod mask;

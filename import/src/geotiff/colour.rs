@@ -376,7 +376,7 @@ impl TiffImage {
             LayoutError::damaged(&self.path, name(), format!("{problem}; fetch or write the file again"))
         };
         guard(&self.path, name, || match &table.packing {
-            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 => {
+            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 | Packing::JpegXl => {
                 let packed = &scratch.packed;
                 let (bytes, channels) = colour_codecs::decode(table, packed, rows).map_err(damaged)?;
                 scratch.bytes = bytes;

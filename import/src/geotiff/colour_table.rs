@@ -8,6 +8,7 @@ use super::chunks::{Compression, Predictor, compression_of};
 use super::colour_paint::{Channels, MAX_BANDS, Paint, Samples};
 use super::listing::Places;
 use super::tags::{self, Directory, TiffFile};
+use crate::jxl;
 use crate::shown::{PRESS_NOTE, PictureOptions, chosen_bands};
 use std::num::NonZero;
 use terrasoar_layout::dem::SampleType;
@@ -31,6 +32,8 @@ pub(super) enum Packing {
     Webp,
     /// Chunks are streams of JPEG 2000.
     Jpeg2000,
+    /// Chunks are streams of JPEG XL.
+    JpegXl,
 }
 
 impl Packing {
@@ -66,6 +69,7 @@ impl Packing {
                     "its chunks are LERC, which is read of heights and not of pictures; convert it: gdal_translate -co TILED=YES \
                      -co COMPRESS=DEFLATE INPUT output.tif",
                 )),
+                Compression::JpegXl => Ok(Self::JpegXl),
                 compression => Ok(Self::Bytes(compression)),
             },
         }
@@ -82,6 +86,7 @@ impl Packing {
             Self::Jpeg { .. } => "JPEG",
             Self::Webp => "WebP",
             Self::Jpeg2000 => "JPEG 2000",
+            Self::JpegXl => "JPEG XL",
         }
     }
 }
@@ -281,7 +286,7 @@ impl Table {
         // Strips are no higher than the image, cut ones lower than the longest.
         let packed = if self.is_raw() { samples.min(self.longest) } else { self.longest };
         let codec = match &self.packing {
-            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 => {
+            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 | Packing::JpegXl => {
                 self.picture_bytes().saturating_add(packed)
             }
             Packing::Bytes(Compression::Zstd) => samples.saturating_mul(2),
@@ -296,6 +301,7 @@ impl Table {
         let texels = padded[0].saturating_mul(padded[1]);
         match &self.packing {
             Packing::Jpeg2000 => texels.saturating_mul(10 * self.side_by_side() + 24).saturating_add(1 << 17),
+            Packing::JpegXl => jxl::chunk_bytes(texels, self.side_by_side(), self.longest),
             Packing::Webp => texels.saturating_mul(12).saturating_add(8 << 20),
             _ => texels.saturating_mul(5 * self.side_by_side()),
         }

@@ -9,6 +9,7 @@ mod completed;
 mod counts;
 mod jp2;
 mod jpeg;
+mod jxl;
 mod oriented;
 mod png;
 mod stretched;
@@ -16,6 +17,7 @@ mod texels;
 mod webp;
 
 use crate::jpeg2000::is_jpeg2000;
+use crate::jxl::is_jxl;
 use crate::places::Frame;
 use crate::reader::{Orientation, Picture};
 use crate::shown::{PictureOptions, Stretch};
@@ -31,7 +33,7 @@ use terrasoar_layout::file::header::Header;
 use terrasoar_layout::imagery::ImageSource;
 use terrasoar_layout::remedy::Remedy;
 
-/// Opens the image at `path`: a pyramid of map tiles, PNG, JPEG, WebP, JPEG 2000 or GeoTIFF, of up to 8 bits a channel (16 are cut to 8 with a word), grey, RGB, CMYK or a palette,
+/// Opens the image at `path`: a pyramid of map tiles, PNG, JPEG, JPEG XL, WebP, JPEG 2000 or GeoTIFF, of up to 8 bits a channel (16 are cut to 8 with a word), grey, RGB, CMYK or a palette,
 /// with or without alpha, with or without a mask. Where it lies is said in it, or by a world file, `.prj` or `.aux.xml` beside it. A picture that lies nowhere is turned as its EXIF
 /// tag says.
 ///
@@ -156,6 +158,8 @@ fn open(
         Box::new(jpeg::JpegImage::open(path)?)
     } else if is_webp(&head) {
         Box::new(webp::WebpImage::open(path)?)
+    } else if is_jxl(&head) {
+        Box::new(jxl::JxlPicture::open(path, options)?)
     } else if is_jpeg2000(&head) {
         Box::new(jp2::Jp2Image::open(path, options)?)
     } else if is_tiff(&head) {
@@ -163,7 +167,7 @@ fn open(
     } else {
         return Err(LayoutError::not_this_format(
             path,
-            "this is no PNG, JPEG, WebP, JPEG 2000 or TIFF; if GDAL knows it, convert it: gdal_translate -co TILED=YES INPUT output.tif",
+            "this is no PNG, JPEG, JPEG XL, WebP, JPEG 2000 or TIFF; if GDAL knows it, convert it: gdal_translate -co TILED=YES INPUT output.tif",
         ));
     };
     let orientation = picture.orientation();

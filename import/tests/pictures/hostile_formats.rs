@@ -1,9 +1,14 @@
-//! WebP and JPEG 2000 made to exhaust memory or time, bare, in a JP2 file and inside of a TIFF.
+//! WebP, JPEG 2000 and JPEG XL made to exhaust memory or time, bare, in a JP2 file and inside of a TIFF.
 
 use super::*;
 
 const BARE: &[u8] = include_bytes!("../image_fixtures/grey.j2k");
 const TILED: &[u8] = include_bytes!("../image_fixtures/rgb-tiles.jp2");
+const XL: [&[u8]; 3] = [
+    include_bytes!("../image_fixtures/rgb.jxl"),
+    include_bytes!("../image_fixtures/rgba.jxl"),
+    include_bytes!("../image_fixtures/lossy.jxl"),
+];
 const LOSSY: &[u8] = include_bytes!("../image_fixtures/rgb.webp");
 
 fn find(bytes: &[u8], wanted: &[u8]) -> usize {
@@ -241,4 +246,87 @@ fn a_webp_is_no_larger_than_it_says() {
             false => assert!(bench.refusal(&path).to_string().contains("72 x 56")),
         }
     }
+}
+
+/// A stream of JPEG XL of another size: from the 17th bit on a bit that says whether the sides are multiples of 8, and those of height and width.
+fn resized_xl(stream: &[u8], [wide, high]: [u32; 2]) -> Vec<u8> {
+    let bits: Vec<bool> = stream.iter().flat_map(|byte| (0..8).map(move |at| byte >> at & 1 == 1)).collect();
+    // 72 x 56 is kept in short: the bit, five bits of height, three of a ratio, five of width.
+    assert!(bits[16], "sides of multiples of 8");
+    let mut made = bits[..16].to_vec();
+    let mut put = |number: u32, count: u32| made.extend((0..count).map(|at| number >> at & 1 == 1));
+    put(0, 1);
+    // Of 30 bits each.
+    put(3, 2);
+    put(high - 1, 30);
+    put(0, 3);
+    put(3, 2);
+    put(wide - 1, 30);
+    made.extend(&bits[16 + 1 + 5 + 3 + 5..]);
+    made.chunks(8).map(|eight| eight.iter().rev().fold(0, |byte, bit| byte << 1 | u8::from(*bit))).collect()
+}
+
+#[test]
+fn the_memory_of_a_jpeg_xl_is_asked_for_before_it_is_taken() {
+    let _alone = alone();
+    let bench = Bench::new();
+    for (number, stream) in XL.into_iter().enumerate() {
+        let path = bench.write("a.jxl", stream);
+        let image = open_image(&path).unwrap();
+        let (done, bytes) = peak(|| image.rows().and_then(|mut rows| rows.read(&mut vec![0; 4 * 72])));
+        done.unwrap();
+        let told = image.info().memory_bytes as usize;
+        assert!(bytes <= told, "{number}: {bytes} taken, {told} told");
+        // Far more texels than the stream has.
+        let large = resized_xl(stream, [100_000; 2]);
+        let (refused, bytes) = peak(|| bench.refusal(&bench.write("b.jxl", &large)));
+        assert!(needs_memory(&refused) > 200_000 && bytes < 4 * MIB, "{number}: {bytes} taken; {refused}");
+        // As many as are allowed, of a stream that is damaged by it.
+        let allowed = resized_xl(stream, [1200; 2]);
+        let path = bench.write("c.jxl", &allowed);
+        let image = open_image(&path).unwrap();
+        assert_eq!(image.info().texels, [1200; 2]);
+        let (_, bytes) = peak(|| image.rows().map(drop));
+        let told = image.info().memory_bytes as usize;
+        assert!(bytes <= told, "{number}: {bytes} taken, {told} told");
+    }
+}
+
+/// A colour profile that says it is 200 MB long.
+#[test]
+fn a_long_colour_profile_of_a_jpeg_xl_is_refused() {
+    let _alone = alone();
+    let bench = Bench::new();
+    let mut bits: Vec<bool> = Vec::new();
+    let mut put = |number: u64, count: u32| bits.extend((0..count).map(|at| number >> at & 1 == 1));
+    // 72 x 56 texels; not all as usual, no more fields, 8 bits, no channels but the colours, not lossy.
+    for (number, count) in
+        [(0x0aff, 16), (1, 1), (6, 5), (0, 3), (8, 5), (0, 1), (0, 1), (0, 1), (0, 2), (1, 1), (0, 2), (0, 1)]
+    {
+        put(number, count);
+    }
+    // Colours by a profile of RGB; no extensions; usual matrices. Then its length.
+    for (number, count) in [
+        (0, 1),
+        (1, 1),
+        (0, 2),
+        (0, 2),
+        (1, 1),
+        (3, 2),
+        (200_000_000 & 0xfff, 12),
+        (1, 1),
+        (200_000_000 >> 12 & 0xff, 8),
+        (1, 1),
+        (200_000_000 >> 20, 8),
+        (0, 1),
+    ] {
+        put(number, count);
+    }
+    (0..20).for_each(|_| put(0, 32));
+    let bytes: Vec<u8> = bits
+        .chunks(8)
+        .map(|eight| eight.iter().rev().fold(0, |byte, bit| byte << 1 | u8::from(*bit)))
+        .collect();
+    let (refused, taken) = peak(|| bench.refusal(&bench.write("a.jxl", &bytes)).to_string());
+    assert!(refused.contains("colour profile is longer") && taken < 4 * MIB, "{taken} taken; {refused}");
 }
