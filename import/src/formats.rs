@@ -6,7 +6,7 @@ use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
 use crate::{
-    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, png, pnm, raw, surfer, tiles,
+    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, openexr, png, pnm, raw, surfer, tiles,
     usgs_dem, vrt, xyz,
 };
 use std::path::{Path, PathBuf};
@@ -59,6 +59,11 @@ const SIGNED: &[Format] = &[
         name: "Netpbm",
         is: |look| pnm::is_pnm(&look.head),
         open: |path, _| boxed(pnm::PnmDem::open(path)),
+    },
+    Format {
+        name: "OpenEXR",
+        is: |look| look.begins(openexr::MAGIC),
+        open: |path, options| boxed(openexr::ExrDem::open(path, options)),
     },
     Format {
         name: "MBTiles",
@@ -116,7 +121,7 @@ const NAMED: &[Format] = &[
 pub(crate) fn is_placed(path: &Path) -> bool {
     const BESIDE: [&str; 12] =
         ["ovr", "msk", "hdr", "xml", "prj", "aux", "clr", "stx", "sta", "blw", "wld", "qml"];
-    const UNPLACED: [&str; 3] = ["PNG", "Netpbm", "headerless heightmap"];
+    const UNPLACED: [&str; 4] = ["PNG", "Netpbm", "OpenEXR", "headerless heightmap"];
     if BESIDE.iter().any(|name| identify::is_called(path, name)) {
         return false;
     }
@@ -126,7 +131,7 @@ pub(crate) fn is_placed(path: &Path) -> bool {
 }
 
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, DTED, USGS DEM, PNG, PGM and OpenEXR, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))

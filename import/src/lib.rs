@@ -47,6 +47,7 @@ mod mask;
 mod mosaic;
 mod netcdf;
 mod opened;
+mod openexr;
 mod options;
 mod parallel;
 pub(crate) mod picture;

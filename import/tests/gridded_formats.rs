@@ -1,5 +1,7 @@
-//! NetCDF, DTED and USGS DEM against arithmetic: the files of `data-scripts/make-netcdf-fixtures.py`, and such made here.
+//! NetCDF, DTED, USGS DEM, Surfer and OpenEXR against arithmetic: the files of `data-scripts/make-netcdf-fixtures.py`, and such made here.
 
+#[path = "gridded/exr.rs"]
+mod exr;
 mod import_support;
 
 use import_support::{Grid, collect};
