@@ -174,8 +174,9 @@ impl ExrDem {
         let at = [index.pixel_position.0, index.pixel_position.1];
         let size = [index.pixel_size.0, index.pixel_size.1];
         let whole = self.declared.samples.map(|side| side as usize);
-        let is_whole = (0..2)
-            .all(|i| at[i] % step[i] == 0 && at[i] < whole[i] && size[i] == step[i].min(whole[i] - at[i]));
+        let is_whole = (0..2).all(|i| {
+            at[i].is_multiple_of(step[i]) && at[i] < whole[i] && size[i] == step[i].min(whole[i] - at[i])
+        });
         let is_full = index.layer == part && index.level.0 == 0 && index.level.1 == 0;
         (is_whole && is_full).then_some(Window {
             col: at[0] as u32,

@@ -40,6 +40,8 @@ const SIGNED: &[Stranger] = &[
     stranger(0, b"\0\0\0\x0cJXL ", "a JPEG XL picture", PICTURE),
     stranger(4, b"ftypavi", "an AVIF picture", PICTURE),
     stranger(4, b"ftyphei", "an HEIF picture", PICTURE),
+    stranger(4, b"ftyphevc", "an HEIF picture", PICTURE),
+    stranger(4, b"ftypmif1", "an HEIF picture", PICTURE),
     stranger(4, b"jP  \r\n", "a JPEG 2000 file", CONVERT),
     stranger(0, b"\xffO\xffQ", "a JPEG 2000 stream", CONVERT),
     stranger(0, b"msid", "a MrSID picture", LICENSED),

@@ -176,6 +176,14 @@ fn what_is_not_read_is_refused_with_a_way_out() {
         &Path::new(env!("CARGO_MANIFEST_DIR")).join("../layout/FORMAT.md"),
         ["no PNG, JPEG, JPEG XL, WebP, JPEG 2000 or TIFF", "gdal_translate"],
     );
+    let folder = tempfile::tempdir().unwrap();
+    for (brand, name) in [("avif", "AVIF"), ("avis", "AVIF"), ("heic", "HEIF"), ("mif1", "HEIF")] {
+        let path = folder.path().join(brand);
+        std::fs::write(&path, format!("\0\0\0\x20ftyp{brand}\0\0\0\0mif1miaf")).unwrap();
+        refused(&path, [name, "magick INPUT output.png"]);
+        let heights = terrasoar_import::open_file(&path).err().expect("an error").to_string();
+        assert!(heights.contains(name) && heights.contains("has no heights"), "{heights}");
+    }
     let floats = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/float32-strips.tif");
     refused(&floats, ["float32", "black"]);
 }

@@ -134,6 +134,17 @@ fn upright(completed: Completed, orientation: Orientation) -> Box<dyn ImageSourc
     Box::new(Oriented::new(completed, orientation))
 }
 
+/// The name of a format that packs pictures as films are packed, by the first bytes of a file.
+fn of_video(head: &[u8]) -> Option<&'static str> {
+    match head.get(4..12)? {
+        b"ftypavif" | b"ftypavis" => Some("AVIF"),
+        b"ftypheic" | b"ftypheix" | b"ftypheim" | b"ftypheis" | b"ftyphevc" | b"ftypmif1" | b"ftypmsf1" => {
+            Some("HEIF")
+        }
+        _ => None,
+    }
+}
+
 /// Opens a picture; `around` is where it is needed: west, south, east and north in degrees.
 fn open(
     path: &Path,
@@ -164,6 +175,11 @@ fn open(
         Box::new(jp2::Jp2Image::open(path, options)?)
     } else if is_tiff(&head) {
         Box::new(TiffImage::open(path, options)?)
+    } else if let Some(what) = of_video(&head) {
+        return Err(LayoutError::unsupported(
+            path,
+            format!("this is an {what} picture, which is not read; convert it: magick INPUT output.png"),
+        ));
     } else {
         return Err(LayoutError::not_this_format(
             path,

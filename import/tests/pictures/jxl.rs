@@ -105,7 +105,7 @@ fn what_is_not_read_is_refused_with_a_way_out() {
     let path = folder.path().join("a.jxl");
     let refused = |bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
-        texels(&path).err().expect("an error").to_string()
+        texels(&path).expect_err("an error").to_string()
     };
     let sound = std::fs::read(fixture("rgb-boxes.jxl")).unwrap();
     let bare = std::fs::read(fixture("rgb.jxl")).unwrap();
