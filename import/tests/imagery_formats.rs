@@ -5,12 +5,16 @@
 #[path = "../../layout/tests/common/mod.rs"]
 mod common;
 
+#[path = "pictures/chroma.rs"]
+mod chroma;
 #[path = "pictures/jp2_boxes.rs"]
 mod jp2_boxes;
 #[path = "pictures/jxl.rs"]
 mod jxl;
 #[path = "pictures/stretch.rs"]
 mod stretch;
+#[path = "../../layout/tests/import_support/tiff.rs"]
+mod tiff;
 
 use std::path::{Path, PathBuf};
 use terrasoar_import::open_image;
@@ -232,4 +236,31 @@ fn damaged_pictures_are_answered() {
         assert!(texels(&path).is_err(), "half of {name}");
     }
     assert!(errors > tries / 3, "{errors} of {tries}");
+}
+
+/// Luma and chroma of every step, packed and not, in strips and tiles, against the formulas of TIFF.
+#[test]
+fn luma_and_chroma_become_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    for case in chroma::all() {
+        let bytes = chroma::file(case);
+        std::fs::write(&path, &bytes).unwrap();
+        let texels = texels(&path).unwrap_or_else(|error| panic!("{case:?}: {error}"));
+        for (at, texel) in (0..).zip(&texels) {
+            let (col, row) = (at % chroma::SIZE[0], at / chroma::SIZE[0]);
+            let wanted = chroma::colours(case, chroma::codes(case, col, row));
+            let is_near = (0..3).all(|i| (f64::from(texel[i]) - wanted[i]).abs() <= 0.51);
+            assert!(is_near && texel[3] == 255, "{case:?} {col} {row}: {texel:?}, not {wanted:?}");
+        }
+        // Cut and changed.
+        for at in (0..bytes.len()).step_by(97) {
+            let mut changed = bytes.clone();
+            changed[at] ^= 0x5a;
+            for damaged in [&changed[..], &bytes[..at]] {
+                std::fs::write(&path, damaged).unwrap();
+                let _ = self::texels(&path);
+            }
+        }
+    }
 }

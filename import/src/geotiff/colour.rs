@@ -1,4 +1,4 @@
-//! GeoTIFF as pictures: grey, palette, RGB, CMYK, with or without alpha, side by side or band after band, 8 bits a channel or 16 cut to them, JPEG-compressed chunks included;
+//! GeoTIFF as pictures: grey, palette, RGB, YCbCr, CMYK, with or without alpha, side by side or band after band, 8 bits a channel or 16 cut to them, JPEG-compressed chunks included;
 //! of any numbers where a person states which are black and white.
 //!
 //! [`super::colour_table`] says where the chunks are and how they are packed; here they become rows. As many chunks as make one row of tiles, or some
@@ -384,7 +384,10 @@ impl TiffImage {
             }
             Packing::Bytes(compression) => {
                 let stride = table.row_bytes() as usize;
-                scratch.bytes.resize(stride * rows as usize, 0);
+                let wide = table.grid.chunk_width;
+                let stored =
+                    table.chroma.map_or(stride * rows as usize, |chroma| chroma.stored_bytes(wide, rows));
+                scratch.bytes.resize(stored, 0);
                 let whole = stride * table.grid.chunk_height as usize;
                 codec::unpack(*compression, &scratch.packed, &mut scratch.bytes, whole).map_err(
                     |failure| match failure {
@@ -405,6 +408,10 @@ impl TiffImage {
                         let line = &mut scratch.widened;
                         predictor::floating(&mut scratch.bytes, stride, bands, size, is_big, line);
                     }
+                }
+                if let Some(chroma) = table.chroma {
+                    chroma.colours(&scratch.bytes, wide, rows, &mut scratch.widened);
+                    std::mem::swap(&mut scratch.bytes, &mut scratch.widened);
                 }
                 if samples.odd.is_some() {
                     table.widen(&scratch.bytes, &mut scratch.widened);

@@ -35,7 +35,7 @@ impl Paint {
         file: &mut TiffFile,
         directory: &Directory,
         bands: u64,
-        jpeg: bool,
+        (jpeg, bytes): (bool, bool),
     ) -> Result<Self, LayoutError> {
         let photometric = file.number(directory, tags::PHOTOMETRIC)?.unwrap_or(if bands < 3 { 1 } else { 2 });
         let what = match (photometric, bands) {
@@ -51,7 +51,7 @@ impl Paint {
             (1, _) => return Ok(Self::Grey),
             (2, 3..) => return Ok(Self::Rgb),
             (5, 4..) if !jpeg => return Ok(Self::Cmyk),
-            (6, 3) if jpeg => return Ok(Self::YCbCr),
+            (6, 3) if jpeg || bytes => return Ok(Self::YCbCr),
             (3, _) => {
                 let listed = file.count(directory, tags::COLOR_MAP);
                 if !(3..=3 * MAX_COLOURS).contains(&listed) {
@@ -65,7 +65,7 @@ impl Paint {
                 return Ok(Self::Palette((0..count).map(colour).collect()));
             }
             (5, _) => "in CMYK, the inks of a press".to_owned(),
-            (6, _) => "in YCbCr without JPEG".to_owned(),
+            (6, _) => "in YCbCr of an unusual kind".to_owned(),
             (8..=10, _) => "in CIE Lab".to_owned(),
             (other, bands) => format!("of {bands} bands with the photometric code {other}"),
         };

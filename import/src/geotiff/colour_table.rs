@@ -8,6 +8,7 @@ use super::chunks::{Compression, Predictor, compression_of};
 use super::colour_paint::{Channels, MAX_BANDS, Paint, Samples};
 use super::listing::Places;
 use super::tags::{self, Directory, TiffFile};
+use super::ycbcr::YCbCr;
 use crate::jxl;
 use crate::shown::{PRESS_NOTE, PictureOptions, chosen_bands};
 use std::num::NonZero;
@@ -106,6 +107,8 @@ pub(super) struct Table {
     pub(super) channels: Channels,
     /// Whether three channels of JPEG are red, green and blue, not luma and chroma.
     pub(super) is_rgb: bool,
+    /// Luma and chroma that no codec makes colours of.
+    pub(super) chroma: Option<YCbCr>,
     /// Whether samples of less than a byte are shades of grey.
     is_shades: bool,
     pub(super) packing: Packing,
@@ -131,8 +134,11 @@ impl Table {
         }
         let bands = file.number(directory, tags::SAMPLES_PER_PIXEL)?.unwrap_or(1);
         let code = file.number(directory, tags::COMPRESSION)?.unwrap_or(1);
-        let named = Paint::read(file, directory, bands, code == 7)?;
-        let is_rgb = !matches!(named, Paint::YCbCr);
+        // Luma and chroma that are no stream of a picture are made colours of here.
+        let is_plain = matches!(code, 1 | 5 | 8 | 32946 | 32773 | 50000)
+            && file.number(directory, tags::PLANAR_CONFIGURATION)?.unwrap_or(1) == 1;
+        let named = Paint::read(file, directory, bands, (code == 7, is_plain))?;
+        let paint_is_chroma = matches!(named, Paint::YCbCr);
         let mut notes = Vec::new();
         let is_stretched = options.stretch.is_some();
         let samples = Samples::read(file, directory, is_stretched)?;
@@ -173,6 +179,20 @@ impl Table {
             }
         };
         let grid = ChunkGrid::read(file, directory, [width, height], if is_planar { bands } else { 1 })?;
+        let chroma = match (&paint_is_chroma, &packing) {
+            (true, Packing::Bytes(_)) => Some(YCbCr::read(file, directory, [grid.chunk_height, height])?),
+            _ => None,
+        };
+        if chroma.is_some()
+            && (samples.sample_type != SampleType::U8
+                || samples.odd.is_some()
+                || !matches!(predictor, Predictor::None))
+        {
+            return Err(unsupported(
+                file,
+                "its luma and chroma are not of 8 bits, or have a predictor; convert it: gdal_translate -co TILED=YES INPUT output.tif",
+            ));
+        }
         if grid.count().saturating_mul(bands) > u64::from(u32::MAX) {
             return Err(file.damaged("it has more chunks than a picture can have; fetch the file again"));
         }
@@ -186,7 +206,8 @@ impl Table {
             is_reversed: !packing.is_picture() && file.number(directory, tags::FILL_ORDER)? == Some(2),
             paint,
             channels,
-            is_rgb,
+            is_rgb: !paint_is_chroma,
+            chroma,
             is_shades,
             packing,
             predictor,
@@ -194,7 +215,7 @@ impl Table {
         };
         table.grid.set_decoded_bytes(table.chunk_bytes());
         table.longest = table.check(file)?;
-        if is_raw {
+        if table.is_raw() {
             table.cut();
         }
         Ok(table)
@@ -231,7 +252,7 @@ impl Table {
 
     /// Whether the chunks are not compressed.
     fn is_raw(&self) -> bool {
-        matches!(self.packing, Packing::Bytes(Compression::None))
+        matches!(self.packing, Packing::Bytes(Compression::None)) && self.chroma.is_none()
     }
 
     /// Bytes that the samples of a chunk take that lie in the image's rows.
@@ -281,7 +302,7 @@ impl Table {
         // As they are worked with, and side by side.
         let texels = u64::from(self.grid.chunk_width) * rows;
         let joined = texels.saturating_mul(self.joined() * self.samples.bytes() as u64);
-        let is_moved = self.samples.odd.is_some() || !self.planes.is_empty();
+        let is_moved = self.samples.odd.is_some() || !self.planes.is_empty() || self.chroma.is_some();
         let moved = if is_moved { joined.saturating_mul(2) } else { 0 };
         // Strips are no higher than the image, cut ones lower than the longest.
         let packed = if self.is_raw() { samples.min(self.longest) } else { self.longest };

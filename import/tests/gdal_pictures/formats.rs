@@ -1,5 +1,6 @@
 //! Pictures of every format, kind of colours and depth, texel by texel against what GDAL reads of the same file, as bytes.
 
+use super::chroma;
 use super::made::{self, Band};
 use super::shown::shown;
 use super::tools;
@@ -304,4 +305,52 @@ fn every_format_and_kind_of_colours_is_shown_as_gdal_reads_it() {
         cases.iter().filter_map(|case| check(case).err().map(|words| format!("{case:?}: {words}"))).collect();
     println!("{} of {} pictures agree", cases.len() - wrong.len(), cases.len());
     assert!(wrong.is_empty(), "{} of {} differ:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}
+
+/// GDAL hands these to libtiff, which cuts luma and chroma to whole numbers before it makes colours of them.
+#[test]
+#[ignore = "needs gdal_translate"]
+fn luma_and_chroma_are_shown_as_gdal_reads_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    let mut compared = 0;
+    for case in chroma::all() {
+        // In tiles that reach beyond the picture libtiff loses its way in units of 4 x 4.
+        if case.is_tiled() && case.steps == [4, 4] {
+            continue;
+        }
+        std::fs::write(&path, chroma::file(case)).unwrap();
+        let (ours, _) = shown(std::slice::from_ref(&path), &PictureOptions::default()).unwrap();
+        let arguments = [
+            "-q",
+            "-of",
+            "ENVI",
+            "-co",
+            "INTERLEAVE=BIP",
+            "-b",
+            "1",
+            "-b",
+            "2",
+            "-b",
+            "3",
+            "a.tif",
+            "read.img",
+        ];
+        // Not everything that TIFF allows is read by libtiff.
+        if tools::try_run(folder.path(), "gdal_translate", &arguments, true).is_err() {
+            continue;
+        }
+        compared += 1;
+        let theirs = std::fs::read(folder.path().join("read.img")).unwrap();
+        let count = (chroma::SIZE[0] * chroma::SIZE[1]) as usize;
+        assert!(ours[0].len() == 4 * count && theirs.len() == 3 * count, "{case:?}");
+        for (at, (ours, theirs)) in
+            ours[0].as_chunks::<4>().0.iter().zip(theirs.as_chunks::<3>().0).enumerate()
+        {
+            let off = (0..3).map(|i| ours[i].abs_diff(theirs[i])).max();
+            assert!(off <= Some(4), "{case:?}, texel {at}: {ours:?} here, {theirs:?} of GDAL");
+        }
+    }
+    println!("{compared} of {} agree", chroma::all().len());
+    assert!(compared > 12, "{compared}");
 }

@@ -1,15 +1,12 @@
 //! Black and white of numbers, and bands by their numbers: what is counted, what is not, and what is refused.
 
-#[path = "../../../layout/tests/import_support/tiff.rs"]
-mod tiff;
-
+use super::tiff::{DATA_AT, RAW, Tag, longs, shorts, text, tiff};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use terrasoar_import::{PictureOptions, Stretch, open_images};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
-use tiff::{DATA_AT, RAW, Tag, longs, shorts, text, tiff};
 
 /// Columns and rows of the pictures made here.
 const SIDE: [u32; 2] = [20, 10];
