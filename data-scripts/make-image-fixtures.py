@@ -31,6 +31,37 @@ def pnm(path, kind, texels):
     path.write_bytes(f"{kind}\n{WIDTH} {HEIGHT}\n255\n".encode() + bytes(v for t in texels for v in t))
 
 
+def chroma(path):
+    """Luma and chroma in units of 2 x 2 texels, 16 rows a strip, which GDAL does not write without JPEG."""
+    def codes(x, y):
+        r, g, b = colour(x, y)
+        luma = 0.299 * r + 0.587 * g + 0.114 * b
+        return round(luma), round(128 + (b - luma) / 1.772), round(128 + (r - luma) / 1.402)
+
+    strips = []
+    for top in range(0, HEIGHT, 16):
+        strip = bytearray()
+        for y in range(top, min(top + 16, HEIGHT), 2):
+            for x in range(0, WIDTH, 2):
+                strip += bytes(codes(x + i, y + j)[0] for j in (0, 1) for i in (0, 1)) + bytes(codes(x, y)[1:])
+        strips.append(bytes(strip))
+    tags = {256: (3, [WIDTH]), 257: (3, [HEIGHT]), 258: (3, [8, 8, 8]), 259: (3, [1]), 262: (3, [6]), 277: (3, [3]), 278: (3, [16]), 530: (3, [2, 2])}
+    places = 8 + 2 + 12 * (len(tags) + 2) + 4
+    out, behind = bytearray(), bytearray()
+    begin = places + 6 + 8 * len(strips)
+    offsets = [begin + sum(map(len, strips[:i])) for i in range(len(strips))]
+    tags |= {273: (4, offsets), 279: (4, [len(strip) for strip in strips])}
+    for tag, (kind, values) in sorted(tags.items()):
+        raw = b"".join(value.to_bytes(2 if kind == 3 else 4, "little") for value in values)
+        if len(raw) > 4:
+            at = places + len(behind)
+            behind += raw
+            raw = at.to_bytes(4, "little")
+        out += tag.to_bytes(2, "little") + kind.to_bytes(2, "little") + len(values).to_bytes(4, "little") + raw.ljust(4, b"\0")
+    head = b"II*\0" + (8).to_bytes(4, "little") + len(tags).to_bytes(2, "little")
+    path.write_bytes(head + out + bytes(4) + behind + b"".join(strips))
+
+
 def main():
     places = [(x, y) for y in range(HEIGHT) for x in range(WIDTH)]
     with tempfile.TemporaryDirectory() as folder:
@@ -70,6 +101,7 @@ def main():
         tiff("jpeg-ycbcr", rgb, *tiles, "-co", "COMPRESS=JPEG", "-co", "PHOTOMETRIC=YCBCR", "-co", "JPEG_QUALITY=95")
         tiff("jpeg-rgb", rgb, "-co", "COMPRESS=JPEG", "-co", "JPEG_QUALITY=95")
         tiff("jpeg-grey", grey, *tiles, "-co", "COMPRESS=JPEG", "-co", "JPEG_QUALITY=95")
+        chroma(OUT / "chroma.tif")
         tiff("rgb-planes", rgb, "-co", "INTERLEAVE=BAND")
         tiff("cmyk", rgba, "-co", "PHOTOMETRIC=CMYK", "-co", "COMPRESS=DEFLATE")
         run("gdal_translate", "-q", "-of", "PNG", "-co", "WORLDFILE=YES", *PLACE, rgba, folder / "rgba.png")

@@ -103,6 +103,19 @@ impl View {
         Self { vertical_exaggeration, ..self }
     }
 
+    /// Whether every number is one that a picture can be taken with: places and angles are finite, and the picture, the field of view, the tolerance and the exaggeration
+    /// are what their fields say. The view of a window that is folded away, of no pixels, is not.
+    pub fn is_sound(&self) -> bool {
+        let angles = [self.yaw_rad, self.pitch_rad, self.roll_rad];
+        self.eye_m.is_finite()
+            && angles.iter().all(|angle| angle.is_finite())
+            && (self.vertical_fov_rad > 0.0 && self.vertical_fov_rad < std::f64::consts::PI)
+            && (self.tolerance_px > 0.0 && self.tolerance_px.is_finite())
+            && (self.vertical_exaggeration > 0.0 && self.vertical_exaggeration.is_finite())
+            && self.viewport.width_px > 0
+            && self.viewport.height_px > 0
+    }
+
     /// Looks from one point towards another, level, at a tolerance of a pixel and true scale, with a field of view of 0.8 radians. What looks
     /// straight down or up has north, or south, at the top; from a point towards itself the line of sight is north.
     pub fn look_at(eye_m: DVec3, at_m: DVec3, viewport: Viewport) -> Self {

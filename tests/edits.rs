@@ -291,8 +291,9 @@ fn a_warm_edit_allocates_nothing() {
             let view = frame(&terrain, [0.5, 0.2], 1500.0, 0.0, -30.0).view(VIEWPORT, 2.0);
             kinetic.update(&view, &mut Unobserved);
             let mut sent = 0;
+            let mut settled_bytes = 0;
             // The same ground up and down, over and over.
-            for round in 0..160 {
+            for round in 0..300 {
                 for i in 0..10u32 {
                     let [west, south] = [60 + 10 * i, 90 + 7 * i];
                     let rect = SampleRect { west, south, east: west + 12, north: south + 12 };
@@ -307,10 +308,14 @@ fn a_warm_edit_allocates_nothing() {
                         kinetic.update(&view, &mut Unobserved);
                     });
                     sent += kinetic.patch().vertices.len();
-                    assert!(round < 140 || counted.count_total == 0, "{culling:?} in round {round}: {counted:?}");
+                    if round == 140 {
+                        settled_bytes = kinetic.bytes();
+                    }
+                    assert!(round <= 140 || counted.count_total == 0, "{culling:?} in round {round}: {counted:?}");
                 }
             }
             assert!(sent > 1000, "{sent}");
+            assert!(kinetic.bytes() <= settled_bytes, "{} bytes after {settled_bytes}", kinetic.bytes());
         }
     });
 }

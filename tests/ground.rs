@@ -229,6 +229,56 @@ fn triangles_in_metres_cover_the_terrain_once() {
     assert_eq!(count, ground.update(&view(0)).triangles);
 }
 
+/// A game may fold its window away, or divide by nothing. The ground stays as it was, and is right again with the next view.
+#[test]
+fn views_of_nonsense_change_nothing() {
+    let (_folder, path) = land();
+    let mapped = MappedTerrain::open(&path).unwrap();
+    let good = view(3);
+    let nonsense = [
+        View { eye_m: [f64::NAN, 0.0, 0.0].into(), ..good },
+        View { eye_m: [0.0, f64::INFINITY, 0.0].into(), ..good },
+        View { yaw_rad: f64::NAN, ..good },
+        View { pitch_rad: f64::NEG_INFINITY, ..good },
+        View { roll_rad: f64::NAN, ..good },
+        good.fov_deg(0.0),
+        good.fov_deg(180.0),
+        good.fov_deg(f64::NAN),
+        good.tolerance_px(0.0),
+        good.tolerance_px(f64::NAN),
+        good.tolerance_px(f64::INFINITY),
+        good.exaggeration(-1.0),
+        good.exaggeration(f64::NAN),
+        good.viewport([0, 600]),
+        good.viewport([800, 0]),
+    ];
+    let all_engines = [PictureEngine::Kinetic, PictureEngine::Soar];
+    let mapped = all_engines
+        .into_iter()
+        .flat_map(|engine| Culling::ALL.map(|culling| mapped.ground(engine, culling).unwrap()));
+    for mut ground in mapped.chain([streamed(&path)]) {
+        for bad in &nonsense {
+            assert!(!bad.is_sound(), "{bad:?}");
+            assert_eq!(ground.update(bad).triangles, 0, "{bad:?}");
+            assert_eq!(ground.view(), None);
+        }
+        assert!(good.is_sound());
+        settle(&mut ground, &good);
+        let triangles = whole(&ground);
+        let count = ground.update(&good).triangles;
+        assert!(triangles.len() > 100);
+        for bad in &nonsense {
+            ground.update(bad);
+            assert!(whole(&ground) == triangles, "{bad:?}");
+            assert_eq!(ground.view(), Some(&good));
+        }
+        settle(&mut ground, &view(5));
+        settle(&mut ground, &good);
+        // Which clusters triangles lie in, and so which are drawn, may differ by now.
+        assert_eq!(ground.update(&good).triangles, count);
+    }
+}
+
 fn crater(x: f64, y: f64) -> Edit {
     Edit::Crater(Crater { centre_m: [x, y], direction_deg: 0.0, radius_m: 60.0, depth_m: 20.0 })
 }

@@ -1,4 +1,4 @@
-//! Elevation data in containers and records of their own: netCDF, OpenEXR, DTED, USGS DEM, and TIFF stored in rarer ways.
+//! Elevation data in containers and records of their own: netCDF, GRIB, OpenEXR, DTED, USGS DEM, and TIFF stored in rarer ways.
 
 use crate::import::read;
 use crate::seeds::{self, Inputs};
@@ -38,6 +38,24 @@ pub(crate) mod openexr {
         // Others than the only one.
         let last = OpenOptions { band: Some("terrain.Z".into()), ..OpenOptions::default() };
         read(&[("dem.exr", data)], &last);
+    }
+}
+
+/// GRIB of edition 2.
+pub(crate) mod grib {
+    use super::*;
+
+    pub(crate) fn seeds() -> Inputs {
+        let all = seeds::folder("import/tests/grib_fixtures", &["grib2", "grib"]);
+        // One of each packing, map and choice; orders of samples are a byte.
+        all.into_iter().filter(|(name, bytes)| !name.contains("order-") && bytes.len() < 1500).collect()
+    }
+
+    pub(crate) fn body(data: &[u8]) {
+        let little = OpenOptions { memory_mib: Some(64), ..OpenOptions::default() };
+        read(&[("dem.grib2", data)], &little);
+        // Fields beside the first.
+        read(&[("dem.grib2", data)], &OpenOptions { band: Some("2".into()), ..little });
     }
 }
 

@@ -26,7 +26,7 @@ mod words;
 mod world_file;
 
 use beside::{aux_xml, reference_system};
-use gridded::{dted, netcdf, openexr, usgs_dem};
+use gridded::{dted, grib, netcdf, openexr, usgs_dem};
 use grids::{ascii_grid, labelled, netpbm, packed_png, raw, surfer, tiles, xyz};
 pub use seeds::Inputs;
 use web_tiles::{map_tile, mbtiles, pmtiles};
@@ -120,6 +120,8 @@ targets! {
     packed_png { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// NetCDF, classic and over HDF5.
     netcdf { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// GRIB of edition 2.
+    grib { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A DTED cell.
     dted { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// A sheet of the USGS.

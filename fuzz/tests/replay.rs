@@ -124,6 +124,11 @@ fn netcdf() {
 }
 
 #[test]
+fn grib() {
+    replay("grib");
+}
+
+#[test]
 fn cells_of_dted() {
     replay("dted");
 }

@@ -6,8 +6,8 @@ use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
 use crate::{
-    OpenOptions, ascii_grid, bt, dted, geotiff, hgt, labelled, netcdf, openexr, png, pnm, raw, surfer, tiles,
-    usgs_dem, vrt, xyz,
+    OpenOptions, ascii_grid, bt, dted, geotiff, grib, hgt, labelled, netcdf, openexr, png, pnm, raw, surfer,
+    tiles, usgs_dem, vrt, xyz,
 };
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
@@ -44,6 +44,14 @@ const SIGNED: &[Format] = &[
         name: "netCDF",
         is: |look| netcdf::is_netcdf(&look.head),
         open: |path, options| boxed(netcdf::NetcdfDem::open(path, options)),
+    },
+    Format {
+        name: "GRIB",
+        is: |look| {
+            let is_called = ["grib2", "grib", "grb2", "grb"].iter().any(|name| look.is_called(name));
+            grib::is_grib(&look.head, is_called)
+        },
+        open: grib,
     },
     Format {
         name: "DTED",
@@ -131,7 +139,7 @@ pub(crate) fn is_placed(path: &Path) -> bool {
 }
 
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, DTED, USGS DEM, PNG, PGM and OpenEXR, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, GRIB 2, DTED, USGS DEM, PNG, PGM and OpenEXR, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))
@@ -189,8 +197,32 @@ fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, Layo
 
 /// Opens a virtual raster; one that GDAL computes is GDAL's, where that is there.
 fn virtual_raster(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
-    match vrt::VrtDem::open(path, options, open_file) {
-        #[cfg(feature = "gdal")]
+    or_gdal(path, options, vrt::VrtDem::open(path, options, open_file))
+}
+
+/// Opens a GRIB file; an edition, grid or packing that is not read here is GDAL's, where that is there.
+fn grib(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, LayoutError> {
+    or_gdal(path, options, grib::GribDem::open(path, options))
+}
+
+/// What was opened.
+#[cfg(not(feature = "gdal"))]
+fn or_gdal<R: Reader + 'static>(
+    _: &Path,
+    _: &OpenOptions,
+    opened: Result<R, LayoutError>,
+) -> Result<Box<dyn Reader>, LayoutError> {
+    boxed(opened)
+}
+
+/// What was opened; what is not read here, and no option mends it, is GDAL's.
+#[cfg(feature = "gdal")]
+fn or_gdal<R: Reader + 'static>(
+    path: &Path,
+    options: &OpenOptions,
+    opened: Result<R, LayoutError>,
+) -> Result<Box<dyn Reader>, LayoutError> {
+    match opened {
         Err(LayoutError::Unsupported { remedy: None, .. }) => {
             boxed(crate::gdal::GdalDem::open(path, options))
         }

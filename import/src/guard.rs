@@ -1,4 +1,4 @@
-//! Keeps a panic inside a third-party decoder from leaving the reader.
+//! Keeps a panic inside a third-party decoder from leaving the reader; and tells what is a file's fault.
 //!
 //! The decoders are fuzzed by their makers, but they still have assertions and index into arrays. If one of them panics on hostile bytes,
 //! the file is damaged, and the program goes on. Every caller drops the state that a panic interrupted.
@@ -8,7 +8,9 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+use terrasoar_layout::dem::Warning;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::words::harmless;
 
 thread_local! {
     /// How many guards this thread is in.
@@ -62,6 +64,12 @@ pub(crate) fn is_ours(error: &LayoutError) -> bool {
         }
         _ => false,
     }
+}
+
+/// What is said of a file of several that was left out, `why`.
+pub(crate) fn left_out(why: &str) -> Warning {
+    let why = harmless(why, 360);
+    Warning::new(format!("{why}; the file was left out: its ground is that of other files, or void"))
 }
 
 #[cfg(test)]

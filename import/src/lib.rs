@@ -32,6 +32,7 @@ mod formats;
 #[cfg(feature = "gdal")]
 mod gdal;
 mod geotiff;
+mod grib;
 mod guard;
 mod heights;
 mod hgt;
@@ -72,6 +73,7 @@ mod value;
 mod vrt;
 mod warp;
 mod webp;
+mod xml;
 mod xyz;
 
 use std::path::{Path, PathBuf};
@@ -117,9 +119,17 @@ pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Dem
         mosaic::Inputs::Several(files) => return mosaic::open(&files, options),
         mosaic::Inputs::Alone(files) => files,
     };
+    // Tiles that could be one grid, where more is asked for than to join them.
+    let is_made = options.feather_m.is_some() || options.resolution.is_some() && options.reproject.is_none();
+    if files.len() > 1 && is_made {
+        return mosaic::open(&files, options);
+    }
     match mosaic::open_one(&files, options) {
         // Tiles of unlike shape, or of which some cannot be read.
         Err(error) if files.len() > 1 && !is_usage(&error) => mosaic::open(&files, options),
+        Ok(_) if options.feather_m.is_some() => Err(LayoutError::Usage(
+            "seams are blended between several files, and one was named; name the others, or leave that out".into(),
+        )),
         Ok(_) if options.resolution.is_some() && options.reproject.is_none() => Err(LayoutError::Usage(
             "a resolution is for data that is brought into another system, and for several files; say which system"
                 .into(),

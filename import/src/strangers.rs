@@ -52,7 +52,6 @@ const SIGNED: &[Stranger] = &[
     stranger(257, b"ustar", "a tar archive", UNPACK),
     stranger(0, b"%PDF", "a PDF document", "find the elevation data it describes"),
     stranger(0, b"\x0e\x03\x13\x01", "an HDF4 file", CONVERT_BAND),
-    stranger(0, b"GRIB", "a GRIB file", CONVERT),
     stranger(0, b"LASF", "a LAS or LAZ point cloud", POINTS),
     stranger(0, b"ASTM-E57", "an E57 point cloud", POINTS),
     stranger(0, b"EHFA_HEADER_TAG", "an Erdas Imagine file", CONVERT),

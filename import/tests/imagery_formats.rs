@@ -116,6 +116,7 @@ fn jpeg_pictures_come_back_about() {
         ("progressive.jpg", false),
         ("grey.jpg", true),
         ("rgb.webp", false),
+        ("chroma.tif", false),
     ] {
         let (mut sum, mut most) = (0, 0);
         each(&texels(&fixture(name)).unwrap(), |x, y, texel| {

@@ -226,7 +226,6 @@ fn advice_for_what_is_not_read_works() {
         ("FITS", "a.fits", &["-ot", "Int16"], false),
         ("PCRaster", "a.map", &["-ot", "Float32", "-mo", "PCRASTER_VALUESCALE=VS_SCALAR"], true),
         ("HF2", "a.hf2", &["-ot", "Float32"], false),
-        ("GRIB", "a.grb", &["-ot", "Float64"], false),
         ("GPKG", "a.gpkg", &["-ot", "Float32", "-co", "TILING_SCHEME=CUSTOM"], false),
         ("SAGA", "a.sdat", &[], true),
         ("RST", "a.rst", &["-ot", "Int16"], true),
@@ -245,6 +244,35 @@ fn advice_for_what_is_not_read_works() {
             continue;
         }
         advice_works(folder.path(), name, "gdal_translate", is_exact);
+    }
+}
+
+/// GRIB files that are not read; where CDO is installed, those that it converts as well.
+#[test]
+#[ignore = "needs gdal-bin"]
+fn advice_for_grib_works() {
+    let folder = tempdir().unwrap();
+    let has_cdo = std::process::Command::new("cdo").arg("--version").output().is_ok();
+    for (name, made) in [
+        ("edition-1.grib", "output.tif"),
+        ("rotated.grib2", "output.tif"),
+        ("gaussian.grib2", "output.grib2"),
+        ("reduced.grib2", "output.grib2"),
+        ("waves.grib2", "output.grib2"),
+    ] {
+        if made.ends_with("grib2") && !has_cdo {
+            eprintln!("{name}: CDO is not installed");
+            continue;
+        }
+        let input = import_support::fixtures().with_file_name("grib_fixtures").join(name);
+        let said = refusal(std::slice::from_ref(&input));
+        let command = said.split("convert it with: ").nth(1).unwrap_or_else(|| panic!("{said}"));
+        let command = command.replace("INPUT", input.to_str().unwrap()).replace(" N ", " 1 ");
+        run(folder.path(), "sh", &["-c", &command]);
+        let made = folder.path().join(made);
+        let grid = read(std::slice::from_ref(&made)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(grid.samples.len() > 100, "{name}");
+        std::fs::remove_file(made).unwrap();
     }
 }
 

@@ -374,3 +374,36 @@ fn unlike_systems_and_steps_are_those_of_gdalwarp() {
         warped_alike(here, &files, &grid, reproject.unwrap_or(UTM), name);
     }
 }
+
+/// Files on both sides of 180 degrees, in degrees and in the zones that meet there.
+#[test]
+#[ignore = "needs GDAL's tools"]
+fn files_on_both_sides_of_180_degrees_are_those_of_gdalwarp() {
+    const ZONE: &str = "EPSG:32660";
+    let folder = tempdir().unwrap();
+    let here = folder.path();
+    let steps = [0.001, 0.000_8];
+    let west = tif(here, "west.tif", "EPSG:4326", [179.6, 52.0], steps, [400, 250], "Float32");
+    let east = tif(here, "eastern.tif", "EPSG:4326", [-180.0, 52.0], steps, [300, 250], "Float32");
+    // 52 N, 179.9 E and 179.9 W.
+    let last = tif(here, "zone-60.tif", ZONE, [690_000.0, 5_770_000.0], [50.0, 50.0], [250, 250], "Float32");
+    let first =
+        tif(here, "zone-1.tif", "EPSG:32601", [295_000.0, 5_770_000.0], [50.0, 50.0], [250, 250], "Float32");
+    for (name, files, reproject) in [
+        ("degrees.tif", vec![west.clone(), east.clone()], Some(ZONE)),
+        ("zones.tif", vec![last.clone(), first.clone()], None),
+        ("mixed.tif", vec![last, east, first, west], Some(ZONE)),
+    ] {
+        let options = OpenOptions {
+            priority: Priority::First,
+            reproject: reproject.map(str::to_owned),
+            resolution: reproject.map(|_| 60.0),
+            ..OpenOptions::default()
+        };
+        let grid = read(&files, &options);
+        // What lies apart would make a grid around the globe.
+        assert!(grid.info.samples_wide < 1200, "{name}: {}", grid.info.samples_wide);
+        // Of systems of as many samples the first file's counts, by name.
+        warped_alike(here, &files, &grid, reproject.unwrap_or("EPSG:32601"), name);
+    }
+}

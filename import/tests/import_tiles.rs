@@ -147,11 +147,16 @@ fn folders_and_archives_of_tiles() {
     // What is no folder of tiles.
     let empty = folder.path().join("empty");
     put(empty.join("notes.md"), b"x");
-    assert!(refusal(std::slice::from_ref(&empty)).contains("no .hgt tiles in this folder"));
-    put(empty.join("a.tif"), b"x");
-    assert!(refusal(std::slice::from_ref(&empty)).contains("a.tif"));
-    put(empty.join("b.tif"), b"x");
-    assert!(refusal(&[empty]).contains("gdalbuildvrt"));
+    for more in ["notes.txt", "a.tif", "b.tif"] {
+        put(empty.join(more), b"x");
+        let said = refusal(std::slice::from_ref(&empty));
+        assert!(
+            said.contains("no elevation data in this folder that says where it lies; name the file"),
+            "{said}"
+        );
+    }
+    put(empty.join("hdr.adf"), b"x");
+    assert!(refusal(&[empty]).contains("ARC/INFO"));
 }
 
 /// Towards the poles tiles have fewer columns. Between the columns of the narrower one heights are on straight lines, which `ground` is not, so a plane is laid out.

@@ -260,7 +260,7 @@ fn a_batch_that_fails_halfway_leaves_no_trace() {
 /// What does not fit is refused whole.
 #[test]
 fn heights_beyond_the_range_are_refused_and_nothing_changes() {
-    let mut bench = Bench::new(&dem([65, 65], 3, false, false), &BuildOptions::default());
+    let mut bench = Bench::new(&dem([65, 65], 3, false, false), &BuildOptions::default().head_room(false));
     for height_m in [-1.0, 1001.0, 1e12, f64::INFINITY] {
         let rect = SampleRect { west: 9, south: 9, east: 12, north: 12 };
         let mut heights_m = vec![400.0; rect.count()];
@@ -275,5 +275,39 @@ fn heights_beyond_the_range_are_refused_and_nothing_changes() {
     assert_eq!(bench.editor.uncommitted(), Vec::<u64>::new());
     for logical in 0..bench.terrain().entries().len() as u64 {
         assert!(bench.page(logical) == bench.terrain().checked_page(logical).unwrap());
+    }
+}
+
+/// Deep valleys and high mountains of any ground, of whole steps, of decimetres and of depths: what room there is stands in FORMAT.md's terms only, so the
+/// numbers here are those of the manual: a range of 16,384 steps.
+#[test]
+fn ground_may_be_dug_and_raised_at_first_try() {
+    for (z_scale, low) in [(1.0, 0.0), (1.0, -4000.0), (0.1, 2203.0), (-1.0, 150.0), (0.3048, 32_000.0)] {
+        let ground =
+            MemoryDem::from_fn([65, 61], SampleType::I16, |x, y| low + f64::from((7 * x + 3 * y) % 50));
+        let step_m = f64::abs(z_scale);
+        // So far apart that the slopes stay below those that radii are made for, which are another limit.
+        let spacing_m = [4000.0 * step_m; 2];
+        let mut bench = Bench::new(&ground, &BuildOptions::default().z_scale(z_scale).spacing_m(spacing_m));
+        let [lowest_m, highest_m] = bench.terrain().header().height_range_m;
+        for (i, height_m) in
+            [lowest_m - 8000.0 * step_m, highest_m + 8000.0 * step_m, lowest_m, lowest_m - 8150.0 * step_m]
+                .into_iter()
+                .enumerate()
+        {
+            let west = 5 + 12 * i as u32;
+            let rect = SampleRect { west, south: 20, east: west + 2, north: 22 };
+            bench
+                .editor
+                .set_heights(&HeightWindow::new(rect, vec![height_m; rect.count()]).unwrap())
+                .unwrap();
+            bench.check();
+        }
+        let rect = SampleRect { west: 5, south: 20, east: 6, north: 21 };
+        let too_deep = HeightWindow::new(rect, vec![lowest_m - 9000.0 * step_m; 4]).unwrap();
+        let Err(LayoutError::OutOfRange { problem, .. }) = bench.editor.set_heights(&too_deep) else {
+            panic!("{z_scale}: deeper than records hold, and not refused");
+        };
+        assert!(problem.contains("records hold"), "{problem}");
     }
 }

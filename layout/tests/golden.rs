@@ -87,7 +87,7 @@ fn what_is_said_about_a_dem_stands_in_the_header() {
 }
 
 fn compare(dem: &MemoryDem, stated: Vec<u8>) {
-    let built = build_bytes(dem, &BuildOptions::default()).unwrap();
+    let built = build_bytes(dem, &BuildOptions::default().head_room(false)).unwrap();
     if let Some(path) = std::env::var_os("TERRASOAR_GOLDEN_DUMP") {
         std::fs::write(path, &built).unwrap();
     }

@@ -141,10 +141,15 @@ impl<'t> Ground<'t> {
         }
     }
 
-    /// Refines the mesh for a view with what is in memory. Streamed ground waits for its first view only.
+    /// Refines the mesh for a view with what is in memory. Streamed ground waits for its first view only. For a view that is not sound ([`View::is_sound`]) the mesh stays that of
+    /// the last one that was; without any there is no mesh yet, and all figures are 0.
     pub fn update(&mut self, view: &View) -> Refined {
         #[cfg(feature = "files")]
         self.settle();
+        let Some(view) = Some(view).filter(|view| view.is_sound()).or(self.views[1].as_ref()).copied() else {
+            return Refined::default();
+        };
+        let view = &view;
         let refined = self.engine.update(view);
         self.step.updates += 1;
         self.views = [self.views[1], Some(*view)];

@@ -15,7 +15,7 @@
 use super::change::{Areas, GroundChange};
 use super::clock::{EXPIRY_MASK, PathClock};
 use super::soar::StripVertex;
-use super::strip::StripBuilder;
+use super::strip::{Strip, StripBuilder};
 use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::Metric;
@@ -97,7 +97,7 @@ pub struct Smart<S: RecordStore> {
     last: Option<Metric>,
     areas: Areas,
     /// Indices into the vertex array.
-    strip: Vec<u32>,
+    strip: Strip<u32>,
 }
 
 impl<S: CompleteStore> Smart<S> {
@@ -122,7 +122,7 @@ impl<S: CompleteStore> Smart<S> {
             clock: PathClock::new(tick_m),
             last: None,
             areas: Areas::default(),
-            strip: Vec::new(),
+            strip: Strip::default(),
             records,
         }
     }
@@ -134,7 +134,7 @@ impl<S: CompleteStore> Smart<S> {
 
     /// The strip of the last update, as indices into [`Smart::vertices`].
     pub fn strip(&self) -> &[u32] {
-        &self.strip
+        self.strip.as_slice()
     }
 
     /// Copies what is in the tree, depth-first, into the spare array.
@@ -164,7 +164,7 @@ struct Walk<'w, S: RecordStore, P> {
     metric: Metric,
     now: u32,
     rotated: bool,
-    strip: StripBuilder<'w, u32>,
+    strip: StripBuilder<u32>,
     tests: u64,
     probe: &'w mut P,
 }
@@ -346,7 +346,7 @@ impl<S: CompleteStore> Engine for Smart<S> {
             metric,
             now: self.clock.now() as u32,
             rotated,
-            strip: StripBuilder::start(&mut self.strip, c[0], 0),
+            strip: self.strip.start(c[0], 0),
             tests: 0,
             probe,
         };
@@ -361,7 +361,7 @@ impl<S: CompleteStore> Engine for Smart<S> {
             }
         }
         let tests = walk.tests;
-        self.strip.push(0);
+        walk.strip.finish(0, &mut self.strip);
         tests
     }
 
@@ -370,6 +370,6 @@ impl<S: CompleteStore> Engine for Smart<S> {
             let v = &self.nodes.vertices[*i as usize];
             GridPoint::new(v.x, v.y)
         };
-        for_each_in_strip(self.strip.iter().map(point), visit);
+        for_each_in_strip(self.strip().iter().map(point), visit);
     }
 }

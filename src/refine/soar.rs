@@ -6,9 +6,10 @@
 //! Cost: 2T - 1 nodes for T triangles, a record read and a test each. Allocates nothing once the strip has grown.
 
 use super::change::GroundChange;
-use super::strip::StripBuilder;
+use super::strip::{Strip, StripBuilder};
 use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
+use crate::metric::pair::{PairMetric, SightedPair};
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
@@ -16,7 +17,7 @@ use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
 use terrasoar_layout::read::store::{CompleteStore, RecordStore};
 
 /// A vertex of the strip: 12 bytes, ready to be uploaded.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(C)]
 pub struct StripVertex {
     /// Column.
@@ -27,18 +28,12 @@ pub struct StripVertex {
     pub height_m: f32,
 }
 
-impl StripVertex {
-    fn new(p: GridPoint, height_m: f64) -> Self {
-        Self { x: p.x(), y: p.y(), height_m: height_m as f32 }
-    }
-}
-
 /// Full refinement every frame.
 #[derive(Debug)]
 pub struct Soar<S: RecordStore> {
     records: S,
     culling: Culling,
-    strip: Vec<StripVertex>,
+    strip: Strip<StripVertex>,
 }
 
 impl<S: CompleteStore> Soar<S> {
@@ -54,12 +49,12 @@ impl<S: CompleteStore> Soar<S> {
     /// }
     /// ```
     pub fn new(records: S, culling: Culling) -> Self {
-        Self { records, culling, strip: Vec::new() }
+        Self { records, culling, strip: Strip::default() }
     }
 
     /// The strip of the last update. Consecutive triples are triangles; repeated vertices turn it.
     pub fn strip(&self) -> &[StripVertex] {
-        &self.strip
+        self.strip.as_slice()
     }
 }
 
@@ -68,44 +63,32 @@ impl<S: CompleteStore> Soar<S> {
 struct Apex {
     slot: u64,
     at: GridPoint,
-    height_m: f64,
+    height_m: f32,
 }
 
 /// One frame's walk.
 struct Walk<'w, S: RecordStore, P> {
     records: &'w S,
-    metric: Metric,
-    strip: StripBuilder<'w, StripVertex>,
+    metric: PairMetric,
+    strip: StripBuilder<StripVertex>,
     tests: u64,
     probe: &'w mut P,
 }
 
 impl<S: RecordStore, P: Probe> Walk<'_, S, P> {
-    /// Visits the triangle (apex; b, d) whose split vertex has slot `split` and level `height - 1`; `planes` are those its ancestors cross.
-    /// Inlined, so that only triangles that are split cost a call.
-    #[inline(always)]
-    fn visit(&mut self, height: u32, apex: Apex, split: u64, b: GridPoint, d: GridPoint, planes: u8) {
-        let v = b.midpoint(d);
-        let vertex = self.records.vertex(split, height - 1);
-        self.probe.read(split);
-        self.tests += 1;
-        let sighting = self.metric.sight(self.records.grid().position_m(v), &vertex);
-        let planes = match planes {
-            _ if !sighting.is_selected() => None,
-            0 => Some(0),
-            crossing => self.metric.cull(&sighting, crossing),
-        };
-        match planes {
-            Some(planes) => {
-                let here = Apex { slot: split, at: v, height_m: vertex.height_m };
-                self.split(height, apex, here, b, d, planes);
-            }
-            None => self.append(apex, height & 1),
-        }
-    }
-
-    /// Visits the two children of the triangle (apex; b, d), split at `here`.
-    fn split(&mut self, height: u32, apex: Apex, here: Apex, b: GridPoint, d: GridPoint, planes: u8) {
+    /// Visits the two children of the triangle (apex; b, d), which is split at `here`; `height` is the level of `here` and one.
+    ///
+    /// The split vertices of both children are read and tested before either is visited: they lie side by side in the file, so two reads are under
+    /// way at once, and the arithmetic of two tests fits the same instructions. `CULLS` says whether `planes`, those which all ancestors cross, are
+    /// any: below a vertex that lies wholly inside the view nothing asks again.
+    fn split<const CULLS: bool>(
+        &mut self,
+        height: u32,
+        apex: Apex,
+        here: Apex,
+        [b, d]: [GridPoint; 2],
+        planes: u8,
+    ) {
         if height == 1 {
             // The smallest triangles have no vertex to split at.
             self.append(here, 0);
@@ -113,16 +96,49 @@ impl<S: RecordStore, P: Probe> Walk<'_, S, P> {
             self.append(here, 0);
             return;
         }
-        let [left, right] = child_slots(apex.slot, here.slot);
-        self.visit(height - 1, here, left, b, apex.at, planes);
+        let level = height - 2;
+        let slots = child_slots(apex.slot, here.slot);
+        let points = [b.midpoint(apex.at), d.midpoint(apex.at)];
+        let vertices = self.records.pair(slots).map(|raw| self.records.decode(raw, level));
+        let pair = self.metric.sight(points, &vertices);
+        slots.into_iter().for_each(|slot| self.probe.read(slot));
+        self.tests += 2;
+        let child = |i: usize| Apex { slot: slots[i], at: points[i], height_m: vertices[i].height_m as f32 };
+        self.visit::<CULLS>(height - 1, here, child(0), (0, &pair), [b, apex.at], planes);
         self.append(apex, height & 1);
-        self.visit(height - 1, here, right, apex.at, d, planes);
+        self.visit::<CULLS>(height - 1, here, child(1), (1, &pair), [apex.at, d], planes);
+    }
+
+    /// Visits the triangle (apex; base), whose split vertex is `split`, one of a pair.
+    /// Inlined, so that only triangles that are split cost a call.
+    #[inline(always)]
+    fn visit<const CULLS: bool>(
+        &mut self,
+        height: u32,
+        apex: Apex,
+        split: Apex,
+        (i, pair): (usize, &SightedPair),
+        base: [GridPoint; 2],
+        planes: u8,
+    ) {
+        if pair.is_selected(i) {
+            if !CULLS {
+                return self.split::<false>(height, apex, split, base, 0);
+            }
+            match self.metric.cull(pair, i, planes) {
+                None => {}
+                Some(0) => return self.split::<false>(height, apex, split, base, 0),
+                Some(planes) => return self.split::<true>(height, apex, split, base, planes),
+            }
+        }
+        self.append(apex, height & 1);
     }
 
     /// Continues the strip to `apex`.
     #[inline(always)]
     fn append(&mut self, apex: Apex, parity: u32) {
-        self.strip.append(apex.at, parity, StripVertex::new(apex.at, apex.height_m));
+        let Apex { at, height_m, .. } = apex;
+        self.strip.append(at, parity, StripVertex { x: at.x(), y: at.y(), height_m });
     }
 }
 
@@ -139,37 +155,42 @@ impl<S: CompleteStore> Engine for Soar<S> {
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
         let grid = *self.records.grid();
         let c = corners(grid.k());
-        let corner =
-            |i: usize| Apex { slot: i as u64, at: c[i], height_m: self.records.vertex(i as u64, 0).height_m };
-        let [sw, se, ne, nw] = [0, 1, 2, 3].map(corner);
-        let centre_at = c[0].midpoint(c[2]);
-        let centre = Apex {
-            slot: CENTRE_SLOT,
-            at: centre_at,
-            height_m: self.records.vertex(CENTRE_SLOT, grid.levels() - 1).height_m,
+        let read = |slot: u64, level: u32, at: GridPoint| {
+            let vertex = self.records.vertex(slot, level);
+            (Apex { slot, at, height_m: vertex.height_m as f32 }, vertex)
         };
+        let [sw, se, ne, nw] = [0, 1, 2, 3].map(|i| read(i as u64, 0, c[i]).0);
+        let height = grid.levels() - 1;
+        let (centre, _) = read(CENTRE_SLOT, height, c[0].midpoint(c[2]));
         (0..=CENTRE_SLOT).for_each(|slot| probe.read(slot));
+        let first = StripVertex { x: sw.at.x(), y: sw.at.y(), height_m: sw.height_m };
         let mut walk = Walk {
             records: &self.records,
-            metric: Metric::new(view),
-            strip: StripBuilder::start(&mut self.strip, sw.at, StripVertex::new(sw.at, sw.height_m)),
+            metric: PairMetric::new(&Metric::new(view), &grid),
+            strip: self.strip.start(sw.at, first),
             tests: 0,
             probe,
         };
-        let height = grid.levels() - 1;
-        let planes = if self.culling == Culling::Vertices { ALL_PLANES } else { 0 };
-        for ((split, [b, d]), next) in ROOTS.into_iter().zip([Some(se), Some(ne), Some(nw), None]) {
-            walk.visit(height, centre, split, c[b], c[d], planes);
+        for ((slot, [b, d]), next) in ROOTS.into_iter().zip([Some(se), Some(ne), Some(nw), None]) {
+            let base = [c[b], c[d]];
+            let (split, vertex) = read(slot, height - 1, base[0].midpoint(base[1]));
+            walk.probe.read(slot);
+            walk.tests += 1;
+            let pair = walk.metric.sight([split.at; 2], &[vertex; 2]);
+            match self.culling {
+                Culling::Vertices => walk.visit::<true>(height, centre, split, (0, &pair), base, ALL_PLANES),
+                Culling::Clusters => walk.visit::<false>(height, centre, split, (0, &pair), base, 0),
+            }
             if let Some(next) = next {
                 walk.append(next, 0);
             }
         }
         let tests = walk.tests;
-        self.strip.push(StripVertex::new(sw.at, sw.height_m));
+        walk.strip.finish(first, &mut self.strip);
         tests
     }
 
     fn for_each_triangle(&self, visit: &mut dyn FnMut(Triangle)) {
-        for_each_in_strip(self.strip.iter().map(|v| GridPoint::new(v.x, v.y)), visit);
+        for_each_in_strip(self.strip().iter().map(|v| GridPoint::new(v.x, v.y)), visit);
     }
 }

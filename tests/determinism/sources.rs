@@ -12,8 +12,8 @@ const OF_THE_SYSTEM: [&str; 26] = [
 /// Of glam: they call those.
 const OF_GLAM: [&str; 6] =
     ["from_axis_angle", "from_rotation_x", "from_rotation_y", "from_rotation_z", "angle_between", "slerp"];
-/// What is searched: the file and what changes it, engines, flights and edits, made-up terrain.
-const FOLDERS: [&str; 3] = ["layout/src", "src", "import/src/synth"];
+/// What is searched: the file and what changes it, engines, flights and edits, what data is read and made up. Map projections are others' code.
+const FOLDERS: [&str; 3] = ["layout/src", "src", "import/src"];
 /// Files for tests alone, and the one that the others take these functions from.
 const NOT_SEARCHED: [&str; 3] = ["layout/src/portable.rs", "layout/src/testing", "src/testing.rs"];
 

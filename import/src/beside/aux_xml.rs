@@ -3,10 +3,13 @@
 //! The text is read by crate `roxmltree`. A file that is no such text is ignored. Cost: one pass.
 
 use crate::reader::{Declared, Said, VerticalUnit};
-use roxmltree::{Document, Node};
+use crate::xml::{self, number_of, text_of};
 
 /// Longest text read; histograms of many bands take some hundred KB.
 pub(super) const MAX_BYTES: u64 = 8 << 20;
+
+/// Memory that its tree may take: an attribute table of 65,536 rows takes half of it.
+const MAX_TREE_BYTES: u64 = 256 << 20;
 
 /// What is said of one band.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -26,41 +29,27 @@ pub(super) struct Aux {
     bands: Vec<(u32, Band)>,
 }
 
-fn text_of(node: Node<'_, '_>, name: &str) -> Option<String> {
-    let found = node.children().find(|child| child.has_tag_name(name))?;
-    found.text().map(|text| text.trim().to_owned()).filter(|text| !text.is_empty())
-}
-
-fn number_of(node: Node<'_, '_>, name: &str) -> Option<f64> {
-    text_of(node, name)?.parse().ok().filter(|value: &f64| value.is_finite())
-}
-
 impl Aux {
     /// Reads the text.
     pub(super) fn parse(text: &str) -> Self {
-        let Ok(document) = Document::parse(text.trim_start_matches('\u{feff}')) else {
-            return Self::default();
-        };
+        let Some(document) = xml::tree(text, MAX_TREE_BYTES) else { return Self::default() };
         let root = document.root_element();
         if !root.has_tag_name("PAMDataset") {
             return Self::default();
         }
-        let corners = text_of(root, "GeoTransform").and_then(|text| {
-            let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
-            let map = <[f64; 6]>::try_from(numbers?).ok()?;
-            (map.iter().all(|value| value.is_finite()) && map[1] * map[5] != map[2] * map[4]).then_some(map)
-        });
+        let text = |node, name| text_of(node, name).map(str::to_owned);
+        let corners = text_of(root, "GeoTransform").and_then(xml::transform);
         let bands = root.children().filter(|child| child.has_tag_name("PAMRasterBand")).map(|band| {
             let number = band.attribute("band").and_then(|number| number.parse().ok()).unwrap_or(1);
             let said = Band {
-                nodata: text_of(band, "NoDataValue"),
+                nodata: text(band, "NoDataValue"),
                 scale: number_of(band, "Scale").filter(|scale| *scale != 0.0),
                 offset: number_of(band, "Offset"),
-                unit: text_of(band, "UnitType"),
+                unit: text(band, "UnitType"),
             };
             (number, said)
         });
-        Self { corners, system: text_of(root, "SRS"), bands: bands.collect() }
+        Self { corners, system: text(root, "SRS"), bands: bands.collect() }
     }
 
     /// Adds it to what the file itself says, and wins.

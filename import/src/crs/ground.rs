@@ -9,6 +9,7 @@ use crate::guard::quiet;
 use crate::reader::HorizontalSize;
 use proj4rs::proj::Proj;
 use proj4rs::transform::transform;
+use terrasoar_layout::portable::{hypot, sin_cos};
 
 /// Words of a PROJ string that are dealt with here, or say nothing about the plane.
 const LEFT_OUT: [&str; 12] = [
@@ -197,7 +198,7 @@ impl Ground {
         let middle = self.own(at)?;
         let [a, b] = self.axes_m;
         let e2 = 1.0 - (b / a) * (b / a);
-        let (sin, cos) = middle[1].sin_cos();
+        let (sin, cos) = sin_cos(middle[1]);
         let w = 1.0 - e2 * sin * sin;
         let [metres_lon, metres_lat] = [a * cos / w.sqrt(), a * (1.0 - e2) / (w * w.sqrt())];
         let length = |[dx, dy]: [f64; 2]| {
@@ -208,7 +209,7 @@ impl Ground {
             if lon.abs() > turn / 2.0 {
                 lon -= turn.copysign(lon);
             }
-            Some((lon * metres_lon).hypot((to[1] - from[1]) * metres_lat))
+            Some(hypot(lon * metres_lon, (to[1] - from[1]) * metres_lat))
         };
         Some(([length(steps[0])?, length(steps[1])?], middle[1]))
     }

@@ -17,7 +17,7 @@ pub(crate) use keywords::Keywords;
 pub(crate) use registry::{is_north_first, unit as unit_of_code, vertical_in_metres};
 pub(crate) use resolve::by_text;
 pub(crate) use resolve::resolve;
-pub(crate) use system::{Kind, System, Unit, exact_metres};
+pub(crate) use system::{Kind, System, Unit, Vertical, exact_metres};
 
 pub(crate) use crate::reader::HorizontalSize;
 use crate::value::US_SURVEY_FOOT_M;

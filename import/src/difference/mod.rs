@@ -15,6 +15,7 @@ use std::path::Path;
 use terrasoar_layout::dem::Window;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::header::Header;
+use terrasoar_layout::portable::hypot;
 use terrasoar_layout::progress::Progress;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::read::window::SampleWindow;
@@ -132,7 +133,7 @@ fn are_same([first, second]: [&Header; 2]) -> bool {
             let near = |x: f64, y: f64| {
                 (0..2).all(|axis| {
                     let at = |m: &[f64; 6]| m[3 * axis] + m[3 * axis + 1] * x + m[3 * axis + 2] * y;
-                    let sample = a[3 * axis + 1].hypot(a[3 * axis + 2]);
+                    let sample = hypot(a[3 * axis + 1], a[3 * axis + 2]);
                     (at(&a) - at(&b)).abs() <= SAME * sample
                 })
             };

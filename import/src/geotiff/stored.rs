@@ -7,6 +7,7 @@
 use super::tags::{self, Directory, TiffFile};
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::pow;
 
 /// What a sample's bits mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,10 +150,10 @@ fn real_24(bits: u32) -> f64 {
     let sign = if bits >> 23 & 1 == 1 { -1.0 } else { 1.0 };
     let (exponent, fraction) = (bits >> 16 & 0x7f, f64::from(bits & 0xffff) / 65536.0);
     sign * match exponent {
-        0 => fraction * 2f64.powi(-62),
+        0 => fraction * pow(2.0, -62.0),
         0x7f if fraction == 0.0 => f64::INFINITY,
         0x7f => f64::NAN,
-        _ => (1.0 + fraction) * 2f64.powi(exponent as i32 - 63),
+        _ => (1.0 + fraction) * pow(2.0, f64::from(exponent) - 63.0),
     }
 }
 

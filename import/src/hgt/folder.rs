@@ -10,15 +10,24 @@ use terrasoar_layout::error::LayoutError;
 const DEEPEST: u32 = 4;
 const MOST_FILES: usize = 200_000;
 
-/// All tiles in the folder at `path`, in the order of their names. Of a tile that is there both packed and unpacked the unpacked one counts.
+/// All tiles in the folder at `path`, each once, in the order of their names.
 ///
 /// # Errors
 /// I/O; [`LayoutError::NotThisFormat`] for a folder without tiles, saying what it is where that can be told.
 pub(crate) fn tiles_in(path: &Path) -> Result<Vec<PathBuf>, LayoutError> {
     let files = files_in(path)?;
+    let tiles = each_once(files.iter().filter(|file| is_tile(file)));
+    if tiles.is_empty() {
+        return Err(LayoutError::not_this_format(path, refusal(&files)));
+    }
+    Ok(tiles)
+}
+
+/// Tiles in the order of their names. Of one that is there both packed and unpacked the unpacked one counts.
+pub(crate) fn each_once<'a>(files: impl IntoIterator<Item = &'a PathBuf>) -> Vec<PathBuf> {
     // A tile's name up to the first point, and how it is packed.
     let mut tiles: BTreeMap<(PathBuf, String), (u8, PathBuf)> = BTreeMap::new();
-    for file in files.iter().filter(|file| is_tile(file)) {
+    for file in files {
         let name =
             file.file_name().map(|name| name.to_string_lossy().to_ascii_uppercase()).unwrap_or_default();
         let stem = name.split('.').next().unwrap_or_default().to_owned();
@@ -29,16 +38,13 @@ pub(crate) fn tiles_in(path: &Path) -> Result<Vec<PathBuf>, LayoutError> {
         } else {
             2
         };
-        let key = (file.parent().unwrap_or(path).to_owned(), stem);
+        let key = (file.parent().unwrap_or(Path::new("")).to_owned(), stem);
         let entry = tiles.entry(key).or_insert_with(|| (rank, file.clone()));
         if rank < entry.0 {
             *entry = (rank, file.clone());
         }
     }
-    if tiles.is_empty() {
-        return Err(LayoutError::not_this_format(path, refusal(&files)));
-    }
-    Ok(tiles.into_values().map(|(_, file)| file).collect())
+    tiles.into_values().map(|(_, file)| file).collect()
 }
 
 /// All files in the folder at `path` and the folders in it, in the order of their names.
@@ -84,11 +90,5 @@ fn refusal(files: &[PathBuf]) -> String {
     if has("hdr.adf") {
         return "this folder is an ARC/INFO grid, which is not read; convert it with: gdal_translate INPUT output.tif".into();
     }
-    let tiffs: Vec<&PathBuf> =
-        files.iter().filter(|file| is_called(file, "tif") || is_called(file, "tiff")).collect();
-    match tiffs.as_slice() {
-        [] => "there are no .hgt tiles in this folder; name the elevation file in it".into(),
-        [one] => format!("there are no .hgt tiles in this folder; name the file in it: {}", one.display()),
-        _ => "there are no .hgt tiles in this folder; join its GeoTIFF files first: gdalbuildvrt all.vrt FOLDER/*.tif && gdal_translate all.vrt all.tif".into(),
-    }
+    "there is no elevation data in this folder that says where it lies; name the file in it".into()
 }

@@ -14,7 +14,7 @@ mod unpacked;
 use std::path::PathBuf;
 
 use crate::reader::{CrsSaid, Declared, HorizontalSize, Reader, Said};
-pub(crate) use folder::{files_in, tiles_in};
+pub(crate) use folder::{each_once, files_in, tiles_in};
 use mosaic::Mosaic;
 use terrasoar_layout::dem::{SampleSink, SampleType, Warning};
 use terrasoar_layout::error::LayoutError;

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::sin_cos;
 
 /// Keys in small letters, and values.
 type Values = BTreeMap<String, String>;
@@ -166,7 +167,7 @@ fn map_info(path: &Path, info: &str) -> Result<(Option<[f64; 6]>, CrsSaid), Layo
         })
     };
     let turn = named("rotation").and_then(|text| number(text.as_bytes())).unwrap_or(0.0).to_radians();
-    let (sin, cos) = turn.sin_cos();
+    let (sin, cos) = sin_cos(turn);
     // Steps of a column and of a row, in x and y.
     let [xc, xr, yc, yr] = [cos * dx, sin * dx, sin * dy, -cos * dy];
     let (across, down) = (1.5 - column, 1.5 - row);

@@ -5,8 +5,11 @@
 //! One file is open at a time. Memory: a share of what is allowed, a few hundred bytes a file, and what reading one file takes. Cost: two passes over the samples, and that of a warp for sheets on other
 //! grids.
 
+mod across;
+mod aim;
 mod blend;
 mod lattice;
+mod levels;
 mod names;
 mod plan;
 mod sheet;
@@ -21,7 +24,8 @@ use crate::opened::{Known, OpenedDem};
 use crate::options::{OpenOptions, Priority, Resampling};
 use crate::reader::{Declared, Reader, Said};
 use crate::value::Voids;
-use crate::warp::{Store, blocks_bytes, each_block, target_system};
+use crate::warp::{Store, blocks_bytes, each_block};
+use aim::{Aim, aimed};
 use blend::{Blend, Edges, over};
 pub(crate) use names::Inputs;
 use plan::Placed;
@@ -31,7 +35,7 @@ use source::{Source, options_of_each};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use target::{Laid, Named, Target, Way, check_way, main_system};
+use target::{Laid, Target, Way};
 use terrasoar_layout::dem::{DemSource, SampleSink, Warning, Window};
 use terrasoar_layout::error::LayoutError;
 use told::Told;
@@ -66,67 +70,36 @@ pub(crate) fn open(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn D
     let each = options_of_each(options);
     let mut told = Told::default();
     let mut looked = Vec::new();
-    for (rank, path) in in_order(paths) {
+    for (rank, path) in in_order(paths, options.priority) {
         match Source::look(&path, rank, &each) {
             Ok(found) => looked.push(found),
             Err(error) if options.strict || is_ours(&error) => return Err(error),
             Err(error) => told.lose(&path, &error),
         }
     }
-    let placed = comparable(looked, options, &mut told)?;
+    if looked.is_empty() {
+        return Err(told.nothing_read());
+    }
+    let (placed, sheets, aim) = aimed(Placed::new(looked), options, &mut told)?;
     placed.sources.iter().for_each(|source| told.look(source));
-    let name = PathBuf::from(format!("the mosaic of {}", plan::counted(placed.sources.len())));
-    let (mosaic, known, later) = Mosaic::new(&name, placed, each, options, told)?;
+    let name = aim::name(&placed);
+    let (mosaic, known, later) = Mosaic::new(&name, (placed, sheets, aim), each, options, told)?;
     let declared = mosaic.declared.clone();
     Ok(Box::new(OpenedDem::known(&name, Box::new(mosaic), declared, known, &later)?))
 }
 
-/// Each file once, in the order of their paths, with its place among the names.
-fn in_order(paths: &[PathBuf]) -> Vec<(usize, PathBuf)> {
+/// Each file once, in the order of their paths, with its place among the names: of several places the one on top.
+fn in_order(paths: &[PathBuf], priority: Priority) -> Vec<(usize, PathBuf)> {
     let mut seen = HashSet::new();
     let whole = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
     let mut files: Vec<(PathBuf, usize, PathBuf)> =
         paths.iter().enumerate().map(|(rank, path)| (whole(path), rank, path.clone())).collect();
+    if priority == Priority::Last {
+        files.reverse();
+    }
     files.retain(|(whole, ..)| seen.insert(whole.clone()));
     files.sort();
     files.into_iter().map(|(_, rank, path)| (rank, path)).collect()
-}
-
-/// The files without those that cannot be brought to where the others are.
-fn comparable(
-    looked: Vec<(Source, System)>,
-    options: &OpenOptions,
-    told: &mut Told,
-) -> Result<Placed, LayoutError> {
-    if looked.is_empty() {
-        return Err(LayoutError::Usage(format!(
-            "none of the files can be read; the first: {}",
-            told.first_loss().unwrap_or("there is none")
-        )));
-    }
-    let placed = Placed::new(looked);
-    let main = main_system(&placed);
-    let mut are_lost = Vec::new();
-    for (source, at) in placed.sources.iter().zip(&placed.at) {
-        let system = placed.lattices[at.0].system;
-        let way = match system == main {
-            true => Ok(()),
-            false => check_way(&source.path, &placed.systems[system], &placed.systems[main]),
-        };
-        match way {
-            Err(error) if options.strict => return Err(error),
-            Err(error) => told.lose(&source.path, &error),
-            Ok(()) => {}
-        }
-        are_lost.push(told.has_lost(&source.path));
-    }
-    if !are_lost.contains(&true) {
-        return Ok(placed);
-    }
-    let of = |at: &(usize, [i64; 2])| placed.systems[placed.lattices[at.0].system].system.clone();
-    let systems: Vec<System> = placed.at.iter().map(of).collect();
-    let kept = placed.sources.into_iter().zip(systems).zip(are_lost).filter(|(_, is_lost)| !is_lost);
-    Ok(Placed::new(kept.map(|(both, _)| both).collect()))
 }
 
 /// Several files.
@@ -153,38 +126,22 @@ impl Mosaic {
     /// The mosaic, what is known of it, and what is left to be done with it.
     fn new(
         name: &Path,
-        placed: Placed,
+        (placed, sheets, aim): (Placed, Vec<Sheet>, Aim),
         each: OpenOptions,
         options: &OpenOptions,
         told: Told,
     ) -> Result<(Self, Known, OpenOptions), LayoutError> {
         let values = Values::of(&placed.sources);
         let sample_bytes = if values.sample_type.fits_f32() { 4 } else { 8 };
-        let sheets = placed.sheets(options.priority)?;
-        let named = Named(name);
-        let main = main_system(&placed);
-        let mut later = options.clone();
-        later.crs = None;
-        // One grid is brought elsewhere as one file is; unlike ones each at once.
-        let is_one = placed.lattices.len() == 1;
+        let mut later = OpenOptions { crs: None, ..options.clone() };
         let mut asked = options.clone();
-        let (mut tied, mut own) = (placed.systems[main].clone(), Some(main));
-        match &options.reproject {
-            Some(_) if is_one => asked.resolution = None,
-            Some(text) => {
-                let (map, samples) = target::extent(&named, &placed, &sheets, main)?;
-                check_way(name, &tied, &tied)?;
-                let ground = tied.ground.as_ref().ok_or_else(|| target::outside(&named))?;
-                let system = target_system(name, text, &tied.system, ground, &map, samples)?;
-                let wanted = lattice::Tied::new(System { vertical: tied.system.vertical.clone(), ..system });
-                own = placed.systems.iter().position(|known| known.is_same(&wanted, &map, samples));
-                check_way(name, &tied, &wanted)?;
-                tied = wanted;
-                later.reproject = None;
+        if options.reproject.is_some() {
+            match aim.is_later {
+                true => asked.resolution = None,
+                false => later.reproject = None,
             }
-            None => {}
         }
-        let target = Target::new(&named, &placed, &sheets, tied, own, sample_bytes, &asked)?;
+        let target = Target::new(name, &placed, &sheets, aim, sample_bytes, &asked)?;
         if later.reproject.is_none() {
             later.resolution = None;
         }
@@ -205,10 +162,9 @@ impl Mosaic {
         let mut declared = Declared::new(target.samples, sample_type, format_of(&placed.sources));
         declared.place = Some(Said::new(target.map, "the places of the files"));
         declared.notes = vec![note(&placed, &sheets, resampled, resampling, options)];
-        let mut warnings = Vec::new();
-        warn_of_levels(&placed, &mut warnings);
-        let bytes: u64 = sheets.iter().map(|sheet| Store::bytes(sheet.samples, sample_bytes)).sum();
-        let bytes = if blend.is_some() { 2 * bytes } else { bytes };
+        let (vertical, unlike) = levels::of(&placed.sources);
+        let bytes = Store::all_bytes(sheets.iter().map(|sheet| &sheet.samples), sample_bytes);
+        let bytes = if blend.is_some() { bytes.saturating_mul(2) } else { bytes };
         let allowed = options.memory_mib.unwrap_or(512) << 20;
         let mosaic = Self {
             declared,
@@ -226,11 +182,11 @@ impl Mosaic {
             told: Mutex::new(told),
         };
         let known = Known {
-            system: target.tied.system,
+            system: System { vertical, ..target.tied.system },
             heights: values.heights,
             voids: Voids::new(name, &[], &[], sample_type)?,
             mask: None,
-            warnings,
+            warnings: unlike.into_iter().collect(),
         };
         Ok((mosaic, known, later))
     }
@@ -242,7 +198,8 @@ impl Mosaic {
     /// The samples of a window of the mosaic, of all sheets.
     fn block(&self, window: Window, stores: &[Store], sink: &dyn SampleSink) -> Result<(), LayoutError> {
         let count = window.width as usize * window.height as usize;
-        let (mut values, mut weights) = (vec![f64::NAN; count], Vec::new());
+        let mut values = vec![f64::NAN; count];
+        let mut weights = if self.blend.is_some() { vec![0.0; count] } else { Vec::new() };
         let highest = self.each.priority == Priority::Highest;
         for (number, (laid, store)) in self.laid.iter().zip(stores).enumerate() {
             let meets = window.col < laid.to[0]
@@ -262,7 +219,6 @@ impl Mosaic {
                         match fresh {
                             None => replace(&mut values[to + i], new, highest),
                             Some(fresh) => {
-                                weights.resize(count, 0.0);
                                 over(&mut values[to + i], &mut weights[to + i], new, fresh[row * wide + i]);
                             }
                         }
@@ -346,24 +302,6 @@ fn note(
     words
 }
 
-/// Says where heights of files are measured from unlike levels.
-fn warn_of_levels(placed: &Placed, warnings: &mut Vec<Warning>) {
-    let mut levels: Vec<&str> = Vec::new();
-    for level in placed.systems.iter().filter_map(|tied| tied.system.vertical.as_ref()) {
-        if !level.name.is_empty() && !levels.contains(&level.name.as_str()) {
-            levels.push(&level.name);
-        }
-    }
-    if levels.len() > 1 {
-        let listed: Vec<String> =
-            levels.iter().take(4).map(|name| terrasoar_layout::words::harmless(name, 60)).collect();
-        warnings.push(Warning::new(format!(
-            "the files measure heights from unlike levels ({}), and none was shifted; bring them to one level first, where steps at seams matter: gdalwarp -t_srs EPSG:n+m",
-            listed.join(", ")
-        )));
-    }
-}
-
 impl Reader for Mosaic {
     fn declared(&self) -> &Declared {
         &self.declared
@@ -374,8 +312,7 @@ impl Reader for Mosaic {
     }
 
     fn memory_bytes(&self) -> u64 {
-        let stores: u64 =
-            self.sheets.iter().map(|sheet| Store::bytes(sheet.samples, self.sample_bytes)).sum();
+        let stores = Store::all_bytes(self.sheets.iter().map(|sheet| &sheet.samples), self.sample_bytes);
         let planes = if self.blend.is_some() { 2 } else { 1 };
         let kept = if self.sheets_in_memory { planes * stores } else { 0 };
         let files = self.sources.iter().map(|source| Store::bytes(source.samples, self.sample_bytes));
@@ -418,10 +355,10 @@ impl Reader for Mosaic {
         }
         drop(weights);
         let read = told.count_read();
-        let why = told.first_loss().unwrap_or_default().to_owned();
+        let nothing = told.nothing_read();
         *self.told.lock().unwrap_or_else(PoisonError::into_inner) = told;
         if read == 0 {
-            return Err(LayoutError::Usage(format!("none of the files can be read; the first: {why}")));
+            return Err(nothing);
         }
         let size = if self.is_copied() && self.blend.is_none() { COPIED } else { BLENDED };
         each_block(self.declared.samples, size, |window| self.block(window, &stores, sink))

@@ -36,12 +36,12 @@ impl Inputs {
                 continue;
             }
             if path.is_dir() {
-                let found = in_folder(path)?;
+                let (found, only) = in_folder(path)?;
                 if found.is_empty() {
                     // Its reader says what the folder is.
                     return Ok(Self::Alone(vec![path.clone()]));
                 }
-                only_tiles &= found.iter().all(|file| hgt::is_tile(file));
+                only_tiles &= only;
                 files.extend(found);
                 continue;
             }
@@ -60,14 +60,17 @@ impl Inputs {
     }
 }
 
-/// The elevation data in a folder and the folders in it, by name.
-fn in_folder(path: &Path) -> Result<Vec<PathBuf>, LayoutError> {
+/// The elevation data in a folder and the folders in it, by name; and whether it is `.hgt` tiles alone.
+fn in_folder(path: &Path) -> Result<(Vec<PathBuf>, bool), LayoutError> {
     let all = hgt::files_in(path)?;
-    let tiles = if all.iter().any(|file| hgt::is_tile(file)) { hgt::tiles_in(path)? } else { Vec::new() };
-    let others = all.into_iter().filter(|file| !hgt::is_tile(file) && formats::is_placed(file));
-    let mut files: Vec<PathBuf> = tiles.into_iter().chain(others).collect();
+    let (tiles, mut others): (Vec<PathBuf>, Vec<PathBuf>) =
+        all.into_iter().partition(|file| hgt::is_tile(file));
+    others.retain(|file| formats::is_placed(file));
+    let is_tiles = others.is_empty();
+    let mut files = hgt::each_once(&tiles);
+    files.append(&mut others);
     files.sort();
-    Ok(files)
+    Ok((files, is_tiles))
 }
 
 /// Whether a name has signs of a pattern.

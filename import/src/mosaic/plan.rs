@@ -1,7 +1,7 @@
 //! What lies over what: files sorted into grids, grids into sheets, sheets from the lowest to the highest.
 //!
-//! Which grids there are does not depend on the order of names: files are taken by their paths. Where the order of names counts (first, last), a sheet is a run of files of one grid in that order. Cost:
-//! one comparison a file and grid.
+//! Which grids there are does not depend on the order of names: files are taken by their paths. Unless the highest ground counts, files have an order, and a sheet is a run of files of one grid in that
+//! order; a file joins a sheet of its grid below others where it meets none of these. Cost: one comparison a file and grid, and with several grids one of boxes a pair of files at most.
 
 use super::lattice::{Lattice, Tied};
 use super::sheet::{Member, Sheet};
@@ -10,11 +10,14 @@ use crate::crs::{HorizontalSize, Kind};
 use crate::options::Priority;
 use std::path::PathBuf;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::ln;
 
 /// Samples on a side of a sheet, at most: files that lie farther apart are a mistake, or several data sets.
 const MOST_SIDE: i64 = 1 << 22;
 /// Areas of steps within a fiftieth of each other are alike.
 const ALIKE: f64 = 1.02;
+/// Steps around a file within which another one may meet it: kernels reach three.
+const MARGIN: f64 = 4.0;
 
 /// Files with their systems, and the grids they lie on.
 pub(super) struct Placed {
@@ -54,6 +57,12 @@ impl Placed {
         Self { sources, systems, lattices, at }
     }
 
+    /// What `make` says of each file and the number of its system.
+    pub(super) fn each<T>(&self, make: impl Fn(&Source, usize) -> T) -> Vec<T> {
+        let all = self.sources.iter().zip(&self.at);
+        all.map(|(source, at)| make(source, self.lattices[at.0].system)).collect()
+    }
+
     /// Metres between the samples of a file.
     pub(super) fn steps_m(&self, source: usize) -> [f64; 2] {
         let Source { map, samples, .. } = &self.sources[source];
@@ -84,19 +93,44 @@ impl Placed {
             Priority::Finest => order = self.coarsest_first(),
         }
         let mut runs: Vec<(usize, Vec<usize>)> = Vec::new();
-        let counts_order = matches!(priority, Priority::First | Priority::Last);
+        let counts_order = priority != Priority::Highest;
         for source in order {
             let lattice = self.at[source].0;
-            let run = match counts_order {
-                true => runs.last_mut().filter(|(of, _)| *of == lattice),
-                false => runs.iter_mut().find(|(of, _)| *of == lattice),
+            let below = runs.iter().rposition(|(of, _)| *of == lattice);
+            let is_free = |run: &usize| {
+                let mut above = runs[run + 1..].iter().flat_map(|(_, members)| members);
+                !counts_order || !above.any(|other| self.may_meet(source, *other))
             };
-            match run {
-                Some((_, members)) => members.push(source),
+            match below.filter(is_free) {
+                Some(run) => runs[run].1.push(source),
                 None => runs.push((lattice, vec![source])),
             }
         }
         runs.into_iter().map(|(lattice, members)| self.sheet(lattice, &members)).collect()
+    }
+
+    /// Whether two files may have ground in common, or so close that new samples are made of both.
+    fn may_meet(&self, a: usize, b: usize) -> bool {
+        let [system, other] = [a, b].map(|source| self.lattices[self.at[source].0].system);
+        if system != other {
+            return true;
+        }
+        let turn = match self.systems[system].system.unit.as_ref().map(|unit| unit.size) {
+            Some(HorizontalSize::Radians(size)) => std::f64::consts::TAU / size,
+            _ => 0.0,
+        };
+        let ends = |source: usize, i: usize| {
+            let Source { map, samples, .. } = &self.sources[source];
+            let (first, step) = ([map[0], map[3]][i], [map[1], map[5]][i]);
+            let last = first + step * f64::from(samples[i] - 1);
+            let margin = MARGIN * step.abs();
+            [first.min(last) - margin, first.max(last) + margin]
+        };
+        let meet = |i: usize, shift: f64| {
+            let ([low, high], [from, to]) = (ends(a, i), ends(b, i));
+            low + shift <= to && from <= high + shift
+        };
+        meet(1, 0.0) && [0.0, turn, -turn].iter().any(|shift| meet(0, *shift))
     }
 
     /// Files by the area of their grid's step on the ground, the largest first; then by path, the last first.
@@ -108,7 +142,7 @@ impl Placed {
             *area = area.min(x * y);
         }
         // No more than some hundreds, whatever the steps.
-        let rank = |source: usize| (areas[self.at[source].0].ln() / ALIKE.ln()).round() as i64;
+        let rank = |source: usize| (ln(areas[self.at[source].0]) / ln(ALIKE)).round() as i64;
         let mut order: Vec<usize> = (0..self.sources.len()).rev().collect();
         order.sort_by_key(|source| std::cmp::Reverse(rank(*source)));
         order

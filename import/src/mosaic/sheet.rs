@@ -6,8 +6,7 @@
 use super::blend::{Blend, Edges, over};
 use super::source::{Failure, Read, Source};
 use crate::options::{OpenOptions, Priority};
-use crate::parallel::each_task;
-use crate::warp::Store;
+use crate::warp::{Store, each_block};
 use std::path::Path;
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
@@ -89,24 +88,12 @@ impl Laying<'_> {
         store: &Store,
         weights: Option<&Store>,
     ) -> Result<(), LayoutError> {
-        let [wide, high] = source.samples;
         // Edges are looked for around each part, so that square ones take least.
         let size = if self.blend.is_some() { BLENDED } else { PART };
-        let across = u64::from(wide.div_ceil(size[0]));
-        let parts = across * u64::from(high.div_ceil(size[1]));
         let edges = self.blend.map(|blend| blend.edges(member.source));
-        each_task(
-            parts,
-            usize::MAX,
-            || Ok(()),
-            |(), part| {
-                // Both are below the file's sides.
-                let (col, row) = ((part % across) as u32 * size[0], (part / across) as u32 * size[1]);
-                let window =
-                    Window { col, row, width: size[0].min(wide - col), height: size[1].min(high - row) };
-                self.part(source, member, window, own, store, weights, edges.as_ref())
-            },
-        )
+        each_block(source.samples, size, |window| {
+            self.part(source, member, window, own, store, weights, edges.as_ref())
+        })
     }
 
     #[allow(clippy::too_many_arguments, reason = "a step of `over`, which has them all")]

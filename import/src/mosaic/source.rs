@@ -4,7 +4,7 @@
 //! damaged after half of its samples leaves nothing behind.
 
 use crate::beside::Beside;
-use crate::crs::System;
+use crate::crs::{System, Vertical};
 use crate::formats;
 use crate::guard::is_ours;
 use crate::opened::OpenedDem;
@@ -32,6 +32,8 @@ pub(super) struct Source {
     pub(super) metres: [f64; 2],
     pub(super) unit: UnitOf,
     pub(super) unit_is_known: bool,
+    /// What heights are measured from, where the file says so.
+    pub(super) level: Option<Vertical>,
     /// Where heights were found, in words.
     pub(super) heights_words: String,
     pub(super) format: String,
@@ -89,6 +91,7 @@ impl Source {
             metres: [info.height_scale, info.height_offset_m],
             unit: info.about.vertical_unit.clone().unwrap_or_default(),
             unit_is_known: dem.unit_is_known(),
+            level: dem.system().vertical.clone(),
             heights_words: heights.map(|(_, words)| words.clone()).unwrap_or_default(),
             format: info.format.clone(),
             memory_bytes: dem.memory_bytes(),

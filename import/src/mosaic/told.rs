@@ -3,6 +3,7 @@
 //! Everything is said in the order of paths, whatever the order in which it was found. Cost: some words a file.
 
 use super::source::{Read, Source};
+use crate::guard::left_out;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use terrasoar_layout::dem::Warning;
@@ -14,8 +15,6 @@ use terrasoar_layout::words::harmless;
 const MOST_EXPLAINED: usize = 6;
 const MOST_NAMED: usize = 2000;
 const MOST_KINDS: usize = 12;
-/// What follows from it.
-const LEFT_OUT: &str = "the file was left out: its ground is that of other files, or void";
 
 /// What was seen of files.
 #[derive(Debug, Clone, Default)]
@@ -61,26 +60,22 @@ impl Told {
         }
     }
 
-    /// Whether a file was left out.
-    pub(super) fn has_lost(&self, path: &Path) -> bool {
-        self.lost.contains_key(path)
-    }
-
     /// How many files were read.
     pub(super) fn count_read(&self) -> usize {
         self.read
     }
 
-    /// Why the first of the files that were left out was, if any was.
-    pub(super) fn first_loss(&self) -> Option<&str> {
-        self.lost.values().next().map(String::as_str)
+    /// That no file is left.
+    pub(super) fn nothing_read(&self) -> LayoutError {
+        let why = self.lost.values().next().map_or("there is none", String::as_str);
+        LayoutError::Usage(format!("none of the files can be read; the first: {why}"))
     }
 
     /// All of it as warnings, of so many files.
     pub(super) fn warnings(&self, files: usize) -> Vec<Warning> {
         let mut all = Vec::new();
         for why in self.lost.values().take(MOST_EXPLAINED) {
-            all.push(Warning::new(format!("{}; {LEFT_OUT}", harmless(why, 360))));
+            all.push(left_out(why));
         }
         if let Some(more) = self.lost.len().checked_sub(MOST_EXPLAINED).filter(|more| *more > 0) {
             let names = self.lost.keys().skip(MOST_EXPLAINED).take(MOST_NAMED);

@@ -13,6 +13,7 @@ mod system;
 
 use crate::options::{Direction, OpenOptions};
 use crate::reader::{Declared, HorizontalSize, Reader, Said, VerticalUnit};
+use crate::value::STANDARD_GRAVITY;
 use attributes::{Unit, exact, is_unsigned, number, numbers, text};
 use axes::{Axis, Way};
 use choose::{Chosen, Grid};
@@ -23,9 +24,6 @@ use stream::Source;
 use terrasoar_layout::dem::{SampleSink, SampleType};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::words::harmless;
-
-/// Metres a second and second, by which a geopotential is divided.
-const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// Whether a file begins so: classic of any version, or HDF5.
 pub(crate) fn is_netcdf(head: &[u8]) -> bool {

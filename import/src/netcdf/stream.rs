@@ -65,7 +65,7 @@ impl Source {
             NcType::Int | NcType::UInt | NcType::Float => 4,
             _ => 8,
         };
-        let wrap = if is_unsigned { f64::from(8 * sample_bytes as u32).exp2() } else { 0.0 };
+        let wrap = if is_unsigned { (1u128 << (8 * sample_bytes)) as f64 } else { 0.0 };
         let stored = if is_transposed { [samples[1], samples[0]] } else { samples };
         let chunk = chunk(path, &grid.place, grid.is_flat, stored, sample_bytes)?;
         let place = grid.place.clone();

@@ -13,6 +13,7 @@ use std::path::Path;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::header::Header;
 use terrasoar_layout::imagery::{ImageInfo, ImageSource, MAX_TEXELS, RowReader};
+use terrasoar_layout::portable::hypot;
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::number;
 
@@ -133,7 +134,7 @@ impl Across {
         let (bounds, is_turned) =
             turn.map_or((bounds, false), |turn| turned(bounds, rim(header, &samples), turn));
         let step = if is_same {
-            [map[1].hypot(map[4]), map[2].hypot(map[5])]
+            [hypot(map[1], map[4]), hypot(map[2], map[5])]
         } else {
             let step = step_at_centre(size, over).ok_or_else(|| {
                 LayoutError::Usage(format!(

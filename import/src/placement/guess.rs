@@ -10,6 +10,7 @@ use crate::reader::HorizontalSize;
 use std::path::Path;
 use terrasoar_layout::dem::Warning;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::hypot;
 use terrasoar_layout::remedy::Remedy;
 
 /// What coordinates of an unknown unit are.
@@ -30,7 +31,7 @@ impl Guess {
     pub(crate) fn of(map: &[f64; 6], samples: [u32; 2]) -> Self {
         let [columns, rows] = samples.map(|count| f64::from(count.max(2) - 1));
         let (west, north) = (map[0].min(map[0] + map[1] * columns), map[3].max(map[3] + map[5] * rows));
-        let [across, down] = [map[1].hypot(map[4]), map[2].hypot(map[5])];
+        let [across, down] = [hypot(map[1], map[4]), hypot(map[2], map[5])];
         let [wide, high] = [across * columns, down * rows];
         let (east, south) = (west + wide, north - high);
         let on_globe = west >= -181.0 && east <= 361.0 && south >= -91.0 && north <= 91.0;

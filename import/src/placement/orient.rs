@@ -5,6 +5,7 @@
 
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::atan2;
 
 /// Largest departure from the axes, in steps over the whole grid.
 const ALONG_STEPS: f64 = 0.01;
@@ -166,7 +167,7 @@ impl SampleSink for Turning<'_> {
 
 /// Degrees by which a grid is turned against north, counterclockwise.
 pub(crate) fn turned_by(map: &[f64; 6], signs: [f64; 2]) -> f64 {
-    (signs[1] * map[4]).atan2(signs[0] * map[1]).to_degrees()
+    atan2(signs[1] * map[4], signs[0] * map[1]).to_degrees()
 }
 
 #[cfg(test)]

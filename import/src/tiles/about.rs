@@ -3,12 +3,15 @@
 //! All of it is text that anybody can write, so numbers that make no sense are passed over. Cost: one pass over some kilobytes.
 
 use crate::reader::Said;
-use roxmltree::Document;
+use crate::xml;
 use serde_json::Value;
 use terrasoar_layout::words::harmless;
 
 /// Longest text that is read.
 pub(super) const MAX_TEXT_BYTES: u64 = 8 << 20;
+
+/// Memory that the tree of a `tilemapresource.xml` may take; that of a maker's has some dozens of elements.
+const MAX_TREE_BYTES: u64 = 16 << 20;
 
 /// All that is said.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -70,19 +73,18 @@ impl About {
 
     /// Takes a `tilemapresource.xml` (TMS 1.0.0), whose rows are counted from the south.
     pub(super) fn take_tile_map(&mut self, text: &str) {
-        let Ok(document) = Document::parse(text.trim_start_matches('\u{feff}')) else { return };
+        let Some(document) = xml::tree(text, MAX_TREE_BYTES) else { return };
         let root = document.root_element();
         if !root.has_tag_name("TileMap") {
             return;
         }
         self.from_south = Some(true);
-        let named = |name: &str| root.children().find(|child| child.has_tag_name(name));
-        if let Some(system) = named("SRS").and_then(|node| node.text()) {
-            let system = system.trim().to_ascii_uppercase();
-            let is_web = ["EPSG:3857", "EPSG:900913", "EPSG:3785", "OSGEO:41001", ""].contains(&&*system);
+        if let Some(system) = xml::text_of(root, "SRS") {
+            let system = system.to_ascii_uppercase();
+            let is_web = ["EPSG:3857", "EPSG:900913", "EPSG:3785", "OSGEO:41001"].contains(&&*system);
             self.other_system = (!is_web).then(|| harmless(&system, 60));
         }
-        if let Some(node) = named("BoundingBox") {
+        if let Some(node) = root.children().find(|child| child.has_tag_name("BoundingBox")) {
             let side = |name: &str| node.attribute(name).and_then(|text| text.trim().parse::<f64>().ok());
             let sides = ["minx", "miny", "maxx", "maxy"].map(side);
             if let [Some(west), Some(south), Some(east), Some(north)] = sides {

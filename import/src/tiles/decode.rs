@@ -48,23 +48,19 @@ pub(super) struct Texels {
 ///
 /// # Errors
 /// Damage; a format or size that is not read.
-pub(super) fn decode(path: &Path, place: &str, bytes: &[u8]) -> Result<Texels, LayoutError> {
-    let problem = |words: &str| LayoutError::damaged(path, place, words);
-    guard(
-        path,
-        || place.to_owned(),
-        || {
-            if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
-                of_png(bytes).map_err(|words| problem(&words))
-            } else if bytes.starts_with(b"\xff\xd8\xff") {
-                of_jpeg(bytes).map_err(|words| problem(&words))
-            } else if is_webp(bytes) {
-                of_webp(bytes).map_err(|words| problem(&words))
-            } else {
-                Err(other(path, place, bytes))
-            }
-        },
-    )
+pub(super) fn decode(path: &Path, place: impl Fn() -> String, bytes: &[u8]) -> Result<Texels, LayoutError> {
+    let problem = |words: &str| LayoutError::damaged(path, place(), words);
+    guard(path, &place, || {
+        if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+            of_png(bytes).map_err(|words| problem(&words))
+        } else if bytes.starts_with(b"\xff\xd8\xff") {
+            of_jpeg(bytes).map_err(|words| problem(&words))
+        } else if is_webp(bytes) {
+            of_webp(bytes).map_err(|words| problem(&words))
+        } else {
+            Err(other(path, &place(), bytes))
+        }
+    })
 }
 
 /// What is no tile of pictures.

@@ -58,8 +58,8 @@ impl TileDem {
     }
 
     /// The heights of a tile.
-    fn heights(&self, label: &str, texels: &Texels) -> Result<Vec<f64>, LayoutError> {
-        check(&self.pyramid, label, texels)?;
+    fn heights(&self, tile: Tile, texels: &Texels) -> Result<Vec<f64>, LayoutError> {
+        check(&self.pyramid, tile, texels)?;
         let mut heights = Vec::with_capacity(texels.rgba.len());
         for [red, green, blue, alpha] in &texels.rgba {
             if *alpha == 0 {
@@ -68,7 +68,8 @@ impl TileDem {
             }
             if let Some(guessed) = self.found.guessed.filter(|guessed| !guessed.holds(*red)) {
                 let problem = format!(
-                    "{label} has colours that are no heights as {} packs them, though other tiles look so; if heights are packed into the colours, state how",
+                    "{} has colours that are no heights as {} packs them, though other tiles look so; if heights are packed into the colours, state how",
+                    self.pyramid.archive.label(tile),
                     guessed.name()
                 );
                 return Err(LayoutError::unsupported(self.pyramid.path(), problem).mended_by(Remedy::Decode));
@@ -82,15 +83,16 @@ impl TileDem {
         let part = self.pyramid.part(tile);
         let window = Window { col: part.to[0], row: part.to[1], width: part.size[0], height: part.size[1] };
         if let Some(texels) = self.pyramid.tile(tile, &mut worker.bytes)? {
-            let heights = self.heights(&self.pyramid.archive.label(tile), &texels)?;
+            let heights = self.heights(tile, &texels)?;
             return sink.put(window, &cut(&heights, texels.side, part));
         }
         let above = self.pyramid.plan.above(&*self.pyramid.archive, tile)?;
         if worker.coarser.as_ref().map(|(kept, ..)| *kept) != above {
             worker.coarser = None;
-            if let Some((coarser, texels)) = self.pyramid.coarser(tile, &mut worker.bytes)? {
-                let heights = self.heights(&self.pyramid.archive.label(coarser), &texels)?;
-                worker.coarser = Some((coarser, texels.side, heights));
+            if let Some(above) = above
+                && let Some(texels) = self.pyramid.coarser(above, &mut worker.bytes)?
+            {
+                worker.coarser = Some((above, texels.side, self.heights(above, &texels)?));
             }
         }
         let Some((coarser, side, heights)) = &worker.coarser else { return sink.put_void(window) };

@@ -1,6 +1,7 @@
 //! A directory of PMTiles: entries in the order of their numbers (PMTiles 3.4, section 4.2).
 //!
-//! Numbers, lengths of runs, lengths and places come in four columns of numbers of variable length. What comes out is in order, and no two entries overlap. Cost: 32 bytes of memory an entry.
+//! Numbers, lengths of runs, lengths and places come in four columns of numbers of variable length, and nothing behind them: so what a directory takes to unpack is in proportion to its entries. What comes
+//! out is in order, and no two entries overlap. Cost: 32 bytes of memory an entry.
 
 use super::curve::FIRST;
 
@@ -76,6 +77,9 @@ impl Directory {
             entry.offset = if offset == 0 { follows.ok_or(SHORT)? } else { offset - 1 };
             follows = entry.offset.checked_add(entry.length);
         }
+        if !numbers.0.is_empty() {
+            return Err("it has bytes behind its last entry; fetch the file again");
+        }
         let mut end = 0;
         for (i, entry) in entries.iter().enumerate() {
             if i > 0 && entry.id < end {
@@ -141,6 +145,8 @@ mod tests {
         assert!(refused(&[2, 1, 1, 1]).contains("cut short"));
         assert!(refused(&[1, 5, 1, 0, 1]).contains("cut short"), "no bytes");
         assert!(refused(&[1, 5, 1, 9, 0]).contains("cut short"), "follows nothing");
+        assert!(refused(&[1, 5, 1, 9, 1, 0]).contains("behind its last entry"));
+        assert!(refused(&[0, 0]).contains("behind its last entry"), "no entries and a byte");
         assert!(refused(&[2, 5, 0, 1, 1, 9, 9, 1, 0]).contains("out of order"));
         assert!(refused(&[2, 5, 1, 2, 1, 9, 9, 1, 0]).contains("out of order"), "a run into the next");
         let long = [0xff; 9];

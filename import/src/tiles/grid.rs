@@ -4,6 +4,7 @@
 
 use std::f64::consts::PI;
 use std::fmt;
+use terrasoar_layout::portable::{ln_1p, sin_cos};
 
 /// Deepest zoom that is read: a texel is some millimetres then.
 pub(super) const MAX_ZOOM: u8 = 30;
@@ -113,7 +114,11 @@ impl Area {
             && (-90.0..=90.0).contains(&south)
             && (-90.0..=90.0).contains(&north);
         let x = |degrees: f64| (degrees / 360.0 + 0.5).clamp(0.0, 1.0);
-        let y = |degrees: f64| (0.5 - degrees.to_radians().tan().asinh() / (2.0 * PI)).clamp(0.0, 1.0);
+        // Half the difference of these logarithms is the inverse hyperbolic sine of the tangent.
+        let y = |degrees: f64| {
+            let sine = sin_cos(degrees.to_radians()).0;
+            (0.5 - (ln_1p(sine) - ln_1p(-sine)) / (4.0 * PI)).clamp(0.0, 1.0)
+        };
         let area = [x(west), y(north), x(east), y(south)];
         (is_sound && area[0] < area[2] && area[1] < area[3]).then_some(Self(area))
     }

@@ -76,13 +76,14 @@ impl TileImage {
             }
             return Ok(());
         }
-        let coarser = self.pyramid.coarser(tile, &mut bytes)?;
+        let above = self.pyramid.plan.above(&*self.pyramid.archive, tile)?;
+        let coarser = above.map(|above| self.pyramid.coarser(above, &mut bytes)).transpose()?.flatten();
         let mut line = vec![[0; 4]; width];
         for row in 0..part.size[1] {
-            if let Some((above, texels)) = &coarser {
+            if let (Some(above), Some(texels)) = (above, &coarser) {
                 for (col, to) in (0..part.size[0]).zip(&mut line) {
                     let texel = [part.from[0] + col, part.from[1] + row];
-                    let at = place_above(tile, self.pyramid.plan.side, *above, texels.side, texel);
+                    let at = place_above(tile, self.pyramid.plan.side, above, texels.side, texel);
                     let [col, row] = at.map(|at| (at as usize).min(texels.side as usize - 1));
                     *to = texels.rgba[row * texels.side as usize + col];
                 }

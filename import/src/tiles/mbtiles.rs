@@ -119,8 +119,10 @@ impl Mbtiles {
     }
 
     fn database(&self) -> MutexGuard<'_, Connection> {
+        let database = self.database.lock().unwrap_or_else(PoisonError::into_inner);
+        // Behind the lock, for another thread's statement would go on with this one's allowance.
         self.left.store(self.allowance, Ordering::Relaxed);
-        self.database.lock().unwrap_or_else(PoisonError::into_inner)
+        database
     }
 
     /// Calls `each` with the rows of a statement, until it wants no more.

@@ -154,7 +154,7 @@ impl Pyramid {
         if !self.archive.fetch(tile, most_bytes(side), bytes)? {
             return Ok(None);
         }
-        let texels = decode(self.path(), &self.archive.label(tile), bytes)?;
+        let texels = decode(self.path(), || self.archive.label(tile), bytes)?;
         if texels.side != side {
             return Err(LayoutError::damaged(
                 self.path(),
@@ -169,13 +169,12 @@ impl Pyramid {
         Ok(Some(texels))
     }
 
-    /// The nearest coarser tile in place of a missing one, if there is one.
-    fn coarser(&self, missing: Tile, bytes: &mut Vec<u8>) -> Result<Option<(Tile, Texels)>, LayoutError> {
-        let Some(tile) = self.plan.above(&*self.archive, missing)? else { return Ok(None) };
+    /// A coarser tile that there is, of whatever size.
+    fn coarser(&self, tile: Tile, bytes: &mut Vec<u8>) -> Result<Option<Texels>, LayoutError> {
         if !self.archive.fetch(tile, most_of_all(), bytes)? {
             return Ok(None);
         }
-        Ok(Some((tile, decode(self.path(), &self.archive.label(tile), bytes)?)))
+        decode(self.path(), || self.archive.label(tile), bytes).map(Some)
     }
 
     /// The part of a tile that is read: its first column and row, and how many.

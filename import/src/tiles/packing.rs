@@ -3,7 +3,7 @@
 //! Cost: where nobody says, some tiles are decoded.
 
 use super::decode::{Stored, Texels};
-use super::{Pyramid, decode};
+use super::{Pyramid, Tile, decode};
 use crate::png::{Evidence, Packing};
 use crate::value::{Decode, decode as named};
 use terrasoar_layout::dem::Warning;
@@ -30,7 +30,7 @@ pub(super) fn find(pyramid: &Pyramid, typed: Option<&str>) -> Result<Found, Layo
     if let Some(tile) = first
         && let Some(texels) = pyramid.tile(*tile, &mut bytes)?
     {
-        check(pyramid, &pyramid.archive.label(*tile), &texels)?;
+        check(pyramid, *tile, &texels)?;
     }
     if let Some(typed) = typed {
         return Ok(Found { packing: named(typed)?, guessed: None, by: "as typed".into(), warning: None });
@@ -54,15 +54,18 @@ pub(super) fn find(pyramid: &Pyramid, typed: Option<&str>) -> Result<Found, Layo
 }
 
 /// Refuses a tile whose colours are not those that were packed.
-pub(super) fn check(pyramid: &Pyramid, label: &str, texels: &Texels) -> Result<(), LayoutError> {
-    let refused = |problem: String| Err(LayoutError::unsupported(pyramid.path(), problem));
+pub(super) fn check(pyramid: &Pyramid, tile: Tile, texels: &Texels) -> Result<(), LayoutError> {
+    let refused = |problem: String| {
+        let label = pyramid.archive.label(tile);
+        Err(LayoutError::unsupported(pyramid.path(), format!("{label} {problem}")))
+    };
     match texels.stored {
         Stored::About(how) => refused(format!(
-            "{label} is {how}, which changes colours a little; heights packed into them would be wrong by metres to thousands of metres; use tiles of PNG or lossless WebP, or lay these over a terrain as a picture"
+            "is {how}, which changes colours a little; heights packed into them would be wrong by metres to thousands of metres; use tiles of PNG or lossless WebP, or lay these over a terrain as a picture"
         )),
-        Stored::Exactly { bits: 16 } => refused(format!(
-            "{label} has 16 bits a channel, and heights are packed into channels of 8; make the tiles again"
-        )),
+        Stored::Exactly { bits: 16 } => refused(
+            "has 16 bits a channel, and heights are packed into channels of 8; make the tiles again".into(),
+        ),
         Stored::Exactly { .. } => Ok(()),
     }
 }
@@ -75,7 +78,7 @@ fn guess(pyramid: &Pyramid) -> Result<Found, LayoutError> {
         if !pyramid.archive.fetch(*tile, decode::most_bytes(pyramid.plan.side), &mut bytes)? {
             continue;
         }
-        let texels = decode::decode(pyramid.path(), &pyramid.archive.label(*tile), &bytes)?;
+        let texels = decode::decode(pyramid.path(), || pyramid.archive.label(*tile), &bytes)?;
         looked_at += 1;
         for row in texels.rgba.chunks_exact(texels.side as usize) {
             let mut before = None;

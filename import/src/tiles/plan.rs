@@ -42,8 +42,6 @@ pub(super) struct Plan {
     pub(super) words: String,
     /// What is missing, in words.
     pub(super) missing: Option<String>,
-    /// What was passed over, in words.
-    pub(super) notes: Vec<String>,
 }
 
 /// What may be read of a pyramid: a person's bounds, those around what it is for, those that it states.
@@ -145,7 +143,6 @@ impl Plan {
             samples: level.samples.clone(),
             words: String::new(),
             missing: None,
-            notes: Vec::new(),
         };
         plan.words = plan.say(coarsest, deepest, level, options.zoom.is_some());
         plan.missing = plan.count_missing(archive, level)?;
@@ -259,7 +256,7 @@ fn first_tile(archive: &dyn Archive, level: &Level) -> Result<Texels, LayoutErro
     let mut bytes = Vec::new();
     for tile in &level.samples {
         if archive.fetch(*tile, most_of_all(), &mut bytes)? {
-            return decode(archive.path(), &archive.label(*tile), &bytes);
+            return decode(archive.path(), || archive.label(*tile), &bytes);
         }
     }
     Err(LayoutError::damaged(archive.path(), "tiles", "they changed while they were read; start again"))

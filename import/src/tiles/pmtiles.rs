@@ -27,8 +27,9 @@ const HEADER_BYTES: usize = 127;
 const MAX_DIRECTORY_BYTES: u64 = 16 << 20;
 /// How deep leaves lie in leaves.
 const DEEPEST: u32 = 4;
-/// Entries of leaves that are kept.
+/// Entries of leaves that are kept, and leaves, which are looked through one by one.
 const KEPT_ENTRIES: usize = 1 << 17;
+const KEPT_LEAVES: usize = 64;
 /// Entries that a survey goes through: a world of zoom 15 has some hundred million.
 const MOST_ENTRIES: u64 = 1 << 29;
 
@@ -167,8 +168,14 @@ impl Pmtiles {
             None => Arc::new(self.directory(part, &place())?),
         };
         kept.push_front((part, Arc::clone(&leaf)));
-        while kept.len() > 1 && kept.iter().map(|(_, leaf)| leaf.len()).sum::<usize>() > KEPT_ENTRIES {
+        while kept.len() > 1
+            && (kept.len() > KEPT_LEAVES
+                || kept.iter().map(|(_, leaf)| leaf.len()).sum::<usize>() > KEPT_ENTRIES)
+        {
             kept.pop_back();
+        }
+        if leaf.first().is_none() {
+            return Err(damaged("it leads to no tile; fetch the file again"));
         }
         if leaf.first().is_some_and(|first| first < entry.id) || leaf.end() > end {
             return Err(damaged("its tiles are not those that it is for; fetch the file again"));
@@ -207,7 +214,7 @@ impl Pmtiles {
         seen: &mut u64,
         each: &mut dyn FnMut(Block),
     ) -> Result<(), LayoutError> {
-        *seen += directory.len() as u64;
+        *seen += directory.len().max(1) as u64;
         if *seen > MOST_ENTRIES {
             return Err(LayoutError::unsupported(
                 &self.path,

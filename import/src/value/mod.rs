@@ -9,5 +9,5 @@ mod voids;
 pub(crate) use band::band;
 pub(crate) use decode::{Decode, decode};
 pub(crate) use suspicion::Suspicion;
-pub(crate) use unit::{US_SURVEY_FOOT_M, unit_m};
+pub(crate) use unit::{STANDARD_GRAVITY, US_SURVEY_FOOT_M, unit_m};
 pub(crate) use voids::Voids;

@@ -7,8 +7,9 @@ use terrasoar_layout::dem::Warning;
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::number;
 
-/// Numbers that commonly mean "no data".
-const COMMON: [f64; 12] = [
+/// Numbers that commonly mean "no data". -10,000 is black where heights are packed into colours as Mapbox has it.
+const COMMON: [f64; 13] = [
+    -10_000.0,
     -32768.0,
     -32767.0,
     -9999.0,
@@ -143,6 +144,8 @@ mod tests {
         assert!(of(&[-9999.0, -10_000.0, -9_500.0, 100.0], 1.0).is_empty());
         assert!(of(&[100.0, 200.0, 300.0], 1.0).is_empty());
         assert_eq!(of(&[-9999.0, 12.0, 80.0], 1.0).len(), 1);
+        assert_eq!(of(&[-10_000.0, 12.0, 80.0], 1.0).len(), 1);
+        assert!(of(&[-10_000.0, -9_800.0, -4_000.0], 1.0).is_empty(), "the floor of a trench");
         assert!(of(&[f64::NAN], 1.0).is_empty());
     }
 

@@ -3,6 +3,8 @@
 //! Names are compared without capitals, spaces, dots, hyphens and a plural's s. A name that is not in the list is no unit: the caller says so. Sizes are those of the
 //! EPSG registry.
 
+/// Metres a second and second, by which a geopotential is divided.
+pub(crate) const STANDARD_GRAVITY: f64 = 9.80665;
 /// Metres of a US survey foot.
 pub(crate) const US_SURVEY_FOOT_M: f64 = 1200.0 / 3937.0;
 

@@ -3,6 +3,7 @@
 //! As GDAL has it: in single precision where both types fit into it, rounded half away from zero, and held within the type.
 
 use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::portable::pow;
 
 /// A power between two ranges.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +37,7 @@ impl Change {
         }
         if let Some(Power { exponent, from: [low, high], to: [least, most] }) = self.power {
             let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
-            value = rounded((most - least) * share.powf(exponent) + least);
+            value = rounded((most - least) * pow(share, exponent) + least);
         }
         if !self.table.is_empty() && !value.is_nan() {
             value = rounded(self.looked_up(value));

@@ -216,16 +216,8 @@ impl Reader for Painted {
 
     fn warnings(&self) -> Vec<Warning> {
         let lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut warnings: Vec<Warning> = lost
-            .values()
-            .take(MOST_NAMED)
-            .map(|why| {
-                Warning::new(format!(
-                    "{}; the file was left out: its ground is that of other files, or void",
-                    harmless(why, 360)
-                ))
-            })
-            .collect();
+        let mut warnings: Vec<Warning> =
+            lost.values().take(MOST_NAMED).map(|why| guard::left_out(why)).collect();
         if lost.len() > MOST_NAMED {
             warnings.push(Warning::new(format!(
                 "{} more files of the virtual raster were left out",

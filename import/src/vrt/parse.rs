@@ -4,9 +4,9 @@
 
 use super::change::{Change, Power};
 use super::said::{Band, Part, Source, Vrt};
-use super::text::{number_of, text_of};
 use crate::options::{OpenOptions, Resampling};
 use crate::value;
+use crate::xml::{self, number_of, text_of};
 use roxmltree::{Document, Node};
 use std::path::Path;
 use terrasoar_layout::dem::SampleType;
@@ -16,6 +16,8 @@ use terrasoar_layout::words::harmless;
 
 /// Sources of one band, at most.
 const MOST_SOURCES: usize = 1 << 16;
+/// Samples of a grid, at most: 256 times those of the largest terrain, for what is thinned out.
+const MOST_SAMPLES: u64 = 1 << 40;
 /// Numbers of a table.
 const MOST_ENTRIES: usize = 1 << 16;
 
@@ -49,6 +51,15 @@ pub(super) fn vrt(path: &Path, tree: &Document<'_>, options: &OpenOptions) -> Re
         })
     };
     let samples = [side("rasterXSize")?, side("rasterYSize")?];
+    if u64::from(samples[0]) * u64::from(samples[1]) > MOST_SAMPLES {
+        return Err(LayoutError::unsupported(
+            path,
+            format!(
+                "it has {} x {} samples, and of a virtual raster at most {MOST_SAMPLES} are read; cut out what you need: gdal_translate -projwin W N E S -of VRT",
+                samples[0], samples[1]
+            ),
+        ));
+    }
     let is_alpha = |node: &Node<'_, '_>| text_of(*node, "ColorInterp") == Some("Alpha");
     let bands: Vec<Node<'_, '_>> =
         root.children().filter(|node| node.has_tag_name("VRTRasterBand")).collect();
@@ -77,19 +88,16 @@ pub(super) fn vrt(path: &Path, tree: &Document<'_>, options: &OpenOptions) -> Re
         }
     };
     let corners = text_of(root, "GeoTransform").map(|text| {
-        let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
-        let map = numbers.and_then(|numbers| <[f64; 6]>::try_from(numbers).ok());
-        map.filter(|map| map.iter().all(|value| value.is_finite()) && map[1] * map[5] != map[2] * map[4])
-            .ok_or_else(|| {
-                LayoutError::damaged(
-                    path,
-                    "GeoTransform",
-                    format!(
-                        "\"{}\" does not place a grid; set it again: gdal_edit.py -a_ullr W N E S FILE.vrt",
-                        harmless(text, 80)
-                    ),
-                )
-            })
+        xml::transform(text).ok_or_else(|| {
+            LayoutError::damaged(
+                path,
+                "GeoTransform",
+                format!(
+                    "\"{}\" does not place a grid; set it again: gdal_edit.py -a_ullr W N E S FILE.vrt",
+                    harmless(text, 80)
+                ),
+            )
+        })
     });
     let has = |name: &str| root.children().any(|node| node.has_tag_name(name));
     let mask = root.children().find(|node| node.has_tag_name("MaskBand"));

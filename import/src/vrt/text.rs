@@ -1,7 +1,8 @@
 //! The text of a virtual raster, taken apart into a tree within bounds: entities are refused, and so is a text whose tree would take more memory than is allowed.
 
 use crate::options::OpenOptions;
-use roxmltree::{Document, Node, ParsingOptions};
+use crate::xml::{self, Crowd};
+use roxmltree::{Document, ParsingOptions};
 use std::io::Read;
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
@@ -10,13 +11,6 @@ use terrasoar_layout::remedy::Remedy;
 /// Share of the memory allowed that the text may take, and that its tree may.
 const TEXT_SHARE: u64 = 16;
 const TREE_SHARE: u64 = 4;
-/// Bytes of the tree for an element with its text, and for an attribute.
-const NODE_BYTES: u64 = 2 * 80;
-const ATTRIBUTE_BYTES: u64 = 80;
-/// Attributes of one element, at most: a tree compares them with each other.
-const MOST_ATTRIBUTES: u64 = 256;
-/// Elements within elements.
-const DEEPEST: u64 = 64;
 
 /// Whether a file begins as a virtual raster.
 pub(crate) fn is_vrt(head: &[u8]) -> bool {
@@ -49,33 +43,16 @@ pub(super) fn read(path: &Path, options: &OpenOptions) -> Result<String, LayoutE
     if bytes.len() as u64 > most {
         return Err(too_large(path, format!("its text is longer than {} MiB", most >> 20)));
     }
-    let (mut nodes, mut attributes, mut of_one, mut depth, mut deepest) = (0u64, 0u64, 0u64, 0i64, 0i64);
-    let mut crowded = 0;
-    let mut before = 0u8;
-    for byte in &bytes {
-        match byte {
-            b'<' => (nodes, of_one, depth) = (nodes + 1, 0, depth + 1),
-            // An end takes back itself and its beginning.
-            b'/' if before == b'<' => depth -= 2,
-            b'>' if matches!(before, b'/' | b'?' | b'-') => depth -= 1,
-            b'=' => (attributes, of_one) = (attributes + 1, of_one + 1),
-            b'>' => of_one = 0,
-            _ => {}
+    match xml::check(&bytes, allowed / TREE_SHARE) {
+        Ok(()) => {}
+        Err(Crowd::Large(nodes)) => return Err(too_large(path, format!("it has {nodes} elements"))),
+        Err(Crowd::Steep) => {
+            return Err(LayoutError::damaged(
+                path,
+                "its text",
+                "its elements lie too deep in each other, or have too many attributes; write it again with gdalbuildvrt",
+            ));
         }
-        crowded = crowded.max(of_one);
-        deepest = deepest.max(depth);
-        before = *byte;
-    }
-    if nodes * NODE_BYTES + attributes * ATTRIBUTE_BYTES > allowed / TREE_SHARE {
-        return Err(too_large(path, format!("it has {nodes} elements")));
-    }
-    // An equals sign within a long text is none of an attribute, but hundreds in a row are no virtual raster's either.
-    if crowded > MOST_ATTRIBUTES || deepest > DEEPEST as i64 {
-        return Err(LayoutError::damaged(
-            path,
-            "its text",
-            "its elements lie too deep in each other, or have too many attributes; write it again with gdalbuildvrt",
-        ));
     }
     Ok(String::from_utf8_lossy(&bytes).trim_start_matches('\u{feff}').to_owned())
 }
@@ -115,18 +92,6 @@ pub(super) fn tree<'t>(path: &Path, text: &'t str) -> Result<Document<'t>, Layou
         },
     )?;
     Ok(parsed)
-}
-
-/// The text of a child.
-pub(super) fn text_of<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
-    let found = node.children().find(|child| child.has_tag_name(name))?;
-    found.text().map(str::trim).filter(|text| !text.is_empty())
-}
-
-/// The number of a child: finite.
-pub(super) fn number_of(node: Node<'_, '_>, name: &str) -> Option<f64> {
-    let found = node.children().find(|child| child.has_tag_name(name))?;
-    found.text()?.trim().parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 #[cfg(test)]

@@ -6,6 +6,8 @@
 //! old sample, up to one step off; bilinear and cubic ones stand where they belong. Cost: the samples under the kernel.
 
 use crate::options::Resampling;
+use std::f64::consts::PI;
+use terrasoar_layout::portable::sin_cos;
 
 /// Old samples at hand: NaN for voids and outside.
 pub(super) trait Samples {
@@ -189,8 +191,7 @@ fn lanczos(x: f64) -> f64 {
     if x.abs() >= 3.0 {
         return 0.0;
     }
-    let sinc =
-        |x: f64| if x == 0.0 { 1.0 } else { (std::f64::consts::PI * x).sin() / (std::f64::consts::PI * x) };
+    let sinc = |x: f64| if x == 0.0 { 1.0 } else { sin_cos(PI * x).0 / (PI * x) };
     sinc(x) * sinc(x / 3.0)
 }
 

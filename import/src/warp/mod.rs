@@ -16,10 +16,11 @@ pub(crate) use mapping::{Mapping, Projections, apply};
 use std::path::{Path, PathBuf};
 pub(crate) use store::Store;
 use target::Grid;
-pub(crate) use target::mesh;
 pub(crate) use target::system as target_system;
+pub(crate) use target::{mesh, three_digits};
 use terrasoar_layout::dem::{SampleSink, SampleType, Window};
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::portable::hypot;
 use terrasoar_layout::remedy::Remedy;
 
 /// Share of the memory allowed that old samples may take.
@@ -297,7 +298,7 @@ fn rim<'a>(places: impl Iterator<Item = &'a [f64; 2]>) -> Option<([f64; 2], [f64
 /// The grid in the same system with its axes north-up, its steps those of the file.
 fn north_up(path: &Path, system: &System, map: &[f64; 6], samples: [u32; 2]) -> Result<Grid, LayoutError> {
     // The step along what is nearer to the east, and across it so that as many samples cover the same ground.
-    let along = if map[1].abs() >= map[2].abs() { map[1].hypot(map[4]) } else { map[2].hypot(map[5]) };
+    let along = if map[1].abs() >= map[2].abs() { hypot(map[1], map[4]) } else { hypot(map[2], map[5]) };
     let steps = [along, (map[1] * map[5] - map[2] * map[4]).abs() / along];
     target::grid(path, samples, steps, None, system.signs, |at| Some(apply(map, at)))
 }

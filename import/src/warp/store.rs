@@ -20,9 +20,15 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    /// Bytes that samples take.
+    /// Bytes that samples take; the largest number there is where they are more, which neither memory nor a file holds.
     pub(crate) fn bytes(samples: [u32; 2], sample_bytes: u64) -> u64 {
-        u64::from(samples[0]) * u64::from(samples[1]) * sample_bytes
+        // Two of 32 bits fit in 64.
+        (u64::from(samples[0]) * u64::from(samples[1])).saturating_mul(sample_bytes)
+    }
+
+    /// Bytes that several grids take.
+    pub(crate) fn all_bytes<'a>(grids: impl IntoIterator<Item = &'a [u32; 2]>, sample_bytes: u64) -> u64 {
+        grids.into_iter().map(|samples| Self::bytes(*samples, sample_bytes)).fold(0, u64::saturating_add)
     }
 
     /// An empty store, in memory or in a file in `folder`.
@@ -48,13 +54,13 @@ impl Store {
         in_memory: bool,
         folder: &Path,
     ) -> Result<Vec<Self>, LayoutError> {
-        let all = samples.iter().map(|samples| Self::bytes(*samples, sample_bytes)).sum();
+        let all = Self::all_bytes(samples, sample_bytes);
         let action = "cannot keep the samples in a temporary file in";
         let kept = Arc::new(Kept::new(all, in_memory, folder, action)?);
-        let mut end = 0;
+        let mut end = 0u64;
         let stores = samples.iter().map(|samples| {
             let begin = end;
-            end += Self::bytes(*samples, sample_bytes);
+            end = begin.saturating_add(Self::bytes(*samples, sample_bytes));
             Self { samples: *samples, sample_bytes, kept: kept.clone(), begin }
         });
         Ok(stores.collect())

@@ -112,10 +112,7 @@ pub(super) fn step(
         None => {
             let steps = [[old_map[1], old_map[4]], [old_map[2], old_map[5]]];
             let (steps, _) = old.steps_m(centre, steps).ok_or_else(|| outside(path))?;
-            let mean = (steps[0] * steps[1]).sqrt();
-            // Three digits are as good and read better.
-            let digit = 10f64.powf(mean.log10().floor() - 2.0);
-            (mean / digit).round() * digit
+            three_digits((steps[0] * steps[1]).sqrt())
         }
     };
     Ok(match new.unit.as_ref().map(|unit| unit.size) {
@@ -123,6 +120,11 @@ pub(super) fn step(
         Some(HorizontalSize::Radians(size)) => metres / (new.radius_m.unwrap_or(6_378_137.0) * size),
         None => metres,
     })
+}
+
+/// A step's first three digits, which are as good and read better: the number that this decimal text reads back as.
+pub(crate) fn three_digits(step: f64) -> f64 {
+    format!("{step:.2e}").parse().unwrap_or(step)
 }
 
 /// The new grid of a `step`, over the old one that `over` brings into the new system.

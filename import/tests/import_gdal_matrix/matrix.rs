@@ -12,6 +12,7 @@ pub(crate) const PNG: Format = Format { name: "PNG", driver: "PNG", ending: "png
 pub(crate) const PNM: Format = Format { name: "Netpbm (PGM)", driver: "PNM", ending: "pgm" };
 pub(crate) const VRT: Format = Format { name: "Virtual raster (.vrt)", driver: "VRT", ending: "vrt" };
 pub(crate) const NETCDF: Format = Format { name: "netCDF", driver: "netCDF", ending: "nc" };
+pub(crate) const GRIB: Format = Format { name: "GRIB 2", driver: "GRIB", ending: "grib2" };
 pub(crate) const BT: Format = Format { name: "VTP BT", driver: "BT", ending: "bt" };
 pub(crate) const DTED: Format = Format { name: "DTED", driver: "DTED", ending: "dt0" };
 pub(crate) const HGT: Format = Format { name: ".hgt tile", driver: "SRTMHGT", ending: "hgt" };
@@ -21,11 +22,12 @@ pub(crate) const SURFER_6: Format = Format { name: "Surfer 6", driver: "GSBG", e
 pub(crate) const SURFER_7: Format = Format { name: "Surfer 7", driver: "GS7BG", ending: "grd" };
 
 /// Formats in the order of the page.
-pub(crate) const FORMATS: [Format; 17] = [
+pub(crate) const FORMATS: [Format; 18] = [
     GEOTIFF,
     COG,
     VRT,
     NETCDF,
+    GRIB,
     ASCII,
     ESRI,
     ENVI,
@@ -127,6 +129,7 @@ pub(crate) fn all() -> Vec<Combination> {
     meanings(&mut list);
     labelled_and_text(&mut list);
     netcdf(&mut list);
+    grib(&mut list);
     virtual_rasters(&mut list);
     pictures(&mut list);
     tiles_and_sheets(&mut list);
@@ -328,6 +331,58 @@ fn netcdf(list: &mut Vec<Combination>) {
                 .stored("version 4, DEFLATE", &["FORMAT=NC4", "COMPRESS=DEFLATE"])
                 .with(Void::Declared),
         );
+    }
+}
+
+/// Packings of GRIB, and what it knows of maps; places are in millionths of a degree there.
+fn grib(list: &mut Vec<Combination>) {
+    const EVEN: System = System { name: "WGS 84, even degrees", step: [0.0008, 0.0006], ..DEGREES };
+    let packings: [(&str, &[&str]); 7] = [
+        ("simple packing", &["DATA_ENCODING=SIMPLE_PACKING"]),
+        ("complex packing", &["DATA_ENCODING=COMPLEX_PACKING", "SPATIAL_DIFFERENCING_ORDER=0"]),
+        ("differences", &["DATA_ENCODING=COMPLEX_PACKING", "SPATIAL_DIFFERENCING_ORDER=1"]),
+        ("differences of differences", &["DATA_ENCODING=COMPLEX_PACKING", "SPATIAL_DIFFERENCING_ORDER=2"]),
+        ("reals", &["DATA_ENCODING=IEEE_FLOATING_POINT"]),
+        ("PNG", &["DATA_ENCODING=PNG"]),
+        ("JPEG 2000", &["DATA_ENCODING=JPEG2000"]),
+    ];
+    for (name, options) in packings {
+        for kind in [Kind::Byte, Kind::UInt16, Kind::Int16, Kind::Float32] {
+            list.push(Combination::new(GRIB, kind, EVEN).stored(name, options));
+        }
+        let is_complex = options.len() > 1;
+        if is_complex {
+            list.push(Combination::new(GRIB, Kind::Int16, EVEN).stored(name, options).with(Void::Declared));
+        }
+    }
+    let maps = [
+        System { corner: [179.99, -17.0], ..EVEN },
+        System { corner: [359.98, 51.0], ..EVEN },
+        System { corner: [-120.5, 40.0], ..EVEN },
+        UTM,
+        SYSTEMS[8],
+        SYSTEMS[9],
+        system("RGF93 / Lambert-93", "EPSG:2154", Unit::Metres(1.0), [700_000.0, 6_600_000.0], 50.0),
+        system(
+            "Antarctic Polar Stereographic",
+            "EPSG:3031",
+            Unit::Metres(1.0),
+            [1_000_000.0, 500_000.0],
+            100.0,
+        ),
+        system(
+            "NSIDC Polar Stereographic North",
+            "EPSG:3413",
+            Unit::Metres(1.0),
+            [-500_000.0, -900_000.0],
+            100.0,
+        ),
+        system("NAD83 / Conus Albers", "EPSG:5070", Unit::Metres(1.0), [100_000.0, 1_500_000.0], 100.0),
+    ];
+    for place in maps {
+        for (name, options) in [packings[0], packings[3]] {
+            list.push(Combination::new(GRIB, Kind::Int16, place).stored(name, options));
+        }
     }
 }
 

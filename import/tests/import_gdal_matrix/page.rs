@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// How a format is known, what is said beside it, and what no table shows.
-const NOTES: [(&str, &str); 17] = [
+const NOTES: [(&str, &str); 18] = [
     (
         "GeoTIFF",
         "Known by its first bytes, BigTIFF too. Keys, world files, `.prj`, `.aux.xml` and `.msk` are read. Chunks are decoded in parallel and never more than a few at a time; \
@@ -24,6 +24,12 @@ const NOTES: [(&str, &str); 17] = [
         "netCDF",
         "Classic files, those with 64-bit offsets, and version 4 (HDF5). COARDS and CF: coordinates, `_FillValue`, `missing_value`, `scale_factor`, `add_offset`, `units`, `positive`, grid \
          mappings; rows and columns either way. Of several variables `--band NAME` picks one. Units of heights are read and are not in the table, for GDAL does not write them.",
+    ),
+    (
+        "GRIB 2",
+        "Known by its first bytes. One field is read: the only one, the only one of the ground, or the one that `--band` names by number or name (HGT, GP, DIST). Packing: simple, complex with and without differences, reals, PNG, \
+         JPEG 2000, and CCSDS, which this GDAL does not write; bitmaps and missing numbers are voids. Grids: longitude and latitude, Mercator, transverse Mercator, polar stereographic, Lambert's conic, Albers, Lambert's \
+         azimuthal; samples in any order. A geopotential is divided by gravity. Rotated, Gaussian and reduced grids, spherical harmonics and GRIB 1 are refused with a command that converts them.",
     ),
     (
         "Esri ASCII grid",

@@ -9,7 +9,7 @@ use terrasoar_import::{OpenOptions, Priority, open_with};
 
 const UTM: &str = "EPSG:32632";
 
-fn warnings(paths: &[PathBuf], options: &OpenOptions) -> Vec<String> {
+pub(crate) fn warnings(paths: &[PathBuf], options: &OpenOptions) -> Vec<String> {
     let dem = open_with(paths, options).unwrap();
     collect(&*dem).unwrap();
     dem.warnings().into_iter().map(|warning| warning.words).collect()
@@ -84,6 +84,35 @@ fn what_cannot_be_laid_with_the_others_is_left_out() {
     let far = at(900_000.0, 9_000_000.0, 0.01).write(file("far.asc"), UTM, |_, _| 5.0);
     let refused = open_with(&[files[0].clone(), far], &OpenOptions::default()).err().unwrap().to_string();
     assert!(refused.contains("65,537"), "{refused}");
+}
+
+/// A file on the other side of the globe has no place in a zone's system; the others have.
+#[test]
+fn what_the_system_does_not_cover_is_named_and_left_out() {
+    let folder = tempdir().unwrap();
+    let file = |name: &str| inside(folder.path(), name);
+    let a = at(500_000.0, 5_000_000.0, 10.0).write(file("a.asc"), UTM, |_, _| 1.0);
+    let b = at(501_000.0, 5_000_000.0, 10.0).write(file("b.asc"), UTM, |_, _| 2.0);
+    let far = at(99.0, 0.01, 0.0001).write(file("far.asc"), "EPSG:4326", |_, _| 3.0);
+    let files = [a, far, b];
+    let elsewhere = OpenOptions { reproject: Some("EPSG:32633".into()), ..OpenOptions::default() };
+    for options in [OpenOptions::default(), elsewhere] {
+        let said = warnings(&files, &options);
+        let named: Vec<&String> = said.iter().filter(|words| words.contains("far.asc")).collect();
+        assert!(named.len() == 1 && named[0].contains("left out"), "{said:?}");
+        let grid = read(&files, &options);
+        assert!([1.0, 2.0].iter().all(|height| grid.samples.contains(height)));
+        let strict = OpenOptions { strict: true, ..options };
+        let refused = open_with(&files, &strict).err().unwrap().to_string();
+        assert!(refused.contains("far.asc") && refused.contains("does not cover"), "{refused}");
+    }
+    // A satellite over the Pacific sees none of them.
+    let none = OpenOptions {
+        reproject: Some("+proj=geos +h=35785831 +lon_0=-171 +datum=WGS84".into()),
+        ..OpenOptions::default()
+    };
+    let refused = open_with(&files, &none).err().unwrap().to_string();
+    assert!(refused.contains("a.asc") && refused.contains("does not cover"), "{refused}");
 }
 
 #[test]

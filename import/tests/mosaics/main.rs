@@ -5,6 +5,7 @@ mod import_support;
 
 mod damage;
 mod ground;
+mod levels;
 mod priority;
 mod repeat;
 mod virtuals;

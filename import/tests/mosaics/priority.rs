@@ -59,6 +59,70 @@ fn on_one_grid_the_priority_decides_and_voids_never_count() {
     }
 }
 
+/// A file that is named twice counts where it is on top: by its first mention, or by its last.
+#[test]
+fn of_a_file_named_twice_the_mention_counts_that_is_on_top() {
+    let folder = tempdir().unwrap();
+    let file = |name: &str| inside(folder.path(), name);
+    let a = at(0.0, 1000.0, 10.0).write(file("a.asc"), UTM, |_, _| 1.0);
+    let b = at(0.0, 1000.0, 10.0).write(file("b.asc"), UTM, |_, _| 2.0);
+    for (priority, files, wanted) in [
+        (Priority::Last, [&a, &b, &a], 1.0),
+        (Priority::Last, [&b, &a, &b], 2.0),
+        (Priority::Last, [&a, &a, &b], 2.0),
+        (Priority::First, [&a, &b, &a], 1.0),
+        (Priority::First, [&b, &a, &b], 2.0),
+    ] {
+        let grid = read(&files.map(Clone::clone), &by(priority));
+        assert!(grid.samples.iter().all(|height| *height == wanted), "{priority:?} {files:?}");
+    }
+}
+
+/// Of files with the same steps the first by name counts, also where another one between them lies half a step off.
+#[test]
+fn of_files_alike_the_first_by_name_counts_across_grids() {
+    let folder = tempdir().unwrap();
+    let file = |name: &str| inside(folder.path(), name);
+    let a = Patch { samples: [30, 100], west: 0.0, north: 1000.0, step: 10.0 };
+    let a = a.write(file("a.asc"), UTM, |_, _| 1.0);
+    let m = Patch { samples: [60, 99], west: 5.0, north: 1005.0, step: 10.0 };
+    let m = m.write(file("m.asc"), UTM, |_, _| 2.0);
+    let z = at(0.0, 1000.0, 10.0).write(file("z.asc"), UTM, |_, _| 3.0);
+    for files in [[&a, &m, &z], [&z, &a, &m]] {
+        let grid = read(&files.map(Clone::clone), &by(Priority::Finest));
+        let found = [105.0, 205.0, 405.0, 805.0].map(|x| height(&grid, x, 505.0));
+        assert_eq!(found, [1.0, 1.0, 2.0, 3.0], "{files:?}");
+    }
+}
+
+/// Tiles of `.hgt` that could be read as one grid are a mosaic where something is asked for that only mosaics do.
+#[test]
+fn tiles_are_blended_and_thinned_as_other_files_are() {
+    let folder = tempdir().unwrap();
+    let tile = |name: &str, height: i16| {
+        let path = inside(folder.path(), name);
+        crate::import_support::write_hgt(&path, 61, |_, _| height);
+        path
+    };
+    let tiles = [tile("N10E010.hgt", 100), tile("N10E011.hgt", 200)];
+    let plain = read(&tiles, &OpenOptions::default());
+    assert_eq!((plain.info.samples_wide, plain.at(59, 30), plain.at(60, 30)), (121, 100.0, 200.0));
+    // Both have the border's samples; beside it each is blended with nothing.
+    let soft = read(&tiles, &OpenOptions { feather_m: Some(20_000.0), ..OpenOptions::default() });
+    assert_eq!((soft.info.samples_wide, soft.at(59, 30), soft.at(61, 30)), (121, 100.0, 200.0));
+    assert!((140.0..150.0).contains(&soft.at(60, 30)), "{}", soft.at(60, 30));
+    let thin = read(&tiles, &OpenOptions { resolution: Some(20_000.0), ..OpenOptions::default() });
+    let step = thin.info.georeference.pixel_to_crs.unwrap()[1];
+    assert!((step * 111_319.49 - 20_000.0).abs() < 1.0, "{step}");
+    for wrong in [
+        OpenOptions { feather_m: Some(20_000.0), ..OpenOptions::default() },
+        OpenOptions { resolution: Some(20_000.0), ..OpenOptions::default() },
+    ] {
+        let refused = open_with(&tiles[..1], &wrong).err().unwrap().to_string();
+        assert!(refused.contains("several files"), "{refused}");
+    }
+}
+
 /// A finer file in the middle of a coarser one, in another system, in feet: the plane that both show is continuous.
 #[test]
 fn unlike_steps_systems_and_units_show_one_plane() {

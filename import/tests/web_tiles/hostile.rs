@@ -87,6 +87,22 @@ fn a_picture_that_unpacks_to_a_world_is_refused_by_its_size() {
     assert!(words.contains("WebP picture is damaged"), "{words}");
 }
 
+/// Attributes of one element are compared with each other where a tree is made of the text.
+#[test]
+fn a_tile_map_of_attributes_without_end_says_nothing() {
+    let folder_of = tempdir().unwrap();
+    let path = folder(&folder_of.path().join("crowd"), &flat(), ".png", false);
+    let plain = read(&path, Some("mapbox"), TileOptions::default()).unwrap();
+    let crowd: String = (0..300_000).map(|i| format!(" a{i}=\"\"")).collect();
+    for text in [format!("<TileMap{crowd}/>"), format!("<TileMap>{}", "<a>".repeat(1 << 20))] {
+        std::fs::write(path.join("tilemapresource.xml"), text).unwrap();
+        let begun = Instant::now();
+        let grid = read(&path, Some("mapbox"), TileOptions::default()).unwrap();
+        assert!(begun.elapsed() < Duration::from_secs(10), "{:?}", begun.elapsed());
+        assert_eq!(grid.samples, plain.samples);
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn links_in_a_ring_are_not_followed() {
@@ -129,6 +145,13 @@ fn directories_that_lead_round_or_overflow_are_damage() {
     is("number", &directory(&[[u64::MAX, 1, 0, length]]), b"", "beyond the deepest zoom");
     is("data", &directory(&[[5, 1, 7, length]]), b"", "lie beyond the end of the file");
     is("none", &directory(&[]), b"", "there are no tiles in it");
+    // A leaf of nothing, and bytes that no entry is made of.
+    let nothing = directory(&[]);
+    let leads = directory(&[[5, 0, 0, nothing.len() as u64]]);
+    is("empty leaf", &leads, &nothing, "leaf directory of tile number 5: it leads to no tile");
+    let spare = [leaf.clone(), vec![0]].concat();
+    is("spare", &directory(&[[5, 0, 0, spare.len() as u64]]), &spare, "behind its last entry");
+    is("spare root", &[directory(&[[5, 1, 0, length]]), vec![0]].concat(), b"", "behind its last entry");
     let mut many = Vec::new();
     varint(u64::MAX, &mut many);
     is("many", &many, b"", "cut short or damaged");
@@ -150,6 +173,19 @@ fn directories_that_unpack_without_end_are_refused() {
         let leaf = packed(packing, &zeros);
         let root = directory(&[[5, 0, 0, leaf.len() as u64]]);
         let words = refused(&pm(folder_of.path(), &format!("leaf-{packing}"), how, &root, &leaf, b""));
+        assert!(words.contains("leaf directory of tile number 5"), "{words}");
+        // Thousands of entries that each lead to zeros of which all could be unpacked.
+        let leaf = packed(packing, &zeros[..16 << 20]);
+        let entries: Vec<_> = (0..1 << 12).map(|i| [5 + i, 0, 0, leaf.len() as u64 + i]).collect();
+        let leaves: Vec<u8> = leaf.iter().copied().chain([0; 1 << 12]).collect();
+        let words = refused(&pm(
+            folder_of.path(),
+            &format!("many-{packing}"),
+            how,
+            &directory(&entries),
+            &leaves,
+            b"",
+        ));
         assert!(words.contains("leaf directory of tile number 5"), "{words}");
     }
 }

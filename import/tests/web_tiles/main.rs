@@ -218,3 +218,41 @@ fn transparent_texels_are_voids_and_so_are_missing_tiles() {
         "{warnings:?}"
     );
 }
+
+/// Black is -10,000 m as Mapbox packs heights: it stands where a picture has nothing, and no land is as low.
+#[test]
+fn black_texels_are_told_and_can_be_named() {
+    let folder_of = tempdir().unwrap();
+    let black = |col: u64, row: u64| (col + row).is_multiple_of(7);
+    let made =
+        tiles(
+            10,
+            COLUMNS,
+            ROWS,
+            16,
+            |col, row| {
+                if black(col, row) { [0, 0, 0, 255] } else { mapbox(hills(col, row)) }
+            },
+        );
+    let path = folder(&folder_of.path().join("black"), &made, ".png", false);
+    let opened = |nodata: Vec<String>| {
+        let options = OpenOptions { decode: Some("mapbox".into()), nodata, ..OpenOptions::default() };
+        let dem = open_with(std::slice::from_ref(&path), &options).unwrap();
+        let grid = collect(&*dem).unwrap();
+        (grid, dem.warnings())
+    };
+    let (grid, said) = opened(Vec::new());
+    let told = said.iter().find(|warning| warning.words.contains("samples are -10000"));
+    let told = told.unwrap_or_else(|| panic!("{said:?}"));
+    let value = told.mended_by.as_ref().unwrap().1.clone();
+    assert_eq!((value.as_str(), grid.voids()), ("-10000", 0));
+    let (grid, said) = opened(vec![value]);
+    assert!(said.is_empty(), "{said:?}");
+    let first = [COLUMNS.start, ROWS.start].map(|tile| u64::from(tile) * 16);
+    for row in 0..grid.info.samples_high {
+        for col in 0..grid.info.samples_wide {
+            let is_black = black(first[0] + u64::from(col), first[1] + u64::from(row));
+            assert_eq!(grid.at(col, row).is_nan(), is_black, "{col} {row}");
+        }
+    }
+}

@@ -15,6 +15,7 @@ mod memory;
 mod options;
 mod plan;
 mod rebuild;
+mod room;
 mod saturate;
 mod scan;
 mod spacing;
@@ -135,7 +136,7 @@ pub fn build_on(
     let stats = spool.stats();
 
     progress.stage("surveying", samples);
-    let code = HeightCode::choose(info, options.z_scale, &stats, options.record);
+    let code = HeightCode::choose(info, options.z_scale, &stats, options.record, options.head_room);
     let height_range_m = survey::check_heights(info, &code, &stats)?;
     let steepest_m = survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
     header.record_kind = code.kind;

@@ -24,6 +24,9 @@ pub struct BuildOptions {
     pub nodata: Option<f64>,
     /// Holes up to so many samples across, either way, are filled from their rims; 0, the default, for none, at most 256.
     pub fill_voids: u32,
+    /// Whether compact records have room for heights below the lowest and above the highest, so that edits may dig and raise. The default is yes: a range
+    /// of 16,384 height steps, or a quarter more than the terrain's. It costs some 0.1 % of triangles, and up to 0.5 % where a terrain is that tall.
+    pub head_room: bool,
     /// Largest side of a tile in steps, a power of two from 2 to 256. Smaller tiles save memory and cost time; the file is the same.
     pub largest_tile: u32,
 }
@@ -38,6 +41,7 @@ impl Default for BuildOptions {
             error: ErrorKind::Bounded,
             nodata: None,
             fill_voids: 0,
+            head_room: true,
             largest_tile: LARGEST_TILE,
         }
     }
@@ -77,6 +81,11 @@ impl BuildOptions {
     /// These options with holes up to so many samples across filled from their rims.
     pub fn fill_voids(self, fill_voids: u32) -> Self {
         Self { fill_voids, ..self }
+    }
+
+    /// These options with or without room for heights that the terrain does not have yet.
+    pub fn head_room(self, head_room: bool) -> Self {
+        Self { head_room, ..self }
     }
 
     /// These options with another largest side of a tile in steps.

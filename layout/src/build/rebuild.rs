@@ -2,6 +2,7 @@
 //!
 //! The samples are read back from the records, so nothing that the file held is lost. Voids keep the heights they are filled with. Cost and memory are those of a build.
 
+use super::room::{self, LARGEST_CODE};
 use super::spool::Spool;
 use super::survey::HeightCode;
 use super::{BuildOptions, MemoryPlan, Work};
@@ -31,8 +32,6 @@ pub struct HeightRoom {
 
 /// Rows read at a time.
 const ROWS: u32 = 16;
-/// Largest height code of compact records.
-const LARGEST_CODE: f64 = 65_535.0;
 
 /// Heights of a terrain as a DEM whose raw samples are the records' height values.
 struct OwnHeights<'t, C: RecordCodec> {
@@ -193,6 +192,7 @@ fn same_code(old: &Header) -> HeightCode {
         rounds: old.heights_rounded,
         base_m: height_base_m,
         step_m: height_step_m,
+        reach_steps: 0.0,
     }
 }
 
@@ -214,11 +214,17 @@ fn roomy_code(old: &Header, room: HeightRoom) -> Result<HeightCode, LayoutError>
     if old.record_kind != RecordKind::Compact {
         return Ok(same);
     }
-    // Whole steps, so that every height stays what it is.
-    let below = ((same.base_m - low) / same.step_m).ceil().max(0.0);
+    // Whole steps, so that every height stays what it is. Where the base moves, it moves by what the next edits may need, too.
+    let range_steps = (high - low) / same.step_m;
+    let below = match ((same.base_m - low) / same.step_m).ceil().max(0.0) {
+        0.0 => 0.0,
+        needed => needed + room::codes_below(range_steps),
+    };
     let above = ((high - same.base_m) / same.step_m).ceil();
     if below + above <= LARGEST_CODE {
-        return Ok(HeightCode { raw_base: -below, base_m: same.base_m - below * same.step_m, ..same });
+        let base_m = same.base_m - below * same.step_m;
+        let reach_steps = room::reach_steps(range_steps);
+        return Ok(HeightCode { raw_base: -below, base_m, reach_steps, ..same });
     }
     Ok(HeightCode { kind: RecordKind::Exact8, ..same })
 }

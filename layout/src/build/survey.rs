@@ -1,5 +1,6 @@
 //! From statistics to a record kind and its scale, and from a pass over the rows to the steepest slope, which bounds the radii.
 
+use super::room::{LARGEST_CODE, codes_below, reach_steps, rounding_step};
 use super::spool::{CANDIDATE_STEPS, SampleStats, Spool};
 use crate::bound::{larger, largest_difference};
 use crate::dem::DemInfo;
@@ -10,9 +11,6 @@ use crate::portable::{hypot, log2, pow};
 use crate::remedy::Remedy;
 use crate::words::number;
 use rayon::prelude::*;
-
-/// Largest height code of compact records.
-const LARGEST_CODE: f64 = 65535.0;
 
 /// How raw samples become the heights of records.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +26,8 @@ pub(super) struct HeightCode {
     pub(super) base_m: f64,
     /// Metres a code.
     pub(super) step_m: f64,
+    /// The largest range of heights, in steps, that the records are to hold; 0 for no more than the terrain's.
+    pub(super) reach_steps: f64,
 }
 
 impl HeightCode {
@@ -37,6 +37,7 @@ impl HeightCode {
         z_scale: f64,
         stats: &SampleStats,
         asked: Option<RecordKind>,
+        has_room: bool,
     ) -> Self {
         let [low, high] = stats.range;
         let range = high - low;
@@ -50,7 +51,7 @@ impl HeightCode {
         let (kind, raw_base, raw_step, rounds) = match (asked.map(RecordKind::name), lossless) {
             (Some("exact"), _) => (exact_kind, 0.0, 1.0, false),
             (_, Some(step)) => (RecordKind::Compact, (low / step).round() * step, step, false),
-            (Some(_), None) => (RecordKind::Compact, low, range / LARGEST_CODE, true),
+            (Some(_), None) => (RecordKind::Compact, low, rounding_step(range, has_room), true),
             (None, None) => (exact_kind, 0.0, 1.0, false),
         };
         let scale_m = info.height_scale * z_scale;
@@ -61,6 +62,12 @@ impl HeightCode {
             (true, RecordKind::Compact) => ((high / raw_step).round() * raw_step, -raw_step),
             (true, _) => (0.0, -1.0),
         };
+        let range_steps = (range / raw_step).abs();
+        let (below, reach_steps) = match kind {
+            RecordKind::Compact if has_room => (codes_below(range_steps), reach_steps(range_steps)),
+            _ => (0.0, 0.0),
+        };
+        let raw_base = raw_base - below * raw_step;
         Self {
             kind,
             raw_base,
@@ -68,6 +75,7 @@ impl HeightCode {
             rounds,
             base_m: (info.height_offset_m + raw_base * info.height_scale) * z_scale,
             step_m: raw_step * scale_m,
+            reach_steps,
         }
     }
 
@@ -184,10 +192,11 @@ pub(super) fn record_scale(
             log2(stretch * growth * 2.0) * f64::from(*steps) <= 254.0
         })
         .unwrap_or(8);
+    let top_m = (range_m[1] - range_m[0]).max(code.reach_steps * code.step_m);
     RecordScale {
         height_base_m: code.base_m,
         height_step_m: code.step_m,
-        error_top_m: ((range_m[1] - range_m[0]) * (1.0 + 1e-6)).max(code.step_m).max(1e-6),
+        error_top_m: (top_m * (1.0 + 1e-6)).max(code.step_m).max(1e-6),
         radius_steps_per_octave: steps,
     }
 }

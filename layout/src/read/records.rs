@@ -137,6 +137,22 @@ impl<C: RecordCodec> RecordStore for Records<'_, C> {
         Some(self.raw(slot))
     }
 
+    /// One look into the table of pages and one check of bounds for both, where they lie in one page.
+    #[inline(always)]
+    fn pair(&self, slots: [u64; 2]) -> [C::Raw; 2] {
+        if page_of::<C>(slots[0]) == page_of::<C>(slots[1]) {
+            let page = self.pages[page_of::<C>(slots[0]) as usize] as usize + INERT_PAGE as usize;
+            let first = self.bytes.first.get(page * PAGE_BYTES..);
+            if let Some(bytes) = first.and_then(|bytes| bytes.first_chunk::<PAGE_BYTES>()) {
+                return slots.map(|slot| {
+                    let within = byte_in_page::<C>(slot);
+                    C::read(&bytes[within..within + C::BYTES])
+                });
+            }
+        }
+        slots.map(|slot| self.raw(slot))
+    }
+
     #[inline(always)]
     fn prefetch(&self, slot: u64) {
         Records::prefetch(self, slot);

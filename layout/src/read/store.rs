@@ -87,6 +87,16 @@ pub trait RecordStore: Send + Sync {
         self.decode(self.get(slot).unwrap_or(Self::Codec::INERT), level)
     }
 
+    /// The records at two slots, not yet decoded, inert ones where they are not at hand. For slots that lie side by side, as those of a triangle's two
+    /// children do, a store may find both at once.
+    ///
+    /// # Panics
+    /// For a slot past the last page.
+    #[inline(always)]
+    fn pair(&self, slots: [u64; 2]) -> [RawOf<Self>; 2] {
+        slots.map(|slot| self.get(slot).unwrap_or(Self::Codec::INERT))
+    }
+
     /// The vertex at a grid point.
     fn vertex_at(&self, p: GridPoint) -> Vertex {
         let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };

@@ -44,7 +44,8 @@ use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners};
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};
 use terrasoar_layout::read::store::{RawOf, RecordStore};
 use time::certificate::Judge;
-use time::clocks::{Clocks, Pose};
+use time::clocks::Clocks;
+use time::course::Pose;
 use time::queue::{Entry, Queue};
 
 /// Levels of the largest terrain.

@@ -350,11 +350,18 @@ impl<C: RecordCodec> Core<C> {
             metres.iter().all(|m| m.abs() <= 1e9)
         };
         if !fits {
+            let [holds_from, holds_to] = if is_compact {
+                let top_m = scale.error_top_m / (1.0 + 1e-6);
+                let codes_to = scale.height_base_m + LARGEST_CODE * scale.height_step_m;
+                [scale.height_base_m.max(high - top_m), codes_to.min(low + top_m)]
+            } else {
+                [-1e9, 1e9]
+            };
             return Err(LayoutError::OutOfRange {
                 path: self.pages.terrain().path().to_owned(),
                 heights_m: metres,
                 problem: format!(
-                    "the edit leads to heights from {:.3} to {:.3} m, this file's records hold {low:.3} to {high:.3} m; rewrite it with room for them",
+                    "the edit leads to heights from {:.3} to {:.3} m, this file's records hold {holds_from:.3} to {holds_to:.3} m; rewrite it with room for them",
                     metres[0], metres[1]
                 ),
             });

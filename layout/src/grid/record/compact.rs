@@ -10,6 +10,8 @@ const FRINGE: u8 = 248;
 const FRINGE_VOID: u8 = 252;
 /// Factors of edge length that fringe codes stand for.
 const FRINGE_FACTORS: [f64; 4] = [1.0, 16.0, 256.0, f64::INFINITY];
+/// Levels that a grid may have.
+const PER_LEVEL: usize = 2 * MAX_K as usize;
 /// Plain error codes an octave.
 const ERROR_STEPS: u32 = 16;
 /// Fringe radius codes an octave.
@@ -37,9 +39,9 @@ pub struct Compact {
     per_least_error: f64,
     errors: [f64; 256],
     radii: [f64; 256],
-    flat_radius_m: [f64; 2 * MAX_K as usize],
-    per_flat_radius: [f64; 2 * MAX_K as usize],
-    edge_m: [f64; 2 * MAX_K as usize],
+    flat_radius_m: [f64; PER_LEVEL],
+    per_flat_radius: [f64; PER_LEVEL],
+    edge_m: [f64; PER_LEVEL],
     error_steps: OctaveTable,
     radius_steps: OctaveTable,
     fringe_radius_steps: OctaveTable,
@@ -72,14 +74,15 @@ impl Compact {
         }
     }
 
+    /// Error and radius of a fringe vertex, metres. A pair of numbers, so that it comes back in registers.
     #[cold]
-    fn decode_fringe(&self, height_m: f64, error_code: u8, radius_code: u8, level: u32) -> Vertex {
-        Vertex {
-            height_m,
-            error_m: self.edge_m[level as usize] * FRINGE_FACTORS[usize::from(error_code & 3)],
-            radius_m: self.flat_radius_m[level as usize] * self.fringe_radius_steps.power(radius_code),
-            class: if error_code < FRINGE_VOID { VertexClass::Fringe } else { VertexClass::FringeVoid },
-        }
+    #[inline(never)]
+    fn fringe_m(&self, error_code: u8, radius_code: u8, level: u32) -> (f64, f64) {
+        let level = level as usize % PER_LEVEL;
+        (
+            self.edge_m[level] * FRINGE_FACTORS[usize::from(error_code & 3)],
+            self.flat_radius_m[level] * self.fringe_radius_steps.power(radius_code),
+        )
     }
 }
 
@@ -100,21 +103,23 @@ impl RecordCodec for Compact {
 
     #[inline(always)]
     fn decode(&self, raw: u32, level: u32) -> Vertex {
+        debug_assert!((level as usize) < PER_LEVEL);
         let [low, high, error_code, radius_code] = raw.to_le_bytes();
         let height_m = self.height_base_m + f64::from(u16::from_le_bytes([low, high])) * self.height_step_m;
-        if error_code >= FRINGE {
-            return self.decode_fringe(height_m, error_code, radius_code, level);
-        }
-        Vertex {
-            height_m,
-            error_m: self.errors[usize::from(error_code)],
-            radius_m: self.flat_radius_m[level as usize] * self.radii[usize::from(radius_code)],
-            class: if error_code == 0 && radius_code == 255 {
-                VertexClass::Inert
-            } else {
-                VertexClass::Plain
-            },
-        }
+        let (error_m, radius_m) = if error_code >= FRINGE {
+            self.fringe_m(error_code, radius_code, level)
+        } else {
+            // The remainder keeps the level inside the table without a check; every level of a grid is below it.
+            let flat_m = self.flat_radius_m[level as usize % PER_LEVEL];
+            (self.errors[usize::from(error_code)], flat_m * self.radii[usize::from(radius_code)])
+        };
+        let class = match error_code {
+            FRINGE_VOID.. => VertexClass::FringeVoid,
+            FRINGE.. => VertexClass::Fringe,
+            0 if radius_code == 255 => VertexClass::Inert,
+            _ => VertexClass::Plain,
+        };
+        Vertex { height_m, error_m, radius_m, class }
     }
 
     #[inline]

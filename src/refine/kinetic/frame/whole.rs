@@ -4,7 +4,7 @@
 use crate::refine::kinetic::mesh::nodes::{CENTRE, body};
 use crate::refine::kinetic::{Kinetic, Patch, root_label};
 use crate::refine::soar::StripVertex;
-use crate::refine::strip::StripBuilder;
+use crate::refine::strip::{Strip, StripBuilder};
 use std::collections::HashMap;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{ROOTS, corners};
@@ -55,7 +55,8 @@ impl<S: RecordStore> Kinetic<S> {
         let grid = self.records.grid();
         let c = corners(grid.k());
         let vertex = |i: usize| *self.vertices.get(i as u32);
-        let mut walk = StripWalk { engine: self, strip: StripBuilder::start(strip, c[0], vertex(0)) };
+        let mut made = Strip::in_room(std::mem::take(strip));
+        let mut walk = StripWalk { engine: self, strip: made.start(c[0], vertex(0)) };
         let centre = (self.nodes.get(CENTRE).point, vertex(4));
         for (root, (side, [b, d])) in ROOTS.into_iter().enumerate() {
             let node = self.nodes.get(CENTRE).body[root_label(side)];
@@ -64,7 +65,8 @@ impl<S: RecordStore> Kinetic<S> {
                 walk.strip.append(c[root + 1], 0, vertex(root + 1));
             }
         }
-        strip.push(*self.vertices.get(0));
+        walk.strip.finish(vertex(0), &mut made);
+        *strip = made.into_vec();
     }
 
     /// All nodes and annexes.
@@ -87,7 +89,7 @@ impl<S: RecordStore> Kinetic<S> {
 /// The walk that makes a strip.
 struct StripWalk<'w, S: RecordStore> {
     engine: &'w Kinetic<S>,
-    strip: StripBuilder<'w, StripVertex>,
+    strip: StripBuilder<StripVertex>,
 }
 
 impl<S: RecordStore> StripWalk<'_, S> {

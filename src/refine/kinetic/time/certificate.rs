@@ -24,7 +24,8 @@
 //!
 //! Where a course has no direction, L = m(0). Everything is rounded towards a shorter life. Cost: two square roots a vertex, and one a plane while turning.
 
-use super::clocks::{BANDS, CLOCKS, Clocks, Course, EXPIRY_BITS, HORIZON, Kind, RATE, band_of, clock_id};
+use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, band_of, clock_id};
+use super::course::Course;
 use crate::metric::{Metric, PLANES, Sighting};
 use glam::DVec3;
 
@@ -62,6 +63,8 @@ pub(crate) struct Judge {
     direction: [f64; 3],
     axis: [f64; 3],
     turn_per_m: f64,
+    /// Share of the way along the course that its clocks count.
+    rate: f64,
     /// What each plane's distance grows by a metre of way, the eye's turn left out.
     slopes: [f64; PLANES],
     /// Axis x normal of each plane.
@@ -88,11 +91,11 @@ struct Life {
 impl Judge {
     /// The judge of a frame, after the clocks have moved to it. Without `culls` the view's planes are not asked.
     pub(crate) fn new(metric: Metric, clocks: &Clocks, culls: bool) -> Self {
-        let (course, Course { direction, axis, turn_per_m }) = clocks.course();
+        let (course, Course { direction, axis, turn_per_m, rate }) = clocks.course();
         let normals = metric.normals().map(DVec3::from_array);
         let slopes = normals.map(|n| n.dot(direction));
         let moves = direction != DVec3::ZERO;
-        let share = |falls: f64| if moves { RATE / RATE.max(falls) } else { 1.0 };
+        let share = |falls: f64| if moves { rate / rate.max(falls) } else { 1.0 };
         Self {
             culls,
             course,
@@ -101,6 +104,7 @@ impl Judge {
             direction: direction.to_array(),
             axis: axis.to_array(),
             turn_per_m,
+            rate,
             // The eye's way takes it nearer to what lies ahead.
             slopes: slopes.map(|k| -k),
             sweeps: normals.map(|n| axis.cross(n).to_array()),
@@ -170,7 +174,7 @@ impl Judge {
         let culled = outside_m > 0.0;
         let planes_m = if culled { outside_m } else { margin_m.min(inside_m) };
         // While the eye moves on by what the margin allows, turning acts on a longer arm.
-        let arm_m = if self.moves { planes_m / RATE } else { 0.0 };
+        let arm_m = if self.moves { planes_m / self.rate } else { 0.0 };
         let arm_m = if culled { distance_m } else { reach_m } + arm_m;
         Life {
             active: selected & !culled,
@@ -193,10 +197,10 @@ impl Judge {
             } else if beyond > 0.0 {
                 // Each plane may vouch by itself.
                 let turn = used_up_at(beyond, -sweep_m, arm_m);
-                outside_m = outside_m.max(beyond.min(RATE * band_m * turn));
+                outside_m = outside_m.max(beyond.min(self.rate * band_m * turn));
             }
         }
-        if life.active { RATE * band_m * inside } else { outside_m }
+        if life.active { self.rate * band_m * inside } else { outside_m }
     }
 
     /// The life of a selected vertex on a course that goes along and turns.
@@ -225,7 +229,7 @@ impl Judge {
         };
         let scale_m = nearest + way_m;
         let band_m = f64::from(1u32 << band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
-        let counted_per_m = RATE * (1.0 + band_m * self.turn_per_m);
+        let counted_per_m = self.rate * (1.0 + band_m * self.turn_per_m);
         let margin_m = if culled {
             // Each plane may vouch by itself.
             let vouched = |i: usize| margins_m[i].min(counted_per_m * ways_m[i].min(longest_m));
@@ -256,7 +260,8 @@ impl Judge {
     /// The margin of the error test. Written without branches, because no processor can predict the answer.
     #[inline(always)]
     fn error_margin_m(&self, sighting: &Sighting, selected: bool, distance_m: f64, reach_m: f64) -> f64 {
-        const ACROSS2: f64 = 1.0 - RATE * RATE;
+        let rate = self.rate;
+        let across2 = 1.0 - rate * rate;
         let now_m = (reach_m - distance_m).abs();
         if !self.moves {
             return now_m;
@@ -266,16 +271,16 @@ impl Judge {
         let (reach2, distance2) = (reach_m * reach_m, sighting.distance2());
         let off2 = (distance2 - b * b - distance2 * SQUARE_ERROR).max(0.0);
         let half_chord2 = reach2 - distance2 + b * b - (reach2 + distance2) * SQUARE_ERROR;
-        let enters = off2 <= ACROSS2 * reach2;
+        let enters = off2 <= across2 * reach2;
         let (square, sign, less) = if selected {
-            (half_chord2, RATE, 0.0)
+            (half_chord2, rate, 0.0)
         } else if enters {
-            (reach2 - off2, -RATE, 0.0)
+            (reach2 - off2, -rate, 0.0)
         } else {
-            (ACROSS2 * off2, 1.0, reach_m)
+            (across2 * off2, 1.0, reach_m)
         };
-        let ahead_m = RATE * b + sign * square.max(0.0).sqrt() - less;
-        let falls_slowly = !selected & (b <= RATE * distance_m);
+        let ahead_m = rate * b + sign * square.max(0.0).sqrt() - less;
+        let falls_slowly = !selected & (b <= rate * distance_m);
         if falls_slowly { now_m } else { ahead_m.min(now_m) }
     }
 }
@@ -294,7 +299,7 @@ fn used_up_at(margin: f64, slope: f64, bend: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::clocks::Pose;
+    use super::super::course::{Pose, RATE, STEADY_RATE};
     use super::*;
     use crate::view::{View, Viewport};
     use glam::DVec3;
@@ -338,14 +343,14 @@ mod tests {
             away in direction(), distance in (0.0f64..10.0).prop_map(f64::exp), edge in prop::option::weighted(0.7, (-1.3f64..1.3, -1.3f64..1.3)),
             closeness in prop_oneof![0.2f64..2.0, 2.0f64..20.0], radius in 0.0f64..300.0,
             steps in prop::collection::vec((direction(), 0.0f64..0.5, -0.01f64..0.01, 0.98f64..1.02, 0.99f64..1.01), 1..80),
-            turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in -0.01f64..0.02,
+            turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, rate in prop_oneof![Just(RATE), Just(STEADY_RATE), 0.001f64..0.5], axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in -0.01f64..0.02,
         ) {
             let mut clocks = Clocks::new(10.0, 3000.0);
             let mut now = view(DVec3::new(100.0, 200.0, 1000.0), 0.3, -0.2, 0.8, 1.0);
             if start_course {
                 let direction = if speed > 1.0 { course } else { DVec3::ZERO };
                 let turn_per_m = if speed > 1.0 && axis != DVec3::ZERO { spin.abs() / speed + 1e-9 } else { 0.0 };
-                clocks.take_course(2, Course { direction, axis, turn_per_m });
+                clocks.take_course(2, Course { direction, axis, turn_per_m, rate });
             }
             let mut metric = Metric::new(&now);
             clocks.move_to(pose(&metric, &now));

@@ -4,7 +4,7 @@
 //! positive. A clock adds up, rounded up, how much the camera's movement can have taken from the margin since. There is one clock for every combination of
 //!
 //! * a *course*: the direction the eye is expected to keep, and the axis it is expected to turn about. Course 0 expects nothing and counts the whole
-//!   path and every turn. Any other course counts [`RATE`] times the way along its direction and the angle about its axis, and all of the way and angle that goes off
+//!   path and every turn. Any other course counts its `rate`, [`RATE`] or [`STEADY_RATE`], times the way along its direction and the angle about its axis, and all of the way and angle that goes off
 //!   them. What lies ahead on the course was taken into account when the margin was made (`super::certificate`). A word made on one course stays on it
 //!   when the eye takes another;
 //! * a *kind*: whether the status depends on the view's planes, so that turning uses it up too;
@@ -13,11 +13,10 @@
 //! Claim: with L = f0 + floor(m / q), m metres of margin made at tick f0 and ticks of q metres, `f < L` implies that less than m has been used.
 //! Proof: a rounding down rho of the total has rho(x) - rho(y) > x - y - 1 in ticks. Cost: some hundred additions a frame.
 
-use glam::{DQuat, DVec3};
+use super::course::{Course, LONG, Pose, RATE, STEADY, STEADY_RATE, Trend};
+use glam::DVec3;
 use terrasoar_layout::portable;
 
-/// Share of the way along the course that is counted. A smaller one lets words last longer on course and shorter off it.
-pub(crate) const RATE: f64 = 0.1;
 /// Courses, the one without direction included.
 pub(crate) const COURSES: usize = 4;
 /// Bands: powers of two.
@@ -31,14 +30,6 @@ pub(crate) const HORIZON: u32 = (1 << (EXPIRY_BITS - 1)) - 1;
 
 /// Fixed-point units a metre.
 const UNITS_PER_M: f64 = (1u64 << 20) as f64;
-/// A course is left when more than this share of the recent way was counted.
-const LEAVE_RATE: f64 = 0.25;
-/// A course is taken only if the recent way leads this straight.
-const STRAIGHT: f64 = 0.9;
-/// How far ahead of a bend its course points.
-const LEAD_RAD: f64 = 0.12;
-/// Share of the newest frame in what "recent" means.
-const RECENT: f64 = 0.2;
 /// (e^x - 1) / x stays below this for x up to 1/2, which margins of at most half a band see to.
 const EXP_SLOPE: f64 = 1.3;
 
@@ -54,65 +45,6 @@ pub(crate) enum Kind {
 /// Number of a clock.
 pub(crate) const fn clock_id(course: usize, kind: Kind, band: usize) -> usize {
     course * 2 * BANDS + (kind as usize) * BANDS + band
-}
-
-/// What of a view moves the clocks.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Pose {
-    pub eye_m: DVec3,
-    /// Right, up and forward.
-    pub axes: [DVec3; 3],
-    pub normals: [DVec3; 4],
-    pub nu: f64,
-    pub exaggeration: f64,
-}
-
-/// What the eye is expected to keep doing.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Course {
-    /// Unit vector it moves along, or zero.
-    pub direction: DVec3,
-    /// Unit vector it turns about, right-handed, or zero.
-    pub axis: DVec3,
-    /// Radians it turns about the axis a metre of way, if it has both.
-    pub turn_per_m: f64,
-}
-
-/// How something has been going of late.
-#[derive(Debug, Clone, Copy, Default)]
-struct Trend {
-    vector: DVec3,
-    length: f64,
-    used: f64,
-}
-
-impl Trend {
-    /// Takes in the newest step, of which the current course counts `used`.
-    fn follow(&mut self, step: DVec3, used: f64) {
-        let length = step.length();
-        if length == 0.0 {
-            return;
-        }
-        // The first step, and one that dwarfs all before it, is all there is to go by.
-        let share = if length > 16.0 * self.length { 1.0 } else { RECENT };
-        self.vector += share * (step - self.vector);
-        self.length += share * (length - self.length);
-        self.used += share * (used - self.used);
-    }
-
-    /// Whether the course misses much of what happens.
-    fn is_off(&self) -> bool {
-        self.used > LEAVE_RATE * self.length
-    }
-
-    /// The direction it keeps, or zero if it keeps none.
-    fn direction(&self) -> DVec3 {
-        if self.vector.length() >= STRAIGHT * self.length {
-            self.vector.normalize_or_zero()
-        } else {
-            DVec3::ZERO
-        }
-    }
 }
 
 /// The clocks of one engine.
@@ -134,6 +66,8 @@ pub(crate) struct Clocks {
     newest: usize,
     way: Trend,
     turn: Trend,
+    /// Share of the way that went off the current course, over a long time.
+    off: f64,
 }
 
 /// What [`Clocks::move_to`] has done.
@@ -167,6 +101,7 @@ impl Clocks {
             newest: 0,
             way: Trend::default(),
             turn: Trend::default(),
+            off: 1.0,
         }
     }
 
@@ -207,18 +142,26 @@ impl Clocks {
         let current = self.courses[self.current];
         self.way.follow(step, current.used_m(step));
         self.turn.follow(last.turn_to(&pose), current.used_rad(&last, &pose));
+        let way_m = step.length();
+        if way_m > 0.0 {
+            self.off += LONG * (current.off_m(step) / way_m - self.off);
+        }
         let next = Course::of(&self.way, &self.turn);
         // Whoever keeps no direction is on no course that could be better.
         let changes =
             |off: bool, current: DVec3, next: DVec3| off && (current != DVec3::ZERO || next != DVec3::ZERO);
-        if changes(self.way.is_off(), current.direction, next.direction)
-            || changes(self.turn.is_off(), current.axis, next.axis)
+        let becomes_steady = self.off <= STEADY && current.rate == RATE && current.is_straight();
+        if changes(self.way.is_off(current.rate), current.direction, next.direction)
+            || changes(self.turn.is_off(current.rate), current.axis, next.axis)
         {
+            self.off = 1.0;
             if next.direction == DVec3::ZERO && next.axis == DVec3::ZERO {
                 self.current = 0;
             } else {
                 moved.next_course = Some((self.newest % (COURSES - 1) + 1, next));
             }
+        } else if becomes_steady && next.is_straight() {
+            moved.next_course = Some((self.newest % (COURSES - 1) + 1, Course { rate: STEADY_RATE, ..next }));
         }
         moved
     }
@@ -276,51 +219,6 @@ impl Clocks {
     /// Reciprocal of the metres of band 0.
     pub(crate) fn bands_per_m(&self) -> f64 {
         1.0 / self.least_band_m
-    }
-}
-
-impl Course {
-    /// The course that goes on as it has been going.
-    fn of(way: &Trend, turn: &Trend) -> Self {
-        let (direction, axis) = (way.direction(), turn.direction());
-        if direction == DVec3::ZERO || axis == DVec3::ZERO {
-            return Self { direction, axis, turn_per_m: 0.0 };
-        }
-        // Who turns flies a bend: straight ahead of where the trend, which lags behind, will have led in a while.
-        let lead = turn_about(axis, turn.length / RECENT + LEAD_RAD);
-        Self { direction: (lead * direction).normalize(), axis, turn_per_m: turn.length / way.length }
-    }
-
-    /// Metres that a step uses up.
-    fn used_m(&self, step: DVec3) -> f64 {
-        let along = step.dot(self.direction).max(0.0);
-        RATE * along + (step - self.direction * along).length()
-    }
-
-    /// Radians that a turn uses up: a bound on how far the planes' normals are from where the counted angle would take them.
-    fn used_rad(&self, last: &Pose, pose: &Pose) -> f64 {
-        let about = if self.turn_per_m > 0.0 {
-            self.turn_per_m * (pose.eye_m - last.eye_m).dot(self.direction).max(0.0)
-        } else {
-            portable::asin(last.turn_to(pose).dot(self.axis).clamp(0.0, 1.0))
-        };
-        let expected = turn_about(if about > 0.0 { self.axis } else { DVec3::Z }, about);
-        let off = |i: usize| (pose.normals[i] - expected * last.normals[i]).length();
-        RATE * about + (0..4).map(off).fold(0.0, f64::max)
-    }
-}
-
-/// The turn by an angle in radians about an axis of length 1.
-fn turn_about(axis: DVec3, angle_rad: f64) -> DQuat {
-    let (sin, cos) = portable::sin_cos(0.5 * angle_rad);
-    let [x, y, z] = (axis * sin).to_array();
-    DQuat::from_xyzw(x, y, z, cos)
-}
-
-impl Pose {
-    /// The turn to another pose: its axis, as long as the sine of its angle.
-    fn turn_to(&self, other: &Self) -> DVec3 {
-        0.5 * (0..3).map(|i| self.axes[i].cross(other.axes[i])).sum::<DVec3>()
     }
 }
 
@@ -384,7 +282,7 @@ mod tests {
     fn a_straight_flight_takes_its_course_and_uses_little_of_it() {
         let mut clocks = Clocks::new(256.0, 0.0);
         let mut taken = 0;
-        for i in 0..100 {
+        for i in 0..60 {
             let moved = clocks.move_to(pose(DVec3::Y * f64::from(10 * i)));
             if let Some((course, direction)) = moved.next_course {
                 clocks.take_course(course, direction);
@@ -394,7 +292,32 @@ mod tests {
         assert_eq!((taken, clocks.course().0), (1, 1));
         let (of_course, of_path) =
             (clocks.now(clock_id(1, Kind::Error, 3)), clocks.now(clock_id(0, Kind::Error, 3)));
-        assert!(of_path > 980 && of_course < 120, "{of_path} {of_course}");
+        assert!(of_path > 580 && of_course < 80, "{of_path} {of_course}");
+    }
+
+    /// A course is flown at the lower rate once it has been kept for long, and given up for another at the first bend.
+    #[test]
+    fn a_long_straight_way_is_steady_until_it_bends() {
+        let mut clocks = Clocks::new(256.0, 0.0);
+        let mut at = DVec3::ZERO;
+        let mut fly = |clocks: &mut Clocks, steps: usize, step: DVec3| {
+            let mut taken = Vec::new();
+            for _ in 0..steps {
+                at += step;
+                if let Some((number, course)) = clocks.move_to(pose(at)).next_course {
+                    clocks.take_course(number, course);
+                    taken.push(course.rate);
+                }
+            }
+            taken
+        };
+        assert_eq!(fly(&mut clocks, 60, DVec3::Y * 10.0), [RATE]);
+        assert_eq!(fly(&mut clocks, 200, DVec3::Y * 10.0), [STEADY_RATE]);
+        assert_eq!(clocks.course().1.direction, DVec3::Y);
+        let bent = DVec3::new(1.0, 9.9, 0.0);
+        let taken = fly(&mut clocks, 30, bent);
+        assert!(!taken.is_empty() && taken.iter().all(|rate| *rate == RATE), "{taken:?}");
+        assert!(clocks.course().1.direction.dot(bent.normalize()) > 0.98);
     }
 
     #[test]

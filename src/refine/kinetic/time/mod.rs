@@ -2,4 +2,5 @@
 
 pub(crate) mod certificate;
 pub(crate) mod clocks;
+pub(crate) mod course;
 pub(crate) mod queue;

@@ -171,7 +171,8 @@ impl Queue {
         self.entries
     }
 
-    /// Looks through a few slots and drops entries that `keep` does not want.
+    /// Looks through a few slots and drops entries that `keep` does not want, and all but one of those that are alike: ground that is changed back and forth under an eye that
+    /// stands still gives a node the same word again and again, and the same entry with it.
     pub(crate) fn sweep_some(&mut self, keep: impl Fn(Entry) -> bool) {
         const SLOTS_A_FRAME: usize = 64;
         let mut kept = std::mem::take(&mut self.moving);
@@ -181,6 +182,8 @@ impl Queue {
                 (self.swept / (LEVELS * SLOTS), self.swept / SLOTS % LEVELS, self.swept % SLOTS);
             if self.wheels[clock].occupied[level] >> slot & 1 == 1 {
                 self.take_slot(clock, level, slot, &mut |entry| kept.extend(keep(entry).then_some(entry)));
+                kept.sort_unstable_by_key(|entry| (entry.node, entry.word));
+                kept.dedup();
                 for entry in kept.drain(..) {
                     self.enter(clock, entry);
                 }
@@ -227,6 +230,26 @@ impl Queue {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_sweep_keeps_what_is_wanted_once() {
+        let mut queue = Queue::new();
+        for round in 0..100 {
+            for node in 0..300 {
+                queue.enter(7, Entry { node, word: 5000 + 100 * node });
+            }
+            // Words that have changed since.
+            queue.enter(7, Entry { node: 1000 + round, word: 70_000 });
+        }
+        for _ in 0..CLOCKS * LEVELS {
+            queue.sweep_some(|entry| entry.node < 1000);
+        }
+        assert_eq!(queue.len(), 300);
+        let mut rest = Vec::new();
+        queue.drain(7, |entry| rest.push(entry.node));
+        rest.sort_unstable();
+        assert_eq!(rest, (0..300).collect::<Vec<_>>());
+    }
 
     proptest! {
         /// Against a sorted list: whatever is entered comes out at its time, once.

@@ -6,6 +6,8 @@
 //! Every engine decides by this file, with the same operations in the same order. So all decide alike to
 //! the last bit. It is the only file that knows the projection. Cost: some ten floating-point operations a test.
 
+pub(crate) mod pair;
+
 use crate::view::View;
 use terrasoar_layout::grid::record::Vertex;
 
