@@ -19,11 +19,11 @@ fn material(at: GroundPoint) -> vec4<f32> {
     let sand = vec3(0.42, 0.34, 0.22);
     let rock = vec3(0.20, 0.18, 0.17);
     let snow = vec3(0.80, 0.84, 0.90);
-    // By height: sand below 760 m, snow above 1,100 m, each fading over some tens of metres.
-    var colour = mix(grass, sand, band(at.height_m, -1e9, 760.0, 60.0));
-    colour = mix(colour, snow, band(at.height_m, 1100.0, 1e9, 80.0));
-    // By slope: bare rock where it is steeper than 38 degrees.
-    colour = mix(colour, rock, band(at.slope_deg, 38.0, 90.0, 10.0));
+    // By height: sand below 40 m, snow above 350 m, each fading over some tens of metres.
+    var colour = mix(grass, sand, band(at.height_m, -1e9, 40.0, 30.0));
+    colour = mix(colour, snow, band(at.height_m, 350.0, 1e9, 80.0));
+    // By slope: bare rock where it is steeper than 44 degrees.
+    colour = mix(colour, rock, band(at.slope_deg, 44.0, 90.0, 10.0));
     return vec4(colour, 1.0);
 }";
 // end: wgsl
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     studio.set_material(Some(material))?;
     // end: set
 
-    let view = View::new([5000.0, 1500.0, 1700.0], 10.0, -14.0).viewport(SIZE_PX);
+    let view = View::new([11300.0, 3000.0, 900.0], 45.0, -10.0).viewport(SIZE_PX);
     studio.fly(&view);
     let rgb = studio.picture(&view, &Look::default())?;
 

@@ -271,7 +271,7 @@ fn textures() -> Result<Material, RenderError> {
     // Each is so many metres wide, and lies over those before it.
     let grass = Layer::new(speckled([52, 78, 30], [96, 120, 58]), 16.0);
     let snow =
-        Layer::new(speckled([214, 224, 236], [250, 252, 255]), 16.0).heights_m([1100.0, f32::INFINITY], 80.0);
+        Layer::new(speckled([214, 224, 236], [250, 252, 255]), 16.0).heights_m([400.0, f32::INFINITY], 80.0);
     let rock = Layer::new(speckled([78, 72, 66], [142, 134, 124]), 32.0).slopes_deg([35.0, 90.0], 10.0);
     Layers::new(side).over(grass).over(snow).over(rock).material()
 }

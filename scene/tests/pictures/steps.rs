@@ -1,8 +1,12 @@
 //! Materials over real ground, through a loss of the device; and the steps for embedders that take pictures.
 
-use super::rig::{Rig, puget_sound, view};
+use super::rig::{Rig, view};
 use super::{Outcome, Test, ensure, examples};
+use std::path::Path;
 use std::process::Command;
+use terrasoar_import::synth::{self, SynthOptions};
+use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::progress::Silent;
 use terrasoar_render::{Gpu, Haze, Layer, Layers, Look, Material, wgpu};
 
 pub const TESTS: &[Test] = &[
@@ -54,14 +58,22 @@ fn wrong(gpu: &Gpu) -> Outcome {
     ensure(rig.draw(&view, &look()) == before, || "the material before is gone".into())
 }
 
+/// The land of docs/first-steps.md.
+fn first_steps_land(dem: &Path, land: &Path) -> Result<(), String> {
+    synth::write(&SynthOptions::default().seed(1), dem, &|_| {}).map_err(|e| e.to_string())?;
+    let dem = terrasoar_import::open(&[dem.to_owned()]).map_err(|e| e.to_string())?;
+    build(&*dem, land, &BuildOptions::default(), &Silent).map(drop).map_err(|e| e.to_string())
+}
+
 /// The programs of examples/steps run, and what they say and draw changes as they mean it to.
 fn pictures(_: &Gpu) -> Outcome {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
-    let land = puget_sound().path();
+    let land = folder.path().join("land.iqt");
+    first_steps_land(&folder.path().join("land.tif"), &land)?;
     let out = folder.path().join("picture.png");
-    let run = |name: &str, more: &[&std::path::Path]| {
+    let run = |name: &str, more: &[&Path]| {
         let done = Command::new(examples::built("terrasoar-scene", name)?)
-            .arg(land)
+            .arg(&land)
             .args(more)
             .output()
             .map_err(|e| e.to_string())?;
@@ -70,8 +82,27 @@ fn pictures(_: &Gpu) -> Outcome {
         Ok::<_, String>(String::from_utf8_lossy(&done.stdout).into_owned())
     };
     run("step_3_picture", &[&out])?;
-    let bytes = std::fs::read(&out).map_err(|e| e.to_string())?;
-    ensure(bytes.starts_with(b"\x89PNG") && bytes.len() > 10_000, || format!("{} bytes", bytes.len()))?;
+    let file = std::fs::File::open(&out).map_err(|e| e.to_string())?;
+    let mut reader =
+        png::Decoder::new(std::io::BufReader::new(file)).read_info().map_err(|e| e.to_string())?;
+    let mut rgb = vec![0; reader.output_buffer_size().ok_or("too large")?];
+    let size = reader.next_frame(&mut rgb).map_err(|e| e.to_string())?;
+    ensure((size.width, size.height) == (960, 540), || format!("{size:?}"))?;
+    // The example's materials by what sets their colours apart: grass is the greenest, sand the reddest, snow bright and bluish, rock grey.
+    let mut shares = [0u32; 4];
+    for pixel in rgb.as_chunks::<3>().0.iter().skip(960 * 180) {
+        let [r, g, b] = pixel.map(f32::from);
+        let seen = [
+            g > 1.1 * r && g > 1.3 * b,
+            r > 1.04 * g && r > 1.2 * b,
+            b > 150.0 && b >= r,
+            (r - b).abs() < 0.12 * r && r < 150.0,
+        ];
+        seen.into_iter().zip(&mut shares).for_each(|(seen, share)| *share += u32::from(seen));
+    }
+    ensure(shares.iter().all(|share| *share > 1000), || {
+        format!("grass, sand, snow, rock: {shares:?} pixels")
+    })?;
     let said = run("step_7_bindings", &[])?;
     let light: Vec<u32> = said.lines().filter_map(|line| line.rsplit(' ').next()?.parse().ok()).collect();
     ensure(light.len() == 3 && light[0] <= light[1] && light[1] < light[2], || said.clone())
