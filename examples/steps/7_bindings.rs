@@ -59,9 +59,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut studio = Studio::new(terrain.file(), PictureEngine::Kinetic, Culling::Vertices, SIZE_PX.into())?;
     let snow_line = SnowLine::default();
     studio.set_material(Some(snow(&snow_line)?))?;
-    let view = View::new([5000.0, 800.0, 2300.0], 10.0, -18.0).viewport(SIZE_PX);
+    let view = View::new([11300.0, 3000.0, 900.0], 45.0, -10.0).viewport(SIZE_PX);
     studio.fly(&view);
-    for height_m in [1500.0_f32, 1000.0, 500.0] {
+    for height_m in [400.0_f32, 250.0, 100.0] {
         set_snow_line(&studio.gpu().queue, &snow_line, height_m);
         let rgb = studio.picture(&view, &Look::default())?;
         let light = rgb.iter().map(|value| u64::from(*value)).sum::<u64>() / rgb.len() as u64;

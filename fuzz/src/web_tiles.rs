@@ -6,7 +6,7 @@ use crate::seeds::{self, Inputs, with_png_sums};
 use crate::words::told;
 use std::io::Write;
 use std::path::Path;
-use terrasoar_import::{OpenOptions, open_image};
+use terrasoar_import::{OpenOptions, TileOptions, open_image};
 
 fn named<const N: usize>(inputs: [(&str, Vec<u8>); N]) -> Inputs {
     inputs.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)).collect()
@@ -36,6 +36,9 @@ fn heights(path: &Path, bytes: &[u8]) {
     let options = OpenOptions { decode: Some("mapbox".into()), ..OpenOptions::default() };
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     read(&[(&name, bytes)], &options);
+    // All but a strip, from both sides of 180 degrees.
+    let tiles = TileOptions { bounds_deg: Some([10.0, -80.0, 5.0, 80.0]), ..TileOptions::default() };
+    read(&[(&name, bytes)], &OpenOptions { tiles, ..options });
 }
 
 /// Reads bytes as an archive of that name: heights, a picture by itself, a picture on a terrain.

@@ -223,8 +223,12 @@ fn or_gdal<R: Reader + 'static>(
     opened: Result<R, LayoutError>,
 ) -> Result<Box<dyn Reader>, LayoutError> {
     match opened {
-        Err(LayoutError::Unsupported { remedy: None, .. }) => {
-            boxed(crate::gdal::GdalDem::open(path, options))
+        Err(ours @ LayoutError::Unsupported { remedy: None, .. }) => {
+            match crate::gdal::GdalDem::open(path, options) {
+                // What GDAL does not know either is told in the words of its reader here.
+                Err(LayoutError::NotThisFormat { .. }) => Err(ours),
+                opened => boxed(opened),
+            }
         }
         opened => boxed(opened),
     }

@@ -118,7 +118,7 @@ pub struct OpenOptions {
 pub struct TileOptions {
     /// The zoom; without it the deepest complete one.
     pub zoom: Option<u8>,
-    /// West, south, east and north in degrees; without them those that the pyramid states, as far as there are tiles.
+    /// West, south, east and north in degrees; without them those that the pyramid states, as far as there are tiles. Elevation data whose west is greater than the east go on across 180 degrees.
     pub bounds_deg: Option<[f64; 4]>,
     /// Whether the rows of a folder of tiles are counted from the south (TMS), where nothing in it says so.
     pub from_south: bool,

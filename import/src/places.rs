@@ -151,9 +151,11 @@ impl Crs {
         }
     }
 
-    /// A full turn, where coordinates are angles.
+    /// Once around the globe, where that leads to the same place.
     pub(crate) fn turn(&self) -> Option<f64> {
-        let HorizontalSize::Radians(size) = self.system.unit.as_ref()?.size else { return None };
+        let HorizontalSize::Radians(size) = self.system.unit.as_ref()?.size else {
+            return self.ground.as_ref().and_then(Ground::turn);
+        };
         Some(std::f64::consts::TAU / size)
     }
 
@@ -289,12 +291,12 @@ impl Frame {
         let mut point = [m[0] + m[1] * x + m[2] * y, m[3] + m[4] * x + m[5] * y];
         let (Some(other), Some(own)) = (&self.other, &self.own) else { return Some(point) };
         if !self.is_same {
-            if let Some(turn) = own.turn() {
+            if let Some(turn) = own.turn().filter(|_| own.is_geographic()) {
                 point[0] = near_zero(point[0], turn);
             }
             point = own.ground.as_ref()?.across_to(other.ground.as_ref()?, point)?;
         }
-        if let Some(turn) = other.turn() {
+        if let Some(turn) = other.turn().filter(|_| other.is_geographic()) {
             point[0] = near_zero(point[0], turn);
         }
         Some(point)
@@ -303,13 +305,13 @@ impl Frame {
     /// Coordinates to metres east and north of the south-west sample, inside of the terrain or not; `None` where the projection has no such place.
     pub fn place_m(&self, mut point: [f64; 2]) -> Option<[f64; 2]> {
         if let (Some(other), Some(own), false) = (&self.other, &self.own, self.is_same) {
-            if let Some(turn) = other.turn() {
+            if let Some(turn) = other.turn().filter(|_| other.is_geographic()) {
                 point[0] = near_zero(point[0], turn);
             }
             point = other.ground.as_ref()?.across_to(own.ground.as_ref()?, point)?;
         }
         let m = &self.map;
-        if let Some(turn) = self.own.as_ref().filter(|own| own.is_geographic()).and_then(Crs::turn) {
+        if let Some(turn) = self.own.as_ref().and_then(Crs::turn) {
             let centre = m[0] + 0.5 * (m[1] * self.last[0] + m[2] * self.last[1]);
             let turns = ((point[0] - centre) / turn).round();
             // Not to lose a bit where there is nothing to turn.

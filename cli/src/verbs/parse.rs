@@ -119,6 +119,16 @@ pub(super) fn extent(text: &str) -> Result<[f64; 4], String> {
     }
 }
 
+/// `W,S,E,N` in degrees; a west that is greater than the east is one on the other side of 180 degrees.
+pub(super) fn bounds(text: &str) -> Result<[f64; 4], String> {
+    let sides: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
+    match <[f64; 4]>::try_from(sides) {
+        Ok(sides) if sides[0] != sides[2] && sides[1] < sides[3] => Ok(sides),
+        Ok(_) => Err("west and east must differ, and south be less than north".into()),
+        Err(_) => Err("give west, south, east and north in degrees, such as 7,46,8,47".into()),
+    }
+}
+
 /// `LOW,HIGH` in percent, or `LOW..HIGH` in values.
 pub(super) fn stretch(text: &str) -> Result<Stretch, String> {
     if let Some((low, high)) = text.split_once("..") {

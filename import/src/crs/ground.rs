@@ -38,7 +38,8 @@ pub(crate) struct Ground {
     /// Metres or radians a unit.
     size: f64,
     signs: [f64; 2],
-    is_geographic: bool,
+    /// Once around the globe in the system's unit, where that leads to the same place.
+    turn: Option<f64>,
     /// Semi-axes of the ellipsoid in metres.
     axes_m: [f64; 2],
     is_shift_lost: bool,
@@ -130,8 +131,11 @@ impl Ground {
             true => Proj::from_proj_string("+proj=longlat +datum=WGS84").ok()?,
             false => own.clone(),
         };
-        let is_geographic = proj.is_latlong();
-        let this = Self { proj, own, world, size, signs, is_geographic, axes_m, is_shift_lost: false };
+        let turn = match proj.is_latlong() {
+            true => Some(std::f64::consts::TAU / size),
+            false => turn_on_map(&proj, &own).map(|metres| metres / size),
+        };
+        let this = Self { proj, own, world, size, signs, turn, axes_m, is_shift_lost: false };
         // A datum by a grid that is not here shows at the first point.
         let (lon, lat) = (this.proj.longitude_of_origin(), this.proj.latitude_of_origin().clamp(-1.4, 1.4));
         let mut probe = (lon + 0.01, lat + 0.01);
@@ -183,9 +187,9 @@ impl Ground {
         self.axes_m[0]
     }
 
-    /// A full turn in the system's unit, where coordinates are angles.
+    /// Once around the globe in the system's unit, where that leads to the same place: of angles, and of maps like Mercator's.
     pub(crate) fn turn(&self) -> Option<f64> {
-        self.is_geographic.then(|| std::f64::consts::TAU / self.size)
+        self.turn
     }
 
     /// Whether the length of a step depends on the latitude alone and strongly, as on Mercator's maps.
@@ -213,6 +217,20 @@ impl Ground {
         };
         Some(([length(steps[0])?, length(steps[1])?], middle[1]))
     }
+}
+
+/// Metres of a map once around the globe, where its x is a longitude in another unit.
+fn turn_on_map(proj: &Proj, own: &Proj) -> Option<f64> {
+    if !matches!(proj.projname(), "merc" | "webmerc" | "eqc" | "cea" | "mill" | "gall") {
+        return None;
+    }
+    let middle = proj.longitude_of_origin();
+    let x = |lon: f64| {
+        let mut point = (lon, 0.0);
+        transform(own, proj, &mut point).ok().map(|()| point.0)
+    };
+    let turn = std::f64::consts::TAU * (x(middle + 1.0)? - x(middle)?);
+    (turn.is_finite() && turn > 0.0).then_some(turn)
 }
 
 /// The string with its ellipsoid and without its datum's shift.
@@ -273,6 +291,31 @@ mod tests {
             let back = ground.of_world(found.map(f64::to_radians)).unwrap();
             let [dx, dy] = [back[0] - x, back[1] - y];
             assert!(dx.hypot(dy) < 1e-4 * x.abs().max(1.0), "{system}: {back:?}");
+        }
+    }
+
+    /// Once around leads to the same place, and what lies beyond the seam of a map is where it is.
+    #[test]
+    fn maps_go_round_where_longitudes_do() {
+        for (system, turn) in [
+            ("EPSG:4326", Some(360.0)),
+            ("EPSG:3857", Some(40_075_016.685_578_49)),
+            ("+proj=merc +lat_ts=41 +lon_0=150 +x_0=1000000 +datum=WGS84 +units=km", Some(30_288.666_64)),
+            ("EPSG:32632", None),
+            ("EPSG:3035", None),
+        ] {
+            let ground = ground(system);
+            let found = ground.turn();
+            assert!(found.zip(turn).is_none_or(|(a, b)| (a / b - 1.0).abs() < 1e-8), "{system}: {found:?}");
+            assert_eq!(found.is_some(), turn.is_some(), "{system}");
+            let Some(turn) = found else { continue };
+            let [x, y] = ground.of_world([3.0, 0.3]).unwrap();
+            for turns in [-1.0, 0.0, 1.0] {
+                let [lon, lat] = ground.world([x + turns * turn, y]).unwrap();
+                let away = (lon - 3.0).rem_euclid(std::f64::consts::TAU);
+                let away = away.min(std::f64::consts::TAU - away);
+                assert!(away < 1e-9 && (lat - 0.3).abs() < 1e-9, "{system}: {lon} {lat} after {turns} turns");
+            }
         }
     }
 

@@ -22,6 +22,11 @@ impl Tied {
         Self { system, ground }
     }
 
+    /// Once around the globe in its unit, where that leads to the same place.
+    pub(super) fn turn(&self) -> Option<f64> {
+        self.ground.as_ref().and_then(Ground::turn)
+    }
+
     /// Whether the grid with this map lies in the same place by either system.
     pub(super) fn is_same(&self, other: &Self, map: &[f64; 6], samples: [u32; 2]) -> bool {
         let (a, b) = (&self.system, &other.system);

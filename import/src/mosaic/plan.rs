@@ -6,7 +6,7 @@
 use super::lattice::{Lattice, Tied};
 use super::sheet::{Member, Sheet};
 use super::source::Source;
-use crate::crs::{HorizontalSize, Kind};
+use crate::crs::HorizontalSize;
 use crate::options::Priority;
 use std::path::PathBuf;
 use terrasoar_layout::error::LayoutError;
@@ -115,10 +115,7 @@ impl Placed {
         if system != other {
             return true;
         }
-        let turn = match self.systems[system].system.unit.as_ref().map(|unit| unit.size) {
-            Some(HorizontalSize::Radians(size)) => std::f64::consts::TAU / size,
-            _ => 0.0,
-        };
+        let turn = self.systems[system].turn().unwrap_or(0.0);
         let ends = |source: usize, i: usize| {
             let Source { map, samples, .. } = &self.sources[source];
             let (first, step) = ([map[0], map[3]][i], [map[1], map[5]][i]);
@@ -186,13 +183,7 @@ impl Placed {
 /// Files on both sides of 180 degrees are close together if the western hemisphere is counted on past 180.
 fn join_across_antimeridian(sources: &mut [Source], systems: &[Tied], of: &[usize]) {
     for (number, tied) in systems.iter().enumerate() {
-        let Some(HorizontalSize::Radians(size)) = tied.system.unit.as_ref().map(|unit| unit.size) else {
-            continue;
-        };
-        if tied.system.kind != Kind::Geographic {
-            continue;
-        }
-        let turn = std::f64::consts::TAU / size;
+        let Some(turn) = tied.turn() else { continue };
         let ends = |source: &Source, past: bool| {
             let add = if past && source.map[0] < 0.0 { turn } else { 0.0 };
             let [a, b] =

@@ -76,6 +76,22 @@ fn longitudes_are_taken_with_any_turn() {
     assert_eq!(world.place_m([185.0, 0.0]), Some([600.0, 100.0]));
 }
 
+/// The web's map ends at 180 degrees, and a terrain on it may go on.
+#[test]
+fn places_beyond_the_seam_of_a_map_are_found() {
+    const HALF: f64 = 20_037_508.342_789_244;
+    let across = header("EPSG:3857", [21, 11], [HALF - 10_000.0, 5_000.0], [1000.0, 1000.0]);
+    let (own, world) = (Frame::own(&across).unwrap(), Frame::wgs84(&across).unwrap());
+    // 5 km of the map beyond it.
+    let lon = -180.0 + 5_000.0 / HALF * 180.0;
+    let place = world.place_m([lon, 0.0]);
+    assert!(is_near(place, [450.0, 100.0], 1e-6), "{place:?}");
+    assert!(is_near(world.coordinates([450.0, 100.0]), [lon, 0.0], 1e-9));
+    assert_eq!(own.place_m([5_000.0 - HALF, 0.0]).map(|at| at.map(f64::round)), Some([450.0, 100.0]));
+    let [west, _, east, _] = world.bounds_deg().unwrap();
+    assert!((west - 179.910_169).abs() < 1e-5 && (east + 179.910_169).abs() < 1e-5, "{west} {east}");
+}
+
 /// A square around the South Pole has every longitude.
 #[test]
 fn around_a_pole_there_are_all_longitudes() {

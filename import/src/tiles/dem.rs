@@ -4,8 +4,9 @@
 //! Cost: a tile in memory for each thread, and a coarser one.
 
 use super::decode::Texels;
-use super::grid::Tile;
+use super::grid::{Tile, place};
 use super::packing::{Found, check, find};
+use super::seam::{Halves, Shifted};
 use super::{Part, Pyramid, place_above};
 use crate::OpenOptions;
 use crate::parallel::each_task;
@@ -21,9 +22,16 @@ const MAX_SIDE: u32 = 65_537;
 
 /// Elevation data in tiles.
 pub(crate) struct TileDem {
-    pyramid: Pyramid,
+    halves: Halves,
     declared: Declared,
     found: Found,
+}
+
+/// A pyramid, and how its heights are packed.
+#[derive(Clone, Copy)]
+struct Packed<'d> {
+    pyramid: &'d Pyramid,
+    found: &'d Found,
 }
 
 /// What a thread keeps.
@@ -37,29 +45,43 @@ struct Worker {
 impl TileDem {
     /// Chooses what is read, and finds out how heights are packed.
     pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<Self, LayoutError> {
-        let pyramid = Pyramid::open(path, &options.tiles, None)?;
-        let found = find(&pyramid, options.decode.as_deref())?;
+        let halves = Halves::open(path, &options.tiles)?;
+        let pyramid = &halves.all[0].0;
+        let found = find(pyramid, options.decode.as_deref())?;
         let plan = &pyramid.plan;
-        if options.reproject.is_none() {
-            refuse_large(path, plan.zoom, plan.size)?;
+        if !halves.is_even() {
+            let problem =
+                "tiles on both sides of 180 degrees have unlike numbers of texels; build two halves";
+            return Err(LayoutError::unsupported(path, problem));
         }
-        let mut declared = Declared::new(plan.size, Decode::SAMPLE_TYPE, pyramid.format());
-        declared.place = Some(Said::new(pyramid.place, "the tiles"));
+        let size = halves.size.map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+        // Halves are put together in memory of this size of numbers.
+        if options.reproject.is_none() || halves.size.iter().any(|side| *side > i32::MAX as u64) {
+            refuse_large(path, plan.zoom, size)?;
+        }
+        let mut declared = Declared::new(size, Decode::SAMPLE_TYPE, pyramid.format());
+        declared.place = Some(Said::new(place(plan.zoom, plan.side, halves.first), "the tiles"));
         declared.crs = pyramid.crs();
         declared.value.unit = Some(Said::new(VerticalUnit::Metres(1.0), "the packing"));
-        declared.aloud.push(plan.words.clone());
+        declared.aloud.extend(halves.all.iter().map(|(half, _)| half.plan.words.clone()));
         declared.notes.push(format!("heights are packed into colours: {}", found.by));
         declared.warnings.extend(found.warning.clone());
-        if let Some(missing) = &plan.missing {
+        for missing in halves.all.iter().filter_map(|(half, _)| half.plan.missing.as_ref()) {
             let higher = plan.zoom.saturating_sub(1).to_string();
             declared.warnings.push(Warning::new(missing.clone()).mended_by(Remedy::Zoom, higher));
         }
-        Ok(Self { pyramid, declared, found })
+        if let Some(why) = &halves.missing {
+            let words = format!("on one side of 180 degrees nothing is read: {why}");
+            declared.warnings.push(Warning::new(words).mended_by(Remedy::Bounds, "W,S,E,N"));
+        }
+        Ok(Self { halves, declared, found })
     }
+}
 
+impl Packed<'_> {
     /// The heights of a tile.
-    fn heights(&self, tile: Tile, texels: &Texels) -> Result<Vec<f64>, LayoutError> {
-        check(&self.pyramid, tile, texels)?;
+    fn heights(self, tile: Tile, texels: &Texels) -> Result<Vec<f64>, LayoutError> {
+        check(self.pyramid, tile, texels)?;
         let mut heights = Vec::with_capacity(texels.rgba.len());
         for [red, green, blue, alpha] in &texels.rgba {
             if *alpha == 0 {
@@ -79,7 +101,7 @@ impl TileDem {
         Ok(heights)
     }
 
-    fn put(&self, tile: Tile, worker: &mut Worker, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+    fn put(self, tile: Tile, worker: &mut Worker, sink: &dyn SampleSink) -> Result<(), LayoutError> {
         let part = self.pyramid.part(tile);
         let window = Window { col: part.to[0], row: part.to[1], width: part.size[0], height: part.size[1] };
         if let Some(texels) = self.pyramid.tile(tile, &mut worker.bytes)? {
@@ -156,17 +178,22 @@ impl Reader for TileDem {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.pyramid.memory_bytes()
+        self.halves.all.iter().map(|(half, _)| half.memory_bytes()).max().unwrap_or(0)
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        let plan = &self.pyramid.plan;
-        each_task(
-            plan.span.count(),
-            usize::MAX,
-            || Ok(Worker::default()),
-            |worker, i| self.put(plan.span.tile(plan.zoom, i), worker, sink),
-        )
+        self.halves.put_rest(sink)?;
+        for (pyramid, by) in &self.halves.all {
+            let (plan, sink) = (&pyramid.plan, Shifted { sink, by: *by });
+            let packed = Packed { pyramid, found: &self.found };
+            each_task(
+                plan.span.count(),
+                usize::MAX,
+                || Ok(Worker::default()),
+                |worker, i| packed.put(plan.span.tile(plan.zoom, i), worker, &sink),
+            )?;
+        }
+        Ok(())
     }
 }
 

@@ -17,6 +17,7 @@ mod mbtiles;
 mod packing;
 mod plan;
 mod pmtiles;
+mod seam;
 
 use crate::input;
 use crate::options::TileOptions;

@@ -157,7 +157,7 @@ impl Plan {
         if let Some(typed) = options.bounds_deg {
             let area = Area::of_degrees(typed).ok_or_else(|| {
                 LayoutError::Usage(
-                    "bounds are west, south, east, north in degrees, the first less than the third and the second less than the fourth, none of them beyond a pole; across the antimeridian build two halves"
+                    "bounds are west, south, east, north in degrees, none of them beyond a pole: the first less than the third, or greater where elevation data are read across 180 degrees, and the second less than the fourth"
                         .into(),
                 )
                 .mended_by(Remedy::Bounds)

@@ -225,4 +225,30 @@ fn files_on_both_sides_of_180_degrees_lie_together() {
     assert_eq!([grid.info.samples_wide, grid.info.samples_high], [200, 100]);
     assert_eq!([grid.at(0, 0), grid.at(199, 99)], [1.0, 2.0]);
     assert!((grid.info.georeference.pixel_to_crs.unwrap()[0] - 179.005).abs() < 1e-9);
+    // Brought to the map of the web, or on it before: it is cut there as well.
+    const HALF: f64 = 20_037_508.342_789_244;
+    let map = OpenOptions {
+        reproject: Some("EPSG:3857".into()),
+        resolution: Some(1000.0),
+        ..OpenOptions::default()
+    };
+    let both = [file("w.asc"), file("e.asc")];
+    let brought = read(&both, &map);
+    let [wide, high] = [brought.info.samples_wide, brought.info.samples_high];
+    assert!((220..=226).contains(&wide) && (112..=120).contains(&high), "{wide} x {high}");
+    assert_eq!([brought.at(5, 50), brought.at(wide - 6, 50)], [1.0, 2.0]);
+    let web = |name: &str, west: f64, value: f64| {
+        at(west, -1_900_000.0, HALF / 20_000.0).write(file(name), "EPSG:3857", |_, _| value)
+    };
+    // A hundred steps on either side.
+    let (left, right) = (web("left.asc", HALF * 0.995, 3.0), web("right.asc", -HALF, 4.0));
+    let joined = read(&[right.clone(), left.clone()], &OpenOptions::default());
+    assert_eq!([joined.info.samples_wide, joined.info.samples_high], [200, 100]);
+    assert_eq!([joined.at(99, 50), joined.at(100, 50)], [3.0, 4.0]);
+    // And out of it into a zone that both lie in.
+    let zone = OpenOptions { reproject: Some("EPSG:32701".into()), ..OpenOptions::default() };
+    let zone = read(&[left, right], &zone);
+    assert!(zone.info.samples_wide < 260, "{}", zone.info.samples_wide);
+    let count = |value: f64| zone.samples.iter().filter(|sample| **sample == value).count();
+    assert!(count(3.0) > 5000 && count(4.0) > 5000, "{} {}", count(3.0), count(4.0));
 }

@@ -1,6 +1,7 @@
 //! Which zoom and which part are read, and what stands for what is missing.
 
-use crate::make::{Pm, Tiles, degrees, folder, mapbox, pmtiles, tiles};
+use crate::import_support::collect;
+use crate::make::{HALF_M, Pm, Tiles, degrees, folder, hills, mapbox, pmtiles, tiles};
 use crate::{read, refusal};
 use tempfile::tempdir;
 use terrasoar_import::{OpenOptions, TileOptions, open_with};
@@ -55,6 +56,60 @@ fn the_deepest_complete_zoom_is_read_and_said() {
     assert_eq!([grid.info.samples_wide, grid.info.samples_high], [64, 64]);
 }
 
+/// The last columns of the world and the first ones are one grid, of which the eastern half has a row less.
+#[test]
+fn bounds_across_180_degrees_join_both_sides() {
+    let folder_of = tempdir().unwrap();
+    let texel = |col: u64, row: u64| mapbox(hills(col, row));
+    let west = tiles(6, 62..64, 25..27, 16, texel);
+    let east = tiles(6, 0..2, 25..26, 16, texel);
+    let all: Tiles = west.clone().into_iter().chain(east).collect();
+    let path = folder(&folder_of.path().join("both"), &all, ".png", false);
+    let [_, south, _, north] = degrees(6, 0..2, 25..27);
+    let bounds = |west: f64, east: f64| TileOptions {
+        bounds_deg: Some([west, south, east, north]),
+        ..TileOptions::default()
+    };
+    // From the first texel of column 62 to the last of column 1, and some less.
+    for (options, skipped, wide) in [(bounds(168.75, -168.75), 0, 64), (bounds(174.375, -174.375), 16, 32)] {
+        let grid = read(&path, Some("mapbox"), options).unwrap();
+        assert_eq!([grid.info.samples_wide, grid.info.samples_high], [wide, 32]);
+        for (col, row) in (0..wide).flat_map(|col| (0..32).map(move |row| (col, row))) {
+            let of_world = (62 * 16 + skipped + u64::from(col)) % 1024;
+            let wanted = hills(of_world, 25 * 16 + u64::from(row)) as f64 / 10.0;
+            let is_void = of_world < 512 && row >= 16;
+            let found = grid.at(col, row);
+            assert!(found == wanted || is_void && found.is_nan(), "{col}, {row}: {found} {wanted}");
+            assert_eq!(found.is_nan(), is_void);
+        }
+        let map = grid.info.georeference.pixel_to_crs.unwrap();
+        let step = 2.0 * HALF_M / 1024.0;
+        assert!((map[0] - (HALF_M - f64::from(wide / 2) * step + step / 2.0)).abs() < 1e-6, "{map:?}");
+    }
+    // Brought into a zone that both lie in; and where there are tiles on one side only.
+    let options = OpenOptions {
+        decode: Some("mapbox".into()),
+        tiles: bounds(168.75, -168.75),
+        reproject: Some("utm".into()),
+        ..OpenOptions::default()
+    };
+    let grid = collect(&*open_with(std::slice::from_ref(&path), &options).unwrap()).unwrap();
+    assert!(grid.info.samples_wide < 90 && grid.samples.len() - grid.voids() > 1000);
+    let path = folder(&folder_of.path().join("west"), &west, ".png", false);
+    let options = OpenOptions { reproject: None, ..options };
+    let dem = open_with(std::slice::from_ref(&path), &options).unwrap();
+    assert_eq!(collect(&*dem).unwrap().info.samples_wide, 32);
+    let said: Vec<String> = dem.warnings().into_iter().map(|warning| warning.words).collect();
+    assert!(said.iter().any(|words| words.contains("one side of 180 degrees")), "{said:?}");
+    // Neither here nor there.
+    let nothing = refusal(
+        &path,
+        Some("mapbox"),
+        TileOptions { bounds_deg: Some([20.0, 0.0, -20.0, 10.0]), ..TileOptions::default() },
+    );
+    assert!(nothing.contains("none of its tiles"), "{nothing}");
+}
+
 #[test]
 fn bounds_cut_to_the_texel() {
     let folder_of = tempdir().unwrap();
@@ -78,9 +133,9 @@ fn bounds_cut_to_the_texel() {
     let beside = TileOptions { bounds_deg: Some([0.0, 0.0, 1.0, 1.0]), ..TileOptions::default() };
     let words = refusal(&path, Some("mapbox"), beside);
     assert!(words.contains("none of its tiles lies in these bounds"), "{words}");
-    let turned = TileOptions { bounds_deg: Some([170.0, 0.0, -170.0, 1.0]), ..TileOptions::default() };
+    let turned = TileOptions { bounds_deg: Some([0.0, 2.0, 1.0, 1.0]), ..TileOptions::default() };
     let words = refusal(&path, Some("mapbox"), turned);
-    assert!(words.contains("across the antimeridian"), "{words}");
+    assert!(words.contains("the second less than the fourth"), "{words}");
 }
 
 #[test]
