@@ -5,8 +5,16 @@
 #[path = "../../layout/tests/common/mod.rs"]
 mod common;
 
+#[path = "pictures/chroma.rs"]
+mod chroma;
+#[path = "pictures/jp2_boxes.rs"]
+mod jp2_boxes;
+#[path = "pictures/jxl.rs"]
+mod jxl;
 #[path = "pictures/stretch.rs"]
 mod stretch;
+#[path = "../../layout/tests/import_support/tiff.rs"]
+mod tiff;
 
 use std::path::{Path, PathBuf};
 use terrasoar_import::open_image;
@@ -30,6 +38,10 @@ fn is_hole(x: u32, y: u32) -> bool {
 /// All texels, read in uneven steps.
 fn texels(path: &Path) -> Result<Vec<[u8; 4]>, LayoutError> {
     let image = open_image(path)?;
+    // As whoever drapes refuses it.
+    if image.info().memory_bytes > 64 << 20 {
+        return Err(LayoutError::Usage("it takes more memory than is allowed".into()));
+    }
     let mut rows = image.rows()?;
     let [wide, high] = image.info().texels;
     let mut all = Vec::new();
@@ -79,13 +91,19 @@ fn lossless_pictures_come_back() {
             assert_eq!(texel, [grey, grey, grey, 255], "{name} {x} {y}");
         });
     }
-    for name in ["rgba-tiles-zstd.tif", "rgb-nodata.tif", "rgba.png", "rgba.webp"] {
+    for name in ["rgba-tiles-zstd.tif", "rgb-nodata.tif", "rgba.png", "rgba.webp", "rgba.jp2"] {
         each(&texels(&fixture(name)).unwrap(), |x, y, texel| {
             let [r, g, b] = colour(x, y);
             assert_eq!(texel[3], if is_hole(x, y) { 0 } else { 255 }, "{name} {x} {y}");
             assert!(texel[3] == 0 || texel == [r, g, b, 255], "{name} {x} {y}: {texel:?}");
         });
     }
+    each(&texels(&fixture("palette.jp2")).unwrap(), |x, y, texel| {
+        let place = colour(x, y)[0] / 16;
+        assert_eq!(texel, [17 * place, 255 - 17 * place, 5 * place, 255], "{x} {y}");
+    });
+    // The same picture with marks of restart.
+    assert!(texels(&fixture("restart.jpg")).unwrap() == texels(&fixture("baseline.jpg")).unwrap());
 }
 
 #[test]
@@ -98,6 +116,7 @@ fn jpeg_pictures_come_back_about() {
         ("progressive.jpg", false),
         ("grey.jpg", true),
         ("rgb.webp", false),
+        ("chroma.tif", false),
     ] {
         let (mut sum, mut most) = (0, 0);
         each(&texels(&fixture(name)).unwrap(), |x, y, texel| {
@@ -160,8 +179,16 @@ fn what_is_not_read_is_refused_with_a_way_out() {
     refused(Path::new(env!("CARGO_MANIFEST_DIR")), ["directory", "name the images"]);
     refused(
         &Path::new(env!("CARGO_MANIFEST_DIR")).join("../layout/FORMAT.md"),
-        ["no PNG, JPEG, WebP, JPEG 2000 or TIFF", "gdal_translate"],
+        ["no PNG, JPEG, JPEG XL, WebP, JPEG 2000 or TIFF", "gdal_translate"],
     );
+    let folder = tempfile::tempdir().unwrap();
+    for (brand, name) in [("avif", "AVIF"), ("avis", "AVIF"), ("heic", "HEIF"), ("mif1", "HEIF")] {
+        let path = folder.path().join(brand);
+        std::fs::write(&path, format!("\0\0\0\x20ftyp{brand}\0\0\0\0mif1miaf")).unwrap();
+        refused(&path, [name, "magick INPUT output.png"]);
+        let heights = terrasoar_import::open_file(&path).err().expect("an error").to_string();
+        assert!(heights.contains(name) && heights.contains("has no heights"), "{heights}");
+    }
     let floats = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/float32-strips.tif");
     refused(&floats, ["float32", "black"]);
 }
@@ -183,12 +210,20 @@ fn damaged_pictures_are_answered() {
         "rgb.webp",
         "rgb-tiles.jp2",
         "grey.j2k",
+        "rgba.jp2",
+        "palette.jp2",
+        "restart.jpg",
         "rgb-tiles-webp.tif",
         "rgb-planes.tif",
+        "rgba.jxl",
+        "rgb-boxes.jxl",
+        "lossy.jxl",
+        "jpegxl-rgb.tif",
+        "jpegxl-rgba.tif",
     ] {
         let bytes = std::fs::read(fixture(name)).unwrap();
         let path = folder.path().join("x");
-        let step = (bytes.len() / 150).max(1);
+        let step = (bytes.len() / if name.contains("jxl") { 40 } else { 150 }).max(1);
         for at in (0..bytes.len()).step_by(step) {
             let mut flipped = bytes.clone();
             flipped[at] ^= 0x5a;
@@ -202,4 +237,31 @@ fn damaged_pictures_are_answered() {
         assert!(texels(&path).is_err(), "half of {name}");
     }
     assert!(errors > tries / 3, "{errors} of {tries}");
+}
+
+/// Luma and chroma of every step, packed and not, in strips and tiles, against the formulas of TIFF.
+#[test]
+fn luma_and_chroma_become_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    for case in chroma::all() {
+        let bytes = chroma::file(case);
+        std::fs::write(&path, &bytes).unwrap();
+        let texels = texels(&path).unwrap_or_else(|error| panic!("{case:?}: {error}"));
+        for (at, texel) in (0..).zip(&texels) {
+            let (col, row) = (at % chroma::SIZE[0], at / chroma::SIZE[0]);
+            let wanted = chroma::colours(case, chroma::codes(case, col, row));
+            let is_near = (0..3).all(|i| (f64::from(texel[i]) - wanted[i]).abs() <= 0.51);
+            assert!(is_near && texel[3] == 255, "{case:?} {col} {row}: {texel:?}, not {wanted:?}");
+        }
+        // Cut and changed.
+        for at in (0..bytes.len()).step_by(97) {
+            let mut changed = bytes.clone();
+            changed[at] ^= 0x5a;
+            for damaged in [&changed[..], &bytes[..at]] {
+                std::fs::write(&path, damaged).unwrap();
+                let _ = self::texels(&path);
+            }
+        }
+    }
 }

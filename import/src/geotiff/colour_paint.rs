@@ -35,7 +35,7 @@ impl Paint {
         file: &mut TiffFile,
         directory: &Directory,
         bands: u64,
-        jpeg: bool,
+        (jpeg, bytes): (bool, bool),
     ) -> Result<Self, LayoutError> {
         let photometric = file.number(directory, tags::PHOTOMETRIC)?.unwrap_or(if bands < 3 { 1 } else { 2 });
         let what = match (photometric, bands) {
@@ -51,7 +51,7 @@ impl Paint {
             (1, _) => return Ok(Self::Grey),
             (2, 3..) => return Ok(Self::Rgb),
             (5, 4..) if !jpeg => return Ok(Self::Cmyk),
-            (6, 3) if jpeg => return Ok(Self::YCbCr),
+            (6, 3) if jpeg || bytes => return Ok(Self::YCbCr),
             (3, _) => {
                 let listed = file.count(directory, tags::COLOR_MAP);
                 if !(3..=3 * MAX_COLOURS).contains(&listed) {
@@ -65,7 +65,7 @@ impl Paint {
                 return Ok(Self::Palette((0..count).map(colour).collect()));
             }
             (5, _) => "in CMYK, the inks of a press".to_owned(),
-            (6, _) => "in YCbCr without JPEG".to_owned(),
+            (6, _) => "in YCbCr of an unusual kind".to_owned(),
             (8..=10, _) => "in CIE Lab".to_owned(),
             (other, bands) => format!("of {bands} bands with the photometric code {other}"),
         };
@@ -161,13 +161,25 @@ impl Samples {
         let Some(stored) = self.odd else { return };
         let whole = stored.odd(row, self.big_endian, count);
         match self.sample_type {
-            SampleType::U8 => {
-                let most = if is_grey { (1u32 << stored.bits().min(8)) - 1 } else { 255 };
-                bytes.extend(whole.map(|number| (number as u32 * 255 / most) as u8));
-            }
+            SampleType::U8 if is_grey => bytes.extend(whole.map(|number| self.shade(number as u32))),
+            SampleType::U8 => bytes.extend(whole.map(|number| number as u8)),
             SampleType::U16 => bytes.extend(whole.flat_map(|number| (number as u16).to_le_bytes())),
             _ => bytes.extend(whole.flat_map(|number| (number as f32).to_le_bytes())),
         }
+    }
+
+    /// A number of less than a byte as a shade of grey.
+    fn shade(&self, number: u32) -> u8 {
+        let most = (1u32 << self.bits().min(8)) - 1;
+        (number * 255 / most) as u8
+    }
+
+    /// The byte as which a number of the file is shown, of samples of bytes that are shades of grey; `None` of one that they cannot have.
+    pub(super) fn shown(&self, number: f64) -> Option<u8> {
+        let most = f64::from((1u32 << self.bits().min(8)) - 1);
+        let is_one =
+            self.sample_type == SampleType::U8 && number.fract() == 0.0 && (0.0..=most).contains(&number);
+        is_one.then(|| self.shade(number as u32))
     }
 
     /// The smallest and largest whole number that a sample can be, of those of up to 16 bits.

@@ -37,6 +37,7 @@ mod rows;
 mod span;
 mod stored;
 mod tags;
+mod ycbcr;
 mod zstd_frame;
 #[cfg(feature = "zstd")]
 mod zstd_library;
