@@ -21,7 +21,7 @@ use crate::jxl::is_jxl;
 use crate::places::Frame;
 use crate::reader::{Orientation, Picture};
 use crate::shown::{PictureOptions, Stretch};
-use crate::tiles::{TileImage, is_pyramid};
+use crate::tiles::{TileImage, check_asked, is_pyramid};
 use crate::webp::is_webp;
 use crate::{TiffImage, input, is_tiff};
 use completed::Completed;
@@ -64,6 +64,7 @@ pub fn open_images(
     header: Option<&Header>,
     options: &PictureOptions,
 ) -> Result<Vec<Box<dyn ImageSource>>, LayoutError> {
+    check_asked(paths, &options.tiles)?;
     let around = header.and_then(Frame::wgs84).and_then(|frame| frame.bounds_deg());
     let mut opened = paths.iter().map(|path| open(path, options, around)).collect::<Result<Vec<_>, _>>()?;
     if let Some(stretch) = options.stretch {
