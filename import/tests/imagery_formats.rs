@@ -265,3 +265,58 @@ fn luma_and_chroma_become_colours() {
         }
     }
 }
+
+/// A picture of two texels of 8 bits a channel: what its extra samples are, and what GDAL says of its bands.
+fn two_texels(channels: u16, extra: &[u16], roles: &[&str], data: &[u8]) -> Vec<[u8; 4]> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    let items = roles.iter().enumerate().map(|(band, role)| {
+        format!("<Item name=\"COLORINTERP\" sample=\"{band}\" role=\"colorinterp\">{role}</Item>\n")
+    });
+    let is_grey = extra.len() + 1 == usize::from(channels);
+    let mut tags = vec![
+        tiff::shorts(256, &[2]),
+        tiff::shorts(257, &[1]),
+        tiff::shorts(258, &vec![8; usize::from(channels)]),
+        tiff::shorts(259, &[1]),
+        tiff::shorts(262, &[if is_grey { 1 } else { 2 }]),
+        tiff::longs(273, &[tiff::DATA_AT]),
+        tiff::shorts(277, &[channels]),
+        tiff::shorts(278, &[1]),
+        tiff::longs(279, &[data.len() as u32]),
+    ];
+    if !extra.is_empty() {
+        tags.push(tiff::shorts(338, extra));
+    }
+    if !roles.is_empty() {
+        tags.push(tiff::text(
+            42112,
+            &format!("<GDALMetadata>\n{}</GDALMetadata>", items.collect::<String>()),
+        ));
+    }
+    std::fs::write(&path, tiff::tiff(false, tags, data)).unwrap();
+    texels(&path).unwrap()
+}
+
+#[test]
+fn bands_are_what_gdal_calls_them() {
+    let bgr = two_texels(3, &[0, 0], &["Blue", "Green", "Red"], &[1, 2, 3, 4, 5, 6]);
+    assert_eq!(bgr, [[3, 2, 1, 255], [6, 5, 4, 255]]);
+    let argb = two_texels(4, &[0, 0, 0], &["Alpha", "Red", "Green", "Blue"], &[0, 2, 3, 4, 128, 5, 6, 7]);
+    assert_eq!(argb, [[2, 3, 4, 0], [5, 6, 7, 128]]);
+    let rgba = two_texels(4, &[0], &["Red", "Green", "Blue", "Alpha"], &[1, 2, 3, 0, 4, 5, 6, 255]);
+    assert_eq!(rgba, [[1, 2, 3, 0], [4, 5, 6, 255]]);
+    // Names that are no colours, or of bands that are not there, change nothing.
+    for roles in [&["Red", "Green", "Undefined"][..], &["Undefined", "Red", "Green", "Blue"]] {
+        assert_eq!(two_texels(3, &[0, 0], roles, &[1, 2, 3, 4, 5, 6]), [[1, 2, 3, 255], [4, 5, 6, 255]]);
+    }
+}
+
+#[test]
+fn colours_multiplied_by_alpha_are_divided() {
+    let data = [50, 25, 0, 100, 200, 100, 7, 255];
+    assert_eq!(two_texels(4, &[1], &[], &data), [[128, 64, 0, 100], [200, 100, 7, 255]]);
+    assert_eq!(two_texels(4, &[2], &[], &data), [[50, 25, 0, 100], [200, 100, 7, 255]]);
+    // A colour above alpha was not multiplied, whatever the file says.
+    assert_eq!(two_texels(4, &[1], &[], &[150, 25, 0, 100, 9, 9, 9, 0]), [[150, 25, 0, 100], [9, 9, 9, 0]]);
+}

@@ -244,8 +244,20 @@ impl Samples {
 pub(super) struct Channels {
     pub(super) colours: Vec<usize>,
     pub(super) alpha: Option<usize>,
+    /// Whether the colours were multiplied by alpha.
+    pub(super) is_multiplied: bool,
     /// Value of all colour channels where there is no picture.
     pub(super) void: Option<f64>,
+}
+
+/// A texel whose colours were multiplied by its alpha, as they were before. A colour above alpha cannot be such a product: files of some programs say that theirs are and do not
+/// mean it, and stay as they are.
+fn divided([r, g, b, alpha]: [u8; 4]) -> [u8; 4] {
+    if alpha == 0 || r.max(g).max(b) > alpha {
+        return [r, g, b, alpha];
+    }
+    let [r, g, b] = [r, g, b].map(|c| ((u32::from(c) * 255 + u32::from(alpha) / 2) / u32::from(alpha)) as u8);
+    [r, g, b, alpha]
 }
 
 impl Channels {
@@ -306,6 +318,9 @@ impl Channels {
             };
             if let Some(alpha) = self.alpha {
                 to[3] = shown(alpha, whole);
+                if self.is_multiplied {
+                    *to = divided(*to);
+                }
             }
             if self.is_void(|channel| f64::from(samples.short(from, channel))) {
                 to[3] = 0;
@@ -324,7 +339,8 @@ impl Channels {
             let alpha = self.alpha.map_or(255.0, |alpha| {
                 (samples.number(from, alpha) / samples.opaque() * 255.0).clamp(0.0, 255.0)
             });
-            *to = [red, green, blue, alpha];
+            let share = if self.is_multiplied && alpha > 0.0 { alpha / 255.0 } else { 1.0 };
+            *to = [red / share, green / share, blue / share, alpha];
             if rounded.is_some_and(|void| [red, green, blue].iter().all(|number| f64::from(*number) == void))
             {
                 *to = [f32::NAN; 4];

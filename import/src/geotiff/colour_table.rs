@@ -7,6 +7,7 @@ use super::chunk_grid::{ChunkGrid, side};
 use super::chunks::{Compression, Predictor, compression_of};
 use super::colour_paint::{Channels, MAX_BANDS, Paint, Samples};
 use super::listing::Places;
+use super::metadata;
 use super::tags::{self, Directory, TiffFile};
 use super::ycbcr::YCbCr;
 use crate::jxl;
@@ -148,14 +149,31 @@ impl Table {
         let extra = file.numbers(directory, tags::EXTRA_SAMPLES, MAX_BANDS)?.unwrap_or_default();
         let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2)).map(|at| named.channels() + at);
         let alpha = alpha.filter(|at| (*at as u64) < bands);
-        let (paint, colours) = colours(file, named, bands, alpha, &options.bands, &mut notes)?;
+        let is_multiplied = alpha.is_some_and(|at| extra.get(at - named.channels()) == Some(&1));
+        let said = match named {
+            // What colour bands are is also told by GDAL, where the photometric code has no word for it.
+            Paint::Grey | Paint::Rgb => {
+                file.text(directory, tags::GDAL_METADATA, super::MAX_METADATA_BYTES)?
+            }
+            _ => None,
+        };
+        let (rgb, named_alpha) = metadata::colours(said.as_deref().unwrap_or_default());
+        let [rgb, named_alpha] = [rgb.map(Vec::from), named_alpha.map(|at| vec![at])]
+            .map(|named| named.filter(|at| at.iter().all(|band| (*band as u64) < bands)));
+        let alpha = named_alpha.map(|at| at[0]).or(alpha);
+        let (paint, colours) = match rgb {
+            Some(rgb) if options.bands.is_empty() && alpha.is_none_or(|at| !rgb.contains(&at)) => {
+                (Paint::Rgb, rgb)
+            }
+            _ => colours(file, named, bands, alpha, &options.bands, &mut notes)?,
+        };
         let is_planar = bands > 1 && file.number(directory, tags::PLANAR_CONFIGURATION)?.unwrap_or(1) != 1;
         // Of bands that lie apart those that are read lie side by side once they were.
         let read = colours.iter().chain(&alpha).map(|band| *band as u64);
         let planes: Vec<u64> = if is_planar { read.collect() } else { Vec::new() };
         let void = file.text(directory, tags::GDAL_NODATA, super::MAX_NODATA_BYTES)?;
         let void = void.and_then(|text| text.trim().parse::<f64>().ok()).filter(|void| !void.is_nan());
-        let mut channels = Channels { colours, alpha, void };
+        let mut channels = Channels { colours, alpha, is_multiplied, void };
         if is_planar {
             channels.alpha = alpha.map(|_| channels.colours.len());
             channels.colours = (0..channels.colours.len()).collect();

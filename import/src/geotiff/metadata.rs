@@ -53,6 +53,18 @@ pub(super) fn names(xml: &str) -> Vec<Option<String>> {
     names
 }
 
+/// The bands that are red, green and blue, where all three are named, and the one that is alpha.
+pub(super) fn colours(xml: &str) -> (Option<[usize; 3]>, Option<usize>) {
+    let roles: Vec<_> = items(xml).filter(|item| item.role == "colorinterp").collect();
+    let band =
+        |name: &str| roles.iter().find(|item| item.text.eq_ignore_ascii_case(name)).map(|item| item.band);
+    let rgb = match (band("Red"), band("Green"), band("Blue")) {
+        (Some(red), Some(green), Some(blue)) => Some([red, green, blue]),
+        _ => None,
+    };
+    (rgb, band("Alpha"))
+}
+
 fn attribute<'a>(attributes: &'a str, name: &str) -> Option<&'a str> {
     let (_, rest) = attributes.split_once(&format!(" {name}=\""))?;
     rest.split_once('"').map(|(value, _)| value)
