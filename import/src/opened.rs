@@ -104,6 +104,9 @@ impl OpenedDem {
             }
             (samples, map, sample_type) = (warp.samples(), Some(warp.map()), warp.sample_type());
             placed.push(warp.words());
+            if warp.is_rough() {
+                warnings.push(shift_lost(&system.name));
+            }
             if let Some(target) = warp.system() {
                 system = System { vertical: system.vertical.clone(), ..target.clone() };
             }
@@ -314,4 +317,12 @@ impl SampleSink for Voiding<'_> {
     fn put_void(&self, window: Window) -> Result<(), LayoutError> {
         self.sink.put_void(window)
     }
+}
+/// That places are off by a shift of datums.
+pub(crate) fn shift_lost(name: &str) -> Warning {
+    let name = terrasoar_layout::words::harmless(name, 80);
+    Warning::new(format!(
+        "the shift of datum of {} is a grid that is not here, and was left out, so places may be off by up to some hundred metres; for true places bring the data over before: gdalwarp -t_srs SYSTEM INPUT output.tif",
+        if name.is_empty() { "the reference system" } else { name.as_str() }
+    ))
 }

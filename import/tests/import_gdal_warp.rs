@@ -204,3 +204,40 @@ fn systems_of_every_kind_are_brought_over() {
         agrees(&path, target, &options, folder.path());
     }
 }
+
+/// GDAL writes these with keys of the file's own: shifts of datum, prime meridians, an oblique projection, Miller's sphere.
+#[test]
+#[ignore = "needs gdalwarp"]
+fn bodies_and_projections_of_the_files_own_are_brought_over() {
+    let folder = tempdir().unwrap();
+    for (system, [x, y]) in [
+        (
+            "+proj=tmerc +lon_0=9 +x_0=3500000 +ellps=bessel +towgs84=598.1,73.7,418.2,0.202,0.045,-2.455,6.7",
+            [3_515_000.0, 5_540_000.0],
+        ),
+        ("+proj=utm +zone=31 +ellps=intl +towgs84=-87,-98,-121", [600_000.0, 5_000_000.0]),
+        (
+            "+proj=lcc +lat_1=46.8 +lat_0=46.8 +k_0=0.99987742 +x_0=600000 +y_0=2200000 +a=6378249.2 +b=6356515 +towgs84=-168,-60,320 +pm=paris",
+            [600_000.0, 2_200_000.0],
+        ),
+        ("+proj=tmerc +lat_0=45 +ellps=bessel +pm=ferro", [600_000.0, 100_000.0]),
+        (
+            "+proj=stere +lat_0=46 +lon_0=3 +k=0.999 +x_0=700000 +y_0=6600000 +datum=WGS84",
+            [715_000.0, 6_615_000.0],
+        ),
+        (
+            "+proj=sterea +lat_0=46 +lon_0=3 +k=0.999 +x_0=700000 +y_0=6600000 +datum=WGS84",
+            [715_000.0, 6_615_000.0],
+        ),
+        ("+proj=mill +lon_0=3 +R_A +datum=WGS84", [700_000.0, 5_000_000.0]),
+    ] {
+        let corners = [x, y + 10_000.0, x + 12_000.0, y];
+        let path = hills(folder.path(), system, corners, [120, 100]);
+        let options = OpenOptions {
+            reproject: Some("EPSG:4326".into()),
+            resolution: Some(0.001),
+            ..OpenOptions::default()
+        };
+        agrees(&path, "EPSG:4326", &options, folder.path());
+    }
+}

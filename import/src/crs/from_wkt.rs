@@ -1,5 +1,6 @@
 //! From a tree of well-known text to a [`System`]: names, codes, units, axes, the ellipsoid; projections by crate `proj4wkt`.
 
+use super::bound;
 use super::registry;
 use super::system::{Kind, System, Unit, Vertical, exact_metres, exact_radians};
 use super::wkt::{self, Node};
@@ -36,10 +37,14 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
         return None;
     }
     if COMPOUND.contains(&key) || key == "BOUNDCRS" || key == "SOURCECRS" {
-        return node.values.iter().find_map(|value| match value {
+        let mut inner = node.values.iter().find_map(|value| match value {
             wkt::Value::Node(child) => horizontal(child, depth + 1),
             _ => None,
-        });
+        })?;
+        if let Some(shift) = bound::shift(node) {
+            inner.proj = inner.proj.map(|proj| shifted(&proj, &shift));
+        }
+        return Some(inner);
     }
     let kind = match key {
         _ if PROJECTED.contains(&key) => Kind::Projected,
@@ -61,6 +66,12 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
     system.signs = signs(node);
     if kind != Kind::Local {
         system.proj = projection(node, system.code);
+        // A grid is named where the registry does not tell the shift.
+        if system.code.is_none()
+            && let Some(grids) = bound::grids(node)
+        {
+            system.proj = system.proj.map(|proj| shifted(&proj, &grids));
+        }
     }
     if kind == Kind::Geographic {
         system.vertical = ellipsoidal(node);
@@ -138,6 +149,18 @@ fn projection(node: &Node, code: Option<u32>) -> Option<String> {
     quiet(|| proj4wkt::wkt_to_projstring(&written(node)).ok())
         .flatten()
         .filter(|proj| proj.contains("+proj="))
+        .map(|proj| match proj.split_whitespace().any(|word| word == "+proj=mill") {
+            // Miller's is drawn on the sphere of the ellipsoid's area.
+            true => format!("{proj} +R_A"),
+            false => proj,
+        })
+}
+
+/// The string with another shift of datum.
+fn shifted(proj: &str, shift: &str) -> String {
+    let is_kept = |word: &&str| !["+towgs84=", "+nadgrids="].iter().any(|start| word.starts_with(start));
+    let kept: Vec<&str> = proj.split_whitespace().filter(is_kept).collect();
+    format!("{} {shift}", kept.join(" "))
 }
 
 /// The node as text again, for a parser that wants one system and nothing around it.

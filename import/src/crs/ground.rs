@@ -42,7 +42,8 @@ pub(crate) struct Ground {
     turn: Option<f64>,
     /// Semi-axes of the ellipsoid in metres.
     axes_m: [f64; 2],
-    is_shift_lost: bool,
+    /// The datum, or the grid of its shift, that is not here.
+    lost: Option<String>,
 }
 
 impl std::fmt::Debug for Ground {
@@ -92,10 +93,10 @@ impl Ground {
             },
             (None, _) => return None,
         };
-        let bare = without(&text, &LEFT_OUT);
-        let (no_grid, had_grid) = match from_proj::word(&bare, "nadgrids") {
-            Some("@null") | None => (bare, false),
-            Some(_) => (without(&bare, &["nadgrids"]), true),
+        let bare = quiet(|| on_sphere(without(&text, &LEFT_OUT)))?;
+        let (no_grid, grid) = match from_proj::word(&bare, "nadgrids") {
+            Some("@null") | None => (bare, None),
+            Some(grid) => (without(&bare, &["nadgrids"]), Some(grid.to_owned())),
         };
         let size = match system.unit.as_ref()?.size {
             HorizontalSize::Metres(metres) => metres,
@@ -104,10 +105,11 @@ impl Ground {
         // Others' code on a stranger's text.
         quiet(|| {
             let whole = Self::of(&no_grid, size, system.signs);
-            let whole = whole.map(|ground| Self { is_shift_lost: had_grid, ..ground });
+            let whole = whole.map(|ground| Self { lost: grid.clone(), ..ground });
             whole.or_else(|| {
                 let rough = Self::of(&plain(&no_grid), size, system.signs)?;
-                Some(Self { is_shift_lost: true, ..rough })
+                let datum = from_proj::word(&no_grid, "datum").map(str::to_owned);
+                Some(Self { lost: grid.or(datum).or_else(|| Some(String::new())), ..rough })
             })
         })
         .flatten()
@@ -116,15 +118,7 @@ impl Ground {
     fn of(text: &str, size: f64, signs: [f64; 2]) -> Option<Self> {
         let proj = Proj::from_proj_string(text).ok()?;
         // A projection may have taken its scale into its own axes, so the ellipsoid is asked apart.
-        let ellipsoid: Vec<&str> = text
-            .split_whitespace()
-            .filter(|word| {
-                ["a", "b", "R", "rf", "f", "ellps", "datum"]
-                    .contains(&word.trim_start_matches('+').split('=').next().unwrap_or(""))
-            })
-            .collect();
-        let body = Proj::from_proj_string(&format!("+proj=longlat {}", ellipsoid.join(" "))).ok()?;
-        let (a, b) = body.ellipse_parameters();
+        let [a, b] = axes_of(text)?;
         let axes_m = if is_web_mercator(&proj, text) { WGS84_M } else { [a, b] };
         let own = Proj::from_proj_string(&format!("+proj=longlat +a={a} +b={b}")).ok()?;
         let world = match is_earth(a) {
@@ -135,7 +129,7 @@ impl Ground {
             true => Some(std::f64::consts::TAU / size),
             false => turn_on_map(&proj, &own).map(|metres| metres / size),
         };
-        let this = Self { proj, own, world, size, signs, turn, axes_m, is_shift_lost: false };
+        let this = Self { proj, own, world, size, signs, turn, axes_m, lost: None };
         // A datum by a grid that is not here shows at the first point.
         let (lon, lat) = (this.proj.longitude_of_origin(), this.proj.latitude_of_origin().clamp(-1.4, 1.4));
         let mut probe = (lon + 0.01, lat + 0.01);
@@ -179,7 +173,17 @@ impl Ground {
 
     /// Whether the datum is told by a grid that is not here, so that places are off by its shift where they are brought to another datum.
     pub(crate) fn is_shift_lost(&self) -> bool {
-        self.is_shift_lost
+        self.lost.is_some()
+    }
+
+    /// Whether places brought to the other system are off by a shift that is not here: one of both has lost it, or each another one.
+    pub(crate) fn is_rough_to(&self, other: &Self) -> bool {
+        self.lost != other.lost
+    }
+
+    /// Whether the ellipsoids differ by metres.
+    pub(crate) fn shape_differs(&self, other: &Self) -> bool {
+        self.axes_m.iter().zip(other.axes_m).any(|(a, b)| (a - b).abs() > 5.0)
     }
 
     /// Radius of the equator in metres.
@@ -231,6 +235,33 @@ fn turn_on_map(proj: &Proj, own: &Proj) -> Option<f64> {
     };
     let turn = std::f64::consts::TAU * (x(middle + 1.0)? - x(middle)?);
     (turn.is_finite() && turn > 0.0).then_some(turn)
+}
+
+/// The string with the sphere of the ellipsoid's area for `+R_A`: its formulas are those of the sphere, and latitudes stay those of the ellipsoid, so that no shift of datum may be made between both.
+fn on_sphere(text: String) -> String {
+    if from_proj::word(&text, "R_A").is_none() {
+        return text;
+    }
+    let bare = without(&text, &["R_A"]);
+    let Some([a, b]) = axes_of(&bare) else { return text };
+    let e2 = 1.0 - (b / a) * (b / a);
+    let radius = a * (1.0 - e2 * (1.0 / 6.0 + e2 * (17.0 / 360.0 + e2 * 67.0 / 3024.0)));
+    let rest = without(&bare, &["a", "b", "R", "rf", "f", "ellps", "datum", "towgs84", "nadgrids"]);
+    format!("{rest} +R={radius}")
+}
+
+/// Semi-axes of the ellipsoid that a string names.
+fn axes_of(text: &str) -> Option<[f64; 2]> {
+    let words: Vec<&str> = text
+        .split_whitespace()
+        .filter(|word| {
+            ["a", "b", "R", "rf", "f", "ellps", "datum"]
+                .contains(&word.trim_start_matches('+').split('=').next().unwrap_or(""))
+        })
+        .collect();
+    let body = Proj::from_proj_string(&format!("+proj=longlat {}", words.join(" "))).ok()?;
+    let (a, b) = body.ellipse_parameters();
+    Some([a, b])
 }
 
 /// The string with its ellipsoid and without its datum's shift.
@@ -291,6 +322,69 @@ mod tests {
             let back = ground.of_world(found.map(f64::to_radians)).unwrap();
             let [dx, dy] = [back[0] - x, back[1] - y];
             assert!(dx.hypot(dy) < 1e-4 * x.abs().max(1.0), "{system}: {back:?}");
+        }
+    }
+
+    /// Shifts that a system carries in WKT 2 or 1 are made; those of grids, which are not here, are told. Positions by gdaltransform (GDAL 3.10).
+    #[test]
+    fn shifts_of_bound_systems_are_made_or_told() {
+        let base = "PROJCRS[\"a\",BASEGEOGCRS[\"b\",DATUM[\"c\",ELLIPSOID[\"Bessel 1841\",6377397.155,299.1528128]],PRIMEM[\"Greenwich\",0]],\
+            CONVERSION[\"d\",METHOD[\"Transverse Mercator\",ID[\"EPSG\",9807]],PARAMETER[\"Latitude of natural origin\",0,ANGLEUNIT[\"degree\",0.0174532925199433],ID[\"EPSG\",8801]],\
+            PARAMETER[\"Longitude of natural origin\",9,ANGLEUNIT[\"degree\",0.0174532925199433],ID[\"EPSG\",8802]],PARAMETER[\"Scale factor at natural origin\",1,SCALEUNIT[\"unity\",1],ID[\"EPSG\",8805]],\
+            PARAMETER[\"False easting\",3500000,LENGTHUNIT[\"metre\",1],ID[\"EPSG\",8806]],PARAMETER[\"False northing\",0,LENGTHUNIT[\"metre\",1],ID[\"EPSG\",8807]]],\
+            CS[Cartesian,2],AXIS[\"E\",east,ORDER[1],LENGTHUNIT[\"metre\",1]],AXIS[\"N\",north,ORDER[2],LENGTHUNIT[\"metre\",1]]]";
+        let bound = |transformation: &str| {
+            let target = "TARGETCRS[GEOGCRS[\"WGS 84\",DATUM[\"World Geodetic System 1984\",ELLIPSOID[\"WGS 84\",6378137,298.257223563]],\
+                CS[ellipsoidal,2],AXIS[\"lat\",north],AXIS[\"lon\",east],ANGLEUNIT[\"degree\",0.0174532925199433]]]";
+            ground(&format!(
+                "BOUNDCRS[SOURCECRS[{base}],{target},ABRIDGEDTRANSFORMATION[\"t\",{transformation}]]"
+            ))
+        };
+        let parameters = |method: &str, turn: f64| {
+            let values = [598.1, 73.7, 418.2, 0.202 * turn, 0.045 * turn, -2.455 * turn, 1.000_006_7];
+            let all = values
+                .iter()
+                .zip(8605..)
+                .map(|(value, code)| format!("PARAMETER[\"p\",{value},ID[\"EPSG\",{code}]]"));
+            format!("METHOD[\"{method}\"],{}", all.collect::<Vec<_>>().join(","))
+        };
+        let at = [3_515_000.0, 5_540_000.0];
+        let is = |ground: &Ground, [lon, lat]: [f64; 2]| {
+            let found = ground.world(at).unwrap().map(f64::to_degrees);
+            assert!((found[0] - lon).abs() < 1e-8 && (found[1] - lat).abs() < 1e-8, "{found:?}");
+        };
+        let shifted = [9.208_161_151_436_43, 49.996_152_069_197_9];
+        for (method, turn) in [
+            ("Position Vector transformation (geog2D domain)", 1.0),
+            ("Coordinate Frame rotation (geog2D domain)", -1.0),
+        ] {
+            let ground = bound(&parameters(method, turn));
+            is(&ground, shifted);
+            assert!(!ground.is_shift_lost());
+        }
+        let grid = bound(
+            "METHOD[\"NTv2\"],PARAMETERFILE[\"Latitude and longitude difference file\",\"BETA2007.gsb\"]",
+        );
+        assert!(grid.is_shift_lost() && grid.is_rough_to(&ground("EPSG:4326")) && !grid.is_rough_to(&grid));
+        let in_one = ground(
+            "GEOGCS[\"a\",DATUM[\"b\",SPHEROID[\"Bessel 1841\",6377397.155,299.1528128],EXTENSION[\"PROJ4_GRIDS\",\"BETA2007.gsb\"]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]",
+        );
+        assert!(in_one.is_shift_lost() && !in_one.is_rough_to(&grid));
+        assert!(ground("EPSG:4267").is_rough_to(&ground("EPSG:4326")));
+        assert!(!ground("EPSG:26714").is_rough_to(&ground("EPSG:4267")));
+    }
+
+    /// Miller's map is drawn on the sphere of the ellipsoid's area, and latitudes stay the ellipsoid's. Positions by gdaltransform.
+    #[test]
+    fn spheres_of_equal_area_shift_no_datum() {
+        for text in [
+            "+proj=mill +R_A +lon_0=3 +datum=WGS84",
+            "PROJCS[\"a\",GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],\
+             PROJECTION[\"Miller_Cylindrical\"],PARAMETER[\"latitude_of_center\",0],PARAMETER[\"longitude_of_center\",3],PARAMETER[\"false_easting\",0],PARAMETER[\"false_northing\",0],UNIT[\"metre\",1]]",
+        ] {
+            let [lon, lat] = ground(text).world([15_000.0, 15_000.0]).unwrap().map(f64::to_degrees);
+            let away = (lon - 3.134_898_088_837_22).abs().max((lat - 0.134_898_009_074_42).abs());
+            assert!(away < 1e-8, "{text}: {lon} {lat}");
         }
     }
 

@@ -2,6 +2,8 @@
 //!
 //! [`resolve`] turns statements into a [`System`]. [`Ground`] converts a system's coordinates to longitude and latitude and back.
 
+mod bound;
+mod compare;
 mod from_proj;
 mod from_wkt;
 mod ground;
@@ -11,6 +13,7 @@ mod resolve;
 mod system;
 mod wkt;
 
+pub(crate) use compare::{figures_differ, places_differ};
 pub(crate) use from_proj::{unit_name as unit_in_words, word as proj_word};
 pub(crate) use ground::{Ground, is_earth};
 pub(crate) use keywords::Keywords;

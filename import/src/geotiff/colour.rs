@@ -62,7 +62,7 @@ impl TiffImage {
             texels: [table.grid.width, table.grid.height],
             georeference: Georeference::default(),
             format: format!("{}{}", if file.is_big() { "BigTIFF" } else { "TIFF" }, table.describe()),
-            notes: table.notes.clone(),
+            notes: table.notes.iter().cloned().chain(place.warnings.into_iter().map(|w| w.words)).collect(),
             memory_bytes: memory_bytes(&table, options.stretch.is_some() && !table.has_bytes()),
         };
         Ok(Self {

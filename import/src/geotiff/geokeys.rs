@@ -5,6 +5,7 @@
 //! returned starts at sample centres either way. Keys name the reference system. Where something is missing or
 //! contradictory the field stays empty: a DEM without a place can still be flown over.
 
+use super::body::{self, ANGULAR_UNIT_SIZE, ANGULAR_UNITS, GEOGRAPHIC_TYPE};
 use super::keys::Keys;
 use super::projection;
 use super::tags::{self, Directory, TiffFile};
@@ -18,10 +19,7 @@ use terrasoar_layout::words::number;
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
 const CITATION: u16 = 1026;
-const GEOGRAPHIC_TYPE: u16 = 2048;
 const GEOGRAPHIC_CITATION: u16 = 2049;
-const ANGULAR_UNITS: u16 = 2054;
-const ANGULAR_UNIT_SIZE: u16 = 2055;
 const SEMI_MAJOR_AXIS: u16 = 2057;
 const PROJECTED_TYPE: u16 = 3072;
 const PROJECTED_CITATION: u16 = 3073;
@@ -36,6 +34,8 @@ pub(super) struct Place {
     /// From sample centres to coordinates.
     pub(super) map: Option<[f64; 6]>,
     pub(super) crs: CrsSaid,
+    /// What keys say that is not, or not quite, honoured.
+    pub(super) warnings: Vec<Warning>,
     /// EPSG's code of the vertical unit.
     pub(super) vertical_unit: Option<u16>,
     /// Scale and offset of heights that the tags of the place give.
@@ -45,9 +45,11 @@ pub(super) struct Place {
 /// Reads tags and keys.
 pub(super) fn read(file: &mut TiffFile, directory: &Directory) -> Result<Place, LayoutError> {
     let keys = Keys::read(file, directory)?;
+    let mut warnings = Vec::new();
     Ok(Place {
         map: transform(file, directory, keys.short(RASTER_TYPE) == Some(2))?,
-        crs: system(&keys),
+        crs: system(&keys, &mut warnings),
+        warnings,
         vertical_unit: keys.short(VERTICAL_UNITS).filter(|code| !matches!(code, 0 | 32767)),
         scale_z: scale_z(file, directory)?,
     })
@@ -67,6 +69,7 @@ impl Place {
     pub(super) fn declare(self, declared: &mut Declared) {
         declared.place = self.map.map(|map| Said::new(map, "the GeoTIFF tags"));
         declared.crs = self.crs;
+        declared.warnings.extend(self.warnings);
         if let Some([scale, offset]) = self.scale_z {
             let words = format!(
                 "the tags of its place give heights a scale of {} and an offset of {}, which GDAL and others pass over, and so was done here",
@@ -107,7 +110,7 @@ fn short_name(citation: &str) -> String {
 }
 
 /// What the keys say of the reference system.
-fn system(keys: &Keys) -> CrsSaid {
+fn system(keys: &Keys, warnings: &mut Vec<Warning>) -> CrsSaid {
     let projected = keys.code(PROJECTED_TYPE);
     let geographic = keys.code(GEOGRAPHIC_TYPE);
     let model = keys.short(MODEL_TYPE).unwrap_or(match (projected, geographic) {
@@ -146,18 +149,24 @@ fn system(keys: &Keys) -> CrsSaid {
     };
     let citations = [CITATION, PROJECTED_CITATION, GEOGRAPHIC_CITATION];
     let esri = citations.iter().find_map(|key| esri_text(&keys.whole_text(*key)?));
-    let own = || {
-        let metres = match unit {
-            Some(HorizontalSize::Metres(metres)) => metres,
-            _ => 1.0,
-        };
-        (model == 1).then(|| projection::proj(keys, metres)).flatten()
-    };
-    let text = match code {
-        Some(_) => None,
-        None => esri
-            .map(|text| Said::new(text, "ESRI's text in a citation"))
-            .or_else(|| own().map(|text| Said::new(text, "keys of the projection"))),
+    let text = match (code, esri) {
+        (Some(code), _) => {
+            body::compare(keys, code, model == 1, warnings);
+            None
+        }
+        (None, Some(text)) => Some(Said::new(text, "ESRI's text in a citation")),
+        (None, None) => {
+            let metres = match unit {
+                Some(HorizontalSize::Metres(metres)) => metres,
+                _ => 1.0,
+            };
+            let own = match model {
+                1 => projection::proj(keys, metres, warnings),
+                2 => body::words(keys, warnings).map(|words| format!("+proj=longlat {words}")),
+                _ => None,
+            };
+            own.map(|text| Said::new(text, "keys of the projection"))
+        }
     };
     let name = names.iter().find_map(|key| keys.text(*key)).map(|name| short_name(&name)).unwrap_or_default();
     CrsSaid {

@@ -30,6 +30,21 @@ impl Keys {
         })
     }
 
+    /// A directory of these keys, codes and numbers.
+    #[cfg(test)]
+    pub(super) fn of(codes: &[(u16, u16)], numbers: &[(u16, &[f64])]) -> Self {
+        let mut keys = Self { directory: vec![1, 1, 0, 0], reals: Vec::new(), texts: String::new() };
+        for (key, code) in codes {
+            keys.directory.extend([u64::from(*key), 0, 1, u64::from(*code)]);
+        }
+        for (key, values) in numbers {
+            let tag = u64::from(tags::GEO_DOUBLE_PARAMS);
+            keys.directory.extend([u64::from(*key), tag, values.len() as u64, keys.reals.len() as u64]);
+            keys.reals.extend_from_slice(values);
+        }
+        keys
+    }
+
     /// Tag, count and value of a key.
     fn entry(&self, key: u16) -> Option<(u64, usize, u64)> {
         let entries = self.directory.get(4..)?.chunks_exact(4);
@@ -50,6 +65,14 @@ impl Keys {
         let (tag, _, at) = self.entry(key)?;
         let at = usize::try_from(at).ok()?;
         (tag == u64::from(tags::GEO_DOUBLE_PARAMS)).then(|| self.reals.get(at).copied()).flatten()
+    }
+
+    /// All numbers of a key.
+    pub(super) fn reals(&self, key: u16) -> Option<&[f64]> {
+        let (tag, count, at) = self.entry(key)?;
+        let at = usize::try_from(at).ok()?;
+        let is_real = tag == u64::from(tags::GEO_DOUBLE_PARAMS) && count > 0;
+        is_real.then(|| self.reals.get(at..at.checked_add(count)?)).flatten()
     }
 
     pub(super) fn text(&self, key: u16) -> Option<String> {

@@ -13,6 +13,7 @@
 //! are not inverted for "white is zero" files.
 
 mod bands;
+mod body;
 mod chunk_grid;
 mod chunks;
 mod codec;
@@ -34,6 +35,7 @@ mod predictor;
 mod projection;
 mod raw;
 mod rows;
+mod shapes;
 mod span;
 mod stored;
 mod tags;

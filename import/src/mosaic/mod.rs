@@ -20,13 +20,14 @@ mod values;
 
 use crate::crs::System;
 use crate::guard::is_ours;
-use crate::opened::{Known, OpenedDem};
+use crate::opened::{Known, OpenedDem, shift_lost};
 use crate::options::{OpenOptions, Priority, Resampling};
 use crate::reader::{Declared, Reader, Said};
 use crate::value::Voids;
 use crate::warp::{Store, blocks_bytes, each_block};
 use aim::{Aim, aimed};
 use blend::{Blend, Edges, over};
+use lattice::Tied;
 pub(crate) use names::Inputs;
 use plan::Placed;
 use sheet::{BLENDED, Laying, Sheet, replace};
@@ -163,6 +164,8 @@ impl Mosaic {
         declared.place = Some(Said::new(target.map, "the places of the files"));
         declared.notes = vec![note(&placed, &sheets, resampled, resampling, options)];
         let (vertical, unlike) = levels::of(&placed.sources);
+        let is_rough = |tied: &&Tied| matches!((&tied.ground, &target.tied.ground), (Some(from), Some(to)) if from.is_rough_to(to));
+        let rough = placed.systems.iter().find(is_rough).map(|tied| shift_lost(&tied.system.name));
         let bytes = Store::all_bytes(sheets.iter().map(|sheet| &sheet.samples), sample_bytes);
         let bytes = if blend.is_some() { bytes.saturating_mul(2) } else { bytes };
         let allowed = options.memory_mib.unwrap_or(512) << 20;
@@ -186,7 +189,7 @@ impl Mosaic {
             heights: values.heights,
             voids: Voids::new(name, &[], &[], sample_type)?,
             mask: None,
-            warnings: unlike.into_iter().collect(),
+            warnings: unlike.into_iter().chain(rough).collect(),
         };
         Ok((mosaic, known, later))
     }

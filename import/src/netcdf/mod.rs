@@ -11,6 +11,7 @@ mod file;
 mod stream;
 mod system;
 
+use crate::crs::{by_text, exact_metres};
 use crate::options::{Direction, OpenOptions};
 use crate::reader::{Declared, HorizontalSize, Reader, Said, VerticalUnit};
 use crate::value::STANDARD_GRAVITY;
@@ -21,8 +22,9 @@ use file::Purpose;
 use netcdf_reader::{NcFile, NcGroup, NcType, NcVariable};
 use std::path::{Path, PathBuf};
 use stream::Source;
-use terrasoar_layout::dem::{SampleSink, SampleType};
+use terrasoar_layout::dem::{SampleSink, SampleType, Warning};
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::harmless;
 
 /// Whether a file begins so: classic of any version, or HDF5.
@@ -145,17 +147,51 @@ impl About<'_> {
             let first = names.split_whitespace().next()?.trim_end_matches(':').to_owned();
             self.beside(&first)
         });
-        if let Some((_, mapping)) = mapping
-            && let Some((found, by)) = system::of(mapping)
-        {
-            let by = format!("attribute {by} of variable \"{}\"", harmless(mapping.name(), 40));
-            declared.crs.text = Some(Said::new(found, by));
+        let unit_m = match x.unit {
+            Some(Unit::Metres(metres)) => metres,
+            _ => 1.0,
+        };
+        let mut is_unread = false;
+        if let Some((_, mapping)) = mapping {
+            match system::of(mapping) {
+                Ok(Some((found, by))) => {
+                    if by == "grid_mapping_name" && unit_m != 1.0 && system::is_moved(mapping) {
+                        declared.warnings.push(
+                            Warning::new(format!(
+                                "coordinates are not in metres, and the false easting and northing of variable \"{}\" were taken in metres, as GDAL takes them; the CF conventions count them in the unit of coordinates",
+                                harmless(mapping.name(), 40)
+                            ))
+                            .mended_by(Remedy::ReferenceSystem, "EPSG:n"),
+                        );
+                    }
+                    let by = format!("attribute {by} of variable \"{}\"", harmless(mapping.name(), 40));
+                    declared.crs.text = Some(Said::new(found, by));
+                }
+                Ok(None) => {}
+                Err(what) => {
+                    is_unread = true;
+                    declared.warnings.push(
+                        Warning::new(format!(
+                            "{what} (variable \"{}\"), so where the data lie on the ground is not known",
+                            harmless(mapping.name(), 40)
+                        ))
+                        .mended_by(Remedy::ReferenceSystem, "EPSG:n"),
+                    );
+                }
+            }
         }
         let by = format!("variables \"{}\" and \"{}\"", harmless(&x.name, 40), harmless(&y.name, 40));
-        // A projection counts in metres, whatever a writer found handier to list.
+        // Coordinates are counted in the unit of their system, whatever a writer found handier to list.
         let factor = match (&declared.crs.text, x.unit) {
-            (Some(_), Some(Unit::Metres(1000.0))) => 1000.0,
+            (Some(text), Some(Unit::Metres(metres))) => {
+                match by_text(&text.value).and_then(|system| system.unit).map(|unit| unit.size) {
+                    Some(HorizontalSize::Metres(size)) => exact_metres(metres / size),
+                    _ => 1.0,
+                }
+            }
             (Some(_), _) => 1.0,
+            // Angles of a system that is not read are no longitudes and latitudes.
+            (None, Some(Unit::Degrees)) if is_unread => 1.0,
             (None, unit) => {
                 let size = unit.map(|unit| match unit {
                     Unit::Degrees => HorizontalSize::Radians(1f64.to_radians()),

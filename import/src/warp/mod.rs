@@ -39,6 +39,7 @@ pub(crate) struct Warp {
     in_memory: bool,
     folder: PathBuf,
     words: String,
+    is_rough: bool,
 }
 
 impl Warp {
@@ -100,7 +101,12 @@ impl Warp {
             grid.samples[1],
             resampling.name()
         );
+        let is_rough = target.as_ref().is_some_and(|target| {
+            let grounds = [system, target].map(Ground::new);
+            matches!(grounds, [Some(old), Some(new)] if old.is_rough_to(&new))
+        });
         Ok(Some(Self {
+            is_rough,
             system: target,
             resampler: Resampler { mapping, kernel, sample_bytes },
             sample_type,
@@ -109,6 +115,11 @@ impl Warp {
             words,
             grid,
         }))
+    }
+
+    /// Whether places may be off by some hundred metres, for a shift between datums is not known here.
+    pub(crate) fn is_rough(&self) -> bool {
+        self.is_rough
     }
 
     /// The new system, if it is another one.
