@@ -49,30 +49,3 @@ pub(super) fn exact(attributes: &[NcAttribute], name: &str) -> Vec<String> {
 pub(super) fn is_unsigned(variable: &NcVariable) -> bool {
     text(variable.attributes(), "_Unsigned").is_some_and(|text| text.eq_ignore_ascii_case("true"))
 }
-
-/// What counts coordinates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Unit {
-    /// Degrees of longitude or latitude.
-    Degrees,
-    /// Metres a unit.
-    Metres(f64),
-}
-
-/// The unit of coordinates by its name; GMT has it in brackets behind what is counted: "longitude [degrees_east]".
-pub(super) fn unit(name: &str) -> Option<Unit> {
-    let inside =
-        name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside.trim());
-    let name = inside.unwrap_or(name).to_ascii_lowercase();
-    Some(match name.as_str() {
-        "degree" | "degrees" | "deg" => Unit::Degrees,
-        _ if ["degree_", "degrees_", "degreen", "degreee", "degreesn", "degreese"]
-            .iter()
-            .any(|start| name.starts_with(start)) =>
-        {
-            Unit::Degrees
-        }
-        "km" | "kilometer" | "kilometre" | "kilometers" | "kilometres" => Unit::Metres(1000.0),
-        _ => Unit::Metres(crate::value::unit_m(&name)?),
-    })
-}
