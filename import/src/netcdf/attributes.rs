@@ -9,6 +9,11 @@ pub(super) fn text(attributes: &[NcAttribute], name: &str) -> Option<String> {
     (!text.is_empty()).then(|| text.to_owned())
 }
 
+/// Whether there is an attribute of that name.
+pub(super) fn has(attributes: &[NcAttribute], name: &str) -> bool {
+    find(attributes, name).is_some()
+}
+
 /// Number of an attribute.
 pub(super) fn number(attributes: &[NcAttribute], name: &str) -> Option<f64> {
     find(attributes, name)?.as_f64().filter(|number| number.is_finite())

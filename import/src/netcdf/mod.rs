@@ -11,6 +11,7 @@ mod file;
 mod stream;
 mod system;
 mod units;
+mod valid;
 
 use crate::options::{Direction, OpenOptions};
 use crate::reader::{Declared, HorizontalSize, Reader, Said, VerticalUnit};
@@ -276,7 +277,7 @@ impl About<'_> {
         let name = harmless(&self.grid.place, 40);
         let by = |attribute: &str| format!("attribute {attribute} of variable \"{name}\"");
         let value = &mut declared.value;
-        let scale = number(attributes, "scale_factor").filter(|scale| *scale != 0.0);
+        let scale = number(attributes, "scale_factor");
         value.scale = scale.map(|scale| Said::new(scale, by("scale_factor")));
         value.offset = number(attributes, "add_offset").map(|offset| Said::new(offset, by("add_offset")));
         for attribute in ["_FillValue", "missing_value"] {
@@ -287,6 +288,18 @@ impl About<'_> {
             && let Some(fill) = default_fill(self.grid.variable.dtype())
         {
             value.nodata.push(Said::new(fill.to_owned(), "netCDF's own fill value"));
+        }
+        let valid = valid::of(self.grid.variable);
+        declared.warnings.extend(valid.problems.into_iter().map(Warning::new));
+        if let Some([low, high]) = valid.range {
+            let shown = match [low, high].map(f64::is_finite) {
+                [true, false] => format!("below {low}"),
+                [false, true] => format!("above {high}"),
+                _ => format!("below {low} or above {high}"),
+            };
+            let by = by(valid.by);
+            declared.notes.push(format!("numbers {shown}, as they are stored, mean \"no data\", by {by}"));
+            value.valid = Some(Said::new([low, high], by));
         }
         let standard = text(attributes, "standard_name").unwrap_or_default();
         let units = text(attributes, "units").unwrap_or_default();
@@ -306,8 +319,18 @@ impl About<'_> {
         } else if standard.starts_with("sea_floor_depth") || standard == "depth" {
             value.direction = Some(Said::new(Direction::Down, by("standard_name")));
         }
-        if numbers(attributes, "scale_factor").len() > 1 {
-            value.scale = None;
+        for attribute in ["scale_factor", "add_offset"] {
+            let is_one = number(attributes, attribute).is_some() && numbers(attributes, attribute).len() == 1;
+            if is_one || !attributes::has(attributes, attribute) {
+                continue;
+            }
+            match attribute {
+                "scale_factor" => value.scale = None,
+                _ => value.offset = None,
+            }
+            let words =
+                format!("{} is not one number and was left out, so heights may be wrong", by(attribute));
+            declared.warnings.push(Warning::new(words).mended_by(Remedy::HeightFactor, "FACTOR"));
         }
     }
 
