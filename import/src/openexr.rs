@@ -290,7 +290,7 @@ fn unsupported(path: &Path, problem: &str) -> LayoutError {
     LayoutError::unsupported(
         path,
         format!(
-            "{problem}; write its heights as one channel of floats in rows: oiiotool INPUT --ch Y -d float -o output.exr"
+            "{problem}; write its heights as one channel of floats in rows, for example with oiiotool"
         ),
     )
 }

@@ -1,8 +1,12 @@
 //! NetCDF, DTED, USGS DEM, Surfer and OpenEXR against arithmetic: the files of `data-scripts/make-netcdf-fixtures.py`, and such made here.
 
+#[path = "import_support/cdf.rs"]
+mod cdf;
 #[path = "gridded/exr.rs"]
 mod exr;
 mod import_support;
+#[path = "gridded/netcdf_words.rs"]
+mod netcdf_words;
 
 use import_support::{Grid, collect};
 use std::path::{Path, PathBuf};

@@ -52,18 +52,7 @@ impl Paint {
             (2, 3..) => return Ok(Self::Rgb),
             (5, 4..) if !jpeg => return Ok(Self::Cmyk),
             (6, 3) if jpeg || bytes => return Ok(Self::YCbCr),
-            (3, _) => {
-                let listed = file.count(directory, tags::COLOR_MAP);
-                if !(3..=3 * MAX_COLOURS).contains(&listed) {
-                    return Err(file.damaged(format!(
-                        "{listed} numbers make no palette of up to {MAX_COLOURS} colours; fetch or write the file again"
-                    )));
-                }
-                let colours = file.numbers(directory, tags::COLOR_MAP, listed)?.unwrap_or_default();
-                let count = colours.len() / 3;
-                let colour = |i: usize| [0, 1, 2].map(|channel| (colours[channel * count + i] >> 8) as u8);
-                return Ok(Self::Palette((0..count).map(colour).collect()));
-            }
+            (3, _) => return Ok(Self::Palette(palette(file, directory)?)),
             (5, _) => "in CMYK, the inks of a press".to_owned(),
             (6, _) => "in YCbCr of an unusual kind".to_owned(),
             (8..=10, _) => "in CIE Lab".to_owned(),
@@ -76,6 +65,31 @@ impl Paint {
                  magick INPUT -colorspace sRGB output.tif, and give it its georeference again with gdal_edit.py"
             ),
         ))
+    }
+
+    /// The palette that a grey image of one band has beside it: who put it there wants these colours, and GDAL shows them.
+    pub(super) fn or_palette(
+        self,
+        file: &mut TiffFile,
+        directory: &Directory,
+        notes: &mut Vec<String>,
+    ) -> Result<Self, LayoutError> {
+        let listed = file.count(directory, tags::COLOR_MAP);
+        if listed == 0 || !matches!(self, Self::Grey | Self::InverseGrey) {
+            return Ok(self);
+        }
+        let bits = file.number(directory, tags::BITS_PER_SAMPLE)?.unwrap_or(1);
+        if bits > 16 || listed != 3 << bits {
+            notes.push(format!(
+                "its palette of {listed} numbers does not go with its samples of {bits} bits and is left out; it is shown as grey"
+            ));
+            return Ok(self);
+        }
+        notes.push(
+            "it calls itself grey and has a palette; it is shown in the colours of the palette, and in grey if band 1 is named"
+                .into(),
+        );
+        Ok(Self::Palette(palette(file, directory)?))
     }
 
     /// Its channels of colour in the file.
@@ -97,6 +111,20 @@ impl Paint {
             Self::Palette(_) => "palette",
         }
     }
+}
+
+/// The colours of the palette.
+fn palette(file: &mut TiffFile, directory: &Directory) -> Result<Vec<[u8; 3]>, LayoutError> {
+    let listed = file.count(directory, tags::COLOR_MAP);
+    if !(3..=3 * MAX_COLOURS).contains(&listed) {
+        return Err(file.damaged(format!(
+            "{listed} numbers make no palette of up to {MAX_COLOURS} colours; fetch or write the file again"
+        )));
+    }
+    let colours = file.numbers(directory, tags::COLOR_MAP, listed)?.unwrap_or_default();
+    let count = colours.len() / 3;
+    let colour = |i: usize| [0, 1, 2].map(|channel| (colours[channel * count + i] >> 8) as u8);
+    Ok((0..count).map(colour).collect())
 }
 
 /// The samples of a picture as they are worked with.

@@ -142,11 +142,17 @@ impl Table {
         let paint_is_chroma = matches!(named, Paint::YCbCr);
         let mut notes = Vec::new();
         let is_stretched = options.stretch.is_some();
+        let extra = file.numbers(directory, tags::EXTRA_SAMPLES, MAX_BANDS)?.unwrap_or_default();
+        // A band that a person names, or states the blacks and whites of, is amounts of light.
+        let is_asked = is_stretched || !options.bands.is_empty();
+        let named = match bands.saturating_sub(extra.len() as u64) {
+            1 if !is_asked => named.or_palette(file, directory, &mut notes)?,
+            _ => named,
+        };
         let samples = Samples::read(file, directory, is_stretched)?;
         if samples.bytes() == 2 && !is_stretched && !matches!(named, Paint::Palette(_)) {
             notes.push("16 bits a channel are cut to the upper 8 of those in use".into());
         }
-        let extra = file.numbers(directory, tags::EXTRA_SAMPLES, MAX_BANDS)?.unwrap_or_default();
         let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2)).map(|at| named.channels() + at);
         let alpha = alpha.filter(|at| (*at as u64) < bands);
         let is_multiplied = alpha.is_some_and(|at| extra.get(at - named.channels()) == Some(&1));

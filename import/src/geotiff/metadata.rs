@@ -31,7 +31,7 @@ pub(super) fn heights(xml: &str, band: usize, value: &mut ValueSaid) {
     for item in items(xml).filter(|item| item.band == band) {
         let number = item.text.parse::<f64>().ok().filter(|value| value.is_finite());
         match (item.role, number) {
-            ("scale", Some(scale)) if scale != 0.0 => value.scale = Some(Said::new(scale, by)),
+            ("scale", Some(scale)) => value.scale = Some(Said::new(scale, by)),
             ("offset", Some(offset)) => value.offset = Some(Said::new(offset, by)),
             ("unittype", _) if !item.text.is_empty() => {
                 value.unit = Some(Said::new(VerticalUnit::Name(item.text), by));
@@ -100,12 +100,14 @@ mod tests {
         assert_eq!(first.unit.unwrap().value, VerticalUnit::Name("Clarke's foot".into()));
         assert_eq!(of(xml, 1).scale.unwrap().value, 3.0);
         assert_eq!(names(xml), [None, Some("a & b".to_owned())]);
+        // That it makes no heights is said where heights are made.
+        let none = of("<Item sample=\"0\" role=\"scale\">0</Item>", 0);
+        assert_eq!(none.scale.unwrap().value, 0.0);
         for damaged in [
             "",
             "<Item",
             "<Item role=\"scale\" sample=\"0\">",
             "<Item sample=\"0\" role=\"scale\">nan</Item>",
-            "<Item sample=\"0\" role=\"scale\">0</Item>",
         ] {
             assert_eq!(of(damaged, 0), ValueSaid::default(), "{damaged}");
         }
