@@ -1,4 +1,4 @@
-//! Elevation data in containers and records of their own: netCDF, GRIB, DTED, USGS DEM, and TIFF stored in rarer ways.
+//! Elevation data in containers and records of their own: netCDF, GRIB, OpenEXR, DTED, USGS DEM, and TIFF stored in rarer ways.
 
 use crate::import::read;
 use crate::seeds::{self, Inputs};
@@ -22,6 +22,22 @@ pub(crate) mod netcdf {
         // Layers and variables beside the first.
         let second = OpenOptions { band: Some("2".into()), ..OpenOptions::default() };
         read(&[("dem.nc", data)], &second);
+    }
+}
+
+/// OpenEXR pictures.
+pub(crate) mod openexr {
+    use super::*;
+
+    pub(crate) fn seeds() -> Inputs {
+        fixtures("exr")
+    }
+
+    pub(crate) fn body(data: &[u8]) {
+        read(&[("dem.exr", data)], &OpenOptions::default());
+        // Others than the only one.
+        let last = OpenOptions { band: Some("terrain.Z".into()), ..OpenOptions::default() };
+        read(&[("dem.exr", data)], &last);
     }
 }
 

@@ -1,10 +1,11 @@
-//! Pictures of every format, told by content: opened, read, draped over a sound terrain.
+//! Pictures of every format, told by content: opened, read, draped over a sound terrain; as they say, and by other bands or stretched.
 
 use crate::land::PLAIN;
 use crate::seeds::{self, Inputs};
 use crate::words::{refused, told};
+use std::num::NonZero;
 use std::path::Path;
-use terrasoar_import::{open_image, open_images_on};
+use terrasoar_import::{PictureOptions, Stretch, open_image, open_images, open_images_on};
 use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::imagery::{DrapeOptions, Extent, ImageSource, Imagery, TileFormat, decode_tile, drape};
 use terrasoar_layout::progress::Silent;
@@ -20,7 +21,7 @@ const MEMORY_MIB: u64 = 64;
 
 pub(crate) fn seeds() -> Inputs {
     let mut seeds =
-        seeds::folder("import/tests/image_fixtures", &["png", "jpg", "tif", "webp", "jp2", "j2k"]);
+        seeds::folder("import/tests/image_fixtures", &["png", "jpg", "tif", "webp", "jp2", "j2k", "jxl"]);
     // Elevation data are pictures too, as far as one can tell.
     seeds.extend(
         seeds::folder("import/tests/fixtures", &["tif"])
@@ -38,6 +39,26 @@ pub(crate) fn body(data: &[u8]) {
         reads_and_drapes(image, folder.path());
     }
     brings(&path);
+    let shown = open_images(std::slice::from_ref(&path), None, &options(data));
+    told(shown).into_iter().flatten().for_each(|image| reads_and_drapes(image, folder.path()));
+}
+
+/// Bands and a stretch, other ones of other data.
+fn options(data: &[u8]) -> PictureOptions {
+    let pick = data.iter().fold(0u8, |sum, byte| sum.rotate_left(1) ^ byte);
+    let bands: &[u32] = [&[3, 2, 1][..], &[1], &[], &[2, 2, 1]][usize::from(pick & 3)];
+    let stretch = [
+        Some(Stretch::Percentiles(2.0, 98.0)),
+        Some(Stretch::Values(-100.0, 3000.0)),
+        Some(Stretch::Percentiles(0.0, 100.0)),
+        None,
+    ][usize::from(pick >> 2 & 3)];
+    PictureOptions {
+        bands: bands.iter().filter_map(|band| NonZero::new(*band)).collect(),
+        stretch,
+        memory_mib: Some(MEMORY_MIB),
+        ..PictureOptions::default()
+    }
 }
 
 /// Brings a picture onto the terrain, from wherever it says it lies.

@@ -26,7 +26,7 @@ mod words;
 mod world_file;
 
 use beside::{aux_xml, reference_system};
-use gridded::{dted, grib, netcdf, usgs_dem};
+use gridded::{dted, grib, netcdf, openexr, usgs_dem};
 use grids::{ascii_grid, labelled, netpbm, packed_png, raw, surfer, tiles, xyz};
 pub use seeds::Inputs;
 use web_tiles::{map_tile, mbtiles, pmtiles};
@@ -98,6 +98,8 @@ targets! {
     ascii_grid { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// A Surfer grid.
     surfer { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// An OpenEXR picture as heights.
+    openexr { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// An XYZ grid.
     xyz { is_text: true, fixed_mib: 160, per_byte: 64 }
     /// Plain numbers with a label of ESRI's or ENVI's beside them.

@@ -64,6 +64,11 @@ fn surfer_grids() {
 }
 
 #[test]
+fn openexr_pictures() {
+    replay("openexr");
+}
+
+#[test]
 fn ascii_grids() {
     replay("ascii_grid");
 }

@@ -6,8 +6,8 @@ use crate::identify::{self, Look};
 use crate::reader::Reader;
 use crate::strangers;
 use crate::{
-    OpenOptions, ascii_grid, bt, dted, geotiff, grib, hgt, labelled, netcdf, png, pnm, raw, surfer, tiles,
-    usgs_dem, vrt, xyz,
+    OpenOptions, ascii_grid, bt, dted, geotiff, grib, hgt, labelled, netcdf, openexr, png, pnm, raw, surfer,
+    tiles, usgs_dem, vrt, xyz,
 };
 use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
@@ -69,6 +69,11 @@ const SIGNED: &[Format] = &[
         open: |path, _| boxed(pnm::PnmDem::open(path)),
     },
     Format {
+        name: "OpenEXR",
+        is: |look| look.begins(openexr::MAGIC),
+        open: |path, options| boxed(openexr::ExrDem::open(path, options)),
+    },
+    Format {
         name: "MBTiles",
         is: |look| tiles::is_mbtiles(look.path, &look.head),
         open: |path, options| boxed(tiles::TileDem::open(path, options)),
@@ -124,7 +129,7 @@ const NAMED: &[Format] = &[
 pub(crate) fn is_placed(path: &Path) -> bool {
     const BESIDE: [&str; 12] =
         ["ovr", "msk", "hdr", "xml", "prj", "aux", "clr", "stx", "sta", "blw", "wld", "qml"];
-    const UNPLACED: [&str; 3] = ["PNG", "Netpbm", "headerless heightmap"];
+    const UNPLACED: [&str; 4] = ["PNG", "Netpbm", "OpenEXR", "headerless heightmap"];
     if BESIDE.iter().any(|name| identify::is_called(path, name)) {
         return false;
     }
@@ -134,7 +139,7 @@ pub(crate) fn is_placed(path: &Path) -> bool {
 }
 
 /// What is read, in a few words for messages.
-pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, GRIB 2, DTED, USGS DEM, PNG and PGM, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
+pub(crate) const READ_HERE: &str = "read are GeoTIFF, virtual rasters, netCDF, GRIB 2, DTED, USGS DEM, PNG, PGM and OpenEXR, .hgt tiles, Esri ASCII and Surfer grids, .flt and .bil with .hdr, ENVI, XYZ, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps";
 
 fn boxed<R: Reader + 'static>(opened: Result<R, LayoutError>) -> Result<Box<dyn Reader>, LayoutError> {
     Ok(Box::new(opened?))

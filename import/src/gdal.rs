@@ -302,8 +302,7 @@ fn declare(dataset: &Dataset, band: &RasterBand<'_>, declared: &mut Declared, is
         return;
     }
     let value = &mut declared.value;
-    value.scale =
-        band.scale().filter(|scale| *scale != 0.0 && *scale != 1.0).map(|scale| Said::new(scale, said));
+    value.scale = band.scale().filter(|scale| *scale != 1.0).map(|scale| Said::new(scale, said));
     value.offset = band.offset().filter(|offset| *offset != 0.0).map(|offset| Said::new(offset, said));
     let unit = band.unit();
     value.unit = (!unit.is_empty()).then(|| Said::new(VerticalUnit::Name(unit), said));

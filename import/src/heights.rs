@@ -55,7 +55,15 @@ pub(crate) fn heights(
     let direction = direction_of(said, system, options, &mut words);
     let sign = if direction == Direction::Down { -1.0 } else { 1.0 };
     let mut scale = 1.0;
-    if let Some(found) = &said.scale {
+    if let Some(found) = said.scale.as_ref().filter(|found| found.value == 0.0) {
+        warnings.push(
+            Warning::new(format!(
+                "the scale 0 ({}) would make all heights alike; 1 was taken, so heights are wrong unless the numbers are heights already; write the true scale into the file",
+                found.by
+            ))
+            .mended_by(Remedy::HeightFactor, "FACTOR"),
+        );
+    } else if let Some(found) = &said.scale {
         scale = found.value;
         words.push(format!("scale {} from {}", number(found.value), found.by));
     }
@@ -200,8 +208,11 @@ mod tests {
             ..OpenOptions::default()
         };
         assert_eq!(of(&said, &typed).0.scale_m, 0.05);
+        said.scale = Some(Said::new(0.0, "a"));
+        let (flat, warnings) = of(&said, &OpenOptions::default());
+        assert!((flat.scale_m + 0.3048).abs() < 1e-15 && warnings[0].words.contains("the scale 0 (a)"));
         said.unit = Some(Said::new(VerticalUnit::Name("mGal".into()), "c"));
-        assert_eq!(of(&said, &OpenOptions::default()).1.len(), 1);
+        assert_eq!(of(&said, &OpenOptions::default()).1.len(), 2);
         let wrong = OpenOptions { height_unit: Some("ell".into()), ..OpenOptions::default() };
         assert!(heights(&said, &System::unknown(), &wrong, false, &mut Vec::new()).is_err());
     }

@@ -41,12 +41,14 @@ pub(crate) mod input;
 mod jpeg2000;
 pub(crate) mod jpeg_frame;
 mod jpeg_rows;
+mod jxl;
 mod kept;
 mod labelled;
 mod mask;
 mod mosaic;
 mod netcdf;
 mod opened;
+mod openexr;
 mod options;
 mod parallel;
 pub(crate) mod picture;
@@ -114,9 +116,13 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn DemSource>, LayoutError> {
 /// As [`open`]; [`LayoutError::Usage`] for options that do not go with the data.
 pub fn open_with(paths: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn DemSource>, LayoutError> {
     let files = match mosaic::Inputs::of(paths)? {
-        mosaic::Inputs::Several(files) => return mosaic::open(&files, options),
+        mosaic::Inputs::Several(files) => {
+            tiles::check_asked(&files, &options.tiles)?;
+            return mosaic::open(&files, options);
+        }
         mosaic::Inputs::Alone(files) => files,
     };
+    tiles::check_asked(&files, &options.tiles)?;
     // Tiles that could be one grid, where more is asked for than to join them.
     let is_made = options.feather_m.is_some() || options.resolution.is_some() && options.reproject.is_none();
     if files.len() > 1 && is_made {

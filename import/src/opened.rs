@@ -59,7 +59,8 @@ impl OpenedDem {
         let mask = beside.complete(&mut declared, options)?;
         let mut warnings = declared.warnings.clone();
         let system = crs::resolve(&declared.crs, options.crs.as_deref(), &mut warnings)?;
-        let voids = Voids::new(path, &declared.value.nodata, &options.nodata, declared.sample_type)?;
+        let voids = Voids::new(path, &declared.value.nodata, &options.nodata, declared.sample_type)?
+            .within(declared.value.valid.as_ref().map(|valid| valid.value), declared.sample_type);
         let heights = heights(&declared.value, &system, options, options.decode.is_some(), &mut warnings)?;
         Self::known(path, reader, declared, Known { system, heights, voids, mask, warnings }, options)
     }

@@ -37,12 +37,11 @@ const SIGNED: &[Stranger] = &[
     stranger(8, b"WEBP", "a WebP picture", PICTURE),
     stranger(0, b"8BPS", "a Photoshop picture", PICTURE),
     stranger(0, b"DDS ", "a DirectDraw texture", PICTURE),
-    stranger(
-        0,
-        b"v/1\x01",
-        "an OpenEXR picture",
-        "write its heights as a 16-bit grey PNG with a program of pictures, such as oiiotool, and name that",
-    ),
+    stranger(0, b"\0\0\0\x0cJXL ", "a JPEG XL picture", PICTURE),
+    stranger(4, b"ftypavi", "an AVIF picture", PICTURE),
+    stranger(4, b"ftyphei", "an HEIF picture", PICTURE),
+    stranger(4, b"ftyphevc", "an HEIF picture", PICTURE),
+    stranger(4, b"ftypmif1", "an HEIF picture", PICTURE),
     stranger(4, b"jP  \r\n", "a JPEG 2000 file", CONVERT),
     stranger(0, b"\xffO\xffQ", "a JPEG 2000 stream", CONVERT),
     stranger(0, b"msid", "a MrSID picture", LICENSED),
@@ -95,6 +94,7 @@ const SIGNED: &[Stranger] = &[
 /// Signatures that samples may have by chance.
 const WEAK: &[Stranger] = &[
     stranger(0, b"\xff\xd8\xff", "a JPEG picture", PICTURE),
+    stranger(0, b"\xff\x0a", "a JPEG XL picture", PICTURE),
     stranger(0, b"BM", "a BMP picture", PICTURE),
     stranger(0, b"\x1f\x8b", "a gzip archive", UNPACK),
     stranger(0, b"BZh", "a bzip2 archive", UNPACK),

@@ -257,3 +257,46 @@ fn the_terrain_is_found_among_thumbnails() {
     let said = refused(&file);
     assert!(said.contains("no full-resolution image"), "{said}");
 }
+
+/// Chunks of JPEG XL, which libjxl packed: see `data-scripts/make-jpegxl-fixtures.py`.
+#[test]
+fn chunks_of_jpeg_xl_give_every_height() {
+    type Height = fn(u32, u32) -> f64;
+    let cases: [(&str, Height); 3] = [
+        ("jpegxl-byte.tif", |col, row| f64::from(20 + 3 * col + 2 * row)),
+        ("jpegxl-uint16.tif", |col, row| f64::from(1000 + 300 * col + 1100 * row)),
+        ("jpegxl-float32.tif", |col, row| match (col + row) % 13 {
+            0 => f64::NAN,
+            _ => -420.125 + 0.375 * f64::from(col) + 33.5 * f64::from(row),
+        }),
+    ];
+    for (name, height) in cases {
+        let bytes = std::fs::read(import_support::fixtures().join(name)).unwrap();
+        let grid = opened(&bytes).unwrap();
+        assert_eq!([grid.info.samples_wide, grid.info.samples_high], [50, 40], "{name}");
+        assert_eq!(
+            grid.info.georeference.pixel_to_crs,
+            Some([1001.0, 2.0, 0.0, 4999.0, 0.0, -2.0]),
+            "{name}"
+        );
+        for (col, row) in (0..50).flat_map(|col| (0..40).map(move |row| (col, row))) {
+            let (found, wanted) = (grid.at(col, row), height(col, row));
+            assert!(
+                found == wanted || (found.is_nan() && wanted.is_nan()),
+                "{name}: {found}, not {wanted} at {col}, {row}"
+            );
+        }
+        // Damage anywhere is answered.
+        let mut wrong = 0;
+        for at in (0..bytes.len()).step_by((bytes.len() / 200).max(1)) {
+            let mut changed = bytes.clone();
+            changed[at] ^= 0x5a;
+            wrong += u32::from(opened(&changed).is_err());
+            wrong += u32::from(opened(&bytes[..at]).is_err());
+        }
+        assert!(wrong > 200, "{name}: {wrong}");
+    }
+    let both = import_support::fixtures().join("../image_fixtures/jpegxl-both-signs.tif");
+    let refused = refusal(&[both]);
+    assert!(refused.contains("positive and negative") && refused.contains("libjxl"), "{refused}");
+}

@@ -1,6 +1,12 @@
-//! NetCDF, DTED and USGS DEM against arithmetic: the files of `data-scripts/make-netcdf-fixtures.py`, and such made here.
+//! NetCDF, DTED, USGS DEM, Surfer and OpenEXR against arithmetic: the files of `data-scripts/make-netcdf-fixtures.py`, and such made here.
 
+#[path = "import_support/cdf.rs"]
+mod cdf;
+#[path = "gridded/exr.rs"]
+mod exr;
 mod import_support;
+#[path = "gridded/netcdf_words.rs"]
+mod netcdf_words;
 
 use import_support::{Grid, collect};
 use std::path::{Path, PathBuf};
@@ -332,4 +338,47 @@ fn an_old_sheet_in_feet_and_arc_seconds() {
     bytes[858..864].copy_from_slice(b"999999");
     std::fs::write(&path, &bytes).unwrap();
     assert!(refused(&path, &OpenOptions::default()).contains("do not go with a file"));
+}
+
+/// Surfer grids of 3 x 2 samples in three kinds, of which one is blank and one of the value that a file beside it declares.
+#[test]
+fn blanks_of_surfer_grids_are_voids_beside_a_declared_nodata() {
+    let heights = [1.0f64, 2.0, -9999.0, 4.0, 1.70141e38, 6.0];
+    let reals = |numbers: &[f64]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let sides = reals(&[0.0, 2.0, 0.0, 1.0, 1.0, 6.0]);
+    let singles: Vec<u8> = heights.iter().flat_map(|height| (*height as f32).to_le_bytes()).collect();
+    let binary_7 = |blank: f64| {
+        let heights = heights.map(|height| if height > 1e38 { blank } else { height });
+        let content = [&[2, 0, 0, 0, 3, 0, 0, 0][..], &reals(&[0.0, 0.0, 1.0, 1.0, 1.0, 6.0, 0.0, blank])];
+        let data = [&b"DATA"[..], &48i32.to_le_bytes(), &reals(&heights)].concat();
+        [&b"DSRB\x04\0\0\0\x01\0\0\0GRID\x48\0\0\0"[..], &content.concat(), &data].concat()
+    };
+    let text = heights.map(|height| format!("{height:e}")).join(" ");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.grd");
+    let aux =
+        "<PAMDataset><PAMRasterBand band=\"1\"><NoDataValue>-9999</NoDataValue></PAMRasterBand></PAMDataset>";
+    for bytes in [
+        format!("DSAA 3 2 0 2 0 1 1 6 {text}").into_bytes(),
+        [&b"DSBB\x03\0\x02\0"[..], &sides, &singles].concat(),
+        binary_7(1.70141e38),
+        binary_7(-32_767.0),
+    ] {
+        std::fs::write(&path, bytes).unwrap();
+        for (is_beside, nodata) in [(true, vec![]), (false, vec!["-9999".to_owned()]), (false, vec![])] {
+            let aux_path = folder.path().join("a.grd.aux.xml");
+            let _ = std::fs::remove_file(&aux_path);
+            if is_beside {
+                std::fs::write(&aux_path, aux).unwrap();
+            }
+            let is_told = is_beside || !nodata.is_empty();
+            let options = OpenOptions { nodata, ..OpenOptions::default() };
+            let grid = with(&path, &options).unwrap();
+            for (number, height) in heights.iter().enumerate() {
+                let found = at(&grid, (number % 3) as f64, (number / 3) as f64);
+                let is_void = *height > 1e38 || (is_told && *height == -9999.0);
+                assert!(if is_void { found.is_nan() } else { found == *height }, "{number}: {found}");
+            }
+        }
+    }
 }

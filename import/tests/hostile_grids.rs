@@ -210,3 +210,44 @@ fn surfer_grids_of_any_claim_end_in_words() {
     let (count, bytes) = read(&path, &options);
     assert!(count.unwrap() == 1 << 20 && bytes < 24 * MIB, "{bytes}");
 }
+
+#[test]
+fn openexr_of_any_claim_ends_in_words() {
+    let _alone = alone();
+    let options = OpenOptions::default();
+    let sound = include_bytes!("format_fixtures/float-zip.exr");
+    let tiles = include_bytes!("format_fixtures/tiles.exr");
+    let find =
+        |bytes: &[u8], wanted: &[u8]| bytes.windows(wanted.len()).position(|part| part == wanted).unwrap();
+    let window = |bytes: &[u8], corners: [i32; 4]| {
+        let mut bytes = bytes.to_vec();
+        let at = find(&bytes, b"dataWindow\0box2i\0") + 21;
+        for (number, corner) in corners.iter().enumerate() {
+            bytes[at + 4 * number..at + 4 * number + 4].copy_from_slice(&corner.to_le_bytes());
+        }
+        bytes
+    };
+    let tile = |sides: [u32; 2]| {
+        let mut bytes = tiles.to_vec();
+        let at = find(&bytes, b"tiles\0tiledesc\0") + 19;
+        bytes[at..at + 4].copy_from_slice(&sides[0].to_le_bytes());
+        bytes[at + 4..at + 8].copy_from_slice(&sides[1].to_le_bytes());
+        bytes
+    };
+    for bytes in [
+        window(sound, [0, 0, i32::MAX - 1, i32::MAX - 1]),
+        window(sound, [i32::MIN, i32::MIN, i32::MAX, i32::MAX]),
+        window(sound, [0, 0, 1 << 24, 36]),
+        window(sound, [0, 0, 42, 1 << 26]),
+        window(sound, [5, 5, 4, 4]),
+        window(sound, [0, 0, 0, 36]),
+        window(tiles, [0, 0, 1 << 20, 1 << 20]),
+        tile([u32::MAX; 2]),
+        tile([1 << 15; 2]),
+        tile([0, 0]),
+        sound[..9].to_vec(),
+    ] {
+        let (said, bytes) = peak(|| refusal(&[("a.exr", &bytes, 0)], &options));
+        assert!(said.contains("a.exr") && bytes < 8 * MIB, "{bytes} bytes; {said}");
+    }
+}

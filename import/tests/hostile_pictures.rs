@@ -17,7 +17,7 @@ use peak::{alone, peak};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use terrasoar_import::open_image;
+use terrasoar_import::{PictureOptions, open_image, open_images};
 use terrasoar_layout::imagery::{DrapeOptions, Draped, drape};
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::{LayoutError, Remedy};

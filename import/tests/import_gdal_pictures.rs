@@ -2,10 +2,16 @@
 //!
 //! Ignored, and so reported, unless asked for: `cargo test -p terrasoar-import --test import_gdal_pictures -- --ignored`. One by itself: `TERRASOAR_ONLY='JPEG'`.
 
+#[path = "pictures/chroma.rs"]
+mod chroma;
 #[path = "gdal_pictures/formats.rs"]
 mod formats;
+#[path = "gdal_pictures/made.rs"]
+mod made;
 #[path = "gdal_pictures/shown.rs"]
 mod shown;
+#[path = "../../layout/tests/import_support/tiff.rs"]
+mod tiff;
 #[path = "import_support/tools.rs"]
 mod tools;
 

@@ -16,7 +16,7 @@ use terrasoar_layout::grid::record::RecordKind;
 
 /// Make a terrain file (.iqt) from elevation data.
 ///
-/// Reads GeoTIFF, GDAL's virtual rasters (.vrt), PNG (grey, or heights packed into colours), PGM, .hgt (packed ones too), Esri ASCII grids, XYZ
+/// Reads GeoTIFF, GDAL's virtual rasters (.vrt), PNG (grey, or heights packed into colours), PGM, OpenEXR, .hgt (packed ones too), Esri ASCII grids, XYZ
 /// grids, .flt and .bil with their .hdr, ENVI, netCDF, GRIB 2, DTED, USGS DEM, VTP BT, pyramids of map tiles (folders, MBTiles, PMTiles) and headerless heightmaps, of any size and any rectangle; and several
 /// of them, folders and patterns as one mosaic. The output appears when it is complete; a build that fails or is killed leaves nothing, and the next one starts from the
 /// beginning. The same input gives the same bytes whatever --threads and --memory.

@@ -19,8 +19,8 @@ use terrasoar_layout::read::terrain::Terrain;
 
 /// Drape an image over a terrain file.
 ///
-/// Reads PNG, JPEG, WebP, JPEG 2000 and GeoTIFF (progressive JPEG, WebP and JPEG 2000 of one tile only as far as memory allows), grey, RGB, CMYK or palette, with or without
-/// alpha, masks and "no data"; with --stretch GeoTIFF of any numbers; and pyramids of map tiles. Pictures in another reference system, turned, mirrored or of other texels than the first are brought onto the terrain by bilinear interpolation. Appends a pyramid of
+/// Reads PNG, JPEG, JPEG XL, WebP, JPEG 2000 and GeoTIFF (progressive JPEG, JPEG XL, WebP and JPEG 2000 of one tile only as far as memory allows), grey, RGB, CMYK or palette, with or without
+/// alpha, masks and "no data"; with --stretch GeoTIFF of any numbers and JPEG 2000 of signed ones or of more than 16 bits, and lossless JPEG XL of reals; and pyramids of map tiles. Pictures in another reference system, turned, mirrored or of larger texels than the finest of them are brought onto the terrain by bilinear interpolation. Appends a pyramid of
 /// compressed tiles to the file; until it is complete the file reads as before, whatever happens, and programs that have it open are not
 /// disturbed. Draping again puts other imagery in the place of the first, whose space is not used again.
 #[derive(Debug, clap::Args)]

@@ -43,7 +43,7 @@ impl Aux {
             let number = band.attribute("band").and_then(|number| number.parse().ok()).unwrap_or(1);
             let said = Band {
                 nodata: text(band, "NoDataValue"),
-                scale: number_of(band, "Scale").filter(|scale| *scale != 0.0),
+                scale: number_of(band, "Scale"),
                 offset: number_of(band, "Offset"),
                 unit: text(band, "UnitType"),
             };

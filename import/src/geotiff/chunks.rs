@@ -19,6 +19,7 @@ pub(super) enum Compression {
     PackBits,
     Zstd,
     Lerc(Lerc),
+    JpegXl,
 }
 
 /// How a blob of LERC is packed once more.
@@ -40,7 +41,13 @@ impl Compression {
             Self::Lerc(Lerc::Plain) => "LERC",
             Self::Lerc(Lerc::Deflate) => "LERC and DEFLATE",
             Self::Lerc(Lerc::Zstd) => "LERC and ZSTD",
+            Self::JpegXl => "JPEG XL",
         }
+    }
+
+    /// Whether a chunk is unpacked as a whole.
+    fn is_whole(self) -> bool {
+        matches!(self, Self::Lerc(_) | Self::JpegXl)
     }
 
     /// Bytes that one packed byte can become at most, by the codec's own limits.
@@ -55,7 +62,7 @@ impl Compression {
             // A block of 128 KiB of one byte takes four bytes.
             Self::Zstd => 32768,
             // One value takes a head, however many samples have it.
-            Self::Lerc(_) => u64::MAX,
+            Self::Lerc(_) | Self::JpegXl => u64::MAX,
         }
     }
 }
@@ -89,8 +96,8 @@ pub(super) struct Chunks {
     pub(super) stored_samples: u64,
 }
 
-/// Longest chunk of LERC when unpacked.
-const MOST_LERC_BYTES: u64 = 64 << 20;
+/// Longest chunk that is unpacked as a whole.
+const MOST_WHOLE_BYTES: u64 = 64 << 20;
 /// Longest row of a chunk: what is unpacked at once at least.
 const MAX_ROW_BYTES: u64 = 64 << 20;
 
@@ -116,9 +123,16 @@ impl Chunks {
         let is_planar = bands > 1 && file.number(directory, tags::PLANAR_CONFIGURATION)? == Some(2);
         let stored = Stored::read(file, directory)?;
         let compression = compression_of(file, directory)?;
+        let is_packed_so = matches!(stored.sample_type(), SampleType::U8 | SampleType::U16 | SampleType::F32);
+        if compression == Compression::JpegXl && !(stored.is_plain() && is_packed_so) {
+            return Err(file.damaged(format!(
+                "its samples are {}, which JPEG XL does not have; fetch or write the file again",
+                stored.name()
+            )));
+        }
         let predictor = file.number(directory, tags::PREDICTOR)?.unwrap_or(1);
         let predictor = match predictor {
-            _ if matches!(compression, Compression::None | Compression::Lerc(_)) => Predictor::None,
+            _ if compression == Compression::None || compression.is_whole() => Predictor::None,
             1 => Predictor::None,
             2 if stored.is_plain() => Predictor::Horizontal,
             3 if stored.is_real() => Predictor::Floating,
@@ -166,15 +180,16 @@ impl Chunks {
                 ),
             ));
         }
-        if matches!(self.compression, Compression::Lerc(_)) && self.decoded_bytes() > MOST_LERC_BYTES {
+        if self.compression.is_whole() && self.decoded_bytes() > MOST_WHOLE_BYTES {
             return Err(LayoutError::unsupported(
                 file.path(),
                 format!(
-                    "its {} of LERC unpack to {} MiB each, more than the {} MiB allowed; write it again in tiles: \
+                    "its {} of {} unpack to {} MiB each, more than the {} MiB allowed; write it again in tiles: \
                      gdal_translate -co TILED=YES -co COMPRESS=DEFLATE -co BIGTIFF=IF_SAFER INPUT output.tif",
                     self.grid.kind(),
+                    self.compression.name(),
                     self.decoded_bytes() >> 20,
-                    MOST_LERC_BYTES >> 20
+                    MOST_WHOLE_BYTES >> 20
                 ),
             ));
         }
@@ -260,6 +275,7 @@ pub(super) fn compression_of(file: &mut TiffFile, directory: &Directory) -> Resu
         8 | 32946 => return Ok(Compression::Deflate),
         32773 => return Ok(Compression::PackBits),
         50000 => return Ok(Compression::Zstd),
+        50002 | 52546 => return Ok(Compression::JpegXl),
         34887 => {
             // Version of LERC, and how its blobs are packed.
             let parameters = file.numbers(directory, tags::LERC_PARAMETERS, 2)?.unwrap_or_default();
@@ -279,7 +295,6 @@ pub(super) fn compression_of(file: &mut TiffFile, directory: &Directory) -> Resu
         34892 => "lossy JPEG",
         34925 => "LZMA",
         50001 => "WebP",
-        50002 | 52546 => "JPEG XL",
         _ => "unknown",
     };
     Err(LayoutError::unsupported(

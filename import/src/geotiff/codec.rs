@@ -57,6 +57,7 @@ impl<R: BufRead> Unpacker<R> {
             Compression::Zstd => State::Zstd(Box::new(zstd_codec::Stream::new(window)?)),
             Compression::PackBits => State::PackBits(Run::Count),
             Compression::Lerc(_) => return Err(damaged("LERC is not unpacked piece by piece")),
+            Compression::JpegXl => return Err(damaged("JPEG XL is not unpacked piece by piece")),
         };
         Ok(Self { input, state })
     }

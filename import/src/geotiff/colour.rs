@@ -1,4 +1,4 @@
-//! GeoTIFF as pictures: grey, palette, RGB, CMYK, with or without alpha, side by side or band after band, 8 bits a channel or 16 cut to them, JPEG-compressed chunks included;
+//! GeoTIFF as pictures: grey, palette, RGB, YCbCr, CMYK, with or without alpha, side by side or band after band, 8 bits a channel or 16 cut to them, JPEG-compressed chunks included;
 //! of any numbers where a person states which are black and white.
 //!
 //! [`super::colour_table`] says where the chunks are and how they are packed; here they become rows. As many chunks as make one row of tiles, or some
@@ -96,7 +96,7 @@ impl Picture for TiffImage {
     }
 
     fn bits(&self) -> Result<u32, LayoutError> {
-        if self.has_bytes() {
+        if self.has_bytes() || !self.has_light() {
             return Ok(8);
         }
         if let Some(bits) = self.bits.get() {
@@ -108,6 +108,10 @@ impl Picture for TiffImage {
 
     fn use_bits(&mut self, bits: u32) {
         self.bits = OnceLock::from(bits);
+    }
+
+    fn byte_of(&self, number: f64) -> Option<u8> {
+        self.table.shown(number)
     }
 
     fn colours(&self) -> usize {
@@ -372,7 +376,7 @@ impl TiffImage {
             LayoutError::damaged(&self.path, name(), format!("{problem}; fetch or write the file again"))
         };
         guard(&self.path, name, || match &table.packing {
-            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 => {
+            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 | Packing::JpegXl => {
                 let packed = &scratch.packed;
                 let (bytes, channels) = colour_codecs::decode(table, packed, rows).map_err(damaged)?;
                 scratch.bytes = bytes;
@@ -380,7 +384,10 @@ impl TiffImage {
             }
             Packing::Bytes(compression) => {
                 let stride = table.row_bytes() as usize;
-                scratch.bytes.resize(stride * rows as usize, 0);
+                let wide = table.grid.chunk_width;
+                let stored =
+                    table.chroma.map_or(stride * rows as usize, |chroma| chroma.stored_bytes(wide, rows));
+                scratch.bytes.resize(stored, 0);
                 let whole = stride * table.grid.chunk_height as usize;
                 codec::unpack(*compression, &scratch.packed, &mut scratch.bytes, whole).map_err(
                     |failure| match failure {
@@ -401,6 +408,10 @@ impl TiffImage {
                         let line = &mut scratch.widened;
                         predictor::floating(&mut scratch.bytes, stride, bands, size, is_big, line);
                     }
+                }
+                if let Some(chroma) = table.chroma {
+                    chroma.colours(&scratch.bytes, wide, rows, &mut scratch.widened);
+                    std::mem::swap(&mut scratch.bytes, &mut scratch.widened);
                 }
                 if samples.odd.is_some() {
                     table.widen(&scratch.bytes, &mut scratch.widened);

@@ -1,11 +1,12 @@
-//! Chunks that are pictures of their own: JPEG, WebP and JPEG 2000 streams, decoded into samples side by side.
+//! Chunks that are pictures of their own: JPEG, WebP, JPEG 2000 and JPEG XL streams, decoded into samples side by side.
 //!
 //! What a stream declares is compared with the chunk before memory is taken for it. Cost: the decoder's.
 
 use super::colour_paint::Samples;
 use super::colour_table::{Packing, Table};
 use crate::jpeg_frame::JpegFrame;
-use crate::jpeg2000::{self, Source, Stream};
+use crate::jpeg2000::{self, Header, Source, Stream};
+use crate::jxl::{self, Depth};
 use crate::webp::{self, Frame};
 use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 use std::io::Cursor;
@@ -16,6 +17,7 @@ pub(super) fn decode(table: &Table, packed: &[u8], rows: u32) -> Result<(Vec<u8>
     match &table.packing {
         Packing::Jpeg { tables } => jpeg(table, &join_tables(tables, packed), rows),
         Packing::Webp => webp(table, packed, rows),
+        Packing::JpegXl => jpeg_xl(table, packed, rows),
         _ => jpeg_2000(table, packed, rows),
     }
 }
@@ -63,7 +65,7 @@ fn jpeg_2000(table: &Table, packed: &[u8], rows: u32) -> Result<(Vec<u8>, usize)
     let pixel = wanted * samples.bytes();
     let mut bytes = vec![0; wide * stream.texels()[1] as usize * pixel];
     for tile in 0..stream.tiles()[0] * stream.tiles()[1] {
-        let channels = jpeg2000::decode_tile(source, &stream, tile, &[]).map_err(damaged)?;
+        let channels = jpeg2000::decode_tile(source, &stream, tile, &Header::default()).map_err(damaged)?;
         if channels.len() != wanted {
             return Err("its stream has other channels than the image".into());
         }
@@ -79,6 +81,23 @@ fn jpeg_2000(table: &Table, packed: &[u8], rows: u32) -> Result<(Vec<u8>, usize)
         }
     }
     Ok((bytes, wanted))
+}
+
+fn jpeg_xl(table: &Table, packed: &[u8], rows: u32) -> Result<(Vec<u8>, usize), String> {
+    let depth = match (table.samples.sample_type, table.samples.odd) {
+        (SampleType::U8, None) => Depth::Whole(8),
+        (SampleType::U16, None) => Depth::Whole(16),
+        (SampleType::F32, None) => Depth::Real(32),
+        _ => return Err("its samples are of a type that JPEG XL does not have".into()),
+    };
+    let channels = table.side_by_side() as usize;
+    let size = [table.grid.chunk_width, table.grid.chunk_height, rows];
+    // The bytes of a big-endian file were packed as if they were little-endian, so they come out in the file's order.
+    let bytes = jxl::chunk(packed, size, channels, depth).map_err(|trouble| match trouble {
+        jxl::Trouble::Io(_) => "its JPEG XL stream is cut short".to_owned(),
+        jxl::Trouble::Damaged(problem) | jxl::Trouble::Unsupported(problem) => problem.to_owned(),
+    })?;
+    Ok((bytes, channels))
 }
 
 /// A whole number as the file would have it without compression.

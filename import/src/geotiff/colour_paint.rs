@@ -35,7 +35,7 @@ impl Paint {
         file: &mut TiffFile,
         directory: &Directory,
         bands: u64,
-        jpeg: bool,
+        (jpeg, bytes): (bool, bool),
     ) -> Result<Self, LayoutError> {
         let photometric = file.number(directory, tags::PHOTOMETRIC)?.unwrap_or(if bands < 3 { 1 } else { 2 });
         let what = match (photometric, bands) {
@@ -51,21 +51,10 @@ impl Paint {
             (1, _) => return Ok(Self::Grey),
             (2, 3..) => return Ok(Self::Rgb),
             (5, 4..) if !jpeg => return Ok(Self::Cmyk),
-            (6, 3) if jpeg => return Ok(Self::YCbCr),
-            (3, _) => {
-                let listed = file.count(directory, tags::COLOR_MAP);
-                if !(3..=3 * MAX_COLOURS).contains(&listed) {
-                    return Err(file.damaged(format!(
-                        "{listed} numbers make no palette of up to {MAX_COLOURS} colours; fetch or write the file again"
-                    )));
-                }
-                let colours = file.numbers(directory, tags::COLOR_MAP, listed)?.unwrap_or_default();
-                let count = colours.len() / 3;
-                let colour = |i: usize| [0, 1, 2].map(|channel| (colours[channel * count + i] >> 8) as u8);
-                return Ok(Self::Palette((0..count).map(colour).collect()));
-            }
+            (6, 3) if jpeg || bytes => return Ok(Self::YCbCr),
+            (3, _) => return Ok(Self::Palette(palette(file, directory)?)),
             (5, _) => "in CMYK, the inks of a press".to_owned(),
-            (6, _) => "in YCbCr without JPEG".to_owned(),
+            (6, _) => "in YCbCr of an unusual kind".to_owned(),
             (8..=10, _) => "in CIE Lab".to_owned(),
             (other, bands) => format!("of {bands} bands with the photometric code {other}"),
         };
@@ -76,6 +65,31 @@ impl Paint {
                  magick INPUT -colorspace sRGB output.tif, and give it its georeference again with gdal_edit.py"
             ),
         ))
+    }
+
+    /// The palette that a grey image of one band has beside it: who put it there wants these colours, and GDAL shows them.
+    pub(super) fn or_palette(
+        self,
+        file: &mut TiffFile,
+        directory: &Directory,
+        notes: &mut Vec<String>,
+    ) -> Result<Self, LayoutError> {
+        let listed = file.count(directory, tags::COLOR_MAP);
+        if listed == 0 || !matches!(self, Self::Grey | Self::InverseGrey) {
+            return Ok(self);
+        }
+        let bits = file.number(directory, tags::BITS_PER_SAMPLE)?.unwrap_or(1);
+        if bits > 16 || listed != 3 << bits {
+            notes.push(format!(
+                "its palette of {listed} numbers does not go with its samples of {bits} bits and is left out; it is shown as grey"
+            ));
+            return Ok(self);
+        }
+        notes.push(
+            "it calls itself grey and has a palette; it is shown in the colours of the palette, and in grey if band 1 is named"
+                .into(),
+        );
+        Ok(Self::Palette(palette(file, directory)?))
     }
 
     /// Its channels of colour in the file.
@@ -97,6 +111,20 @@ impl Paint {
             Self::Palette(_) => "palette",
         }
     }
+}
+
+/// The colours of the palette.
+fn palette(file: &mut TiffFile, directory: &Directory) -> Result<Vec<[u8; 3]>, LayoutError> {
+    let listed = file.count(directory, tags::COLOR_MAP);
+    if !(3..=3 * MAX_COLOURS).contains(&listed) {
+        return Err(file.damaged(format!(
+            "{listed} numbers make no palette of up to {MAX_COLOURS} colours; fetch or write the file again"
+        )));
+    }
+    let colours = file.numbers(directory, tags::COLOR_MAP, listed)?.unwrap_or_default();
+    let count = colours.len() / 3;
+    let colour = |i: usize| [0, 1, 2].map(|channel| (colours[channel * count + i] >> 8) as u8);
+    Ok((0..count).map(colour).collect())
 }
 
 /// The samples of a picture as they are worked with.
@@ -161,13 +189,25 @@ impl Samples {
         let Some(stored) = self.odd else { return };
         let whole = stored.odd(row, self.big_endian, count);
         match self.sample_type {
-            SampleType::U8 => {
-                let most = if is_grey { (1u32 << stored.bits().min(8)) - 1 } else { 255 };
-                bytes.extend(whole.map(|number| (number as u32 * 255 / most) as u8));
-            }
+            SampleType::U8 if is_grey => bytes.extend(whole.map(|number| self.shade(number as u32))),
+            SampleType::U8 => bytes.extend(whole.map(|number| number as u8)),
             SampleType::U16 => bytes.extend(whole.flat_map(|number| (number as u16).to_le_bytes())),
             _ => bytes.extend(whole.flat_map(|number| (number as f32).to_le_bytes())),
         }
+    }
+
+    /// A number of less than a byte as a shade of grey.
+    fn shade(&self, number: u32) -> u8 {
+        let most = (1u32 << self.bits().min(8)) - 1;
+        (number * 255 / most) as u8
+    }
+
+    /// The byte as which a number of the file is shown, of samples of bytes that are shades of grey; `None` of one that they cannot have.
+    pub(super) fn shown(&self, number: f64) -> Option<u8> {
+        let most = f64::from((1u32 << self.bits().min(8)) - 1);
+        let is_one =
+            self.sample_type == SampleType::U8 && number.fract() == 0.0 && (0.0..=most).contains(&number);
+        is_one.then(|| self.shade(number as u32))
     }
 
     /// The smallest and largest whole number that a sample can be, of those of up to 16 bits.
@@ -232,8 +272,20 @@ impl Samples {
 pub(super) struct Channels {
     pub(super) colours: Vec<usize>,
     pub(super) alpha: Option<usize>,
+    /// Whether the colours were multiplied by alpha.
+    pub(super) is_multiplied: bool,
     /// Value of all colour channels where there is no picture.
     pub(super) void: Option<f64>,
+}
+
+/// A texel whose colours were multiplied by its alpha, as they were before. A colour above alpha cannot be such a product: files of some programs say that theirs are and do not
+/// mean it, and stay as they are.
+fn divided([r, g, b, alpha]: [u8; 4]) -> [u8; 4] {
+    if alpha == 0 || r.max(g).max(b) > alpha {
+        return [r, g, b, alpha];
+    }
+    let [r, g, b] = [r, g, b].map(|c| ((u32::from(c) * 255 + u32::from(alpha) / 2) / u32::from(alpha)) as u8);
+    [r, g, b, alpha]
 }
 
 impl Channels {
@@ -294,6 +346,9 @@ impl Channels {
             };
             if let Some(alpha) = self.alpha {
                 to[3] = shown(alpha, whole);
+                if self.is_multiplied {
+                    *to = divided(*to);
+                }
             }
             if self.is_void(|channel| f64::from(samples.short(from, channel))) {
                 to[3] = 0;
@@ -312,7 +367,8 @@ impl Channels {
             let alpha = self.alpha.map_or(255.0, |alpha| {
                 (samples.number(from, alpha) / samples.opaque() * 255.0).clamp(0.0, 255.0)
             });
-            *to = [red, green, blue, alpha];
+            let share = if self.is_multiplied && alpha > 0.0 { alpha / 255.0 } else { 1.0 };
+            *to = [red / share, green / share, blue / share, alpha];
             if rounded.is_some_and(|void| [red, green, blue].iter().all(|number| f64::from(*number) == void))
             {
                 *to = [f32::NAN; 4];

@@ -7,7 +7,10 @@ use super::chunk_grid::{ChunkGrid, side};
 use super::chunks::{Compression, Predictor, compression_of};
 use super::colour_paint::{Channels, MAX_BANDS, Paint, Samples};
 use super::listing::Places;
+use super::metadata;
 use super::tags::{self, Directory, TiffFile};
+use super::ycbcr::YCbCr;
+use crate::jxl;
 use crate::shown::{PRESS_NOTE, PictureOptions, chosen_bands};
 use std::num::NonZero;
 use terrasoar_layout::dem::SampleType;
@@ -31,6 +34,8 @@ pub(super) enum Packing {
     Webp,
     /// Chunks are streams of JPEG 2000.
     Jpeg2000,
+    /// Chunks are streams of JPEG XL.
+    JpegXl,
 }
 
 impl Packing {
@@ -66,6 +71,7 @@ impl Packing {
                     "its chunks are LERC, which is read of heights and not of pictures; convert it: gdal_translate -co TILED=YES \
                      -co COMPRESS=DEFLATE INPUT output.tif",
                 )),
+                Compression::JpegXl => Ok(Self::JpegXl),
                 compression => Ok(Self::Bytes(compression)),
             },
         }
@@ -82,6 +88,7 @@ impl Packing {
             Self::Jpeg { .. } => "JPEG",
             Self::Webp => "WebP",
             Self::Jpeg2000 => "JPEG 2000",
+            Self::JpegXl => "JPEG XL",
         }
     }
 }
@@ -101,6 +108,8 @@ pub(super) struct Table {
     pub(super) channels: Channels,
     /// Whether three channels of JPEG are red, green and blue, not luma and chroma.
     pub(super) is_rgb: bool,
+    /// Luma and chroma that no codec makes colours of.
+    pub(super) chroma: Option<YCbCr>,
     /// Whether samples of less than a byte are shades of grey.
     is_shades: bool,
     pub(super) packing: Packing,
@@ -126,32 +135,58 @@ impl Table {
         }
         let bands = file.number(directory, tags::SAMPLES_PER_PIXEL)?.unwrap_or(1);
         let code = file.number(directory, tags::COMPRESSION)?.unwrap_or(1);
-        let named = Paint::read(file, directory, bands, code == 7)?;
-        let is_rgb = !matches!(named, Paint::YCbCr);
+        // Luma and chroma that are no stream of a picture are made colours of here.
+        let is_plain = matches!(code, 1 | 5 | 8 | 32946 | 32773 | 50000)
+            && file.number(directory, tags::PLANAR_CONFIGURATION)?.unwrap_or(1) == 1;
+        let named = Paint::read(file, directory, bands, (code == 7, is_plain))?;
+        let paint_is_chroma = matches!(named, Paint::YCbCr);
         let mut notes = Vec::new();
         let is_stretched = options.stretch.is_some();
+        let extra = file.numbers(directory, tags::EXTRA_SAMPLES, MAX_BANDS)?.unwrap_or_default();
+        // A band that a person names, or states the blacks and whites of, is amounts of light.
+        let is_asked = is_stretched || !options.bands.is_empty();
+        let named = match bands.saturating_sub(extra.len() as u64) {
+            1 if !is_asked => named.or_palette(file, directory, &mut notes)?,
+            _ => named,
+        };
         let samples = Samples::read(file, directory, is_stretched)?;
-        if samples.bytes() == 2 && !is_stretched {
+        if samples.bytes() == 2 && !is_stretched && !matches!(named, Paint::Palette(_)) {
             notes.push("16 bits a channel are cut to the upper 8 of those in use".into());
         }
-        let extra = file.numbers(directory, tags::EXTRA_SAMPLES, MAX_BANDS)?.unwrap_or_default();
         let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2)).map(|at| named.channels() + at);
         let alpha = alpha.filter(|at| (*at as u64) < bands);
-        let (paint, colours) = colours(file, named, bands, alpha, &options.bands, &mut notes)?;
+        let is_multiplied = alpha.is_some_and(|at| extra.get(at - named.channels()) == Some(&1));
+        let said = match named {
+            // What colour bands are is also told by GDAL, where the photometric code has no word for it.
+            Paint::Grey | Paint::Rgb => {
+                file.text(directory, tags::GDAL_METADATA, super::MAX_METADATA_BYTES)?
+            }
+            _ => None,
+        };
+        let (rgb, named_alpha) = metadata::colours(said.as_deref().unwrap_or_default());
+        let [rgb, named_alpha] = [rgb.map(Vec::from), named_alpha.map(|at| vec![at])]
+            .map(|named| named.filter(|at| at.iter().all(|band| (*band as u64) < bands)));
+        let alpha = named_alpha.map(|at| at[0]).or(alpha);
+        let (paint, colours) = match rgb {
+            Some(rgb) if options.bands.is_empty() && alpha.is_none_or(|at| !rgb.contains(&at)) => {
+                (Paint::Rgb, rgb)
+            }
+            _ => colours(file, named, bands, alpha, &options.bands, &mut notes)?,
+        };
         let is_planar = bands > 1 && file.number(directory, tags::PLANAR_CONFIGURATION)?.unwrap_or(1) != 1;
         // Of bands that lie apart those that are read lie side by side once they were.
         let read = colours.iter().chain(&alpha).map(|band| *band as u64);
         let planes: Vec<u64> = if is_planar { read.collect() } else { Vec::new() };
         let void = file.text(directory, tags::GDAL_NODATA, super::MAX_NODATA_BYTES)?;
         let void = void.and_then(|text| text.trim().parse::<f64>().ok()).filter(|void| !void.is_nan());
-        let mut channels = Channels { colours, alpha, void };
+        let mut channels = Channels { colours, alpha, is_multiplied, void };
         if is_planar {
             channels.alpha = alpha.map(|_| channels.colours.len());
             channels.colours = (0..channels.colours.len()).collect();
         }
         let is_shades = !is_stretched && !matches!(paint, Paint::Palette(_));
-        if let (Some(odd), true) = (samples.odd.filter(|odd| odd.bits() < 8), is_shades) {
-            channels.void = channels.void.map(|void| void * 255.0 / ((1u32 << odd.bits()) - 1) as f64);
+        if samples.bits() < 8 && is_shades {
+            channels.void = channels.void.and_then(|void| samples.shown(void)).map(f64::from);
         }
         let packing = Packing::read(file, directory, &samples, (bands, is_planar))?;
         let predictor = file.number(directory, tags::PREDICTOR)?.unwrap_or(1);
@@ -168,6 +203,20 @@ impl Table {
             }
         };
         let grid = ChunkGrid::read(file, directory, [width, height], if is_planar { bands } else { 1 })?;
+        let chroma = match (&paint_is_chroma, &packing) {
+            (true, Packing::Bytes(_)) => Some(YCbCr::read(file, directory, [grid.chunk_height, height])?),
+            _ => None,
+        };
+        if chroma.is_some()
+            && (samples.sample_type != SampleType::U8
+                || samples.odd.is_some()
+                || !matches!(predictor, Predictor::None))
+        {
+            return Err(unsupported(
+                file,
+                "its luma and chroma are not of 8 bits, or have a predictor; convert it: gdal_translate -co TILED=YES INPUT output.tif",
+            ));
+        }
         if grid.count().saturating_mul(bands) > u64::from(u32::MAX) {
             return Err(file.damaged("it has more chunks than a picture can have; fetch the file again"));
         }
@@ -181,7 +230,8 @@ impl Table {
             is_reversed: !packing.is_picture() && file.number(directory, tags::FILL_ORDER)? == Some(2),
             paint,
             channels,
-            is_rgb,
+            is_rgb: !paint_is_chroma,
+            chroma,
             is_shades,
             packing,
             predictor,
@@ -189,7 +239,7 @@ impl Table {
         };
         table.grid.set_decoded_bytes(table.chunk_bytes());
         table.longest = table.check(file)?;
-        if is_raw {
+        if table.is_raw() {
             table.cut();
         }
         Ok(table)
@@ -226,7 +276,7 @@ impl Table {
 
     /// Whether the chunks are not compressed.
     fn is_raw(&self) -> bool {
-        matches!(self.packing, Packing::Bytes(Compression::None))
+        matches!(self.packing, Packing::Bytes(Compression::None)) && self.chroma.is_none()
     }
 
     /// Bytes that the samples of a chunk take that lie in the image's rows.
@@ -276,12 +326,12 @@ impl Table {
         // As they are worked with, and side by side.
         let texels = u64::from(self.grid.chunk_width) * rows;
         let joined = texels.saturating_mul(self.joined() * self.samples.bytes() as u64);
-        let is_moved = self.samples.odd.is_some() || !self.planes.is_empty();
+        let is_moved = self.samples.odd.is_some() || !self.planes.is_empty() || self.chroma.is_some();
         let moved = if is_moved { joined.saturating_mul(2) } else { 0 };
         // Strips are no higher than the image, cut ones lower than the longest.
         let packed = if self.is_raw() { samples.min(self.longest) } else { self.longest };
         let codec = match &self.packing {
-            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 => {
+            Packing::Jpeg { .. } | Packing::Webp | Packing::Jpeg2000 | Packing::JpegXl => {
                 self.picture_bytes().saturating_add(packed)
             }
             Packing::Bytes(Compression::Zstd) => samples.saturating_mul(2),
@@ -296,6 +346,7 @@ impl Table {
         let texels = padded[0].saturating_mul(padded[1]);
         match &self.packing {
             Packing::Jpeg2000 => texels.saturating_mul(10 * self.side_by_side() + 24).saturating_add(1 << 17),
+            Packing::JpegXl => jxl::chunk_bytes(texels, self.side_by_side(), self.longest),
             Packing::Webp => texels.saturating_mul(12).saturating_add(8 << 20),
             _ => texels.saturating_mul(5 * self.side_by_side()),
         }
@@ -325,6 +376,16 @@ impl Table {
     /// Whether its samples are shown as they are, as bytes.
     pub(super) fn has_bytes(&self) -> bool {
         self.samples.sample_type == SampleType::U8
+    }
+
+    /// The byte of each colour as which a number of the file is shown; `None` of one that no sample is, and of inks and places in a palette.
+    pub(super) fn shown(&self, number: f64) -> Option<u8> {
+        let byte = self.samples.shown(number)?;
+        match self.paint {
+            Paint::Palette(_) | Paint::Cmyk => None,
+            Paint::InverseGrey => Some(255 - byte),
+            Paint::Grey | Paint::Rgb | Paint::YCbCr => Some(byte),
+        }
     }
 
     /// The samples of a chunk of one plane as they are worked with, where no machine has those of the file.

@@ -31,7 +31,7 @@ pub(super) fn heights(xml: &str, band: usize, value: &mut ValueSaid) {
     for item in items(xml).filter(|item| item.band == band) {
         let number = item.text.parse::<f64>().ok().filter(|value| value.is_finite());
         match (item.role, number) {
-            ("scale", Some(scale)) if scale != 0.0 => value.scale = Some(Said::new(scale, by)),
+            ("scale", Some(scale)) => value.scale = Some(Said::new(scale, by)),
             ("offset", Some(offset)) => value.offset = Some(Said::new(offset, by)),
             ("unittype", _) if !item.text.is_empty() => {
                 value.unit = Some(Said::new(VerticalUnit::Name(item.text), by));
@@ -51,6 +51,18 @@ pub(super) fn names(xml: &str) -> Vec<Option<String>> {
         names[item.band] = Some(item.text);
     }
     names
+}
+
+/// The bands that are red, green and blue, where all three are named, and the one that is alpha.
+pub(super) fn colours(xml: &str) -> (Option<[usize; 3]>, Option<usize>) {
+    let roles: Vec<_> = items(xml).filter(|item| item.role == "colorinterp").collect();
+    let band =
+        |name: &str| roles.iter().find(|item| item.text.eq_ignore_ascii_case(name)).map(|item| item.band);
+    let rgb = match (band("Red"), band("Green"), band("Blue")) {
+        (Some(red), Some(green), Some(blue)) => Some([red, green, blue]),
+        _ => None,
+    };
+    (rgb, band("Alpha"))
 }
 
 fn attribute<'a>(attributes: &'a str, name: &str) -> Option<&'a str> {
@@ -88,12 +100,14 @@ mod tests {
         assert_eq!(first.unit.unwrap().value, VerticalUnit::Name("Clarke's foot".into()));
         assert_eq!(of(xml, 1).scale.unwrap().value, 3.0);
         assert_eq!(names(xml), [None, Some("a & b".to_owned())]);
+        // That it makes no heights is said where heights are made.
+        let none = of("<Item sample=\"0\" role=\"scale\">0</Item>", 0);
+        assert_eq!(none.scale.unwrap().value, 0.0);
         for damaged in [
             "",
             "<Item",
             "<Item role=\"scale\" sample=\"0\">",
             "<Item sample=\"0\" role=\"scale\">nan</Item>",
-            "<Item sample=\"0\" role=\"scale\">0</Item>",
         ] {
             assert_eq!(of(damaged, 0), ValueSaid::default(), "{damaged}");
         }

@@ -39,6 +39,7 @@ mod shapes;
 mod span;
 mod stored;
 mod tags;
+mod ycbcr;
 mod zstd_frame;
 #[cfg(feature = "zstd")]
 mod zstd_library;

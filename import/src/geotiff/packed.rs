@@ -1,7 +1,7 @@
 //! Reads compressed chunks, each by one worker, some rows at a time.
 //!
 //! What a worker holds is a window of rows, not the chunk: a file of one huge strip takes no more memory than a tiled one. As many workers read as fit into
-//! [`BUDGET_BYTES`]. Only rows of more than a megabyte, large windows of ZSTD and chunks of LERC take more, which [`Chunks::memory_bytes`] tells. Bands that lie one after the other
+//! [`BUDGET_BYTES`]. Only rows of more than a megabyte, large windows of ZSTD and chunks of LERC and JPEG XL take more, which [`Chunks::memory_bytes`] tells. Bands that lie one after the other
 //! are read in step.
 
 use std::fs::File;
@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::super::guard::guard;
 use super::super::parallel::each_task;
-use super::super::{WINDOW_SAMPLES, input};
+use super::super::{WINDOW_SAMPLES, input, jxl};
 use super::chunks::{Chunks, Compression, Predictor};
 use super::convert::Convert;
 use super::failure::Failure;
@@ -40,6 +40,11 @@ impl Chunks {
             Compression::Zstd => self.largest_window,
             // The blob, its samples and mask, and their bytes.
             Compression::Lerc(_) => 6 * self.decoded_bytes(),
+            Compression::JpegXl => {
+                let texels = u64::from(self.grid.chunk_width) * u64::from(self.grid.chunk_height);
+                let packed = 2 * self.decoded_bytes() + (1 << 10);
+                packed + jxl::chunk_bytes(texels, self.side_by_side(), packed)
+            }
             _ => 0,
         };
         let scratch = if self.predictor == Predictor::Floating { stride } else { 0 };

@@ -1,6 +1,6 @@
 //! A compressed chunk on its way out of the file, some rows at a time.
 //!
-//! Most codecs unpack piece by piece. Two work on a whole chunk: LERC, and ZSTD where its window is larger than the chunk. Rows come out as they would lie in a
+//! Most codecs unpack piece by piece. Three work on a whole chunk: LERC, JPEG XL, and ZSTD where its window is larger than the chunk. Rows come out as they would lie in a
 //! file without compression and predictor.
 
 use super::chunks::{Chunks, Compression, Lerc, Predictor};
@@ -8,8 +8,10 @@ use super::codec::Unpacker;
 use super::failure::Failure;
 use super::span::{LARGEST_WHOLE, Span};
 use super::{lerc, predictor, zstd_frame};
+use crate::jxl::{self, Depth, Trouble};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
+use terrasoar_layout::dem::SampleType;
 
 /// Packed bytes read at once.
 pub(super) const INPUT_BYTES: u64 = 1 << 16;
@@ -33,6 +35,7 @@ impl<'f> Rows<'f> {
         let mut span = Span { file, at, left: length, is_reversed: chunks.is_reversed };
         let whole = match chunks.compression {
             Compression::Lerc(packing) => Some(unpack_lerc(span, packing, chunks, chunk)?),
+            Compression::JpegXl => Some(unpack_jpeg_xl(span, chunks, chunk)?),
             Compression::Zstd if chunks.whole_is_needed(span)? => {
                 Some(unpack_zstd(&mut span, chunks, chunk)?)
             }
@@ -123,4 +126,21 @@ fn unpack_lerc(mut span: Span<'_>, packing: Lerc, chunks: &Chunks, chunk: u64) -
         blob = unpacker.rest(most as usize)?;
     }
     lerc::unpack(chunks, &blob, chunks.grid.window(chunk).height)
+}
+
+/// Unpacks a chunk of JPEG XL. As of LERC the bytes of a big-endian file were packed as if they were little-endian, so they come out in the file's order.
+fn unpack_jpeg_xl(mut span: Span<'_>, chunks: &Chunks, chunk: u64) -> Result<Vec<u8>, Failure> {
+    let packed = packed(&mut span, chunks.decoded_bytes())?;
+    let grid = &chunks.grid;
+    let depth = match chunks.sample_type {
+        SampleType::U8 => Depth::Whole(8),
+        SampleType::U16 => Depth::Whole(16),
+        SampleType::F32 => Depth::Real(32),
+        _ => return Err(Failure::Damaged("its samples are of a type that JPEG XL does not have".into())),
+    };
+    let size = [grid.chunk_width, grid.chunk_height, grid.window(chunk).height];
+    jxl::chunk(&packed, size, chunks.side_by_side() as usize, depth).map_err(|trouble| match trouble {
+        Trouble::Io(error) => Failure::Io(error),
+        Trouble::Damaged(problem) | Trouble::Unsupported(problem) => Failure::Damaged(problem.into()),
+    })
 }

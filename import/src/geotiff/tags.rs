@@ -39,6 +39,9 @@ pub(super) const SUB_IFDS: u16 = 330;
 pub(super) const EXTRA_SAMPLES: u16 = 338;
 pub(super) const SAMPLE_FORMAT: u16 = 339;
 pub(super) const JPEG_TABLES: u16 = 347;
+pub(super) const YCBCR_COEFFICIENTS: u16 = 529;
+pub(super) const YCBCR_SUBSAMPLING: u16 = 530;
+pub(super) const REFERENCE_BLACK_WHITE: u16 = 532;
 pub(super) const MODEL_PIXEL_SCALE: u16 = 33550;
 pub(super) const MODEL_TIEPOINT: u16 = 33922;
 pub(super) const MODEL_TRANSFORMATION: u16 = 34264;
@@ -50,7 +53,7 @@ pub(super) const GDAL_NODATA: u16 = 42113;
 pub(super) const LERC_PARAMETERS: u16 = 50674;
 
 /// The tags that mean something here; what others hold is never looked at.
-const KNOWN: [u16; 33] = [
+const KNOWN: [u16; 36] = [
     NEW_SUBFILE_TYPE,
     SUBFILE_TYPE,
     IMAGE_WIDTH,
@@ -84,6 +87,9 @@ const KNOWN: [u16; 33] = [
     GDAL_METADATA,
     GDAL_NODATA,
     LERC_PARAMETERS,
+    YCBCR_COEFFICIENTS,
+    YCBCR_SUBSAMPLING,
+    REFERENCE_BLACK_WHITE,
 ];
 
 /// Tags of all directories together, at most: a directory has some twenty.
@@ -324,6 +330,9 @@ impl TiffFile {
         };
         Ok(Some(match kind {
             12 => bytes.chunks_exact(8).map(|value| f64::from_bits(self.u64(value))).collect(),
+            5 => {
+                bytes.chunks_exact(8).map(|v| f64::from(self.u32(v)) / f64::from(self.u32(&v[4..]))).collect()
+            }
             11 => bytes.chunks_exact(4).map(|value| f64::from(f32::from_bits(self.u32(value)))).collect(),
             _ => {
                 return Err(

@@ -247,7 +247,9 @@ fn of_jpeg(trouble: Trouble) -> Fault {
 fn jpeg_2000(file: &File, stream: &Stream) -> Result<Vec<f32>, Fault> {
     let ([wide, high], tiles) = (stream.texels(), stream.tiles());
     let decode = |tile: u32| {
-        let mut channels = jpeg2000::decode_tile(Source::File(file), stream, tile, &[]).map_err(of_jpeg)?;
+        let mut channels =
+            jpeg2000::decode_tile(Source::File(file), stream, tile, &jpeg2000::Header::default())
+                .map_err(of_jpeg)?;
         channels.pop().map(|(samples, _)| samples).ok_or(ENDED)
     };
     if tiles == [1, 1] {

@@ -1,7 +1,9 @@
-//! The boxes of a JP2 file (ISO/IEC 15444-1, annex I): where the stream lies, what its channels mean, and what is said of the ground.
+//! The boxes of a JP2 file (ISO/IEC 15444-1, annex I): where the stream lies, the headers in front of it, and what is said of the ground.
 //!
 //! Cost: a read of 16 bytes a box; held are the box of headers and those of the ground.
 
+use super::header::Header;
+use super::part;
 use super::place::{self, Ground};
 use super::{Source, Stream, Trouble, damaged, stream};
 
@@ -16,49 +18,12 @@ const MAX_HEADER_BYTES: u64 = 8 << 20;
 const GEO_TIFF: [u8; 16] =
     [0xb1, 0x4b, 0xf8, 0xbd, 0x08, 0x3d, 0x4b, 0x43, 0xa5, 0xae, 0x8c, 0xd7, 0xd5, 0xa6, 0xce, 0x03];
 
-/// What channels mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Colours {
-    Grey,
-    Rgb,
-    Cmyk,
-    /// The file does not say.
-    Unknown,
-}
-
 /// A JP2 file, or a bare stream.
 #[derive(Debug)]
 pub(crate) struct Jp2 {
     pub(crate) stream: Stream,
-    /// The box of headers; empty in a bare stream.
-    pub(crate) header: Vec<u8>,
-    pub(crate) colours: Colours,
-    /// Whether one channel is alpha, which is then the last.
-    pub(crate) has_alpha: bool,
-    /// Channels that a palette makes, if there is one.
-    pub(crate) palette: Option<usize>,
+    pub(crate) header: Header,
     pub(crate) ground: Ground,
-}
-
-/// A box: its kind and where its content lies.
-struct Found {
-    kind: [u8; 4],
-    at: u64,
-    end: u64,
-}
-
-fn next(source: Source<'_>, at: u64, end: u64) -> Result<Found, Trouble> {
-    let head: [u8; 8] = source.array(at)?;
-    let kind = [head[4], head[5], head[6], head[7]];
-    let length = u64::from(u32::from_be_bytes([head[0], head[1], head[2], head[3]]));
-    let (content, length) = match length {
-        0 => (at + 8, end - at),
-        1 => (at + 16, u64::from_be_bytes(source.array(at + 8)?)),
-        length => (at + 8, length),
-    };
-    let last = at.checked_add(length).filter(|last| content <= *last);
-    let last = last.ok_or_else(|| damaged("a box of it has no end"))?;
-    Ok(Found { kind, at: content, end: last.min(end) })
 }
 
 impl Jp2 {
@@ -75,7 +40,7 @@ impl Jp2 {
                 break;
             }
             // What stands behind the stream may be anything.
-            let found = match next(source, at, length) {
+            let found = match part::next(source, at, length) {
                 Ok(found) => found,
                 Err(_) if this.is_some() => break,
                 Err(trouble) => return Err(trouble),
@@ -86,9 +51,7 @@ impl Jp2 {
                     if size > MAX_HEADER_BYTES {
                         return Err(damaged("its headers are longer than 8 MiB"));
                     }
-                    header.extend(((size + 8) as u32).to_be_bytes());
-                    header.extend(b"jp2h");
-                    header.extend(source.vec(found.at, size as usize)?);
+                    header = source.vec(found.at, size as usize)?;
                 }
                 b"jp2c" if this.is_none() => this = Some(Stream::read(source, found.at, size)?),
                 b"uuid"
@@ -104,51 +67,25 @@ impl Jp2 {
             at = found.end;
         }
         let stream = this.ok_or_else(|| damaged("there is no picture in it"))?;
-        let mut this =
-            Self { stream, header, colours: Colours::Unknown, has_alpha: false, palette: None, ground };
-        this.read_header()?;
-        Ok(this)
+        let header = if header.is_empty() { Header::default() } else { Header::read(&header, &stream)? };
+        Ok(Self { stream, header, ground })
     }
 
-    fn read_header(&mut self) -> Result<(), Trouble> {
-        let header = std::mem::take(&mut self.header);
-        let source = Source::Memory(&header);
-        let end = header.len() as u64;
-        let mut at = 8;
-        while at + 8 <= end {
-            let found = next(source, at, end)?;
-            let content = &header[found.at as usize..found.end as usize];
-            match &found.kind {
-                // Of several systems the first that is known by a number counts.
-                b"colr" if self.colours == Colours::Unknown && content.first() == Some(&1) => {
-                    self.colours = match content.get(3..7) {
-                        Some([0, 0, 0, 12 | 13]) => Colours::Cmyk,
-                        Some([0, 0, 0, 17]) => Colours::Grey,
-                        Some([0, 0, 0, 16 | 18 | 20]) => Colours::Rgb,
-                        Some([0, 0, 0, 14 | 19]) => {
-                            return Err(Trouble::Unsupported("its colours are in CIE Lab"));
-                        }
-                        _ => Colours::Unknown,
-                    };
-                }
-                b"cdef" => {
-                    // Number, kind and colour of each channel, of two bytes each.
-                    let kinds = content.get(2..).unwrap_or_default().chunks_exact(6);
-                    self.has_alpha = kinds.filter(|channel| matches!(channel[2..4], [0, 1 | 2])).count() == 1;
-                }
-                b"pclr" => self.palette = content.get(2).map(|columns| usize::from(*columns)),
-                _ => {}
-            }
-            at = found.end.max(at + 8);
-        }
-        self.header = header;
-        Ok(())
+    /// Channels of a texel.
+    pub(crate) fn channels(&self) -> usize {
+        self.header.palette.unwrap_or(self.stream.channels())
+    }
+
+    /// Memory that decoding the largest tile takes at most.
+    pub(crate) fn tile_bytes(&self) -> u64 {
+        self.stream.tile_bytes_of(self.channels()).saturating_add(self.header.bytes())
     }
 }
 
 /// A JP2 file of a stream and a box of headers.
 pub(super) fn wrap(header: &[u8], stream: &[u8]) -> Vec<u8> {
-    let mut bytes = [SIGNATURE, FILE_TYPE, header].concat();
+    let mut bytes = Vec::with_capacity(SIGNATURE.len() + FILE_TYPE.len() + header.len() + 8 + stream.len());
+    [SIGNATURE, FILE_TYPE, header].into_iter().for_each(|part| bytes.extend(part));
     // Its length is what is left.
     bytes.extend(b"\0\0\0\0jp2c");
     bytes.extend(stream);

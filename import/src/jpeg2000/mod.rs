@@ -1,14 +1,17 @@
 //! JPEG 2000 (ISO/IEC 15444-1), tile by tile: a tile with the headers it needs is a small picture of its own, which hayro-jpeg2000 decodes.
 //!
-//! [`boxes`] finds the stream in a JP2 file, [`stream`] where each tile lies in it, [`place`] what is said of the ground. Coordinates of a stream are absolute: a header whose image is cut to one tile describes exactly that
+//! [`boxes`] finds the stream in a JP2 file, [`header`] what its channels mean, [`stream`] where each tile lies in it, [`place`] what is said of the ground. Coordinates of a stream are absolute: a header whose image is cut to one tile describes exactly that
 //! tile. So memory is for tiles at work, not for the picture, and tiles are decoded in parallel. A picture of one tile is decoded as a whole. Every size is
-//! checked before memory is taken for it ([`Stream::tile_bytes`]).
+//! checked before memory is taken for it ([`Jp2::tile_bytes`]).
 
 mod boxes;
+mod header;
+mod part;
 mod place;
 mod stream;
 
-pub(crate) use boxes::{Colours, Jp2};
+pub(crate) use boxes::Jp2;
+pub(crate) use header::{Colours, Header};
 pub(crate) use stream::Stream;
 
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image};
@@ -76,15 +79,15 @@ pub(crate) fn is_jpeg2000(head: &[u8]) -> bool {
     head.starts_with(boxes::SIGNATURE) || head.starts_with(stream::START)
 }
 
-/// Decodes a tile. `header` is the box of headers of a JP2 file, empty without: palette, colour system and order of channels.
+/// Decodes a tile: its channels as they stand in the file, or as a palette makes them. `header` is that of a JP2 file.
 pub(crate) fn decode_tile(
     source: Source<'_>,
     stream: &Stream,
     tile: u32,
-    header: &[u8],
+    header: &Header,
 ) -> Result<Vec<Channel>, Trouble> {
     let cut = stream.cut(source, tile)?;
-    let wrapped = if header.is_empty() { cut } else { boxes::wrap(header, &cut) };
+    let wrapped = if header.bytes.is_empty() { cut } else { boxes::wrap(&header.bytes, &cut) };
     let failed = |_| damaged("its JPEG 2000 stream is damaged, or of a kind that is not read");
     let image = Image::new(&wrapped, &DecodeSettings::default()).map_err(failed)?;
     let wanted = stream.tile_size(tile);
@@ -94,25 +97,33 @@ pub(crate) fn decode_tile(
     let mut context = DecoderContext::default();
     let decoded = image.decode(&mut context).map_err(failed)?;
     let count = wanted[0] as usize * wanted[1] as usize;
-    let channels: Vec<Channel> = decoded
+    let mut channels: Vec<Channel> = decoded
         .components()
         .iter()
-        .map(|channel| {
-            // Rounded and within its bits, whatever a lossy stream makes of it.
+        .enumerate()
+        .map(|(place, channel)| {
             let (bits, samples) = (channel.bit_depth(), channel.samples());
-            let is_signed = stream.is_signed() && header_has_no_palette(header);
+            let is_signed = stream.has_sign(header.order.get(place).copied().unwrap_or(place));
             let [low, high] = limits(bits, is_signed);
-            (samples.iter().map(|sample| sample.round().clamp(low, high)).collect(), bits)
+            // The decoder puts half of the range on all numbers, which the standard does on those without a sign (annex G.1.2).
+            let shift = if is_signed { low } else { 0.0 };
+            // Rounded and within its bits, whatever a lossy stream makes of it.
+            let number = |sample: &f32| (sample + shift).round().clamp(low, high);
+            (samples.iter().map(number).collect(), bits)
         })
         .collect();
     if channels.is_empty() || channels.iter().any(|(samples, _)| samples.len() != count) {
         return Err(damaged("a channel has another size than the picture"));
     }
+    if !header.order.is_empty() {
+        if channels.len() != header.order.len() {
+            return Err(damaged("it has another number of channels than its header says"));
+        }
+        let mut places: Vec<(usize, Channel)> = header.order.iter().copied().zip(channels).collect();
+        places.sort_by_key(|(channel, _)| *channel);
+        channels = places.into_iter().map(|(_, channel)| channel).collect();
+    }
     Ok(channels)
-}
-
-fn header_has_no_palette(header: &[u8]) -> bool {
-    !header.windows(4).any(|four| four == b"pclr")
 }
 
 /// The smallest and largest number of so many bits.

@@ -69,10 +69,10 @@ fn word(bytes: &[u8], at: usize) -> u32 {
 
 impl Style {
     /// Of the segment of a style, from behind its length: of all channels, or of one.
-    fn read(segment: &[u8], of_one: bool, many: bool) -> Option<Self> {
+    fn read(segment: &[u8], of_one: bool) -> Option<Self> {
         let (flags, layers, at) = if of_one {
-            let at = if many { 2 } else { 1 };
-            (*segment.get(at)?, 1, at + 1)
+            // Of up to 256 channels the number is a byte.
+            (*segment.get(1)?, 1, 2)
         } else {
             (*segment.first()?, half(segment, 2).max(1), 5)
         };
@@ -180,8 +180,7 @@ impl Stream {
         if !matches!(marker, STYLE | STYLE_OF_CHANNEL) {
             return Ok(());
         }
-        let many = self.channels.len() > 3 * 256;
-        let style = Style::read(segment, marker == STYLE_OF_CHANNEL, many);
+        let style = Style::read(segment, marker == STYLE_OF_CHANNEL);
         let style = style.ok_or_else(|| damaged("its header is damaged"))?;
         self.block_bytes = self.block_bytes.max(style.bytes_a_sample());
         Ok(())
@@ -256,14 +255,24 @@ impl Stream {
         self.channels.len() / 3
     }
 
-    /// Whether the first channel has a sign.
+    /// Whether a channel has a sign.
     pub(crate) fn is_signed(&self) -> bool {
-        self.channels[0] & 0x80 != 0
+        (0..self.channels()).any(|channel| self.has_sign(channel))
+    }
+
+    /// Whether this channel has a sign.
+    pub(crate) fn has_sign(&self, channel: usize) -> bool {
+        self.channels.get(3 * channel).is_some_and(|bits| bits & 0x80 != 0)
     }
 
     /// Bits of the widest channel.
     pub(crate) fn bits(&self) -> u8 {
         self.channels.chunks_exact(3).map(|channel| (channel[0] & 0x7f) + 1).max().unwrap_or(8)
+    }
+
+    /// Bits of a channel, if there is such a one.
+    pub(super) fn bits_of(&self, channel: usize) -> Option<u8> {
+        self.channels.get(3 * channel).map(|bits| (bits & 0x7f) + 1)
     }
 
     /// Texels of the largest tile.
@@ -272,13 +281,22 @@ impl Stream {
         [0, 1].map(|i| u64::from(self.tile[i].min(texels[i]))).iter().product()
     }
 
-    /// Memory that decoding the largest tile takes at most: its stream twice, samples of all channels in the decoder and here, and what the decoder works with.
+    /// Memory that decoding the largest tile takes at most: its stream twice and the header with it, samples of all channels in the decoder and here, and what the decoder works with.
     pub(crate) fn tile_bytes(&self) -> u64 {
+        self.tile_bytes_of(self.channels())
+    }
+
+    /// As [`Self::tile_bytes`], where a palette makes so many channels.
+    pub(super) fn tile_bytes_of(&self, made: usize) -> u64 {
         let texels = self.largest_tile();
         let channels = self.channels() as u64;
-        let samples = texels.saturating_mul(4 * (2 * channels + 4));
+        // Those of the stream are kept until those of the palette are made.
+        let own = if made == self.channels() { 0 } else { channels };
+        let samples = texels.saturating_mul(4 * (2 * (made as u64).max(channels) + own + 4));
         let blocks = (texels as f64 * channels as f64 * self.block_bytes) as u64;
-        samples.saturating_add(blocks).saturating_add(2 * self.longest + (1 << 16))
+        samples
+            .saturating_add(blocks)
+            .saturating_add(2 * self.longest + 3 * self.header.len() as u64 + (1 << 16))
     }
 
     /// The stream of one tile.
@@ -323,7 +341,7 @@ impl Stream {
             let segment = part.get(at + 4..at + 2 + length.max(2));
             let segment = segment.ok_or_else(|| damaged("the header of a tile has no end"))?;
             if matches!(marker, STYLE | STYLE_OF_CHANNEL) {
-                let style = Style::read(segment, marker == STYLE_OF_CHANNEL, false);
+                let style = Style::read(segment, marker == STYLE_OF_CHANNEL);
                 let style = style.ok_or_else(|| damaged("the header of a tile is damaged"))?;
                 if style.bytes_a_sample() > self.block_bytes {
                     return Err(Trouble::Unsupported(

@@ -18,8 +18,9 @@ use std::io::Read;
 const BAND_ROWS: u32 = 128;
 /// Memory that the bands at work may take together, unless one takes more.
 const MOST_BYTES: u64 = 160 << 20;
-/// Longest header.
+/// Longest header, and how much of it each band may carry.
 const MAX_HEADER_BYTES: usize = 16 << 20;
+const MAX_KEPT_BYTES: usize = 256 << 10;
 
 /// Why there are no more rows.
 #[derive(Debug)]
@@ -80,10 +81,10 @@ impl Shape {
         Self { size, units, unit_high: unit[1], channels: sampling.len() as u64, band }
     }
 
-    /// Memory that a band takes while it is decoded: its coefficients, planes, texels, and texels that wait.
+    /// Memory that a band takes while it is decoded: its header, coefficients, planes, texels, and texels that wait.
     fn band_bytes(&self) -> u64 {
         let rows = u64::from((self.band + 2) * self.unit_high);
-        (u64::from(self.size[0]) + 64) * rows * self.channels * 4
+        (u64::from(self.size[0]) + 64) * rows * self.channels * 4 + MAX_KEPT_BYTES as u64
     }
 
     /// Bands decoded at once.
@@ -150,11 +151,11 @@ impl<R: Read + Sync> JpegRows<R> {
             let mut keep = |segment: &[u8]| {
                 header.extend([0xff, byte[0], two[0], two[1]]);
                 header.extend(segment);
-                header.len() - segment.len()
+                (header.len() <= MAX_KEPT_BYTES).then_some(header.len() - segment.len()).ok_or(NoRows::Other)
             };
             match byte[0] {
                 0xc0 | 0xc1 => {
-                    let at = keep(&segment);
+                    let at = keep(&segment)?;
                     height_at = at + 1;
                     let size = [3, 1].map(|at| {
                         segment.get(at..at + 2).map_or(0, |b| u32::from(u16::from_be_bytes([b[0], b[1]])))
@@ -170,7 +171,7 @@ impl<R: Read + Sync> JpegRows<R> {
                     interval = segment.get(..2).map_or(0, |b| u32::from(u16::from_be_bytes([b[0], b[1]])))
                 }
                 // Quantisation, and what says how colours are meant.
-                0xdb | 0xe0 | 0xee => drop(keep(&segment)),
+                0xdb | 0xe0 | 0xee => drop(keep(&segment)?),
                 0xda => {
                     let channels = scan(&segment, &frame).ok_or(NoRows::Other)?;
                     header.extend(tables());
@@ -355,7 +356,7 @@ mod tests {
 
     #[test]
     fn bands_joined_are_the_picture() {
-        for jpeg in ["baseline", "grey", "cmyk"].map(fixture) {
+        for jpeg in ["baseline", "grey", "cmyk", "restart"].map(fixture) {
             let jpeg = &jpeg[..];
             let whole = Decoder::new(jpeg).decode().unwrap();
             for (band, step) in [(1, 7), (2, 1000), (3, 216), (100, 1 << 20)] {
@@ -368,15 +369,30 @@ mod tests {
 
     #[test]
     fn streams_cut_or_changed_end_in_an_answer() {
-        let baseline = fixture("baseline");
-        let shape = shape(&baseline, 1).unwrap();
-        let mut wrong = 0;
-        for at in 0..baseline.len() {
-            let mut changed = baseline.to_vec();
-            changed[at] ^= 0x5a;
-            wrong += u32::from(read(&changed, shape, 999).is_err());
-            wrong += u32::from(read(&baseline[..at], shape, 999).is_err());
+        for sound in ["baseline", "restart"].map(fixture) {
+            let shape = shape(&sound, 1).unwrap();
+            let mut wrong = 0;
+            for at in 0..sound.len() {
+                let mut changed = sound.clone();
+                changed[at] ^= 0x5a;
+                wrong += u32::from(read(&changed, shape, 999).is_err());
+                wrong += u32::from(read(&sound[..at], shape, 999).is_err());
+            }
+            assert!(wrong > sound.len() as u32, "{wrong}");
         }
-        assert!(wrong > baseline.len() as u32, "{wrong}");
+    }
+
+    #[test]
+    fn a_mark_of_restart_must_stand_where_the_header_says() {
+        let sound = fixture("restart");
+        let shape = shape(&sound, 1).unwrap();
+        let marks: Vec<usize> = (0..sound.len() - 1)
+            .filter(|at| sound[*at] == 0xff && matches!(sound[at + 1], 0xd0..=0xd7))
+            .collect();
+        assert!(marks.len() > 5, "{marks:?}");
+        for at in marks {
+            let missing = [&sound[..at], &sound[at + 2..]].concat();
+            assert!(matches!(read(&missing, shape, 999), Err(NoRows::Damaged)), "{at}");
+        }
     }
 }

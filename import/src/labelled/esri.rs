@@ -130,7 +130,7 @@ fn sample_type(
     let is_signed = nodata.and_then(|text| number(text.as_bytes())).is_some_and(|value| value < 0.0)
         || has_extension("dem");
     let is_said = words.contains_key("nbits");
-    let class = class.unwrap_or(match bits {
+    let class = class.unwrap_or_else(|| match bits {
         // Where even the size had to be found out, four or eight bytes are reals.
         32 | 64 if !is_said => 'F',
         64 => 'F',

@@ -180,29 +180,59 @@ impl Placed {
     }
 }
 
-/// Files on both sides of 180 degrees are close together if the western hemisphere is counted on past 180.
+/// Files on both sides of 180 degrees, or of 0 where longitudes run to 360, are close together if they are counted on past it: so that they span the least of the circle.
 fn join_across_antimeridian(sources: &mut [Source], systems: &[Tied], of: &[usize]) {
     for (number, tied) in systems.iter().enumerate() {
         let Some(turn) = tied.turn() else { continue };
-        let ends = |source: &Source, past: bool| {
-            let add = if past && source.map[0] < 0.0 { turn } else { 0.0 };
-            let [a, b] =
-                [0.0, f64::from(source.samples[0] - 1)].map(|col| source.map[0] + col * source.map[1] + add);
-            [a.min(b), a.max(b)]
+        let mine: Vec<usize> = (0..sources.len()).filter(|at| of[*at] == number).collect();
+        let ends = |at: &usize| {
+            let Source { map, samples, .. } = &sources[*at];
+            let last = map[0] + f64::from(samples[0] - 1) * map[1];
+            [map[0].min(last), map[0].max(last)]
         };
-        let span = |past: bool| {
-            let mine = sources.iter().zip(of).filter(|(_, system)| **system == number);
-            let [low, high] = mine.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (source, _)| {
-                let [a, b] = ends(source, past);
-                [low.min(a), high.max(b)]
-            });
-            high - low
-        };
-        if span(false) > turn / 2.0 && span(true) < span(false) {
-            let mine = sources.iter_mut().zip(of).filter(|(_, system)| **system == number);
-            mine.filter(|(source, _)| source.map[0] < 0.0).for_each(|(source, _)| source.map[0] += turn);
+        let turns = shortest(&mine.iter().map(ends).collect::<Vec<_>>(), turn);
+        for (at, turns) in mine.iter().zip(turns.unwrap_or_default()) {
+            sources[*at].map[0] += turns * turn;
         }
     }
+}
+
+/// By how many turns each of the spans must be moved so that all together are the shortest, from half a turn west of 0 on; nothing where they are short as they lie.
+fn shortest(spans: &[[f64; 2]], turn: f64) -> Option<Vec<f64>> {
+    let [low, high] = spans
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], span| [low.min(span[0]), high.max(span[1])]);
+    // Also where there is none, or one that is no number.
+    if !((high - low).is_finite() && high - low > turn / 2.0) {
+        return None;
+    }
+    // Each brought into the first turn, by where it begins.
+    let home = |span: &[f64; 2]| -(span[0] / turn).floor();
+    let mut order: Vec<usize> = (0..spans.len()).collect();
+    let at = |number: usize| spans[number].map(|end| end + turn * home(&spans[number]));
+    order.sort_by(|a, b| at(*a)[0].total_cmp(&at(*b)[0]));
+    // Where the span begins with one of them, those before it come a turn later.
+    let mut after = vec![f64::NEG_INFINITY; order.len() + 1];
+    for (place, number) in order.iter().enumerate().rev() {
+        after[place] = at(*number)[1].max(after[place + 1]);
+    }
+    let (mut best, mut before) = ((high - low) - turn * 1e-9, f64::NEG_INFINITY);
+    let mut begin = None;
+    for (place, number) in order.iter().enumerate() {
+        let [west, east] = at(*number);
+        let length = after[place].max(before + turn) - west;
+        if length < best {
+            (best, begin) = (length, Some((place, west)));
+        }
+        before = before.max(east);
+    }
+    let (begin, west) = begin?;
+    let all = if west >= turn / 2.0 { -1.0 } else { 0.0 };
+    let mut turns = vec![0.0; spans.len()];
+    for (place, number) in order.iter().enumerate() {
+        turns[*number] = home(&spans[*number]) + all + if place < begin { 1.0 } else { 0.0 };
+    }
+    Some(turns)
 }
 
 /// So many files, in words.
@@ -221,5 +251,62 @@ pub(super) fn names(paths: &[PathBuf]) -> String {
         [one] => name(one),
         [one, other] => format!("{} and {}", name(one), name(other)),
         [first, .., last] => format!("{} to {}", name(first), name(last)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shortest;
+
+    #[test]
+    fn files_span_the_least_of_the_circle() {
+        let ends = |spans: &[[f64; 2]]| {
+            let turns = shortest(spans, 360.0)?;
+            let moved = spans.iter().zip(turns).map(|(span, turns)| span.map(|end| end + 360.0 * turns));
+            Some(moved.collect::<Vec<_>>())
+        };
+        assert_eq!(ends(&[[0.0, 1.0], [359.0, 360.0]]).unwrap(), [[0.0, 1.0], [-1.0, 0.0]]);
+        assert_eq!(ends(&[[179.0, 180.0], [-180.0, -179.0]]).unwrap(), [[179.0, 180.0], [180.0, 181.0]]);
+        assert_eq!(ends(&[[-170.0, -160.0], [100.0, 110.0]]).unwrap(), [[190.0, 200.0], [100.0, 110.0]]);
+        assert_eq!(ends(&[[350.0, 355.0], [-9.0, -5.0]]).unwrap(), [[-10.0, -5.0], [-9.0, -5.0]]);
+        assert_eq!(ends(&[[-180.0, 180.0], [190.0, 200.0]]).unwrap(), [[-180.0, 180.0], [-170.0, -160.0]]);
+        for lie in [&[[0.0, 10.0], [170.0, 175.0]][..], &[[-180.0, 0.0], [0.0, 180.0]], &[], &[[f64::NAN; 2]]]
+        {
+            assert_eq!(ends(lie), None, "{lie:?}");
+        }
+    }
+
+    #[test]
+    fn no_other_count_of_turns_is_shorter() {
+        // All ways of moving up to five files by a turn either way, against the one that is found.
+        let mut state = 7u64;
+        let mut random = |most: f64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f64 / (1u64 << 24) as f64 * most
+        };
+        for _ in 0..300 {
+            let count = 2 + random(4.0) as usize;
+            let spans: Vec<[f64; 2]> = (0..count)
+                .map(|_| {
+                    let west = random(720.0) - 360.0;
+                    [west, west + random(40.0)]
+                })
+                .collect();
+            let length = |turns: &[f64]| {
+                let moved =
+                    || spans.iter().zip(turns).map(|(span, turns)| span.map(|end| end + 360.0 * turns));
+                moved().map(|span| span[1]).fold(f64::MIN, f64::max)
+                    - moved().map(|span| span[0]).fold(f64::MAX, f64::min)
+            };
+            let found = length(&shortest(&spans, 360.0).unwrap_or(vec![0.0; count]));
+            let ways = (0..5usize.pow(count as u32)).map(|way| {
+                let turns: Vec<f64> =
+                    (0..count).map(|at| (way / 5usize.pow(at as u32) % 5) as f64 - 2.0).collect();
+                length(&turns)
+            });
+            let least = ways.fold(f64::MAX, f64::min);
+            // Where files lie within half the circle nothing is moved.
+            assert!(found <= least + 1e-6 || found <= 180.0, "{spans:?}: {found}, not {least}");
+        }
     }
 }

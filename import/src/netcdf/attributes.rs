@@ -9,6 +9,11 @@ pub(super) fn text(attributes: &[NcAttribute], name: &str) -> Option<String> {
     (!text.is_empty()).then(|| text.to_owned())
 }
 
+/// Whether there is an attribute of that name.
+pub(super) fn has(attributes: &[NcAttribute], name: &str) -> bool {
+    find(attributes, name).is_some()
+}
+
 /// Number of an attribute.
 pub(super) fn number(attributes: &[NcAttribute], name: &str) -> Option<f64> {
     find(attributes, name)?.as_f64().filter(|number| number.is_finite())
@@ -48,31 +53,4 @@ pub(super) fn exact(attributes: &[NcAttribute], name: &str) -> Vec<String> {
 /// Whether a whole number that the format knows with a sign only is meant without.
 pub(super) fn is_unsigned(variable: &NcVariable) -> bool {
     text(variable.attributes(), "_Unsigned").is_some_and(|text| text.eq_ignore_ascii_case("true"))
-}
-
-/// What counts coordinates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Unit {
-    /// Degrees of longitude or latitude.
-    Degrees,
-    /// Metres a unit.
-    Metres(f64),
-}
-
-/// The unit of coordinates by its name; GMT has it in brackets behind what is counted: "longitude [degrees_east]".
-pub(super) fn unit(name: &str) -> Option<Unit> {
-    let inside =
-        name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside.trim());
-    let name = inside.unwrap_or(name).to_ascii_lowercase();
-    Some(match name.as_str() {
-        "degree" | "degrees" | "deg" => Unit::Degrees,
-        _ if ["degree_", "degrees_", "degreen", "degreee", "degreesn", "degreese"]
-            .iter()
-            .any(|start| name.starts_with(start)) =>
-        {
-            Unit::Degrees
-        }
-        "km" | "kilometer" | "kilometre" | "kilometers" | "kilometres" => Unit::Metres(1000.0),
-        _ => Unit::Metres(crate::value::unit_m(&name)?),
-    })
 }

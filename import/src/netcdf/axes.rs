@@ -3,8 +3,9 @@
 //! A dimension's coordinates are the variable of its name. They may grow or fall and begin anywhere. Each is checked to be evenly spaced, because other grids
 //! would have to be resampled. Cost: one reading of each, a block at a time.
 
-use super::attributes::{Unit, number, text, unit};
+use super::attributes::{number, text};
 use super::file::guarded;
+use super::units::{self, Unit, unit};
 use netcdf_reader::{NcFile, NcSliceInfo, NcSliceInfoElem, NcVariable};
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
@@ -25,7 +26,10 @@ pub(super) enum Way {
 pub(super) struct Axis {
     pub(super) first: f64,
     pub(super) step: f64,
+    /// Degrees are brought to those of east and north; `None` where nothing is said, or nothing that is known.
     pub(super) unit: Option<Unit>,
+    /// The name of a unit that is not known.
+    pub(super) strange_unit: Option<String>,
     /// Name of the variable.
     pub(super) name: String,
 }
@@ -56,19 +60,7 @@ pub(super) fn way(name: &str, coordinates: Option<&NcVariable>) -> Option<Way> {
             | "northings"
             | "ny"
             | "nrows" => Some(Way::North),
-            _ if ["degree_e", "degrees_e", "degreee", "degreese"]
-                .iter()
-                .any(|start| word.starts_with(start)) =>
-            {
-                Some(Way::East)
-            }
-            _ if ["degree_n", "degrees_n", "degreen", "degreesn"]
-                .iter()
-                .any(|start| word.starts_with(start)) =>
-            {
-                Some(Way::North)
-            }
-            _ => None,
+            _ => units::way(&word),
         }
     })
 }
@@ -121,8 +113,62 @@ pub(super) fn read(
             }
         }
     }
-    let unit = text(attributes, "units").and_then(|name| unit(&name));
-    Ok(Axis { first, step, unit, name: variable.name().to_owned() })
+    let said = text(attributes, "units");
+    let found = said.as_deref().and_then(unit);
+    check_unit(path, variable, said.as_deref(), found)?;
+    let (factor, known) = match found {
+        Some(Unit::Degrees(degrees)) => (degrees, Some(Unit::Degrees(1.0))),
+        other => (1.0, other),
+    };
+    Ok(Axis {
+        first: first * factor,
+        step: step * factor,
+        unit: known,
+        strange_unit: said.filter(|_| known.is_none()),
+        name: variable.name().to_owned(),
+    })
+}
+
+/// Refuses coordinates that are angles by their name and not by their unit, or the other way round.
+fn check_unit(
+    path: &Path,
+    variable: &NcVariable,
+    said: Option<&str>,
+    found: Option<Unit>,
+) -> Result<(), LayoutError> {
+    let Some(said) = said else { return Ok(()) };
+    let standard = text(variable.attributes(), "standard_name").unwrap_or_default();
+    let is_named = matches!(
+        variable.name().to_ascii_lowercase().as_str(),
+        "lon" | "long" | "longitude" | "lat" | "latitude"
+    );
+    let angles = ["longitude", "latitude", "grid_longitude", "grid_latitude"];
+    let is_angle = angles.contains(&standard.as_str());
+    let [name, shown] = [variable.name(), said].map(|text| harmless(text, 40));
+    match found {
+        None if is_angle || (is_named && standard.is_empty()) => Err(LayoutError::unsupported(
+            path,
+            format!(
+                "variable \"{name}\" holds longitudes or latitudes in \"{shown}\", which is no unit of angles that is known here; write the unit they are in \
+                 into the file, for example: ncatted -a units,{name},o,c,degrees INPUT output.nc"
+            ),
+        )),
+        Some(Unit::Metres(_)) if is_angle => Err(LayoutError::unsupported(
+            path,
+            format!(
+                "variable \"{name}\" holds longitudes or latitudes by its standard name, and its unit \"{shown}\" is a length; mend the one that is wrong, for \
+                 example: ncatted -a units,{name},o,c,degrees INPUT output.nc"
+            ),
+        )),
+        Some(Unit::Degrees(_)) if standard.starts_with("projection_") => Err(LayoutError::unsupported(
+            path,
+            format!(
+                "variable \"{name}\" holds the coordinates of a projection as angles, in \"{shown}\", as those of satellites do; make a grid of longitudes and \
+                 latitudes of it: gdalwarp -t_srs EPSG:4326 INPUT output.tif"
+            ),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// A number in a few characters.

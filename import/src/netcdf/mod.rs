@@ -10,12 +10,14 @@ mod choose;
 mod file;
 mod stream;
 mod system;
+mod units;
+mod valid;
 
 use crate::crs::{by_text, exact_metres};
 use crate::options::{Direction, OpenOptions};
 use crate::reader::{Declared, HorizontalSize, Reader, Said, VerticalUnit};
 use crate::value::STANDARD_GRAVITY;
-use attributes::{Unit, exact, is_unsigned, number, numbers, text};
+use attributes::{exact, is_unsigned, number, numbers, text};
 use axes::{Axis, Way};
 use choose::{Chosen, Grid};
 use file::Purpose;
@@ -26,6 +28,7 @@ use terrasoar_layout::dem::{SampleSink, SampleType, Warning};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::harmless;
+use units::Unit;
 
 /// Whether a file begins so: classic of any version, or HDF5.
 pub(crate) fn is_netcdf(head: &[u8]) -> bool {
@@ -181,28 +184,76 @@ impl About<'_> {
             }
         }
         let by = format!("variables \"{}\" and \"{}\"", harmless(&x.name, 40), harmless(&y.name, 40));
-        // Coordinates are counted in the unit of their system, whatever a writer found handier to list.
-        let factor = match (&declared.crs.text, x.unit) {
-            (Some(text), Some(Unit::Metres(metres))) => {
-                match by_text(&text.value).and_then(|system| system.unit).map(|unit| unit.size) {
-                    Some(HorizontalSize::Metres(size)) => exact_metres(metres / size),
-                    _ => 1.0,
-                }
-            }
-            (Some(_), _) => 1.0,
-            // Angles of a system that is not read are no longitudes and latitudes.
-            (None, Some(Unit::Degrees)) if is_unread => 1.0,
-            (None, unit) => {
-                let size = unit.map(|unit| match unit {
-                    Unit::Degrees => HorizontalSize::Radians(1f64.to_radians()),
-                    Unit::Metres(metres) => HorizontalSize::Metres(metres),
-                });
-                declared.crs.unit = size.map(|size| Said::new(size, format!("units of {by}")));
-                1.0
-            }
-        };
-        let map = [x.first, x.step, 0.0, y.first, 0.0, y.step].map(|value| value * factor);
+        let factors = self.units(declared, [x, y], is_unread, &by);
+        let map = [x.first, x.step, 0.0, y.first, 0.0, y.step];
+        let map = std::array::from_fn(|i| map[i] * factors[i / 3]);
         declared.place = Some(Said::new(map, by));
+    }
+
+    /// What brings the coordinates of two axes into one unit: that of the system, or else that of the first axis, which is stated. Angles of a system that the file names and that
+    /// is not read are no longitudes and latitudes.
+    fn units(&self, declared: &mut Declared, [x, y]: [&Axis; 2], is_unread: bool, by: &str) -> [f64; 2] {
+        for axis in [x, y] {
+            if let Some(unit) = &axis.strange_unit {
+                let words = format!(
+                    "the unit \"{}\" of variable \"{}\" is not known here; its numbers were taken as they are",
+                    harmless(unit, 40),
+                    harmless(&axis.name, 40)
+                );
+                declared.warnings.push(Warning::new(words).mended_by(Remedy::Spacing, "METRES"));
+            }
+        }
+        let counts = [x.unit, y.unit].map(|unit| unit.map(|unit| matches!(unit, Unit::Degrees(_))));
+        if let [Some(a), Some(b)] = counts
+            && a != b
+        {
+            let words = format!(
+                "one of {by} is in degrees and the other one is not; its numbers were taken as they are"
+            );
+            declared.warnings.push(Warning::new(words).mended_by(Remedy::ReferenceSystem, "EPSG:n"));
+            return [1.0; 2];
+        }
+        let Some(text) = &declared.crs.text else {
+            let Some(unit) = x.unit.or(y.unit) else { return [1.0; 2] };
+            if is_unread && counts[0].or(counts[1]) == Some(true) {
+                return [1.0; 2];
+            }
+            let size = match unit {
+                Unit::Degrees(_) => HorizontalSize::Radians(1f64.to_radians()),
+                Unit::Metres(metres) => HorizontalSize::Metres(metres),
+            };
+            declared.crs.unit = Some(Said::new(size, format!("units of {by}")));
+            return match (x.unit, y.unit) {
+                (Some(Unit::Metres(x)), Some(Unit::Metres(y))) => [1.0, y / x],
+                _ => [1.0; 2],
+            };
+        };
+        let of_system = by_text(&text.value).and_then(|system| system.unit).map(|unit| unit.size);
+        let is_angle = counts[0].or(counts[1]);
+        match (of_system, is_angle) {
+            (Some(HorizontalSize::Radians(size)), Some(true)) => {
+                let degree = 1f64.to_radians();
+                [if size == degree { 1.0 } else { degree / size }; 2]
+            }
+            (Some(HorizontalSize::Radians(_)), Some(false))
+            | (Some(HorizontalSize::Metres(_)), Some(true)) => {
+                let [here, there] =
+                    if is_angle == Some(true) { ["degrees", "lengths"] } else { ["lengths", "degrees"] };
+                let words = format!(
+                    "{by} count in {here}, and the reference system that the file names ({}) in {there}; their numbers were taken as they are",
+                    text.by
+                );
+                let system = if is_angle == Some(true) { "EPSG:4326" } else { "EPSG:n" };
+                declared.warnings.push(Warning::new(words).mended_by(Remedy::ReferenceSystem, system));
+                [1.0; 2]
+            }
+            // Coordinates are counted in the unit of their system, whatever a writer found handier to list.
+            (Some(HorizontalSize::Metres(size)), _) => [x.unit, y.unit].map(|unit| match unit {
+                Some(Unit::Metres(metres)) => exact_metres(metres / size),
+                _ => 1.0,
+            }),
+            _ => [1.0; 2],
+        }
     }
 
     /// Size and place of a grid of GMT before version 4: a list of samples from the north-west, and its shape in variables beside it.
@@ -236,15 +287,19 @@ impl About<'_> {
             let gaps = sides.map(|side| if is_area { side } else { side - 1.0 });
             let [across, down] = [(east - west) / gaps[0], (north - south) / gaps[1]];
             let half = if is_area { 0.5 } else { 0.0 };
+            let units = ["x_range", "y_range"].map(|name| {
+                self.beside(name)
+                    .and_then(|(_, v)| text(v.attributes(), "units"))
+                    .and_then(|name| units::unit(&name))
+            });
+            let [x, y] =
+                units.map(|unit| if let Some(Unit::Degrees(degrees)) = unit { degrees } else { 1.0 });
             let map = [west + half * across, across, 0.0, north - half * down, 0.0, -down];
             if map.iter().all(|value| value.is_finite()) && across > 0.0 && down > 0.0 {
+                let map = std::array::from_fn(|i| map[i] * [x, y][i / 3]);
                 declared.place = Some(Said::new(map, "variables \"x_range\" and \"y_range\""));
             }
-            let unit = self
-                .beside("x_range")
-                .and_then(|(_, v)| text(v.attributes(), "units"))
-                .and_then(|name| attributes::unit(&name));
-            if unit == Some(Unit::Degrees) {
+            if matches!(units[0], Some(Unit::Degrees(_))) {
                 let size = HorizontalSize::Radians(1f64.to_radians());
                 declared.crs.unit = Some(Said::new(size, "units of variable \"x_range\""));
             }
@@ -258,7 +313,7 @@ impl About<'_> {
         let name = harmless(&self.grid.place, 40);
         let by = |attribute: &str| format!("attribute {attribute} of variable \"{name}\"");
         let value = &mut declared.value;
-        let scale = number(attributes, "scale_factor").filter(|scale| *scale != 0.0);
+        let scale = number(attributes, "scale_factor");
         value.scale = scale.map(|scale| Said::new(scale, by("scale_factor")));
         value.offset = number(attributes, "add_offset").map(|offset| Said::new(offset, by("add_offset")));
         for attribute in ["_FillValue", "missing_value"] {
@@ -269,6 +324,18 @@ impl About<'_> {
             && let Some(fill) = default_fill(self.grid.variable.dtype())
         {
             value.nodata.push(Said::new(fill.to_owned(), "netCDF's own fill value"));
+        }
+        let valid = valid::of(self.grid.variable);
+        declared.warnings.extend(valid.problems.into_iter().map(Warning::new));
+        if let Some([low, high]) = valid.range {
+            let shown = match [low, high].map(f64::is_finite) {
+                [true, false] => format!("below {low}"),
+                [false, true] => format!("above {high}"),
+                _ => format!("below {low} or above {high}"),
+            };
+            let by = by(valid.by);
+            declared.notes.push(format!("numbers {shown}, as they are stored, mean \"no data\", by {by}"));
+            value.valid = Some(Said::new([low, high], by));
         }
         let standard = text(attributes, "standard_name").unwrap_or_default();
         let units = text(attributes, "units").unwrap_or_default();
@@ -288,8 +355,18 @@ impl About<'_> {
         } else if standard.starts_with("sea_floor_depth") || standard == "depth" {
             value.direction = Some(Said::new(Direction::Down, by("standard_name")));
         }
-        if numbers(attributes, "scale_factor").len() > 1 {
-            value.scale = None;
+        for attribute in ["scale_factor", "add_offset"] {
+            let is_one = number(attributes, attribute).is_some() && numbers(attributes, attribute).len() == 1;
+            if is_one || !attributes::has(attributes, attribute) {
+                continue;
+            }
+            match attribute {
+                "scale_factor" => value.scale = None,
+                _ => value.offset = None,
+            }
+            let words =
+                format!("{} is not one number and was left out, so heights may be wrong", by(attribute));
+            declared.warnings.push(Warning::new(words).mended_by(Remedy::HeightFactor, "FACTOR"));
         }
     }
 

@@ -56,14 +56,18 @@ impl Completed {
                 voids.push(value as f32);
                 continue;
             }
-            match value.filter(|value| value.fract() == 0.0 && (0.0..=255.0).contains(value)) {
-                Some(value) if picture.has_bytes() && !is_stretched => void = Some(value as u8),
-                _ => info.notes.push(format!(
-                    "\"no data\" {} from {} is no value of this picture and was passed over",
-                    terrasoar_layout::words::harmless(said.value.trim(), 40),
-                    said.by
-                )),
+            if let Some(byte) = value.filter(|_| !is_stretched).and_then(|value| picture.byte_of(value)) {
+                void = Some(byte);
+                continue;
             }
+            let why = match value {
+                Some(_) if !picture.has_bytes() => {
+                    "counts in a picture of more than 8 bits only where black and white are stated, and was passed over"
+                }
+                _ => "is no value of this picture's colours and was passed over",
+            };
+            let value = terrasoar_layout::words::harmless(said.value.trim(), 40);
+            info.notes.push(format!("\"no data\" {value} from {} {why}", said.by));
         }
         let masks = masking.as_ref().map_or(0, Masking::memory_bytes);
         info.memory_bytes = info.memory_bytes.saturating_add(masks);
@@ -119,6 +123,11 @@ impl Completed {
         Ok(masking.keep(self.picture.mask())?.map(|bits| (masking, bits)))
     }
 
+    /// As [`Picture::has_bytes`].
+    pub(super) fn has_bytes(&self) -> bool {
+        self.picture.has_bytes()
+    }
+
     /// Bits in use of its channels, as [`Picture::bits`].
     pub(super) fn bits(&self) -> Result<u32, LayoutError> {
         self.picture.bits()
@@ -147,7 +156,10 @@ impl ImageSource for Completed {
     fn rows(&self) -> Result<Box<dyn RowReader + '_>, LayoutError> {
         let wide = self.info.texels[0] as usize;
         if self.is_stretched {
-            let shades = self.shades.unwrap_or(Shades::new([[0.0, 255.0]; 3], false));
+            let unknown = || {
+                LayoutError::Usage(format!("{}: black and white are not known yet", self.path().display()))
+            };
+            let shades = self.shades.ok_or_else(unknown)?;
             return Ok(Box::new(Stretched { rows: self.numbers()?, shades, wide, row: Vec::new() }));
         }
         let mask = self.mask()?;

@@ -24,7 +24,8 @@ pub(super) struct Jp2Image {
     jp2: Jp2,
     map: Option<[f64; 6]>,
     crs: CrsSaid,
-    /// Channels that are shown: one, three, or four of CMYK.
+    /// Channels, as they stand in the file: alpha, and those that are shown: one, three, or four of CMYK.
+    alpha: Option<usize>,
     shown: Vec<usize>,
     is_cmyk: bool,
     has_bytes: bool,
@@ -38,20 +39,22 @@ impl Jp2Image {
         let file = input::open(path, "cannot open the JPEG 2000 file")?;
         let length = file.metadata().map_err(|e| refused(path, "header", Trouble::Io(e)))?.len();
         let jp2 = Jp2::read(Source::File(&file), length).map_err(|t| refused(path, "header", t))?;
-        let (map, crs, note) = said(path, &jp2);
-        let stream = &jp2.stream;
-        let (channels, bits) = (jp2.palette.unwrap_or(stream.channels()), stream.bits());
-        let colours = channels - usize::from(jp2.has_alpha && channels > 1);
+        let (map, crs, note) = said(path, &jp2)?;
+        let (stream, header) = (&jp2.stream, &jp2.header);
+        let (channels, bits) = (jp2.channels(), stream.bits());
+        // A picture of nothing but alpha is one of grey.
+        let alpha = header.alpha.filter(|_| channels > 1);
+        let colours = channels - usize::from(alpha.is_some());
         let mut notes: Vec<String> = note.into_iter().collect();
-        let mut is_cmyk = jp2.colours == Colours::Cmyk && colours >= 4;
+        let mut is_cmyk = header.colours == Colours::Cmyk && colours >= 4;
         let mut shown = chosen_bands(path, channels as u64, &options.bands)?;
         if shown.is_empty() {
             let count = match colours {
                 _ if is_cmyk => 4,
-                3.. if jp2.colours != Colours::Grey => 3,
+                3.. if header.colours != Colours::Grey => 3,
                 _ => 1,
             };
-            shown = (0..count).collect();
+            shown = header.in_order(channels).filter(|channel| Some(*channel) != alpha).take(count).collect();
             if colours > count {
                 let left = colours - count;
                 notes.push(format!(
@@ -64,7 +67,7 @@ impl Jp2Image {
         if is_cmyk {
             notes.push(PRESS_NOTE.into());
         }
-        let has_bytes = jp2.palette.is_some() || (bits <= 8 && !stream.is_signed());
+        let has_bytes = header.palette.is_some() || (bits <= 8 && !stream.is_signed());
         if options.stretch.is_none() && !has_bytes {
             if stream.is_signed() || bits > 16 {
                 return Err(LayoutError::unsupported(
@@ -80,7 +83,9 @@ impl Jp2Image {
         }
         let [wide, _] = stream.texels();
         let high = stream.largest_tile() / u64::from(stream.tile_size(0)[0]).max(1);
-        let texel_bytes = if options.stretch.is_some() { size_of::<Numbers>() as u64 } else { 4 };
+        // Bits in use are looked for among numbers.
+        let is_numbers = options.stretch.is_some() || !has_bytes;
+        let texel_bytes = if is_numbers { size_of::<Numbers>() as u64 } else { 4 };
         let threads = rayon::current_num_threads().min(stream.tiles()[0] as usize) as u64;
         let info = ImageInfo {
             texels: stream.texels(),
@@ -92,7 +97,7 @@ impl Jp2Image {
             notes,
             memory_bytes: (u64::from(wide) * texel_bytes)
                 .saturating_mul(high)
-                .saturating_add(stream.tile_bytes().saturating_mul(threads)),
+                .saturating_add(jp2.tile_bytes().saturating_mul(threads)),
         };
         Ok(Self {
             path: path.to_owned(),
@@ -100,6 +105,7 @@ impl Jp2Image {
             jp2,
             map,
             crs,
+            alpha,
             shown,
             is_cmyk,
             has_bytes,
@@ -131,18 +137,16 @@ impl Jp2Image {
         for channel in &self.shown {
             shown.push(channels.get(*channel).ok_or_else(missing)?);
         }
-        let alpha = if self.jp2.has_alpha && channels.len() > 1 { channels.last() } else { None };
+        let alpha = self.alpha.map(|channel| channels.get(channel).ok_or_else(missing)).transpose()?;
         let size = stream.tile_size(tile);
         let count = size[0] as usize * size[1] as usize;
         Ok((0..count).map(|at| T::of(self.numbers_at(&shown, alpha, at), bits)).collect())
     }
 
     fn numbers_at(&self, shown: &[&Channel], alpha: Option<&Channel>, at: usize) -> Numbers {
-        // Less than a byte is shown as one.
         let number = |i: usize| {
             let (samples, bits) = shown[i.min(shown.len() - 1)];
-            let whole = if *bits < 8 { 255.0 / limits(*bits, false)[1] } else { 1.0 };
-            if self.has_bytes { (samples[at] * whole).round() } else { samples[at] }
+            if self.has_bytes { as_byte(samples[at], *bits) } else { samples[at] }
         };
         let full = |(_, bits): &Channel| limits(*bits, false)[1];
         let alpha = alpha.map_or(255.0, |alpha| alpha.0[at] / full(alpha) * 255.0);
@@ -155,6 +159,12 @@ impl Jp2Image {
         }
         [number(0), number(1), number(2), alpha]
     }
+}
+
+/// A number of so many bits, of less than 8 as a share of 255.
+fn as_byte(number: f32, bits: u8) -> f32 {
+    let whole = if bits < 8 { 255.0 / limits(bits, false)[1] } else { 1.0 };
+    (number * whole).round()
 }
 
 /// What numbers become.
@@ -183,6 +193,14 @@ impl Picture for Jp2Image {
 
     fn has_bytes(&self) -> bool {
         self.has_bytes
+    }
+
+    fn byte_of(&self, number: f64) -> Option<u8> {
+        let bits = self.jp2.stream.bits();
+        let is_one = number.fract() == 0.0 && (0.0..=f64::from(limits(bits, false)[1])).contains(&number);
+        // Of a palette it is a place, and of inks no light.
+        let is_light = self.jp2.header.palette.is_none() && !self.is_cmyk;
+        (is_one && self.has_bytes && is_light).then(|| as_byte(number as f32, bits) as u8)
     }
 
     fn bits(&self) -> Result<u32, LayoutError> {
@@ -222,9 +240,12 @@ impl Picture for Jp2Image {
     }
 
     fn limits(&self) -> Option<[i32; 2]> {
-        let bits = if self.has_bytes { 8 } else { self.jp2.stream.bits() };
-        (bits <= 16)
-            .then(|| limits(bits, self.jp2.stream.is_signed() && !self.has_bytes).map(|number| number as i32))
+        let stream = &self.jp2.stream;
+        let bits = if self.has_bytes { 8 } else { stream.bits() };
+        let is_signed = stream.has_sign(self.shown[0]);
+        // Signed channels beside others, which no picture has, are counted as any numbers are.
+        let is_alike = self.shown.iter().all(|channel| stream.has_sign(*channel) == is_signed);
+        (bits <= 16 && is_alike).then(|| limits(bits, is_signed).map(|number| number as i32))
     }
 }
 
@@ -291,24 +312,41 @@ impl NumberRows for Rows<'_, Numbers> {
     }
 }
 
-/// The map from texel centres, and the system; what was not understood, in words. The GeoTIFF in it counts before GML.
-fn said(path: &Path, jp2: &Jp2) -> (Option<[f64; 6]>, CrsSaid, Option<String>) {
-    let mut note = None;
-    if let Some(tiff) = jp2.ground.tiff() {
-        match geotiff::place_of(path, tiff) {
-            Ok((Some(map), crs)) => return (Some(map), crs, None),
-            Ok((None, _)) => {}
-            Err(_) => note = Some("its box of a GeoTIFF (GeoJP2) is damaged and was passed over".to_owned()),
+/// What a box says of the ground: the map from texel centres, and the system.
+type Place = (Option<[f64; 6]>, CrsSaid);
+/// The same of all boxes, and what was not understood, in words.
+type Told = (Option<[f64; 6]>, CrsSaid, Option<String>);
+
+/// What the boxes say. The GeoTIFF counts before GML.
+fn said(path: &Path, jp2: &Jp2) -> Result<Told, LayoutError> {
+    let tiff = jp2.ground.tiff().map(|tiff| geotiff::place_of(path, tiff));
+    together(tiff, jp2.ground.gml())
+}
+
+fn together(
+    tiff: Option<Result<Place, LayoutError>>,
+    gml: Option<Result<([f64; 6], CrsSaid), ()>>,
+) -> Result<Told, LayoutError> {
+    let (mut crs, mut note) = (CrsSaid::default(), None);
+    match tiff {
+        Some(Ok((Some(map), crs))) => return Ok((Some(map), crs, None)),
+        // A file beside it may say the place.
+        Some(Ok((None, said))) => crs = said,
+        // What went wrong on this machine is no fault of the file's.
+        Some(Err(error @ LayoutError::Io { .. })) => return Err(error),
+        Some(Err(_)) => {
+            note = Some("its box of a GeoTIFF (GeoJP2) is damaged and was passed over".to_owned());
         }
+        None => {}
     }
-    match jp2.ground.gml() {
+    Ok(match gml {
         Some(Ok((map, crs))) => (Some(map), crs, note),
         Some(Err(())) => {
             let words = "what it says of its place in GML (GMLJP2) is not understood and was passed over";
-            (None, CrsSaid::default(), Some(words.to_owned()))
+            (None, crs, Some(words.to_owned()))
         }
-        None => (None, CrsSaid::default(), note),
-    }
+        None => (None, crs, note),
+    })
 }
 
 fn refused(path: &Path, place: &str, trouble: Trouble) -> LayoutError {
@@ -323,5 +361,38 @@ fn refused(path: &Path, place: &str, trouble: Trouble) -> LayoutError {
                 "{problem}, which is not read; convert it: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE INPUT output.tif"
             ),
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reader::Said;
+
+    fn crs(code: u32) -> CrsSaid {
+        CrsSaid { code: Some(Said::new(code, "a test")), ..CrsSaid::default() }
+    }
+
+    #[test]
+    fn a_box_that_cannot_be_read_here_is_not_called_damaged() {
+        let map = [1.0, 2.0, 0.0, 3.0, 0.0, -2.0];
+        let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        let error = LayoutError::io(Path::new("a.jp2"), "cannot keep a part of the file", full);
+        let refused = together(Some(Err(error)), Some(Ok((map, crs(4326))))).unwrap_err();
+        assert!(matches!(refused, LayoutError::Io { .. }), "{refused}");
+        let broken = || LayoutError::damaged(Path::new("a.jp2"), "header", "it is cut short");
+        let (found, said, note) = together(Some(Err(broken())), Some(Ok((map, crs(4326))))).unwrap();
+        assert!(
+            found == Some(map) && said.code.is_some() && note.is_some_and(|note| note.contains("GeoJP2"))
+        );
+    }
+
+    #[test]
+    fn a_system_without_a_place_counts_where_gml_says_no_other() {
+        let code = |(map, crs, _): Told| (map.is_some(), crs.code.map(|code| code.value));
+        let tiff = || Some(Ok((None, crs(32_632))));
+        assert_eq!(code(together(tiff(), None).unwrap()), (false, Some(32_632)));
+        assert_eq!(code(together(tiff(), Some(Err(()))).unwrap()), (false, Some(32_632)));
+        assert_eq!(code(together(tiff(), Some(Ok(([1.0; 6], crs(4326))))).unwrap()), (true, Some(4326)));
     }
 }

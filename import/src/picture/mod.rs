@@ -9,6 +9,7 @@ mod completed;
 mod counts;
 mod jp2;
 mod jpeg;
+mod jxl;
 mod oriented;
 mod png;
 mod stretched;
@@ -16,10 +17,11 @@ mod texels;
 mod webp;
 
 use crate::jpeg2000::is_jpeg2000;
+use crate::jxl::is_jxl;
 use crate::places::Frame;
 use crate::reader::{Orientation, Picture};
 use crate::shown::{PictureOptions, Stretch};
-use crate::tiles::{TileImage, is_pyramid};
+use crate::tiles::{TileImage, check_asked, is_pyramid};
 use crate::webp::is_webp;
 use crate::{TiffImage, input, is_tiff};
 use completed::Completed;
@@ -31,8 +33,8 @@ use terrasoar_layout::file::header::Header;
 use terrasoar_layout::imagery::ImageSource;
 use terrasoar_layout::remedy::Remedy;
 
-/// Opens the image at `path`: a pyramid of map tiles, PNG, JPEG or GeoTIFF, of 8 bits a channel (16 are cut to 8 with a word), grey, RGB or a palette, with or
-/// without alpha, with or without a mask. Where it lies is said in it, or by a world file, `.prj` or `.aux.xml` beside it. A picture that lies nowhere is turned as its EXIF
+/// Opens the image at `path`: a pyramid of map tiles, PNG, JPEG, JPEG XL, WebP, JPEG 2000 or GeoTIFF, of up to 8 bits a channel (16 are cut to 8 with a word), grey, RGB, CMYK or a palette,
+/// with or without alpha, with or without a mask. Where it lies is said in it, or by a world file, `.prj` or `.aux.xml` beside it. A picture that lies nowhere is turned as its EXIF
 /// tag says.
 ///
 /// # Errors
@@ -62,11 +64,14 @@ pub fn open_images(
     header: Option<&Header>,
     options: &PictureOptions,
 ) -> Result<Vec<Box<dyn ImageSource>>, LayoutError> {
+    check_asked(paths, &options.tiles)?;
     let around = header.and_then(Frame::wgs84).and_then(|frame| frame.bounds_deg());
     let mut opened = paths.iter().map(|path| open(path, options, around)).collect::<Result<Vec<_>, _>>()?;
     if let Some(stretch) = options.stretch {
         stretch_all(&mut opened, stretch, options)?;
     } else if opened.len() > 1 && header.is_some() {
+        let sought = opened.iter().filter(|(completed, _)| !completed.has_bytes());
+        fits(sought, "looking for the bits in use", options)?;
         let bits = opened.iter().map(|(completed, _)| completed.bits()).collect::<Result<Vec<_>, _>>()?;
         // Those of bytes take none of it.
         let most = bits.into_iter().max().unwrap_or(8);
@@ -81,21 +86,33 @@ pub fn open_images(
     }
 }
 
+/// Refuses to do something with all of `pictures`, one after the other, for which there is too little memory.
+fn fits<'p>(
+    pictures: impl Iterator<Item = &'p (Completed, Orientation)>,
+    what: &str,
+    options: &PictureOptions,
+) -> Result<(), LayoutError> {
+    let needed = pictures.map(|(completed, _)| completed.info().memory_bytes).max().unwrap_or(0);
+    let allowed = options.memory_mib.unwrap_or(512).saturating_mul(1 << 20);
+    if needed <= allowed {
+        return Ok(());
+    }
+    let enough_mib = needed.div_ceil(1 << 20) + 16;
+    Err(LayoutError::Usage(format!(
+        "{what} takes {enough_mib} MiB, more than the {} MiB allowed",
+        allowed >> 20
+    ))
+    .mended_by(Remedy::Memory { enough_mib: Some(enough_mib) }))
+}
+
 /// Finds black and white of all pictures together.
 fn stretch_all(
     opened: &mut [(Completed, Orientation)],
     stretch: Stretch,
     options: &PictureOptions,
 ) -> Result<(), LayoutError> {
-    let needed = opened.iter().map(|(completed, _)| completed.info().memory_bytes).max().unwrap_or(0);
-    let allowed = options.memory_mib.unwrap_or(512) << 20;
-    if matches!(stretch, Stretch::Percentiles(..)) && needed > allowed {
-        let enough_mib = needed.div_ceil(1 << 20) + 16;
-        return Err(LayoutError::Usage(format!(
-            "looking for black and white takes {enough_mib} MiB, more than the {} MiB allowed",
-            allowed >> 20
-        ))
-        .mended_by(Remedy::Memory { enough_mib: Some(enough_mib) }));
+    if matches!(stretch, Stretch::Percentiles(..)) {
+        fits(opened.iter(), "looking for black and white", options)?;
     }
     let pictures: Vec<&Completed> = opened.iter().map(|(completed, _)| completed).collect();
     let limits = counts::limits(&pictures, stretch)?;
@@ -116,6 +133,17 @@ fn upright(completed: Completed, orientation: Orientation) -> Box<dyn ImageSourc
         return Box::new(completed);
     }
     Box::new(Oriented::new(completed, orientation))
+}
+
+/// The name of a format that packs pictures as films are packed, by the first bytes of a file.
+fn of_video(head: &[u8]) -> Option<&'static str> {
+    match head.get(4..12)? {
+        b"ftypavif" | b"ftypavis" => Some("AVIF"),
+        b"ftypheic" | b"ftypheix" | b"ftypheim" | b"ftypheis" | b"ftyphevc" | b"ftypmif1" | b"ftypmsf1" => {
+            Some("HEIF")
+        }
+        _ => None,
+    }
 }
 
 /// Opens a picture; `around` is where it is needed: west, south, east and north in degrees.
@@ -142,14 +170,21 @@ fn open(
         Box::new(jpeg::JpegImage::open(path)?)
     } else if is_webp(&head) {
         Box::new(webp::WebpImage::open(path)?)
+    } else if is_jxl(&head) {
+        Box::new(jxl::JxlPicture::open(path, options)?)
     } else if is_jpeg2000(&head) {
         Box::new(jp2::Jp2Image::open(path, options)?)
     } else if is_tiff(&head) {
         Box::new(TiffImage::open(path, options)?)
+    } else if let Some(what) = of_video(&head) {
+        return Err(LayoutError::unsupported(
+            path,
+            format!("this is an {what} picture, which is not read; convert it: magick INPUT output.png"),
+        ));
     } else {
         return Err(LayoutError::not_this_format(
             path,
-            "this is no PNG, JPEG, WebP, JPEG 2000 or TIFF; if GDAL knows it, convert it: gdal_translate -co TILED=YES INPUT output.tif",
+            "this is no PNG, JPEG, JPEG XL, WebP, JPEG 2000 or TIFF; if GDAL knows it, convert it: gdal_translate -co TILED=YES INPUT output.tif",
         ));
     };
     let orientation = picture.orientation();

@@ -26,6 +26,9 @@ pub(super) struct PngImage {
     orientation: Orientation,
     has_bytes: bool,
     is_grey: bool,
+    is_palette: bool,
+    /// The largest number of a channel in the file.
+    most: u16,
     /// Bits in use of 16, once they were looked for or said.
     bits: OnceLock<u32>,
 }
@@ -67,8 +70,10 @@ impl PngImage {
         let orientation = header.exif_metadata.as_deref().map(Orientation::of_exif);
         let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
         let has_bytes = header.bit_depth != BitDepth::Sixteen;
-        let is_grey = color == "grey";
-        Ok(Self { path: path.to_owned(), info, orientation, has_bytes, is_grey, bits: OnceLock::new() })
+        let (is_grey, is_palette) = (color == "grey", color == "palette");
+        let most = ((1u32 << header.bit_depth as u8) - 1) as u16;
+        let bits = OnceLock::new();
+        Ok(Self { path: path.to_owned(), info, orientation, has_bytes, is_grey, is_palette, most, bits })
     }
 }
 
@@ -79,6 +84,12 @@ impl Picture for PngImage {
 
     fn has_bytes(&self) -> bool {
         self.has_bytes
+    }
+
+    fn byte_of(&self, number: f64) -> Option<u8> {
+        let is_one = number.fract() == 0.0 && (0.0..=f64::from(self.most)).contains(&number);
+        // Of one, two or four bits: the share of the largest is whole.
+        (is_one && self.has_bytes && !self.is_palette).then(|| (number as u16 * (255 / self.most)) as u8)
     }
 
     fn bits(&self) -> Result<u32, LayoutError> {

@@ -109,7 +109,7 @@ pub(crate) enum VerticalUnit {
 /// What raw numbers mean: metres of height are `(raw * scale + offset) * unit`, negated where they are depths.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct ValueSaid {
-    /// Units a raw number, of any sign but 0.
+    /// Units a raw number, of any sign; 0, which makes no heights, is passed over with a warning.
     pub(crate) scale: Option<Said<f64>>,
     /// Units at raw number 0.
     pub(crate) offset: Option<Said<f64>>,
@@ -119,4 +119,6 @@ pub(crate) struct ValueSaid {
     pub(crate) direction: Option<Said<Direction>>,
     /// Raw values that mean "no data", as text: decimal, "nan", any notation; compared in the sample's own type.
     pub(crate) nodata: Vec<Said<String>>,
+    /// The lowest and the highest raw number that is data, where the file says so; infinite where one is not said.
+    pub(crate) valid: Option<Said<[f64; 2]>>,
 }

@@ -57,6 +57,11 @@ pub(crate) trait Picture: ImageSource {
     /// Whether its channels are bytes in the file.
     fn has_bytes(&self) -> bool;
 
+    /// The byte of each colour as which a number of the file is shown; `None` of one that no channel can hold, and where bytes are no numbers of the file.
+    fn byte_of(&self, number: f64) -> Option<u8> {
+        (self.has_bytes() && number.fract() == 0.0 && (0.0..=255.0).contains(&number)).then_some(number as u8)
+    }
+
     /// Bits that its channels make use of: of 16 cameras and satellites use 10, 12 or 14. May read the whole picture once.
     ///
     /// # Errors

@@ -30,7 +30,7 @@ use grid::Tile;
 pub(crate) use image::TileImage;
 use plan::Plan;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use terrasoar_layout::error::LayoutError;
 
 /// How an SQLite database begins.
@@ -62,6 +62,18 @@ pub(crate) fn is_pyramid(path: &Path) -> bool {
     let mut head = Vec::new();
     let read = input::open(path, "cannot read the image").map(|file| file.take(100).read_to_end(&mut head));
     matches!(read, Ok(Ok(_))) && (is_mbtiles(path, &head) || is_pmtiles(&head))
+}
+
+/// Refuses a request for a part of a pyramid where none of `paths` is one: the whole of something else would be read without a word.
+pub(crate) fn check_asked(paths: &[PathBuf], options: &TileOptions) -> Result<(), LayoutError> {
+    if *options == TileOptions::default() || paths.iter().any(|path| is_pyramid(path)) {
+        return Ok(());
+    }
+    Err(LayoutError::Usage(
+        "zoom, bounds and the order of tiles are for pyramids of map tiles, and none was named; leave them out, or cut the data before: gdal_translate -projwin WEST NORTH EAST SOUTH \
+         INPUT output.tif"
+            .into(),
+    ))
 }
 
 /// A pyramid, and what of it is read.

@@ -32,6 +32,8 @@ struct Mark {
 pub(crate) struct Voids {
     marks: Vec<Mark>,
     is_real: bool,
+    /// Lowest and highest number that is data.
+    valid: Option<[f64; 2]>,
 }
 
 impl Voids {
@@ -78,12 +80,24 @@ impl Voids {
                 matched: AtomicBool::new(false),
             });
         }
-        Ok(Self { marks, is_real: !sample_type.is_integer() })
+        Ok(Self { marks, is_real: !sample_type.is_integer(), valid: None })
+    }
+
+    /// With all void that is lower or higher than what the file declares to be `valid`, in the type of the samples.
+    pub(crate) fn within(mut self, valid: Option<[f64; 2]>, sample_type: SampleType) -> Self {
+        // An end of more digits than the samples have must not make its own number void.
+        let rounded = |value: f64| match sample_type {
+            SampleType::F16 => f64::from(f16::from_f64(value)),
+            SampleType::F32 => f64::from(value as f32),
+            _ => value,
+        };
+        self.valid = valid.map(|ends| ends.map(rounded));
+        self
     }
 
     /// Whether anything is looked for in samples.
     pub(crate) fn is_idle(&self) -> bool {
-        !self.is_real && self.marks.iter().all(|mark| mark.value.is_none())
+        !self.is_real && self.valid.is_none() && self.marks.iter().all(|mark| mark.value.is_none())
     }
 
     /// The values, as text.
@@ -110,6 +124,12 @@ impl Voids {
             if found {
                 mark.matched.store(true, Ordering::Relaxed);
             }
+        }
+        if let Some([low, high]) = self.valid {
+            samples
+                .iter_mut()
+                .filter(|sample| **sample < low || **sample > high)
+                .for_each(|sample| *sample = f64::NAN);
         }
         if self.is_real {
             samples.iter_mut().filter(|sample| sample.is_infinite()).for_each(|sample| *sample = f64::NAN);
@@ -187,6 +207,23 @@ mod tests {
         assert!(void("18446744073709551615", U64, u64::MAX as f64));
         assert!(void("9007199254740993", I64, 9_007_199_254_740_993i64 as f64));
         assert!(void("0.1", F16, f64::from(f16::from_f64(0.1))) && void("-65504", F16, -65504.0));
+    }
+
+    #[test]
+    fn what_lies_outside_of_what_is_valid_is_void() {
+        let void = |valid: [f64; 2], sample_type: SampleType, sample: f64| {
+            let voids = Voids::new(Path::new("t.nc"), &[], &[], sample_type).unwrap();
+            let voids = voids.within(Some(valid), sample_type);
+            assert!(!voids.is_idle());
+            let mut samples = [sample];
+            voids.apply(&mut samples);
+            samples[0].is_nan()
+        };
+        let tenth = f64::from(0.1f32);
+        assert!(!void([0.0, 0.1], SampleType::F32, tenth) && void([0.0, 0.1], SampleType::F64, tenth));
+        assert!(!void([-5.0, 5.0], SampleType::I16, -5.0) && void([-5.0, 5.0], SampleType::I16, 6.0));
+        assert!(void([0.0, f64::INFINITY], SampleType::I16, -1.0));
+        assert!(!void([f64::NEG_INFINITY, 0.0], SampleType::I32, -1e9));
     }
 
     #[test]

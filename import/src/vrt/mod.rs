@@ -134,6 +134,7 @@ fn declared(vrt: &Vrt) -> Declared {
         unit: band.unit.clone().map(|unit| Said::new(VerticalUnit::Name(unit), "UnitType")),
         direction: None,
         nodata: band.nodata.clone().map(|text| Said::new(text, "NoDataValue")).into_iter().collect(),
+        valid: None,
     };
     declared.notes.push(format);
     if vrt.by_points {

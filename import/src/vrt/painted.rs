@@ -105,11 +105,18 @@ impl Painted {
             None if is_mask || is_made => declared.value.nodata.clone(),
             None => Vec::new(),
         };
-        let voids = Voids::new(&source.file, &nodata, &[], declared.sample_type)?;
+        let valid = declared.value.valid.as_ref().map(|valid| valid.value);
+        let voids =
+            Voids::new(&source.file, &nodata, &[], declared.sample_type)?.within(valid, declared.sample_type);
         let sample_bytes = if declared.sample_type.fits_f32() { 4 } else { 8 };
         let action = Store::new(file, sample_bytes, self.in_memory(file, sample_bytes), &self.folder());
         let store = action.inspect_err(|_| ours.store(true, Ordering::Relaxed))?;
-        let sink = Taking { store: &store, voids: (!nodata.is_empty()).then_some(&voids), is_mask, ours };
+        let sink = Taking {
+            store: &store,
+            voids: (!nodata.is_empty() || valid.is_some()).then_some(&voids),
+            is_mask,
+            ours,
+        };
         let is_masked = is_mask || source.change.as_ref().is_some_and(|change| change.uses_mask);
         match mask.filter(|_| is_masked) {
             Some(mask) => mask.stream(&*reader, &sink)?,

@@ -187,7 +187,7 @@ fn band(path: &Path, node: Node<'_, '_>, number: u32) -> Result<Band, LayoutErro
         number,
         sample_type,
         nodata: text_of(node, "NoDataValue").filter(|_| !hides).map(str::to_owned),
-        scale: number_of(node, "Scale").filter(|scale| *scale != 0.0),
+        scale: number_of(node, "Scale"),
         offset: number_of(node, "Offset"),
         unit: text_of(node, "UnitType").map(str::to_owned),
         sources,

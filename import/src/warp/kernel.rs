@@ -2,8 +2,8 @@
 //!
 //! Coordinates count sample centres: 0 is the first one. A place is void outside of the outermost samples' areas. Bilinear and Lanczos weight the samples that are there and
 //! divide by the sum of their weights; cubic falls back on bilinear where one of its 16 is not; the mean weighs samples by how much of them lies under the new one.
-//! Where new samples are farther apart than old ones, kernels are widened by as much, so that nothing is skipped. A widened Lanczos kernel stands, in GDAL as here, at the centre of an
-//! old sample, up to one step off; bilinear and cubic ones stand where they belong. Cost: the samples under the kernel.
+//! Where new samples are farther apart than old ones, kernels are widened by as much, so that nothing is skipped. All stand where they belong; GDAL 3.6 puts widened Lanczos kernels at
+//! the centre of an old sample, up to one step off, which later versions do not. Cost: the samples under the kernel.
 
 use crate::options::Resampling;
 use std::f64::consts::PI;
@@ -79,10 +79,6 @@ impl Kernel {
     /// The samples within `radius` of a place, weighed by a function of the distance by columns and by rows.
     fn weighed(&self, from: &impl Samples, [x, y]: [f64; 2], radius: f64, weight: fn(f64) -> f64) -> f64 {
         let [across, down] = self.scale;
-        // GDAL makes the weights of a widened Lanczos kernel once, for places at a sample's centre.
-        let is_fixed = self.resampling == Resampling::Lanczos;
-        let x = if is_fixed && across < 1.0 { x.floor() } else { x };
-        let y = if is_fixed && down < 1.0 { y.floor() } else { y };
         let range =
             |at: f64, scale: f64| ((at - radius / scale).ceil() as i64, (at + radius / scale).floor() as i64);
         let ((west, east), (north, south)) = (range(x, across), range(y, down));
@@ -231,10 +227,24 @@ mod tests {
             assert!(!at(-0.4, 5.0).is_nan() && !at(49.4, 49.4).is_nan(), "{resampling:?}");
             assert!(!at(30.6, 30.0).is_nan(), "{resampling:?}");
             let wide = Kernel { scale: [0.5; 2], ..kernel };
+            // Between samples, and not half-way either, lest what is off to one side is made good on the other.
+            for x in [20.0, 20.3, 20.5, 20.9] {
+                let far = wide.sample(&Plane, [x, 17.4], [[x - 1.0, 16.4], [x + 1.0, 18.4]]);
+                let off = far - (100.0 + 3.0 * x - 7.0 * 17.4);
+                let least = if resampling == Resampling::Lanczos { 0.3 } else { 1e-9 };
+                assert!(
+                    resampling == Resampling::Nearest || off.abs() <= least,
+                    "{resampling:?} at {x}: {off}"
+                );
+            }
             let far = wide.sample(&Plane, [12.5, 17.5], [[11.5, 16.5], [13.5, 18.5]]);
             assert!(
                 (far - (100.0 + 37.5 - 122.5)).abs()
-                    <= if off > 1.0 || resampling == Resampling::Lanczos { 10.0 } else { 1e-9 },
+                    <= match resampling {
+                        Resampling::Nearest => 10.0,
+                        Resampling::Lanczos => 0.1,
+                        _ => 1e-9,
+                    },
                 "{resampling:?}: {far}"
             );
         }

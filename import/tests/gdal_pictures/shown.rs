@@ -1,5 +1,6 @@
 //! Pictures of every type of numbers, by bands and stretched, texel by texel against `gdal_translate -b -scale`, and percentiles against a sorted list.
 
+use super::made::{self, Band};
 use super::tools;
 use std::path::{Path, PathBuf};
 use terrasoar_import::{PictureOptions, Stretch, open_images};
@@ -56,39 +57,34 @@ fn bytes(kind: &str, value: f64) -> Vec<u8> {
     }
 }
 
-/// A TIFF of five bands of a type, made by GDAL.
-fn make(folder: &Path, kind: &str, creation: &[&str]) -> Result<PathBuf, String> {
+/// A file of a driver.
+fn name(driver: &str) -> &'static str {
+    if driver == "GTiff" { "p.tif" } else { "p.jp2" }
+}
+
+/// A file of five bands of a type, made by GDAL.
+fn make(folder: &Path, driver: &str, kind: &str, creation: &[&str]) -> Result<PathBuf, String> {
     let gdal = if kind == "NBITS=12" { "UInt16" } else { kind };
-    let size = bytes(kind, 0.0).len();
-    let mut vrt = format!("<VRTDataset rasterXSize=\"{}\" rasterYSize=\"{}\">\n", SIZE[0], SIZE[1]);
-    for band in 0..BANDS {
-        let raw: Vec<u8> = (0..SIZE[0] * SIZE[1]).flat_map(|at| bytes(kind, value(kind, band, at))).collect();
-        std::fs::write(folder.join(format!("{band}.raw")), raw).map_err(|error| error.to_string())?;
-        vrt += &format!(
-            "<VRTRasterBand dataType=\"{gdal}\" band=\"{}\" subClass=\"VRTRawRasterBand\"><SourceFilename relativetoVRT=\"1\">{band}.raw</SourceFilename>\
-             <ImageOffset>0</ImageOffset><PixelOffset>{size}</PixelOffset><LineOffset>{}</LineOffset><ByteOrder>LSB</ByteOrder></VRTRasterBand>\n",
-            band + 1,
-            size * SIZE[0]
-        );
-    }
-    std::fs::write(folder.join("source.vrt"), vrt + "</VRTDataset>").map_err(|error| error.to_string())?;
-    let mut arguments = vec!["-q"];
+    let band = |band| Band {
+        said: String::new(),
+        numbers: (0..SIZE[0] * SIZE[1]).flat_map(|at| bytes(kind, value(kind, band, at))).collect(),
+    };
+    let bands: Vec<Band> = (0..BANDS).map(band).collect();
+    let mut arguments = vec!["-of", driver];
     if kind == "NBITS=12" {
         arguments.extend(["-co", kind]);
     }
     creation.iter().for_each(|option| arguments.extend(["-co", option]));
-    arguments.extend(["source.vrt", "p.tif"]);
-    tools::try_run(folder, "gdal_translate", &arguments, true)?;
-    Ok(folder.join("p.tif"))
+    made::make(folder, SIZE, (gdal, bytes(kind, 0.0).len()), &bands, (name(driver), &arguments))
 }
 
 /// Bytes of the bands as GDAL scales them, RGBA.
-fn scaled(folder: &Path, bands: &[u32], [low, high]: [f64; 2]) -> Result<Vec<u8>, String> {
+fn scaled(folder: &Path, driver: &str, bands: &[u32], [low, high]: [f64; 2]) -> Result<Vec<u8>, String> {
     let numbers: Vec<String> = bands.iter().map(u32::to_string).collect();
     let (low, high) = (low.to_string(), high.to_string());
     let mut arguments = vec!["-q", "-of", "ENVI", "-co", "INTERLEAVE=BIP", "-ot", "Byte"];
     numbers.iter().for_each(|band| arguments.extend(["-b", band]));
-    arguments.extend(["-scale", &low, &high, "0", "255", "p.tif", "scaled.img"]);
+    arguments.extend(["-scale", &low, &high, "0", "255", name(driver), "scaled.img"]);
     tools::try_run(folder, "gdal_translate", &arguments, true)?;
     let bytes = std::fs::read(folder.join("scaled.img")).map_err(|error| error.to_string())?;
     let texel = |texel: &[u8]| [texel[0], texel[texel.len() / 2], texel[texel.len() - 1], 255];
@@ -111,13 +107,13 @@ fn sorted_limits(kind: &str, band: u32, [low, high]: [f64; 2]) -> [f64; 2] {
     [low, high].map(|percent| all[((percent / 100.0 * all.len() as f64).ceil() as usize).max(1) - 1])
 }
 
-fn check(kind: &str, creation: &[&str], bands: &[u32]) -> Result<(), String> {
+fn check(driver: &str, kind: &str, creation: &[&str], bands: &[u32]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
-    let path = make(folder.path(), kind, creation)?;
+    let path = make(folder.path(), driver, kind, creation)?;
     let limits = [value(kind, 0, 0).min(0.0), value(kind, 2, 1) + value(kind, 4, 0).abs()];
     let (ours, _) =
         shown(std::slice::from_ref(&path), &options(bands, Stretch::Values(limits[0], limits[1])))?;
-    let theirs = scaled(folder.path(), bands, limits)?;
+    let theirs = scaled(folder.path(), driver, bands, limits)?;
     if let Some(at) = (0..theirs.len()).find(|at| ours[0][*at] != theirs[*at]) {
         return Err(format!(
             "channel {} of texel {}: {} here, {} of GDAL",
@@ -131,7 +127,7 @@ fn check(kind: &str, creation: &[&str], bands: &[u32]) -> Result<(), String> {
     let (ours, notes) = shown(&[path], &options(bands, Stretch::Percentiles(3.0, 97.5)))?;
     for (channel, band) in bands.iter().enumerate() {
         let limits = sorted_limits(kind, *band, [3.0, 97.5]);
-        let theirs = scaled(folder.path(), &[*band], limits)?;
+        let theirs = scaled(folder.path(), driver, &[*band], limits)?;
         if let Some(at) =
             (0..theirs.len() / 4).find(|at| ours[0][4 * at + channel].abs_diff(theirs[4 * at]) > 0)
         {
@@ -168,8 +164,21 @@ fn numbers_of_every_type_are_stretched_as_gdal_scales_them() {
             }
             for bands in [&[4, 3, 2][..], &[5], &[1, 2, 3]] {
                 count += 1;
-                if let Err(words) = check(kind, creation, bands) {
+                if let Err(words) = check("GTiff", kind, creation, bands) {
                     wrong.push(format!("{kind} {creation:?} {bands:?}: {words}"));
+                }
+            }
+        }
+    }
+    for kind in ["Byte", "UInt16", "Int16"] {
+        for creation in [
+            &["REVERSIBLE=YES", "QUALITY=100"][..],
+            &["REVERSIBLE=YES", "QUALITY=100", "BLOCKXSIZE=32", "BLOCKYSIZE=32"],
+        ] {
+            for bands in [&[4, 3, 2][..], &[5]] {
+                count += 1;
+                if let Err(words) = check("JP2OpenJPEG", kind, creation, bands) {
+                    wrong.push(format!("JPEG 2000 {kind} {creation:?} {bands:?}: {words}"));
                 }
             }
         }

@@ -10,8 +10,8 @@ const NOTES: [(&str, &str); 18] = [
     (
         "GeoTIFF",
         "Known by its first bytes, BigTIFF too. Keys, world files, `.prj`, `.aux.xml` and `.msk` are read. Chunks are decoded in parallel and never more than a few at a time; \
-         files may be sparse, planar, and of bits from 1 to 64. Of several bands `--band` names one. Sub-images and overviews are passed over. JPEG, WebP, JPEG 2000, LZMA and JPEG XL chunks are refused with a command that \
-         converts them.",
+         files may be sparse, planar, and of bits from 1 to 64. Of several bands `--band` names one. Sub-images and overviews are passed over. Chunks of JPEG XL are read (uint8, uint16, float32), and compared with arithmetic in a test of their own; reals of both signs side by side \
+         are packed by libjxl in a way that only libjxl reads, and some are refused. JPEG, WebP, JPEG 2000 and LZMA chunks are refused with a command that converts them.",
     ),
     ("Cloud-optimised GeoTIFF", "A GeoTIFF with overviews; the full image is read."),
     (
@@ -100,6 +100,7 @@ pub(crate) fn page() -> String {
     }
     page.push_str(
         "| headerless heightmap | - | any, stated as `--raw WxH:TYPE`; square `.r16`, `.r32` and `.raw` by their length | `--nodata` |\n\
+         | OpenEXR | - | float16, float32, uint32 | not a number |\n\
          | map tiles: folders, MBTiles, PMTiles | - | packed into colours | transparent, missing |\n\n\
          `--nodata` adds a mark of voids to any format. All formats are read in bounded memory (`--memory`).\n\n",
     );
@@ -115,6 +116,12 @@ pub(crate) fn page() -> String {
             let _ = writeln!(page, "Stored as: {}.\n", joined("; ", storage.iter().copied()));
         }
     }
+    page.push_str(
+        "### OpenEXR\n\n\
+         One channel of half, float or uint, in rows or tiles, packed by RLE, ZIP, PIZ, PXR24, B44 or not at all. Of several `--band NAME` names one, \
+         as `PART.NAME` in a file of several parts; alpha does not count. Not-a-number is void. The data window is read; nothing says where it lies, so a world file, `--spacing` and `--z-scale` do. \
+         Deep data, DWAA and DWAB are refused. OpenEXR's own library wrote the files that are compared with arithmetic.\n\n",
+    );
     page.push_str(
         "### Map tiles\n\n\
          Pyramids of web-map tiles in EPSG:3857: folders of `zoom/column/row.png` (XYZ, and TMS), MBTiles, and PMTiles of version 3. Heights are packed into PNG or lossless WebP, as \

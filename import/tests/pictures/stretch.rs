@@ -1,15 +1,12 @@
 //! Black and white of numbers, and bands by their numbers: what is counted, what is not, and what is refused.
 
-#[path = "../../../layout/tests/import_support/tiff.rs"]
-mod tiff;
-
+use super::tiff::{DATA_AT, RAW, Tag, longs, shorts, text, tiff};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use terrasoar_import::{PictureOptions, Stretch, open_images};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
-use tiff::{DATA_AT, RAW, Tag, longs, shorts, text, tiff};
 
 /// Columns and rows of the pictures made here.
 const SIDE: [u32; 2] = [20, 10];
@@ -256,4 +253,85 @@ fn memory_is_asked_for_before_percentiles_are_looked_for() {
     let tight = PictureOptions { memory_mib: Some(1), ..options(PERCENT, &[]) };
     let refused = open_images(&[path.to_owned()], None, &tight).err().expect("an error");
     assert!(matches!(refused.remedy(), Some(Remedy::Memory { .. })), "{refused}");
+}
+
+/// Numbers of less than a byte are shown as bytes, and so is "no data".
+#[test]
+fn no_data_of_few_bits_is_a_hole() {
+    let folder = Folder::new();
+    for bits in 1..8u16 {
+        let most = (1u32 << bits) - 1;
+        let number = |x: u32, y: u32| (7 * x + 3 * y) & most;
+        let mut data = Vec::new();
+        for y in 0..SIDE[1] {
+            let row =
+                (0..SIDE[0]).flat_map(|x| (0..bits).rev().map(move |bit| (number(x, y) >> bit & 1) as u8));
+            let row: Vec<u8> = row.collect();
+            data.extend(
+                row.chunks(8).map(|eight| (0..8).fold(0, |byte, i| byte << 1 | eight.get(i).unwrap_or(&0))),
+            );
+        }
+        for void in 0..=most {
+            let path = folder.put("a.tif", &made(1, bits, 1, vec![text(42113, &void.to_string())], &data));
+            let texels = shown(&[path], &options(None, &[])).unwrap().remove(0).0;
+            for (at, texel) in (0..).zip(texels) {
+                let number = number(at % SIDE[0], at / SIDE[0]);
+                let alpha = if number == void { 0 } else { 255 };
+                assert_eq!(texel[3], alpha, "{number} of {bits} bits, void {void}");
+                assert!(texel[0].abs_diff((number * 255 / most) as u8) <= 1, "{number} of {bits} bits");
+            }
+        }
+        let path = folder.put("a.tif", &made(1, bits, 1, vec![text(42113, "300")], &data));
+        assert!(shown(&[path], &options(None, &[])).unwrap()[0].0.iter().all(|texel| texel[3] == 255));
+    }
+}
+
+/// Inks and places in a palette have no bits in use: they leave a picture beside them as bright as it is.
+#[test]
+fn inks_and_palettes_of_a_mosaic_change_no_brightness() {
+    let folder = Folder::new();
+    let land = folder.0.path().join("a.iqt");
+    super::common::drape::land(&land);
+    let terrain = terrasoar_layout::read::terrain::Terrain::open(&land).unwrap();
+    let words = |numbers: &[u16]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let dark: Vec<u16> = (0..200).map(|at| at * 20).collect();
+    let dark = folder.put("dark.tif", &made(1, 16, 1, Vec::new(), &words(&dark)));
+    let inks = words(&[60_000, 30_000, 65_535, 1000].repeat(200));
+    let inks = folder.put("inks.tif", &made(4, 16, 1, vec![shorts(262, &[5])], &inks));
+    let colours: Vec<u16> = (0..3 * 65_536u32).map(|i| (i % 65_536) as u16).collect();
+    let table = vec![shorts(262, &[3]), shorts(320, &colours)];
+    let places: Vec<u16> = (0..200).map(|at| 65_535 - at).collect();
+    let places = folder.put("places.tif", &made(1, 16, 1, table, &words(&places)));
+    for other in [inks, places] {
+        let images =
+            open_images(&[dark.clone(), other], Some(terrain.header()), &PictureOptions::default()).unwrap();
+        let mut rgba = vec![0; (SIDE[0] * SIDE[1] * 4) as usize];
+        images[0].rows().unwrap().read(&mut rgba).unwrap();
+        for (at, texel) in rgba.as_chunks::<4>().0.iter().enumerate() {
+            assert_eq!(usize::from(texel[0]), (at * 20) >> 4, "{at}");
+        }
+        // And the other is as it is alone.
+        let alone = open_images(&[images[1].path().to_owned()], None, &PictureOptions::default()).unwrap();
+        let mut both = [rgba.clone(), rgba];
+        images[1].rows().unwrap().read(&mut both[0]).unwrap();
+        alone[0].rows().unwrap().read(&mut both[1]).unwrap();
+        assert!(both[0] == both[1]);
+    }
+}
+
+/// "No data" beside a picture of 16 bits counts with a stretch alone, and the note says so.
+#[test]
+fn no_data_beside_a_picture_of_16_bits_is_told() {
+    let folder = Folder::new();
+    let data: Vec<u8> = (0..200u16).map(|at| at * 300).flat_map(u16::to_le_bytes).collect();
+    let path = folder.put("a.tif", &made(1, 16, 1, Vec::new(), &data));
+    folder.put(
+        "a.tif.aux.xml",
+        b"<PAMDataset><PAMRasterBand band=\"1\"><NoDataValue>300</NoDataValue></PAMRasterBand></PAMDataset>",
+    );
+    let (texels, notes) = shown(std::slice::from_ref(&path), &options(None, &[])).unwrap().remove(0);
+    assert!(notes.contains("\"no data\" 300") && notes.contains("black and white"), "{notes}");
+    assert_eq!(texels[1][3], 255);
+    let (texels, notes) = shown(&[path], &options(PERCENT, &[])).unwrap().remove(0);
+    assert!(!notes.contains("no data") && texels[1][3] == 0, "{notes}");
 }

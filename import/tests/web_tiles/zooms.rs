@@ -4,7 +4,7 @@ use crate::import_support::collect;
 use crate::make::{HALF_M, Pm, Tiles, degrees, folder, hills, mapbox, pmtiles, tiles};
 use crate::{read, refusal};
 use tempfile::tempdir;
-use terrasoar_import::{OpenOptions, TileOptions, open_with};
+use terrasoar_import::{OpenOptions, PictureOptions, TileOptions, open_images, open_with};
 
 const SIDE: u32 = 32;
 
@@ -201,4 +201,31 @@ fn sets_that_are_nearly_all_void_are_refused() {
     pmtiles(&path, &made, "{}", [-180.0, -85.06, 180.0, 85.06], Pm::PLAIN);
     let words = refusal(&path, Some("mapbox"), TileOptions::default());
     assert!(words.contains("lie scattered over 256 x 256 places"), "{words}");
+}
+
+/// What is asked of a pyramid is not dropped without a word where there is none.
+#[test]
+fn what_is_for_pyramids_is_refused_of_other_files() {
+    let folder = tempdir().unwrap();
+    let [grid, other, picture] = ["a.asc", "b.asc", "c.png"].map(|name| folder.path().join(name));
+    let ascii = |x: u32| format!("ncols 3\nnrows 2\nxllcorner {x}\nyllcorner 0\ncellsize 1\n1 2 3\n4 5 6\n");
+    std::fs::write(&grid, ascii(0)).unwrap();
+    std::fs::write(&other, ascii(3)).unwrap();
+    let asked = [
+        TileOptions { zoom: Some(3), ..TileOptions::default() },
+        TileOptions { bounds_deg: Some([0.0, 0.0, 1.0, 1.0]), ..TileOptions::default() },
+        TileOptions { from_south: true, ..TileOptions::default() },
+    ];
+    for tiles in asked {
+        for paths in [vec![grid.clone()], vec![grid.clone(), other.clone()]] {
+            let options = OpenOptions { tiles: tiles.clone(), ..OpenOptions::default() };
+            let error = open_with(&paths, &options).err().expect("refused").to_string();
+            assert!(error.contains("pyramids of map tiles"), "{error}");
+            assert!(open_with(&paths, &OpenOptions::default()).is_ok());
+        }
+        let options = PictureOptions { tiles, ..PictureOptions::default() };
+        let error =
+            open_images(std::slice::from_ref(&picture), None, &options).err().expect("refused").to_string();
+        assert!(error.contains("pyramids of map tiles"), "{error}");
+    }
 }

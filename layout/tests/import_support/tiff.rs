@@ -32,6 +32,11 @@ pub(crate) fn reals(number: u16, values: &[f64]) -> Tag {
     Tag { number, kind: 12, count: values.len() as u64, values: Values::Here(bytes) }
 }
 
+pub(crate) fn rationals(number: u16, values: &[[u32; 2]]) -> Tag {
+    let bytes = values.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+    Tag { number, kind: 5, count: values.len() as u64, values: Values::Here(bytes) }
+}
+
 pub(crate) fn text(number: u16, text: &str) -> Tag {
     let bytes = [text.as_bytes(), b"\0"].concat();
     Tag { number, kind: 2, count: bytes.len() as u64, values: Values::Here(bytes) }

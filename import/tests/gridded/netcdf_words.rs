@@ -1,0 +1,112 @@
+//! What netCDF's attributes say of coordinates and numbers, in files made here, against arithmetic.
+
+use super::cdf::{Axis, Values, words, write};
+use super::{Grid, at, refused, with};
+use std::path::{Path, PathBuf};
+use terrasoar_import::{OpenOptions, open_with};
+use terrasoar_layout::dem::Warning;
+
+/// A grid of 9 by 7 samples, 3 a column and 7 a row on, at these coordinates.
+fn made(folder: &Path, x: (&str, &[f64], &str), y: (&str, &[f64], &str)) -> PathBuf {
+    let path = folder.join("a.nc");
+    let z = Values::Floats((0..7).flat_map(|row| (0..9).map(move |col| height(col, row) as f32)).collect());
+    write(&path, [&axis(x), &axis(y)], (&z, &[]), &[]);
+    path
+}
+
+fn axis<'a>((name, numbers, unit): (&'a str, &[f64], &str)) -> Axis<'a> {
+    let attributes = if unit.is_empty() { vec![] } else { vec![("units", words(unit))] };
+    Axis { name, numbers: numbers.to_vec(), attributes }
+}
+
+fn height(col: u32, row: u32) -> f64 {
+    f64::from(100 + 3 * col + 7 * row)
+}
+
+fn steps(count: u32, from: f64, step: f64) -> Vec<f64> {
+    (0..count).map(|at| from + step * f64::from(at)).collect()
+}
+
+fn told(path: &Path) -> Vec<Warning> {
+    open_with(&[path.to_owned()], &OpenOptions::default()).unwrap().warnings()
+}
+
+fn read(path: &Path) -> Grid {
+    with(path, &OpenOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn angles_count_from_the_side_that_their_unit_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let east = ["degrees_east", "degree_E", "degreesE", "degrees"];
+    let west = ["degrees_west", "degree_west", "degrees_W", "degree_W", "degreesW", "degreeW"];
+    let north = ["degrees_north", "degree_N", "degreesN", "degrees"];
+    let south = ["degrees_south", "degree_south", "degrees_S", "degree_S", "degreesS", "degreeS"];
+    let of = |names: &[&'static str], sign: f64| names.iter().map(|name| (*name, sign)).collect::<Vec<_>>();
+    let across = [of(&east, 1.0), of(&west, -1.0)].concat();
+    let down = [of(&north, 1.0), of(&south, -1.0)].concat();
+    for (x_unit, x_sign) in &across {
+        for (y_unit, y_sign) in &down {
+            // Once by names that say which way they lie, once by units alone.
+            for names in [["lon", "lat"], ["a", "b"]] {
+                if names[0] == "a" && [x_unit, y_unit].contains(&&"degrees") {
+                    continue;
+                }
+                let (x, y) = (steps(9, 10.0, 0.5), steps(7, 40.0, 0.5));
+                let path = made(folder.path(), (names[0], &x, x_unit), (names[1], &y, y_unit));
+                let grid = read(&path);
+                assert_eq!(grid.info.georeference.unit, terrasoar_layout::dem::HorizontalUnit::Degree);
+                for (col, row) in [(0, 0), (8, 0), (0, 6), (8, 6), (3, 2)] {
+                    let found = at(&grid, x_sign * x[col as usize], y_sign * y[row as usize]);
+                    assert_eq!(found, height(col, row), "{x_unit}, {y_unit}: {col}, {row}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn angles_in_other_units_become_degrees() {
+    let folder = tempfile::tempdir().unwrap();
+    for (unit, per_degree) in [
+        ("radians", 1f64.to_radians()),
+        ("radian", 1f64.to_radians()),
+        ("rad", 1f64.to_radians()),
+        ("arc_minutes", 60.0),
+        ("arcmin", 60.0),
+        ("arc_second", 3600.0),
+        ("gon", 1.0 / 0.9),
+        ("0.001 degrees", 1000.0),
+    ] {
+        let of = |degrees: Vec<f64>| degrees.iter().map(|value| value * per_degree).collect::<Vec<_>>();
+        let (x, y) = (of(steps(9, 10.0, 0.5)), of(steps(7, 40.0, 0.5)));
+        let path = made(folder.path(), ("longitude", &x, unit), ("latitude", &y, unit));
+        let grid = read(&path);
+        for (col, row) in [(0, 0), (8, 6), (3, 2)] {
+            let found = at(&grid, 10.0 + 0.5 * f64::from(col), 40.0 + 0.5 * f64::from(row));
+            assert_eq!(found, height(col, row), "{unit}");
+        }
+    }
+    let (x, y) = (steps(9, 10.0, 0.5), steps(7, 40.0, 0.5));
+    let strange = made(folder.path(), ("lon", &x, "furlongs"), ("lat", &y, "degrees_north"));
+    let said = refused(&strange, &OpenOptions::default());
+    assert!(said.contains("\"furlongs\"") && said.contains("ncatted -a units,lon"), "{said}");
+}
+
+#[test]
+fn lengths_of_two_units_meet_and_strangers_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let (x, y) = (steps(9, 600.0, 0.5), steps(7, 5_000_000.0, 500.0));
+    let grid = read(&made(folder.path(), ("x", &x, "km"), ("y", &y, "m")));
+    assert_eq!(at(&grid, 600.5, 5000.5), height(1, 1));
+    let (x, y) = (steps(9, 600_000.0, 500.0), steps(7, 5_000_000.0, 500.0));
+    let path = made(folder.path(), ("x", &x, "furlongs"), ("y", &y, "furlongs"));
+    let said: Vec<String> = told(&path).iter().map(|warning| warning.words.clone()).collect();
+    assert!(
+        said.iter().any(|words| words.contains("\"furlongs\" of variable \"x\" is not known")),
+        "{said:?}"
+    );
+    let path = made(folder.path(), ("x", &x, "m"), ("y", &steps(7, 40.0, 0.5), "degrees_north"));
+    let said: Vec<String> = told(&path).iter().map(|warning| warning.words.clone()).collect();
+    assert!(said.iter().any(|words| words.contains("is in degrees and the other one is not")), "{said:?}");
+}
