@@ -5,6 +5,9 @@
 
 use super::axes::Way;
 
+/// A degree to the south, which differs from "degrees" by its capital alone.
+const ONE_SOUTH: &str = "degreeS";
+
 /// What counts coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Unit {
@@ -31,6 +34,9 @@ pub(super) fn unit(name: &str) -> Option<Unit> {
 
 /// Whether a unit itself tells longitudes from latitudes.
 pub(super) fn way(name: &str) -> Option<Way> {
+    if inside(name) == ONE_SOUTH {
+        return Some(Way::North);
+    }
     match direction(&plain(inside(name)))? {
         "e" | "east" | "w" | "west" => Some(Way::East),
         "n" | "north" | "s" | "south" => Some(Way::North),
@@ -74,6 +80,9 @@ fn direction(plain: &str) -> Option<&str> {
 }
 
 fn unit_of(name: &str) -> Option<Unit> {
+    if name == ONE_SOUTH {
+        return Some(Unit::Degrees(-1.0));
+    }
     let plain = plain(name);
     if let Some(towards) = direction(&plain) {
         let is_back = matches!(towards, "w" | "west" | "s" | "south");
