@@ -5,8 +5,14 @@
 
 use super::axes::Way;
 
-/// A degree to the south, which differs from "degrees" by its capital alone.
-const ONE_SOUTH: &str = "degreeS";
+/// Whether it is a degree to the south, which differs from "degrees" by a capital or by what parts the words.
+fn is_one_south(name: &str) -> bool {
+    let is_parted = ["degree", "deg"].iter().any(|word| {
+        let rest = name.to_ascii_lowercase();
+        matches!(rest.strip_prefix(word), Some("_s" | " s" | "-s"))
+    });
+    is_parted || matches!(name, "degreeS" | "degS")
+}
 
 /// What counts coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +40,7 @@ pub(super) fn unit(name: &str) -> Option<Unit> {
 
 /// Whether a unit itself tells longitudes from latitudes.
 pub(super) fn way(name: &str) -> Option<Way> {
-    if inside(name) == ONE_SOUTH {
+    if is_one_south(inside(name)) {
         return Some(Way::North);
     }
     match direction(&plain(inside(name)))? {
@@ -80,7 +86,7 @@ fn direction(plain: &str) -> Option<&str> {
 }
 
 fn unit_of(name: &str) -> Option<Unit> {
-    if name == ONE_SOUTH {
+    if is_one_south(name) {
         return Some(Unit::Degrees(-1.0));
     }
     let plain = plain(name);
