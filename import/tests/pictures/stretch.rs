@@ -294,7 +294,7 @@ fn a_palette_of_a_picture_that_calls_itself_grey_counts() {
         (0..768u32).map(|i| (i % 256 * 257) as u16 ^ [0, 0xffff, 0x0f0f][i as usize / 256]).collect();
     let data: Vec<u8> = (0..200).collect();
     let path = folder.put("a.tif", &made(1, 8, 1, vec![shorts(320, &colours)], &data));
-    let (texels, notes) = shown(&[path.clone()], &options(None, &[])).unwrap().remove(0);
+    let (texels, notes) = shown(std::slice::from_ref(&path), &options(None, &[])).unwrap().remove(0);
     for (at, texel) in (0u8..).zip(texels) {
         assert_eq!(texel, [at, at ^ 0xff, at ^ 0x0f, 255]);
     }
