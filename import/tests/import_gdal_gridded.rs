@@ -1,5 +1,7 @@
 //! NetCDF, DTED, USGS DEM and rarer kinds of TIFF as GDAL writes them, against what GDAL reads in them.
 
+#[path = "import_support/cdf.rs"]
+mod cdf;
 #[path = "import_support/gdal.rs"]
 mod gdal;
 mod import_support;
@@ -76,6 +78,54 @@ fn netcdf() {
     let crater = data("crater_lake_1025.bt");
     run(folder.path(), "gdal_translate", &["-q", "-of", "netCDF", crater.to_str().unwrap(), "utm.nc"]);
     agrees_north_up(&folder.path().join("utm.nc"));
+}
+
+#[test]
+#[ignore = "needs GDAL's tools"]
+fn netcdf_with_ranges_of_valid_numbers() {
+    use cdf::{Axis, Values, words, write};
+    let folder = tempdir().unwrap();
+    let axis = |name, from: f64, step: f64, count: u32, unit| Axis {
+        name,
+        numbers: (0..count).map(|at| from + step * f64::from(at)).collect(),
+        attributes: vec![
+            ("units", words(unit)),
+            ("standard_name", words(if name == "lon" { "longitude" } else { "latitude" })),
+        ],
+    };
+    let (x, y) = (axis("lon", 10.0, 0.5, 30, "degrees_east"), axis("lat", 47.0, -0.25, 20, "degrees_north"));
+    let shorts = Values::Shorts((0..600).collect());
+    let floats = Values::Floats((0..600).map(|at| at as f32).collect());
+    let range = |low: i16, high: i16| ("valid_range", Values::Shorts(vec![low, high]));
+    let fill = ("_FillValue", Values::Shorts(vec![-1]));
+    let fill_real = ("_FillValue", Values::Floats(vec![-1.0]));
+    let packed = [("scale_factor", Values::Doubles(vec![0.5])), ("add_offset", Values::Doubles(vec![100.0]))];
+    let cases: Vec<(Values, Vec<(&str, Values)>)> = vec![
+        (shorts.clone(), vec![fill.clone(), range(100, 300)]),
+        (shorts.clone(), [&packed[..], &[fill.clone(), range(100, 300)]].concat()),
+        (
+            shorts.clone(),
+            vec![
+                fill.clone(),
+                ("valid_min", Values::Shorts(vec![100])),
+                ("valid_max", Values::Shorts(vec![120])),
+            ],
+        ),
+        (floats.clone(), vec![fill_real.clone(), ("valid_range", Values::Floats(vec![50.0, 70.5]))]),
+        (
+            floats,
+            vec![
+                fill_real,
+                ("valid_min", Values::Floats(vec![50.0])),
+                ("valid_max", Values::Floats(vec![1e6])),
+            ],
+        ),
+    ];
+    for (number, (z, about)) in cases.iter().enumerate() {
+        let path = folder.path().join(format!("{number}.nc"));
+        write(&path, [&x, &y], (z, about), &[]);
+        agrees_north_up(&path);
+    }
 }
 
 #[test]

@@ -203,3 +203,23 @@ fn place(path: &Path, words: &Words, [_, high]: [u32; 2]) -> Result<Option<[f64;
     };
     Ok(x.zip(y).map(|(x, y)| [x, dx, 0.0, y, 0.0, -dy]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_label_that_says_what_its_numbers_are_is_not_told_that_it_does_not() {
+        for (said, sample_type, warned) in [
+            ("NBITS 32\nPIXELTYPE FLOAT\n", SampleType::F32, false),
+            ("NBITS 16\nPIXELTYPE SIGNEDINT\n", SampleType::I16, false),
+            ("NBITS 32\nPIXELTYPE UNSIGNEDINT\n", SampleType::U32, false),
+            ("NBITS 16\n", SampleType::U16, true),
+            ("NBITS 32\nNODATA -1\n", SampleType::I32, true),
+        ] {
+            let text = format!("NROWS 2\nNCOLS 2\n{said}");
+            let label = parse(Path::new("e.hdr"), &text, Path::new("e.bil"), 16).unwrap();
+            assert_eq!((label.kind.sample_type, !label.warnings.is_empty()), (sample_type, warned), "{said}");
+        }
+    }
+}

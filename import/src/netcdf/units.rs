@@ -5,6 +5,15 @@
 
 use super::axes::Way;
 
+/// Whether it is a degree to the south, which differs from "degrees" by a capital or by what parts the words.
+fn is_one_south(name: &str) -> bool {
+    let is_parted = ["degree", "deg"].iter().any(|word| {
+        let rest = name.to_ascii_lowercase();
+        matches!(rest.strip_prefix(word), Some("_s" | " s" | "-s"))
+    });
+    is_parted || matches!(name, "degreeS" | "degS")
+}
+
 /// What counts coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Unit {
@@ -31,6 +40,9 @@ pub(super) fn unit(name: &str) -> Option<Unit> {
 
 /// Whether a unit itself tells longitudes from latitudes.
 pub(super) fn way(name: &str) -> Option<Way> {
+    if is_one_south(inside(name)) {
+        return Some(Way::North);
+    }
     match direction(&plain(inside(name)))? {
         "e" | "east" | "w" | "west" => Some(Way::East),
         "n" | "north" | "s" | "south" => Some(Way::North),
@@ -74,6 +86,9 @@ fn direction(plain: &str) -> Option<&str> {
 }
 
 fn unit_of(name: &str) -> Option<Unit> {
+    if is_one_south(name) {
+        return Some(Unit::Degrees(-1.0));
+    }
     let plain = plain(name);
     if let Some(towards) = direction(&plain) {
         let is_back = matches!(towards, "w" | "west" | "s" | "south");

@@ -110,3 +110,53 @@ fn lengths_of_two_units_meet_and_strangers_are_told() {
     let said: Vec<String> = told(&path).iter().map(|warning| warning.words.clone()).collect();
     assert!(said.iter().any(|words| words.contains("is in degrees and the other one is not")), "{said:?}");
 }
+
+/// A grid of whole numbers of 16 bits, 0 to 62, and what its attributes make of it: the numbers that are data.
+fn data(folder: &Path, about: &[(&str, Values)], z: Values) -> (Vec<f64>, Vec<String>) {
+    let path = folder.join("v.nc");
+    let (x, y) = (steps(9, 10.0, 0.5), steps(7, 46.0, -0.5));
+    write(&path, [&axis(("lon", &x, "degrees_east")), &axis(("lat", &y, "degrees_north"))], (&z, about), &[]);
+    let grid = read(&path);
+    let found = grid.samples.iter().copied().filter(|value| !value.is_nan()).collect();
+    (found, told(&path).into_iter().map(|warning| warning.words).collect())
+}
+
+#[test]
+fn only_what_is_valid_is_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let shorts = || Values::Shorts((0..63).collect());
+    let whole = |from: i32, to: i32| (from..=to).map(f64::from).collect::<Vec<_>>();
+    let packed =
+        || [("scale_factor", Values::Doubles(vec![0.5])), ("add_offset", Values::Doubles(vec![100.0]))];
+    let range = |low: i16, high: i16| ("valid_range", Values::Shorts(vec![low, high]));
+    let of = |about: &[(&str, Values)]| data(folder.path(), about, shorts()).0;
+    assert_eq!(of(&[range(10, 20)]), whole(10, 20));
+    assert_eq!(of(&[("valid_min", Values::Shorts(vec![50]))]), whole(50, 62));
+    assert_eq!(of(&[("valid_max", Values::Floats(vec![7.5]))]), whole(0, 7));
+    let both = [("valid_min", Values::Shorts(vec![5])), ("valid_max", Values::Shorts(vec![6]))];
+    assert_eq!(of(&both), whole(5, 6));
+    // In packed numbers, whatever they become.
+    assert_eq!(of(&[&packed()[..], &[range(10, 20)]].concat()), whole(10, 20));
+    let missing = ("missing_value", Values::Shorts(vec![11, 13]));
+    assert_eq!(of(&[range(10, 14), missing]), [10.0, 12.0, 14.0]);
+    // Numbers without a sign, in a file whose type has one.
+    let unsigned = [("_Unsigned", words("true")), ("valid_range", Values::Bytes(vec![10, -6]))];
+    let bytes = Values::Bytes((0..63).map(|at| (at * 4) as u8 as i8).collect());
+    let (found, _) = data(folder.path(), &unsigned, bytes);
+    assert_eq!(found, (3..=62).map(|at| f64::from(at * 4)).collect::<Vec<_>>());
+    // What cannot be meant is left out and said.
+    for (about, word) in [
+        (range(20, 10), "valid_range"),
+        (("valid_range", Values::Shorts(vec![3])), "valid_range"),
+        (("valid_min", words("low")), "valid_min"),
+        (("scale_factor", words("half")), "scale_factor"),
+        (("scale_factor", Values::Doubles(vec![0.0])), "the scale 0 (attribute scale_factor"),
+    ] {
+        let (found, said) = data(folder.path(), &[about], shorts());
+        assert_eq!(found, whole(0, 62), "{word}");
+        assert!(said.iter().any(|said| said.contains(word)), "{word}: {said:?}");
+    }
+    let reals = ("valid_range", Values::Doubles(vec![10.0, 20.0]));
+    let (found, said) = data(folder.path(), &[&packed()[..], &[reals]].concat(), shorts());
+    assert!(found == whole(10, 20) && said.iter().any(|said| said.contains("taken as packed")), "{said:?}");
+}

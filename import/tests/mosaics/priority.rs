@@ -252,3 +252,20 @@ fn files_on_both_sides_of_180_degrees_lie_together() {
     let count = |value: f64| zone.samples.iter().filter(|sample| **sample == value).count();
     assert!(count(3.0) > 5000 && count(4.0) > 5000, "{} {}", count(3.0), count(4.0));
 }
+
+#[test]
+fn files_on_both_sides_of_0_degrees_lie_together_where_longitudes_run_to_360() {
+    let folder = tempdir().unwrap();
+    let file = |name: &str| inside(folder.path(), name);
+    let east = at(0.0, 45.0, 0.01).write(file("e.asc"), "EPSG:4326", |_, _| 2.0);
+    let west = at(359.0, 45.0, 0.01).write(file("w.asc"), "EPSG:4326", |_, _| 1.0);
+    for paths in [[&east, &west], [&west, &east]] {
+        let grid = read(&paths.map(Clone::clone), &OpenOptions::default());
+        assert_eq!([grid.info.samples_wide, grid.info.samples_high], [200, 100]);
+        assert_eq!(
+            [grid.at(0, 0), grid.at(99, 50), grid.at(100, 50), grid.at(199, 99)],
+            [1.0, 1.0, 2.0, 2.0]
+        );
+        assert!((grid.info.georeference.pixel_to_crs.unwrap()[0] + 0.995).abs() < 1e-9);
+    }
+}

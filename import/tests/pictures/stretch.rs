@@ -286,6 +286,26 @@ fn no_data_of_few_bits_is_a_hole() {
     }
 }
 
+/// A grey picture with a palette beside it is shown in its colours, as GDAL does, and in grey where a person asks for the band.
+#[test]
+fn a_palette_of_a_picture_that_calls_itself_grey_counts() {
+    let folder = Folder::new();
+    let colours: Vec<u16> =
+        (0..768u32).map(|i| (i % 256 * 257) as u16 ^ [0, 0xffff, 0x0f0f][i as usize / 256]).collect();
+    let data: Vec<u8> = (0..200).collect();
+    let path = folder.put("a.tif", &made(1, 8, 1, vec![shorts(320, &colours)], &data));
+    let (texels, notes) = shown(std::slice::from_ref(&path), &options(None, &[])).unwrap().remove(0);
+    for (at, texel) in (0u8..).zip(texels) {
+        assert_eq!(texel, [at, at ^ 0xff, at ^ 0x0f, 255]);
+    }
+    assert!(notes.contains("has a palette"), "{notes}");
+    let (texels, notes) = shown(&[path], &options(None, &[1])).unwrap().remove(0);
+    assert!((0u8..).zip(texels).all(|(at, texel)| texel == [at, at, at, 255]) && notes.is_empty(), "{notes}");
+    let short = folder.put("b.tif", &made(1, 8, 1, vec![shorts(320, &colours[..300])], &data));
+    let (texels, notes) = shown(&[short], &options(None, &[])).unwrap().remove(0);
+    assert!(texels[7] == [7, 7, 7, 255] && notes.contains("300 numbers does not go"), "{notes}");
+}
+
 /// Inks and places in a palette have no bits in use: they leave a picture beside them as bright as it is.
 #[test]
 fn inks_and_palettes_of_a_mosaic_change_no_brightness() {
