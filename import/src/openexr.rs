@@ -289,9 +289,7 @@ fn changed(path: &Path) -> LayoutError {
 fn unsupported(path: &Path, problem: &str) -> LayoutError {
     LayoutError::unsupported(
         path,
-        format!(
-            "{problem}; write its heights as one channel of floats in rows, for example with oiiotool"
-        ),
+        format!("{problem}; write its heights as one channel of floats in rows, for example with oiiotool"),
     )
 }
 
