@@ -1,7 +1,7 @@
 //! Whether two geographic systems, as words of PROJ strings, put the same numbers at the same place: by trying, at some places around the globe.
 
 use super::{Ground, by_text};
-use terrasoar_layout::portable::cos;
+use terrasoar_layout::portable::sin_cos;
 
 /// How far apart two places may be that are called the same.
 const SAME_WITHIN_M: f64 = 5.0;
@@ -18,7 +18,7 @@ pub(crate) fn places_differ(a: &str, b: &str) -> bool {
         let (Some(a), Some(b)) = (a.world(at), b.world(at)) else { return false };
         let turn = std::f64::consts::TAU;
         let across = (a[0] - b[0] + turn / 2.0).rem_euclid(turn) - turn / 2.0;
-        let metres = RADIUS_M * (across * cos(lat)).abs().max((a[1] - b[1]).abs());
+        let metres = RADIUS_M * (across * sin_cos(lat).1).abs().max((a[1] - b[1]).abs());
         metres > SAME_WITHIN_M
     })
 }

@@ -45,6 +45,12 @@ const MERIDIANS: [f64; 14] = [
 /// Words of a PROJ string that tell a geographic system.
 const WORDS: [&str; 8] = ["R", "a", "b", "rf", "ellps", "datum", "towgs84", "nadgrids"];
 
+/// Whether the keys name anything that a map could be of.
+pub(super) fn is_named(keys: &Keys) -> bool {
+    let has_code = |key: u16| keys.short(key).is_some_and(|code| code != 0);
+    has_code(GEOGRAPHIC_TYPE) || has_code(DATUM) || has_code(ELLIPSOID) || keys.real(SEMI_MAJOR).is_some()
+}
+
 /// Degrees a unit of angles, in which the parameters of projections are; `None` for a unit that is not known.
 pub(super) fn degrees_a_unit(keys: &Keys) -> Option<f64> {
     let radians = match keys.short(ANGULAR_UNITS) {

@@ -29,6 +29,8 @@ pub(super) fn proj(keys: &Keys, unit_m: f64, warnings: &mut Vec<Warning>) -> Opt
         let what = match (keys.code(METHOD), keys.code(PROJECTION)) {
             (Some(method), _) => format!("by method {method} (key ProjCoordTrans), which is not read here"),
             (None, Some(code)) => format!("as number {code} (key Projection), which is not read here"),
+            // A map that names no body either is a local one: metres from a corner.
+            (None, None) if !body::is_named(keys) => return None,
             (None, None) => "by no method (keys ProjectedCSType, Projection, ProjCoordTrans)".to_owned(),
         };
         warnings.push(body::unplaced(&format!("the file gives its projection {what}")));

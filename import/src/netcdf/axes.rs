@@ -5,7 +5,7 @@
 
 use super::attributes::{number, text};
 use super::file::guarded;
-use super::units::{self, Unit, unit};
+use super::units::{self, Unit, Way, unit};
 use netcdf_reader::{NcFile, NcSliceInfo, NcSliceInfoElem, NcVariable};
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
@@ -13,13 +13,6 @@ use terrasoar_layout::words::harmless;
 
 /// Coordinates read at once.
 const BLOCK: u64 = 1 << 16;
-
-/// Which way an axis lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Way {
-    East,
-    North,
-}
 
 /// Coordinates evenly apart.
 #[derive(Debug, Clone, PartialEq)]

@@ -18,7 +18,7 @@ use crate::options::{Direction, OpenOptions};
 use crate::reader::{Declared, HorizontalSize, Reader, Said, VerticalUnit};
 use crate::value::STANDARD_GRAVITY;
 use attributes::{exact, is_unsigned, number, numbers, text};
-use axes::{Axis, Way};
+use axes::Axis;
 use choose::{Chosen, Grid};
 use file::Purpose;
 use netcdf_reader::{NcFile, NcGroup, NcType, NcVariable};
@@ -28,7 +28,7 @@ use terrasoar_layout::dem::{SampleSink, SampleType, Warning};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::harmless;
-use units::Unit;
+use units::{Unit, Way};
 
 /// Whether a file begins so: classic of any version, or HDF5.
 pub(crate) fn is_netcdf(head: &[u8]) -> bool {

@@ -3,7 +3,12 @@
 //! An angle says how many degrees it is, below 0 where it counts to the west or the south: "degrees_west". A number before a name multiplies it: "0.001 degrees". A name that is not known is
 //! no unit: the caller says so, for a guess would put the ground elsewhere. Cost: some comparisons of text.
 
-use super::axes::Way;
+/// Which way an axis lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    East,
+    North,
+}
 
 /// Whether it is a degree to the south, which differs from "degrees" by a capital or by what parts the words.
 fn is_one_south(name: &str) -> bool {
