@@ -5,8 +5,6 @@
 #[path = "import_support/gdal.rs"]
 mod gdal;
 mod import_support;
-#[path = "import_support/tools.rs"]
-mod tools;
 
 use gdal::{run, values};
 use import_support::{Random, data, fixtures};
@@ -132,7 +130,7 @@ fn fixtures_and_real_terrain() {
         // Turned grids are resampled, and masked and inverted ones are not the numbers that GDAL prints.
         path.extension().is_some_and(|e| e == "tif")
             && ["refused-", "rotated", "min-is-white", "mask"].iter().all(|word| !name.contains(word))
-            && tools::unpacks(path)
+            && gdal::tools::unpacks(path)
     });
     paths.extend(["puget_sound_1025.png", "crater_lake_1025.bt"].map(data));
     let large = folder.path().join("large.tif");

@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "each test binary uses a part of this")]
 
 #[path = "tools.rs"]
-mod tools;
+pub(crate) mod tools;
 
 use super::import_support::{Grid, Random, collect, read};
 use std::path::Path;
