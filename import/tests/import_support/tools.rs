@@ -51,8 +51,7 @@ pub(crate) fn values(path: &Path, places: &[(u32, u32)]) -> Vec<f64> {
 }
 
 /// GDAL's version: major and minor.
-#[allow(dead_code, reason = "not all tests that share this file ask")]
-pub fn gdal_version() -> [u32; 2] {
+pub(crate) fn gdal_version() -> [u32; 2] {
     let told = Command::new("gdalinfo").arg("--version").output().expect("gdalinfo runs");
     let told = String::from_utf8_lossy(&told.stdout).into_owned();
     let numbers = told.trim_start_matches("GDAL ").split(|c: char| !c.is_ascii_digit());

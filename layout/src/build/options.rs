@@ -25,7 +25,8 @@ pub struct BuildOptions {
     /// Holes up to so many samples across, either way, are filled from their rims; 0, the default, for none, at most 256.
     pub fill_voids: u32,
     /// Whether compact records have room for heights below the lowest and above the highest, so that edits may dig and raise. The default is yes: a range
-    /// of 16,384 height steps, or a quarter more than the terrain's. It costs some 0.1 % of triangles, and up to 0.5 % where a terrain is that tall.
+    /// of 16,384 height steps, or a quarter more than the terrain's. It costs some 0.1 % of triangles, and more where a terrain is that tall: its smallest errors grow
+    /// by up to a quarter.
     pub head_room: bool,
     /// Largest side of a tile in steps, a power of two from 2 to 256. Smaller tiles save memory and cost time; the file is the same.
     pub largest_tile: u32,
