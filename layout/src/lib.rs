@@ -57,6 +57,7 @@ pub mod grid;
 pub mod imagery;
 pub mod mix;
 mod numbers;
+pub mod packed;
 pub mod portable;
 pub mod printable;
 pub mod progress;

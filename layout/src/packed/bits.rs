@@ -1,0 +1,92 @@
+//! Bits one after the other in bytes, the low ones first.
+
+/// Bits on their way into bytes.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct BitWriter {
+    bytes: Vec<u8>,
+    waiting: u64,
+    count: u32,
+}
+
+impl BitWriter {
+    /// Appends the low `count` bits of `value`, at most 32; the others are 0.
+    pub(crate) fn put(&mut self, value: u32, count: u32) {
+        self.waiting |= u64::from(value) << self.count;
+        self.count += count;
+        while self.count >= 8 {
+            self.bytes.push(self.waiting as u8);
+            self.waiting >>= 8;
+            self.count -= 8;
+        }
+    }
+
+    /// All bytes, the last one filled up with zeros.
+    pub(crate) fn finish(mut self) -> Vec<u8> {
+        if self.count > 0 {
+            self.bytes.push(self.waiting as u8);
+        }
+        self.bytes
+    }
+}
+
+/// Bits out of bytes. Behind the end there are zeros.
+#[derive(Debug, Clone)]
+pub(crate) struct BitReader<'b> {
+    bytes: &'b [u8],
+    /// Bits taken.
+    at: usize,
+}
+
+impl<'b> BitReader<'b> {
+    pub(crate) fn new(bytes: &'b [u8]) -> Self {
+        Self { bytes, at: 0 }
+    }
+
+    /// The next `count` bits, at most 32.
+    #[inline]
+    pub(crate) fn take(&mut self, count: u32) -> u32 {
+        let from = self.at >> 3;
+        let word = match self.bytes.get(from..).and_then(|rest| rest.first_chunk::<8>()) {
+            Some(chunk) => u64::from_le_bytes(*chunk),
+            None => self.last_word(from),
+        };
+        let value = word >> (self.at & 7) & ((1 << count) - 1);
+        self.at += count as usize;
+        value as u32
+    }
+
+    #[cold]
+    fn last_word(&self, from: usize) -> u64 {
+        let rest = self.bytes.get(from..).unwrap_or_default();
+        rest.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte))
+    }
+
+    /// Whether all bytes were taken, and no more, and what is left of the last is 0.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.at.div_ceil(8) == self.bytes.len()
+            && (self.at.is_multiple_of(8) || self.bytes[self.at / 8] >> (self.at % 8) == 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn bits_come_back(values in prop::collection::vec((any::<u32>(), 0u32..=32), 0..100)) {
+            let mut writer = BitWriter::default();
+            let low = |value: u32, count: u32| (u64::from(value) & ((1 << count) - 1)) as u32;
+            values.iter().for_each(|(value, count)| writer.put(low(*value, *count), *count));
+            let bytes = writer.finish();
+            let mut reader = BitReader::new(&bytes);
+            for (value, count) in &values {
+                prop_assert_eq!(reader.take(*count), low(*value, *count));
+            }
+            prop_assert!(reader.is_at_end());
+            reader.take(9);
+            prop_assert!(!reader.is_at_end());
+        }
+    }
+}

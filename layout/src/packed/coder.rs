@@ -1,0 +1,247 @@
+//! Values in contexts into bytes and back: what a segment is made of (FORMAT.md, section 9.4).
+//!
+//! Tokens are coded by a range variant of asymmetric numeral systems (J. Duda, 2013) over tables that do not change. Several states take turns over one row of words, so that a processor has
+//! several independent steps at hand. Invariant: decoding never reads outside the bytes, and [`Decoder::finish`] says whether all of them, and nothing else, were used.
+
+use super::bits::{BitReader, BitWriter};
+use super::model::{Counts, DecodeTables, ERRORS, Model, SCALE, SCALE_LOG};
+use super::token::{BASES, token_of};
+
+/// What a state is before the first and after the last symbol.
+const START: u32 = 1 << 16;
+/// Most states that take turns.
+const MOST_LANES: usize = 32;
+
+/// Either way through the values of a tile: walking over it is the same for both.
+pub(crate) trait Coder {
+    /// One value after the other, each in its context, counted from `first`. The place of a value decides whose turn it is.
+    fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]);
+
+    /// A single value. `turn` is its place among those coded one by one.
+    fn value(&mut self, context: u16, turn: usize, value: &mut u16);
+
+    /// Bits as they are, at most 16.
+    fn raw(&mut self, bits: u32, value: &mut u16);
+}
+
+/// Symbols of a segment on their way into bytes.
+#[derive(Debug, Default)]
+pub(crate) struct Encoder {
+    /// Context, token, turn.
+    symbols: Vec<(u16, u8, u32)>,
+    bits: BitWriter,
+}
+
+impl Coder for Encoder {
+    fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
+        for (turn, (context, value)) in contexts.iter().zip(values).enumerate() {
+            self.value(first + u16::from(*context), turn, value);
+        }
+    }
+
+    fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
+        let token = token_of(*value);
+        self.symbols.push((context, token, turn as u32));
+        let (base, bits) = BASES[usize::from(token)];
+        self.bits.put(u32::from(*value - base), bits.into());
+    }
+
+    fn raw(&mut self, bits: u32, value: &mut u16) {
+        self.bits.put(u32::from(*value), bits);
+    }
+}
+
+impl Encoder {
+    /// Counts its symbols.
+    pub(crate) fn count(&self, counts: &mut Counts) {
+        self.symbols.iter().for_each(|(context, token, _)| {
+            counts[usize::from(*context)][usize::from(*token)] += 1;
+        });
+    }
+
+    /// The segment. `None` if the model lacks one of its tokens.
+    pub(crate) fn finish(self, model: &Model) -> Option<Vec<u8>> {
+        let lanes: usize = match self.symbols.len() {
+            0..1_000 => 4,
+            1_000..3_000 => 8,
+            3_000..11_000 => 16,
+            _ => MOST_LANES,
+        };
+        let starts: Vec<[u16; 64]> = model
+            .tables
+            .iter()
+            .map(|table| {
+                let mut at = 0;
+                std::array::from_fn(|token| {
+                    at += table[token];
+                    at - table[token]
+                })
+            })
+            .collect();
+        let mut states = [START; MOST_LANES];
+        let mut words = Vec::new();
+        for (context, token, turn) in self.symbols.iter().rev() {
+            let table = usize::from(*model.table_of.get(usize::from(*context))?);
+            let frequency = u32::from(model.tables[table][usize::from(*token)]);
+            if frequency == 0 {
+                return None;
+            }
+            let state = &mut states[*turn as usize % lanes];
+            if u64::from(*state) >= u64::from(frequency) << (32 - SCALE_LOG) {
+                words.push(*state as u16);
+                *state >>= 16;
+            }
+            let start = u32::from(starts[table][usize::from(*token)]);
+            *state = (*state / frequency << SCALE_LOG) + *state % frequency + start;
+        }
+        let mut bytes = vec![lanes as u8];
+        bytes.extend(u16::try_from(words.len()).ok()?.to_le_bytes());
+        states[..lanes].iter().for_each(|state| bytes.extend(state.to_le_bytes()));
+        words.iter().rev().for_each(|word| bytes.extend(word.to_le_bytes()));
+        bytes.extend(self.bits.finish());
+        Some(bytes)
+    }
+}
+
+/// Values as they are: for segments whose tokens the tables of the file lack. What tables are is not needed.
+#[derive(Debug, Default)]
+pub(crate) struct PlainEncoder(BitWriter);
+
+impl Coder for PlainEncoder {
+    fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
+        for (context, value) in contexts.iter().zip(values) {
+            self.value(first + u16::from(*context), 0, value);
+        }
+    }
+
+    fn value(&mut self, context: u16, _: usize, value: &mut u16) {
+        self.0.put(u32::from(*value), plain_bits(context));
+    }
+
+    fn raw(&mut self, bits: u32, value: &mut u16) {
+        self.0.put(u32::from(*value), bits);
+    }
+}
+
+impl PlainEncoder {
+    /// The segment.
+    pub(crate) fn finish(self) -> Vec<u8> {
+        let mut bytes = vec![0];
+        bytes.extend(self.0.finish());
+        bytes
+    }
+}
+
+/// Bits of a value that is stored as it is.
+fn plain_bits(context: u16) -> u32 {
+    if context < ERRORS { 16 } else { 8 }
+}
+
+/// A segment's values.
+#[derive(Debug)]
+pub(crate) struct Decoder<'b> {
+    tables: &'b DecodeTables,
+    states: [u32; MOST_LANES],
+    /// 0 where values are stored as they are.
+    lanes: usize,
+    words: &'b [[u8; 2]],
+    /// Words taken.
+    at: usize,
+    bits: BitReader<'b>,
+    tokens: Vec<u8>,
+}
+
+impl<'b> Decoder<'b> {
+    /// `None` if the bytes do not begin as a segment does.
+    pub(crate) fn new(tables: &'b DecodeTables, bytes: &'b [u8]) -> Option<Self> {
+        let (lanes, rest) = bytes.split_first()?;
+        let lanes = usize::from(*lanes);
+        let mut states = [START; MOST_LANES];
+        let (mut words, mut bits): (&[[u8; 2]], _) = (&[], rest);
+        if lanes > 0 {
+            if !lanes.is_power_of_two() || lanes > MOST_LANES {
+                return None;
+            }
+            let (count, rest) = rest.split_first_chunk()?;
+            let (first, rest) = rest.split_at_checked(4 * lanes)?;
+            for (state, bytes) in states.iter_mut().zip(first.as_chunks().0) {
+                *state = u32::from_le_bytes(*bytes);
+            }
+            let (of_words, rest) = rest.split_at_checked(2 * usize::from(u16::from_le_bytes(*count)))?;
+            (words, bits) = (of_words.as_chunks().0, rest);
+        }
+        let bits = BitReader::new(bits);
+        Some(Self { tables, states, lanes, words, at: 0, bits, tokens: Vec::new() })
+    }
+
+    /// Whether all of the segment was used, and led back to where encoding began.
+    pub(crate) fn finish(&self) -> bool {
+        self.at == self.words.len() && self.bits.is_at_end() && self.states.iter().all(|s| *s == START)
+    }
+
+    /// The token that a state stands for, and the state after it.
+    #[inline(always)]
+    fn step(&self, context: usize, state: u32) -> (u8, u32) {
+        let table = usize::from(self.tables.table_of[context]);
+        let entry = self.tables.tables[table][state as usize & (SCALE - 1)];
+        // No state is above 2^32 - 1 after it: the frequency is at most 2^11, and what is above the low bits less than 2^21.
+        (entry as u8, ((entry >> 8) & 0xfff).wrapping_mul(state >> SCALE_LOG).wrapping_add(entry >> 20))
+    }
+
+    fn tokens(&mut self, first: u16, contexts: &[u8]) {
+        let mut tokens = std::mem::take(&mut self.tokens);
+        tokens.clear();
+        tokens.resize(contexts.len(), 0);
+        let mask = self.lanes - 1;
+        let (mut states, mut at, words) = (self.states, self.at, self.words);
+        for (turn, (token, context)) in tokens.iter_mut().zip(contexts).enumerate() {
+            let state = &mut states[turn & mask & (MOST_LANES - 1)];
+            let (found, mut next) = self.step(usize::from(first) + usize::from(*context), *state);
+            if next < START {
+                next = next << 16 | u32::from(u16::from_le_bytes(words.get(at).copied().unwrap_or_default()));
+                at += 1;
+            }
+            (*token, *state) = (found, next);
+        }
+        (self.states, self.at, self.tokens) = (states, at, tokens);
+    }
+}
+
+impl Coder for Decoder<'_> {
+    fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
+        if self.lanes == 0 {
+            let bits = plain_bits(first);
+            values.iter_mut().for_each(|value| *value = self.bits.take(bits) as u16);
+            return;
+        }
+        self.tokens(first, contexts);
+        for (value, token) in values.iter_mut().zip(&self.tokens) {
+            *value = u16::from(*token);
+            if *token >= 16 {
+                let (base, bits) = BASES[usize::from(*token) & 63];
+                *value = base.wrapping_add(self.bits.take(bits.into()) as u16);
+            }
+        }
+    }
+
+    fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
+        if self.lanes == 0 {
+            *value = self.bits.take(plain_bits(context)) as u16;
+            return;
+        }
+        let lane = turn & (self.lanes - 1) & (MOST_LANES - 1);
+        let (token, mut next) = self.step(usize::from(context), self.states[lane]);
+        if next < START {
+            let word = self.words.get(self.at).copied().unwrap_or_default();
+            next = next << 16 | u32::from(u16::from_le_bytes(word));
+            self.at += 1;
+        }
+        self.states[lane] = next;
+        let (base, bits) = BASES[usize::from(token) & 63];
+        *value = base.wrapping_add(self.bits.take(bits.into()) as u16);
+    }
+
+    fn raw(&mut self, bits: u32, value: &mut u16) {
+        *value = self.bits.take(bits) as u16;
+    }
+}
