@@ -23,7 +23,8 @@ Examples:
 
 Bounds are least x and y and greatest x and y of the samples' own places (not of pixels around them), in the elevation model's coordinates; the row below them says how to get from
 samples to coordinates. In --json, sample_to_crs are the six numbers m of it: a sample so many columns east and rows north of the south-west one, both from 0, lies at
-x = m0 + m1 column + m2 row, y = m3 + m4 column + m5 row. bounds, bounds_wgs84, sample_to_crs and height_step_m are null where there are none. unused_bytes are bytes that nothing
+x = m0 + m1 column + m2 row, y = m3 + m4 column + m5 row. bounds, bounds_wgs84, sample_to_crs and height_step_m are null where there are none, and unpacked_bytes where the
+terrain is not packed. unused_bytes are bytes that nothing
 leads to; history_bytes those that undo and redo need, or that edits made after an undo left behind.")]
 pub(super) struct Args {
     #[command(flatten)]
@@ -73,7 +74,10 @@ struct Info {
     pages: u64,
     logical_pages: u64,
     generation: u32,
+    /// Of the packed file, where the terrain is packed.
     file_bytes: u64,
+    /// Of the terrain file that it was made of, where the terrain is packed.
+    unpacked_bytes: Option<u64>,
     bytes_per_sample: f64,
     /// The file with the edits, if they lie apart.
     overlay: Option<String>,
@@ -135,6 +139,7 @@ impl Pictures {
 impl Info {
     fn of(terrain: &Terrain, args: &TerrainArgs) -> Result<Self> {
         let header = terrain.header();
+        let packed_bytes = terrain.source().packed_bytes();
         let commits = history(terrain)?;
         let beside = unused_bytes(terrain)?;
         let [unused_bytes, history_bytes] = if commits.is_empty() { [beside, 0] } else { [0, beside] };
@@ -167,7 +172,8 @@ impl Info {
             pages: header.stored_pages,
             logical_pages: header.record_pages(),
             generation: header.generation,
-            file_bytes: header.file_bytes,
+            file_bytes: packed_bytes.unwrap_or(header.file_bytes),
+            unpacked_bytes: packed_bytes.map(|_| header.file_bytes),
             bytes_per_sample: terrain.bytes_per_sample(),
             overlay: args.overlay.as_ref().map(|overlay| overlay.display().to_string()),
             commits: commits.len() as u64,
@@ -207,7 +213,15 @@ impl Info {
             ("records", format!("{}, {} bytes each", self.record, self.record_bytes)),
             ("error", self.error.to_owned()),
             ("pages", format!("{} of {} stored", grouped(self.pages), grouped(self.logical_pages))),
-            ("file size", format!("{} bytes", grouped(self.file_bytes))),
+            (
+                "file size",
+                match self.unpacked_bytes {
+                    Some(unpacked) => {
+                        format!("{} bytes, packed; {} unpacked", grouped(self.file_bytes), grouped(unpacked))
+                    }
+                    None => format!("{} bytes", grouped(self.file_bytes)),
+                },
+            ),
             ("a sample", format!("{:.2} bytes", self.bytes_per_sample)),
         ];
         let at = rows.iter().position(|(name, _)| *name == "records").unwrap_or(rows.len());

@@ -31,6 +31,7 @@ mod movie_file;
 mod output;
 mod outputs;
 mod overlays;
+mod pack;
 mod parse;
 #[cfg(feature = "pictures")]
 mod picture;
@@ -108,6 +109,8 @@ enum Verb {
     Redo(edit::past::RedoArgs),
     History(edit::past::HistoryArgs),
     Compact(edit::compact::Args),
+    Pack(pack::PackArgs),
+    Unpack(pack::UnpackArgs),
     Info(info::Args),
     Verify(verify::Args),
     Height(height::Args),
@@ -213,6 +216,8 @@ fn carry_out() -> ExitCode {
         Verb::Redo(args) => edit::past::redo(&args),
         Verb::History(args) => edit::past::list(&args),
         Verb::Compact(args) => edit::compact::run(&args),
+        Verb::Pack(args) => pack::run_pack(&args),
+        Verb::Unpack(args) => pack::run_unpack(&args),
         Verb::Info(args) => info::run(&args),
         Verb::Verify(args) => verify::run(&args),
         Verb::Height(args) => height::run(&args),

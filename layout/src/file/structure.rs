@@ -10,6 +10,7 @@ use super::source::PreadSource;
 use super::source::Source;
 use crate::error::LayoutError;
 use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
+use crate::packed::{is_packed, only_read};
 use std::path::Path;
 
 /// Reads and checks header and directory (FORMAT.md, section 6).
@@ -37,9 +38,13 @@ fn read_header(source: &dyn Source) -> Result<Header, LayoutError> {
     let mut slot_a = Box::new([0; PAGE_BYTES]);
     let mut slot_b = Box::new([0; PAGE_BYTES]);
     if length < 4 * page_bytes {
-        let mut start = [0; 8];
-        let have = (length as usize).min(8);
+        let mut start = [0; 16];
+        let have = (length as usize).min(start.len());
         source.read_at(0, &mut start[..have])?;
+        if is_packed(&start[..have]) {
+            return Err(only_read(path));
+        }
+        let have = have.min(8);
         return Err(if have > 0 && super::header::MAGIC.starts_with(&start[..have]) {
             truncated(path, length, None)
         } else {

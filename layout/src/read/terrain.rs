@@ -19,6 +19,7 @@ use crate::file::structure::{read_directory, read_structure};
 use crate::grid::order::slot_of;
 use crate::grid::record::{AnyCodec, Vertex};
 use crate::grid::{Grid, GridPoint};
+use crate::packed::{PackedSource, is_packed};
 use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -45,13 +46,18 @@ impl std::fmt::Debug for Terrain {
 }
 
 impl Terrain {
-    /// Opens the file at `path`: checks it by plain reads, then maps it (see [`MapSource`] for what that asks of others).
+    /// Opens the file at `path`: checks it by plain reads, then maps it (see [`MapSource`] for what that asks of others). A packed one is not mapped: for
+    /// [`Terrain::records`] all of it is unpacked into memory, where a [`Terrain::pool`] takes what it needs.
     ///
     /// # Errors
     /// As FORMAT.md, section 6: not a terrain file, another version, truncated or damaged; or I/O.
     #[cfg(feature = "files")]
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
-        let (file, header, entries) = open_settled(path)?;
+        let file = PreadSource::open(path)?;
+        if starts_packed(&file)? {
+            return Self::over(Box::new(PackedSource::open(Box::new(file))?.lending_whole()));
+        }
+        let (file, header, entries) = open_settled(file)?;
         Ok(Self::of(Box::new(MapSource::map(file)?), header, entries))
     }
 
@@ -61,7 +67,11 @@ impl Terrain {
     /// As [`Terrain::open`].
     #[cfg(feature = "files")]
     pub fn open_unmapped(path: &Path) -> Result<Self, LayoutError> {
-        let (file, header, entries) = open_settled(path)?;
+        let file = PreadSource::open(path)?;
+        if starts_packed(&file)? {
+            return Self::from_source(Box::new(file));
+        }
+        let (file, header, entries) = open_settled(file)?;
         Ok(Self::of(Box::new(file), header, entries))
     }
 
@@ -97,6 +107,14 @@ impl Terrain {
     /// # Errors
     /// As [`Terrain::open`].
     pub fn from_source(source: Box<dyn Source>) -> Result<Self, LayoutError> {
+        if starts_packed(&*source)? {
+            return Self::over(Box::new(PackedSource::open(source)?));
+        }
+        Self::over(source)
+    }
+
+    /// Opens a source that is the terrain file itself.
+    fn over(source: Box<dyn Source>) -> Result<Self, LayoutError> {
         let (header, entries) = read_structure(&*source)?;
         Ok(Self::of(source, header, entries))
     }
@@ -141,7 +159,7 @@ impl Terrain {
     pub fn bytes_per_sample(&self) -> f64 {
         let [wide, high] = self.grid().samples();
         let imagery = self.header.imagery.map_or(0, |place| place.bytes);
-        (self.header.file_bytes - imagery) as f64 / (f64::from(wide) * f64::from(high))
+        (self.source.packed_bytes().unwrap_or(self.header.file_bytes).saturating_sub(imagery)) as f64 / (f64::from(wide) * f64::from(high))
     }
 
     /// The source it reads from.
@@ -226,10 +244,17 @@ impl Terrain {
     }
 }
 
+/// Whether a source holds packed terrain.
+fn starts_packed(source: &dyn Source) -> Result<bool, LayoutError> {
+    let mut start = [0; 16];
+    let have = source.byte_count().min(start.len() as u64) as usize;
+    source.read_at(0, &mut start[..have])?;
+    Ok(is_packed(&start[..have]))
+}
+
 /// Opens and checks a file that others may append to at this moment.
 #[cfg(feature = "files")]
-fn open_settled(path: &Path) -> Result<(PreadSource, Header, Vec<Entry>), LayoutError> {
-    let mut file = PreadSource::open(path)?;
+fn open_settled(mut file: PreadSource) -> Result<(PreadSource, Header, Vec<Entry>), LayoutError> {
     let (header, entries) = read_growing(&mut file)?;
     Ok((file, header, entries))
 }

@@ -9,6 +9,7 @@ use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64};
 use crate::grid::Grid;
 use crate::grid::record::{RecordKind, RecordScale};
+use crate::packed::{PACKED_VERSION, only_read};
 use std::path::Path;
 
 /// A header slot of a file.
@@ -50,6 +51,9 @@ impl Fields<'_> {
             return Err(self.damaged("the magic bytes are missing"));
         }
         let major = get_u16(p, 0x008);
+        if major == PACKED_VERSION {
+            return Err(only_read(self.path));
+        }
         if major != 1 {
             return Err(LayoutError::unsupported(
                 self.path,

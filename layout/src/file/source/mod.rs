@@ -68,6 +68,11 @@ pub trait Source: Send + Sync {
     /// Length in bytes when it was opened.
     fn byte_count(&self) -> u64;
 
+    /// Length in bytes of the packed file that the terrain file is unpacked from as it is read; `None` for one that is not packed.
+    fn packed_bytes(&self) -> Option<u64> {
+        None
+    }
+
     /// Offset at which the header slots lie: 0, or where an overlay begins behind its base.
     fn own_start(&self) -> u64 {
         0

@@ -1,0 +1,121 @@
+//! `terrasoar pack` and `terrasoar unpack`: a terrain file in a tenth of the room, and back.
+
+use super::output::{grouped, print, print_json};
+use super::outputs::{Force, Kind};
+use super::progress::Meter;
+use anyhow::Result;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::packed::{pack, unpack};
+
+/// Pack a terrain file into a third to a tenth of its bytes, without any loss.
+///
+/// Packed terrain is drawn and flown over as it is: tiles are unpacked as views need them. What needs all records at hand, such as replay and mesh, unpacks the whole into memory first. It is only
+/// read: to edit it or to drape an image over it, unpack it. Terrains with compact records can be packed, as a build or compact leaves them. What was written is unpacked again and compared with the terrain, byte for byte,
+/// before it gets its name.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  terrasoar pack alps.iqt -o alps-packed.iqt
+  terrasoar pack alps.iqt -o alps-packed.iqt --json
+
+Fields of --json: file, output, bytes_before, bytes_after, bytes_per_sample (imagery left out), seconds.")]
+pub(super) struct PackArgs {
+    /// Terrain file (.iqt)
+    file: PathBuf,
+    /// Packed file to write
+    #[arg(short, long, value_name = "OUT.iqt")]
+    output: PathBuf,
+    #[command(flatten)]
+    force: Force,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Make the terrain file again that a packed one was made of.
+///
+/// It is the same, byte for byte. Every page is checked.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example:
+  terrasoar unpack alps-packed.iqt -o alps.iqt
+
+Fields of --json: file, output, bytes_before, bytes_after, seconds.")]
+pub(super) struct UnpackArgs {
+    /// Packed terrain file (.iqt)
+    file: PathBuf,
+    /// Terrain file to write
+    #[arg(short, long, value_name = "OUT.iqt")]
+    output: PathBuf,
+    #[command(flatten)]
+    force: Force,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Answer {
+    file: String,
+    output: String,
+    bytes_before: u64,
+    bytes_after: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bytes_per_sample: Option<f64>,
+    seconds: f64,
+}
+
+impl Answer {
+    fn tell(&self, is_json: bool) -> Result<()> {
+        if is_json {
+            return print_json(self);
+        }
+        let a_sample =
+            self.bytes_per_sample.map_or(String::new(), |bytes| format!(", {bytes:.3} bytes a sample"));
+        print(&format!(
+            "{}: {} bytes instead of {}{a_sample}, {:.1} s",
+            self.output,
+            grouped(self.bytes_after),
+            grouped(self.bytes_before),
+            self.seconds
+        ))
+    }
+}
+
+pub(super) fn run_pack(args: &PackArgs) -> Result<()> {
+    let start = Instant::now();
+    args.force.file(&args.output, Kind::Terrain, &[args.file.as_path()])?;
+    let progress = Meter::new("samples");
+    let packed = pack(&SystemDisk, &args.file, &args.output, &progress)?;
+    drop(progress);
+    let answer = Answer {
+        file: args.file.display().to_string(),
+        output: args.output.display().to_string(),
+        bytes_before: packed.bytes_before,
+        bytes_after: packed.bytes,
+        bytes_per_sample: Some(packed.bytes_per_sample),
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    answer.tell(args.json)
+}
+
+pub(super) fn run_unpack(args: &UnpackArgs) -> Result<()> {
+    let start = Instant::now();
+    args.force.file(&args.output, Kind::Terrain, &[args.file.as_path()])?;
+    let bytes_before = std::fs::metadata(&args.file).map_or(0, |meta| meta.len());
+    let progress = Meter::new("samples");
+    let header = unpack(&SystemDisk, &args.file, &args.output, &progress)?;
+    drop(progress);
+    let answer = Answer {
+        file: args.file.display().to_string(),
+        output: args.output.display().to_string(),
+        bytes_before,
+        bytes_after: header.file_bytes,
+        bytes_per_sample: None,
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    answer.tell(args.json)
+}

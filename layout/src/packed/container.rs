@@ -1,0 +1,242 @@
+//! What a packed file begins with: its header, and where its sections lie (FORMAT.md, section 9.1).
+//!
+//! The header is that of the terrain file that it was made of, but for the version and a few fields that say what is different. Invariant: sections that [`Container::parse`] returned lie in the file.
+
+use crate::error::LayoutError;
+use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u16, get_u32, get_u64, put_u16, put_u32, put_u64};
+use crate::file::header::{MAGIC, seal};
+use crate::words::number;
+use std::path::Path;
+
+/// Version of files that hold packed terrain.
+pub(crate) const PACKED_VERSION: u16 = 2;
+/// The way of packing that is described in FORMAT.md.
+const SCHEME: u16 = 1;
+/// Sections that a header has room for.
+const MOST_SECTIONS: usize = 8;
+const SECTION_TABLE: usize = 0x120;
+const SECTION_BYTES: usize = 24;
+/// Bit of a section's kind: a reader that does not know it may leave it out.
+const MAY_BE_SKIPPED: u32 = 1 << 31;
+
+/// Tables of the coder.
+pub(crate) const MODEL: u32 = 1;
+/// Runs of absent and present record pages.
+pub(crate) const RUNS: u32 = 2;
+/// Checksums of present record pages.
+pub(crate) const SUMS: u32 = 3;
+/// Where directory leaves lie.
+pub(crate) const ROOT: u32 = 4;
+/// The header slot of the terrain file that is not current.
+pub(crate) const OTHER_SLOT: u32 = 5;
+/// What lies behind the directory in the terrain file: imagery.
+pub(crate) const TAIL: u32 = 6;
+
+/// A part of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Section {
+    pub(crate) kind: u32,
+    /// CRC-32 of its bytes; 0 for the tail, which has checksums of its own.
+    pub(crate) checksum: u32,
+    pub(crate) offset: u64,
+    pub(crate) bytes: u64,
+}
+
+/// What the header of a packed file says besides what the terrain's does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Container {
+    /// Minor version of the terrain file.
+    pub(crate) minor: u16,
+    /// Whether the current header was in the second slot.
+    pub(crate) is_second: bool,
+    /// Length of the packed file.
+    pub(crate) packed_bytes: u64,
+    pub(crate) sections: Vec<Section>,
+}
+
+/// Whether a file that begins so is a packed terrain file, or one of another version than the first.
+pub(crate) fn is_packed(start: &[u8]) -> bool {
+    start.len() >= 10 && start[..8] == MAGIC && get_u16(start, 8) == PACKED_VERSION
+}
+
+/// What is said to those who need the terrain file itself.
+pub(crate) fn only_read(path: &Path) -> LayoutError {
+    LayoutError::unsupported(
+        path,
+        "the terrain is packed, and packed terrain is only read; make a file that can be changed of it with `terrasoar unpack`",
+    )
+}
+
+impl Container {
+    /// The header page of the packed file, of that of the terrain file.
+    pub(crate) fn to_page(&self, current: &Page) -> Box<Page> {
+        let mut page = Box::new(*current);
+        let p = &mut page[..];
+        put_u16(p, 0x008, PACKED_VERSION);
+        put_u16(p, 0x00a, 0);
+        p[0x100..0x200].fill(0);
+        put_u16(p, 0x100, SCHEME);
+        put_u16(p, 0x102, self.minor);
+        p[0x104] = u8::from(self.is_second);
+        p[0x105] = super::shape::TILE_LOG as u8;
+        p[0x106] = super::shape::OCTAVES as u8;
+        p[0x107] = self.sections.len() as u8;
+        put_u64(p, 0x108, self.packed_bytes);
+        for (i, section) in self.sections.iter().enumerate().take(MOST_SECTIONS) {
+            let at = SECTION_TABLE + i * SECTION_BYTES;
+            put_u32(p, at, section.kind);
+            put_u32(p, at + 4, section.checksum);
+            put_u64(p, at + 8, section.offset);
+            put_u64(p, at + 16, section.bytes);
+        }
+        seal(&mut page);
+        page
+    }
+
+    /// Reads and checks a header page; gives the terrain file's current one, too.
+    pub(crate) fn parse(path: &Path, page: &Page, length: u64) -> Result<(Self, Box<Page>), LayoutError> {
+        let p = &page[..];
+        let damaged = |problem: &str| {
+            LayoutError::damaged(path, "header", format!("{problem}; restore a copy or pack the terrain again"))
+        };
+        if get_u32(p, 0xffc) != checksum(&p[..0xffc]) {
+            return Err(damaged("the checksum does not match"));
+        }
+        let unknown = |what: String| LayoutError::unsupported(path, format!("{what}; use a newer terrasoar"));
+        if get_u16(p, 0x00a) != 0 || get_u16(p, 0x100) != SCHEME {
+            return Err(unknown(format!(
+                "the terrain is packed in a way that this program does not know: version {}.{}, scheme {}",
+                PACKED_VERSION,
+                get_u16(p, 0x00a),
+                get_u16(p, 0x100)
+            )));
+        }
+        if [p[0x105], p[0x106]] != [super::shape::TILE_LOG as u8, super::shape::OCTAVES as u8] {
+            return Err(unknown("the terrain is packed in tiles of another size".into()));
+        }
+        let (count, is_second) = (usize::from(p[0x107]), p[0x104]);
+        if count > MOST_SECTIONS || is_second > 1 {
+            return Err(damaged("a field of the packed terrain is out of range"));
+        }
+        let packed_bytes = get_u64(p, 0x108);
+        if packed_bytes > length {
+            return Err(LayoutError::damaged(
+                path,
+                format!("byte {length}"),
+                format!(
+                    "the file is cut short: it has {length} bytes of {}; copy it again or pack the terrain again",
+                    number(packed_bytes as f64)
+                ),
+            ));
+        }
+        let mut sections: Vec<Section> = Vec::with_capacity(count);
+        for i in 0..count {
+            let at = SECTION_TABLE + i * SECTION_BYTES;
+            let section = Section {
+                kind: get_u32(p, at),
+                checksum: get_u32(p, at + 4),
+                offset: get_u64(p, at + 8),
+                bytes: get_u64(p, at + 16),
+            };
+            if section.kind & MAY_BE_SKIPPED != 0 {
+                continue;
+            }
+            if !(MODEL..=TAIL).contains(&section.kind) {
+                return Err(unknown(format!("the packed terrain has a section of kind {}", section.kind)));
+            }
+            let end = section.offset.checked_add(section.bytes);
+            if section.offset < PAGE_BYTES as u64 || end.is_none_or(|end| end > packed_bytes) {
+                return Err(damaged("a section lies outside the file"));
+            }
+            if sections.iter().any(|other| other.kind == section.kind) {
+                return Err(damaged("a section is there twice"));
+            }
+            sections.push(section);
+        }
+        let minor = get_u16(p, 0x102);
+        let mut current = Box::new(*page);
+        put_u16(&mut current[..], 0x008, 1);
+        put_u16(&mut current[..], 0x00a, minor);
+        current[0x100..0x200].fill(0);
+        seal(&mut current);
+        Ok((Self { minor, is_second: is_second == 1, packed_bytes, sections }, current))
+    }
+
+    /// The section of a kind; one without bytes if there is none.
+    pub(crate) fn section(&self, kind: u32) -> Section {
+        let found = self.sections.iter().find(|section| section.kind == kind).copied();
+        found.unwrap_or(Section { kind, checksum: 0, offset: PAGE_BYTES as u64, bytes: 0 })
+    }
+}
+
+/// Runs of absent and present pages in turn, absent ones first, seven bits a byte, the low ones first.
+pub(crate) fn runs_of(is_present: impl Iterator<Item = bool>) -> Vec<u8> {
+    let (mut bytes, mut now, mut run) = (Vec::new(), false, 0u64);
+    let mut put = |mut run: u64| {
+        while run >= 128 {
+            bytes.push(run as u8 | 128);
+            run >>= 7;
+        }
+        bytes.push(run as u8);
+    };
+    for present in is_present {
+        if present != now {
+            put(run);
+            (now, run) = (present, 0);
+        }
+        run += 1;
+    }
+    put(run);
+    bytes
+}
+
+/// Numbers of the present pages, of which there are `count` among `pages`. `None` if the bytes say anything else.
+pub(crate) fn present_pages(bytes: &[u8], pages: u64, count: u64) -> Option<Vec<u32>> {
+    let mut present = Vec::new();
+    let (mut at, mut is_present, mut bytes) = (0u64, false, bytes.iter());
+    while at < pages {
+        let mut run = 0u64;
+        for shift in (0..).step_by(7) {
+            let byte = bytes.next().filter(|_| shift < 63)?;
+            run |= u64::from(byte & 127) << shift;
+            if byte & 128 == 0 {
+                break;
+            }
+        }
+        let end = at.checked_add(run).filter(|end| *end <= pages)?;
+        if is_present {
+            if present.len() as u64 + run > count {
+                return None;
+            }
+            present.extend((at..end).map(|page| page as u32));
+        }
+        (at, is_present) = (end, !is_present);
+    }
+    (bytes.next().is_none() && present.len() as u64 == count).then_some(present)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn runs_come_back(pages in prop::collection::vec((any::<bool>(), 1usize..400), 0..30)) {
+            let all: Vec<bool> = pages.iter().flat_map(|(present, count)| vec![*present; *count]).collect();
+            let bytes = runs_of(all.iter().copied());
+            let expected: Vec<u32> = (0u32..).zip(&all).filter(|(_, p)| **p).map(|(i, _)| i).collect();
+            let count = expected.len() as u64;
+            if !all.is_empty() {
+                prop_assert_eq!(present_pages(&bytes, all.len() as u64, count), Some(expected));
+                prop_assert_eq!(present_pages(&bytes, all.len() as u64, count + 1), None);
+                prop_assert_eq!(present_pages(&bytes[..bytes.len() - 1], all.len() as u64, count), None);
+            }
+        }
+
+        #[test]
+        fn any_bytes_are_runs_or_none(bytes in prop::collection::vec(any::<u8>(), 0..40), pages in 0u64..3000, count in 0u64..3000) {
+            present_pages(&bytes, pages, count);
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! A terrain file packed into another, in two passes: one that counts, for the tables, and one that writes.
+//!
+//! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name. So whatever the file holds, what is packed is the same, or packing fails and says
+//! so. Cost: each vertex is looked up twice and unpacked once; memory is a few megabytes, and 16 bytes a record page.
+
+use super::coder::{Encoder, PlainEncoder};
+use super::container::{Container, MODEL, OTHER_SLOT, ROOT, RUNS, SUMS, Section, TAIL, runs_of};
+use super::model::{CONTEXTS, Counts, Model};
+use super::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
+use super::rules::Rules;
+use super::shape::{Groups, SEGMENTS, TileId};
+use super::source::PackedSource;
+use super::tile::TileRecords;
+use super::token::TOKENS;
+use super::walk::{Scratch, walk};
+use crate::error::LayoutError;
+use crate::file::atomic::AtomicFile;
+use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
+use crate::file::directory::{put_all_leaves, root_bytes};
+use crate::file::disk::Disk;
+use crate::file::header::{Header, INERT_PAGE};
+use crate::file::source::{PreadSource, Source};
+use crate::grid::GridPoint;
+use crate::grid::order::slot_of;
+use crate::grid::record::Compact;
+use crate::progress::Progress;
+use crate::read::kinds::ByKind;
+use crate::read::records::Records;
+use crate::read::terrain::Terrain;
+use rayon::prelude::*;
+use std::path::Path;
+
+const PAGE: u64 = PAGE_BYTES as u64;
+/// Tiles packed before they are written.
+const TILES_AT_ONCE: usize = 4096;
+/// Bytes compared, or copied, at a time.
+pub(super) const CHUNK_BYTES: usize = 256 << 10;
+
+/// What became of a terrain that was packed.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Packed {
+    /// Bytes of the terrain file.
+    pub bytes_before: u64,
+    /// Bytes of the packed one, imagery included.
+    pub bytes: u64,
+    /// Bytes a sample of the packed one, imagery left out.
+    pub bytes_per_sample: f64,
+}
+
+/// Packs the terrain file `from` into a new file `to`. It reads as the terrain file does, pages and imagery included.
+///
+/// # Errors
+/// Damage and I/O of the terrain; I/O of `to`; [`LayoutError::Unsupported`] for a terrain with exact records, one that was edited since it was built or written anew, and one that is packed already.
+pub fn pack(
+    disk: &dyn Disk,
+    from: &Path,
+    to: &Path,
+    progress: &dyn Progress,
+) -> Result<Packed, LayoutError> {
+    let terrain = Terrain::open(from)?;
+    check_packable(&terrain)?;
+    let Some(ByKind::Compact(records)) = terrain.records() else {
+        return Err(refused(from, "its records are exact ones; only compact ones can be packed"));
+    };
+    check_pages(&terrain, progress)?;
+    let file = AtomicFile::create(to)?;
+    let packer = Packer {
+        records,
+        groups: Groups::of(terrain.grid()),
+        rules: Rules::new(terrain.grid(), &terrain.header().scale),
+        progress,
+    };
+    let bytes = packer.write(disk, &terrain, &file)?;
+    compare(&terrain, &file, progress)?;
+    let [wide, high] = terrain.grid().samples().map(f64::from);
+    let imagery = terrain.header().imagery.map_or(0, |place| place.bytes);
+    progress.stage("syncing", 0);
+    file.publish_on(disk)?;
+    Ok(Packed {
+        bytes_before: terrain.header().file_bytes,
+        bytes,
+        bytes_per_sample: bytes.saturating_sub(imagery) as f64 / (wide * high),
+    })
+}
+
+fn refused(path: &Path, problem: &str) -> LayoutError {
+    LayoutError::unsupported(path, format!("the terrain cannot be packed: {problem}"))
+}
+
+/// Whether a file is laid out as a build leaves it: then its directory follows from which pages there are.
+fn check_packable(terrain: &Terrain) -> Result<(), LayoutError> {
+    let (path, header) = (terrain.path(), terrain.header());
+    if terrain.source().packed_bytes().is_some() {
+        return Err(refused(path, "it is packed already"));
+    }
+    let in_order = "it was edited, or other programs wrote it; write it anew with `terrasoar compact` first";
+    let mut next = INERT_PAGE;
+    for entry in terrain.entries().iter().filter(|entry| entry.is_present()) {
+        next += 1;
+        if entry.page != next || entry.generation != 1 {
+            return Err(refused(path, in_order));
+        }
+    }
+    let (root, page) = put_all_leaves(terrain.entries(), next + 1, |_, _| Ok(()))?;
+    let root = root_bytes(&root);
+    let is_in_order = header.history.is_none()
+        && [header.root_page, header.root_checksum] == [page, root.checksum]
+        && u64::from(page) * PAGE + root.bytes.len() as u64 <= header.file_bytes;
+    if is_in_order { Ok(()) } else { Err(refused(path, in_order)) }
+}
+
+/// Holds every record page against its checksum: through a map nobody would.
+fn check_pages(terrain: &Terrain, progress: &dyn Progress) -> Result<(), LayoutError> {
+    let per_page = terrain.header().records_per_page();
+    progress.stage("checking", terrain.header().stored_pages * per_page);
+    (0..terrain.entries().len() as u64)
+        .into_par_iter()
+        .filter(|page| terrain.entries()[*page as usize].is_present())
+        .try_for_each(|page| terrain.checked_page(page).map(|_| progress.advance(per_page)))
+}
+
+/// A packed tile.
+struct Made {
+    segments: [Vec<u8>; SEGMENTS],
+}
+
+struct Packer<'p> {
+    records: Records<'p, Compact>,
+    groups: Groups,
+    rules: Rules,
+    progress: &'p dyn Progress,
+}
+
+impl Packer<'_> {
+    /// The records of a tile; `None` if all that it gives are inert.
+    fn records_of(&self, id: TileId) -> Option<TileRecords> {
+        let group = &self.groups.groups[usize::from(id.group)];
+        let shape = self.groups.shape(id);
+        let first = id.at.map(|v| v << (group.stride_log + group.tile_log));
+        let k = self.records.grid().k();
+        let records = TileRecords::from_fn(&shape, |at| {
+            let [x, y] = [0, 1].map(|axis| first[axis] + (at[axis] << group.stride_log));
+            self.records.raw(slot_of(k, GridPoint::new(x, y)))
+        });
+        (!records.gives_nothing(&shape)).then_some(records)
+    }
+
+    fn samples_of(&self, id: TileId) -> u64 {
+        3 << (2 * self.groups.groups[usize::from(id.group)].tile_log) >> 2
+    }
+
+    fn encoded(&self, id: TileId, scratch: &mut Scratch) -> Option<[Encoder; SEGMENTS]> {
+        let records = self.records_of(id)?;
+        let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
+        walk(&self.groups.shape(id), &self.rules, scratch, &mut encoders, Some(&records));
+        Some(encoders)
+    }
+
+    /// Counts what occurs.
+    fn model(&self, tiles: &[(usize, TileId)]) -> Model {
+        let none = || (vec![[0; TOKENS]; CONTEXTS], Scratch::default());
+        let counts = tiles
+            .par_chunks(64)
+            .fold(none, |(mut counts, mut scratch), tiles| {
+                for (_, id) in tiles {
+                    for encoder in self.encoded(*id, &mut scratch).into_iter().flatten() {
+                        encoder.count(&mut counts);
+                    }
+                    self.progress.advance(self.samples_of(*id));
+                }
+                (counts, scratch)
+            })
+            .map(|(counts, _)| counts)
+            .reduce(|| none().0, sum);
+        Model::from_counts(&counts)
+    }
+
+    fn make(&self, id: TileId, model: &Model, scratch: &mut Scratch) -> Option<Made> {
+        let encoders = self.encoded(id, scratch)?;
+        let segments = encoders.map(|encoder| encoder.finish(model));
+        self.progress.advance(self.samples_of(id));
+        if let [Some(a), Some(b), Some(c)] = segments {
+            return Some(Made { segments: [a, b, c] });
+        }
+        // Nothing that was counted is lacking; should it ever be, values are stored as they are.
+        let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
+        walk(&self.groups.shape(id), &self.rules, scratch, &mut encoders, self.records_of(id).as_ref());
+        Some(Made { segments: encoders.map(PlainEncoder::finish) })
+    }
+
+    /// Writes the whole file; its length.
+    fn write(&self, disk: &dyn Disk, terrain: &Terrain, file: &AtomicFile) -> Result<u64, LayoutError> {
+        let tiles: Vec<(usize, TileId)> = self.groups.tiles().collect();
+        let samples = tiles.iter().map(|(_, id)| self.samples_of(*id)).sum();
+        self.progress.stage("counting", samples);
+        let model = self.model(&tiles);
+        self.progress.stage("packing", samples);
+
+        let (source, header) = (terrain.source(), terrain.header());
+        let slots = header_slots(source, header)?;
+        let mut front = Front::default();
+        front.put(MODEL, &model.to_bytes());
+        front.put(RUNS, &runs_of(terrain.entries().iter().map(|entry| entry.is_present())));
+        let present = terrain.entries().iter().filter(|entry| entry.is_present());
+        let sums: Vec<u8> = present.flat_map(|entry| entry.checksum.to_le_bytes()).collect();
+        front.put(SUMS, &sums);
+        if slots.other.iter().any(|byte| *byte != 0) {
+            front.put(OTHER_SLOT, &slots.other[..]);
+        }
+        let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
+        // Leaves have their place before it is known what they hold.
+        let leaf_sizes = self.groups.leaf_sizes();
+        let first_leaf = PAGE + front.bytes.len() as u64;
+        let mut at = first_leaf;
+        let leaf_offsets: Vec<u64> = leaf_sizes
+            .iter()
+            .map(|size| {
+                at += (size * PLACE_BYTES) as u64;
+                at - (size * PLACE_BYTES) as u64
+            })
+            .collect();
+
+        let mut places: Vec<Vec<TilePlace>> = leaf_sizes.iter().map(|size| Vec::with_capacity(*size)).collect();
+        let failed = |e| {
+            let when_full = "cannot write the packed file, for which there is no room; make some on its disk, or name an output on another";
+            LayoutError::write(file.target(), "cannot write the packed file", when_full, e)
+        };
+        let write = |bytes: &[u8], offset| disk.write_at(file.file(), bytes, offset).map_err(failed);
+        for tiles in tiles.chunks(TILES_AT_ONCE) {
+            let made: Vec<Option<Made>> = tiles
+                .par_iter()
+                .with_min_len(16)
+                .map_init(Scratch::default, |scratch, (_, id)| self.make(*id, &model, scratch))
+                .collect();
+            let mut bytes = Vec::new();
+            for ((leaf, _), made) in tiles.iter().zip(made) {
+                let mut place = TilePlace::default();
+                if let Some(made) = made {
+                    place.offset = at + bytes.len() as u64;
+                    for (s, segment) in made.segments.iter().enumerate() {
+                        place.lengths[s] = segment.len() as u16;
+                        place.checksums[s] = checksum(segment);
+                        bytes.extend(segment);
+                    }
+                }
+                places[*leaf].push(place);
+            }
+            write(&bytes, at)?;
+            at += bytes.len() as u64;
+        }
+        let root = &mut front.bytes[root..];
+        for (i, (leaf, offset)) in places.iter().zip(&leaf_offsets).enumerate() {
+            let mut bytes = vec![0; leaf.len() * PLACE_BYTES];
+            if leaf.iter().any(TilePlace::is_present) {
+                leaf.iter().enumerate().for_each(|(i, place)| place.write(&mut bytes, i));
+                put_u64(root, i * LEAF_BYTES, *offset);
+                put_u32(root, i * LEAF_BYTES + 8, checksum(&bytes));
+            }
+            write(&bytes, *offset)?;
+        }
+        front.seal(ROOT);
+
+        // Imagery.
+        let root_pages = (header.root_entries() * 16).div_ceil(PAGE);
+        let tail_start = (u64::from(header.root_page) + root_pages) * PAGE;
+        let tail_bytes = header.file_bytes - tail_start;
+        if tail_bytes > 0 {
+            front.sections.push(Section { kind: TAIL, checksum: 0, offset: at, bytes: tail_bytes });
+            let mut chunk = vec![0; CHUNK_BYTES];
+            let mut done = 0;
+            while done < tail_bytes {
+                let count = to_usize((tail_bytes - done).min(CHUNK_BYTES as u64))?;
+                source.read_at(tail_start + done, &mut chunk[..count])?;
+                write(&chunk[..count], at + done)?;
+                done += count as u64;
+            }
+            at += tail_bytes;
+        }
+        let container = Container {
+            minor: u16::from_le_bytes([slots.current[0x00a], slots.current[0x00b]]),
+            is_second: slots.is_second,
+            packed_bytes: at,
+            sections: front.sections,
+        };
+        write(&front.bytes, PAGE)?;
+        write(&container.to_page(&slots.current)[..], 0)?;
+        Ok(at)
+    }
+}
+
+fn sum(mut a: Counts, b: Counts) -> Counts {
+    a.iter_mut().flatten().zip(b.iter().flatten()).for_each(|(a, b)| *a += b);
+    a
+}
+
+/// Sections behind the header.
+#[derive(Default)]
+struct Front {
+    bytes: Vec<u8>,
+    sections: Vec<Section>,
+}
+
+impl Front {
+    /// Appends a section; where it begins behind the header.
+    fn put(&mut self, kind: u32, bytes: &[u8]) -> usize {
+        let at = self.bytes.len();
+        let offset = PAGE + at as u64;
+        self.bytes.extend(bytes);
+        self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
+        at
+    }
+
+    /// The checksum of a section that was filled in meanwhile.
+    fn seal(&mut self, kind: u32) {
+        for section in self.sections.iter_mut().filter(|section| section.kind == kind) {
+            let from = (section.offset - PAGE) as usize;
+            section.checksum = checksum(&self.bytes[from..from + section.bytes as usize]);
+        }
+    }
+}
+
+/// The two header pages of a terrain file.
+struct HeaderSlots {
+    current: Box<Page>,
+    other: Box<Page>,
+    is_second: bool,
+}
+
+fn header_slots(source: &dyn Source, header: &Header) -> Result<HeaderSlots, LayoutError> {
+    let (mut first, mut second) = (Box::new([0; PAGE_BYTES]), Box::new([0; PAGE_BYTES]));
+    source.read_at(0, &mut first[..])?;
+    source.read_at(PAGE, &mut second[..])?;
+    let is_it = |page: &Page| Header::parse(source.path(), page).is_ok_and(|found| found == *header);
+    Ok(if is_it(&first) {
+        HeaderSlots { current: first, other: second, is_second: false }
+    } else {
+        HeaderSlots { current: second, other: first, is_second: true }
+    })
+}
+
+/// Whether what was written reads as the terrain file, byte for byte.
+fn compare(terrain: &Terrain, file: &AtomicFile, progress: &dyn Progress) -> Result<(), LayoutError> {
+    let path = file.target();
+    let again = file
+        .file()
+        .try_clone()
+        .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
+    let packed = PackedSource::open(Box::new(PreadSource::over(path, again)?))?;
+    let bytes = terrain.header().file_bytes;
+    progress.stage("comparing", bytes / 4);
+    (0..bytes.div_ceil(CHUNK_BYTES as u64)).into_par_iter().try_for_each(|chunk| {
+        let from = chunk * CHUNK_BYTES as u64;
+        let count = to_usize((bytes - from).min(CHUNK_BYTES as u64))?;
+        let (mut ours, mut theirs) = (vec![0; count], vec![0; count]);
+        terrain.source().read_at(from, &mut ours)?;
+        packed.read_at(from, &mut theirs)?;
+        progress.advance(count as u64 / 4);
+        let Some(at) = ours.iter().zip(&theirs).position(|(a, b)| a != b) else { return Ok(()) };
+        let page = (from + at as u64) / PAGE;
+        Err(refused(
+            terrain.path(),
+            &format!("file page {page} holds what no build writes; check it with `terrasoar verify`"),
+        ))
+    })
+}

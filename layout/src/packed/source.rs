@@ -1,0 +1,445 @@
+//! A packed file read as the terrain file that it was made of: its bytes, unpacked as they are asked for.
+//!
+//! Everything that reads a terrain reads this one: the header, directory, pages and imagery are those of the terrain file, at their places there, so that a record page that is read is checked
+//! against the directory's checksum, whatever it was unpacked from. Only what writes, and what maps, needs the terrain file itself.
+//!
+//! Invariant: memory is what the front of the file takes, and that of [`CACHE_BYTES`] of tiles. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
+
+use super::cache::Cache;
+use super::coder::Decoder;
+use super::container::{Container, MODEL, OTHER_SLOT, ROOT, RUNS, SUMS, Section, TAIL, present_pages};
+use super::model::{DecodeTables, Model};
+use super::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
+use super::rules::Rules;
+use super::shape::{Groups, TileId, TileShape};
+use super::tile::{INERT, TileRecords};
+use super::walk::{Scratch, walk};
+use crate::error::LayoutError;
+use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
+use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use crate::file::header::{Header, INERT_PAGE};
+use crate::file::source::Source;
+use crate::file::structure::inert_page;
+use crate::grid::order::point_of;
+use crate::grid::record::RecordKind;
+use std::path::Path;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+const PAGE: u64 = PAGE_BYTES as u64;
+/// Tiles kept unpacked.
+const CACHE_BYTES: usize = 16 << 20;
+/// Bytes of the whole that are unpacked at a time.
+const WHOLE_BYTES: usize = 256 << 10;
+/// First record page of a terrain file as a build leaves it.
+const FIRST_PAGE: u64 = INERT_PAGE as u64 + 1;
+/// What opening reads first.
+const FIRST_READ: u64 = 64 << 10;
+
+/// A packed terrain file.
+pub(crate) struct PackedSource {
+    inner: Box<dyn Source>,
+    container: Container,
+    header: Header,
+    slots: [Box<Page>; 2],
+    inert: Box<Page>,
+    /// Logical page of each that is present, and its checksum.
+    present: Vec<u32>,
+    sums: Vec<u32>,
+    /// For each leaf of the terrain file's directory that is present, its number and the place of its first page in `present`.
+    leaves: Vec<(u32, usize)>,
+    /// The root of the terrain file's directory, made when it is first asked for.
+    root: OnceLock<Vec<u8>>,
+    groups: Groups,
+    leaf_sizes: Vec<usize>,
+    /// Where leaves of tiles lie, and what they hold, once they were needed.
+    tile_leaves: Vec<(u64, u32)>,
+    tiles: Vec<OnceLock<Box<[TilePlace]>>>,
+    rules: Rules,
+    tables: DecodeTables,
+    cache: Cache,
+    scratch: Mutex<Vec<Scratch>>,
+    /// Whether the whole may be unpacked for those who need it, and what came of that.
+    lends_whole: bool,
+    whole: OnceLock<Option<Vec<u8>>>,
+}
+
+impl PackedSource {
+    /// Opens the packed file `inner`: reads its front.
+    ///
+    /// # Errors
+    /// A damaged front; a way of packing that is not known; I/O.
+    pub(crate) fn open(inner: Box<dyn Source>) -> Result<Self, LayoutError> {
+        let length = inner.byte_count();
+        let path = inner.path().to_owned();
+        let path = &*path;
+        let mut first = vec![0; to_usize(length.min(FIRST_READ))?];
+        inner.read_at(0, &mut first)?;
+        let Some(page) = first.first_chunk::<PAGE_BYTES>() else {
+            let problem = format!("the file is cut short: it has {length} bytes; copy it again");
+            return Err(LayoutError::damaged(path, format!("byte {length}"), problem));
+        };
+        let (container, current) = Container::parse(path, page, length)?;
+        let front = Front::read(&*inner, &container, first)?;
+        let mut other = Box::new([0; PAGE_BYTES]);
+        let other_bytes = front.section(&*inner, &container.section(OTHER_SLOT), "other header")?;
+        if !other_bytes.is_empty() {
+            let whole = other_bytes.first_chunk().ok_or_else(|| odd(path, "other header"))?;
+            other = Box::new(*whole);
+        }
+        let slots = if container.is_second { [other, current] } else { [current, other] };
+        let header = Header::current(path, &slots[0], &slots[1])?;
+        let place = check_shape(path, &header)?;
+        let runs = front.section(&*inner, &container.section(RUNS), "record pages")?;
+        let present = present_pages(&runs, header.record_pages(), header.stored_pages)
+            .ok_or_else(|| odd(path, "record pages"))?;
+        let sums = front.section(&*inner, &container.section(SUMS), "page checksums")?;
+        if sums.len() as u64 != 4 * header.stored_pages {
+            return Err(odd(path, "page checksums"));
+        }
+        let sums = (0..present.len()).map(|i| get_u32(&sums, 4 * i)).collect();
+        let leaves = leaves_of(&present);
+        if u64::from(header.root_page) != FIRST_PAGE + header.stored_pages + leaves.len() as u64 {
+            return Err(odd(path, "record pages"));
+        }
+        let model = front.section(&*inner, &container.section(MODEL), "tables")?;
+        let tables = DecodeTables::of(&Model::parse(&model).ok_or_else(|| odd(path, "tables"))?);
+        let groups = Groups::of(&header.grid);
+        let leaf_sizes = groups.leaf_sizes();
+        let root = front.section(&*inner, &container.section(ROOT), "tile directory")?;
+        if root.len() != groups.leaves * LEAF_BYTES {
+            return Err(odd(path, "tile directory"));
+        }
+        let tail = container.section(TAIL).bytes;
+        if place + tail != header.file_bytes {
+            return Err(odd(path, "imagery"));
+        }
+        Ok(Self {
+            tile_leaves: (0..groups.leaves)
+                .map(|i| (get_u64(&root, i * LEAF_BYTES), get_u32(&root, i * LEAF_BYTES + 8)))
+                .collect(),
+            tiles: (0..groups.leaves).map(|_| OnceLock::new()).collect(),
+            rules: Rules::new(&header.grid, &header.scale),
+            inert: inert_page(header.record_kind),
+            cache: Cache::new(CACHE_BYTES),
+            scratch: Mutex::default(),
+            lends_whole: false,
+            whole: OnceLock::new(),
+            root: OnceLock::new(),
+            inner,
+            container,
+            header,
+            slots,
+            present,
+            sums,
+            leaves,
+            groups,
+            leaf_sizes,
+            tables,
+        })
+    }
+
+    /// Lends all bytes of the terrain file, unpacked when they are first asked for: what takes all records needs them all in memory.
+    pub(crate) fn lending_whole(mut self) -> Self {
+        self.lends_whole = true;
+        self
+    }
+
+    /// All bytes of the terrain file; `None` if there is no memory for them, or some of them cannot be read.
+    fn unpack_whole(&self) -> Option<Vec<u8>> {
+        let mut bytes = Vec::new();
+        bytes.try_reserve_exact(usize::try_from(self.header.file_bytes).ok()?).ok()?;
+        bytes.resize(bytes.capacity(), 0);
+        bytes.truncate(self.header.file_bytes as usize);
+        let fill = |(i, chunk): (usize, &mut [u8])| self.read_at((i * WHOLE_BYTES) as u64, chunk).ok();
+        #[cfg(feature = "files")]
+        {
+            use rayon::prelude::*;
+            bytes.par_chunks_mut(WHOLE_BYTES).enumerate().map(fill).collect::<Option<()>>()?;
+        }
+        #[cfg(not(feature = "files"))]
+        bytes.chunks_mut(WHOLE_BYTES).enumerate().map(fill).collect::<Option<()>>()?;
+        Some(bytes)
+    }
+
+    /// Where the tile directory's leaf `leaf` says its tiles lie.
+    fn leaf(&self, leaf: usize) -> Result<&[TilePlace], LayoutError> {
+        let known = &self.tiles[leaf];
+        if let Some(places) = known.get() {
+            return Ok(places);
+        }
+        let count = self.leaf_sizes[leaf];
+        let (offset, sum) = self.tile_leaves[leaf];
+        let mut places = vec![TilePlace::default(); count];
+        if offset > 0 {
+            let damaged = |problem: &str| {
+                LayoutError::damaged_terrain(self.path(), format!("tile directory leaf {leaf}"), problem)
+            };
+            let mut bytes = vec![0; count * PLACE_BYTES];
+            let end = offset.checked_add(bytes.len() as u64);
+            if end.is_none_or(|end| end > self.container.packed_bytes) {
+                return Err(damaged("it lies outside the file"));
+            }
+            self.inner.read_at(offset, &mut bytes)?;
+            if checksum(&bytes) != sum {
+                return Err(damaged("the checksum does not match"));
+            }
+            places.iter_mut().enumerate().for_each(|(i, place)| *place = TilePlace::read(&bytes, i));
+        }
+        let _ = known.set(places.into());
+        known.get().map(|places| &**places).ok_or_else(|| odd(self.path(), "tile directory"))
+    }
+
+    /// The records of a tile down to octave `finest`, counted from its own finest; `None` if they are all inert.
+    fn tile(&self, id: TileId, finest: u32) -> Result<Option<Arc<TileRecords>>, LayoutError> {
+        let Some((leaf, within)) = self.groups.leaf_of(id) else { return Ok(None) };
+        if let Some(tile) = self.cache.get(id, finest) {
+            return Ok(Some(tile));
+        }
+        let place = self.leaf(leaf)?[within];
+        if !place.is_present() {
+            return Ok(None);
+        }
+        let shape = self.groups.shape(id);
+        let segments = TileShape::segment_of(finest.min(shape.tile_log.saturating_sub(1))) + 1;
+        let tile = Arc::new(self.unpack(id, &shape, &place, segments)?);
+        self.cache.put(id, Arc::clone(&tile));
+        Ok(Some(tile))
+    }
+
+    /// Reads and unpacks a tile.
+    fn unpack(
+        &self,
+        id: TileId,
+        shape: &TileShape,
+        place: &TilePlace,
+        segments: usize,
+    ) -> Result<TileRecords, LayoutError> {
+        let damaged = |problem: &str| {
+            let [x, y] = id.at;
+            let stride = 1u64 << shape.stride_log;
+            LayoutError::damaged_terrain(self.path(), format!("tile {x}, {y} of stride {stride}"), problem)
+        };
+        let mut bytes = vec![0; place.bytes(segments)];
+        if place.offset.saturating_add(bytes.len() as u64) > self.container.packed_bytes {
+            return Err(damaged("it lies outside the file"));
+        }
+        self.inner.read_at(place.offset, &mut bytes)?;
+        let mut decoders = Vec::with_capacity(segments);
+        let mut rest = &bytes[..];
+        for s in 0..segments {
+            let (segment, after) = rest.split_at(place.lengths[s].into());
+            if checksum(segment) != place.checksums[s] {
+                return Err(damaged("the checksum does not match"));
+            }
+            let wrong = || damaged("it holds something else than a tile");
+            decoders.push(Decoder::new(&self.tables, segment).ok_or_else(wrong)?);
+            rest = after;
+        }
+        let scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut scratch = scratch.unwrap_or_default();
+        let records = walk(shape, &self.rules, &mut scratch, &mut decoders, None);
+        self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+        if decoders.iter().all(Decoder::finish) {
+            Ok(records)
+        } else {
+            Err(damaged("it holds something else than a tile"))
+        }
+    }
+
+    /// Fills a record page.
+    fn record_page(&self, logical: u32, page: &mut Page) -> Result<(), LayoutError> {
+        let k = self.header.grid.k();
+        let mut near: Vec<(TileId, Option<Arc<TileRecords>>)> = Vec::new();
+        let first = u64::from(logical) * self.header.records_per_page();
+        for (slot, place) in (first..).zip(page.as_chunks_mut::<4>().0) {
+            let mut record = INERT;
+            if let Some(p) = point_of(k, slot) {
+                let octave = self.groups.octave(p);
+                let (id, at) = self.groups.tile_of(p, octave);
+                let finest = octave.saturating_sub(self.groups.groups[usize::from(id.group)].stride_log);
+                let is_it = |(known, tile): &(TileId, Option<Arc<TileRecords>>)| {
+                    *known == id && tile.as_ref().is_none_or(|tile| tile.finest <= finest)
+                };
+                let found = match near.iter().position(is_it) {
+                    Some(found) => found,
+                    None => {
+                        near.push((id, self.tile(id, finest)?));
+                        near.len() - 1
+                    }
+                };
+                record = near[found].1.as_ref().map_or(INERT, |tile| tile.at(at));
+                // The next vertex is likely to be in the same tile.
+                near.swap(0, found);
+            }
+            *place = record.to_le_bytes();
+        }
+        Ok(())
+    }
+
+    /// One page of the terrain file, other than of imagery.
+    fn page(&self, number: u64, page: &mut Page) -> Result<(), LayoutError> {
+        let stored = self.header.stored_pages;
+        match number {
+            0 | 1 => *page = *self.slots[number as usize],
+            2 => *page = *self.inert,
+            _ if number - FIRST_PAGE < stored => {
+                self.record_page(self.present[(number - FIRST_PAGE) as usize], page)?;
+            }
+            _ if number < u64::from(self.header.root_page) => {
+                let at = (number - FIRST_PAGE - stored) as usize;
+                page.copy_from_slice(&self.directory_leaf(at));
+            }
+            _ => {
+                let root = self.root.get_or_init(|| self.directory_root());
+                let at = (number - u64::from(self.header.root_page)) as usize * PAGE_BYTES;
+                page.fill(0);
+                let bytes = root.get(at..).unwrap_or_default();
+                let count = bytes.len().min(PAGE_BYTES);
+                page[..count].copy_from_slice(&bytes[..count]);
+            }
+        }
+        Ok(())
+    }
+
+    /// A leaf of the terrain file's directory, of those that are present.
+    fn directory_leaf(&self, at: usize) -> Vec<u8> {
+        let (number, first) = self.leaves[at];
+        let end = self.leaves.get(at + 1).map_or(self.present.len(), |(_, next)| *next);
+        let mut entries = vec![Entry::default(); ENTRIES_PER_LEAF];
+        for i in first..end {
+            let within = self.present[i] as usize - number as usize * ENTRIES_PER_LEAF;
+            entries[within] =
+                Entry { page: (FIRST_PAGE as usize + i) as u32, checksum: self.sums[i], generation: 1 };
+        }
+        leaf_page(&entries)
+    }
+
+    /// The root of the terrain file's directory.
+    fn directory_root(&self) -> Vec<u8> {
+        let mut bytes = vec![0; self.header.root_entries() as usize * ENTRY_BYTES];
+        let first = (FIRST_PAGE + self.header.stored_pages) as u32;
+        for (at, (number, _)) in self.leaves.iter().enumerate() {
+            let sum = checksum(&self.directory_leaf(at));
+            let entry = Entry { page: first + at as u32, checksum: sum, generation: 1 };
+            entry.write(&mut bytes, *number as usize);
+        }
+        bytes
+    }
+
+    /// Where imagery begins in the terrain file.
+    fn tail_start(&self) -> u64 {
+        self.header.file_bytes - self.container.section(TAIL).bytes
+    }
+}
+
+impl Source for PackedSource {
+    fn path(&self) -> &Path {
+        self.inner.path()
+    }
+
+    /// That of the terrain file.
+    fn byte_count(&self) -> u64 {
+        self.header.file_bytes
+    }
+
+    fn packed_bytes(&self) -> Option<u64> {
+        Some(self.container.packed_bytes)
+    }
+
+    fn bytes(&self) -> Option<&[u8]> {
+        if !self.lends_whole {
+            return None;
+        }
+        self.whole.get_or_init(|| self.unpack_whole()).as_deref()
+    }
+
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
+        let end = offset.checked_add(buffer.len() as u64).filter(|end| *end <= self.header.file_bytes);
+        if end.is_none() {
+            return Err(LayoutError::damaged(self.path(), format!("byte {offset}"), "the data ends before it"));
+        }
+        let tail = self.tail_start();
+        let (mut at, mut rest) = (offset, buffer);
+        let mut page = Box::new([0; PAGE_BYTES]);
+        while !rest.is_empty() {
+            if at >= tail {
+                return self.inner.read_at(self.container.section(TAIL).offset + (at - tail), rest);
+            }
+            let within = (at % PAGE) as usize;
+            let count = rest.len().min(PAGE_BYTES - within);
+            self.page(at / PAGE, &mut page)?;
+            let (here, after) = rest.split_at_mut(count);
+            here.copy_from_slice(&page[within..within + count]);
+            (at, rest) = (at + count as u64, after);
+        }
+        Ok(())
+    }
+}
+
+/// The first bytes of a file: as far as one more read reaches all sections but imagery.
+struct Front(Vec<u8>);
+
+impl Front {
+    fn read(inner: &dyn Source, container: &Container, first: Vec<u8>) -> Result<Self, LayoutError> {
+        let needed = container.sections.iter().filter(|section| section.kind != TAIL);
+        let end = needed.clone().map(|section| section.offset + section.bytes).max().unwrap_or(0);
+        let sum: u64 = needed.map(|section| section.bytes).sum();
+        let mut bytes = first;
+        // Files that have other things between them are read section by section.
+        if end > bytes.len() as u64 && end <= sum + FIRST_READ {
+            let from = bytes.len();
+            bytes.resize(to_usize(end)?, 0);
+            inner.read_at(from as u64, &mut bytes[from..])?;
+        }
+        Ok(Self(bytes))
+    }
+
+    fn section(
+        &self,
+        inner: &dyn Source,
+        section: &Section,
+        name: &'static str,
+    ) -> Result<Vec<u8>, LayoutError> {
+        let (from, count) = (to_usize(section.offset)?, to_usize(section.bytes)?);
+        let bytes = match self.0.get(from..from + count) {
+            Some(bytes) => bytes.to_vec(),
+            None => {
+                let mut bytes = vec![0; count];
+                inner.read_at(section.offset, &mut bytes)?;
+                bytes
+            }
+        };
+        if checksum(&bytes) != section.checksum {
+            let problem = "the checksum does not match";
+            return Err(LayoutError::damaged_terrain(inner.path(), name.into(), problem));
+        }
+        Ok(bytes)
+    }
+}
+
+/// A part that contradicts the header.
+fn odd(path: &Path, place: &'static str) -> LayoutError {
+    LayoutError::damaged_terrain(path, place.into(), "they are not what the header says")
+}
+
+/// Whether a header is one of a file that can have been packed; where its directory ends.
+fn check_shape(path: &Path, header: &Header) -> Result<u64, LayoutError> {
+    if header.record_kind != RecordKind::Compact || header.history.is_some() {
+        let problem = "it holds what packed terrain does not: exact records, or a journal";
+        return Err(LayoutError::damaged_terrain(path, "header".into(), problem));
+    }
+    let root_pages = (header.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE);
+    Ok((u64::from(header.root_page) + root_pages) * PAGE)
+}
+
+/// Leaves of the terrain file's directory that hold pages which are present, and the place of the first in `present`.
+fn leaves_of(present: &[u32]) -> Vec<(u32, usize)> {
+    let mut leaves: Vec<(u32, usize)> = Vec::new();
+    for (at, page) in present.iter().enumerate() {
+        let leaf = page / ENTRIES_PER_LEAF as u32;
+        if leaves.last().is_none_or(|(last, _)| *last != leaf) {
+            leaves.push((leaf, at));
+        }
+    }
+    leaves
+}

@@ -1,0 +1,242 @@
+//! Packed terrain: the same terrain file, read in whatever way, and damage that is told.
+
+mod common;
+
+use common::{MemoryDem, build_bytes};
+use proptest::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use terrasoar_layout::LayoutError;
+use terrasoar_layout::build::BuildOptions;
+use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::file::source::MemorySource;
+use terrasoar_layout::grid::record::RecordKind;
+use terrasoar_layout::packed::{pack, unpack};
+use terrasoar_layout::progress::Silent;
+use terrasoar_layout::read::loader::{Loader, Outcome, PageRequest};
+use terrasoar_layout::read::terrain::Terrain;
+use terrasoar_layout::verify::verify;
+
+/// Hills with voids, as rough as asked.
+fn dem(size: [u32; 2], roughness: u32, voids: u32) -> MemoryDem {
+    MemoryDem::from_fn(size, SampleType::I16, move |x, y| {
+        if voids > 0 && x + y > 0 && (x / 13 + 3 * (y / 17)) % 7 < voids {
+            return f64::NAN;
+        }
+        let (u, v) = (f64::from(x), f64::from(y));
+        let rough = f64::from((x * 31 + y * 57) ^ (x * y)) % f64::from(1 + roughness);
+        (900.0 + 200.0 * (u * 0.031).sin() + 150.0 * (v * 0.043).cos() + rough).round()
+    })
+}
+
+fn options() -> BuildOptions {
+    BuildOptions::default().record(Some(RecordKind::Compact)).spacing_m([20.0, 25.0])
+}
+
+struct Bench {
+    _folder: tempfile::TempDir,
+    plain: PathBuf,
+    packed: PathBuf,
+}
+
+impl Bench {
+    fn of(bytes: &[u8]) -> Result<Self, LayoutError> {
+        let folder = tempfile::tempdir().unwrap();
+        let (plain, packed) = (folder.path().join("plain.iqt"), folder.path().join("packed.iqt"));
+        std::fs::write(&plain, bytes).unwrap();
+        pack(&SystemDisk, &plain, &packed, &Silent)?;
+        Ok(Self { _folder: folder, plain, packed })
+    }
+
+    fn bytes(&self, path: &Path) -> Vec<u8> {
+        std::fs::read(path).unwrap()
+    }
+}
+
+fn open(bytes: Vec<u8>) -> Result<Terrain, LayoutError> {
+    Terrain::from_source(Box::new(MemorySource::new("packed", bytes)))
+}
+
+/// Whether every page of two terrains is the same.
+fn assert_same(a: &Terrain, b: &Terrain) {
+    assert_eq!(a.header(), b.header());
+    assert_eq!(a.entries(), b.entries());
+    // From the last to the first, so that tiles are asked for in another order than they were written in.
+    for page in (0..a.entries().len() as u64).rev() {
+        assert!(a.checked_page(page).unwrap() == b.checked_page(page).unwrap(), "page {page}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn packed_terrain_is_the_terrain(
+        wide in 2u32..300, high in 2u32..300, roughness in prop_oneof![Just(0u32), Just(5), Just(9000)], voids in 0u32..8,
+    ) {
+        let bytes = build_bytes(&dem([wide, high], roughness, voids), &options()).unwrap();
+        let bench = Bench::of(&bytes).unwrap();
+        let back = bench.plain.with_file_name("back.iqt");
+        unpack(&SystemDisk, &bench.packed, &back, &Silent).unwrap();
+        prop_assert!(bench.bytes(&back) == bytes);
+        assert_same(&Terrain::open(&bench.plain).unwrap(), &open(bench.bytes(&bench.packed)).unwrap());
+    }
+}
+
+/// Larger than a tile of the second group, in every way of reading.
+#[test]
+fn packed_terrain_is_read_in_every_way() {
+    let bytes = build_bytes(&dem([700, 530], 3, 2), &options()).unwrap();
+    let bench = Bench::of(&bytes).unwrap();
+    let (plain, packed) = (Terrain::open(&bench.plain).unwrap(), Terrain::open(&bench.packed).unwrap());
+    assert_same(&plain, &packed);
+    assert!(packed.source().bytes() == Some(&bytes[..]));
+    assert!(packed.bytes_per_sample() < 0.6 * plain.bytes_per_sample());
+    let packed = Terrain::open_unmapped(&bench.packed).unwrap();
+    assert!(packed.records().is_none());
+    let report = verify(&packed, &|_| {}).unwrap();
+    assert_eq!(report.problems, []);
+    assert_eq!(report, verify(&plain, &|_| {}).unwrap());
+    for place in [[0.0, 0.0], [133.0, 207.0], [7777.0, 9999.0], [13_980.0, 13_225.0]] {
+        assert_eq!(plain.height_m(place[0], place[1]).unwrap(), packed.height_m(place[0], place[1]).unwrap());
+    }
+    // By a loader's threads.
+    let packed = Arc::new(packed);
+    let loader = Loader::start(Arc::clone(&packed), 3).unwrap();
+    let pages = packed.entries().len() as u64;
+    loader.ask(1, &(0..pages).map(|page| PageRequest { page, due: 1 }).collect::<Vec<_>>());
+    for _ in 0..pages {
+        let arrival = loader.take_within(std::time::Duration::from_secs(60)).unwrap();
+        let Outcome::Read(page) = arrival.outcome else { panic!("{arrival:?}") };
+        assert!(page == plain.checked_page(arrival.page).unwrap());
+    }
+}
+
+/// What cannot be packed, and what packed terrain cannot do, is said.
+#[test]
+fn what_is_not_supported_is_refused() {
+    let bytes = build_bytes(&dem([90, 70], 3, 0), &options()).unwrap();
+    let bench = Bench::of(&bytes).unwrap();
+    let out = bench.plain.with_file_name("out.iqt");
+    let error = pack(&SystemDisk, &bench.packed, &out, &Silent).unwrap_err().to_string();
+    assert!(error.contains("packed already"), "{error}");
+    let error = unpack(&SystemDisk, &bench.plain, &out, &Silent).unwrap_err().to_string();
+    assert!(error.contains("not packed"), "{error}");
+    let exact = build_bytes(&dem([90, 70], 3, 0), &options().record(Some(RecordKind::Exact8))).unwrap();
+    let error = Bench::of(&exact).err().unwrap().to_string();
+    assert!(error.contains("compact ones"), "{error}");
+    let error = terrasoar_layout::edit::EditSession::open(&bench.packed).err().unwrap().to_string();
+    assert!(error.contains("terrasoar unpack"), "{error}");
+    assert!(!out.exists());
+}
+
+/// Other versions and ways of packing are refused in words, with a sound checksum.
+#[test]
+fn what_is_not_known_is_refused() {
+    let bytes = build_bytes(&dem([90, 70], 3, 0), &options()).unwrap();
+    let bench = Bench::of(&bytes).unwrap();
+    let packed = bench.bytes(&bench.packed);
+    for (at, value, word) in [(0x00a, 1, "version 2.1"), (0x100, 2, "scheme 2"), (0x105, 7, "tiles"), (0x120, 9, "kind 9")] {
+        let mut other = packed.clone();
+        other[at] = value;
+        seal(&mut other);
+        let error = open(other).err().unwrap().to_string();
+        assert!(error.contains(word) && error.contains("newer terrasoar"), "{error}");
+    }
+    // A section that may be left out is.
+    let mut more = packed.clone();
+    more[0x107] += 1;
+    let at = 0x120 + 24 * usize::from(packed[0x107]);
+    more[at..at + 4].copy_from_slice(&0x8000_0009u32.to_le_bytes());
+    seal(&mut more);
+    assert_same(&open(more).unwrap(), &open(packed).unwrap());
+}
+
+fn seal(bytes: &mut [u8]) {
+    let sum = crc32fast::hash(&bytes[..0xffc]);
+    bytes[0xffc..0x1000].copy_from_slice(&sum.to_le_bytes());
+}
+
+fn number(bytes: &[u8], at: usize, count: usize) -> usize {
+    bytes[at..at + count].iter().rev().fold(0, |sum, byte| sum << 8 | usize::from(*byte))
+}
+
+/// Makes all checksums right again: of tiles, leaves, sections and the header, where they lie in the file.
+fn seal_all(bytes: &mut [u8], leaf_tiles: &[usize]) {
+    let put = |bytes: &mut [u8], at: usize, range: std::ops::Range<usize>| {
+        if let Some(part) = bytes.get(range) {
+            let sum = crc32fast::hash(part).to_le_bytes();
+            bytes[at..at + 4].copy_from_slice(&sum);
+        }
+    };
+    let sections: Vec<usize> = (0..usize::from(bytes[0x107]).min(8)).map(|i| 0x120 + 24 * i).collect();
+    for at in sections {
+        let (kind, from, count) = (number(bytes, at, 4), number(bytes, at + 8, 6), number(bytes, at + 16, 6));
+        if kind == 4 && from + count <= bytes.len() {
+            for (i, tiles) in leaf_tiles.iter().enumerate().filter(|(i, _)| 12 * i + 12 <= count) {
+                let leaf = number(bytes, from + 12 * i, 6);
+                if leaf + 24 * tiles > bytes.len() {
+                    continue;
+                }
+                for tile in (0..*tiles).map(|t| leaf + 24 * t) {
+                    let mut segment = number(bytes, tile, 6);
+                    for s in 0..3 {
+                        let length = number(bytes, tile + 6 + 2 * s, 2);
+                        put(bytes, tile + 12 + 4 * s, segment..segment + length);
+                        segment += length;
+                    }
+                }
+                put(bytes, from + 12 * i + 8, leaf..leaf + 24 * tiles);
+            }
+        }
+        if kind != 6 {
+            put(bytes, at + 4, from..from + count);
+        }
+    }
+    seal(bytes);
+}
+
+/// Cuts and flipped bits anywhere are told, or do no harm; nothing panics. With checksums made right again pages still have theirs.
+#[test]
+fn damage_is_told() {
+    // 200 x 150 in a square of 256: the group of stride 1 has 4 x 4 tiles, of which the data reach 4 x 4; the other one tile.
+    let bytes = build_bytes(&dem([200, 150], 3, 1), &options()).unwrap();
+    let bench = Bench::of(&bytes).unwrap();
+    let packed = bench.bytes(&bench.packed);
+    let plain = open(bytes).unwrap();
+    let look = |damaged: Vec<u8>| -> Result<(), LayoutError> {
+        let terrain = open(damaged)?;
+        for page in 0..terrain.entries().len() as u64 {
+            let read = terrain.checked_page(page)?;
+            assert!(plain.entries().len() as u64 != terrain.entries().len() as u64 || read == plain.checked_page(page).unwrap());
+        }
+        Ok(())
+    };
+    look(packed.clone()).unwrap();
+    let mut random = 7u64;
+    let mut below = |end: usize| {
+        random = random.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+        ((random >> 33) as usize) % end
+    };
+    let mut told = 0;
+    for round in 0..1200 {
+        let mut damaged = packed.clone();
+        match round % 4 {
+            0 => damaged.truncate(below(packed.len())),
+            1 => damaged[below(packed.len())] ^= 1 << below(8),
+            // Behind the header, and sealed.
+            2 => {
+                damaged[4096 + below(packed.len() - 4096)] ^= 1 << below(8);
+                seal_all(&mut damaged, &[1, 16]);
+            }
+            _ => {
+                let at = 0x100 + below(0x100);
+                damaged[at] = below(256) as u8;
+                seal_all(&mut damaged, &[1, 16]);
+            }
+        }
+        told += usize::from(look(damaged).is_err());
+    }
+    assert!(told > 900, "{told}");
+}
