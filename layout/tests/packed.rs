@@ -11,9 +11,12 @@ use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::source::MemorySource;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::packed::{pack, unpack};
 use terrasoar_layout::progress::Silent;
+use terrasoar_layout::read::kinds::ByKind;
 use terrasoar_layout::read::loader::{Loader, Outcome, PageRequest};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
@@ -239,4 +242,30 @@ fn damage_is_told() {
         told += usize::from(look(damaged).is_err());
     }
     assert!(told > 900, "{told}");
+}
+
+/// Another reader, written from FORMAT.md alone, finds the same records.
+#[test]
+fn a_reader_written_from_the_specification_agrees() {
+    let python = |args: &[&std::ffi::OsStr]| std::process::Command::new("python3").args(args).output();
+    if python(&["--version".as_ref()]).is_err() {
+        eprintln!("no Python here: not compared");
+        return;
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data-scripts/read_packed.py");
+    for (size, roughness, voids) in [([150, 131], 4, 2), ([70, 9], 900, 0), ([3, 2], 0, 0)] {
+        let bench = Bench::of(&build_bytes(&dem(size, roughness, voids), &options()).unwrap()).unwrap();
+        let out = bench.plain.with_file_name("records");
+        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        let found = bench.bytes(&out);
+        let plain = Terrain::open(&bench.plain).unwrap();
+        let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
+        for (i, record) in found.chunks_exact(4).enumerate() {
+            let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
+            let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));
+            assert_eq!(record, records.raw(slot).to_le_bytes(), "{size:?}: {x}, {y}");
+        }
+        assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
+    }
 }
