@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::drape::{draped, land, same_picture};
 use common::{MemoryDem, build_bytes};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
@@ -9,11 +10,13 @@ use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::edit::{EditSession, compact};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::grid::record::RecordKind;
+use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
 use terrasoar_layout::packed::{pack, unpack};
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::kinds::ByKind;
@@ -129,9 +132,46 @@ fn what_is_not_supported_is_refused() {
     let exact = build_bytes(&dem([90, 70], 3, 0), &options().record(Some(RecordKind::Exact8))).unwrap();
     let error = Bench::of(&exact).err().unwrap().to_string();
     assert!(error.contains("compact ones"), "{error}");
-    let error = terrasoar_layout::edit::EditSession::open(&bench.packed).err().unwrap().to_string();
+    let error = EditSession::open(&bench.packed).err().unwrap().to_string();
     assert!(error.contains("terrasoar unpack"), "{error}");
     assert!(!out.exists());
+    // Whoever would write to it is refused before a byte is written.
+    let before = bench.bytes(&bench.packed);
+    let picture = || MemoryImage::from_fn([21, 10], |x, y| [x as u8 * 9, y as u8 * 20, 7, 255]);
+    for error in [
+        draped(&bench.packed, picture(), &DrapeOptions::default()).err(),
+        compact(&SystemDisk, &bench.packed, None, &bench.packed, &Silent).err(),
+        EditSession::open_overlay(&bench.packed, &out).err(),
+        Terrain::open_with_overlay(&bench.packed, &bench.packed).err(),
+    ] {
+        let error = error.unwrap().to_string();
+        assert!(error.contains("terrasoar unpack"), "{error}");
+    }
+    assert!(bench.bytes(&bench.packed) == before);
+    assert!(!out.exists());
+    // Compacted to another file it is unpacked.
+    compact(&SystemDisk, &bench.packed, None, &out, &Silent).unwrap();
+    assert!(bench.bytes(&out) == bytes);
+}
+
+/// A picture comes along; and an edited terrain is written anew first.
+#[test]
+fn pictures_are_packed_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let [plain, packed, back] = ["plain.iqt", "packed.iqt", "back.iqt"].map(|name| folder.path().join(name));
+    land(&plain);
+    draped(&plain, MemoryImage::from_fn([210, 100], |x, y| [x as u8, y as u8, 7, 255]), &DrapeOptions::default()).unwrap();
+    pack(&SystemDisk, &plain, &packed, &Silent).unwrap();
+    let (a, b) = (Terrain::open(&plain).unwrap(), Terrain::open_unmapped(&packed).unwrap());
+    assert!(same_picture(&a, &b));
+    assert_same(&a, &b);
+    unpack(&SystemDisk, &packed, &back, &Silent).unwrap();
+    assert!(std::fs::read(&back).unwrap() == std::fs::read(&plain).unwrap());
+    // Draped again, it holds a picture that nothing leads to.
+    draped(&plain, MemoryImage::from_fn([21, 10], |_, _| [1, 2, 3, 255]), &DrapeOptions::default()).unwrap();
+    pack(&SystemDisk, &plain, &packed, &Silent).unwrap();
+    unpack(&SystemDisk, &packed, &back, &Silent).unwrap();
+    assert!(std::fs::read(&back).unwrap() == std::fs::read(&plain).unwrap());
 }
 
 /// Other versions and ways of packing are refused in words, with a sound checksum.

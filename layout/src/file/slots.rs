@@ -4,6 +4,7 @@ use super::bytes::{PAGE_BYTES, Page};
 use super::header::{Header, MAGIC};
 use super::source::Source;
 use crate::error::LayoutError;
+use crate::packed::only_read;
 use std::path::Path;
 
 const PAGE: u64 = PAGE_BYTES as u64;
@@ -27,6 +28,9 @@ impl Slots {
 
     /// As [`Slots::read`], of a file that begins with `magic`.
     pub(crate) fn read_as(source: &dyn Source, start: u64, magic: [u8; 8]) -> Result<Self, LayoutError> {
+        if source.packed_bytes().is_some() {
+            return Err(only_read(source.path()));
+        }
         let page = |number: u64| -> Result<Box<Page>, LayoutError> {
             let mut page = Box::new([0; PAGE_BYTES]);
             source.read_at(start + number * PAGE, &mut page[..])?;
