@@ -336,7 +336,7 @@ fn foreign_files_are_called_foreign() {
     let png = include_bytes!("../../tests/data/puget_sound_1025.png");
     let newer = {
         let mut bytes = file(None);
-        bytes[8] = 2;
+        bytes[8] = 3;
         bytes
     };
     let foreign: [(&str, Vec<u8>); 6] = [

@@ -160,7 +160,12 @@ fn pictures_are_packed_too() {
     let folder = tempfile::tempdir().unwrap();
     let [plain, packed, back] = ["plain.iqt", "packed.iqt", "back.iqt"].map(|name| folder.path().join(name));
     land(&plain);
-    draped(&plain, MemoryImage::from_fn([210, 100], |x, y| [x as u8, y as u8, 7, 255]), &DrapeOptions::default()).unwrap();
+    draped(
+        &plain,
+        MemoryImage::from_fn([210, 100], |x, y| [x as u8, y as u8, 7, 255]),
+        &DrapeOptions::default(),
+    )
+    .unwrap();
     pack(&SystemDisk, &plain, &packed, &Silent).unwrap();
     let (a, b) = (Terrain::open(&plain).unwrap(), Terrain::open_unmapped(&packed).unwrap());
     assert!(same_picture(&a, &b));
@@ -180,7 +185,9 @@ fn what_is_not_known_is_refused() {
     let bytes = build_bytes(&dem([90, 70], 3, 0), &options()).unwrap();
     let bench = Bench::of(&bytes).unwrap();
     let packed = bench.bytes(&bench.packed);
-    for (at, value, word) in [(0x00a, 1, "version 2.1"), (0x100, 2, "scheme 2"), (0x105, 7, "tiles"), (0x120, 9, "kind 9")] {
+    for (at, value, word) in
+        [(0x00a, 1, "version 2.1"), (0x100, 2, "scheme 2"), (0x105, 7, "tiles"), (0x120, 9, "kind 9")]
+    {
         let mut other = packed.clone();
         other[at] = value;
         seal(&mut other);
@@ -252,7 +259,10 @@ fn damage_is_told() {
         let terrain = open(damaged)?;
         for page in 0..terrain.entries().len() as u64 {
             let read = terrain.checked_page(page)?;
-            assert!(plain.entries().len() as u64 != terrain.entries().len() as u64 || read == plain.checked_page(page).unwrap());
+            assert!(
+                plain.entries().len() as u64 != terrain.entries().len() as u64
+                    || read == plain.checked_page(page).unwrap()
+            );
         }
         Ok(())
     };

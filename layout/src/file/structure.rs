@@ -1,6 +1,8 @@
 //! What is checked when a terrain file is opened: header, directory, inert page (FORMAT.md, section 6). Record pages are checked when they are read.
 //!
-//! Invariant: every page number of the directory that is handed out lies inside the source as it was when it was opened, and no page has two uses. Cost: a read a leaf page.
+//! Invariant: every page number of the directory that is handed out lies inside the source as it was when it was opened, and no page has two uses. Cost: three reads for a file as a build leaves it, one
+//! of the first three pages, one of the root, and one of all leaves, which lie one after the other; a read more for each place where leaves of an edited file lie apart, and for each
+//! 8 MiB of them.
 
 use super::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use super::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, absent};
@@ -13,10 +15,13 @@ use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
 use crate::packed::{is_packed, only_read};
 use std::path::Path;
 
+/// Leaves read at once, at most: 8 MiB.
+const RUN_LEAVES: usize = 2048;
+
 /// Reads and checks header and directory (FORMAT.md, section 6).
 pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>), LayoutError> {
-    let header = read_header(source)?;
-    let entries = check_structure(source, &header)?;
+    let (header, inert) = read_front(source)?;
+    let entries = check_structure(source, &header, &inert)?;
     Ok((header, entries))
 }
 
@@ -24,19 +29,17 @@ pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>)
 #[cfg(feature = "files")]
 pub(crate) fn read_growing(file: &mut PreadSource) -> Result<(Header, Vec<Entry>), LayoutError> {
     // The header first and then the length: what a header counts was in the file before the header was.
-    let header = read_header(file)?;
+    let (header, inert) = read_front(file)?;
     file.measure_again()?;
-    let entries = check_structure(file, &header)?;
+    let entries = check_structure(file, &header, &inert)?;
     Ok((header, entries))
 }
 
-/// The current header.
-fn read_header(source: &dyn Source) -> Result<Header, LayoutError> {
+/// The current header, and the inert page, which is behind the two slots.
+fn read_front(source: &dyn Source) -> Result<(Header, Box<Page>), LayoutError> {
     let path = source.path();
     let length = source.byte_count();
     let page_bytes = PAGE_BYTES as u64;
-    let mut slot_a = Box::new([0; PAGE_BYTES]);
-    let mut slot_b = Box::new([0; PAGE_BYTES]);
     if length < 4 * page_bytes {
         let mut start = [0; 16];
         let have = (length as usize).min(start.len());
@@ -54,18 +57,25 @@ fn read_header(source: &dyn Source) -> Result<Header, LayoutError> {
             )
         });
     }
-    source.read_at(0, &mut slot_a[..])?;
-    source.read_at(page_bytes, &mut slot_b[..])?;
-    Header::current(path, &slot_a, &slot_b)
+    let mut front = Box::new([[0; PAGE_BYTES]; 3]);
+    source.read_at(0, front.as_flattened_mut())?;
+    let [slot_a, slot_b, inert] = &*front;
+    Ok((Header::current(path, slot_a, slot_b)?, Box::new(*inert)))
 }
 
 /// Whether all that a header leads to is there; the directory.
-fn check_structure(source: &dyn Source, header: &Header) -> Result<Vec<Entry>, LayoutError> {
+fn check_structure(source: &dyn Source, header: &Header, inert: &Page) -> Result<Vec<Entry>, LayoutError> {
     let length = source.byte_count();
     if length < header.file_bytes {
         return Err(truncated(source.path(), length, Some(header.file_bytes)));
     }
-    check_inert_page(source, header)?;
+    if *inert != *inert_page(header.record_kind) {
+        return Err(LayoutError::damaged_terrain(
+            source.path(),
+            "inert page".into(),
+            "it holds something else",
+        ));
+    }
     read_directory(source, header)
 }
 
@@ -95,29 +105,69 @@ pub(crate) fn read_leaf(
     if !here.is_present() {
         return Ok(());
     }
-    let page_bytes = PAGE_BYTES as u64;
-    let in_file = |page: u32| page > INERT_PAGE && (u64::from(page) + 1) * page_bytes <= header.file_bytes;
-    if !in_file(here.page) {
-        return Err(LayoutError::damaged_terrain(
-            source.path(),
-            format!("directory leaf {i}"),
-            "it lies outside the file",
-        ));
-    }
+    check_leaf_place(source, header, i, here)?;
     let mut leaf = [0; PAGE_BYTES];
-    source.read_at(u64::from(here.page) * page_bytes, &mut leaf)?;
-    if checksum(&leaf) != here.checksum {
-        return Err(LayoutError::damaged_terrain(
-            source.path(),
-            format!("directory leaf {i}"),
-            "the checksum does not match",
-        ));
+    source.read_at(u64::from(here.page) * PAGE_BYTES as u64, &mut leaf)?;
+    parse_leaf(source, header, i, here, &leaf, entries)
+}
+
+/// Whether a page may be a leaf or a record page.
+fn is_in_file(header: &Header, page: u32) -> bool {
+    page > INERT_PAGE && (u64::from(page) + 1) * PAGE_BYTES as u64 <= header.file_bytes
+}
+
+fn damaged_leaf(source: &dyn Source, i: usize, problem: &str) -> LayoutError {
+    LayoutError::damaged_terrain(source.path(), format!("directory leaf {i}"), problem)
+}
+
+fn check_leaf_place(source: &dyn Source, header: &Header, i: usize, here: Entry) -> Result<(), LayoutError> {
+    if is_in_file(header, here.page) {
+        Ok(())
+    } else {
+        Err(damaged_leaf(source, i, "it lies outside the file"))
+    }
+}
+
+/// The entries of a leaf that was read.
+fn parse_leaf(
+    source: &dyn Source,
+    header: &Header,
+    i: usize,
+    here: Entry,
+    leaf: &Page,
+    entries: &mut [Entry],
+) -> Result<(), LayoutError> {
+    if checksum(leaf) != here.checksum {
+        return Err(damaged_leaf(source, i, "the checksum does not match"));
     }
     for (j, place) in entries.iter_mut().enumerate() {
-        *place = Entry::read(&leaf, j);
-        if place.is_present() && !in_file(place.page) {
+        *place = Entry::read(leaf, j);
+        if place.is_present() && !is_in_file(header, place.page) {
             let place = format!("directory entry of record page {}", i * ENTRIES_PER_LEAF + j);
             return Err(LayoutError::damaged_terrain(source.path(), place, "the page lies outside the file"));
+        }
+    }
+    Ok(())
+}
+
+/// Fills `entries`, those of all leaves, with those of the leaves `wanted`, which are present. Leaves that lie one after the other are read at once.
+fn read_leaves(
+    source: &dyn Source,
+    header: &Header,
+    root: &[Entry],
+    wanted: &[usize],
+    entries: &mut [Entry],
+) -> Result<(), LayoutError> {
+    let follows = |a: &usize, b: &usize| root[*a].page.checked_add(1) == Some(root[*b].page);
+    let mut bytes = Vec::new();
+    for run in wanted.chunk_by(follows).flat_map(|run| run.chunks(RUN_LEAVES)) {
+        run.iter().try_for_each(|i| check_leaf_place(source, header, *i, root[*i]))?;
+        bytes.resize(run.len() * PAGE_BYTES, 0);
+        source.read_at(u64::from(root[run[0]].page) * PAGE_BYTES as u64, &mut bytes)?;
+        for (i, leaf) in run.iter().zip(bytes.as_chunks::<PAGE_BYTES>().0) {
+            let first = i * ENTRIES_PER_LEAF;
+            let end = (first + ENTRIES_PER_LEAF).min(entries.len());
+            parse_leaf(source, header, *i, root[*i], leaf, &mut entries[first..end])?;
         }
     }
     Ok(())
@@ -142,13 +192,19 @@ pub(crate) fn read_directory_beside(
     uses.take_root(source, header, &root)?;
     let mut entries = absent(to_usize(header.record_pages())?);
     let mut stored = 0;
+    let mut wanted = Vec::new();
     for (i, (here, leaf)) in root.iter().zip(entries.chunks_mut(ENTRIES_PER_LEAF)).enumerate() {
         let first = i * ENTRIES_PER_LEAF;
         let same = known.filter(|(root, _)| here.is_present() && root.get(i) == Some(here));
         match same.and_then(|(_, entries)| entries.get(first..first + leaf.len())) {
             Some(known) => leaf.copy_from_slice(known),
-            None => read_leaf(source, header, i, *here, leaf)?,
+            None if here.is_present() => wanted.push(i),
+            None => {}
         }
+    }
+    read_leaves(source, header, &root, &wanted, &mut entries)?;
+    for (i, (here, leaf)) in root.iter().zip(entries.chunks(ENTRIES_PER_LEAF)).enumerate() {
+        let first = i * ENTRIES_PER_LEAF;
         if here.is_present() {
             uses.take_entries(source, first, leaf)?;
             stored += leaf.iter().filter(|entry| entry.is_present()).count() as u64;
@@ -159,19 +215,6 @@ pub(crate) fn read_directory_beside(
         return Err(LayoutError::damaged_terrain(source.path(), "directory".into(), problem));
     }
     Ok((root, entries))
-}
-
-fn check_inert_page(source: &dyn Source, header: &Header) -> Result<(), LayoutError> {
-    let mut page = Box::new([0; PAGE_BYTES]);
-    source.read_at(u64::from(INERT_PAGE) * PAGE_BYTES as u64, &mut page[..])?;
-    if page[..] != inert_page(header.record_kind)[..] {
-        return Err(LayoutError::damaged_terrain(
-            source.path(),
-            "inert page".into(),
-            "it holds something else",
-        ));
-    }
-    Ok(())
 }
 
 /// A page of inert records.

@@ -97,7 +97,11 @@ impl Container {
     pub(crate) fn parse(path: &Path, page: &Page, length: u64) -> Result<(Self, Box<Page>), LayoutError> {
         let p = &page[..];
         let damaged = |problem: &str| {
-            LayoutError::damaged(path, "header", format!("{problem}; restore a copy or pack the terrain again"))
+            LayoutError::damaged(
+                path,
+                "header",
+                format!("{problem}; restore a copy or pack the terrain again"),
+            )
         };
         if get_u32(p, 0xffc) != checksum(&p[..0xffc]) {
             return Err(damaged("the checksum does not match"));

@@ -52,12 +52,7 @@ pub struct Packed {
 ///
 /// # Errors
 /// Damage and I/O of the terrain; I/O of `to`; [`LayoutError::Unsupported`] for a terrain with exact records, one that was edited since it was built or written anew, and one that is packed already.
-pub fn pack(
-    disk: &dyn Disk,
-    from: &Path,
-    to: &Path,
-    progress: &dyn Progress,
-) -> Result<Packed, LayoutError> {
+pub fn pack(disk: &dyn Disk, from: &Path, to: &Path, progress: &dyn Progress) -> Result<Packed, LayoutError> {
     let terrain = Terrain::open(from)?;
     check_packable(&terrain)?;
     let Some(ByKind::Compact(records)) = terrain.records() else {
@@ -221,7 +216,8 @@ impl Packer<'_> {
             })
             .collect();
 
-        let mut places: Vec<Vec<TilePlace>> = leaf_sizes.iter().map(|size| Vec::with_capacity(*size)).collect();
+        let mut places: Vec<Vec<TilePlace>> =
+            leaf_sizes.iter().map(|size| Vec::with_capacity(*size)).collect();
         let failed = |e| {
             let when_full = "cannot write the packed file, for which there is no room; make some on its disk, or name an output on another";
             LayoutError::write(file.target(), "cannot write the packed file", when_full, e)

@@ -131,8 +131,7 @@ impl Lattices<i32> {
             predicted.chunks_exact_mut(m).zip(classes.chunks_exact_mut(m)).enumerate()
         {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m);
-            let far =
-                [e(-1, 0), e(-1, 1), e(2, 0), e(2, 1), e(0, -1), e(1, -1), e(0, 2), e(1, 2)];
+            let far = [e(-1, 0), e(-1, 1), e(2, 0), e(2, 1), e(0, -1), e(1, -1), e(0, 2), e(1, 2)];
             predict([e(0, 0), e(1, 1), e(1, 0), e(0, 1)], far, predicted, classes);
         }
     }
@@ -146,16 +145,14 @@ impl Lattices<i32> {
         for (j, (predicted, classes)) in rows.enumerate() {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m);
             let w = |dx: isize, dy: isize| self.whites.row(dx, j as isize + dy, m);
-            let far =
-                [w(-1, -1), w(-1, 0), w(1, -1), w(1, 0), e(0, -1), e(1, -1), e(0, 1), e(1, 1)];
+            let far = [w(-1, -1), w(-1, 0), w(1, -1), w(1, 0), e(0, -1), e(1, -1), e(0, 1), e(1, 1)];
             predict([e(0, 0), e(1, 0), w(0, -1), w(0, 0)], far, predicted, classes);
         }
         let rows = north.chunks_exact_mut(m + 1).zip(north_classes.chunks_exact_mut(m + 1));
         for (j, (predicted, classes)) in rows.enumerate() {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m + 1);
             let w = |dx: isize, dy: isize| self.whites.row(dx, j as isize + dy, m + 1);
-            let far =
-                [w(-1, -1), w(0, -1), w(-1, 1), w(0, 1), e(-1, 0), e(-1, 1), e(1, 0), e(1, 1)];
+            let far = [w(-1, -1), w(0, -1), w(-1, 1), w(0, 1), e(-1, 0), e(-1, 1), e(1, 0), e(1, 1)];
             predict([e(0, 0), e(0, 1), w(-1, 0), w(0, 0)], far, predicted, classes);
         }
     }
@@ -193,7 +190,9 @@ mod tests {
 
     #[test]
     fn classes_are_half_octaves() {
-        for (uneven, class) in [(0, 0), (3, 0), (5, 0), (6, 1), (7, 1), (8, 2), (12, 3), (4096, 20), (9 << 19, 31)] {
+        for (uneven, class) in
+            [(0, 0), (3, 0), (5, 0), (6, 1), (7, 1), (8, 2), (12, 3), (4096, 20), (9 << 19, 31)]
+        {
             assert_eq!(class_of(uneven), class, "{uneven}");
         }
     }

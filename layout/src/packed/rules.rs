@@ -47,7 +47,8 @@ impl Rules {
         let slope = |octave: u32| {
             std::array::from_fn(|i| {
                 let (octaves, part) = (i as u32 / SLOPE_STEPS, i as u32 % SLOPE_STEPS);
-                let apart = f64::from(1u32 << octaves) * f64::from(SLOPE_STEPS + part) / f64::from(SLOPE_STEPS);
+                let apart =
+                    f64::from(1u32 << octaves) * f64::from(SLOPE_STEPS + part) / f64::from(SLOPE_STEPS);
                 let rise = apart * step_m / (2.0 * f64::from(1u32 << octave) * grid.spacing_m()[0]);
                 powers.index_at_least((1.0 + rise * rise).sqrt()).unwrap_or(u8::MAX)
             })

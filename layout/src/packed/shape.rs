@@ -192,7 +192,8 @@ mod tests {
     /// Every vertex that is not beyond the data has a tile, inside of which it lies on the lattice of its octave; and tiles are numbered one after the other.
     #[test]
     fn every_vertex_has_a_tile() {
-        for samples in [[2, 2], [3, 5], [65, 65], [100, 33], [129, 129], [513, 300], [1025, 700], [700, 1025]] {
+        for samples in [[2, 2], [3, 5], [65, 65], [100, 33], [129, 129], [513, 300], [1025, 700], [700, 1025]]
+        {
             let grid = Grid::new(samples, [1.0, 1.0]).unwrap();
             let groups = Groups::of(&grid);
             let n = grid.side_steps();

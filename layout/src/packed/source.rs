@@ -356,7 +356,11 @@ impl Source for PackedSource {
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
         let end = offset.checked_add(buffer.len() as u64).filter(|end| *end <= self.header.file_bytes);
         if end.is_none() {
-            return Err(LayoutError::damaged(self.path(), format!("byte {offset}"), "the data ends before it"));
+            return Err(LayoutError::damaged(
+                self.path(),
+                format!("byte {offset}"),
+                "the data ends before it",
+            ));
         }
         let tail = self.tail_start();
         let (mut at, mut rest) = (offset, buffer);

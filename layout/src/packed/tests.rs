@@ -40,7 +40,9 @@ fn records(shape: &TileShape, seed: u64, wildness: u64) -> TileRecords {
         }
         match random.below(12) {
             0 if wildness > 100 => sound(random.below(1 << 32) as u32),
-            1 if wildness > 0 => height | (248 + random.below(8) as u32) << 16 | (random.below(256) as u32) << 24,
+            1 if wildness > 0 => {
+                height | (248 + random.below(8) as u32) << 16 | (random.below(256) as u32) << 24
+            }
             _ => height | (40 + random.below(9) as u32) << 16 | (random.below(5) as u32) << 24,
         }
     })

@@ -159,7 +159,8 @@ impl Terrain {
     pub fn bytes_per_sample(&self) -> f64 {
         let [wide, high] = self.grid().samples();
         let imagery = self.header.imagery.map_or(0, |place| place.bytes);
-        (self.source.packed_bytes().unwrap_or(self.header.file_bytes).saturating_sub(imagery)) as f64 / (f64::from(wide) * f64::from(high))
+        (self.source.packed_bytes().unwrap_or(self.header.file_bytes).saturating_sub(imagery)) as f64
+            / (f64::from(wide) * f64::from(high))
     }
 
     /// The source it reads from.

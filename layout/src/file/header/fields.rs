@@ -58,7 +58,7 @@ impl Fields<'_> {
             return Err(LayoutError::unsupported(
                 self.path,
                 format!(
-                    "the file has format version {major}, this program reads version 1; use a newer terrasoar"
+                    "the file has format version {major}, this program reads versions 1 and 2; use a newer terrasoar"
                 ),
             ));
         }

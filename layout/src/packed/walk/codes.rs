@@ -15,7 +15,8 @@ pub(super) fn derived(rules: &Rules, scratch: &mut Scratch, octave: &Octave) {
     let side = m + 1;
     for j in 0..side {
         let y = j as isize;
-        let (low, high, at) = (heights.coarse.row(0, y, m), heights.coarse.row(1, y, m), heights.east.row(0, y, m));
+        let (low, high, at) =
+            (heights.coarse.row(0, y, m), heights.coarse.row(1, y, m), heights.east.row(0, y, m));
         let codes = errors.east.row_mut(0, y, m);
         for i in 0..m {
             codes[i] = rules.step(2 * at[i] - low[i] - high[i]);
@@ -52,7 +53,12 @@ pub(super) fn derived(rules: &Rules, scratch: &mut Scratch, octave: &Octave) {
         }
     }
     for j in 0..side {
-        errors.east.row(0, j as isize, m).iter().enumerate().for_each(|(i, code)| put(whites + j * m + i, *code, 0));
+        errors
+            .east
+            .row(0, j as isize, m)
+            .iter()
+            .enumerate()
+            .for_each(|(i, code)| put(whites + j * m + i, *code, 0));
     }
     for j in 0..m {
         let row = errors.north.row(0, j as isize, side);
@@ -140,7 +146,8 @@ fn white_contexts(rules: &Rules, slopes: &[u8; 256], scratch: &mut Scratch, octa
                 radii: parents(of_radii),
             };
             let at = j * m + i;
-            [contexts[at], most_errors[at], radius_contexts[at], least_radii[at]] = around.contexts(rules, slopes);
+            [contexts[at], most_errors[at], radius_contexts[at], least_radii[at]] =
+                around.contexts(rules, slopes);
         }
     }
 }
@@ -150,7 +157,8 @@ fn black_contexts(rules: &Rules, slopes: &[u8; 256], scratch: &mut Scratch, octa
     let Scratch { heights, errors, radii, contexts, most_errors, radius_contexts, least_radii, .. } = scratch;
     let mut at = octave.whites();
     let mut put = |around: Around| {
-        [contexts[at], most_errors[at], radius_contexts[at], least_radii[at]] = around.contexts(rules, slopes);
+        [contexts[at], most_errors[at], radius_contexts[at], least_radii[at]] =
+            around.contexts(rules, slopes);
         at += 1;
     };
     for j in 0..=m {
@@ -211,9 +219,7 @@ fn take<C: Coder>(
     } = scratch;
     chosen.clear();
     chosen.extend(
-        range
-            .filter(|i| octave.is_given(*i) && (!is_special || kinds[*i] == ORDINARY))
-            .map(|i| i as u32),
+        range.filter(|i| octave.is_given(*i) && (!is_special || kinds[*i] == ORDINARY)).map(|i| i as u32),
     );
     values.resize(chosen.len(), 0);
     let codes = |i: usize| truth.map_or([0; 2], |truth| codes_of(truth.at(octave.place(i))));
