@@ -39,6 +39,7 @@
 //! | make a terrain file | `build` |
 //! | open one, and get from a place to a height or a record | [`read`]: [`terrain`](read::terrain), mapped [`records`](read::records), a [`pool`](read::pool) of pages, and the [`loader`](read::loader) whose threads fill it |
 //! | know where a vertex lies in the file | [`grid`] |
+//! | make a file a tenth as large | `packing` |
 //! | put a picture on the ground, and read its tiles | [`imagery`] |
 //! | change heights, undo, commit | [`edit`] |
 //! | find out whether a file is sound | `verify` |
@@ -57,7 +58,9 @@ pub mod grid;
 pub mod imagery;
 pub mod mix;
 mod numbers;
-pub mod packed;
+mod packed;
+#[cfg(feature = "files")]
+pub mod packing;
 pub mod portable;
 pub mod printable;
 pub mod progress;

@@ -10,7 +10,7 @@ use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::source::{CountingSource, MemorySource, Source};
-use terrasoar_layout::packed::pack;
+use terrasoar_layout::packing::pack;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
 

@@ -17,7 +17,7 @@ use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
-use terrasoar_layout::packed::{pack, unpack};
+use terrasoar_layout::packing::{pack, unpack};
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::kinds::ByKind;
 use terrasoar_layout::read::loader::{Loader, Outcome, PageRequest};

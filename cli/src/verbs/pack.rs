@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use terrasoar_layout::file::disk::SystemDisk;
-use terrasoar_layout::packed::{pack, unpack};
+use terrasoar_layout::packing::{pack, unpack};
 
 /// Pack a terrain file into a third to a tenth of its bytes, without any loss.
 ///

@@ -15,8 +15,7 @@ use crate::grid::record::{RecordKind, RecordScale};
 use fields::Fields;
 use std::path::Path;
 
-/// First bytes of every terrain file.
-pub const MAGIC: [u8; 8] = *b"\x89IQT\r\n\x1a\n";
+pub use super::version::MAGIC;
 /// The page that absent record pages read as.
 pub const INERT_PAGE: u32 = 2;
 /// Entries a directory leaf page.

@@ -8,7 +8,7 @@
 //! replace can. On other systems no other writer is kept out: macOS has such a lock, but no safe function for it. Nor is one kept out on file systems without locks.
 
 use crate::error::LayoutError;
-use crate::packed::{is_packed, only_read};
+use crate::file::version::{is_packed, only_read};
 use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;

@@ -8,6 +8,7 @@
 //! * `slots`: which of a file's two headers counts.
 //! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
 //! * `publish`: a terrain file that does not open is not published; `seen`: a terrain that was edited meanwhile is not replaced.
+//! * `version`: packed terrain is told from a terrain file.
 //! * `opening`: opening a pipe does not wait.
 
 #[cfg(feature = "files")]
@@ -33,3 +34,4 @@ pub mod source;
 pub(crate) mod structure;
 #[cfg(feature = "files")]
 pub(crate) mod tail;
+pub(crate) mod version;

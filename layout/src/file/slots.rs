@@ -4,7 +4,7 @@ use super::bytes::{PAGE_BYTES, Page};
 use super::header::{Header, MAGIC};
 use super::source::Source;
 use crate::error::LayoutError;
-use crate::packed::only_read;
+use crate::file::version::only_read;
 use std::path::Path;
 
 const PAGE: u64 = PAGE_BYTES as u64;

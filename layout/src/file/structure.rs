@@ -11,8 +11,8 @@ use super::header::{Header, INERT_PAGE};
 use super::source::PreadSource;
 use super::source::Source;
 use crate::error::LayoutError;
+use crate::file::version::{is_packed, only_read};
 use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
-use crate::packed::{is_packed, only_read};
 use std::path::Path;
 
 /// Leaves read at once, at most: 8 MiB.

@@ -4,12 +4,11 @@
 
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u16, get_u32, get_u64, put_u16, put_u32, put_u64};
-use crate::file::header::{MAGIC, seal};
+use crate::file::header::seal;
+use crate::file::version::PACKED_VERSION;
 use crate::words::number;
 use std::path::Path;
 
-/// Version of files that hold packed terrain.
-pub(crate) const PACKED_VERSION: u16 = 2;
 /// The way of packing that is described in FORMAT.md.
 const SCHEME: u16 = 1;
 /// Sections that a header has room for.
@@ -52,19 +51,6 @@ pub(crate) struct Container {
     /// Length of the packed file.
     pub(crate) packed_bytes: u64,
     pub(crate) sections: Vec<Section>,
-}
-
-/// Whether a file that begins so is a packed terrain file, or one of another version than the first.
-pub(crate) fn is_packed(start: &[u8]) -> bool {
-    start.len() >= 10 && start[..8] == MAGIC && get_u16(start, 8) == PACKED_VERSION
-}
-
-/// What is said to those who need the terrain file itself.
-pub(crate) fn only_read(path: &Path) -> LayoutError {
-    LayoutError::unsupported(
-        path,
-        "the terrain is packed, and packed terrain is only read; make a file that can be changed of it with `terrasoar unpack`",
-    )
 }
 
 impl Container {

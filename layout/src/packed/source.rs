@@ -89,13 +89,14 @@ impl PackedSource {
         let slots = if container.is_second { [other, current] } else { [current, other] };
         let header = Header::current(path, &slots[0], &slots[1])?;
         let place = check_shape(path, &header)?;
-        let runs = front.section(&*inner, &container.section(RUNS), "record pages")?;
-        let present = present_pages(&runs, header.record_pages(), header.stored_pages)
-            .ok_or_else(|| odd(path, "record pages"))?;
+        // The checksums first: what a file claims to hold is bounded by their bytes.
         let sums = front.section(&*inner, &container.section(SUMS), "page checksums")?;
         if sums.len() as u64 != 4 * header.stored_pages {
             return Err(odd(path, "page checksums"));
         }
+        let runs = front.section(&*inner, &container.section(RUNS), "record pages")?;
+        let present = present_pages(&runs, header.record_pages(), header.stored_pages)
+            .ok_or_else(|| odd(path, "record pages"))?;
         let sums = (0..present.len()).map(|i| get_u32(&sums, 4 * i)).collect();
         let leaves = leaves_of(&present);
         if u64::from(header.root_page) != FIRST_PAGE + header.stored_pages + leaves.len() as u64 {

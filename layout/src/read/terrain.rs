@@ -16,10 +16,11 @@ use crate::file::source::{MapSource, PreadSource};
 #[cfg(feature = "files")]
 use crate::file::structure::read_growing;
 use crate::file::structure::{read_directory, read_structure};
+use crate::file::version::is_packed;
 use crate::grid::order::slot_of;
 use crate::grid::record::{AnyCodec, Vertex};
 use crate::grid::{Grid, GridPoint};
-use crate::packed::{PackedSource, is_packed};
+use crate::packed::source::PackedSource;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};

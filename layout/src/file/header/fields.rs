@@ -7,9 +7,9 @@ use super::{ErrorKind, Header, History, INERT_PAGE, ImageryPlace, SpacingOrigin}
 use crate::dem::HorizontalUnit;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64};
+use crate::file::version::{PACKED_VERSION, only_read};
 use crate::grid::Grid;
 use crate::grid::record::{RecordKind, RecordScale};
-use crate::packed::{PACKED_VERSION, only_read};
 use std::path::Path;
 
 /// A header slot of a file.

@@ -3,16 +3,6 @@
 //! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name. So whatever the file holds, what is packed is the same, or packing fails and says
 //! so. Cost: each vertex is looked up twice and unpacked once; memory is a few megabytes, and 16 bytes a record page.
 
-use super::coder::{Encoder, PlainEncoder};
-use super::container::{Container, MODEL, OTHER_SLOT, ROOT, RUNS, SUMS, Section, TAIL, runs_of};
-use super::model::{CONTEXTS, Counts, Model};
-use super::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
-use super::rules::Rules;
-use super::shape::{Groups, SEGMENTS, TileId};
-use super::source::PackedSource;
-use super::tile::TileRecords;
-use super::token::TOKENS;
-use super::walk::{Scratch, walk};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
@@ -23,6 +13,16 @@ use crate::file::source::{PreadSource, Source};
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::Compact;
+use crate::packed::coder::{Encoder, PlainEncoder};
+use crate::packed::container::{Container, MODEL, OTHER_SLOT, ROOT, RUNS, SUMS, Section, TAIL, runs_of};
+use crate::packed::model::{CONTEXTS, Counts, Model};
+use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
+use crate::packed::rules::Rules;
+use crate::packed::shape::{Groups, SEGMENTS, TileId};
+use crate::packed::source::PackedSource;
+use crate::packed::tile::TileRecords;
+use crate::packed::token::TOKENS;
+use crate::packed::walk::{Scratch, walk};
 use crate::progress::Progress;
 use crate::read::kinds::ByKind;
 use crate::read::records::Records;

@@ -1,0 +1,86 @@
+//! Packed terrain is flown over as the terrain it was made of: every engine draws the same triangles in every frame, from a pool whose pages are unpacked as they come, and from the whole.
+
+mod common;
+
+use common::checks::{keys, triangles, views};
+use common::{frame, noise, rugged};
+use std::sync::Arc;
+use terrasoar::refine::kinetic::Kinetic;
+use terrasoar::refine::naive::Naive;
+use terrasoar::refine::smart::Smart;
+use terrasoar::refine::soar::Soar;
+use terrasoar::refine::{Culling, Engine, Unobserved};
+use terrasoar::stream::{ModelDisk, Prefetch, Streamed};
+use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::dem::{MemoryDem, SampleType};
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::packing::pack;
+use terrasoar_layout::progress::Silent;
+use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::terrain::Terrain;
+
+#[test]
+fn engines_fly_packed_terrain_as_the_terrain() {
+    for (samples, holes) in [([257, 257], false), ([330, 190], true)] {
+        let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| {
+            let is_hole = holes && x + y > 0 && (noise(5, y / 9, x / 7) < 0.05 || noise(6, y, x) < 0.001);
+            if is_hole { f64::NAN } else { rugged(6, x, y) }
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let [plain, packed] = ["plain.iqt", "packed.iqt"].map(|name| folder.path().join(name));
+        build(&dem, &plain, &BuildOptions::default().spacing_m([10.0, 12.0]), &Silent).unwrap();
+        pack(&SystemDisk, &plain, &packed, &Silent).unwrap();
+        let plain = Terrain::open(&plain).unwrap();
+        let whole = Terrain::open(&packed).unwrap();
+        let streamed = Arc::new(Terrain::open_unmapped(&packed).unwrap());
+        let (Some(ByKind::Compact(plain_records)), Some(ByKind::Compact(records)), ByKind::Compact(pool)) =
+            (plain.records(), whole.records(), streamed.pool(64 << 20).unwrap())
+        else {
+            panic!("compact records")
+        };
+        let path = (0..24).map(|i| {
+            let along = 0.1 + f64::from(i) * 0.025;
+            frame(&plain, [0.4, along], 1300.0, 15.0 + 4.0 * f64::from(i), -25.0)
+        });
+        for culling in Culling::ALL {
+            let mut expected = Soar::new(plain_records.clone(), culling);
+            let mut engines: [Box<dyn FnMut(&terrasoar::view::View) -> Vec<_>>; 4] = [
+                over(Soar::new(records.clone(), culling)),
+                over(Smart::new(records.clone(), culling)),
+                over(Naive::new(records.clone(), culling)),
+                over(Kinetic::new(records.clone(), culling)),
+            ];
+            for view in views(path.clone(), 1.0) {
+                expected.update(&view, &mut Unobserved);
+                let expected = keys(&triangles(&expected));
+                assert!(expected.len() > 50);
+                for engine in &mut engines {
+                    assert!(keys(&engine(&view)) == expected);
+                }
+            }
+        }
+        let mut flown = Streamed::new(
+            pool,
+            ModelDisk::new(Arc::clone(&streamed), 40, 1),
+            Culling::Vertices,
+            Prefetch::default(),
+        );
+        let mut expected = Soar::new(plain_records.clone(), Culling::Vertices);
+        for view in views(path, 1.0) {
+            let frames = (0..500).find(|_| flown.update(&view, &mut Unobserved).work.late == 0);
+            assert!(frames.is_some(), "pages stay late");
+            expected.update(&view, &mut Unobserved);
+            assert!(keys(&triangles(flown.engine())) == keys(&triangles(&expected)));
+        }
+    }
+}
+
+/// An engine's triangles for a view.
+fn over<'e, E: Engine + 'e>(
+    mut engine: E,
+) -> Box<dyn FnMut(&terrasoar::view::View) -> Vec<terrasoar::mesh::Triangle> + 'e> {
+    Box::new(move |view| {
+        engine.update(view, &mut Unobserved);
+        triangles(&engine)
+    })
+}
