@@ -92,7 +92,7 @@ impl Encoder {
                 *state >>= 16;
             }
             let start = u32::from(starts[table][usize::from(*token)]);
-            *state = (*state / frequency << SCALE_LOG) + *state % frequency + start;
+            *state = ((*state / frequency) << SCALE_LOG) + *state % frequency + start;
         }
         let mut bytes = vec![lanes as u8];
         bytes.extend(u16::try_from(words.len()).ok()?.to_le_bytes());
