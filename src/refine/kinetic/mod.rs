@@ -16,6 +16,7 @@
 //! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
 
 mod capacity;
+mod chunked;
 mod frame;
 mod mesh;
 mod time;
