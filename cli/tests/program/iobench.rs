@@ -80,7 +80,7 @@ fn every_engine_and_layout_has_a_run_with_every_field() {
         assert_eq!(run["stream"].is_object(), run["source"] == "pool");
     }
     for field in
-        ["terrain", "flight", "tolerance_px", "viewport_px", "cache_mib", "page_bytes", "kernel_known"]
+        ["terrain", "flight", "tolerance_px", "metric", "viewport_px", "cache_mib", "page_bytes", "kernel_known"]
     {
         assert!(!value[field].is_null(), "{field}");
     }
