@@ -45,7 +45,7 @@ fn main() -> Result<(), Failure> {
         let terrain = Terrain::open(&path)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let [wide, high] = terrain.grid().samples();
-        println!("## {name}: {wide} x {high} samples, {} m apart\n", terrain.grid().spacing_m()[0]);
+        println!("## {name}: {wide} x {high} samples, {:.1} m apart\n", terrain.grid().spacing_m()[0]);
         with_records!(terrain.records().ok_or("not in memory")?, records => {
             triangles(&terrain, &records)?;
             flights(&terrain, &records, frames)?;
@@ -94,7 +94,7 @@ fn triangles<C: RecordCodec>(terrain: &Terrain, records: &Records<'_, C>) -> Res
             }
             cells.push(format!("{}, {:.1} %", sums[0] / 36, 100.0 * sums[1] as f64 / sums[0] as f64));
         }
-        println!("| {} m | {} |", times * spacing_m, cells.join(" | "));
+        println!("| {:.0} m | {} |", times * spacing_m, cells.join(" | "));
     }
     println!();
     Ok(())
@@ -152,7 +152,7 @@ fn flights<C: RecordCodec>(terrain: &Terrain, records: &Records<'_, C>, frames: 
             for (took, metric) in took.iter_mut().zip(ErrorMetric::ALL) {
                 let a_frame = |sum: u64| sum as f64 / f64::from(frames - 1);
                 println!(
-                    "| {} m | {pitch_deg} | {samples} | {} | {:.0} | {:.1} | {:.1} | {:.3} % | {:.1} | {:.1} |",
+                    "| {:.0} m | {pitch_deg} | {samples} | {} | {:.0} | {:.1} | {:.1} | {:.3} % | {:.1} | {:.1} |",
                     times * spacing_m,
                     metric.name(),
                     a_frame(took.triangles),
