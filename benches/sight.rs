@@ -38,7 +38,9 @@ fn main() -> Result<(), Failure> {
         }
     }
     if paths.is_empty() {
-        println!("skipped: name a terrain file, such as one made by `terrasoar synth --size 4097` and `terrasoar build`");
+        println!(
+            "skipped: name a terrain file, such as one made by `terrasoar synth --size 4097` and `terrasoar build`"
+        );
         return Ok(());
     }
     for path in paths {
@@ -87,7 +89,10 @@ fn triangles<C: RecordCodec>(terrain: &Terrain, records: &Records<'_, C>) -> Res
                 let eye_m = eye_m(terrain, at, times * spacing_m)?;
                 for turn in 0..4 {
                     for (sum, metric) in sums.iter_mut().zip(ErrorMetric::ALL) {
-                        soar.update(&view(eye_m, 90.0 * f64::from(turn) + 20.0, pitch_deg).metric(metric), &mut Unobserved);
+                        soar.update(
+                            &view(eye_m, 90.0 * f64::from(turn) + 20.0, pitch_deg).metric(metric),
+                            &mut Unobserved,
+                        );
                         *sum += triangles_of(&soar);
                     }
                 }
@@ -118,15 +123,23 @@ struct Took {
 
 fn flights<C: RecordCodec>(terrain: &Terrain, records: &Records<'_, C>, frames: u32) -> Result<(), Failure> {
     let spacing_m = terrain.grid().spacing_m()[0];
-    println!("Straight flights of {frames} frames, figures a frame; shares are of SOAR's tests by the same metric:\n");
-    println!("| above the ground | pitch | samples a frame | metric | triangles | SOAR's ns a test | kinetic's tests | share | tests a change | us |");
+    println!(
+        "Straight flights of {frames} frames, figures a frame; shares are of SOAR's tests by the same metric:\n"
+    );
+    println!(
+        "| above the ground | pitch | samples a frame | metric | triangles | SOAR's ns a test | kinetic's tests | share | tests a change | us |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|");
     for (times, pitch_deg) in [(4.0, -10.0), (64.0, -20.0), (64.0, -60.0), (400.0, -50.0), (400.0, -90.0)] {
         for samples in [0.05, 0.5, 2.0] {
             let [x, y, up] = eye_m(terrain, [0.45, 0.3], times * spacing_m)?;
             let mut took = [Took::default(), Took::default()];
             let mut engines = ErrorMetric::ALL.map(|metric| {
-                (metric, Soar::new(records.clone(), Culling::Vertices), Kinetic::new(records.clone(), Culling::Vertices))
+                (
+                    metric,
+                    Soar::new(records.clone(), Culling::Vertices),
+                    Kinetic::new(records.clone(), Culling::Vertices),
+                )
             });
             for i in 0..frames {
                 let way = samples * spacing_m * f64::from(i);

@@ -126,7 +126,8 @@ fn the_mesh_conforms_whatever_is_late_and_catches_up() {
     for (samples, holes) in [([257, 257], false), ([240, 180], true)] {
         let terrain = Arc::new(rugged_terrain(samples, 6, holes));
         let flown = views(path(&terrain, 40, true), 1.0);
-        let ways = Culling::ALL.into_iter().flat_map(|culling| ErrorMetric::ALL.map(|metric| (culling, metric)));
+        let ways =
+            Culling::ALL.into_iter().flat_map(|culling| ErrorMetric::ALL.map(|metric| (culling, metric)));
         for (culling, metric) in ways {
             let flown = measured(&flown, metric);
             for prefetch in Prefetch::ALL {

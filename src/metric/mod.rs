@@ -122,7 +122,15 @@ impl Metric {
         if self.kind == ErrorMetric::Ball {
             let reach_m = seen_m + radius_m;
             let is_selected = distance2 < reach_m * reach_m;
-            return Sighting { offset_m, distance2, reach_m, radius_m, span_m: radius_m, ring_m: 0.0, is_selected };
+            return Sighting {
+                offset_m,
+                distance2,
+                reach_m,
+                radius_m,
+                span_m: radius_m,
+                ring_m: 0.0,
+                is_selected,
+            };
         }
         let span_m = radius_m + error_m;
         let reach_m = seen_m + span_m;
@@ -193,7 +201,11 @@ impl Sighting {
     /// Metres that the eye can move in any direction before the answer changes: positive if selected, nu e + r - |P - p| for a ball (SMART, eq. 6).
     #[inline(always)]
     pub fn margin_m(&self) -> f64 {
-        if self.ring_m == 0.0 { self.reach_m - self.distance2.sqrt() } else { self.tube_m() - self.ring2().sqrt() }
+        if self.ring_m == 0.0 {
+            self.reach_m - self.distance2.sqrt()
+        } else {
+            self.tube_m() - self.ring2().sqrt()
+        }
     }
 
     /// Radius of the tube about the ring in which the vertex is selected.
@@ -256,7 +268,8 @@ impl Sighting {
     /// can be. `tolerance_px` is the metric's.
     pub fn error_px(&self, tolerance_px: f64, nearest_m: f64) -> f64 {
         let distance_m = self.distance_m();
-        let from_the_side = (self.reach_m - self.span_m) / (distance_m - self.span_m).max(nearest_m) * tolerance_px;
+        let from_the_side =
+            (self.reach_m - self.span_m) / (distance_m - self.span_m).max(nearest_m) * tolerance_px;
         if self.ring_m == 0.0 {
             return from_the_side;
         }

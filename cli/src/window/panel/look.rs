@@ -74,7 +74,8 @@ pub(super) fn mesh(ui: &mut Ui, facts: &Facts<'_>, settings: &mut Settings, wish
             "As if every error were seen from the side",
             "Along the line of sight: the steeper one looks down, the less of a height shows",
         ]) {
-            ui.selectable_value(&mut settings.metric, metric.name().to_owned(), metric.name()).on_hover_text(means);
+            ui.selectable_value(&mut settings.metric, metric.name().to_owned(), metric.name())
+                .on_hover_text(means);
         }
     });
     let [least, most] = EXAGGERATION;

@@ -165,7 +165,10 @@ impl Judge {
             (margin_m, if selected { reach_m } else { distance_m })
         } else {
             // Near the axis of the ring an error may grow beyond the distance before it shows.
-            (ring::margin_m(sighting, self.moves.then_some(self.direction), self.rate), distance_m.max(reach_m))
+            (
+                ring::margin_m(sighting, self.moves.then_some(self.direction), self.rate),
+                distance_m.max(reach_m),
+            )
         };
         if !self.culls {
             return Life { active: selected, kind: Kind::Error, margin_m, scale_m };

@@ -339,6 +339,9 @@ mod tests {
         assert_eq!(clocks.move_to(turned).clocks, 0, "standing still uses up nothing");
         assert_eq!(clocks.move_to(Pose { nu: 200.0, ..turned }).clocks, u128::MAX);
         clocks.move_to(Pose { metric: ErrorMetric::Sight, nu: 200.0, ..turned });
-        assert!((0..CLOCKS).all(|clock| clocks.now(clock) >= u64::from(HORIZON)), "nothing outlives a change of the measure");
+        assert!(
+            (0..CLOCKS).all(|clock| clocks.now(clock) >= u64::from(HORIZON)),
+            "nothing outlives a change of the measure"
+        );
     }
 }

@@ -67,7 +67,8 @@ impl Passing {
     #[inline(always)]
     fn nearest_foot_m(&self) -> f64 {
         // Straight below or above the vertex all directions are alike.
-        let slope = if self.across_m > 0.0 { (-self.across_foot_m2 / self.across_m).clamp(-1.0, 1.0) } else { 0.0 };
+        let slope =
+            if self.across_m > 0.0 { (-self.across_foot_m2 / self.across_m).clamp(-1.0, 1.0) } else { 0.0 };
         self.foot_m + self.ring_m * slope
     }
 
@@ -88,7 +89,8 @@ impl Passing {
         }
         let one_m = rate * leaves_m;
         // Where the course leaves the ball, seen from the vertex. Any direction would do, this one is good.
-        let out_m = self.foot_m + (self.reach_m * self.reach_m - self.distance2 + self.foot_m * self.foot_m).max(0.0).sqrt();
+        let out_m = self.foot_m
+            + (self.reach_m * self.reach_m - self.distance2 + self.foot_m * self.foot_m).max(0.0).sqrt();
         let [x, y] = [0, 1].map(|i| self.course[i] * out_m - self.offset_m[i]);
         let length = (x * x + y * y).sqrt();
         let ([a, b], [east_m, north_m]) = (self.course, self.offset_m);
@@ -98,7 +100,8 @@ impl Passing {
         let half_chord2 = self.tube_m * self.tube_m - far2 + far_m * far_m - self.slack2;
         let s = (far2 - self.away2) / (2.0 * (far_m - near_m));
         let at2 = |foot_m: f64, away2: f64| s * (s - 2.0 * foot_m) + away2;
-        let between_m = self.tube_m - (at2(near_m, self.away2).max(at2(far_m, far2)).max(0.0) + self.slack2).sqrt();
+        let between_m =
+            self.tube_m - (at2(near_m, self.away2).max(at2(far_m, far2)).max(0.0) + self.slack2).sqrt();
         // No number where directions are none or both are one.
         if half_chord2 > 0.0 && s >= 0.0 && far_m > near_m {
             one_m.max((between_m + rate * s).min(rate * (far_m + half_chord2.sqrt())).min(now_m))

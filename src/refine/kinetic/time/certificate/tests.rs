@@ -116,3 +116,34 @@ fn on_course_words_last_until_the_change() {
     let crossing = 866.0 - (600.0f64.powi(2) - 500.0f64.powi(2)).sqrt();
     assert!(way > crossing - 3.0 && way <= crossing + 1.0, "{way} {crossing}");
 }
+
+/// By line of sight, on a course past a vertex, a few words are enough from afar until it is far behind.
+#[test]
+fn few_words_are_made_along_the_line_of_sight() {
+    for (side_m, below_m) in [(0.0, 300.0), (500.0, 300.0), (100.0, 700.0), (500.0, 0.0), (2000.0, 900.0)] {
+        let mut clocks = Clocks::new(10.0, 0.0);
+        let start = view(DVec3::ZERO, 0.0, 0.0, 0.8, 1.0).metric(ErrorMetric::Sight);
+        clocks.take_course(1, Course { direction: DVec3::Y, ..Default::default() });
+        let nu = Metric::new(&start).nu();
+        let vertex =
+            Vertex { height_m: -below_m, error_m: 1500.0 / nu, radius_m: 20.0, class: VertexClass::Plain };
+        let (mut word, mut words, mut changes) = (None, 0, 0);
+        for way in 0..8000 {
+            let moved = View { eye_m: DVec3::Y * f64::from(way), ..start };
+            let metric = Metric::new(&moved);
+            clocks.move_to(pose(&metric, &moved));
+            let is_over = |word: u32| clocks.now(clock_of(word)) >= u64::from(expiry_of(word));
+            if word.is_none_or(is_over) {
+                let next = Judge::new(metric, &clocks, false).word(&metric.sight([side_m, 4000.0], &vertex));
+                words += 1;
+                changes += usize::from(word.is_some_and(|word| (word ^ next) & ACTIVE != 0));
+                word = Some(next);
+            }
+        }
+        assert!(changes > 0 || side_m > 1500.0, "{side_m} {below_m}");
+        assert!(
+            words <= 4 + 8 * changes,
+            "{words} words for {changes} changes at {side_m} m, {below_m} m below"
+        );
+    }
+}
