@@ -61,6 +61,9 @@ impl Session {
         }
         settings.ramp = plan.ramp.clone().or(settings.ramp);
         settings.tolerance_px = plan.tolerance_px.or(settings.tolerance_px);
+        if let Some(metric) = plan.metric {
+            settings.metric = metric.name().to_owned();
+        }
         settings.exaggeration = plan.exaggeration.unwrap_or(settings.exaggeration);
         let size: Size = match plan.size_px {
             Some([width, height]) => PhysicalSize::new(width, height).into(),

@@ -31,7 +31,7 @@ use crate::fit;
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
-use terrasoar::view::Viewport;
+use terrasoar::view::{ErrorMetric, Viewport};
 use terrasoar_layout::read::terrain::Terrain;
 
 pub(crate) use keys::list as list_of_keys;
@@ -53,6 +53,8 @@ pub(crate) struct Plan {
     pub ramp: Option<String>,
     /// Pixels.
     pub tolerance_px: Option<f64>,
+    /// How errors are measured.
+    pub metric: Option<ErrorMetric>,
     /// Factor on heights.
     pub exaggeration: Option<f64>,
     /// Size of the window in pixels.

@@ -327,6 +327,7 @@ impl<S: RecordStore> Engine for Kinetic<S> {
             normals: metric.normals().map(DVec3::from_array),
             nu: metric.nu(),
             exaggeration: metric.exaggeration(),
+            metric: metric.kind(),
         };
         self.work = Work::default();
         self.patch.clear();
