@@ -331,7 +331,7 @@ impl<C: RecordCodec> Core<C> {
         }
         let ranges = [0, 1].map(|i| crate::bound::range(&codes[i]));
         self.scratch.near.set(changed, &codes[1]);
-        let new = NewCodes { rect: changed, codes: &codes[1], ranges };
+        let new = NewCodes { rect: changed, codes: &codes[1], old_codes: &codes[0], ranges };
         Update::new(&self.rules, &mut self.pages, new, &mut self.scratch).run();
         self.codes = codes;
     }

@@ -90,6 +90,20 @@ impl<C: RecordCodec> Pages<C> {
         C::read(&self.page_at(slot)[within..within + C::BYTES])
     }
 
+    /// The records of two slots, most often of one page.
+    #[inline(always)]
+    pub(crate) fn raw_pair(&mut self, slots: [u64; 2]) -> [C::Raw; 2] {
+        let pages = slots.map(page_of::<C>);
+        if pages[0] != pages[1] {
+            return slots.map(|slot| self.raw(slot));
+        }
+        let page = self.page_at(slots[0]);
+        slots.map(|slot| {
+            let within = byte_in_page::<C>(slot);
+            C::read(&page[within..within + C::BYTES])
+        })
+    }
+
     /// The record of a slot whose page is here.
     #[inline(always)]
     pub(crate) fn raw_if_held(&self, slot: u64) -> Option<C::Raw> {
