@@ -10,6 +10,7 @@
 
 use super::clocks::{CLOCKS, EXPIRY_BITS};
 use crate::refine::kinetic::capacity::grow;
+use terrasoar_layout::read::prefetch::prefetch;
 
 /// Bits of a digit.
 const DIGIT: u32 = 6;
@@ -19,8 +20,8 @@ const SLOTS: usize = 1 << DIGIT;
 const LEVELS: usize = EXPIRY_BITS.div_ceil(DIGIT) as usize;
 /// No chunk.
 const NONE: u32 = u32::MAX;
-/// Entries a chunk, which is a cache line of 64 bytes.
-const CHUNK_ENTRIES: usize = 7;
+/// Entries a chunk, which is two cache lines that a processor brings together.
+const CHUNK_ENTRIES: usize = 15;
 
 /// A node and the word it had when it was entered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -142,6 +143,11 @@ impl Queue {
                 (true, _) => (1 << digit) - 1,
             };
             let mut slots = self.wheels[clock].occupied[level] & over;
+            let mut heads = slots;
+            while heads != 0 {
+                prefetch(&self.chunks, self.wheels[clock].heads[level][heads.trailing_zeros() as usize] as usize);
+                heads &= heads - 1;
+            }
             while slots != 0 {
                 self.take_slot(clock, level, slots.trailing_zeros() as usize, &mut due);
                 slots &= slots - 1;
@@ -216,6 +222,7 @@ impl Queue {
         wheel.occupied[level] &= !(1 << slot);
         let mut at = std::mem::replace(&mut wheel.heads[level][slot], NONE);
         while at != NONE {
+            prefetch(&self.chunks, self.chunks[at as usize].next as usize);
             let chunk = &mut self.chunks[at as usize];
             chunk.entries[..chunk.used as usize].iter().for_each(|entry| each(*entry));
             self.entries -= chunk.used as usize;
