@@ -146,7 +146,12 @@ impl ApplicationHandler<Wake> for Session {
             viewer.window().request_redraw();
         }
         match event {
-            WindowEvent::CloseRequested => return self.end(event_loop),
+            WindowEvent::CloseRequested => {
+                viewer.quit();
+                if viewer.may_end() {
+                    return self.end(event_loop);
+                }
+            }
             WindowEvent::Resized(size) => viewer.resize(size.width, size.height),
             WindowEvent::Occluded(hidden) => viewer.hide(hidden),
             WindowEvent::Focused(false) => viewer.hand.release(),
