@@ -4,7 +4,7 @@
 //! incoherences, while turning, on the spot, and with a million triangles? What do the other ways to find expired words cost, and how
 //! much memory does it hold? Data: terrain files named on the command line. Command:
 //!
-//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE]
+//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE] [--walking]
 //!
 //! All engines fly the same frames in the same process, one after the other, three times over; a frame's time is the least of its three, and figures are
 //! medians over the last two thirds of the frames. One thread. Prints Markdown. Keep runs under benches/runs/.
@@ -34,13 +34,14 @@ const PASSES: usize = 3;
 fn main() -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
-    let (mut path, mut frames, mut profile) = (None, 1500, None);
+    let (mut path, mut frames, mut profile, mut only_walks) = (None, 1500, None, false);
     while let Some(word) = words.next() {
         match word.as_str() {
             "--frames" => frames = words.next().ok_or("--frames wants a number")?.parse()?,
             "--profile" => {
                 profile = Some(words.next().ok_or("--profile wants a percentage")?.parse::<f64>()?)
             }
+            "--walking" => only_walks = true,
             _ => path = Some(PathBuf::from(word)),
         }
     }
@@ -54,6 +55,7 @@ fn main() -> Result<(), Failure> {
     with_records!(terrain.records().ok_or("not in memory")?, records => {
         match profile {
             Some(percent) => fly_only(&terrain, &records, frames, percent),
+            None if only_walks => walking(&terrain, &records),
             None => report(&terrain, &records, frames),
         }
     })
@@ -69,14 +71,24 @@ fn fly_only<C: RecordCodec>(
     let views = views(&straight(terrain, frames, percent, 1.0)?.0, 1.0);
     let mut engine = Kinetic::new(records.clone(), Culling::Vertices);
     let start = Instant::now();
-    let mut updates = 0u64;
+    let (mut updates, mut tests, mut changes) = (0u64, 0u64, 0u64);
     while start.elapsed().as_secs() < 10 {
         for view in views.iter().chain(views.iter().rev()) {
             engine.update(view, &mut Unobserved);
+            let work = engine.work();
             updates += 1;
+            tests += work.tests;
+            changes += work.splits + work.merges;
         }
     }
-    println!("{updates} updates in {:.1} s", start.elapsed().as_secs_f64());
+    let seconds = start.elapsed().as_secs_f64();
+    println!(
+        "{updates} updates in {seconds:.1} s, {:.1} us each: {:.0} changes of {:.0} ns and {:.2} tests each",
+        seconds * 1e6 / updates as f64,
+        changes as f64 / updates as f64,
+        seconds * 1e9 / changes as f64,
+        tests as f64 / changes as f64
+    );
     Ok(())
 }
 

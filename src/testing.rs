@@ -1,6 +1,6 @@
 //! Little terrains in memory and views of them, for the tests of this package and of those above it.
 
-use crate::view::{View, Viewport};
+use crate::view::{ErrorMetric, View, Viewport};
 use glam::DVec3;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
@@ -43,5 +43,6 @@ pub fn view_at(terrain: &Terrain, at: [f64; 2], yaw_rad: f64) -> View {
         viewport: Viewport { width_px: 320, height_px: 240 },
         tolerance_px: 1.0,
         vertical_exaggeration: 1.0,
+        metric: ErrorMetric::default(),
     }
 }

@@ -34,6 +34,30 @@ impl Default for Viewport {
     }
 }
 
+/// How an error of the mesh is measured on the screen. Both keep the mesh free of cracks, and both depend on the eye's place alone: turning changes nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum ErrorMetric {
+    /// As if every error were seen from the side: an error e at a distance D shows as e / D.
+    #[default]
+    Ball,
+    /// Along the line of sight: errors of height show as e g / D^2, g being the distance over the ground. They are the shorter the steeper the eye looks down, and from
+    /// straight above they do not show at all. Outlines of voids are measured as by [`ErrorMetric::Ball`].
+    Sight,
+}
+
+impl ErrorMetric {
+    /// Both measures.
+    pub const ALL: [Self; 2] = [Self::Ball, Self::Sight];
+
+    /// The word the command line uses.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ball => "ball",
+            Self::Sight => "sight",
+        }
+    }
+}
+
 /// One frame's camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
@@ -53,6 +77,8 @@ pub struct View {
     pub tolerance_px: f64,
     /// What heights are multiplied by when drawn; above 0, 1 for true scale. The eye's height is not affected.
     pub vertical_exaggeration: f64,
+    /// How errors are measured on the screen.
+    pub metric: ErrorMetric,
 }
 
 impl View {
@@ -75,6 +101,7 @@ impl View {
             viewport: Viewport::default(),
             tolerance_px: 1.0,
             vertical_exaggeration: 1.0,
+            metric: ErrorMetric::default(),
         }
     }
 
@@ -103,6 +130,11 @@ impl View {
         Self { vertical_exaggeration, ..self }
     }
 
+    /// This view with errors measured in another way.
+    pub fn metric(self, metric: ErrorMetric) -> Self {
+        Self { metric, ..self }
+    }
+
     /// Whether every number is one that a picture can be taken with: places and angles are finite, and the picture, the field of view, the tolerance and the exaggeration
     /// are what their fields say. The view of a window that is folded away, of no pixels, is not.
     pub fn is_sound(&self) -> bool {
@@ -129,6 +161,7 @@ impl View {
             viewport,
             tolerance_px: 1.0,
             vertical_exaggeration: 1.0,
+            metric: ErrorMetric::default(),
         }
     }
 
@@ -150,7 +183,7 @@ impl View {
         f64::from(self.viewport.height_px) / self.vertical_fov_rad
     }
 
-    /// Pixels a radian over the tolerance: a vertex is in the mesh when nearer than `nu * error + radius`.
+    /// Pixels a radian over the tolerance: a vertex is in the mesh when nearer than `nu * error + radius`, by [`ErrorMetric::Ball`].
     pub fn nu(&self) -> f64 {
         self.pixels_per_radian() / self.tolerance_px
     }
@@ -190,6 +223,7 @@ mod tests {
                 viewport: Viewport::default(),
                 tolerance_px: 1.0,
                 vertical_exaggeration: 1.0,
+                metric: ErrorMetric::default(),
             };
             let [right, up, forward] = view.axes();
             assert!((right.cross(up) + forward).length() < 1e-12, "right-handed, looking along forward");
@@ -236,6 +270,7 @@ mod tests {
             viewport: Viewport::default(),
             tolerance_px: 1.0,
             vertical_exaggeration: 1.0,
+            metric: ErrorMetric::default(),
         };
         assert!((view.axes()[2] - DVec3::X).length() < 1e-12, "yaw 90 degrees looks east");
         let up = View { pitch_rad: 0.5, ..view };

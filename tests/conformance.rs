@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::checks::{VIEWPORT, check_conforming, check_tolerance, keys, triangles, views};
+use common::checks::{VIEWPORT, check_conforming, check_tolerance, keys, measured, triangles, views};
 use common::mirror::{Mirror, check_clusters, drawn};
 use common::{frame, noise, rugged_terrain};
 use proptest::prelude::*;
@@ -15,15 +15,25 @@ use terrasoar::refine::naive::Naive;
 use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
-use terrasoar::view::View;
+use terrasoar::view::{ErrorMetric, View};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
-/// Flies `views` with all engines and checks every frame.
+/// Flies `views` with all engines, errors being measured in every way, and checks every frame.
 fn fly(terrain: &Terrain, views: &[View], check_samples: bool) {
+    fly_as_is(terrain, &measured(views, ErrorMetric::Ball), check_samples);
+    let by_sight = measured(views, ErrorMetric::Sight);
+    fly_culling(terrain, &by_sight, Culling::Vertices, check_samples);
+    // Culling knows nothing of metrics: some flights are enough.
+    if check_samples {
+        fly_culling(terrain, &by_sight, Culling::Clusters, false);
+    }
+}
+
+fn fly_as_is(terrain: &Terrain, views: &[View], check_samples: bool) {
     fly_culling(terrain, views, Culling::Vertices, check_samples);
     fly_culling(terrain, views, Culling::Clusters, false);
 }
@@ -209,6 +219,55 @@ fn vertical_exaggeration() {
     }
 }
 
+/// Every few frames errors are measured in another way.
+#[test]
+fn metrics_by_turns() {
+    for terrain in terrains() {
+        let flown: Vec<View> = (0..40u32)
+            .map(|i| {
+                let step = f64::from(i);
+                let at = frame(&terrain, [0.3 + 0.005 * step, 0.4], 1200.0 + 20.0 * step, 2.0 * step, -60.0);
+                at.view(VIEWPORT, 2.0).metric(ErrorMetric::ALL[(i / 3 % 2) as usize])
+            })
+            .collect();
+        fly_as_is(&terrain, &flown, false);
+    }
+}
+
+/// From heights just above the ground to far away, looking ahead, down, and straight down: by line of sight no sample in view is farther from its place on the picture than the
+/// tolerance. The freedom is used: from the side errors would be larger than that, and there are fewer triangles.
+#[test]
+fn no_sample_is_off_along_the_line_of_sight() {
+    let (mut largest, mut sums) = ([0.0f64; 2], [0usize; 2]);
+    for terrain in terrains() {
+        let [width_m, height_m] = terrain.grid().extent_m();
+        with_records!(terrain.records().unwrap(), records => {
+            for (i, above_m) in [3.0, 30.0, 150.0, 600.0, 3000.0].into_iter().enumerate() {
+                for (j, pitch_deg) in [-90.0, -75.0, -50.0, -20.0, 0.0].into_iter().enumerate() {
+                    for tolerance_px in [0.5, 2.0, 8.0] {
+                        let at = [0.31 + 0.07 * i as f64, 0.29 + 0.09 * j as f64];
+                        let ground_m = terrain.height_m(at[0] * width_m, at[1] * height_m).unwrap().unwrap_or(800.0);
+                        let eye = frame(&terrain, at, ground_m + above_m, 70.0 * i as f64, pitch_deg);
+                        for (sum, metric) in sums.iter_mut().zip(ErrorMetric::ALL) {
+                            let view = eye.view(VIEWPORT, tolerance_px).metric(metric);
+                            let mut soar = Soar::new(records.clone(), Culling::Vertices);
+                            soar.update(&view, &mut Unobserved);
+                            let mesh = triangles(&soar);
+                            let errors_px = check_tolerance(&records, &view, &mesh);
+                            *sum += mesh.len();
+                            if metric == ErrorMetric::Sight {
+                                largest = [0, 1].map(|i| largest[i].max(errors_px[i] / tolerance_px));
+                            }
+                        }
+                    }
+                }
+            }
+        });
+    }
+    assert!(largest[0] > 0.8 && largest[1] > 2.0, "{largest:?} of the tolerance");
+    assert!(sums[1] * 5 < sums[0] * 4, "{sums:?} triangles by ball and by line of sight");
+}
+
 /// Round and round until every clock has run out of ticks many times over.
 #[test]
 fn longer_than_the_clocks() {
@@ -223,6 +282,7 @@ fn longer_than_the_clocks() {
                 let wide = 1.0 + 0.9 * (f64::from(i) * 0.013).sin();
                 let at = [0.5 + 3.0 * wide * angle.cos(), 0.5 + 3.0 * wide * angle.sin()];
                 let view = frame(&terrain, at, 2000.0, 90.0 - angle.to_degrees() + f64::from(i % 11), -20.0).view(VIEWPORT, 0.4);
+                let view = view.metric(ErrorMetric::ALL[i as usize / 750]);
                 soar.update(&view, &mut Unobserved);
                 kinetic.update(&view, &mut Unobserved);
                 assert!(keys(&triangles(&soar)) == keys(&triangles(&kinetic)), "{culling:?}, frame {i}");
@@ -283,11 +343,16 @@ fn smart_tests_little_of_what_soar_tests() {
         let mut soar = Soar::new(records.clone(), Culling::Vertices);
         let mut smart = Smart::new(records.clone(), Culling::Vertices);
         let path = (0..60).map(|i| frame(&terrain, [0.5, 0.2 + 0.0005 * f64::from(i)], 1400.0, 0.0, -20.0));
-        let tests: Vec<[u64; 2]> =
-            views(path, 1.0).iter().map(|v| [soar.update(v, &mut Unobserved), smart.update(v, &mut Unobserved)]).collect();
-        assert_eq!(tests[0][0], tests[0][1], "the first frame tests all");
-        let sums = tests[1..].iter().fold([0; 2], |s, t| [s[0] + t[0], s[1] + t[1]]);
-        assert!(sums[1] * 5 < sums[0], "{sums:?}");
+        let flown = views(path, 1.0);
+        for metric in ErrorMetric::ALL {
+            let tests: Vec<[u64; 2]> = measured(&flown, metric)
+                .iter()
+                .map(|v| [soar.update(v, &mut Unobserved), smart.update(v, &mut Unobserved)])
+                .collect();
+            assert_eq!(tests[0][0], tests[0][1], "the first frame tests all");
+            let sums = tests[1..].iter().fold([0; 2], |s, t| [s[0] + t[0], s[1] + t[1]]);
+            assert!(sums[1] * 5 < sums[0], "{metric:?}: {sums:?}");
+        }
     });
 }
 

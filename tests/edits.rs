@@ -17,7 +17,7 @@ use terrasoar::refine::naive::Naive;
 use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
-use terrasoar::view::View;
+use terrasoar::view::{ErrorMetric, View};
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Area, Changes, Crater, Edit, Editor, SampleRect};
@@ -153,7 +153,7 @@ proptest! {
 
     #[test]
     fn engines_draw_the_edited_ground(
-        which in 0usize..4, clusters in any::<bool>(), seed in any::<u64>(), exaggerate in any::<bool>(),
+        which in 0usize..4, clusters in any::<bool>(), along_sight in any::<bool>(), seed in any::<u64>(), exaggerate in any::<bool>(),
         edits in prop::collection::vec((0usize..24, prop::collection::vec(edit(), 1..4)), 1..8),
     ) {
         let terrain = &terrains()[which];
@@ -171,7 +171,8 @@ proptest! {
             };
             // Every third frame another one, in the midst of whatever else goes on.
             let vertical_exaggeration = if exaggerate { 0.5 + random(i / 3, 3) } else { 1.0 };
-            View { vertical_exaggeration, ..frame.view(VIEWPORT, 2.0) }
+            let metric = if along_sight { ErrorMetric::Sight } else { ErrorMetric::Ball };
+            View { vertical_exaggeration, metric, ..frame.view(VIEWPORT, 2.0) }
         }).collect();
         fly(terrain, &views, &edits, culling);
     }

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::checks::{VIEWPORT, check_conforming, keys, triangles, views};
+use common::checks::{VIEWPORT, check_conforming, keys, measured, triangles, views};
 use common::mirror::{Mirror, drawn};
 use common::{frame, rugged_terrain};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use terrasoar::flight::FlightFrame;
 use terrasoar::refine::kinetic::{Budget, Kinetic, Patch};
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
-use terrasoar::view::View;
+use terrasoar::view::{ErrorMetric, View};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -76,7 +76,9 @@ fn a_budget_of_tests_keeps_the_mesh_conforming() {
         for tests in [16, 100, 700] {
             for culling in Culling::ALL {
                 let budget = Budget::default().tests(tests);
-                fly_with(budget, &terrain, &views(path(&terrain, 40), 1.0), culling);
+                for metric in ErrorMetric::ALL {
+                    fly_with(budget, &terrain, &measured(&views(path(&terrain, 40), 1.0), metric), culling);
+                }
             }
         }
     }
@@ -107,7 +109,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(10))]
     #[test]
     fn budgets_on_random_walks(
-        tests in 8u64..400, seed in 0u64..50, holes: bool,
+        tests in 8u64..400, seed in 0u64..50, holes: bool, metric in prop::sample::select(&ErrorMetric::ALL[..]),
         steps in prop::collection::vec((-0.1f64..0.1, -0.1f64..0.1, -80.0f64..80.0, -30.0f64..30.0), 5..30),
     ) {
         let terrain = rugged_terrain([90, 70], seed, holes);
@@ -116,7 +118,7 @@ proptest! {
             (x, y, up, yaw) = (x + dx, y + dy, up + dz, yaw + turn);
             frame(&terrain, [x, y], up, yaw, -25.0)
         }).collect();
-        let flown = views(flown, 1.0);
+        let flown = measured(&views(flown, 1.0), metric);
         with_records!(terrain.records().unwrap(), records => {
             let mut kinetic = Kinetic::new(records.clone(), Culling::Vertices);
             kinetic.set_budget(Budget::default().tests(tests));
@@ -160,13 +162,17 @@ fn patches_do_not_depend_on_the_number_of_threads() {
 fn a_warm_frame_allocates_nothing() {
     let terrain = rugged_terrain([257, 257], 3, false);
     with_records!(terrain.records().unwrap(), records => {
-        for culling in Culling::ALL {
+        for (culling, metric) in [
+            (Culling::Vertices, ErrorMetric::Ball),
+            (Culling::Clusters, ErrorMetric::Ball),
+            (Culling::Vertices, ErrorMetric::Sight),
+        ] {
             let mut kinetic = Kinetic::new(records.clone(), culling);
             let round = |kinetic: &mut Kinetic<_>| {
                 for i in 0..400 {
                     let angle = f64::from(i) / 400.0 * std::f64::consts::TAU;
                     let at = [0.5 + 0.3 * angle.cos(), 0.5 + 0.3 * angle.sin()];
-                    let view = frame(&terrain, at, 1300.0, -angle.to_degrees(), -20.0).view(VIEWPORT, 1.0);
+                    let view = frame(&terrain, at, 1300.0, -angle.to_degrees(), -20.0).view(VIEWPORT, 1.0).metric(metric);
                     kinetic.update(&view, &mut Unobserved);
                     assert!(i == 0 || kinetic.work().tests > 0);
                 }

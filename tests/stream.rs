@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::checks::{check_conforming, keys, triangles, views};
+use common::checks::{check_conforming, keys, measured, triangles, views};
 use common::mirror::{Mirror, drawn};
 use common::{frame, rugged, rugged_terrain, terrain_of};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use terrasoar::flight::FlightFrame;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::stream::{ModelDisk, Prefetch, StreamFrame, Streamed, height_at};
-use terrasoar::view::View;
+use terrasoar::view::{ErrorMetric, View};
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::file::bytes::PAGE_BYTES;
@@ -126,7 +126,10 @@ fn the_mesh_conforms_whatever_is_late_and_catches_up() {
     for (samples, holes) in [([257, 257], false), ([240, 180], true)] {
         let terrain = Arc::new(rugged_terrain(samples, 6, holes));
         let flown = views(path(&terrain, 40, true), 1.0);
-        for culling in Culling::ALL {
+        let ways =
+            Culling::ALL.into_iter().flat_map(|culling| ErrorMetric::ALL.map(|metric| (culling, metric)));
+        for (culling, metric) in ways {
+            let flown = measured(&flown, metric);
             for prefetch in Prefetch::ALL {
                 let how = How {
                     culling,

@@ -1,5 +1,6 @@
 //! The program `terrasoar`. The work is done in libraries; the command line is in [`verbs`].
 
+mod beside;
 mod fit;
 mod numbers;
 mod verbs;

@@ -9,7 +9,7 @@ use crate::material::TILED_M;
 use crate::ramps::linear_of;
 use crate::tiles::{Imagery, Pyramid, TILE_CELLS};
 use crate::view::{LocalView, TerrainShape, clip_from_eye, near_m, whole_and_rest};
-use terrasoar::view::View;
+use terrasoar::view::{ErrorMetric, View};
 use terrasoar_layout::imagery::{BORDER_TEXELS, INNER_TEXELS, TILE_TEXELS};
 
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -91,6 +91,7 @@ impl Uniforms {
         let [low_m, high_m] = look.tint_range_m.unwrap_or(terrain.height_range_m.map(|h| h as f32));
         let contour = look.contours.unwrap_or_default();
         let wire = look.wireframe.unwrap_or_default();
+        let along_sight = if refined_for.metric == ErrorMetric::Sight { 1.0 } else { 0.0 };
         let image = inputs.imagery.map_or_else(Image::default, |imagery| Image::new(imagery, view));
         Self {
             clip_from_eye: clip_from_eye(axes, tangents, near_m, inputs.depth_range).to_cols_array_2d(),
@@ -106,7 +107,7 @@ impl Uniforms {
             ],
             height: [local.height_origin_m, local.eye_above_origin_m, g as f32, near_m as f32],
             lod: with((refined_for.eye_m - view.eye_m).as_vec3(), refined_for.nu() as f32),
-            lod_more: [g.max(1.0) as f32, 0.0, view.pixels_per_radian() as f32, inputs.wall_bottom_m],
+            lod_more: [g.max(1.0) as f32, along_sight, view.pixels_per_radian() as f32, inputs.wall_bottom_m],
             sun: with(to_sun, look.sun.strength),
             sun_colour: rgb(sun_colour, 0.0),
             ambient: rgb(sky_light, look.shading.clamp(0.0, 1.0)),

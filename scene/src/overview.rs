@@ -1,7 +1,7 @@
 //! A view of a whole terrain, from obliquely above, for when no view is given.
 
 use glam::DVec3;
-use terrasoar::view::{View, Viewport};
+use terrasoar::view::{ErrorMetric, View, Viewport};
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Heading of the overview, degrees: the light comes from the left, as on maps.
@@ -25,6 +25,7 @@ pub fn view_from(eye_m: DVec3, [yaw_rad, pitch_rad]: [f64; 2], fov_deg: f64, vie
         viewport,
         tolerance_px: 1.0,
         vertical_exaggeration: 1.0,
+        metric: ErrorMetric::default(),
     }
 }
 

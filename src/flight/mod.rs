@@ -11,7 +11,7 @@ mod reader;
 pub mod sample;
 mod writer;
 
-use crate::view::{View, Viewport};
+use crate::view::{ErrorMetric, View, Viewport};
 use glam::DVec3;
 
 pub use error::FlightError;
@@ -49,6 +49,7 @@ impl FlightFrame {
             viewport,
             tolerance_px,
             vertical_exaggeration: 1.0,
+            metric: ErrorMetric::default(),
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::refine::smart::Smart;
 use crate::refine::soar::Soar;
 use crate::refine::{Culling, Engine, Unobserved};
 use crate::stats::FrameStats;
-use crate::view::{View, Viewport};
+use crate::view::{ErrorMetric, View, Viewport};
 use edits::{Changing, Still};
 use mesh::collect_mesh;
 use passes::{FrameTimes, count_frames, time_updates};
@@ -120,6 +120,8 @@ pub struct Quality {
     pub viewport: Viewport,
     /// Tolerance in pixels, 0.01 to 10,000.
     pub tolerance_px: f64,
+    /// How errors are measured on the screen.
+    pub metric: ErrorMetric,
     /// What heights are multiplied by, 0.01 to 100.
     pub vertical_exaggeration: f64,
     /// Where what lies out of view is left out.
@@ -133,6 +135,7 @@ impl Default for Quality {
         Self {
             viewport: Viewport::default(),
             tolerance_px: 1.0,
+            metric: ErrorMetric::default(),
             vertical_exaggeration: 1.0,
             culling: Culling::default(),
             budget_tests: None,
@@ -149,6 +152,11 @@ impl Quality {
     /// This quality with another tolerance in pixels.
     pub fn tolerance_px(self, tolerance_px: f64) -> Self {
         Self { tolerance_px, ..self }
+    }
+
+    /// This quality with errors measured in another way.
+    pub fn metric(self, metric: ErrorMetric) -> Self {
+        Self { metric, ..self }
     }
 
     /// This quality with heights multiplied by another number.
@@ -187,9 +195,10 @@ impl Quality {
         Ok(self)
     }
 
-    fn view(self, frame: &FlightFrame) -> View {
+    /// A frame of a flight at this quality.
+    pub fn view(self, frame: &FlightFrame) -> View {
         let view = frame.view(self.viewport, self.tolerance_px);
-        View { vertical_exaggeration: self.vertical_exaggeration, ..view }
+        View { vertical_exaggeration: self.vertical_exaggeration, metric: self.metric, ..view }
     }
 }
 

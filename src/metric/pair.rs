@@ -4,13 +4,14 @@
 //! to the last bit. Cost: the arithmetic of one test for two vertices, and of two planes for four.
 
 use super::{ALL_PLANES, Metric, PLANES};
+use crate::view::ErrorMetric;
 use terrasoar_layout::grid::record::Vertex;
 use terrasoar_layout::grid::{Grid, GridPoint};
 use wide::{f64x2, f64x4, i32x4};
 
-/// The tests of a view over a grid, two vertices at once.
+/// The tests of a view over a grid, two vertices at once; `SIGHT` is whether errors are measured along the line of sight.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PairMetric {
+pub(crate) struct PairMetric<const SIGHT: bool> {
     /// East and north.
     eye_m: f64x2,
     eye_height_m: f64x2,
@@ -36,8 +37,9 @@ pub(crate) struct SightedPair {
     selected: u32,
 }
 
-impl PairMetric {
+impl<const SIGHT: bool> PairMetric<SIGHT> {
     pub(crate) fn new(metric: &Metric, grid: &Grid) -> Self {
+        debug_assert_eq!(SIGHT, metric.kind == ErrorMetric::Sight);
         Self {
             eye_m: f64x2::new([metric.eye_m[0], metric.eye_m[1]]),
             eye_height_m: f64x2::splat(metric.eye_m[2]),
@@ -62,10 +64,23 @@ impl PairMetric {
         });
         let height_m = both(|v| v.height_m) * self.exaggeration - self.eye_height_m;
         let radius_m = both(|v| v.radius_m) * self.radius_factor;
-        let reach_m = self.nu * (both(|v| v.error_m) * self.exaggeration) + radius_m;
+        let error_m = both(|v| v.error_m) * self.exaggeration;
+        let seen_m = self.nu * error_m;
         let [x2, y2] = f64x2::transpose(offset_m.map(|xy| xy * xy));
-        let distance2 = x2 + y2 + height_m * height_m;
-        let selected = distance2.simd_lt(reach_m * reach_m).to_bitmask();
+        let across2 = x2 + y2;
+        let distance2 = across2 + height_m * height_m;
+        let selected = if SIGHT {
+            let span_m = radius_m + error_m;
+            let reach_m = seen_m + span_m;
+            let is_plain = both(|v| if v.class.is_plain() { 1.0 } else { 0.0 }).simd_gt(f64x2::ZERO);
+            let (tube_m, ring2_m) = (is_plain.select(span_m, reach_m), is_plain.select(seen_m, f64x2::ZERO));
+            let beyond2 = distance2 - tube_m * reach_m;
+            let is_in_tube = (beyond2 * beyond2).simd_lt(ring2_m * ring2_m * across2);
+            (beyond2.simd_lt(f64x2::ZERO) | is_in_tube).to_bitmask()
+        } else {
+            let reach_m = seen_m + radius_m;
+            distance2.simd_lt(reach_m * reach_m).to_bitmask()
+        };
         SightedPair { offset_m, height_m, radius_m, selected }
     }
 
@@ -102,6 +117,11 @@ mod tests {
     /// Against the definition, bit for bit, on vertices near the borders of both tests too.
     #[test]
     fn pairs_decide_as_the_metric_does() {
+        decide::<false>(ErrorMetric::Ball);
+        decide::<true>(ErrorMetric::Sight);
+    }
+
+    fn decide<const SIGHT: bool>(kind: ErrorMetric) {
         let grid = Grid::new([700, 1025], [10.0, 3.7]).unwrap();
         let mut random = 1u64;
         let mut next = |below: f64| {
@@ -112,14 +132,15 @@ mod tests {
         for round in 0..20_000 {
             let view = View::new([next(7000.0), next(3700.0), next(900.0)], next(360.0), -next(80.0))
                 .viewport(Viewport { width_px: 800, height_px: 600 })
-                .exaggeration([1.0, 0.3, 2.5][round % 3]);
+                .exaggeration([1.0, 0.3, 2.5][round % 3])
+                .metric(kind);
             let metric = Metric::new(&view);
             let points = [0, 1].map(|_| GridPoint::new(next(1025.0) as u32, next(1025.0) as u32));
             let mut vertices = [0, 1].map(|_| Vertex {
                 height_m: next(1000.0),
                 error_m: [next(20.0), 0.0, f64::INFINITY][next(2.05) as usize],
                 radius_m: next(500.0),
-                class: VertexClass::Plain,
+                class: [VertexClass::Plain, VertexClass::Fringe, VertexClass::FringeVoid][next(3.0) as usize],
             });
             if round % 4 == 0 {
                 // Half of these reach exactly as far as the vertex lies: not selected, and the other half one bit farther.
@@ -127,7 +148,7 @@ mod tests {
                 vertices[0].error_m = 0.0;
                 vertices[0].radius_m = sighting.distance_m();
             }
-            let pairs = PairMetric::new(&metric, &grid);
+            let pairs = PairMetric::<SIGHT>::new(&metric, &grid);
             let pair = pairs.sight(points, &vertices);
             for i in 0..2 {
                 let sighting = metric.sight(grid.position_m(points[i]), &vertices[i]);

@@ -325,8 +325,8 @@ impl<S: CompleteStore> Engine for Smart<S> {
         let grid = *self.records.grid();
         let metric = Metric::new(view);
         let rotated = self.last.is_none_or(|last| last.normals() != metric.normals());
-        // A change of nu or of exaggeration scales every margin by its own error: no word outlives it.
-        let scale = |m: &Metric| (m.nu(), m.exaggeration());
+        // A change of nu or of exaggeration scales every margin by its own error, and another measure makes other margins: no word outlives it.
+        let scale = |m: &Metric| (m.nu(), m.exaggeration(), m.kind());
         if self.last.is_some_and(|last| scale(&last) != scale(&metric)) {
             self.nodes.words.iter_mut().for_each(|word| *word &= SPLIT);
         }

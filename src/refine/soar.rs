@@ -11,7 +11,7 @@ use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::pair::{PairMetric, SightedPair};
 use crate::metric::{ALL_PLANES, Metric};
-use crate::view::View;
+use crate::view::{ErrorMetric, View};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
 use terrasoar_layout::read::store::{CompleteStore, RecordStore};
@@ -56,6 +56,45 @@ impl<S: CompleteStore> Soar<S> {
     pub fn strip(&self) -> &[StripVertex] {
         self.strip.as_slice()
     }
+
+    /// Refines for a view whose errors are measured along the line of sight, or not.
+    fn refine<P: Probe, const SIGHT: bool>(&mut self, view: &View, probe: &mut P) -> u64 {
+        let grid = *self.records.grid();
+        let c = corners(grid.k());
+        let read = |slot: u64, level: u32, at: GridPoint| {
+            let vertex = self.records.vertex(slot, level);
+            (Apex { slot, at, height_m: vertex.height_m as f32 }, vertex)
+        };
+        let [sw, se, ne, nw] = [0, 1, 2, 3].map(|i| read(i as u64, 0, c[i]).0);
+        let height = grid.levels() - 1;
+        let (centre, _) = read(CENTRE_SLOT, height, c[0].midpoint(c[2]));
+        (0..=CENTRE_SLOT).for_each(|slot| probe.read(slot));
+        let first = StripVertex { x: sw.at.x(), y: sw.at.y(), height_m: sw.height_m };
+        let mut walk = Walk {
+            records: &self.records,
+            metric: PairMetric::<SIGHT>::new(&Metric::new(view), &grid),
+            strip: self.strip.start(sw.at, first),
+            tests: 0,
+            probe,
+        };
+        for ((slot, [b, d]), next) in ROOTS.into_iter().zip([Some(se), Some(ne), Some(nw), None]) {
+            let base = [c[b], c[d]];
+            let (split, vertex) = read(slot, height - 1, base[0].midpoint(base[1]));
+            walk.probe.read(slot);
+            walk.tests += 1;
+            let pair = walk.metric.sight([split.at; 2], &[vertex; 2]);
+            match self.culling {
+                Culling::Vertices => walk.visit::<true>(height, centre, split, (0, &pair), base, ALL_PLANES),
+                Culling::Clusters => walk.visit::<false>(height, centre, split, (0, &pair), base, 0),
+            }
+            if let Some(next) = next {
+                walk.append(next, 0);
+            }
+        }
+        let tests = walk.tests;
+        walk.strip.finish(first, &mut self.strip);
+        tests
+    }
 }
 
 /// A vertex that the walk has tested: where it lies in the file, on the grid and in height.
@@ -67,15 +106,15 @@ struct Apex {
 }
 
 /// One frame's walk.
-struct Walk<'w, S: RecordStore, P> {
+struct Walk<'w, S: RecordStore, P, const SIGHT: bool> {
     records: &'w S,
-    metric: PairMetric,
+    metric: PairMetric<SIGHT>,
     strip: StripBuilder<StripVertex>,
     tests: u64,
     probe: &'w mut P,
 }
 
-impl<S: RecordStore, P: Probe> Walk<'_, S, P> {
+impl<S: RecordStore, P: Probe, const SIGHT: bool> Walk<'_, S, P, SIGHT> {
     /// Visits the two children of the triangle (apex; b, d), which is split at `here`; `height` is the level of `here` and one.
     ///
     /// The split vertices of both children are read and tested before either is visited: they lie side by side in the file, so two reads are under
@@ -153,41 +192,10 @@ impl<S: CompleteStore> Engine for Soar<S> {
     fn ground_changed(&mut self, _: &GroundChange<'_>) {}
 
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
-        let grid = *self.records.grid();
-        let c = corners(grid.k());
-        let read = |slot: u64, level: u32, at: GridPoint| {
-            let vertex = self.records.vertex(slot, level);
-            (Apex { slot, at, height_m: vertex.height_m as f32 }, vertex)
-        };
-        let [sw, se, ne, nw] = [0, 1, 2, 3].map(|i| read(i as u64, 0, c[i]).0);
-        let height = grid.levels() - 1;
-        let (centre, _) = read(CENTRE_SLOT, height, c[0].midpoint(c[2]));
-        (0..=CENTRE_SLOT).for_each(|slot| probe.read(slot));
-        let first = StripVertex { x: sw.at.x(), y: sw.at.y(), height_m: sw.height_m };
-        let mut walk = Walk {
-            records: &self.records,
-            metric: PairMetric::new(&Metric::new(view), &grid),
-            strip: self.strip.start(sw.at, first),
-            tests: 0,
-            probe,
-        };
-        for ((slot, [b, d]), next) in ROOTS.into_iter().zip([Some(se), Some(ne), Some(nw), None]) {
-            let base = [c[b], c[d]];
-            let (split, vertex) = read(slot, height - 1, base[0].midpoint(base[1]));
-            walk.probe.read(slot);
-            walk.tests += 1;
-            let pair = walk.metric.sight([split.at; 2], &[vertex; 2]);
-            match self.culling {
-                Culling::Vertices => walk.visit::<true>(height, centre, split, (0, &pair), base, ALL_PLANES),
-                Culling::Clusters => walk.visit::<false>(height, centre, split, (0, &pair), base, 0),
-            }
-            if let Some(next) = next {
-                walk.append(next, 0);
-            }
+        match view.metric {
+            ErrorMetric::Ball => self.refine::<P, false>(view, probe),
+            ErrorMetric::Sight => self.refine::<P, true>(view, probe),
         }
-        let tests = walk.tests;
-        walk.strip.finish(first, &mut self.strip);
-        tests
     }
 
     fn for_each_triangle(&self, visit: &mut dyn FnMut(Triangle)) {

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use terrasoar::flight::FlightFrame;
 use terrasoar::mesh::{Triangle, TriangleKey, has_area, is_drawn, twice_area, with_apex_first};
 use terrasoar::refine::Engine;
-use terrasoar::view::{View, Viewport};
+use terrasoar::view::{ErrorMetric, View, Viewport};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::read::store::RecordStore;
 
@@ -12,6 +12,11 @@ pub const VIEWPORT: Viewport = Viewport { width_px: 320, height_px: 240 };
 
 pub fn views(frames: impl IntoIterator<Item = FlightFrame>, tolerance_px: f64) -> Vec<View> {
     frames.into_iter().map(|f| f.view(VIEWPORT, tolerance_px)).collect()
+}
+
+/// The same views with errors measured in another way.
+pub fn measured(views: &[View], metric: ErrorMetric) -> Vec<View> {
+    views.iter().map(|view| view.metric(metric)).collect()
 }
 
 pub fn triangles(engine: &impl Engine) -> Vec<Triangle> {
@@ -71,11 +76,17 @@ pub fn check_drawn_cover(records: &impl RecordStore, triangles: &[Triangle]) {
     }
 }
 
-/// Every sample in view is drawn within the tolerance, or hidden by a void within it.
-pub fn check_tolerance(records: &impl RecordStore, view: &View, triangles: &[Triangle]) {
+/// The angle between two directions from the eye.
+fn angle_rad(a: glam::DVec3, b: glam::DVec3) -> f64 {
+    a.cross(b).length().atan2(a.dot(b))
+}
+
+/// Every sample in view is drawn within the tolerance, or hidden by a void within it. Returns the largest error in pixels, as it shows and as it would from the side.
+pub fn check_tolerance(records: &impl RecordStore, view: &View, triangles: &[Triangle]) -> [f64; 2] {
     let grid = records.grid();
     let [right, up, forward] = view.axes();
     let tan_y = (view.vertical_fov_rad / 2.0).tan();
+    let mut largest_px = [0.0f64; 2];
     let tan_x = tan_y * f64::from(view.viewport.width_px) / f64::from(view.viewport.height_px);
     for t in triangles.iter().filter(|t| has_area(grid, **t)) {
         let folded = t.map(|p| grid.fold(p));
@@ -109,7 +120,11 @@ pub fn check_tolerance(records: &impl RecordStore, view: &View, triangles: &[Tri
                 let pixels_a_metre = view.pixels_per_radian() / to.length();
                 if drawn {
                     let height = (0..3).map(|i| w[i] as f64 / whole * corners[i][2]).sum::<f64>();
-                    let error_px = (sample.height_m - height).abs() * pixels_a_metre;
+                    let side_px = (sample.height_m - height).abs() * pixels_a_metre;
+                    let drawn_at = glam::DVec3::new(px, py, height) - view.eye_m;
+                    let shown_px = angle_rad(to, drawn_at) * view.pixels_per_radian();
+                    let error_px = if view.metric == ErrorMetric::Ball { side_px } else { shown_px };
+                    largest_px = [largest_px[0].max(shown_px), largest_px[1].max(side_px)];
                     assert!(error_px <= view.tolerance_px * (1.0 + 1e-9), "{error_px} px at {p:?} in {t:?}");
                 } else if !sample.class.is_void() && w.iter().all(|w| *w > 0) {
                     // Left out for a void: the hole is too large by less than the triangle's longest edge.
@@ -123,4 +138,5 @@ pub fn check_tolerance(records: &impl RecordStore, view: &View, triangles: &[Tri
             }
         }
     }
+    largest_px
 }

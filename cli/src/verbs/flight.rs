@@ -27,7 +27,7 @@ Examples:
   terrasoar flight terrain alps.iqt -o low.flight --frames 1000 --incoherence 0.6
   terrasoar flight turn alps.iqt -o turn.flight --frames 360 --speed 5 --turn-rate 1
 
---tolerance-px, --viewport and --exaggeration matter for --incoherence only: they decide which triangles a frame has. The flight notes them, and of the terrain its extent and a digest of its heights;
+--tolerance-px, --metric, --viewport and --exaggeration matter for --incoherence only: they decide which triangles a frame has. The flight notes them, and of the terrain its extent and a digest of its heights;
 terrasoar replay says when it is flown with others.")]
 pub(super) struct Args {
     /// What the flight does

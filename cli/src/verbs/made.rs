@@ -41,6 +41,7 @@ pub(super) fn title(terrain: &Path, flight: &Path, quality: Quality) -> ReportTi
         terrain: name(terrain),
         flight: name(flight),
         tolerance_px: quality.tolerance_px,
+        metric: quality.metric,
         viewport: quality.viewport,
         exaggeration: quality.vertical_exaggeration,
         culling: quality.culling,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use terrasoar::flight::generate::FlightKind;
 use terrasoar::flyover::EngineKind;
 use terrasoar::refine::Culling;
-use terrasoar::view::Viewport;
+use terrasoar::view::{ErrorMetric, Viewport};
 use terrasoar_import::Stretch;
 
 fn number(text: &str) -> Result<f64, String> {
@@ -210,6 +210,12 @@ pub(super) fn pace(text: &str) -> Result<f64, String> {
             Err("it must be 0, or from 0.001 to 1000000".into())
         }
     })
+}
+
+/// A measure of errors by name.
+pub(super) fn metric() -> impl TypedValueParser<Value = ErrorMetric> {
+    PossibleValuesParser::new(ErrorMetric::ALL.map(ErrorMetric::name))
+        .map(|word| ErrorMetric::ALL.into_iter().find(|metric| metric.name() == word).unwrap_or_default())
 }
 
 /// A way of culling by name.

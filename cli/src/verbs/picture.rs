@@ -8,7 +8,7 @@ use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::Quality;
 use terrasoar::ground::PictureEngine;
 use terrasoar::refine::Culling;
-use terrasoar::view::{View, Viewport};
+use terrasoar::view::{ErrorMetric, View, Viewport};
 use terrasoar_lab::picture::encode_for_print;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_render::ramps::{RAMPS, Ramp};
@@ -42,6 +42,9 @@ pub(super) struct PictureArgs {
     /// Largest error on the screen in pixels
     #[arg(long, value_name = "PX", default_value = "1", value_parser = parse::tolerance_px)]
     pub tolerance_px: f64,
+    /// How errors are measured on the screen: ball (as if all were seen from the side) or sight (along the line of sight, where heights show the less the steeper one looks down)
+    #[arg(long, value_name = "METRIC", default_value = ErrorMetric::default().name(), value_parser = parse::metric())]
+    pub metric: ErrorMetric,
     /// Whether vertices move into place as the eye comes nearer, or appear there
     #[arg(long, value_name = "ON|OFF", default_value = "on", action = ArgAction::Set, value_parser = switch())]
     pub morph: bool,
@@ -119,9 +122,10 @@ impl PictureArgs {
         look
     }
 
-    /// A view at this tolerance and exaggeration.
+    /// A view at this tolerance and exaggeration, with errors measured in this way.
     pub(super) fn refine(&self, view: View) -> View {
-        View { tolerance_px: self.tolerance_px, vertical_exaggeration: self.exaggeration, ..view }
+        let view = view.tolerance_px(self.tolerance_px).metric(self.metric);
+        view.exaggeration(self.exaggeration)
     }
 
     /// A studio for `terrain`.
@@ -241,10 +245,7 @@ pub(super) fn draw_frame(
     quality: Quality,
 ) -> Result<(Vec<u8>, String)> {
     let mut studio = Studio::new(terrain, PictureEngine::default(), quality.culling, quality.viewport)?;
-    let view = |frame: &FlightFrame| View {
-        vertical_exaggeration: quality.vertical_exaggeration,
-        ..frame.view(quality.viewport, quality.tolerance_px)
-    };
+    let view = |frame: &FlightFrame| quality.view(frame);
     let Some(asked) = flight.frames.get(frame) else { bail!("the flight has no frame {frame}") };
     for flown in &flight.frames[..=frame] {
         studio.fly(&view(flown));

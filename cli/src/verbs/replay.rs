@@ -15,7 +15,7 @@ use terrasoar::flight::{Flight, FlightFrame};
 use terrasoar::flyover::{EngineKind, Quality, TimedBatch, replay, replay_edited};
 use terrasoar::refine::Culling;
 use terrasoar::stats::{FrameStats, ReplaySummary};
-use terrasoar::view::Viewport;
+use terrasoar::view::{ErrorMetric, Viewport};
 use terrasoar_lab::report::{Origin, ReportFile, write_frames_csv};
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -63,6 +63,7 @@ pub(super) struct Args {
 
 /// Names of the notes in which a flight says for which pictures its speed was found.
 const TOLERANCE_NOTE: &str = "solved-tolerance-px";
+const METRIC_NOTE: &str = "solved-metric";
 const VIEWPORT_NOTE: &str = "solved-viewport";
 const EXAGGERATION_NOTE: &str = "solved-exaggeration";
 const CULLING_NOTE: &str = "solved-culling";
@@ -73,6 +74,9 @@ pub(super) struct QualityArgs {
     /// Largest error on the screen in pixels
     #[arg(long, value_name = "PX", default_value = "1", value_parser = parse::tolerance_px)]
     tolerance_px: f64,
+    /// How errors are measured on the screen: ball (as if all were seen from the side) or sight (along the line of sight, where heights show the less the steeper one looks down)
+    #[arg(long, value_name = "METRIC", default_value = ErrorMetric::default().name(), value_parser = parse::metric())]
+    metric: ErrorMetric,
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = parse::viewport)]
     viewport: Viewport,
@@ -89,6 +93,7 @@ impl QualityArgs {
         Quality::default()
             .viewport(self.viewport)
             .tolerance_px(self.tolerance_px)
+            .metric(self.metric)
             .vertical_exaggeration(self.exaggeration)
             .culling(self.culling)
     }
@@ -107,10 +112,11 @@ impl QualityArgs {
     }
 
     /// What a flight whose speed was found for an incoherence notes of the picture it was found for.
-    pub(super) fn notes(self) -> [(String, String); 4] {
+    pub(super) fn notes(self) -> [(String, String); 5] {
         let [wide, high] = self.viewport.size_px();
         [
             (TOLERANCE_NOTE.into(), self.tolerance_px.to_string()),
+            (METRIC_NOTE.into(), self.metric.name().into()),
             (VIEWPORT_NOTE.into(), format!("{wide}x{high}")),
             (EXAGGERATION_NOTE.into(), self.exaggeration.to_string()),
             (CULLING_NOTE.into(), self.culling.name().into()),
@@ -128,6 +134,7 @@ impl QualityArgs {
             let noted = note(name).unwrap_or_default();
             match name.as_str() {
                 TOLERANCE_NOTE => format!("a tolerance of {noted} px, here it is {value} px"),
+                METRIC_NOTE => format!("errors measured by {noted}, here it is by {value}"),
                 VIEWPORT_NOTE => format!("a picture of {noted}, here it is {value}"),
                 EXAGGERATION_NOTE => format!("an exaggeration of {noted}, here it is {value}"),
                 _ => format!("culling by {noted}, here it is by {value}"),

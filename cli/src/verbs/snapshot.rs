@@ -41,7 +41,7 @@ Examples:
   terrasoar snapshot alps.iqt --ortho --window 395000,5092000,401000,5097000 --crs dem --dpi 300 --world-file -o village.png
 
 Fields of --json: output, size_px, style, ramp, ramp_range_m (heights of the ramp's ends), frame (null without a flight), eye_m, raised_m (by how much the eye was raised above the ground),
-metres_per_px (null without --ortho), scale (n of 1:n; null without --ortho and --dpi), beside (files of --world-file), yaw_deg, pitch_deg, vertical_fov_deg, tolerance_px, exaggeration, engine, triangles, adapter, backend.")]
+metres_per_px (null without --ortho), scale (n of 1:n; null without --ortho and --dpi), beside (files of --world-file), yaw_deg, pitch_deg, vertical_fov_deg, tolerance_px, metric, exaggeration, engine, triangles, adapter, backend.")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
@@ -136,6 +136,7 @@ struct Answer {
     pitch_deg: f64,
     vertical_fov_deg: f64,
     tolerance_px: f64,
+    metric: &'static str,
     exaggeration: f64,
     engine: &'static str,
     triangles: u64,
@@ -210,6 +211,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
             pitch_deg: view.pitch_rad.to_degrees(),
             vertical_fov_deg: view.vertical_fov_rad.to_degrees(),
             tolerance_px: view.tolerance_px,
+            metric: view.metric.name(),
             exaggeration: view.vertical_exaggeration,
             engine: picture.engine_name(),
             triangles,

@@ -5,7 +5,7 @@ use super::{parse, picture};
 use crate::window::{self, Plan};
 use anyhow::Result;
 use std::path::PathBuf;
-use terrasoar::view::Viewport;
+use terrasoar::view::{ErrorMetric, Viewport};
 use terrasoar_render::ramps::Ramp;
 
 /// Fly over a terrain in a window.
@@ -30,6 +30,9 @@ pub(super) struct Args {
     /// Largest error on the screen in pixels, instead of the last one
     #[arg(long, value_name = "PX", value_parser = parse::tolerance_px)]
     tolerance_px: Option<f64>,
+    /// How errors are measured on the screen, instead of the last one: ball (as if all were seen from the side) or sight (along the line of sight, where heights show the less the steeper one looks down)
+    #[arg(long, value_name = "METRIC", value_parser = parse::metric())]
+    metric: Option<ErrorMetric>,
     /// Multiply heights by this factor, instead of the last one
     #[arg(long, value_name = "FACTOR", value_parser = parse::exaggeration)]
     exaggeration: Option<f64>,
@@ -70,6 +73,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         style: args.style.clone(),
         ramp: args.ramp.map(|ramp| ramp.name.to_owned()),
         tolerance_px: args.tolerance_px,
+        metric: args.metric,
         exaggeration: args.exaggeration,
         size_px: args.size.map(Viewport::size_px),
         narrate: args.narrate,

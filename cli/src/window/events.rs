@@ -61,6 +61,9 @@ impl Session {
         }
         settings.ramp = plan.ramp.clone().or(settings.ramp);
         settings.tolerance_px = plan.tolerance_px.or(settings.tolerance_px);
+        if let Some(metric) = plan.metric {
+            settings.metric = metric.name().to_owned();
+        }
         settings.exaggeration = plan.exaggeration.unwrap_or(settings.exaggeration);
         let size: Size = match plan.size_px {
             Some([width, height]) => PhysicalSize::new(width, height).into(),
@@ -143,7 +146,12 @@ impl ApplicationHandler<Wake> for Session {
             viewer.window().request_redraw();
         }
         match event {
-            WindowEvent::CloseRequested => return self.end(event_loop),
+            WindowEvent::CloseRequested => {
+                viewer.quit();
+                if viewer.may_end() {
+                    return self.end(event_loop);
+                }
+            }
             WindowEvent::Resized(size) => viewer.resize(size.width, size.height),
             WindowEvent::Occluded(hidden) => viewer.hide(hidden),
             WindowEvent::Focused(false) => viewer.hand.release(),

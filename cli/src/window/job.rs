@@ -3,35 +3,14 @@
 //! The file goes beside the elevation data where nothing has its name yet, else into the folder for temporary files. **Every error comes back as
 //! a message.** If the window closes meanwhile nothing is left, because a build's output has no name before it is complete.
 
+use super::meter::Meter;
 use super::threads;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::file::atomic::folder_of;
 use terrasoar_layout::file::header::SpacingOrigin;
-use terrasoar_layout::progress::Progress;
-
-/// How a build gets on.
-#[derive(Debug, Default)]
-struct Meter {
-    stage: Mutex<&'static str>,
-    total: AtomicU64,
-    done: AtomicU64,
-}
-
-impl Progress for Meter {
-    fn stage(&self, name: &'static str, samples: u64) {
-        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = name;
-        self.total.store(samples, Ordering::Relaxed);
-        self.done.store(0, Ordering::Relaxed);
-    }
-
-    fn advance(&self, samples: u64) {
-        self.done.fetch_add(samples, Ordering::Relaxed);
-    }
-}
 
 /// A build that has ended well.
 #[derive(Debug, PartialEq, Eq)]
@@ -73,10 +52,7 @@ impl Job {
 
     /// What it is at, and which part of that is done.
     pub(crate) fn progress(&self) -> (&'static str, f32) {
-        let stage = *self.progress.stage.lock().unwrap_or_else(PoisonError::into_inner);
-        let [done, total] =
-            [&self.progress.done, &self.progress.total].map(|n| n.load(Ordering::Relaxed) as f32);
-        (stage, if total > 0.0 { (done / total).min(1.0) } else { 0.0 })
+        self.progress.read()
     }
 
     /// What came of it, once it has ended; later on nothing.

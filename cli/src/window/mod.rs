@@ -1,6 +1,6 @@
 //! `terrasoar view`: a window that a terrain is flown over in.
 //!
-//! `camera`, `coordinates`, `pick`, `flights`, `settings`, `keys`, `hand`, `job` and `workshop` know no window and are tested by themselves; `screen` and
+//! `camera`, `coordinates`, `pick`, `flights`, `settings`, `keys`, `hand`, `job`, `meter` and `workshop` know no window and are tested by themselves; `screen` and
 //! `overlay` know no terrain; `viewer` puts a frame together, `events` brings it the window's events. A frame is drawn only when something
 //! moves or was touched. **What fails while the window is open is shown in the window.**
 
@@ -15,6 +15,7 @@ mod history;
 mod job;
 mod keep;
 mod keys;
+mod meter;
 mod overlay;
 mod panel;
 mod pick;
@@ -31,7 +32,7 @@ use crate::fit;
 use anyhow::Result;
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
-use terrasoar::view::Viewport;
+use terrasoar::view::{ErrorMetric, Viewport};
 use terrasoar_layout::read::terrain::Terrain;
 
 pub(crate) use keys::list as list_of_keys;
@@ -53,6 +54,8 @@ pub(crate) struct Plan {
     pub ramp: Option<String>,
     /// Pixels.
     pub tolerance_px: Option<f64>,
+    /// How errors are measured.
+    pub metric: Option<ErrorMetric>,
     /// Factor on heights.
     pub exaggeration: Option<f64>,
     /// Size of the window in pixels.

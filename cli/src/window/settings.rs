@@ -10,6 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use terrasoar::refine::Culling;
 use terrasoar::sink::FileSink;
+use terrasoar::view::ErrorMetric;
 use terrasoar_render::ramps::Ramp;
 use terrasoar_render::{Capabilities, Haze, LOOKS, Look, Surface};
 
@@ -19,6 +20,8 @@ use terrasoar_render::{Capabilities, Haze, LOOKS, Look, Surface};
 pub(crate) struct Settings {
     /// Largest error on the screen in pixels, 0.1 to 50; without it what suits the adapter.
     pub tolerance_px: Option<f64>,
+    /// Name of the way errors are measured.
+    pub metric: String,
     /// Tolerance where none is set.
     #[serde(skip)]
     pub suited_tolerance_px: f64,
@@ -60,6 +63,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             tolerance_px: None,
+            metric: ErrorMetric::default().name().to_owned(),
             suited_tolerance_px: 1.0,
             exaggeration: 1.0,
             sun_azimuth_deg: 312.0,
@@ -143,6 +147,11 @@ impl Settings {
         look
     }
 
+    /// How errors are measured.
+    pub(crate) fn metric(&self) -> ErrorMetric {
+        ErrorMetric::ALL.into_iter().find(|metric| metric.name() == self.metric).unwrap_or_default()
+    }
+
     /// The way of culling.
     pub(crate) fn culling(&self) -> Culling {
         Culling::ALL.into_iter().find(|c| c.name() == self.culling).unwrap_or_default()
@@ -201,6 +210,7 @@ impl Settings {
         }
         self.ramp = self.ramp.filter(|name| Ramp::named(name).is_some());
         self.culling = self.culling().name().to_owned();
+        self.metric = self.metric().name().to_owned();
         self.window = [self.window[0].clamp(320, 16_384), self.window[1].clamp(240, 16_384)];
         self
     }

@@ -52,7 +52,15 @@ impl Stage {
     /// # Errors
     /// As [`Stage::open`].
     pub(crate) fn again(&self, gpu: &Gpu) -> Result<Self> {
-        Self::new(self.terrain().open_again_unmapped()?, gpu, self.culling, self.cache_bytes)
+        self.with(self.terrain().open_again_unmapped()?, gpu)
+    }
+
+    /// Another terrain in the same way, on another scene.
+    ///
+    /// # Errors
+    /// As [`Stage::new`].
+    pub(crate) fn with(&self, terrain: Terrain, gpu: &Gpu) -> Result<Self> {
+        Self::new(terrain, gpu, self.culling, self.cache_bytes)
     }
 
     /// The same terrain culled in another way, with whatever was edited.

@@ -18,6 +18,7 @@ use super::flights::{Player, Recorder};
 use super::hand::Hand;
 use super::history::History;
 use super::job::Job;
+use super::meter::Meter;
 use super::overlay::Overlay;
 use super::panel::{Memory, Note};
 use super::pick::Hit;
@@ -84,6 +85,8 @@ pub(super) struct Viewer {
     strokes: u64,
     workshop: Workshop,
     rain: Option<edit::Rain>,
+    /// How the rewriting of the file gets on, while it is under way.
+    widening: Option<Arc<Meter>>,
     frame_at: Option<Instant>,
     frames: u64,
     /// Whether the picture will be better when what it lacks has come.
@@ -145,6 +148,7 @@ impl Viewer {
             strokes: 0,
             workshop,
             rain: None,
+            widening: None,
             frame_at: None,
             frames: 0,
             unsettled: true,
@@ -178,6 +182,11 @@ impl Viewer {
     /// The window.
     pub(super) fn window(&self) -> &Window {
         &self.window
+    }
+
+    /// Whether the window is to be closed, and nothing keeps it open.
+    pub(super) fn may_end(&self) -> bool {
+        self.ending && !self.is_widening()
     }
 
     /// Whether something was touched since the last frame.
@@ -238,7 +247,7 @@ impl Viewer {
             || self.rain.is_some()
             || self.player.as_ref().is_some_and(Player::is_playing);
         self.tell_motion(moving);
-        if self.ending {
+        if self.may_end() {
             return Next::End;
         }
         if moving || self.unsettled || self.touched || counting || again.is_zero() {

@@ -87,6 +87,7 @@ fn snapshot_repeats(_: &Gpu) -> Outcome {
         "pitch_deg",
         "vertical_fov_deg",
         "tolerance_px",
+        "metric",
         "exaggeration",
         "engine",
         "triangles",

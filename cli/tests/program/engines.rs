@@ -28,10 +28,11 @@ const REPLAY_FIELDS: [&str; 21] = [
 ];
 
 /// What says where figures come from.
-const ORIGIN_FIELDS: [&str; 8] = [
+const ORIGIN_FIELDS: [&str; 9] = [
     "terrain",
     "flight",
     "tolerance_px",
+    "metric",
     "viewport_px",
     "exaggeration",
     "culling",
@@ -150,6 +151,7 @@ fn engines_replay_the_same_mesh() {
         "# flight: land.flight",
         "# engine: smart",
         "# tolerance_px: 1",
+        "# metric: ball",
         "# viewport_px: 800x600",
         "# exaggeration: 1",
         "# culling: vertices",
@@ -168,6 +170,8 @@ fn tolerance_and_viewport_change_the_mesh() {
     };
     let base = triangles(&[]);
     assert!(triangles(&["--tolerance-px", "8"]) < base);
+    assert_eq!(triangles(&["--metric", "ball"]), base);
+    assert!(triangles(&["--metric", "sight"]) < base);
     assert!(triangles(&["--viewport", "1600x1200"]) > base);
 }
 

@@ -79,9 +79,16 @@ fn every_engine_and_layout_has_a_run_with_every_field() {
         assert!(run["needed_mb"].as_f64() >= run["realtime_mb"].as_f64());
         assert_eq!(run["stream"].is_object(), run["source"] == "pool");
     }
-    for field in
-        ["terrain", "flight", "tolerance_px", "viewport_px", "cache_mib", "page_bytes", "kernel_known"]
-    {
+    for field in [
+        "terrain",
+        "flight",
+        "tolerance_px",
+        "metric",
+        "viewport_px",
+        "cache_mib",
+        "page_bytes",
+        "kernel_known",
+    ] {
         assert!(!value[field].is_null(), "{field}");
     }
     assert!(value["cap"].is_null() && value["cap_note"].is_null());

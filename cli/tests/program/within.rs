@@ -221,6 +221,7 @@ fn a_flight_says_for_which_pictures_its_speed_was_found() {
     let notes = std::fs::read_to_string(bench.path("s.flight")).unwrap();
     for note in [
         "solved-tolerance-px: 0.5",
+        "solved-metric: ball",
         "solved-viewport: 640x480",
         "solved-exaggeration: 1",
         "solved-culling: vertices",

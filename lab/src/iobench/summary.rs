@@ -19,6 +19,8 @@ pub struct IoBench {
     pub flight: String,
     /// Tolerance in pixels.
     pub tolerance_px: f64,
+    /// How errors were measured.
+    pub metric: String,
     /// Size of the picture, wide and high.
     pub viewport_px: [u32; 2],
     /// Heights were multiplied by this.

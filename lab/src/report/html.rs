@@ -28,8 +28,9 @@ pub(super) fn page(report: &ComparisonReport<'_>, frame_files: &[String], plots:
     let title = report.title;
     let heading = escaped(&format!("{}: {}", title.terrain, title.flight));
     let of = format!(
-        "Tolerance {} px, picture {} × {} px, heights × {}, culling by {}",
+        "Tolerance {} px by {}, picture {} × {} px, heights × {}, culling by {}",
         exact(title.tolerance_px),
+        title.metric.name(),
         title.viewport.width_px,
         title.viewport.height_px,
         exact(title.exaggeration),

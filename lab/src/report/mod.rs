@@ -320,6 +320,7 @@ mod tests {
             terrain: "Puget Sound 8193 x 8193".into(),
             flight: "straight, 12 m a frame".into(),
             tolerance_px: 1.0,
+            metric: terrasoar::view::ErrorMetric::default(),
             viewport: terrasoar::view::Viewport::default(),
             exaggeration: 1.0,
             culling: terrasoar::refine::Culling::default(),

@@ -7,7 +7,7 @@ use crate::made::Made;
 use serde::Serialize;
 use std::io::{self, Write};
 use terrasoar::refine::Culling;
-use terrasoar::view::Viewport;
+use terrasoar::view::{ErrorMetric, Viewport};
 use terrasoar_layout::printable;
 
 /// What was flown, as it stands in the report's titles.
@@ -19,6 +19,8 @@ pub struct ReportTitle {
     pub flight: String,
     /// Tolerance in pixels.
     pub tolerance_px: f64,
+    /// How errors were measured.
+    pub metric: ErrorMetric,
     /// Size of the picture.
     pub viewport: Viewport,
     /// Heights were multiplied by this.
@@ -36,6 +38,7 @@ impl ReportTitle {
             terrain: &self.terrain,
             flight: &self.flight,
             tolerance_px: self.tolerance_px,
+            metric: self.metric.name(),
             viewport_px: self.viewport.size_px(),
             exaggeration: self.exaggeration,
             culling: self.culling.name(),
@@ -54,6 +57,8 @@ pub struct Origin<'a> {
     pub flight: &'a str,
     /// Tolerance in pixels.
     pub tolerance_px: f64,
+    /// How errors were measured.
+    pub metric: &'a str,
     /// Size of the picture, wide and high.
     pub viewport_px: [u32; 2],
     /// Heights were multiplied by this.
@@ -78,6 +83,7 @@ impl Origin<'_> {
         line(to, "flight", self.flight)?;
         engine.iter().try_for_each(|engine| line(to, "engine", engine))?;
         line(to, "tolerance_px", &self.tolerance_px.to_string())?;
+        line(to, "metric", self.metric)?;
         let [wide, high] = self.viewport_px;
         line(to, "viewport_px", &format!("{wide}x{high}"))?;
         line(to, "exaggeration", &self.exaggeration.to_string())?;
@@ -121,6 +127,7 @@ mod tests {
             terrain: "hill\n# flight: none.iqt",
             flight: "low.flight",
             tolerance_px: 1.5,
+            metric: "ball",
             viewport_px: [800, 600],
             exaggeration: 2.0,
             culling: "vertices",
@@ -146,6 +153,7 @@ mod tests {
                 "flight",
                 "engine",
                 "tolerance_px",
+                "metric",
                 "viewport_px",
                 "exaggeration",
                 "culling"

@@ -23,14 +23,16 @@ impl Plane {
         let x = |p: (GridPoint, f64)| f64::from(p.0.x());
         let y = |p: (GridPoint, f64)| f64::from(p.0.y());
         let (xv, yv, zv) = (0.5 * (x(b) + x(d)), 0.5 * (y(b) + y(d)), 0.5 * (b.1 + d.1));
+        // Corners lie powers of two apart: a product with the inverse is the quotient.
+        let per = |steps: f64| inverse_of_power_of_two(steps);
         let (gx, gy) = if y(b) == y(d) {
-            ((d.1 - b.1) / (x(d) - x(b)), (a.1 - zv) / (y(a) - yv))
+            ((d.1 - b.1) * per(x(d) - x(b)), (a.1 - zv) * per(y(a) - yv))
         } else if x(b) == x(d) {
-            ((a.1 - zv) / (x(a) - xv), (d.1 - b.1) / (y(d) - y(b)))
+            ((a.1 - zv) * per(x(a) - xv), (d.1 - b.1) * per(y(d) - y(b)))
         } else if y(a) == y(b) {
-            ((a.1 - b.1) / (x(a) - x(b)), (d.1 - a.1) / (y(d) - y(a)))
+            ((a.1 - b.1) * per(x(a) - x(b)), (d.1 - a.1) * per(y(d) - y(a)))
         } else {
-            ((d.1 - a.1) / (x(d) - x(a)), (a.1 - b.1) / (y(a) - y(b)))
+            ((d.1 - a.1) * per(x(d) - x(a)), (a.1 - b.1) * per(y(a) - y(b)))
         };
         Self { xv, yv, zv, gx, gy }
     }
@@ -86,5 +88,30 @@ impl Plane {
             corners.into_iter().fold(f64::INFINITY, f64::min),
             corners.into_iter().fold(f64::NEG_INFINITY, f64::max),
         ]
+    }
+}
+
+/// The inverse of a power of two, or of its negative, from 2^-1022 to 2^1022.
+#[inline(always)]
+fn inverse_of_power_of_two(power: f64) -> f64 {
+    const SIGN: u64 = 1 << 63;
+    let bits = power.to_bits();
+    f64::from_bits((bits & SIGN) | ((2046 << 52) - (bits & !SIGN)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inverses_are_those_of_a_division() {
+        for exponent in -20..=20 {
+            for power in [2.0f64.powi(exponent), -(2.0f64.powi(exponent))] {
+                assert_eq!(inverse_of_power_of_two(power), 1.0 / power);
+                for value in [0.0, 1.0, -0.3, 65_535.0, 1e-9, 123.456] {
+                    assert_eq!((value * inverse_of_power_of_two(power)).to_bits(), (value / power).to_bits());
+                }
+            }
+        }
     }
 }

@@ -4,7 +4,7 @@
 
 use super::levels::{LevelShape, Levels};
 use super::plan::{PagePart, block_bounds};
-use crate::grid::order::{BLOCK_SLOTS, BlockPoints, level_slots};
+use crate::grid::order::{BLOCK_SLOTS, BlockCells, level_slots};
 use crate::grid::record::RecordCodec;
 use crate::grid::{Grid, GridPoint};
 
@@ -39,13 +39,12 @@ pub(super) fn gather<C: RecordCodec>(
         return None;
     }
     let mut bytes = vec![0; part.count() as usize * C::BYTES];
-    let block = BlockPoints::new(grid.k(), shape.level(), start);
+    let block = BlockCells::new(grid.k(), shape.level(), start);
     for (i, place) in bytes.chunks_exact_mut(C::BYTES).enumerate() {
-        let raw = block.point(within + i).filter(|p| !shape.is_beyond(*p)).and_then(|p| {
-            let (row, column) = shape.index(p);
-            rows.get(row.wrapping_sub(south))?.get(column).copied()
-        });
-        C::write(raw.unwrap_or(C::INERT), place);
+        // Rows hold no more than what is not beyond the data, so ghosts and others are in none.
+        let (row, column) = block.cell(within + i);
+        let raw = rows.get(row.wrapping_sub(south)).and_then(|row| row.get(column));
+        C::write(raw.copied().unwrap_or(C::INERT), place);
     }
     Some(bytes)
 }

@@ -98,13 +98,25 @@ impl<'a> Tile<'a> {
     fn scan_inside(&self, own: &OwnErrors, step_m: f64) {
         let mut s = 2;
         while s < self.side {
-            self.scan_black(own, s, step_m);
-            self.scan_white(own, s, step_m);
+            // Most triangles are of the smallest three sizes; with the size known to the compiler their rows are no loops.
+            match s {
+                2 => self.scan_size(own, 2, step_m),
+                4 => self.scan_size(own, 4, step_m),
+                8 => self.scan_size(own, 8, step_m),
+                _ => self.scan_size(own, s, step_m),
+            }
             s *= 2;
         }
     }
 
+    #[inline(always)]
+    fn scan_size(&self, own: &OwnErrors, s: u32, step_m: f64) {
+        self.scan_black(own, s, step_m);
+        self.scan_white(own, s, step_m);
+    }
+
     /// Triangles on axis-aligned edges of length 2s.
+    #[inline(always)]
     fn scan_black(&self, own: &OwnErrors, s: u32, step_m: f64) {
         for y in (0..self.samples[1]).step_by(s as usize) {
             let odd_row = (y / s) & 1 == 1;
@@ -112,12 +124,13 @@ impl<'a> Tile<'a> {
             for x in (first..self.samples[0].min(self.side + 1)).step_by(2 * s as usize) {
                 let farthest =
                     if odd_row { farthest_upright(self, x, y, s) } else { farthest_level(self, x, y, s) };
-                self.raise(own, x, y, farthest, step_m);
+                self.raise(own, 2 * s.trailing_zeros(), x, y, farthest, step_m);
             }
         }
     }
 
     /// Triangles on the diagonals of squares of side 2s.
+    #[inline(always)]
     fn scan_white(&self, own: &OwnErrors, s: u32, step_m: f64) {
         for y in (s..self.samples[1].min(self.side)).step_by(2 * s as usize) {
             for x in (s..self.samples[0].min(self.side)).step_by(2 * s as usize) {
@@ -125,7 +138,8 @@ impl<'a> Tile<'a> {
                 let [b, d] = self.grid.edge_ends(v);
                 // Rising: the diagonal climbs from south-west to north-east.
                 let rising = (b.x() < d.x()) == (b.y() < d.y());
-                self.raise(own, x, y, farthest_diagonal(self, x, y, s, rising), step_m);
+                let farthest = farthest_diagonal(self, x, y, s, rising);
+                self.raise(own, 2 * s.trailing_zeros() + 1, x, y, farthest, step_m);
             }
         }
     }
@@ -164,9 +178,19 @@ impl<'a> Tile<'a> {
         }
     }
 
-    fn raise(&self, own: &OwnErrors, x: u32, y: u32, farthest: f64, step_m: f64) {
-        if farthest > 0.0 {
-            own.raise(GridPoint::new(self.x0 + x, self.y0 + y), farthest, step_m);
+    #[inline(always)]
+    fn raise(&self, own: &OwnErrors, level: u32, x: u32, y: u32, farthest: f64, step_m: f64) {
+        if farthest <= 0.0 {
+            return;
+        }
+        let v = GridPoint::new(self.x0 + x, self.y0 + y);
+        let Some(cell) = own.cell(level, v) else { return };
+        let bits = scanned_error_m(farthest, step_m).to_bits();
+        // What lies on the border is the next tile's as well; nobody else has to do with what lies inside.
+        if x > 0 && y > 0 && x < self.side && y < self.side {
+            cell.store(bits, Ordering::Relaxed);
+        } else {
+            cell.fetch_max(bits, Ordering::Relaxed);
         }
     }
 }
@@ -214,13 +238,17 @@ fn for_each_triangle_around(
 }
 
 impl OwnErrors {
+    /// The own error of a vertex of this level.
+    #[inline(always)]
+    fn cell(&self, level: u32, v: GridPoint) -> Option<&AtomicU32> {
+        let (row, column) = index_in(level, v);
+        self.row(level, row)?.get(column)
+    }
+
     /// Raises the own error of `v` to at least `codes` height codes.
     fn raise(&self, v: GridPoint, codes: f64, step_m: f64) {
-        let metres = scanned_error_m(codes, step_m);
-        let level = self.grid().level(v);
-        let (row, column) = index_in(level, v);
-        if let Some(cell) = self.row(level, row).and_then(|r| r.get(column)) {
-            cell.fetch_max(metres.to_bits(), Ordering::Relaxed);
+        if let Some(cell) = self.cell(self.grid().level(v), v) {
+            cell.fetch_max(scanned_error_m(codes, step_m).to_bits(), Ordering::Relaxed);
         }
     }
 }

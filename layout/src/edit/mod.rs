@@ -30,7 +30,7 @@ pub use session::compact::{Compacted, compact};
 #[cfg(feature = "files")]
 pub use session::picture::Repainted;
 #[cfg(feature = "files")]
-pub use session::widen::widen;
+pub use session::widen::{room_for, widen};
 #[cfg(feature = "files")]
 pub use session::{Committed, EditSession, HistoryEntry, history};
 

@@ -201,48 +201,67 @@ pub(crate) const fn black_block_at(d: u32, offset: u64, order: u32) -> [u64; 2] 
     [a >> order << order, b >> order << order]
 }
 
-/// Slots of a block whose points [`BlockPoints`] enumerates.
-pub(crate) const BLOCK_SLOTS: u64 = 1024;
+/// Slots of a block whose cells [`BlockCells`] enumerates.
+pub(crate) const BLOCK_SLOTS: u64 = 1 << (2 * BLOCK_ORDER);
+/// Binary logarithm of a block's side.
+const BLOCK_ORDER: u32 = 5;
 
-/// Even bits of each 10-bit number, gathered.
-const GATHERED: [u8; BLOCK_SLOTS as usize] = {
-    let mut table = [0; BLOCK_SLOTS as usize];
+/// Where the slots of an aligned block lie, each as (rows north, columns east) of the block's first row and column: of white blocks, and of black ones, which stand on a corner.
+const WITHIN: [[(u8, i8); BLOCK_SLOTS as usize]; 2] = {
+    let mut table = [[(0, 0); BLOCK_SLOTS as usize]; 2];
     let mut i = 0;
-    while i < table.len() {
-        table[i] = gather(i as u64) as u8;
+    while i < BLOCK_SLOTS as usize {
+        let (even, odd) = (gather(i as u64) as u8, gather(i as u64 >> 1) as u8);
+        table[0][i] = (odd, (even ^ odd) as i8);
+        let a = odd ^ ((1 << BLOCK_ORDER) - 1);
+        let b = a ^ even;
+        table[1][i] = (a + b, (a as i8 - b as i8) >> 1);
         i += 1;
     }
     table
 };
 
-/// The grid points of one aligned block of a level's slots: [`point_of`] with the work for the block done once.
+/// Rows and columns, within their level, of the slots of one aligned block: [`point_of`] with the work for the block done once.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct BlockPoints {
-    k: u32,
-    level: u32,
-    /// Gathered bits of the block's offset: even ones, odd ones.
-    even: u64,
-    odd: u64,
+pub(crate) struct BlockCells {
+    row: usize,
+    column: usize,
+    within: &'static [(u8, i8); BLOCK_SLOTS as usize],
+    /// `k`, level and first slot of a level that is smaller than a block and of black vertices, whose turned bits lie within the block.
+    small: Option<(u32, u32, u64)>,
 }
 
-impl BlockPoints {
+impl BlockCells {
     /// The block of `level` that starts `offset` slots into it, a multiple of [`BLOCK_SLOTS`].
     pub(crate) fn new(k: u32, level: u32, offset: u64) -> Self {
         debug_assert!(offset.is_multiple_of(BLOCK_SLOTS));
-        Self { k, level, even: gather(offset), odd: gather(offset >> 1) }
+        if level & 1 == 1 {
+            let [x, y] = white_block_at(offset, BLOCK_ORDER);
+            return Self { row: y as usize, column: x as usize, within: &WITHIN[0], small: None };
+        }
+        let d = k - 1 - level / 2;
+        if d < BLOCK_ORDER {
+            let first = level_slots(k, level).start;
+            return Self { row: 0, column: 0, within: &WITHIN[1], small: Some((k, level, first)) };
+        }
+        let [a, b] = black_block_at(d, offset, BLOCK_ORDER).map(|v| v as i64);
+        // See `black_point`.
+        let (u, w) = (a - b + (1 << d), a + b + 1 - (1 << d));
+        Self { row: w as usize, column: (u >> 1) as usize, within: &WITHIN[1], small: None }
     }
 
-    /// The point of the block's `i`-th slot; `None` for a ghost.
+    /// Row and column of the block's `i`-th slot. Those of a ghost are in no level: too large, or below 0 and so larger still.
     #[inline(always)]
-    pub(crate) fn point(&self, i: usize) -> Option<GridPoint> {
-        let t = self.level / 2;
-        let d = self.k - 1 - t;
-        let even = self.even | u64::from(GATHERED[i % BLOCK_SLOTS as usize]);
-        let odd = self.odd | u64::from(GATHERED[i / 2 % BLOCK_SLOTS as usize]);
-        if self.level & 1 == 1 {
-            return Some(white_point(t, odd, even));
+    pub(crate) fn cell(&self, i: usize) -> (usize, usize) {
+        if let Some((k, level, first)) = self.small {
+            let t = level / 2;
+            return match point_of(k, first + i as u64) {
+                Some(p) => ((p.y() >> t) as usize, (p.x() >> (t + 1)) as usize),
+                None => (usize::MAX, usize::MAX),
+            };
         }
-        black_point(d, t, odd, even)
+        let (north, east) = self.within[i % BLOCK_SLOTS as usize];
+        (self.row.wrapping_add(usize::from(north)), self.column.wrapping_add_signed(isize::from(east)))
     }
 }
 
@@ -320,11 +339,23 @@ mod tests {
         for k in 1..=8 {
             for level in 0..2 * k {
                 let slots = level_slots(k, level);
+                let (t, is_white) = (level / 2, level & 1);
                 for offset in (0..slots.end - slots.start).step_by(BLOCK_SLOTS as usize) {
-                    let block = BlockPoints::new(k, level, offset);
+                    let block = BlockCells::new(k, level, offset);
                     let count = (slots.end - slots.start - offset).min(BLOCK_SLOTS);
                     for i in 0..count {
-                        assert_eq!(block.point(i as usize), point_of(k, slots.start + offset + i));
+                        let (row, column) = block.cell(i as usize);
+                        match point_of(k, slots.start + offset + i) {
+                            Some(p) => assert_eq!(
+                                (row, column),
+                                ((p.y() >> (t + is_white)) as usize, (p.x() >> (t + 1)) as usize)
+                            ),
+                            // Beyond the rows and columns of the level.
+                            None => {
+                                let steps = 1usize << (k - t);
+                                assert!(row > steps || column >= steps / 2 + row % 2, "{row} {column}");
+                            }
+                        }
                     }
                 }
             }

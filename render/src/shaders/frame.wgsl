@@ -14,7 +14,7 @@ struct Frame {
     height: vec4<f32>,
     // Eye the mesh was refined for, from the eye; nu.
     lod: vec4<f32>,
-    // Factor on radii; unused; pixels a radian; bottom of side walls, metres before exaggeration.
+    // Factor on radii; 1 where errors are measured along the line of sight, else 0; pixels a radian; bottom of side walls, metres before exaggeration.
     lod_more: vec4<f32>,
     // Towards the sun; strength of its light.
     sun: vec4<f32>,

@@ -30,3 +30,13 @@ fn metres_from_eye(cells: vec2<f32>, height_from_origin_m: f32) -> vec3<f32> {
 fn own(v: Vertex) -> f32 {
     return v.height_m - frame.height.x;
 }
+
+// Error that shows along the line of sight over the tolerance, at most: 1 where the vertex enters the mesh.
+fn excess_along_sight(v: Vertex) -> f32 {
+    let from_eye_m = metres_from_eye(cells_from_eye(v), own(v)) - frame.lod.xyz;
+    let distance_m = length(from_eye_m);
+    let error_m = v.error_m * frame.height.z;
+    let span_m = v.radius_m * frame.lod_more.x + error_m;
+    let from_the_side = frame.lod.w * error_m / max(distance_m - span_m, 1e-3);
+    return from_the_side * (length(from_eye_m.xy) + span_m) / (distance_m + span_m);
+}

@@ -62,6 +62,9 @@ struct OwnPoint {
 // Screen error over tolerance that would show without the vertex, on a scale of octaves.
 fn demand_of(v: Vertex) -> f32 {
     let true_place = metres_from_eye(cells_from_eye(v), own(v));
+    if frame.lod_more.y > 0.0 {
+        return clamp(log2(max(excess_along_sight(v), 1e-6)), 0.0, 4.0);
+    }
     let nearest_m = length(true_place - frame.lod.xyz) - v.radius_m * frame.lod_more.x;
     return clamp(log2(frame.lod.w * v.error_m * frame.height.z / max(nearest_m, 1e-3)), 0.0, 4.0);
 }

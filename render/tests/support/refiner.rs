@@ -4,6 +4,7 @@
 //! eye and a mesh at another have slots in common, as a caller's have.
 
 use glam::DVec3;
+use terrasoar::view::ErrorMetric;
 use terrasoar_render::{MeshVertex, TerrainShape, View};
 
 /// All vertices of a square, and what refinement needs to know of them.
@@ -109,7 +110,15 @@ impl Square {
         let v = &self.vertices[slot as usize];
         let place = self.place(slot) * DVec3::new(1.0, 1.0, g);
         let reach = view.nu() * f64::from(v.error_m) * g + f64::from(v.radius_m) * g.max(1.0);
-        place.distance(view.eye_m) < reach
+        let away = place - view.eye_m;
+        match view.metric {
+            ErrorMetric::Ball => away.length() < reach,
+            ErrorMetric::Sight => {
+                let error = f64::from(v.error_m) * g;
+                let (seen, span) = (view.nu() * error, f64::from(v.radius_m) * g.max(1.0) + error);
+                away.length_squared() < span * span + seen * (away.truncate().length() + span)
+            }
+        }
     }
 
     /// The mesh of a view, not culled.

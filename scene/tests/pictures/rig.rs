@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use terrasoar::ground::{Ground, PictureEngine, StreamOptions};
 use terrasoar::refine::Culling;
-use terrasoar::view::{View, Viewport};
+use terrasoar::view::{ErrorMetric, View, Viewport};
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
@@ -126,5 +126,6 @@ pub fn view(
         viewport: Viewport { width_px: size_px[0], height_px: size_px[1] },
         tolerance_px: 1.0,
         vertical_exaggeration: 1.0,
+        metric: ErrorMetric::default(),
     }
 }

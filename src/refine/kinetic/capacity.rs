@@ -2,6 +2,8 @@
 
 /// Lists below this many bytes are left as they are.
 const SMALL_BYTES: usize = 32 << 10;
+/// Lists of more bytes are given back by another thread.
+const LARGE_BYTES: usize = 1 << 20;
 /// A list is cut down when a frame uses less than one part in so many of it.
 const UNUSED: usize = 32;
 
@@ -13,8 +15,26 @@ pub(super) fn grow<T>(array: &mut Vec<T>, more: usize) {
 }
 
 /// Gives back most of a list's memory if a frame that used `used` of it has no need of it: after the first frame, or a jump.
-pub(super) fn settle<T>(list: &mut Vec<T>, used: usize) {
-    if list.capacity() * size_of::<T>() > SMALL_BYTES && used < list.capacity() / UNUSED {
-        list.shrink_to((4 * used).max(SMALL_BYTES / size_of::<T>()));
+pub(super) fn settle<T: Copy + Send + 'static>(list: &mut Vec<T>, used: usize) {
+    let bytes = list.capacity() * size_of::<T>();
+    if bytes > SMALL_BYTES && used < list.capacity() / UNUSED {
+        let least = (4 * used).max(SMALL_BYTES / size_of::<T>());
+        if bytes < LARGE_BYTES {
+            return list.shrink_to(least);
+        }
+        let mut small = Vec::with_capacity(least.max(list.len()));
+        small.extend_from_slice(list);
+        give_up(std::mem::replace(list, small));
     }
+}
+
+/// Gives memory back beside the frame: the system takes a millisecond for some ten megabytes.
+#[cfg(feature = "files")]
+fn give_up<T: Send + 'static>(list: Vec<T>) {
+    rayon::spawn(move || drop(list));
+}
+
+#[cfg(not(feature = "files"))]
+fn give_up<T>(list: Vec<T>) {
+    drop(list);
 }

@@ -16,6 +16,7 @@
 //! Cost: some ten nanoseconds a test, a hundred a split or merge, a hundred additions for the clocks. Allocates nothing once its arrays have grown.
 
 mod capacity;
+mod chunked;
 mod frame;
 mod mesh;
 mod time;
@@ -326,6 +327,7 @@ impl<S: RecordStore> Engine for Kinetic<S> {
             normals: metric.normals().map(DVec3::from_array),
             nu: metric.nu(),
             exaggeration: metric.exaggeration(),
+            metric: metric.kind(),
         };
         self.work = Work::default();
         self.patch.clear();

@@ -13,12 +13,10 @@ use std::sync::Arc;
 use std::time::Instant;
 use terrasoar::edits::LoadedBatch;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::HeightRoom;
-use terrasoar_layout::edit::{EditSession, Editor, Foresight, holds_heights, widen};
+use terrasoar_layout::edit::{EditSession, Editor, Foresight, holds_heights, room_for, widen};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::header::Header;
 use terrasoar_layout::grid::Grid;
-use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Memory for rewriting a file in MiB.
@@ -253,19 +251,4 @@ impl Work<'_> {
         }
         Ok(())
     }
-}
-
-/// Room for heights that a file cannot hold: as much again beyond its range as they ask for, so that a long script does not rewrite it for every batch; less where
-/// that would take larger records.
-fn room_for(header: &Header, heights_m: [f64; 2]) -> HeightRoom {
-    let [low, high] = header.height_range_m;
-    // Slopes that are too steep come without heights.
-    let lowest = if heights_m[0].is_nan() { low } else { heights_m[0].min(low) };
-    let highest = if heights_m[1].is_nan() { high } else { heights_m[1].max(high) };
-    let roomy = HeightRoom { lowest_m: 2.0 * lowest - low, highest_m: 2.0 * highest - high };
-    let steps = (roomy.highest_m - roomy.lowest_m) / header.scale.height_step_m;
-    if header.record_kind == RecordKind::Compact && steps > 60_000.0 {
-        return HeightRoom { lowest_m: lowest, highest_m: highest };
-    }
-    roomy
 }

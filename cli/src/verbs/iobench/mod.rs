@@ -176,14 +176,7 @@ pub(in crate::verbs) fn run(args: &Args) -> Result<()> {
     let flight = Flight::read(&args.flight)?;
     args.quality.look_at(&Terrain::open_unmapped(&args.file)?, &flight, &args.flight)?;
     let quality = args.quality.quality();
-    let views: Vec<View> = flight
-        .frames
-        .iter()
-        .map(|frame| View {
-            vertical_exaggeration: quality.vertical_exaggeration,
-            ..frame.view(quality.viewport, quality.tolerance_px)
-        })
-        .collect();
+    let views: Vec<View> = flight.frames.iter().map(|frame| quality.view(frame)).collect();
     // Times come first: what counting holds would be in the peak of memory.
     let timed = measure::measured(args, &views, &standing, &progress)?;
     let (runs, block_m) = measure::counted(args, &views, &progress)?;
@@ -243,6 +236,7 @@ fn bench_of(args: &Args, block_m: f64, standing: Standing, runs: Vec<IoRun>) -> 
         terrain: made::name(&args.file),
         flight: made::name(&args.flight),
         tolerance_px: quality.tolerance_px,
+        metric: quality.metric.name().into(),
         viewport_px: quality.viewport.size_px(),
         exaggeration: quality.vertical_exaggeration,
         culling: quality.culling.name().into(),

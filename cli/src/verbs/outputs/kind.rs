@@ -1,7 +1,7 @@
 //! What verbs write, and whether a file that is there could be of that kind.
 
 use super::there::{named, start_of, terrain};
-use crate::verbs::overlays::named_beside;
+use crate::beside::named_beside;
 use std::io;
 use std::path::Path;
 use terrasoar::edits::{Script, Step};

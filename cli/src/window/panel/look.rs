@@ -5,6 +5,7 @@ use crate::window::keys::Action;
 use crate::window::settings::{CONTOUR_INTERVAL_M, EXAGGERATION, Settings, TOLERANCE_PX};
 use egui::{ComboBox, Slider, Ui};
 use terrasoar::refine::Culling;
+use terrasoar::view::ErrorMetric;
 use terrasoar_render::LOOKS;
 use terrasoar_render::ramps::RAMPS;
 
@@ -56,7 +57,7 @@ pub(super) fn show(ui: &mut Ui, facts: &Facts<'_>, settings: &mut Settings) {
     });
 }
 
-/// Tolerance, exaggeration, culling, freezing.
+/// Tolerance and how it is measured, exaggeration, culling, freezing.
 pub(super) fn mesh(ui: &mut Ui, facts: &Facts<'_>, settings: &mut Settings, wishes: &mut Vec<Wish>) {
     let [least, most] = TOLERANCE_PX;
     let mut tolerance_px = settings.tolerance_px();
@@ -68,6 +69,15 @@ pub(super) fn mesh(ui: &mut Ui, facts: &Facts<'_>, settings: &mut Settings, wish
     {
         settings.tolerance_px = Some(tolerance_px);
     }
+    ComboBox::from_label("errors by").width(80.0).selected_text(&settings.metric).show_ui(ui, |ui| {
+        for (metric, means) in ErrorMetric::ALL.into_iter().zip([
+            "As if every error were seen from the side",
+            "Along the line of sight: the steeper one looks down, the less of a height shows",
+        ]) {
+            ui.selectable_value(&mut settings.metric, metric.name().to_owned(), metric.name())
+                .on_hover_text(means);
+        }
+    });
     let [least, most] = EXAGGERATION;
     let exaggeration = Slider::new(&mut settings.exaggeration, least..=most).logarithmic(true);
     ui.add(exaggeration.prefix("x ").text("heights"));

@@ -80,8 +80,8 @@ pub(crate) struct Facts<'a> {
     pub raining: bool,
     /// Whether edits are on their way to the disk.
     pub saving: bool,
-    /// File that is being built, its stage and which part of it is done.
-    pub job: Option<(String, &'static str, f32)>,
+    /// What is done in the background, in words, and which part of it is done.
+    pub works: Vec<(String, f32)>,
     /// What is to be said.
     pub notes: &'a [Note],
 }

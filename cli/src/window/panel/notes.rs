@@ -1,4 +1,4 @@
-//! Notes: where a file was written, what went wrong, how far a build has come.
+//! Notes: where a file was written, what went wrong, how far a build or a rewriting has come.
 //!
 //! News disappears by itself after a while. Errors stay until they are closed.
 
@@ -43,9 +43,9 @@ pub(super) fn show(context: &Context, facts: &Facts<'_>, room: Rect, wishes: &mu
     let area = Area::new(Id::unique("notes")).pivot(Align2::RIGHT_TOP).default_width(width);
     area.fixed_pos(room.right_top() + vec2(-12.0, 12.0)).show(context, |ui| {
         ui.set_max_width(width);
-        if let Some((file, stage, part)) = &facts.job {
+        for (words, part) in &facts.works {
             frame(Color32::from_rgb(0x3d, 0x86, 0xc6)).show(ui, |ui| {
-                ui.label(format!("building {file}: {stage}"));
+                ui.add(egui::Label::new(words).wrap());
                 ui.add(ProgressBar::new(*part).desired_width(width - 24.0).show_percentage());
             });
         }

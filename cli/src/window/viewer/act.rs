@@ -88,7 +88,7 @@ impl Viewer {
                 self.rig.circling = None;
                 self.rig.place(self.rig.camera);
             }
-            Action::Quit => self.ending = true,
+            Action::Quit => self.quit(),
         }
     }
 
@@ -142,7 +142,22 @@ impl Viewer {
         }
     }
 
+    /// Closes the window, at once or when a rewriting of the file is over.
+    pub(in crate::window) fn quit(&mut self) {
+        if self.is_widening() && !self.ending {
+            self.news("The window closes when the file is rewritten and all edits are saved.");
+        }
+        self.ending = true;
+    }
+
     pub(super) fn open_terrain(&mut self, path: &Path) {
+        if self.is_widening() {
+            return self.trouble(format!(
+                "{}: {} is being rewritten with room for edits; open this one after that",
+                path.display(),
+                self.terrain_name
+            ));
+        }
         // First, for it may be the same file.
         let closed = self.close_workshop();
         if let Err(words) = &closed {

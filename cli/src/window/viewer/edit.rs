@@ -13,8 +13,8 @@ use crate::window::workshop::{News, Seen, Workshop};
 use std::time::{Duration, Instant};
 use terrasoar::edits::rain::Rain as RainOfCraters;
 use terrasoar::flight::generate::Ground;
-use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::Edit;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_scene::repaint::Repaint;
 use winit::event_loop::EventLoopProxy;
 
@@ -185,14 +185,16 @@ impl Viewer {
             News::Nothing | News::Closed(None) => {}
             News::Edited(seen) => self.follow(*seen),
             News::Refused(error) => {
+                self.widening = None;
                 self.end_work();
-                self.trouble(match error {
-                    LayoutError::OutOfRange { .. } => format!(
-                        "{error} (`terrasoar edit` does that by itself; here it would take the ground from under the eye)"
-                    ),
-                    _ => error.to_string(),
-                });
+                self.trouble(error.to_string());
             }
+            News::Widening { words, meter } => {
+                self.widening = Some(meter);
+                self.news(words);
+                self.tell("widening");
+            }
+            News::Widened(terrain) => self.show_widened(*terrain),
             News::Turned { back, seen } => {
                 self.follow(*seen);
                 self.tell(if back { "undone" } else { "redone" });
@@ -214,10 +216,14 @@ impl Viewer {
             News::NotTurned(error) => self.trouble(error.to_string()),
             News::NotOpened(error) => {
                 (self.stroke, self.rain) = (None, None);
-                self.trouble(error.to_string());
+                let lost = match self.widening.take() {
+                    Some(_) => "; edits that were not saved before are not in the file",
+                    None => "",
+                };
+                self.trouble(format!("{error}{lost}"));
             }
             News::Broken(words) => {
-                (self.stroke, self.rain) = (None, None);
+                (self.stroke, self.rain, self.widening) = (None, None, None);
                 self.trouble(words);
                 self.show_file();
             }
@@ -235,9 +241,38 @@ impl Viewer {
         }
     }
 
+    /// Shows the file as it was rewritten. What is edited from now on is of that file.
+    fn show_widened(&mut self, terrain: Terrain) {
+        self.widening = None;
+        match self.stage.with(terrain, &self.screen.gpu) {
+            Ok(stage) => {
+                self.put_on_show(stage);
+                self.tell("widened");
+            }
+            Err(error) => {
+                self.trouble(format!("{error:#}"));
+                // What follows cannot be shown over what is on show. It is brought to the disk, and the file is opened from there.
+                (self.stroke, self.rain) = (None, None);
+                if let (_, Err(words)) = self.workshop.close() {
+                    self.trouble(words);
+                }
+                self.show_file();
+            }
+        }
+    }
+
+    /// Whether the file is being rewritten.
+    pub(super) fn is_widening(&self) -> bool {
+        self.widening.is_some()
+    }
+
     /// Puts another stage in place of the one before, whose edits are settled.
     pub(super) fn take_stage(&mut self, stage: Stage) {
         self.workshop = workshop_for(&stage, &self.plan, &self.proxy);
+        self.put_on_show(stage);
+    }
+
+    fn put_on_show(&mut self, stage: Stage) {
         self.coordinates = Coordinates::of(stage.terrain().header());
         self.stage = stage;
         self.frozen = None;

@@ -13,17 +13,7 @@ impl Viewer {
         let (mut settings, mut wishes) = (self.settings.clone(), Vec::new());
         let adapter = self.screen.gpu.capabilities.adapter.clone();
         let extent_m = self.stage.heights().extent_m();
-        let job = self.job.as_ref().map(|job| {
-            let (stage, part) = job.progress();
-            (
-                terrasoar_layout::printable::line(
-                    &job.input.file_name().unwrap_or_default().to_string_lossy(),
-                )
-                .into_owned(),
-                stage,
-                part,
-            )
-        });
+        let works = self.works();
         let facts = Facts {
             terrain: &self.terrain_name,
             extent_m,
@@ -43,7 +33,7 @@ impl Viewer {
             ring: self.ring(),
             raining: self.rain.is_some(),
             saving: self.is_saving(),
-            job,
+            works,
             notes: &self.notes,
         };
         let memory = &mut self.memory;
@@ -55,6 +45,21 @@ impl Viewer {
         self.touched |= self.settings != before;
         self.follow_settings(&before);
         layer
+    }
+
+    /// What is done in the background, and which part of it is done.
+    fn works(&self) -> Vec<(String, f32)> {
+        let building = self.job.as_ref().map(|job| {
+            let (stage, part) = job.progress();
+            let name = job.input.file_name().unwrap_or_default().to_string_lossy();
+            (format!("building {}: {stage}", terrasoar_layout::printable::line(&name)), part)
+        });
+        let widening = self.widening.as_ref().map(|meter| {
+            let (stage, part) = meter.read();
+            let name = terrasoar_layout::printable::line(&self.terrain_name);
+            (format!("making room in {name} for this edit: {stage}. What you edit meanwhile follows."), part)
+        });
+        building.into_iter().chain(widening).collect()
     }
 
     /// What other settings mean beyond the picture.

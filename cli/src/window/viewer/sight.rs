@@ -19,7 +19,9 @@ impl Viewer {
     }
 
     pub(super) fn view(&self) -> View {
-        self.rig.camera.view(self.viewport(), self.settings.tolerance_px(), self.settings.exaggeration)
+        let settings = &self.settings;
+        let view = self.rig.camera.view(self.viewport(), settings.tolerance_px(), settings.exaggeration);
+        view.metric(settings.metric())
     }
 
     /// The ground at a place of the window.

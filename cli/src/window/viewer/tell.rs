@@ -57,6 +57,7 @@ impl Viewer {
         self.tell_state("help", self.memory.help.to_string());
         self.tell_state("frozen", self.frozen.is_some().to_string());
         self.tell_state("tolerance", format!("{} px", self.settings.tolerance_px()));
+        self.tell_state("metric", self.settings.metric.clone());
         self.tell_state("style", self.settings.style.clone());
         self.tell_state("playing", self.player.as_ref().is_some_and(Player::is_playing).to_string());
         self.tell_state("tool", self.tools.tool.name().into());

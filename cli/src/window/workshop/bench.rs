@@ -3,6 +3,8 @@
 //! Invariants: orders are carried out in the order in which they come. Nothing is reported as saved before the second thread has written it. An undo is done after everything
 //! before it is on the disk. Cost: the session's own, and a copy of each page that changed.
 
+mod room;
+
 use super::news::{News, Order, Report, Seen, Tally};
 use super::writer::Writer;
 use super::{Open, Spawn, Wake};
@@ -31,17 +33,25 @@ pub(super) struct Bench {
     /// Orders that came while something was waited for.
     kept: VecDeque<Order>,
     writing: Writing,
+    /// What is not on the disk yet.
+    batches: VecDeque<Batch>,
     /// The stroke of which something was refused last.
     refused: Option<u64>,
     desk: Desk,
+}
+
+/// Edits and paint that are applied together.
+struct Batch {
+    edits: Vec<Edit>,
+    paints: Vec<Paint>,
 }
 
 /// What is on its way to the disk.
 enum Writing {
     /// Nothing.
     Idle,
-    /// The first so many edits; what is to follow has this label.
-    UnderWay { edits: u64, next: Option<String> },
+    /// The first so many edits, and the first so many batches of those that are not on the disk; what is to follow has this label.
+    UnderWay { edits: u64, batches: usize, next: Option<String> },
 }
 
 /// Where reports go, and what is in all of them.
@@ -84,18 +94,32 @@ impl Bench {
         match open_session(open, desk.generation).and_then(|session| parts(session, to_bench, spawn)) {
             Err(error) => desk.report(News::NotOpened(error)),
             Ok((session, writer, helpers)) => {
-                let (picture, kept, writing) = (PictureWatch::default(), VecDeque::new(), Writing::Idle);
-                let bench =
-                    Self { writer, session, helpers, picture, orders, kept, writing, refused: None, desk };
-                bench.run();
+                let bench = Self {
+                    writer,
+                    session,
+                    helpers,
+                    picture: PictureWatch::default(),
+                    orders,
+                    kept: VecDeque::new(),
+                    writing: Writing::Idle,
+                    batches: VecDeque::new(),
+                    refused: None,
+                    desk,
+                };
+                bench.run(open);
             }
         }
     }
 
-    fn run(mut self) {
+    fn run(mut self, open: &Open) {
         while let Some(order) = self.kept.pop_front().or_else(|| self.orders.recv().ok()) {
             match order {
-                Order::Apply { stroke, edits, paints } => self.apply(stroke, &edits, &paints),
+                Order::Apply { stroke, edits, paints } => {
+                    match self.apply(stroke, Batch { edits, paints }, open) {
+                        Some(bench) => self = bench,
+                        None => return,
+                    }
+                }
                 Order::Commit { label } => self.commit(label),
                 Order::Turn { back } => self.turn(back),
                 Order::Written(job, outcome) => {
@@ -116,20 +140,41 @@ impl Bench {
         }
     }
 
-    fn apply(&mut self, stroke: u64, edits: &[Edit], paints: &[Paint]) {
-        self.desk.done.orders += 1;
-        self.desk.done.edits += edits.len() as u64;
-        if self.refused == Some(stroke) {
-            return self.desk.report(News::Nothing);
-        }
-        let news = match self.session.apply_and_paint(edits, paints) {
-            Ok((changes, _)) => News::Edited(Box::new(self.seen(&changes))),
-            Err(error) => {
-                self.refused = Some(stroke);
-                News::Refused(error)
+    /// Applies a batch; the file is rewritten for it where that is what it takes. `None` if there is no session any more, which is told.
+    fn apply(mut self, stroke: u64, batch: Batch, open: &Open) -> Option<Self> {
+        let edits = batch.edits.len() as u64;
+        let mut news = News::Nothing;
+        if self.refused != Some(stroke) {
+            let mut done = self.try_to(&batch);
+            let mut widenings = 0;
+            while let Err(LayoutError::OutOfRange { heights_m, problem, .. }) = &done
+                && widenings < room::MOST_WIDENINGS
+            {
+                widenings += 1;
+                let (bench, made) = self.make_room(*heights_m, problem, open)?;
+                self = bench;
+                done = made.and_then(|()| self.try_to(&batch));
             }
-        };
+            news = match done {
+                Ok(seen) => {
+                    self.batches.push_back(batch);
+                    News::Edited(seen)
+                }
+                Err(error) => {
+                    self.refused = Some(stroke);
+                    News::Refused(error)
+                }
+            };
+        }
+        self.desk.done.orders += 1;
+        self.desk.done.edits += edits;
         self.desk.report(news);
+        Some(self)
+    }
+
+    fn try_to(&mut self, batch: &Batch) -> Result<Box<Seen>, LayoutError> {
+        let (changes, _) = self.session.apply_and_paint(&batch.edits, &batch.paints)?;
+        Ok(Box::new(self.seen(&changes)))
     }
 
     fn commit(&mut self, label: String) {
@@ -150,11 +195,12 @@ impl Bench {
         let edits = self.desk.done.edits;
         match helpers.install(|| session.prepare_commit(label))? {
             Some(job) => {
-                self.writing = Writing::UnderWay { edits, next: None };
+                self.writing = Writing::UnderWay { edits, batches: self.batches.len(), next: None };
                 self.writer.write(job);
                 Ok(true)
             }
             None => {
+                self.batches.clear();
                 self.desk.done.saved = edits;
                 Ok(false)
             }
@@ -173,7 +219,8 @@ impl Bench {
     fn written(&mut self, job: CommitJob, outcome: Result<(), LayoutError>) -> Result<(), LayoutError> {
         let writing = std::mem::replace(&mut self.writing, Writing::Idle);
         let committed = self.session.finish_commit(job, outcome)?;
-        if let Writing::UnderWay { edits, .. } = writing {
+        if let Writing::UnderWay { edits, batches, .. } = writing {
+            self.batches.drain(..batches);
             self.desk.done.saved = edits;
         }
         self.desk.generation = self.session.header().generation;
@@ -190,18 +237,24 @@ impl Bench {
     fn settle(&mut self) -> Result<(), LayoutError> {
         let mut label = self.next_label();
         loop {
-            while let Writing::UnderWay { .. } = self.writing {
-                match self.orders.recv() {
-                    Ok(Order::Written(job, outcome)) => self.written(*job, outcome)?,
-                    Ok(order) => self.kept.push_back(order),
-                    // The second thread has a sender, and ends only after this one.
-                    Err(_) => return Ok(()),
-                }
-            }
+            self.wait_for_writing()?;
             if !self.begin(label.take().as_deref().unwrap_or("edits"))? {
                 return Ok(());
             }
         }
+    }
+
+    /// Waits until the commit under way is written. Orders that come meanwhile are kept.
+    fn wait_for_writing(&mut self) -> Result<(), LayoutError> {
+        while let Writing::UnderWay { .. } = self.writing {
+            match self.orders.recv() {
+                Ok(Order::Written(job, outcome)) => self.written(*job, outcome)?,
+                Ok(order) => self.kept.push_back(order),
+                // The second thread has a sender, and ends only after this one.
+                Err(_) => return Ok(()),
+            }
+        }
+        Ok(())
     }
 
     fn turn(&mut self, back: bool) {

@@ -3,6 +3,8 @@
 //! The window sends orders and takes their results, frame by frame, in the order in which they were given. Edits are in memory before they are seen. A stroke is committed when it
 //! ends, by a second thread, while the next stroke may be under way already. **What is reported as saved is on the disk.** Closing the workshop waits for this.
 //!
+//! An edit that the file's records cannot hold makes the thread rewrite the file (`bench::room`); the orders after it wait for that, and the window does not.
+//!
 //! A thread that cannot start is an error message, and the next edit tries again. If the thread ends unexpectedly, a message says how much was not on the disk, and edits are refused until the
 //! terrain is opened again. Before that, what was being written is written, and the right to edit is given back. Cost: a message an order and one back, with the pages that changed.
 

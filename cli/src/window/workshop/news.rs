@@ -1,10 +1,13 @@
 //! What the window and the workshop's thread send each other: plain values that share nothing, so that neither waits for the other.
 
+use crate::window::meter::Meter;
+use std::sync::Arc;
 use terrasoar::stream::GroundPatch;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{CommitJob, Edit};
 use terrasoar_layout::file::entries::Entry;
 use terrasoar_layout::imagery::Paint;
+use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_scene::repaint::Repaint;
 
 /// What the thread is to do, one after the other.
@@ -55,6 +58,15 @@ pub(crate) enum News {
     Edited(Box<Seen>),
     /// Edits could not be applied; nothing of the batch was.
     Refused(LayoutError),
+    /// The file has no room for an edit, and is being rewritten with room for it. Orders wait for that.
+    Widening {
+        /// Why, and what it means, as a message.
+        words: String,
+        /// How it gets on.
+        meter: Arc<Meter>,
+    },
+    /// The file was rewritten. This is what it has now, and all that follows is of it: the edits that were not on the disk yet come again.
+    Widened(Box<Terrain>),
     /// The last commit was taken back, or brought back, on the disk too.
     Turned {
         /// Whether it was taken back.

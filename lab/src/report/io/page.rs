@@ -10,8 +10,9 @@ pub(crate) fn page(bench: &IoBench, plots: &[PlotFile]) -> String {
     let mut out = String::new();
     let [wide, high] = bench.viewport_px;
     let of = format!(
-        "Tolerance {} px, picture {wide} × {high} px, cache {} MiB, disk {} pages between frames",
+        "Tolerance {} px by {}, picture {wide} × {high} px, cache {} MiB, disk {} pages between frames",
         exact(bench.tolerance_px),
+        bench.metric,
         bench.cache_mib,
         bench.disk_pages_per_frame
     );

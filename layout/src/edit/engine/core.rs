@@ -192,7 +192,8 @@ impl<C: RecordCodec> Core<C> {
     /// Vertices and pages that the batch wrote to, as far as they are not as they were.
     fn tell(&mut self, changes: &mut Changes) {
         let written = self.pages.overwritten();
-        let mut tell = |Overwritten { point, slot, old }: &Overwritten<C::Raw>| {
+        changes.vertices.reserve_exact(written.len());
+        for Overwritten { point, slot, old } in written {
             if self.pages.raw_if_held(*slot) != Some(*old) {
                 changes.vertices.push(*point);
                 let page = page_of::<C>(*slot);
@@ -200,16 +201,6 @@ impl<C: RecordCodec> Core<C> {
                     changes.pages.push(page);
                 }
             }
-        };
-        if changes.samples.len() == 1 {
-            // One update writes a record once.
-            written.iter().for_each(tell);
-        } else {
-            // The first of several entries of a slot has the record from before all.
-            let mut order: Vec<(u64, usize)> = written.iter().map(|w| w.slot).zip(0..).collect();
-            order.sort_unstable();
-            order.dedup_by_key(|(slot, _)| *slot);
-            order.iter().for_each(|(_, i)| tell(&written[*i]));
         }
         changes.pages.sort_unstable();
         changes.pages.dedup();
@@ -331,7 +322,7 @@ impl<C: RecordCodec> Core<C> {
         }
         let ranges = [0, 1].map(|i| crate::bound::range(&codes[i]));
         self.scratch.near.set(changed, &codes[1]);
-        let new = NewCodes { rect: changed, codes: &codes[1], ranges };
+        let new = NewCodes { rect: changed, codes: &codes[1], old_codes: &codes[0], ranges };
         Update::new(&self.rules, &mut self.pages, new, &mut self.scratch).run();
         self.codes = codes;
     }

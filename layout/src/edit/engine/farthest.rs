@@ -9,15 +9,15 @@ use super::midway::Ground;
 use crate::bound::{Plane, Rules, larger};
 use crate::grid::GridPoint;
 use crate::grid::order::{CENTRE_SLOT, child_slots, slot_of};
-use crate::grid::record::{RecordCodec, Vertex, VertexClass};
+use crate::grid::record::{RecordCodec, VertexClass};
 
 /// A triangle of the descent: its corners, how far they are above the plane, its slots, and which edges belong to others.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     /// Apex and the ends of the base.
     corners: [GridPoint; 3],
-    /// Codes by which the corners lie above the plane; not a number for voids.
-    above: [f64; 3],
+    /// Codes by which the corners are off the plane; infinite for voids, of which nothing is known.
+    off: [f64; 3],
     apex_slot: u64,
     split_slot: u64,
     /// Whether the base, the edge from the apex to its first end and that to its second lie on a leg of the whole triangle: their samples count with the vertex
@@ -77,38 +77,51 @@ impl<'s, C: RecordCodec> Search<'s, C> {
         let piece = Piece {
             corners,
             // A plane passes through its corners.
-            above: [0.0; 3],
+            off: [0.0; 3],
             apex_slot: slots[0],
             split_slot: slots[1],
             outside: [false, true, true],
         };
-        self.visit(ground, piece, raw, self.level);
-    }
-
-    #[inline(always)]
-    fn consider(&mut self, above: f64) {
-        if above.abs() > self.farthest {
-            self.farthest = above.abs();
-            let metres = f64::from(self.rules.scanned_error_m(self.farthest));
-            if metres > self.limit_m {
-                self.limit_m = self.limit_m.max(self.rules.stored_error_m(self.level, self.class, metres));
-                self.know_enough();
-            }
-        }
-    }
-
-    /// Looks at the vertex that splits `piece`, whose record is `raw` and whose level is `level`, 1 or more, and at what lies below it.
-    fn visit(&mut self, ground: &mut Ground<'_, C>, piece: Piece, raw: C::Raw, level: u32) {
-        let [a, b, d] = piece.corners;
-        let v = b.midpoint(d);
-        let vertex = self.rules.codec.decode(raw, level);
+        let vertex = self.rules.codec.decode(raw, self.level);
         if vertex.class == VertexClass::Inert {
             return;
         }
-        let above =
-            if vertex.class.is_void() { f64::NAN } else { self.plane.above(v, ground.code_of(v, raw)) };
-        if !piece.outside[0] && !above.is_nan() {
-            self.consider(above);
+        // The vertex's record is the only one that may not say the new height yet.
+        let v = corners[1].midpoint(corners[2]);
+        let code = if vertex.class.is_void() { f64::NAN } else { ground.code_of(v, raw) };
+        self.visit(ground, piece, v, code, self.level);
+    }
+
+    /// Codes by which a sample is off the plane; infinite for a void, whose code is not a number.
+    #[inline(always)]
+    fn off(&self, p: GridPoint, code: f64) -> f64 {
+        if code.is_nan() { f64::INFINITY } else { self.plane.above(p, code).abs() }
+    }
+
+    #[inline(always)]
+    fn consider(&mut self, off: f64) {
+        if off > self.enough && off > self.farthest && off < f64::INFINITY {
+            self.take(off);
+        }
+    }
+
+    #[inline(never)]
+    fn take(&mut self, off: f64) {
+        self.farthest = off;
+        let metres = f64::from(self.rules.scanned_error_m(off));
+        if metres > self.limit_m {
+            self.limit_m = self.limit_m.max(self.rules.stored_error_m(self.level, self.class, metres));
+            self.know_enough();
+        }
+    }
+
+    /// Looks at the vertex `v` that splits `piece`, whose level is `level`, 1 or more, and whose height code is `code`, not a number for a void; and at what lies below it.
+    fn visit(&mut self, ground: &mut Ground<'_, C>, piece: Piece, v: GridPoint, code: f64, level: u32) {
+        let [a, b, d] = piece.corners;
+        let off = self.off(v, code);
+        let [base_out, b_out, d_out] = piece.outside;
+        if !base_out {
+            self.consider(off);
         }
         // The centre's triangles are no part of the walk that slots follow.
         let slots = if piece.split_slot == CENTRE_SLOT {
@@ -116,58 +129,62 @@ impl<'s, C: RecordCodec> Search<'s, C> {
         } else {
             child_slots(piece.apex_slot, piece.split_slot)
         };
-        let [base_out, b_out, d_out] = piece.outside;
-        let [above_a, above_b, above_d] = piece.above;
-        let halves = [
-            Piece {
-                corners: [v, b, a],
-                above: [above, above_b, above_a],
-                apex_slot: piece.split_slot,
-                split_slot: slots[0],
-                outside: [b_out, base_out, false],
-            },
-            Piece {
-                corners: [v, a, d],
-                above: [above, above_a, above_d],
-                apex_slot: piece.split_slot,
-                split_slot: slots[1],
-                outside: [d_out, false, base_out],
-            },
-        ];
-        let raws = slots.map(|slot| ground.pages.raw(slot));
+        let raws = ground.pages.raw_pair(slots);
+        let splits = [a.midpoint(b), a.midpoint(d)];
+        // All levels below the asked vertex's say the new heights.
+        let code_of = |raw: C::Raw| if C::is_void(raw) { f64::NAN } else { C::height_value(raw) };
         if level == 1 {
-            for (half, raw) in halves.into_iter().zip(raws) {
-                let leaf = half.corners[1].midpoint(half.corners[2]);
-                if !half.outside[0] && !C::is_void(raw) {
-                    self.consider(self.plane.above(leaf, ground.code_of(leaf, raw)));
+            for i in [0, 1] {
+                if ![b_out, d_out][i] {
+                    let off = self.off(splits[i], code_of(raws[i]));
+                    self.consider(off);
                 }
             }
             return;
         }
-        let bounds = [0, 1].map(|i| self.bound(&halves[i], &self.rules.codec.decode(raws[i], level - 1)));
-        for i in [0, 1].into_iter().filter(|i| bounds[*i] > self.enough) {
-            // Siblings share a cache line more often than not.
-            ground.pages.prefetch(child_slots(halves[i].apex_slot, halves[i].split_slot)[0]);
-        }
-        let order = if bounds[1] > bounds[0] { [1, 0] } else { [0, 1] };
-        for i in order {
+        let [off_a, off_b, off_d] = piece.off;
+        let shared = larger(off, off_a);
+        let bounds = [0, 1].map(|i| self.bound(larger(shared, [off_b, off_d][i]), raws[i], level - 1));
+        let mut go = |search: &mut Self, i: usize| {
+            // The ends of the new base turn about, so that slots follow.
+            let half = if i == 0 {
+                Piece {
+                    corners: [v, b, a],
+                    off: [off, off_b, off_a],
+                    apex_slot: piece.split_slot,
+                    split_slot: slots[0],
+                    outside: [b_out, base_out, false],
+                }
+            } else {
+                Piece {
+                    corners: [v, a, d],
+                    off: [off, off_a, off_d],
+                    apex_slot: piece.split_slot,
+                    split_slot: slots[1],
+                    outside: [d_out, false, base_out],
+                }
+            };
+            search.visit(ground, half, splits[i], code_of(raws[i]), level - 1);
+        };
+        let first = usize::from(bounds[1] > bounds[0]);
+        for i in [first, 1 - first] {
             if bounds[i] > self.enough {
-                self.visit(ground, halves[i], raws[i], level - 1);
+                go(self, i);
             }
         }
     }
 
-    /// Codes of distance that no sample of `piece` exceeds, `split` being the vertex that splits it.
+    /// Codes of distance that no sample of a triangle exceeds whose corners are `off` at most, `raw` being the record of the vertex that splits it.
     #[inline(always)]
-    fn bound(&self, piece: &Piece, split: &Vertex) -> f64 {
+    fn bound(&self, off: f64, raw: C::Raw, level: u32) -> f64 {
+        let split = self.rules.codec.decode(raw, level);
         if split.class == VertexClass::Inert {
             return 0.0;
         }
         // An error says nothing of triangles with a void corner. Samples on the legs are the children's to count, whose triangles have the split vertex as a corner.
-        let [a, b, d] = piece.above.map(f64::abs);
-        if a.is_nan() || b.is_nan() || d.is_nan() || split.class.is_void() {
+        if split.class.is_void() {
             return f64::INFINITY;
         }
-        larger(larger(a, b), d) + self.slack + split.error_m * self.per_step
+        off + self.slack + split.error_m * self.per_step
     }
 }

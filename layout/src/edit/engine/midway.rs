@@ -13,6 +13,8 @@ pub(crate) struct NewCodes<'u> {
     pub(crate) rect: SampleRect,
     /// Codes, rows from the south; NaN for voids, whose records keep what they say.
     pub(crate) codes: &'u [f64],
+    /// Codes before.
+    pub(crate) old_codes: &'u [f64],
     /// Lowest and highest code before and after.
     pub(crate) ranges: [[f64; 2]; 2],
 }
@@ -28,6 +30,19 @@ impl NewCodes<'_> {
         }
         let code = self.codes[y as usize * rect.wide() as usize + x as usize];
         (!code.is_nan()).then_some(code)
+    }
+
+    /// Whether a data sample has another code than before.
+    #[inline(always)]
+    pub(crate) fn is_moved(&self, q: GridPoint) -> bool {
+        let rect = &self.rect;
+        let (x, y) = (q.x().wrapping_sub(rect.west), q.y().wrapping_sub(rect.south));
+        if x >= rect.wide() || y >= rect.high() {
+            return false;
+        }
+        let at = y as usize * rect.wide() as usize + x as usize;
+        // Voids differ from everything, and stay.
+        self.old_codes[at] != self.codes[at] && !self.codes[at].is_nan()
     }
 }
 

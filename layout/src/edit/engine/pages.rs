@@ -3,11 +3,11 @@
 //! Pages are read when they are touched. Those that are not committed stay. Of all others, which can be read again from the file, a bounded number is kept. A page that
 //! cannot be read does not stop the work halfway through. The first error is kept until the end of the batch, which then is taken back.
 //!
-//! Invariants: the log holds every record that was overwritten since the batch began, in order, so that going back through it takes the batch back. A page that was
+//! Invariants: the log holds every record that was overwritten since the batch began, each once and as it was then, so that it takes the batch back. A page that was
 //! written to since the last commit has a copy from before, which takes everything back. While a commit is under way the copies from before it are kept until it has succeeded.
 
 use crate::error::LayoutError;
-use crate::file::bytes::{Page, to_usize};
+use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
 use crate::file::entries::Entry;
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
@@ -36,6 +36,9 @@ pub(crate) struct Overwritten<R> {
     pub(crate) old: R,
 }
 
+/// Bits for the records of a page that the batch wrote to.
+type Marks = [u64; PAGE_BYTES / 4 / 64];
+
 /// Pages with edits.
 #[derive(Debug)]
 pub(crate) struct Pages<C: RecordCodec> {
@@ -51,6 +54,9 @@ pub(crate) struct Pages<C: RecordCodec> {
     clean: usize,
     most_clean: usize,
     log: Vec<Overwritten<C::Raw>>,
+    /// Where the marks of a page are, counted from 1; 0 for pages that the batch did not write to.
+    marked: Vec<u32>,
+    marks: Vec<(u64, Marks)>,
     /// Pages written to since the last commit began, and what they held then.
     uncommitted: Vec<(u64, Box<Page>)>,
     /// How many of them were written to by batches that stay; those behind are the batch's that is under way.
@@ -72,6 +78,8 @@ impl<C: RecordCodec> Pages<C> {
             clean: 0,
             most_clean: CLEAN_PAGES,
             log: Vec::new(),
+            marked: vec![0; count],
+            marks: Vec::new(),
             uncommitted: Vec::new(),
             kept: 0,
             taken: Vec::new(),
@@ -88,6 +96,20 @@ impl<C: RecordCodec> Pages<C> {
     pub(crate) fn raw(&mut self, slot: u64) -> C::Raw {
         let within = byte_in_page::<C>(slot);
         C::read(&self.page_at(slot)[within..within + C::BYTES])
+    }
+
+    /// The records of two slots, most often of one page.
+    #[inline(always)]
+    pub(crate) fn raw_pair(&mut self, slots: [u64; 2]) -> [C::Raw; 2] {
+        let pages = slots.map(page_of::<C>);
+        if pages[0] != pages[1] {
+            return slots.map(|slot| self.raw(slot));
+        }
+        let page = self.page_at(slots[0]);
+        slots.map(|slot| {
+            let within = byte_in_page::<C>(slot);
+            C::read(&page[within..within + C::BYTES])
+        })
     }
 
     /// The record of a slot whose page is here.
@@ -164,7 +186,28 @@ impl<C: RecordCodec> Pages<C> {
             self.flags[logical] |= EDITED | UNCOMMITTED;
         }
         C::write(raw, &mut self.page_at(slot)[within..within + C::BYTES]);
-        self.log.push(Overwritten { point, slot, old });
+        if self.mark(logical, within / C::BYTES) {
+            self.log.push(Overwritten { point, slot, old });
+        }
+    }
+
+    /// Marks a record of a page; whether it was not marked before.
+    #[inline(always)]
+    fn mark(&mut self, logical: usize, record: usize) -> bool {
+        if self.marked[logical] == 0 {
+            self.marks.push((logical as u64, [0; _]));
+            self.marked[logical] = self.marks.len() as u32;
+        }
+        let word = &mut self.marks[self.marked[logical] as usize - 1].1[record / 64];
+        let bit = 1 << (record % 64);
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
+    }
+
+    /// Ends the batch's marks.
+    fn unmark(&mut self) {
+        self.marks.drain(..).for_each(|(logical, _)| self.marked[logical as usize] = 0);
     }
 
     /// Puts what the file has at another place into a page that is here and committed.
@@ -196,7 +239,7 @@ impl<C: RecordCodec> Pages<C> {
         self.failure.is_some()
     }
 
-    /// What was overwritten since the batch began.
+    /// What was overwritten since the batch began, each record once.
     pub(crate) fn overwritten(&self) -> &[Overwritten<C::Raw>] {
         &self.log
     }
@@ -204,6 +247,7 @@ impl<C: RecordCodec> Pages<C> {
     /// Ends a batch that is to stay.
     pub(crate) fn keep(&mut self) {
         self.log.clear();
+        self.unmark();
         self.kept = self.uncommitted.len();
         if self.clean > self.most_clean {
             self.drop_clean();
@@ -216,6 +260,7 @@ impl<C: RecordCodec> Pages<C> {
             let within = byte_in_page::<C>(slot);
             C::write(old, &mut self.page_at(slot)[within..within + C::BYTES]);
         }
+        self.unmark();
         // Pages that this batch alone wrote to are as they were: there is nothing to commit of them.
         for (logical, _) in self.uncommitted.drain(self.kept..) {
             let flags = &mut self.flags[logical as usize];

@@ -2,23 +2,22 @@
 //! is recomputed as the maximum over all contributions, upwards until nothing changes. So values fall as well as rise.
 //!
 //! The work goes level by level. At a level, the vertices whose diamonds touch the changed rectangle are enumerated, and the parents of changed children outside it
-//! are added. A bounded error has contributions from all samples in the diamond; most of the time two comparisons show that it stays as it is, else
-//! [`Search`] finds the farthest sample. Cost: the samples of the rectangle, some ten vertices a level above them, a few tens of records for each search.
+//! are added. A bounded error has contributions from all samples in the diamond; `bounded` knows when more of
+//! them have to be looked at than those that changed. Cost: the samples of the rectangle, some ten vertices a level above them, a few tens of records for each search.
 
-use super::farthest::Search;
+mod bounded;
+
 use super::midway::{Ground, NewCodes};
 use super::near::{NEAR_LEVELS, Near, first_of_row};
 use super::pages::Pages;
-use crate::bound::{Below, FIRST_SCANNED, Plane, Rules, farthest_diagonal, farthest_level, farthest_upright};
+use crate::bound::{Below, FIRST_SCANNED, Rules, farthest_diagonal, farthest_level, farthest_upright};
 use crate::edit::operations::window::SampleRect;
 use crate::error::LayoutError;
 use crate::file::header::ErrorKind;
 use crate::grid::order::{corners, slot_of};
-use crate::grid::record::{RecordCodec, Vertex, VertexClass};
+use crate::grid::record::{RecordCodec, VertexClass};
 use crate::grid::{Grid, GridPoint};
-
-/// Changed children that a vertex's former error is looked up among; with more of them it is found by search.
-const FEW: usize = 64;
+use bounded::Asked;
 
 /// Lists that outlive an update, so that none is allocated anew.
 #[derive(Debug)]
@@ -181,7 +180,7 @@ impl<'u, C: RecordCodec> Update<'u, C> {
             }
         }
         let own_m = if rules.error_kind == ErrorKind::Bounded && level >= FIRST_SCANNED && !folded {
-            self.bounded_error_m(v, level, slot, old, &was, below.error_m)
+            self.bounded_error_m(&Asked { v, level, slot, old, was: &was, children_m: below.error_m })
         } else {
             rules.own_error_m(v, grid.edge_ends(v), folded, |p| self.ground.code(p))
         };
@@ -264,99 +263,6 @@ impl<'u, C: RecordCodec> Update<'u, C> {
             }
         }
     }
-
-    /// The triangles that a vertex splits, none of whose corners is void, as (corners, height codes).
-    fn triangles(&mut self, v: GridPoint) -> impl Iterator<Item = ([GridPoint; 3], [f64; 3])> + use<C> {
-        let [b, d] = self.rules.grid.edge_ends(v);
-        let ends = [b, d].map(|p| self.ground.code_unless_void(p));
-        let mut found = [None; 2];
-        for (a, place) in self.rules.grid.apexes(v).zip(&mut found) {
-            let code = self.ground.code_unless_void(a);
-            if !(code.is_nan() || ends[0].is_nan() || ends[1].is_nan()) {
-                *place = Some(([a, b, d], [code, ends[0], ends[1]]));
-            }
-        }
-        found.into_iter().flatten()
-    }
-
-    /// The error in metres, children included, of a vertex whose triangles lie in the data: a number that its record says as it is.
-    /// `children_m` is what its children's records say now.
-    fn bounded_error_m(
-        &mut self,
-        v: GridPoint,
-        level: u32,
-        slot: u64,
-        old: C::Raw,
-        was: &Vertex,
-        children_m: f64,
-    ) -> f64 {
-        let rules = self.rules;
-        if let Some(error_m) = self.unchanged_error_m(v, level, was, children_m) {
-            return error_m;
-        }
-        let mut limit_m = rules.stored_error_m(level, was.class, children_m);
-        for (corners, codes) in self.triangles(v) {
-            let [a, b, d] = corners;
-            let plane = Plane::of([(a, codes[0]), (b, codes[1]), (d, codes[2])]);
-            let mut search = Search::new(rules, plane, level, was.class, limit_m);
-            let corners = in_walk_order(&rules.grid, corners, level);
-            search.run(&mut self.ground, corners, [slot_of(rules.grid.k(), a), slot], old);
-            limit_m = search.limit_m;
-        }
-        limit_m
-    }
-
-    /// The error in metres of a vertex of which a look at its children and at the range of heights shows that no search is needed.
-    fn unchanged_error_m(&mut self, v: GridPoint, level: u32, was: &Vertex, children_m: f64) -> Option<f64> {
-        let rules = self.rules;
-        let before_m = was.error_m;
-        let s = 1 << (level / 2);
-        // Where the changed rectangle and the diamond's bounds meet.
-        let rect = self.ground.new.rect;
-        let low = [rect.west.max(v.x().saturating_sub(s)), rect.south.max(v.y().saturating_sub(s))];
-        let high = [rect.east.min(v.x() + s), rect.north.min(v.y() + s)];
-        let mut now_m = 0.0f64;
-        let mut then_m = 0.0f64;
-        if low[0] <= high[0] && low[1] <= high[1] {
-            for (corners, codes) in self.triangles(v) {
-                if corners.iter().any(|p| rect.contains(p.x(), p.y())) {
-                    return None;
-                }
-                let [a, b, d] = [0, 1, 2].map(|i| (corners[i], codes[i]));
-                let [plane_low, plane_high] = Plane::of([a, b, d]).range(low, high);
-                let [then, now] = self
-                    .ground
-                    .new
-                    .ranges
-                    .map(|[low, high]| (high - plane_low).max(plane_high - low).max(0.0) * (1.0 + 1e-9));
-                then_m = then_m.max(f64::from(rules.scanned_error_m(then)));
-                now_m = now_m.max(f64::from(rules.scanned_error_m(now)));
-            }
-        }
-        if now_m > before_m {
-            return None;
-        }
-        // Samples that did not change are no farther than before.
-        if children_m >= before_m {
-            return Some(rules.stored_error_m(level, was.class, children_m));
-        }
-        if before_m <= rules.stored_error_m(level, was.class, 0.0) {
-            return Some(before_m);
-        }
-        // Something made the error what it was; if neither a sample that changed nor a child did, it still does.
-        if rules.stored_error_m(level, was.class, then_m) >= before_m || self.scratch.below.len() > FEW {
-            return None;
-        }
-        for child in rules.grid.children(v) {
-            let changed = self.scratch.below.iter().find(|(p, _)| *p == child);
-            let was_m = changed.map_or(0.0, |(_, old)| rules.codec.decode(*old, level - 1).error_m);
-            // Fringe vertices round errors in steps of their own.
-            if rules.stored_error_m(level, was.class, was_m) >= before_m {
-                return None;
-            }
-        }
-        Some(before_m)
-    }
 }
 
 /// A rectangle of samples and the padding that folds onto it.
@@ -421,14 +327,4 @@ impl NearLevel {
             (true, _) => Edge::Falling,
         }
     }
-}
-
-/// The ends of the base in the order in which the walk from the roots meets them: counter-clockwise for the roots, and turned about from level to level.
-fn in_walk_order(grid: &Grid, [a, b, d]: [GridPoint; 3], level: u32) -> [GridPoint; 3] {
-    let along = |p: GridPoint| (i64::from(p.x()) - i64::from(a.x()), i64::from(p.y()) - i64::from(a.y()));
-    let ((bx, by), (dx, dy)) = (along(b), along(d));
-    let is_ccw = bx * dy - by * dx > 0;
-    // The roots' split vertices have the level below the centre's.
-    let wants_ccw = (grid.levels() - level).is_multiple_of(2);
-    if is_ccw == wants_ccw { [a, b, d] } else { [a, d, b] }
 }

@@ -8,6 +8,7 @@ use crate::file::disk::Disk;
 use crate::file::header::Header;
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
+use crate::grid::record::RecordKind;
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -38,4 +39,19 @@ pub fn widen(
     drop(terrain);
     progress.stage("syncing", 0);
     publish_terrain(disk, file, Some(&lock))
+}
+
+/// Room for heights that a file cannot hold, `heights_m` from the lowest to the highest as [`LayoutError::OutOfRange`] tells them: as much again beyond its range as they ask for,
+/// so that many edits do not rewrite it many times; less where that would take larger records. Heights that are not numbers ask for nothing: slopes that are too steep come without
+/// any, and [`widen`] makes room for slopes in any case.
+pub fn room_for(header: &Header, heights_m: [f64; 2]) -> HeightRoom {
+    let [low, high] = header.height_range_m;
+    let lowest = if heights_m[0].is_nan() { low } else { heights_m[0].min(low) };
+    let highest = if heights_m[1].is_nan() { high } else { heights_m[1].max(high) };
+    let roomy = HeightRoom { lowest_m: 2.0 * lowest - low, highest_m: 2.0 * highest - high };
+    let steps = (roomy.highest_m - roomy.lowest_m) / header.scale.height_step_m;
+    if header.record_kind == RecordKind::Compact && steps > 60_000.0 {
+        return HeightRoom { lowest_m: lowest, highest_m: highest };
+    }
+    roomy
 }

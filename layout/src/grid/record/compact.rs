@@ -20,6 +20,50 @@ const FRINGE_RADIUS_STEPS: u32 = 8;
 /// Makes a rounded quotient a lower bound; comparing products then decides.
 const BELOW: f64 = 1.0 - 1e-12;
 
+/// Parts of an octave that plain errors are looked up by; a part holds one error at most.
+const PARTS_BITS: u32 = 6;
+/// Bits of a double behind those parts.
+const SHIFT: u32 = 52 - PARTS_BITS;
+/// Parts of all plain errors, and one to look ahead.
+const PARTS: usize = (FRINGE as usize / ERROR_STEPS as usize + 2) << PARTS_BITS;
+
+/// Codes of errors by the leading bits of a number.
+#[derive(Debug, Clone)]
+struct ErrorCodes {
+    /// Leading bits of the least error.
+    first: u64,
+    /// For each part, the first code that stands for at least where it begins.
+    codes: Box<[u8; PARTS]>,
+}
+
+impl ErrorCodes {
+    fn new(errors: &[f64; 256]) -> Self {
+        let first = errors[1].to_bits() >> SHIFT;
+        let mut codes = Box::new([FRINGE; PARTS]);
+        let mut code = 1;
+        for (part, place) in (0..).zip(codes.iter_mut()) {
+            let begins = f64::from_bits((first + part) << SHIFT);
+            while code < FRINGE && errors[usize::from(code)] < begins {
+                code += 1;
+            }
+            *place = code;
+        }
+        Self { first, codes }
+    }
+
+    /// The first code that stands for at least `error_m`, more than 0; [`FRINGE`] or more if none does.
+    #[inline(always)]
+    fn at_least(&self, errors: &[f64; 256], error_m: f64) -> u8 {
+        if error_m <= errors[1] {
+            return 1;
+        }
+        // Infinity and what is not a number lie behind all parts.
+        let part = (error_m.to_bits() >> SHIFT).wrapping_sub(self.first) as usize;
+        let code = self.codes.get(part).copied().unwrap_or(FRINGE);
+        code + u8::from(errors[usize::from(code)] < error_m)
+    }
+}
+
 /// The first code from `guess` on that stands for at least `value`.
 #[inline(always)]
 fn first_at_least(guess: u8, value: f64, stands_for: impl Fn(u8) -> f64) -> Option<u8> {
@@ -36,13 +80,12 @@ fn first_at_least(guess: u8, value: f64, stands_for: impl Fn(u8) -> f64) -> Opti
 pub struct Compact {
     height_base_m: f64,
     height_step_m: f64,
-    per_least_error: f64,
+    error_codes: ErrorCodes,
     errors: [f64; 256],
     radii: [f64; 256],
     flat_radius_m: [f64; PER_LEVEL],
     per_flat_radius: [f64; PER_LEVEL],
     edge_m: [f64; PER_LEVEL],
-    error_steps: OctaveTable,
     radius_steps: OctaveTable,
     fringe_radius_steps: OctaveTable,
 }
@@ -53,22 +96,22 @@ impl Compact {
         let error_steps = OctaveTable::new(ERROR_STEPS);
         let radius_steps = OctaveTable::new(scale.radius_steps_per_octave);
         let bottom = scale.error_top_m / error_steps.power(FRINGE - 2);
+        let errors = std::array::from_fn(|i| match i as u8 {
+            0 => 0.0,
+            code => bottom * error_steps.power(code - 1),
+        });
         let per_level = |f: &dyn Fn(u32) -> f64| {
             std::array::from_fn(|l| if (l as u32) < grid.levels() { f(l as u32) } else { 0.0 })
         };
         Self {
             height_base_m: scale.height_base_m,
             height_step_m: scale.height_step_m,
-            per_least_error: BELOW / bottom,
-            errors: std::array::from_fn(|i| match i as u8 {
-                0 => 0.0,
-                code => bottom * error_steps.power(code - 1),
-            }),
+            error_codes: ErrorCodes::new(&errors),
+            errors,
             radii: std::array::from_fn(|i| if i == 255 { 0.0 } else { radius_steps.power(i as u8) }),
             flat_radius_m: per_level(&|l| grid.flat_radius_m(l)),
             per_flat_radius: per_level(&|l| BELOW / grid.flat_radius_m(l)),
             edge_m: per_level(&|l| grid.edge_m(l)),
-            error_steps,
             radius_steps,
             fringe_radius_steps: OctaveTable::new(FRINGE_RADIUS_STEPS),
         }
@@ -141,14 +184,11 @@ impl RecordCodec for Compact {
         };
         let (error_code, radius_code) = match class {
             VertexClass::Plain => {
-                let error_code = if error_m <= 0.0 {
-                    0
-                } else {
-                    let guess =
-                        self.error_steps.index_at_least(error_m * self.per_least_error)?.checked_add(1)?;
-                    first_at_least(guess, error_m, |code| self.errors[usize::from(code)])
-                        .filter(|code| *code < FRINGE)?
-                };
+                let error_code =
+                    if error_m <= 0.0 { 0 } else { self.error_codes.at_least(&self.errors, error_m) };
+                if error_code >= FRINGE {
+                    return None;
+                }
                 (error_code, radius_code(&self.radius_steps).filter(|code| *code < 255)?)
             }
             fringe => {
@@ -175,5 +215,32 @@ impl RecordCodec for Compact {
     #[inline]
     fn round_height(value: f64) -> f64 {
         value.round_ties_even()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_code_of_an_error_is_the_first_that_reaches_it() {
+        let grid = Grid::new([33, 33], [10.0; 2]).unwrap();
+        for error_top_m in [1e-3, 0.7, 1.0, 1000.0, 12_345.678, 9e6] {
+            let scale = RecordScale {
+                height_base_m: 0.0,
+                height_step_m: 1.0,
+                error_top_m,
+                radius_steps_per_octave: 16,
+            };
+            let codec = Compact::new(&grid, &scale);
+            let exact = (1..FRINGE).map(|code| codec.errors[usize::from(code)]);
+            let around = exact.flat_map(|error_m| [error_m.next_down(), error_m, error_m.next_up()]);
+            let between = (0..4000).map(|i| error_top_m * 0.997f64.powi(i));
+            for error_m in around.chain(between).chain([error_top_m * 1.01, f64::INFINITY, f64::NAN]) {
+                let naive = (1..FRINGE).find(|code| codec.errors[usize::from(*code)] >= error_m);
+                let made = codec.encode(0, 0.0, VertexClass::Plain, error_m, 0.0);
+                assert_eq!(made.map(|raw| (raw >> 16) as u8), naive, "{error_m} of {error_top_m}");
+            }
+        }
     }
 }

@@ -99,7 +99,7 @@ impl BoundsColumns {
 mod tests {
     use super::*;
     use crate::metric::Metric;
-    use crate::view::{View, Viewport};
+    use crate::view::{ErrorMetric, View, Viewport};
     use glam::DVec3;
     use proptest::prelude::*;
 
@@ -113,6 +113,7 @@ mod tests {
             let view = View {
                 eye_m: DVec3::new(eye.0, eye.1, eye.2), yaw_rad: yaw, pitch_rad: pitch, roll_rad: roll, vertical_fov_rad: 0.8,
                 viewport: Viewport::default(), tolerance_px: 1.0, vertical_exaggeration: exaggeration,
+                metric: ErrorMetric::default(),
             };
             let metric = Metric::new(&view);
             let spacing_m = [10.0, 12.0];

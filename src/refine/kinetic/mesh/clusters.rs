@@ -17,14 +17,29 @@ const NONE: u32 = u32::MAX;
 
 #[derive(Debug, Clone, Copy)]
 struct Cluster {
-    /// Bit i: place i is taken.
-    taken: u128,
-    /// Bit i of side s: slot 2 i + s has changed.
-    written: [u128; 2],
+    /// Bit i % 64 of word i / 64: place i is taken. Two words, because a processor waits where 16 bytes are read that were written as twice 8.
+    taken: [u64; 2],
+    /// The same of side s: slot 2 i + s has changed.
+    written: [[u64; 2]; 2],
     /// Where children go when this cluster is full, and which use of that cluster is meant.
     spill: (u32, u32),
     /// How often the cluster has been emptied.
     use_count: u32,
+}
+
+impl Cluster {
+    fn is_full(&self) -> bool {
+        self.taken == [u64::MAX; 2]
+    }
+
+    fn is_empty(&self) -> bool {
+        self.taken == [0; 2]
+    }
+
+    /// Whether a slot has changed.
+    fn is_written(&self) -> bool {
+        self.written != [[0; 2]; 2]
+    }
 }
 
 /// How places are dealt out.
@@ -41,7 +56,9 @@ pub(crate) struct Clusters {
     clusters: Vec<Cluster>,
     /// Bounds of each cluster.
     bounds: BoundsColumns,
-    /// Packed: no cluster before this one has room.
+    /// Packed: bit c % 64 of word c / 64: cluster c has room.
+    open: Vec<u64>,
+    /// Packed: no word before this one has a bit.
     first_open: usize,
     /// Near: empty clusters. May hold others as well.
     empty: Vec<u32>,
@@ -56,6 +73,7 @@ impl Clusters {
             dealing,
             clusters: Vec::new(),
             bounds: BoundsColumns::default(),
+            open: Vec::new(),
             first_open: 0,
             empty: Vec::new(),
             written: Vec::new(),
@@ -67,6 +85,7 @@ impl Clusters {
     pub(crate) fn bytes(&self) -> usize {
         self.clusters.capacity() * size_of::<Cluster>()
             + self.bounds.bytes()
+            + self.open.capacity() * size_of::<u64>()
             + (self.empty.capacity() + self.written.capacity()) * size_of::<u32>()
     }
 
@@ -92,35 +111,43 @@ impl Clusters {
     /// Takes a place in the cluster of the place `beside`, if it has room and is not cluster `other`.
     pub(crate) fn take_in_cluster_of(&mut self, beside: u32, other: usize) -> Option<u32> {
         let cluster = beside as usize / CLUSTER;
-        (cluster != other && self.clusters.get(cluster)?.taken != u128::MAX).then(|| self.take_in(cluster))
+        (cluster != other && !self.clusters.get(cluster)?.is_full()).then(|| self.take_in(cluster))
     }
 
     fn take_in(&mut self, cluster: usize) -> u32 {
-        let place = (!self.clusters[cluster].taken).trailing_zeros();
-        self.clusters[cluster].taken |= 1 << place;
+        let taken = &mut self.clusters[cluster].taken;
+        let word = usize::from(taken[0] == u64::MAX);
+        let place = (!taken[word]).trailing_zeros();
+        taken[word] |= 1 << place;
+        if self.clusters[cluster].is_full() {
+            self.open[cluster / 64] &= !(1 << (cluster % 64));
+        }
         self.taken += 1;
-        (cluster * CLUSTER) as u32 + place
+        (cluster * CLUSTER + 64 * word) as u32 + place
     }
 
     /// The first cluster with room.
     fn cluster_with_room(&mut self) -> usize {
-        let full =
-            self.clusters[self.first_open..].iter().take_while(|cluster| cluster.taken == u128::MAX).count();
-        self.first_open += full;
-        if self.first_open == self.clusters.len() { self.new_cluster() } else { self.first_open }
+        while let Some(open) = self.open.get(self.first_open) {
+            if *open != 0 {
+                return 64 * self.first_open + open.trailing_zeros() as usize;
+            }
+            self.first_open += 1;
+        }
+        let cluster = self.new_cluster();
+        self.first_open = cluster / 64;
+        cluster
     }
 
     fn cluster_near(&mut self, cluster: usize) -> usize {
-        let Some(Cluster { taken, spill: (spill, use_count), .. }) = self.clusters.get(cluster).copied()
-        else {
-            return self.new_cluster();
-        };
-        if taken != u128::MAX {
+        let Some(present) = self.clusters.get(cluster).copied() else { return self.new_cluster() };
+        let (spill, use_count) = present.spill;
+        if !present.is_full() {
             return cluster;
         }
         if let Some(other) = self.clusters.get(spill as usize)
             && other.use_count == use_count
-            && other.taken != u128::MAX
+            && !other.is_full()
         {
             return spill as usize;
         }
@@ -131,7 +158,7 @@ impl Clusters {
 
     fn empty_cluster(&mut self) -> usize {
         while let Some(cluster) = self.empty.pop() {
-            if self.clusters.get(cluster as usize).is_some_and(|cluster| cluster.taken == 0) {
+            if self.clusters.get(cluster as usize).is_some_and(Cluster::is_empty) {
                 return cluster as usize;
             }
         }
@@ -139,24 +166,30 @@ impl Clusters {
     }
 
     fn new_cluster(&mut self) -> usize {
-        self.clusters.push(Cluster { taken: 0, written: [0; 2], spill: (NONE, 0), use_count: 0 });
+        self.clusters.push(Cluster { taken: [0; 2], written: [[0; 2]; 2], spill: (NONE, 0), use_count: 0 });
         self.bounds.push_empty();
-        self.clusters.len() - 1
+        let cluster = self.clusters.len() - 1;
+        self.open.resize(cluster / 64 + 1, 0);
+        self.open[cluster / 64] |= 1 << (cluster % 64);
+        cluster
     }
 
     /// Gives a place back.
     pub(crate) fn give_back(&mut self, place: u32) {
         let index = place as usize / CLUSTER;
         let cluster = &mut self.clusters[index];
-        cluster.taken &= !(1 << (place as usize % CLUSTER));
+        cluster.taken[place as usize / 64 % 2] &= !(1 << (place % 64));
+        let is_empty = cluster.is_empty();
+        self.open[index / 64] |= 1 << (index % 64);
         self.taken -= 1;
-        if cluster.taken == 0 {
+        if is_empty {
+            let cluster = &mut self.clusters[index];
             cluster.use_count = cluster.use_count.wrapping_add(1);
             self.bounds.set(index, Bounds::EMPTY);
         }
         if self.dealing == Dealing::Packed {
-            self.first_open = self.first_open.min(index);
-        } else if cluster.taken == 0 {
+            self.first_open = self.first_open.min(index / 64);
+        } else if is_empty {
             self.empty.push(index as u32);
         }
     }
@@ -164,11 +197,13 @@ impl Clusters {
     /// Gives up empty clusters at the end whose slots have been told; whether there were any.
     pub(crate) fn give_up_empty_end(&mut self) -> bool {
         let before = self.clusters.len();
-        while self.clusters.last().is_some_and(|cluster| cluster.taken == 0 && cluster.written == [0; 2]) {
+        while self.clusters.last().is_some_and(|cluster| cluster.is_empty() && !cluster.is_written()) {
             self.clusters.pop();
             self.bounds.pop();
+            let cluster = self.clusters.len();
+            self.open[cluster / 64] &= !(1 << (cluster % 64));
         }
-        self.first_open = self.first_open.min(self.clusters.len());
+        self.open.truncate(self.clusters.len().div_ceil(64));
         self.clusters.len() < before
     }
 
@@ -177,23 +212,25 @@ impl Clusters {
     pub(crate) fn touch(&mut self, place: u32, side: usize) {
         let index = place as usize / CLUSTER;
         let cluster = &mut self.clusters[index];
-        if cluster.written == [0; 2] {
+        if !cluster.is_written() {
             self.written.push(index as u32);
         }
-        cluster.written[side] |= 1 << (place as usize % CLUSTER);
+        cluster.written[side][place as usize / 64 % 2] |= 1 << (place % 64);
     }
 
     /// Hands out the slots that have changed, as places and sides, cluster by cluster in order.
     pub(crate) fn take_written(&mut self, mut each: impl FnMut(u32, usize)) {
         for index in self.written.drain(..) {
             let written = std::mem::take(&mut self.clusters[index as usize].written);
-            let mut either = written[0] | written[1];
-            while either != 0 {
-                let place = either.trailing_zeros();
-                either &= either - 1;
-                for (side, written) in written.iter().enumerate() {
-                    if written >> place & 1 == 1 {
-                        each(index * CLUSTER as u32 + place, side);
+            for word in 0..2 {
+                let mut either = written[0][word] | written[1][word];
+                while either != 0 {
+                    let place = either.trailing_zeros();
+                    either &= either - 1;
+                    for (side, written) in written.iter().enumerate() {
+                        if written[word] >> place & 1 == 1 {
+                            each(index * CLUSTER as u32 + 64 * word as u32 + place, side);
+                        }
                     }
                 }
             }
@@ -232,19 +269,15 @@ impl Clusters {
 
     /// Places taken in a cluster.
     pub(crate) fn places_of(&self, cluster: usize) -> impl Iterator<Item = u32> + use<> {
-        let mut taken = self.clusters[cluster].taken;
-        std::iter::from_fn(move || {
-            let place = taken.trailing_zeros();
-            (taken != 0).then(|| {
-                taken &= taken - 1;
-                (cluster * CLUSTER) as u32 + place
-            })
-        })
+        let taken = self.clusters[cluster].taken;
+        (0..CLUSTER)
+            .filter(move |place| taken[place / 64] >> (place % 64) & 1 == 1)
+            .map(move |place| (cluster * CLUSTER + place) as u32)
     }
 
     /// Bounds and triangle slots of every cluster that is in use.
     pub(crate) fn clusters(&self) -> impl Iterator<Item = (Bounds, Range<u32>)> {
-        let used = self.clusters.iter().enumerate().filter(|(_, cluster)| cluster.taken != 0);
+        let used = self.clusters.iter().enumerate().filter(|(_, cluster)| !cluster.is_empty());
         used.map(|(index, cluster)| (self.bounds.get(index), slots_of(index, cluster)))
     }
 
@@ -252,7 +285,7 @@ impl Clusters {
     pub(crate) fn cull(&mut self, planes: &[BoxPlane; PLANES], mut draw: impl FnMut(Range<u32>)) {
         let is_seen = self.bounds.cull(planes);
         for (index, cluster) in self.clusters.iter().enumerate() {
-            if cluster.taken != 0 && is_seen(index) {
+            if !cluster.is_empty() && is_seen(index) {
                 draw(slots_of(index, cluster));
             }
         }
@@ -262,6 +295,8 @@ impl Clusters {
 /// The triangle slots from a cluster's first place taken to its last.
 fn slots_of(index: usize, cluster: &Cluster) -> Range<u32> {
     let first = (index * CLUSTER) as u32;
-    let (from, to) = (cluster.taken.trailing_zeros(), CLUSTER as u32 - cluster.taken.leading_zeros());
+    let [low, high] = cluster.taken;
+    let from = if low != 0 { low.trailing_zeros() } else { 64 + high.trailing_zeros() };
+    let to = if high != 0 { 128 - high.leading_zeros() } else { 64 - low.leading_zeros() };
     2 * (first + from)..2 * (first + to)
 }

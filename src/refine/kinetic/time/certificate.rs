@@ -22,10 +22,13 @@
 //! the bound is concave. A course that has both turns by w s in a way s: the clock counts c s, c = rho (1 + G w), a plane's distance changes by at most
 //! (k + B w) s + (d w^2 + 2 w) s^2 / 2, and with S the way at which that or the sphere of radius R ends it, L = min(m(0), c S).
 //!
+//! By the line of sight a vertex is selected inside the tube about a ring (`crate::metric`); `super::ring` brings that down to spheres.
+//!
 //! Where a course has no direction, L = m(0). Everything is rounded towards a shorter life. Cost: two square roots a vertex, and one a plane while turning.
 
 use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, band_of, clock_id};
 use super::course::Course;
+use super::ring;
 use crate::metric::{Metric, PLANES, Sighting};
 use glam::DVec3;
 
@@ -157,8 +160,16 @@ impl Judge {
         if self.turn_per_m > 0.0 && selected && self.culls {
             return self.turning_life(sighting, distance_m, reach_m);
         }
-        let margin_m = self.error_margin_m(sighting, selected, distance_m, reach_m);
-        let scale_m = if selected { reach_m } else { distance_m };
+        let (margin_m, scale_m) = if sighting.ring_m() == 0.0 {
+            let margin_m = self.error_margin_m(sighting, selected, distance_m, reach_m);
+            (margin_m, if selected { reach_m } else { distance_m })
+        } else {
+            // Near the axis of the ring an error may grow beyond the distance before it shows.
+            (
+                ring::margin_m(sighting, self.moves.then_some(self.direction), self.rate),
+                distance_m.max(reach_m),
+            )
+        };
         if !self.culls {
             return Life { active: selected, kind: Kind::Error, margin_m, scale_m };
         }
@@ -224,8 +235,13 @@ impl Judge {
             let outside = (0..PLANES).filter(|i| margins_m[*i] > 0.0);
             (outside.map(|i| ways_m[i]).fold(0.0, f64::max).min(longest_m), f64::INFINITY)
         } else {
-            let inside_m = margins_m.iter().fold(reach_m - distance_m, |least, beyond| least.min(-beyond));
-            (ways_m.iter().copied().fold(self.chord_m(sighting, reach_m).min(longest_m), f64::min), inside_m)
+            let (margin_m, chord_m) = if sighting.ring_m() == 0.0 {
+                (reach_m - distance_m, self.chord_m(sighting, reach_m))
+            } else {
+                (sighting.margin_m(), ring::chord_m(sighting, self.direction))
+            };
+            let inside_m = margins_m.iter().fold(margin_m, |least, beyond| least.min(-beyond));
+            (ways_m.iter().copied().fold(chord_m.min(longest_m), f64::min), inside_m)
         };
         let scale_m = nearest + way_m;
         let band_m = f64::from(1u32 << band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
@@ -298,111 +314,4 @@ fn used_up_at(margin: f64, slope: f64, bend: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::course::{Pose, RATE, STEADY_RATE};
-    use super::*;
-    use crate::view::{View, Viewport};
-    use glam::DVec3;
-    use proptest::prelude::*;
-    use terrasoar_layout::grid::record::{Vertex, VertexClass};
-
-    fn view(eye_m: DVec3, yaw: f64, pitch: f64, fov: f64, exaggeration: f64) -> View {
-        View {
-            eye_m,
-            yaw_rad: yaw,
-            pitch_rad: pitch,
-            roll_rad: 0.1 * yaw,
-            vertical_fov_rad: fov,
-            viewport: Viewport::default(),
-            tolerance_px: 1.0,
-            vertical_exaggeration: exaggeration,
-        }
-    }
-
-    fn pose(metric: &Metric, view: &View) -> Pose {
-        Pose {
-            eye_m: view.eye_m,
-            axes: view.axes(),
-            normals: metric.normals().map(DVec3::from_array),
-            nu: metric.nu(),
-            exaggeration: view.vertical_exaggeration,
-        }
-    }
-
-    fn direction() -> impl Strategy<Value = DVec3> {
-        (-1.0f64..1.0, -1.0f64..1.0, -1.0f64..1.0)
-            .prop_map(|(x, y, z)| (DVec3::new(x, y, z) + DVec3::X * 1e-3).normalize())
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(3000))]
-        /// Whatever the camera does, a word that is alive has the status that a new test gives.
-        #[test]
-        fn a_live_word_is_a_true_word(
-            course in direction(), speed in 0.01f64..80.0,
-            away in direction(), distance in (0.0f64..10.0).prop_map(f64::exp), edge in prop::option::weighted(0.7, (-1.3f64..1.3, -1.3f64..1.3)),
-            closeness in prop_oneof![0.2f64..2.0, 2.0f64..20.0], radius in 0.0f64..300.0,
-            steps in prop::collection::vec((direction(), 0.0f64..0.5, -0.01f64..0.01, 0.98f64..1.02, 0.99f64..1.01), 1..80),
-            turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, rate in prop_oneof![Just(RATE), Just(STEADY_RATE), 0.001f64..0.5], axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in -0.01f64..0.02,
-        ) {
-            let mut clocks = Clocks::new(10.0, 3000.0);
-            let mut now = view(DVec3::new(100.0, 200.0, 1000.0), 0.3, -0.2, 0.8, 1.0);
-            if start_course {
-                let direction = if speed > 1.0 { course } else { DVec3::ZERO };
-                let turn_per_m = if speed > 1.0 && axis != DVec3::ZERO { spin.abs() / speed + 1e-9 } else { 0.0 };
-                clocks.take_course(2, Course { direction, axis, turn_per_m, rate });
-            }
-            let mut metric = Metric::new(&now);
-            clocks.move_to(pose(&metric, &now));
-            // Where vertices enter and leave the view, or anywhere.
-            let away = edge.map_or(away, |(x, y)| {
-                let [right, up, forward] = now.axes();
-                (forward + 0.42 * (4.0 / 3.0 * x * right + y * up)).normalize()
-            });
-            let at = now.eye_m + away * distance;
-            // An error that puts the vertex near the boundary of selection.
-            let radius = radius.min(0.5 * distance);
-            let error_m = ((distance * closeness - radius) / metric.nu()).max(0.0);
-            let vertex = Vertex { height_m: at.z.clamp(-3000.0, 3000.0), error_m, radius_m: radius, class: VertexClass::Plain };
-            let sight = |metric: &Metric| metric.sight([at.x, at.y], &vertex);
-            let word = Judge::new(metric, &clocks, culls).word(&sight(&metric));
-            for (side, off, turn, zoom, stretch) in steps {
-                now.eye_m += speed * (course + off * side);
-                if turning { now.yaw_rad += spin + 0.1 * turn; now.pitch_rad += 0.1 * turn; }
-                if zooming { now.vertical_fov_rad = (now.vertical_fov_rad * zoom).clamp(0.05, 2.0); }
-                if stretching { now.vertical_exaggeration = (now.vertical_exaggeration * stretch).clamp(0.2, 5.0); }
-                metric = Metric::new(&now);
-                clocks.move_to(pose(&metric, &now));
-                if clocks.now(clock_of(word)) >= u64::from(expiry_of(word)) {
-                    break;
-                }
-                let s = sight(&metric);
-                let active = s.is_selected() && (!culls || metric.cull(&s, crate::metric::ALL_PLANES).is_some());
-                prop_assert_eq!(word & ACTIVE != 0, active);
-            }
-        }
-    }
-
-    /// On course, a word lasts until its vertex changes if its margin falls at all fast, not a fraction of the way.
-    #[test]
-    fn on_course_words_last_until_the_change() {
-        let mut clocks = Clocks::new(10.0, 0.0);
-        let start = view(DVec3::ZERO, 0.0, 0.0, 0.8, 1.0);
-        clocks.take_course(1, Course { direction: DVec3::Y, ..Default::default() });
-        let metric = Metric::new(&start);
-        clocks.move_to(pose(&metric, &start));
-        // Not selected, 30 degrees off the course; SMART would look again after 400 m, then 330 m more, ...
-        let vertex =
-            Vertex { height_m: 0.0, error_m: 600.0 / metric.nu(), radius_m: 0.0, class: VertexClass::Plain };
-        let at = [500.0, 866.0];
-        let word = Judge::new(metric, &clocks, false).word(&metric.sight(at, &vertex));
-        let mut way = 0.0;
-        while clocks.now(clock_of(word)) < u64::from(expiry_of(word)) {
-            way += 1.0;
-            let moved = View { eye_m: DVec3::Y * way, ..start };
-            clocks.move_to(pose(&Metric::new(&moved), &moved));
-        }
-        let crossing = 866.0 - (600.0f64.powi(2) - 500.0f64.powi(2)).sqrt();
-        assert!(way > crossing - 3.0 && way <= crossing + 1.0, "{way} {crossing}");
-    }
-}
+mod tests;

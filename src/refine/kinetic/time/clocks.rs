@@ -114,6 +114,8 @@ impl Clocks {
         let ratio = |now: f64, then: f64| if now == then { 0.0 } else { portable::ln(now / then).abs() };
         let zoomed = EXP_SLOPE * (ratio(pose.nu, last.nu) + ratio(pose.exaggeration, last.exaggeration));
         let turned = pose.normals != last.normals;
+        // Another measure is another mesh.
+        let zoomed = if pose.metric == last.metric { zoomed } else { f64::INFINITY };
         let mut moved = Moved::default();
         if step == DVec3::ZERO && !turned && raised_m + zoomed == 0.0 {
             return moved;
@@ -233,6 +235,7 @@ pub(crate) fn band_of(scale: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::ErrorMetric;
 
     #[test]
     fn bands_cover_what_they_stand_for() {
@@ -265,6 +268,7 @@ mod tests {
             normals: [DVec3::X; 4],
             nu: 100.0,
             exaggeration: 1.0,
+            metric: ErrorMetric::Ball,
         }
     }
 
@@ -334,5 +338,10 @@ mod tests {
         }
         assert_eq!(clocks.move_to(turned).clocks, 0, "standing still uses up nothing");
         assert_eq!(clocks.move_to(Pose { nu: 200.0, ..turned }).clocks, u128::MAX);
+        clocks.move_to(Pose { metric: ErrorMetric::Sight, nu: 200.0, ..turned });
+        assert!(
+            (0..CLOCKS).all(|clock| clocks.now(clock) >= u64::from(HORIZON)),
+            "nothing outlives a change of the measure"
+        );
     }
 }

@@ -3,6 +3,7 @@
 //! A course counts little of the way along it and all of the way off it (`super::clocks`). So it is worth taking while the eye keeps to it, and worth leaving soon.
 //! Invariant: nothing here decides a status. Courses only move the time at which a vertex is tested again. Cost: a few dozen operations a frame.
 
+use crate::view::ErrorMetric;
 use glam::{DQuat, DVec3};
 use terrasoar_layout::portable;
 
@@ -31,6 +32,8 @@ pub(crate) struct Pose {
     pub normals: [DVec3; 4],
     pub nu: f64,
     pub exaggeration: f64,
+    /// A change of it leaves no certificate.
+    pub metric: ErrorMetric,
 }
 
 /// What the eye is expected to keep doing.

@@ -4,3 +4,4 @@ pub(crate) mod certificate;
 pub(crate) mod clocks;
 pub(crate) mod course;
 pub(crate) mod queue;
+mod ring;

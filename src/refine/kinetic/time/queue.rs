@@ -9,7 +9,7 @@
 //! enter, the same for each level on the way out, nothing for entries whose turn has not come. All entries lie in chunks of one pool.
 
 use super::clocks::{CLOCKS, EXPIRY_BITS};
-use crate::refine::kinetic::capacity::grow;
+use crate::refine::kinetic::chunked::Chunked;
 
 /// Bits of a digit.
 const DIGIT: u32 = 6;
@@ -19,8 +19,8 @@ const SLOTS: usize = 1 << DIGIT;
 const LEVELS: usize = EXPIRY_BITS.div_ceil(DIGIT) as usize;
 /// No chunk.
 const NONE: u32 = u32::MAX;
-/// Entries a chunk, which is a cache line of 64 bytes.
-const CHUNK_ENTRIES: usize = 7;
+/// Entries a chunk, which is two cache lines that a processor brings together.
+const CHUNK_ENTRIES: usize = 15;
 
 /// A node and the word it had when it was entered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -56,7 +56,7 @@ struct Wheel {
 #[derive(Debug)]
 pub(crate) struct Queue {
     wheels: Box<[Wheel]>,
-    chunks: Vec<Chunk>,
+    chunks: Chunked<Chunk, 8>,
     free: u32,
     /// Entries on their way to another level.
     moving: Vec<Entry>,
@@ -70,7 +70,7 @@ impl Queue {
         let wheel = Wheel { now: 0, occupied: [0; LEVELS], heads: [[NONE; SLOTS]; LEVELS] };
         Self {
             wheels: vec![wheel; CLOCKS].into(),
-            chunks: Vec::new(),
+            chunks: Chunked::default(),
             free: NONE,
             moving: Vec::new(),
             entries: 0,
@@ -81,7 +81,7 @@ impl Queue {
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         self.wheels.len() * size_of::<Wheel>()
-            + self.chunks.capacity() * size_of::<Chunk>()
+            + self.chunks.bytes()
             + self.moving.capacity() * size_of::<Entry>()
     }
 
@@ -109,9 +109,7 @@ impl Queue {
         entries[0] = entry;
         let fresh = Chunk { next: *head, used: 1, entries };
         if self.free == NONE {
-            *head = self.chunks.len() as u32;
-            grow(&mut self.chunks, 1);
-            self.chunks.push(fresh);
+            *head = self.chunks.push(fresh) as u32;
         } else {
             *head = self.free;
             self.free = std::mem::replace(&mut self.chunks[*head as usize], fresh).next;
@@ -142,6 +140,11 @@ impl Queue {
                 (true, _) => (1 << digit) - 1,
             };
             let mut slots = self.wheels[clock].occupied[level] & over;
+            let mut heads = slots;
+            while heads != 0 {
+                self.chunks.prefetch(self.wheels[clock].heads[level][heads.trailing_zeros() as usize] as usize);
+                heads &= heads - 1;
+            }
             while slots != 0 {
                 self.take_slot(clock, level, slots.trailing_zeros() as usize, &mut due);
                 slots &= slots - 1;
@@ -216,6 +219,7 @@ impl Queue {
         wheel.occupied[level] &= !(1 << slot);
         let mut at = std::mem::replace(&mut wheel.heads[level][slot], NONE);
         while at != NONE {
+            self.chunks.prefetch(self.chunks[at as usize].next as usize);
             let chunk = &mut self.chunks[at as usize];
             chunk.entries[..chunk.used as usize].iter().for_each(|entry| each(*entry));
             self.entries -= chunk.used as usize;

@@ -1,6 +1,7 @@
 //! The workshop over disks that are slow, fail or panic, and threads that do not start.
 
 mod orders;
+mod room;
 mod troubles;
 
 use super::*;
@@ -88,14 +89,19 @@ struct Land {
 
 impl Land {
     fn new() -> Self {
+        Self::between([-2000.0, 4000.0], true)
+    }
+
+    /// With heights up to these; with room for others, or without any.
+    fn between([lowest_m, highest_m]: [f64; 2], head_room: bool) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("land.iqt");
         let dem = MemoryDem::from_fn([200, 200], SampleType::I16, |x, y| match (x, y) {
-            (0, 0) => -2000.0,
-            (1, 0) => 4000.0,
+            (0, 0) => lowest_m,
+            (1, 0) => highest_m,
             _ => f64::from((x * 7 + y * 13) % 50 + 300),
         });
-        let options = BuildOptions::default().spacing_m([10.0; 2]);
+        let options = BuildOptions::default().spacing_m([10.0; 2]).head_room(head_room);
         build(&dem, &path, &options, &Silent).unwrap();
         Self { _folder: folder, path }
     }
@@ -164,4 +170,20 @@ fn stroke(workshop: &mut Workshop, i: u64) -> Edit {
 
 fn is_saved(news: &News) -> bool {
     matches!(news, News::Saved { .. })
+}
+
+/// One letter for each piece of news.
+fn letters(news: &[News]) -> String {
+    let letter = |news: &News| match news {
+        News::Edited(_) => 'e',
+        News::Saved { .. } => 's',
+        News::Widening { .. } => 'w',
+        News::Widened(_) => 'W',
+        News::Refused(_) => 'r',
+        News::Turned { .. } => 't',
+        News::NothingToTurn { .. } => 'n',
+        News::Nothing => '-',
+        other => panic!("{other:?}"),
+    };
+    news.iter().map(letter).collect()
 }
