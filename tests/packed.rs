@@ -5,12 +5,14 @@ mod common;
 use common::checks::{keys, triangles, views};
 use common::{frame, noise, rugged};
 use std::sync::Arc;
+use terrasoar::mesh::Triangle;
 use terrasoar::refine::kinetic::Kinetic;
 use terrasoar::refine::naive::Naive;
 use terrasoar::refine::smart::Smart;
 use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Unobserved};
 use terrasoar::stream::{ModelDisk, Prefetch, Streamed};
+use terrasoar::view::View;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::file::disk::SystemDisk;
@@ -44,7 +46,7 @@ fn engines_fly_packed_terrain_as_the_terrain() {
         });
         for culling in Culling::ALL {
             let mut expected = Soar::new(plain_records.clone(), culling);
-            let mut engines: [Box<dyn FnMut(&terrasoar::view::View) -> Vec<_>>; 4] = [
+            let mut engines: [Flown<'_>; 4] = [
                 over(Soar::new(records.clone(), culling)),
                 over(Smart::new(records.clone(), culling)),
                 over(Naive::new(records.clone(), culling)),
@@ -75,10 +77,10 @@ fn engines_fly_packed_terrain_as_the_terrain() {
     }
 }
 
-/// An engine's triangles for a view.
-fn over<'e, E: Engine + 'e>(
-    mut engine: E,
-) -> Box<dyn FnMut(&terrasoar::view::View) -> Vec<terrasoar::mesh::Triangle> + 'e> {
+/// An engine, as its triangles for a view.
+type Flown<'e> = Box<dyn FnMut(&View) -> Vec<Triangle> + 'e>;
+
+fn over<'e, E: Engine + 'e>(mut engine: E) -> Flown<'e> {
     Box::new(move |view| {
         engine.update(view, &mut Unobserved);
         triangles(&engine)

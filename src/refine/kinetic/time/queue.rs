@@ -142,7 +142,8 @@ impl Queue {
             let mut slots = self.wheels[clock].occupied[level] & over;
             let mut heads = slots;
             while heads != 0 {
-                self.chunks.prefetch(self.wheels[clock].heads[level][heads.trailing_zeros() as usize] as usize);
+                self.chunks
+                    .prefetch(self.wheels[clock].heads[level][heads.trailing_zeros() as usize] as usize);
                 heads &= heads - 1;
             }
             while slots != 0 {
