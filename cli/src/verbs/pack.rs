@@ -7,6 +7,7 @@ use anyhow::Result;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
+use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::packing::{pack, unpack};
 
@@ -23,16 +24,8 @@ Examples:
 
 Fields of --json: file, output, bytes_before, bytes_after, bytes_per_sample (imagery left out), seconds.")]
 pub(super) struct PackArgs {
-    /// Terrain file (.iqt)
-    file: PathBuf,
-    /// Packed file to write
-    #[arg(short, long, value_name = "OUT.iqt")]
-    output: PathBuf,
     #[command(flatten)]
-    force: Force,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
+    rewriting: Rewriting,
 }
 
 /// Make the terrain file again that a packed one was made of.
@@ -45,7 +38,14 @@ Example:
 
 Fields of --json: file, output, bytes_before, bytes_after, seconds.")]
 pub(super) struct UnpackArgs {
-    /// Packed terrain file (.iqt)
+    #[command(flatten)]
+    rewriting: Rewriting,
+}
+
+/// A file read and another written of it.
+#[derive(Debug, clap::Args)]
+struct Rewriting {
+    /// Terrain file to read (.iqt)
     file: PathBuf,
     /// Terrain file to write
     #[arg(short, long, value_name = "OUT.iqt")]
@@ -55,6 +55,13 @@ pub(super) struct UnpackArgs {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+}
+
+/// What a rewriting came to.
+struct Sizes {
+    bytes_before: u64,
+    bytes_after: u64,
+    bytes_per_sample: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -68,54 +75,53 @@ struct Answer {
     seconds: f64,
 }
 
-impl Answer {
-    fn tell(&self, is_json: bool) -> Result<()> {
-        if is_json {
-            return print_json(self);
+impl Rewriting {
+    /// Does it, and tells what came of it.
+    fn run(&self, rewrite: impl FnOnce(&Meter) -> Result<Sizes, LayoutError>) -> Result<()> {
+        let start = Instant::now();
+        self.force.file(&self.output, Kind::Terrain, &[self.file.as_path()])?;
+        let progress = Meter::new("samples");
+        let Sizes { bytes_before, bytes_after, bytes_per_sample } = rewrite(&progress)?;
+        drop(progress);
+        let answer = Answer {
+            file: self.file.display().to_string(),
+            output: self.output.display().to_string(),
+            bytes_before,
+            bytes_after,
+            bytes_per_sample,
+            seconds: start.elapsed().as_secs_f64(),
+        };
+        if self.json {
+            return print_json(&answer);
         }
-        let a_sample =
-            self.bytes_per_sample.map_or(String::new(), |bytes| format!(", {bytes:.3} bytes a sample"));
+        let a_sample = bytes_per_sample.map_or(String::new(), |bytes| format!(", {bytes:.3} bytes a sample"));
         print(&format!(
             "{}: {} bytes instead of {}{a_sample}, {:.1} s",
-            self.output,
-            grouped(self.bytes_after),
-            grouped(self.bytes_before),
-            self.seconds
+            answer.output,
+            grouped(bytes_after),
+            grouped(bytes_before),
+            answer.seconds
         ))
     }
 }
 
 pub(super) fn run_pack(args: &PackArgs) -> Result<()> {
-    let start = Instant::now();
-    args.force.file(&args.output, Kind::Terrain, &[args.file.as_path()])?;
-    let progress = Meter::new("samples");
-    let packed = pack(&SystemDisk, &args.file, &args.output, &progress)?;
-    drop(progress);
-    let answer = Answer {
-        file: args.file.display().to_string(),
-        output: args.output.display().to_string(),
-        bytes_before: packed.bytes_before,
-        bytes_after: packed.bytes,
-        bytes_per_sample: Some(packed.bytes_per_sample),
-        seconds: start.elapsed().as_secs_f64(),
-    };
-    answer.tell(args.json)
+    let Rewriting { file, output, .. } = &args.rewriting;
+    args.rewriting.run(|progress| {
+        let packed = pack(&SystemDisk, file, output, progress)?;
+        Ok(Sizes {
+            bytes_before: packed.bytes_before,
+            bytes_after: packed.bytes,
+            bytes_per_sample: Some(packed.bytes_per_sample),
+        })
+    })
 }
 
 pub(super) fn run_unpack(args: &UnpackArgs) -> Result<()> {
-    let start = Instant::now();
-    args.force.file(&args.output, Kind::Terrain, &[args.file.as_path()])?;
-    let bytes_before = std::fs::metadata(&args.file).map_or(0, |meta| meta.len());
-    let progress = Meter::new("samples");
-    let header = unpack(&SystemDisk, &args.file, &args.output, &progress)?;
-    drop(progress);
-    let answer = Answer {
-        file: args.file.display().to_string(),
-        output: args.output.display().to_string(),
-        bytes_before,
-        bytes_after: header.file_bytes,
-        bytes_per_sample: None,
-        seconds: start.elapsed().as_secs_f64(),
-    };
-    answer.tell(args.json)
+    let Rewriting { file, output, .. } = &args.rewriting;
+    args.rewriting.run(|progress| {
+        let bytes_before = std::fs::metadata(file).map_or(0, |meta| meta.len());
+        let header = unpack(&SystemDisk, file, output, progress)?;
+        Ok(Sizes { bytes_before, bytes_after: header.file_bytes, bytes_per_sample: None })
+    })
 }
