@@ -18,6 +18,7 @@
 mod capacity;
 mod chunked;
 mod frame;
+mod hands;
 mod mesh;
 mod time;
 
@@ -96,6 +97,8 @@ pub struct Kinetic<S: RecordStore> {
     waiting: Vec<Entry>,
     patch: Patch,
     edits: Edits,
+    /// Whether arrays may hold more than the mesh needs, for it was larger before a jump.
+    is_roomy: bool,
     work: Work,
 }
 
@@ -132,6 +135,7 @@ impl<S: RecordStore> Kinetic<S> {
             waiting: Vec::new(),
             patch: Patch::default(),
             edits: Edits::default(),
+            is_roomy: false,
             work: Work::default(),
             records,
         }
@@ -200,16 +204,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     fn patch_vertex(&self, point: GridPoint, vertex: &Vertex, ends: [u32; 2]) -> MeshVertex {
-        let folded = self.records.grid().fold(point);
-        MeshVertex {
-            x: folded.x(),
-            y: folded.y(),
-            height_m: vertex.height_m as f32,
-            error_m: vertex.error_m as f32,
-            radius_m: vertex.radius_m as f32,
-            ends,
-            flags: if self.records.grid().is_corner(point) { MeshVertex::NO_LEVEL } else { level_of(point) },
-        }
+        MeshVertex::of(&self.records, point, vertex, ends)
     }
 
     /// The vertex of a node, from the record it holds.
@@ -277,6 +272,7 @@ impl<S: RecordStore> Kinetic<S> {
         settle(&mut self.patch.vertices, used);
         settle(&mut self.patch.triangles, used);
         self.edits.settle(self.nodes.clusters.taken());
+        self.give_back_room();
     }
 
     /// A record of the first page.
@@ -333,17 +329,22 @@ impl<S: RecordStore> Engine for Kinetic<S> {
         self.patch.clear();
         self.tell_edits();
         probe.phase(Phase::Scan);
-        if self.nodes.is_empty() {
-            self.plant(probe);
-        }
         self.take_arrivals();
         self.collect(pose, probe);
         let judge = Judge::new(metric, &self.clocks, self.culling == Culling::Vertices);
-        let mut allowance = Allowance::new(self.budget);
-        self.test_fresh(&judge, probe);
-        self.test_due(&judge, &mut allowance, probe);
-        probe.phase(Phase::Apply);
-        self.apply(&judge, &mut allowance, probe);
+        let is_planted = self.nodes.is_empty();
+        if is_planted {
+            self.plant(probe);
+        }
+        if is_planted && self.budget == Budget::default() {
+            self.build(&judge, probe);
+        } else {
+            let mut allowance = Allowance::new(self.budget);
+            self.test_fresh(&judge, probe);
+            self.test_due(&judge, &mut allowance, probe);
+            probe.phase(Phase::Apply);
+            self.apply(&judge, &mut allowance, probe);
+        }
         if !S::IS_COMPLETE {
             self.look(&judge);
         }

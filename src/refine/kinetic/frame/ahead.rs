@@ -98,6 +98,13 @@ impl Ahead {
             + self.seen.capacity() * size_of::<GridPoint>()
     }
 
+    /// Forgets all nodes.
+    pub(crate) fn clear(&mut self) {
+        self.far.clear();
+        self.looks.clear();
+        self.blocked.clear();
+    }
+
     /// Takes in what the clocks did in this frame.
     pub(crate) fn keep_pace(&mut self, clocks: &Clocks) {
         self.frame += 1;
