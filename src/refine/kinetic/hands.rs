@@ -3,6 +3,7 @@
 //! Invariant: what comes out is the same whatever the number of threads; each element is made by itself, from its number alone. Little work is done by the thread that asks, and all of it
 //! where there are no threads. Cost: the work, and some microseconds to share it.
 
+use super::capacity::grow;
 #[cfg(feature = "files")]
 use rayon::prelude::*;
 use std::ops::Range;
@@ -28,7 +29,7 @@ pub(super) fn extend_by<T: Send>(
     count: usize,
     make: impl Fn(usize) -> T + Sync + Send,
 ) {
-    array.reserve_exact(count);
+    grow(array, count);
     #[cfg(feature = "files")]
     if is_shared(count, share) {
         return array.par_extend((0..count).into_par_iter().with_min_len(share).map(make));

@@ -52,6 +52,8 @@ use time::queue::{Entry, Queue};
 
 /// Levels of the largest terrain.
 const LEVELS: usize = 32;
+/// Late vertices that are asked for their error in a frame whose time is bounded: evenly out of all that are late.
+const MOST_ASSESSED: usize = 8192;
 /// Sweeps of a queue in one frame.
 const MOST_SWEEPS: usize = 16;
 
@@ -214,7 +216,7 @@ impl<S: RecordStore> Kinetic<S> {
         self.records.decode(node.raw, level_of(node.point))
     }
 
-    /// Counts what is late and how far the largest error of it exceeds the tolerance.
+    /// Counts what is late and how far the largest error of it exceeds the tolerance. Where time counts, [`MOST_ASSESSED`] vertices at the most are asked for their error.
     fn assess_late(&mut self, metric: &Metric, view: &View) {
         let [dx, dy] = self.records.grid().spacing_m();
         let nearest_m = dx.min(dy);
@@ -226,12 +228,14 @@ impl<S: RecordStore> Kinetic<S> {
             let shows = sighting.is_selected() && !culled;
             if shows { sighting.error_px(view.tolerance_px, nearest_m) } else { 0.0 }
         };
-        let (mut late, mut late_error_px) = (0, 0.0f64);
+        let (mut late, mut late_error_px) = (0u64, 0.0f64);
+        let all = self.late.len() + self.to_split.iter().map(Vec::len).sum::<usize>();
+        let apart = if self.budget.time.is_some() { all.div_ceil(MOST_ASSESSED).max(1) as u64 } else { 1 };
         for node in
             self.late.iter().chain(self.to_split.iter().flatten()).filter(|node| self.nodes.is_live(**node))
         {
             late += 1;
-            if !self.nodes.is_split(*node) {
+            if late.is_multiple_of(apart) && !self.nodes.is_split(*node) {
                 late_error_px = late_error_px.max(error_px(*node));
             }
         }

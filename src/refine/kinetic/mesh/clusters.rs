@@ -198,15 +198,20 @@ impl Clusters {
         (self.first_open, self.taken) = (0, 0);
     }
 
-    /// Takes so many places, `fill` in each cluster, in the place of all that were taken. No slot is noted: all are to be told, and the
-    /// number of those that may have shown something before is returned.
-    pub(crate) fn fill(&mut self, nodes: usize, fill: usize) -> usize {
+    /// How many slots may have shown something before all places were given back.
+    pub(crate) fn stale_slots(&self) -> usize {
+        2 * CLUSTER * self.stale.end
+    }
+
+    /// Takes so many places, `fill` in each cluster, in the place of all that were taken. No slot is noted: all are to be told.
+    pub(crate) fn fill(&mut self, nodes: usize, fill: usize) {
         self.empty_lists();
         for cluster in 0..nodes.div_ceil(fill) {
             self.new_cluster();
             let taken = (nodes - cluster * fill).min(fill);
-            self.clusters[cluster].taken =
-                [0, 64].map(|from| u64::MAX.checked_shr(64 - taken.saturating_sub(from).min(64) as u32).unwrap_or(0));
+            self.clusters[cluster].taken = [0, 64].map(|from| {
+                u64::MAX.checked_shr(64 - taken.saturating_sub(from).min(64) as u32).unwrap_or(0)
+            });
             self.clusters[cluster].written = [[0; 2]; 2];
             if self.clusters[cluster].is_full() {
                 self.open[cluster / 64] &= !(1 << (cluster % 64));
@@ -214,7 +219,6 @@ impl Clusters {
         }
         self.written.clear();
         self.taken = nodes;
-        2 * CLUSTER * self.stale.end
     }
 
     /// Gives a place back.

@@ -186,6 +186,7 @@ impl<R: Copy> Nodes<R> {
     }
 
     /// What the two slots of a place show: triangles of vertex slots, counter-clockwise, apex first.
+    #[inline]
     pub(crate) fn triangles(&self, node: u32) -> [Option<[u32; 3]>; 2] {
         let Node { word, parents, body, point, .. } = self.get(node);
         if *word & !STATUS == NO_VERTEX {
