@@ -181,9 +181,9 @@ fn take_table(bits: &mut BitReader<'_>) -> Option<Frequencies> {
 /// What decoding looks up: for each context, by the low bits of a state, token, frequency and place in it.
 #[derive(Debug)]
 pub(crate) struct DecodeTables {
-    pub(crate) table_of: Vec<u16>,
+    table_of: Vec<u16>,
     /// Token in 8 bits, frequency in 12, place in 12.
-    pub(crate) tables: Vec<[u32; SCALE]>,
+    tables: Vec<[u32; SCALE]>,
 }
 
 impl DecodeTables {
@@ -199,6 +199,12 @@ impl DecodeTables {
             }
         }
         Self { table_of: model.table_of.clone(), tables }
+    }
+
+    /// The table of a context.
+    #[inline(always)]
+    pub(crate) fn of_context(&self, context: usize) -> &[u32; SCALE] {
+        &self.tables[usize::from(self.table_of[context])]
     }
 }
 
