@@ -4,7 +4,7 @@
 //! several independent steps at hand. Invariant: decoding never reads outside the bytes, and [`Decoder::finish`] says whether all of them, and nothing else, were used.
 
 use super::bits::{BitReader, BitWriter};
-use super::model::{Counts, DecodeTables, ERRORS, Model, SCALE, SCALE_LOG};
+use super::model::{Counts, DecodeTable, DecodeTables, ERRORS, Model, SCALE_LOG};
 use super::token::{BASES, TOKENS, token_of};
 
 /// What a state is before the first and after the last symbol.
@@ -182,14 +182,6 @@ impl<'b> Decoder<'b> {
         self.at == self.words.len() && self.bits.is_at_end() && self.states.iter().all(|s| *s == START)
     }
 
-    /// The token that a state stands for, and the state after it.
-    #[inline(always)]
-    fn step(table: &[u32; SCALE], state: u32) -> (u8, u32) {
-        let entry = table[state as usize & (SCALE - 1)];
-        // No state is above 2^32 - 1 after it: the frequency is at most 2^11, and what is above the low bits less than 2^21.
-        (entry as u8, ((entry >> 8) & 0xfff).wrapping_mul(state >> SCALE_LOG).wrapping_add(entry >> 20))
-    }
-
     /// Tokens and bits beside them to values.
     #[inline(always)]
     fn expand(&mut self, tokens: &[u8], values: &mut [u16]) {
@@ -211,7 +203,7 @@ impl<'b> Decoder<'b> {
     #[inline(always)]
     fn tokens<const LANES: usize>(&mut self, first: u16, contexts: &[u8], tokens: &mut [u8]) {
         let mut states = *self.states.first_chunk::<LANES>().unwrap_or(&[START; LANES]);
-        let tables: [&[u32; SCALE]; SPAN] =
+        let tables: [&DecodeTable; SPAN] =
             std::array::from_fn(|i| self.tables.of_context(usize::from(first) + i));
         let mut at = self.at;
         let mut tokens = tokens.chunks_exact_mut(LANES);
@@ -229,19 +221,20 @@ impl<'b> Decoder<'b> {
             };
             let mut taken = 0;
             for lane in 0..LANES {
-                let (token, next) = Self::step(tables[usize::from(contexts[lane]) % SPAN], states[lane]);
+                let (token, next) = tables[usize::from(contexts[lane]) % SPAN].step(states[lane]);
                 tokens[lane] = token;
+                // Without a branch, which nothing foretells.
                 let word = u32::from(u16::from_le_bytes(words[taken % LANES]));
-                let is_low = next < START;
-                states[lane] = if is_low { next << 16 | word } else { next };
-                taken += usize::from(is_low);
+                let is_low = u32::from(next < START);
+                states[lane] = next << (16 * is_low) | word & is_low.wrapping_neg();
+                taken += is_low as usize;
             }
             at += taken;
         }
         let rest = tokens.into_remainder().iter_mut().zip(contexts.remainder());
         for ((token, context), state) in rest.zip(&mut states) {
             let next;
-            (*token, next) = Self::step(tables[usize::from(*context) % SPAN], *state);
+            (*token, next) = tables[usize::from(*context) % SPAN].step(*state);
             *state = next;
             if next < START {
                 let word = self.words.get(at).copied().unwrap_or_default();
@@ -255,6 +248,7 @@ impl<'b> Decoder<'b> {
 }
 
 impl Coder for Decoder<'_> {
+    #[inline(always)]
     fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
         if self.lanes == 0 {
             let bits = plain_bits(first);
@@ -276,6 +270,7 @@ impl Coder for Decoder<'_> {
         }
     }
 
+    #[inline(always)]
     fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
         if self.lanes == 0 {
             *value = self.bits.take(plain_bits(context)) as u16;
@@ -283,7 +278,7 @@ impl Coder for Decoder<'_> {
         }
         let lane = turn & (self.lanes - 1) & (MOST_LANES - 1);
         let table = self.tables.of_context(usize::from(context));
-        let (token, mut next) = Self::step(table, self.states[lane]);
+        let (token, mut next) = table.step(self.states[lane]);
         if next < START {
             let word = self.words.get(self.at).copied().unwrap_or_default();
             next = next << 16 | u32::from(u16::from_le_bytes(word));
@@ -294,6 +289,7 @@ impl Coder for Decoder<'_> {
         *value = base.wrapping_add(self.bits.take(bits.into()) as u16);
     }
 
+    #[inline(always)]
     fn raw(&mut self, bits: u32, value: &mut u16) {
         *value = self.bits.take(bits) as u16;
     }

@@ -1,7 +1,7 @@
 //! Packed terrain: the records of a terrain in a tenth of the room, every bit of them (FORMAT.md, section 9).
 //!
 //! * `shape`: how a terrain is cut into groups of tiles, each of which is read by itself.
-//! * `walk`: the way through a tile, for writing and reading; `plane` predicts heights, `rules` knows what follows from them.
+//! * `walk`: the way through a tile, for writing and reading, `wide` with the instructions there are; `plane` predicts heights, `rules` knows what follows from them.
 //! * `container`, `places`, `source`: a packed file, read as the terrain file that it was made of. Module `packing` makes one, and that terrain file again.
 //! * `tile`, `blocks`: a tile's records, and where those of a page lie in tiles.
 //! * `coder`, `model`, `token`, `bits`: values into bytes and back.
@@ -24,6 +24,7 @@ pub(crate) mod stages;
 pub(crate) mod tile;
 pub(crate) mod token;
 pub(crate) mod walk;
+pub(crate) mod wide;
 
 #[cfg(test)]
 mod tests;

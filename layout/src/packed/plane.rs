@@ -162,22 +162,50 @@ impl Lattices<i32> {
     }
 }
 
+/// Vertices of a row that are predicted together.
+const TOGETHER: usize = 8;
+
 /// Predictions and classes of a row, from two opposite pairs of corners and the eight vertices around.
 #[inline(always)]
 fn predict(near: [&[i32]; 4], far: [&[i32]; 8], predicted: &mut [i32], classes: &mut [u8]) {
     let count = predicted.len();
-    let (near, far) = (near.map(|row| &row[..count]), far.map(|row| &row[..count]));
-    let classes = &mut classes[..count];
-    for i in 0..count {
-        let [a, b, c, d] = near.map(|row| row[i]);
-        let around: i32 = far.iter().map(|row| row[i]).sum();
-        let corners = a + b + c + d;
-        predicted[i] = (10 * corners - around + 16) >> 5;
-        let twist = (a + b - c - d).abs();
-        let curve = (2 * corners - around).abs();
-        let range = a.max(b).max(c.max(d)) - a.min(b).min(c.min(d));
-        classes[i] = class_of(8 * twist + curve + 2 * range);
+    let mut done = 0;
+    // The last ones together with some that were predicted before.
+    while done < count && count >= TOGETHER {
+        let from = done.min(count - TOGETHER);
+        predict_some::<TOGETHER>(near, far, from, predicted, classes);
+        done = from + TOGETHER;
     }
+    (done..count).for_each(|from| predict_some::<1>(near, far, from, predicted, classes));
+}
+
+/// Some of a row, by copies of it: then the compiler knows that what is written is none of what is read.
+#[inline(always)]
+fn predict_some<const N: usize>(
+    near: [&[i32]; 4],
+    far: [&[i32]; 8],
+    from: usize,
+    predicted: &mut [i32],
+    classes: &mut [u8],
+) {
+    let copy = |row: &[i32]| {
+        let mut copy = [0; N];
+        copy.copy_from_slice(&row[from..from + N]);
+        copy
+    };
+    let ([a, b, c, d], far) = (near.map(copy), far.map(copy));
+    let (mut heights, mut of_classes) = ([0; N], [0; N]);
+    for i in 0..N {
+        let around: i32 = far.iter().map(|row| row[i]).sum();
+        let corners = a[i] + b[i] + c[i] + d[i];
+        heights[i] = (10 * corners - around + 16) >> 5;
+        let twist = (a[i] + b[i] - c[i] - d[i]).abs();
+        let curve = (2 * corners - around).abs();
+        let range = a[i].max(b[i]).max(c[i].max(d[i])) - a[i].min(b[i]).min(c[i].min(d[i]));
+        of_classes[i] = class_of(8 * twist + curve + 2 * range);
+    }
+    predicted[from..from + N].copy_from_slice(&heights);
+    classes[from..from + N].copy_from_slice(&of_classes);
 }
 
 /// Half octaves of a number from 4 on, as a class.

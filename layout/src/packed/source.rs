@@ -3,7 +3,7 @@
 //! Everything that reads a terrain reads this one: the header, directory, pages and imagery are those of the terrain file, at their places there, so that a record page that is read is checked
 //! against the directory's checksum, whatever it was unpacked from. Only what writes, and what maps, needs the terrain file itself.
 //!
-//! Invariant: memory is what the front of the file takes, and that of [`CACHE_BYTES`] of tiles. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
+//! Invariant: memory is what the front of the file takes, and tiles in a quarter of what the pool over it was given, [`MOST_CACHE_BYTES`] at most. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
 mod records;
 #[cfg(feature = "testing")]
@@ -16,6 +16,7 @@ use super::places::{LEAF_BYTES, TilePlace};
 use super::rules::Rules;
 use super::shape::Groups;
 use super::walk::Scratch;
+use super::wide::Width;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
 use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
@@ -28,8 +29,10 @@ use std::sync::atomic::AtomicU64;
 use std::sync::{Mutex, OnceLock};
 
 const PAGE: u64 = PAGE_BYTES as u64;
-/// Tiles kept unpacked.
-const CACHE_BYTES: usize = 16 << 20;
+/// Bytes of tiles kept unpacked, at most, and where no pool of pages has said how many.
+const MOST_CACHE_BYTES: usize = 16 << 20;
+/// Part of a pool's memory that its tiles take, up to that.
+const TILES_SHARE: u64 = 4;
 /// Bytes of the whole that are unpacked at a time.
 const WHOLE_BYTES: usize = 256 << 10;
 /// First record page of a terrain file as a build leaves it.
@@ -60,6 +63,7 @@ pub(crate) struct PackedSource {
     tables: DecodeTables,
     cache: Cache,
     scratch: Mutex<Vec<Scratch>>,
+    width: Width,
     /// Tiles that were unpacked.
     unpacked: AtomicU64,
     /// Whether the whole may be unpacked for those who need it, and what came of that.
@@ -125,8 +129,9 @@ impl PackedSource {
             tiles: (0..groups.leaves).map(|_| OnceLock::new()).collect(),
             rules: Rules::new(&header.grid, &header.scale),
             inert: inert_page(header.record_kind),
-            cache: Cache::new(CACHE_BYTES),
+            cache: Cache::new(MOST_CACHE_BYTES),
             scratch: Mutex::default(),
+            width: Width::best(),
             unpacked: AtomicU64::new(0),
             lends_whole: false,
             whole: OnceLock::new(),
@@ -235,6 +240,12 @@ impl Source for PackedSource {
 
     fn packed_bytes(&self) -> Option<u64> {
         Some(self.container.packed_bytes)
+    }
+
+    fn take_share(&self, cache_bytes: u64) -> u64 {
+        let share = (cache_bytes / TILES_SHARE).min(MOST_CACHE_BYTES as u64);
+        self.cache.set_most_bytes(share as usize);
+        share
     }
 
     fn bytes(&self) -> Option<&[u8]> {

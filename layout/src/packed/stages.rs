@@ -5,10 +5,32 @@ use super::places::TilePlace;
 use super::shape::{SEGMENTS, TileId, TileShape};
 use super::source::PackedSource;
 use super::walk::{Scratch, walk};
+use super::wide::Width;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, checksum};
 use crate::file::source::{MemorySource, Source};
 use std::hint::black_box;
+
+/// A way of reading tiles that this processor has.
+#[derive(Debug, Clone, Copy)]
+pub struct Way(Width);
+
+impl Way {
+    /// All there are, the portable one first.
+    pub fn all() -> Vec<Self> {
+        Width::all().into_iter().map(Self).collect()
+    }
+
+    /// Whether every processor has it.
+    pub fn is_portable(self) -> bool {
+        self.0 == Width::Portable
+    }
+
+    /// A name for it.
+    pub fn name(self) -> String {
+        format!("{:?}", self.0)
+    }
+}
 
 /// A packed file in memory, and what its tiles ask for while they are unpacked.
 pub struct Stages {
@@ -115,6 +137,11 @@ impl Stages {
     /// Records of all pages that are present.
     pub fn records(&self) -> u64 {
         self.records
+    }
+
+    /// Reads tiles this way from now on.
+    pub fn read(&mut self, way: Way) {
+        self.source.set_width(way.0);
     }
 
     /// All values, without what is made of them.

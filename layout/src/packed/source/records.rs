@@ -10,7 +10,6 @@ use crate::packed::coder::Decoder;
 use crate::packed::places::{PLACE_BYTES, TilePlace};
 use crate::packed::shape::{TileId, TileShape};
 use crate::packed::tile::{INERT, TileRecords};
-use crate::packed::walk::walk;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 
@@ -95,7 +94,7 @@ impl PackedSource {
         }
         let scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = scratch.unwrap_or_default();
-        let records = walk(shape, &self.rules, &mut scratch, &mut decoders, None);
+        let records = self.width.read(shape, &self.rules, &mut scratch, &mut decoders);
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
         if decoders.iter().all(Decoder::finish) {
             Ok(records)

@@ -7,8 +7,13 @@ use crate::packed::model::DecodeTables;
 use crate::packed::places::TilePlace;
 use crate::packed::rules::Rules;
 use crate::packed::shape::{TileId, TileShape};
+use crate::packed::wide::Width;
 
 impl PackedSource {
+    pub(in crate::packed) fn set_width(&mut self, width: Width) {
+        self.width = width;
+    }
+
     pub(in crate::packed) fn packed(&self) -> &dyn Source {
         &*self.inner
     }
