@@ -117,7 +117,9 @@ proptest! {
             let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
             prop_assert!(decoders.iter().all(|decoder| decoder.finish()));
             for width in Width::all() {
-                prop_assert_eq!(&read(width, &shape, &rules, &tables, &segments[..count]), &(found.clone(), true));
+                let (other, is_whole) = read(width, &shape, &rules, &tables, &segments[..count]);
+                prop_assert!(is_whole && other.finest == found.finest);
+                prop_assert_eq!(given(&shape, &other, found.finest), given(&shape, &found, found.finest));
             }
             let finest = ((SEGMENTS - count) as u32).min(shape.tile_log);
             prop_assert_eq!(found.finest, finest);
