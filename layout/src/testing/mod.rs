@@ -6,6 +6,7 @@
 //! | [`Mutation`] | one change of a part that matters, told by eight bytes |
 //! | [`Sealed`] | a terrain file, and perhaps an overlay over it, mutated and sealed by a recipe of mutations |
 //! | [`seeds`] | small sound files to begin with |
+//! | `Stages`, `Way` | what unpacking is made of, to be measured |
 //! | [`exercise`] | everything that this crate does with a file |
 //!
 //! Invariant: mutating and sealing never panic or take long, whatever the bytes; equal recipes give equal files. Cost: a few checksums of the file.
@@ -18,6 +19,8 @@ mod seal;
 mod sealed;
 mod seeds;
 
+#[cfg(feature = "testing")]
+pub use crate::packed::stages::{Stages, Way};
 pub use exercise::exercise;
 pub use mutation::Mutation;
 pub use seal::{Counts, reseal, reseal_overlay};

@@ -73,6 +73,12 @@ pub trait Source: Send + Sync {
         None
     }
 
+    /// Bytes, of the `cache_bytes` that a pool of pages is given, that this source takes for itself: what it unpacks is kept in them. The pool that was made last decides.
+    fn take_share(&self, cache_bytes: u64) -> u64 {
+        let _ = cache_bytes;
+        0
+    }
+
     /// Offset at which the header slots lie: 0, or where an overlay begins behind its base.
     fn own_start(&self) -> u64 {
         0
