@@ -9,6 +9,7 @@ use super::bytes::{PAGE_BYTES, Page};
 use super::disk::Disk;
 use super::header::Header;
 use super::lock::WriteLock;
+use super::packed_end::PackedEnd;
 use super::slots::Slots;
 use crate::error::LayoutError;
 use std::fs::File;
@@ -59,10 +60,12 @@ pub(crate) struct Tail {
     begin: u64,
     /// The generation after all that were tried.
     generation: u32,
-    /// The current header as it stands in the file.
+    /// The current header as it stands in the terrain file.
     current: Box<Page>,
     /// Byte from the file's start at which the next header goes.
     header_offset: u64,
+    /// Where the file grows, if it is packed.
+    packed_end: Option<PackedEnd>,
 }
 
 /// Whose end it is.
@@ -126,6 +129,7 @@ impl Tail {
             generation,
             current: slots.current.clone(),
             header_offset: slots.next_offset(),
+            packed_end: slots.packed_end.clone(),
         })
     }
 
@@ -153,7 +157,12 @@ impl Tail {
     /// Writes `bytes` at `offset`, which lies behind everything that counts.
     pub(crate) fn write(&self, disk: &dyn Disk, bytes: &[u8], offset: u64) -> Result<(), LayoutError> {
         debug_assert!(offset >= self.begin);
-        self.put(disk, bytes, offset - self.start)
+        self.put(disk, bytes, self.place_of(offset))
+    }
+
+    /// Where in the file the byte `offset` of the terrain lies, one behind everything that counts.
+    fn place_of(&self, offset: u64) -> u64 {
+        self.packed_end.as_ref().map_or_else(|| offset - self.start, |end| end.place_of(offset))
     }
 
     fn put(&self, disk: &dyn Disk, bytes: &[u8], place: u64) -> Result<(), LayoutError> {
@@ -205,14 +214,15 @@ impl Tail {
             )));
         }
         next.attempt.header_begun.store(true, Ordering::Release);
-        self.put(disk, &next.page[..], self.header_offset)?;
+        let page = self.packed_end.as_ref().map(|end| end.to_file(&next.page));
+        self.put(disk, &page.as_ref().unwrap_or(&next.page)[..], self.header_offset)?;
         self.sync(disk)
     }
 
-    /// Gives back what was written, whose header was never begun. Failing here costs space only.
+    /// Gives back what was written, whose header was never begun, of a terrain that had `length` bytes. Failing here costs space only.
     pub(crate) fn give_up(&self, disk: &dyn Disk, next: Option<&NextHeader>, length: u64) {
         if next.is_none_or(|next| !next.attempt.header_begun.load(Ordering::Acquire)) {
-            let _ = disk.set_len(self.file(), length);
+            let _ = disk.set_len(self.file(), self.place_of(length));
         }
     }
 }

@@ -1,16 +1,18 @@
 //! What a packed file begins with: its header, and where its sections lie (FORMAT.md, section 9.1).
 //!
-//! The header is that of the terrain file that it was made of, but for the version and a few fields that say what is different. Invariant: sections that [`Container::parse`] returned lie in the file.
+//! A header page is that of the terrain file that it reads as, but for the version and a few fields that say what is different. Invariant: sections that [`Container::parse`] returned lie in the file.
 
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u16, get_u32, get_u64, put_u16, put_u32, put_u64};
-use crate::file::header::seal;
+use crate::file::packed_end::{FIELDS, PackedEnd, UNPACKED_MINOR};
 use crate::file::version::PACKED_VERSION;
 use crate::words::number;
 use std::path::Path;
 
 /// The way of packing that is described in FORMAT.md.
 const SCHEME: u16 = 1;
+/// Bytes before all sections: two header slots.
+pub(crate) const FRONT: u64 = 2 * PAGE_BYTES as u64;
 /// Sections that a header has room for.
 const MOST_SECTIONS: usize = 8;
 const SECTION_TABLE: usize = 0x120;
@@ -26,16 +28,12 @@ pub(crate) const RUNS: u32 = 2;
 pub(crate) const SUMS: u32 = 3;
 /// Where directory leaves lie.
 pub(crate) const ROOT: u32 = 4;
-/// The header slot of the terrain file that is not current.
-pub(crate) const OTHER_SLOT: u32 = 5;
-/// What lies behind the directory in the terrain file: imagery.
-pub(crate) const TAIL: u32 = 6;
 
 /// A part of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Section {
     pub(crate) kind: u32,
-    /// CRC-32 of its bytes; 0 for the tail, which has checksums of its own.
+    /// CRC-32 of its bytes.
     pub(crate) checksum: u32,
     pub(crate) offset: u64,
     pub(crate) bytes: u64,
@@ -44,30 +42,27 @@ pub(crate) struct Section {
 /// What the header of a packed file says besides what the terrain's does.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Container {
-    /// Minor version of the terrain file.
-    pub(crate) minor: u16,
-    /// Whether the current header was in the second slot.
-    pub(crate) is_second: bool,
-    /// Length of the packed file.
+    /// Bytes that are packed, of whole pages; what was appended follows.
     pub(crate) packed_bytes: u64,
+    /// Record pages that are packed.
+    pub(crate) pages: u64,
+    /// Length of the terrain file when it was packed.
+    pub(crate) unpacked_bytes: u64,
     pub(crate) sections: Vec<Section>,
 }
 
 impl Container {
-    /// The header page of the packed file, of that of the terrain file.
-    pub(crate) fn to_page(&self, current: &Page) -> Box<Page> {
-        let mut page = Box::new(*current);
+    /// How header pages tell it, and where the file grows whose first byte that is not packed is `from`.
+    pub(crate) fn end(&self, from: u64) -> PackedEnd {
+        let mut page = [0; PAGE_BYTES];
         let p = &mut page[..];
-        put_u16(p, 0x008, PACKED_VERSION);
-        put_u16(p, 0x00a, 0);
-        p[0x100..0x200].fill(0);
         put_u16(p, 0x100, SCHEME);
-        put_u16(p, 0x102, self.minor);
-        p[0x104] = u8::from(self.is_second);
         p[0x105] = super::shape::TILE_LOG as u8;
         p[0x106] = super::shape::OCTAVES as u8;
         p[0x107] = self.sections.len() as u8;
         put_u64(p, 0x108, self.packed_bytes);
+        put_u64(p, 0x110, self.pages);
+        put_u64(p, 0x118, self.unpacked_bytes);
         for (i, section) in self.sections.iter().enumerate().take(MOST_SECTIONS) {
             let at = SECTION_TABLE + i * SECTION_BYTES;
             put_u32(p, at, section.kind);
@@ -75,12 +70,19 @@ impl Container {
             put_u64(p, at + 8, section.offset);
             put_u64(p, at + 16, section.bytes);
         }
-        seal(&mut page);
-        page
+        self.end_of(&page, from)
     }
 
-    /// Reads and checks a header page; gives the terrain file's current one, too.
-    pub(crate) fn parse(path: &Path, page: &Page, length: u64) -> Result<(Self, Box<Page>), LayoutError> {
+    /// As [`Container::end`], of a file with this header page, fields that this version does not know included.
+    pub(crate) fn end_of(&self, page: &Page, from: u64) -> PackedEnd {
+        let mut fields = Box::new([0; 0x100]);
+        fields.copy_from_slice(&page[FIELDS]);
+        put_u16(&mut fields[..], UNPACKED_MINOR - FIELDS.start, 0);
+        PackedEnd { fields, from, place: self.packed_bytes, unpacked_bytes: self.unpacked_bytes }
+    }
+
+    /// Reads and checks a header page of a file of `length` bytes.
+    pub(crate) fn parse(path: &Path, page: &Page, length: u64) -> Result<Self, LayoutError> {
         let p = &page[..];
         let damaged = |problem: &str| {
             LayoutError::damaged(
@@ -104,11 +106,10 @@ impl Container {
         if [p[0x105], p[0x106]] != [super::shape::TILE_LOG as u8, super::shape::OCTAVES as u8] {
             return Err(unknown("the terrain is packed in tiles of another size".into()));
         }
-        let (count, is_second) = (usize::from(p[0x107]), p[0x104]);
-        if count > MOST_SECTIONS || is_second > 1 {
+        let (count, packed_bytes) = (usize::from(p[0x107]), get_u64(p, 0x108));
+        if count > MOST_SECTIONS || packed_bytes % PAGE_BYTES as u64 != 0 {
             return Err(damaged("a field of the packed terrain is out of range"));
         }
-        let packed_bytes = get_u64(p, 0x108);
         if packed_bytes > length {
             return Err(LayoutError::damaged(
                 path,
@@ -131,11 +132,11 @@ impl Container {
             if section.kind & MAY_BE_SKIPPED != 0 {
                 continue;
             }
-            if !(MODEL..=TAIL).contains(&section.kind) {
+            if !(MODEL..=ROOT).contains(&section.kind) {
                 return Err(unknown(format!("the packed terrain has a section of kind {}", section.kind)));
             }
             let end = section.offset.checked_add(section.bytes);
-            if section.offset < PAGE_BYTES as u64 || end.is_none_or(|end| end > packed_bytes) {
+            if section.offset < FRONT || end.is_none_or(|end| end > packed_bytes) {
                 return Err(damaged("a section lies outside the file"));
             }
             if sections.iter().any(|other| other.kind == section.kind) {
@@ -143,19 +144,13 @@ impl Container {
             }
             sections.push(section);
         }
-        let minor = get_u16(p, 0x102);
-        let mut current = Box::new(*page);
-        put_u16(&mut current[..], 0x008, 1);
-        put_u16(&mut current[..], 0x00a, minor);
-        current[0x100..0x200].fill(0);
-        seal(&mut current);
-        Ok((Self { minor, is_second: is_second == 1, packed_bytes, sections }, current))
+        Ok(Self { packed_bytes, pages: get_u64(p, 0x110), unpacked_bytes: get_u64(p, 0x118), sections })
     }
 
     /// The section of a kind; one without bytes if there is none.
     pub(crate) fn section(&self, kind: u32) -> Section {
         let found = self.sections.iter().find(|section| section.kind == kind).copied();
-        found.unwrap_or(Section { kind, checksum: 0, offset: PAGE_BYTES as u64, bytes: 0 })
+        found.unwrap_or(Section { kind, checksum: 0, offset: FRONT, bytes: 0 })
     }
 }
 

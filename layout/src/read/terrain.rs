@@ -58,6 +58,12 @@ impl Terrain {
         if starts_packed(&file)? {
             return Self::over(Box::new(PackedSource::open(Box::new(file))?.lending_whole()));
         }
+        Self::mapped(file)
+    }
+
+    /// Opens and maps a file that is the terrain file itself.
+    #[cfg(feature = "files")]
+    pub(crate) fn mapped(file: PreadSource) -> Result<Self, LayoutError> {
         let (file, header, entries) = open_settled(file)?;
         Ok(Self::of(Box::new(MapSource::map(file)?), header, entries))
     }
@@ -247,7 +253,7 @@ impl Terrain {
 }
 
 /// Whether a source holds packed terrain.
-fn starts_packed(source: &dyn Source) -> Result<bool, LayoutError> {
+pub(crate) fn starts_packed(source: &dyn Source) -> Result<bool, LayoutError> {
     let mut start = [0; 16];
     let have = source.byte_count().min(start.len() as u64) as usize;
     source.read_at(0, &mut start[..have])?;

@@ -26,6 +26,7 @@ use crate::file::slots::Slots;
 use crate::file::source::{PreadSource, Source};
 use crate::file::structure::{read_directory, read_growing, read_root, read_structure};
 use crate::file::tail::{Attempt, Attempted, Tail};
+use crate::read::opened::Opened;
 use crate::read::terrain::Terrain;
 use crate::remedy::Remedy;
 use commit::{CommitJob, Content};
@@ -104,7 +105,7 @@ impl EditSession {
     /// As [`EditSession::open`].
     pub fn open_on(disk: Arc<dyn Disk + Send>, path: &Path) -> Result<Self, LayoutError> {
         let lock = take_lock(path)?;
-        let source = Box::new(over(path, &lock)?);
+        let source = Opened::of(over(path, &lock)?)?.into_source();
         let (header, entries) = read_structure(&*source)?;
         let slots = Slots::read(&*source, 0)?;
         let terrain = Terrain::of(source, header, entries);
@@ -129,13 +130,14 @@ impl EditSession {
         base: &Path,
         overlay: &Path,
     ) -> Result<Self, LayoutError> {
-        let mut base_file = PreadSource::open(base)?;
-        read_growing(&mut base_file)?;
-        create_overlay(&*disk, &base_file, &Slots::read(&base_file, 0)?, overlay)?;
+        let mut base_file = Opened::of(PreadSource::open(base)?)?;
+        let look = base_file.source_mut();
+        read_growing(look)?;
+        create_overlay(&*disk, look, &Slots::read(look, 0)?, overlay)?;
         let lock = take_lock(overlay)?;
         let mut overlay_file = over(overlay, &lock)?;
-        let overlaid = Overlaid::read(&mut base_file, &mut overlay_file)?;
-        let source = overlaid.source(base_file, overlay_file, false)?;
+        let overlaid = Overlaid::read(base_file.source_mut(), &mut overlay_file)?;
+        let source = overlaid.source(base_file.into_source(), Box::new(overlay_file))?;
         let Overlaid { slots, split: start, .. } = overlaid;
         let entries = read_directory(&*source, &slots.header)?;
         let terrain = Terrain::of(source, slots.header.clone(), entries);
