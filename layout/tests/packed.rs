@@ -10,7 +10,7 @@ use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::SampleType;
-use terrasoar_layout::edit::{compact, compact_packed};
+use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, compact_packed};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::grid::GridPoint;
@@ -302,14 +302,34 @@ fn a_reader_written_from_the_specification_agrees() {
         let out = bench.plain.with_file_name("records");
         let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
         assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-        let found = bench.bytes(&out);
-        let plain = Terrain::open(&bench.plain).unwrap();
-        let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
-        for (i, record) in found.chunks_exact(4).enumerate() {
-            let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
-            let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));
-            assert_eq!(record, records.raw(slot).to_le_bytes(), "{size:?}: {x}, {y}");
+        check_records(&bench.bytes(&out), &bench.plain, size);
+        // Edited, and back by one commit.
+        for path in [&bench.plain, &bench.packed] {
+            let mut session = EditSession::open(path).unwrap();
+            for (i, height_m) in [(0, 901.0), (1, 950.0), (2, 1000.0)] {
+                let rect =
+                    SampleRect { west: i, south: i, east: (i + 40).min(size[0] - 1), north: size[1] - 1 };
+                if i < size[1] {
+                    session.apply(&[Edit::Set { area: Area::Rect(rect), height_m }]).unwrap();
+                    session.commit("set").unwrap();
+                }
+            }
+            session.undo().unwrap();
         }
-        assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
+        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        check_records(&bench.bytes(&out), &bench.plain, size);
     }
+}
+
+/// Whether `found` is the record of each sample of the terrain file.
+fn check_records(found: &[u8], plain: &Path, size: [u32; 2]) {
+    let plain = Terrain::open(plain).unwrap();
+    let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
+    for (i, record) in found.chunks_exact(4).enumerate() {
+        let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
+        let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));
+        assert_eq!(record, records.raw(slot).to_le_bytes(), "{size:?}: {x}, {y}");
+    }
+    assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
 }

@@ -55,7 +55,8 @@ impl Slots {
     }
 
     /// The next header was written.
-    pub(crate) fn flip(&mut self, page: Box<Page>, header: Header) {
+    pub(crate) fn flip(&mut self, page: Box<Page>, header: Header, packed_end: Option<PackedEnd>) {
+        self.packed_end = packed_end;
         self.current = page;
         self.current_slot = 1 - self.current_slot;
         self.header = header;

@@ -4,15 +4,14 @@
 
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u16, get_u32, get_u64, put_u16, put_u32, put_u64};
-use crate::file::packed_end::{FIELDS, PackedEnd, UNPACKED_MINOR};
-use crate::file::version::PACKED_VERSION;
+use crate::file::header::Header;
+use crate::file::packed_end::{FIELDS, FRONT, PACKED_BYTES, PackedEnd, from_file};
+use crate::file::version::{MAGIC, PACKED_VERSION};
 use crate::words::number;
 use std::path::Path;
 
 /// The way of packing that is described in FORMAT.md.
 const SCHEME: u16 = 1;
-/// Bytes before all sections: two header slots.
-pub(crate) const FRONT: u64 = 2 * PAGE_BYTES as u64;
 /// Sections that a header has room for.
 const MOST_SECTIONS: usize = 8;
 const SECTION_TABLE: usize = 0x120;
@@ -42,27 +41,24 @@ pub(crate) struct Section {
 /// What the header of a packed file says besides what the terrain's does.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Container {
-    /// Bytes that are packed, of whole pages; what was appended follows.
+    /// Length of the file when it was packed; what was appended follows.
     pub(crate) packed_bytes: u64,
     /// Record pages that are packed.
     pub(crate) pages: u64,
-    /// Length of the terrain file when it was packed.
-    pub(crate) unpacked_bytes: u64,
     pub(crate) sections: Vec<Section>,
 }
 
 impl Container {
-    /// How header pages tell it, and where the file grows whose first byte that is not packed is `from`.
-    pub(crate) fn end(&self, from: u64) -> PackedEnd {
+    /// The end of the file with this front, `end` bytes long, whose terrain file has `first` as the first page that is not packed.
+    pub(crate) fn end(&self, first: u64, end: u64) -> PackedEnd {
         let mut page = [0; PAGE_BYTES];
         let p = &mut page[..];
         put_u16(p, 0x100, SCHEME);
         p[0x105] = super::shape::TILE_LOG as u8;
         p[0x106] = super::shape::OCTAVES as u8;
         p[0x107] = self.sections.len() as u8;
-        put_u64(p, 0x108, self.packed_bytes);
+        put_u64(p, PACKED_BYTES, self.packed_bytes);
         put_u64(p, 0x110, self.pages);
-        put_u64(p, 0x118, self.unpacked_bytes);
         for (i, section) in self.sections.iter().enumerate().take(MOST_SECTIONS) {
             let at = SECTION_TABLE + i * SECTION_BYTES;
             put_u32(p, at, section.kind);
@@ -70,15 +66,9 @@ impl Container {
             put_u64(p, at + 8, section.offset);
             put_u64(p, at + 16, section.bytes);
         }
-        self.end_of(&page, from)
-    }
-
-    /// As [`Container::end`], of a file with this header page, fields that this version does not know included.
-    pub(crate) fn end_of(&self, page: &Page, from: u64) -> PackedEnd {
         let mut fields = Box::new([0; 0x100]);
         fields.copy_from_slice(&page[FIELDS]);
-        put_u16(&mut fields[..], UNPACKED_MINOR - FIELDS.start, 0);
-        PackedEnd { fields, from, place: self.packed_bytes, unpacked_bytes: self.unpacked_bytes }
+        PackedEnd::of_new(fields, first, end)
     }
 
     /// Reads and checks a header page of a file of `length` bytes.
@@ -106,8 +96,8 @@ impl Container {
         if [p[0x105], p[0x106]] != [super::shape::TILE_LOG as u8, super::shape::OCTAVES as u8] {
             return Err(unknown("the terrain is packed in tiles of another size".into()));
         }
-        let (count, packed_bytes) = (usize::from(p[0x107]), get_u64(p, 0x108));
-        if count > MOST_SECTIONS || packed_bytes % PAGE_BYTES as u64 != 0 {
+        let (count, packed_bytes) = (usize::from(p[0x107]), get_u64(p, PACKED_BYTES));
+        if count > MOST_SECTIONS {
             return Err(damaged("a field of the packed terrain is out of range"));
         }
         if packed_bytes > length {
@@ -144,13 +134,31 @@ impl Container {
             }
             sections.push(section);
         }
-        Ok(Self { packed_bytes, pages: get_u64(p, 0x110), unpacked_bytes: get_u64(p, 0x118), sections })
+        Ok(Self { packed_bytes, pages: get_u64(p, 0x110), sections })
     }
 
     /// The section of a kind; one without bytes if there is none.
     pub(crate) fn section(&self, kind: u32) -> Section {
         let found = self.sections.iter().find(|section| section.kind == kind).copied();
         found.unwrap_or(Section { kind, checksum: 0, offset: FRONT, bytes: 0 })
+    }
+}
+
+/// The header page that counts of the two slots, and what it says.
+pub(super) fn current_of<'p>(
+    path: &Path,
+    pages: [&'p Page; 2],
+    length: u64,
+) -> Result<(Container, Header, &'p Page), LayoutError> {
+    let read = |page: &'p Page| {
+        let container = Container::parse(path, page, length)?;
+        Ok::<_, LayoutError>((container, Header::parse(path, &from_file(page))?, page))
+    };
+    match pages.map(read) {
+        [Ok(a), Ok(b)] => Ok(if b.1.generation > a.1.generation { b } else { a }),
+        [Ok(it), Err(_)] | [Err(_), Ok(it)] => Ok(it),
+        // A slot that was never written says nothing.
+        [Err(a), Err(b)] => Err(if pages[0][..8] == MAGIC { a } else { b }),
     }
 }
 

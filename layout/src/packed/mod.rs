@@ -3,10 +3,12 @@
 //! * `shape`: how a terrain is cut into groups of tiles, each of which is read by itself.
 //! * `walk`: the way through a tile, for writing and reading; `plane` predicts heights, `rules` knows what follows from them.
 //! * `container`, `places`, `source`: a packed file, read as the terrain file that it was made of. Module `packing` makes one, and that terrain file again.
+//! * `appended`: what was appended to it since.
 //! * `coder`, `model`, `token`, `bits`: values into bytes and back.
 //!
 //! Invariant: what is read is what was written, or an error; no bytes make reading panic, or take memory beyond a tile's.
 
+mod appended;
 mod bits;
 mod cache;
 pub(crate) mod coder;

@@ -5,9 +5,10 @@
 //!
 //! Invariant: memory is what the front of the file takes, and that of [`CACHE_BYTES`] of tiles. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
+use super::appended::Appended;
 use super::cache::Cache;
 use super::coder::Decoder;
-use super::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, present_pages};
+use super::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, current_of, present_pages};
 use super::model::{DecodeTables, Model};
 use super::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
 use super::rules::Rules;
@@ -18,10 +19,9 @@ use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
 use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::file::header::{Header, INERT_PAGE};
-use crate::file::packed_end::{PackedEnd, from_file};
+use crate::file::packed_end::{PackedEnd, Run, from_file};
 use crate::file::source::Source;
 use crate::file::structure::inert_page;
-use crate::file::version::MAGIC;
 use crate::grid::order::point_of;
 use crate::grid::record::RecordKind;
 use std::path::Path;
@@ -49,9 +49,11 @@ pub(crate) struct PackedSource {
     sums: Vec<u32>,
     /// For each leaf of the terrain file's directory that is present, its number and the place of its first page in `present`.
     leaves: Vec<(u32, usize)>,
-    /// First page of the root of the directory that is packed, and where what is not packed begins.
+    /// First page of the root of the directory that is packed.
     root_page: u64,
+    /// What is not packed, as it was when the file was opened, and as it is.
     end: PackedEnd,
+    appended: Appended,
     /// The root of the terrain file's directory, made when it is first asked for.
     root: OnceLock<Vec<u8>>,
     groups: Groups,
@@ -104,7 +106,7 @@ impl PackedSource {
         let leaves = leaves_of(&present);
         let root_page = FIRST_PAGE + container.pages + leaves.len() as u64;
         let root_pages = (header.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE);
-        let end = container.end_of(&page, (root_page + root_pages) * PAGE);
+        let first_page = root_page + root_pages;
         let model = front.section(&*inner, &container.section(MODEL), "tables")?;
         let tables = DecodeTables::of(&Model::parse(&model).ok_or_else(|| odd(path, "tables"))?);
         let groups = Groups::of(&header.grid);
@@ -113,16 +115,20 @@ impl PackedSource {
         if root.len() != groups.leaves * LEAF_BYTES {
             return Err(odd(path, "tile directory"));
         }
-        if header.file_bytes < end.from {
-            return Err(odd(path, "record pages"));
-        }
         // The header first and then the length: what a header counts was in the file before the header was.
         inner.measure_again()?;
-        let (length, wanted) = (inner.byte_count(), end.place_of(header.file_bytes));
-        if length < wanted {
-            let problem = format!("the file is cut short: it has {length} bytes of {wanted}; copy it again");
+        let end = PackedEnd::read(&*inner, &page, first_page)?;
+        let length = inner.byte_count();
+        if length < end.end {
+            let problem =
+                format!("the file is cut short: it has {length} bytes of {}; copy it again", end.end);
             return Err(LayoutError::damaged(path, format!("byte {length}"), problem));
         }
+        if header.file_bytes.div_ceil(PAGE) != end.pages() {
+            return Err(odd(path, "appended pages"));
+        }
+        let appended = Appended::default();
+        appended.learn(&end.runs);
         Ok(Self {
             tile_leaves: (0..groups.leaves)
                 .map(|i| (get_u64(&root, i * LEAF_BYTES), get_u32(&root, i * LEAF_BYTES + 8)))
@@ -137,6 +143,7 @@ impl PackedSource {
             root: OnceLock::new(),
             root_page,
             end,
+            appended,
             inner,
             container,
             header,
@@ -344,13 +351,9 @@ impl Source for PackedSource {
         self.inner.path()
     }
 
-    /// That of the terrain file, as far as it was appended to.
+    /// That of the terrain file.
     fn byte_count(&self) -> u64 {
-        self.end.from + self.inner.byte_count().saturating_sub(self.end.place)
-    }
-
-    fn measure_again(&mut self) -> Result<(), LayoutError> {
-        self.inner.measure_again()
+        self.header.file_bytes
     }
 
     fn packed_end(&self) -> Option<&PackedEnd> {
@@ -358,7 +361,7 @@ impl Source for PackedSource {
     }
 
     fn packed_bytes(&self) -> Option<u64> {
-        Some(self.end.place_of(self.header.file_bytes))
+        Some(self.end.end)
     }
 
     fn bytes(&self) -> Option<&[u8]> {
@@ -372,8 +375,11 @@ impl Source for PackedSource {
         let (mut at, mut rest) = (offset, buffer);
         let mut page = Box::new([0; PAGE_BYTES]);
         while !rest.is_empty() {
-            if at >= self.end.from {
-                return self.inner.read_at(self.end.place_of(at), rest);
+            if at / PAGE >= self.end.first {
+                let packed = |number, page: &mut Page| self.packed_page(number, page);
+                let count = self.appended.read(&*self.inner, at, rest, || self.runs_now(), packed)?;
+                (at, rest) = (at + count as u64, &mut rest[count..]);
+                continue;
             }
             let within = (at % PAGE) as usize;
             let count = rest.len().min(PAGE_BYTES - within);
@@ -432,21 +438,23 @@ fn odd(path: &Path, place: &'static str) -> LayoutError {
     LayoutError::damaged_terrain(path, place.into(), "they are not what the header says")
 }
 
-/// The header page that counts of the two slots, and what it says.
-fn current_of<'p>(
-    path: &Path,
-    pages: [&'p Page; 2],
-    length: u64,
-) -> Result<(Container, Header, &'p Page), LayoutError> {
-    let read = |page: &'p Page| {
-        let container = Container::parse(path, page, length)?;
-        Ok::<_, LayoutError>((container, Header::parse(path, &from_file(page))?, page))
-    };
-    match pages.map(read) {
-        [Ok(a), Ok(b)] => Ok(if b.1.generation > a.1.generation { b } else { a }),
-        [Ok(it), Err(_)] | [Err(_), Ok(it)] => Ok(it),
-        // A slot that was never written says nothing.
-        [Err(a), Err(b)] => Err(if pages[0][..8] == MAGIC { a } else { b }),
+impl PackedSource {
+    /// What was appended up to now.
+    fn runs_now(&self) -> Result<Vec<Run>, LayoutError> {
+        let mut slots = [[0; PAGE_BYTES]; 2];
+        self.inner.read_at(0, slots.as_flattened_mut())?;
+        let [a, b] = &slots;
+        let (_, _, page) = current_of(self.path(), [a, b], u64::MAX)?;
+        Ok(PackedEnd::read(&*self.inner, page, self.end.first)?.runs)
+    }
+
+    /// A page that an appended one is a difference to.
+    fn packed_page(&self, number: u64, page: &mut Page) -> Result<(), LayoutError> {
+        if number >= self.end.first {
+            let problem = "it is the difference to a page that is not packed";
+            return Err(LayoutError::damaged_terrain(self.path(), "appended page".into(), problem));
+        }
+        self.page(number, page)
     }
 }
 

@@ -6,17 +6,18 @@
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
-use crate::file::directory::{put_all_leaves, root_bytes};
+use crate::file::directory::{page_at, put_all_leaves, root_bytes};
 use crate::file::disk::Disk;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
+use crate::file::packed_end::{FRONT, Run};
 use crate::file::slots::Slots;
 use crate::file::source::{PreadSource, Source};
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::{Compact, RecordKind};
 use crate::packed::coder::{Encoder, PlainEncoder};
-use crate::packed::container::{Container, FRONT, MODEL, ROOT, RUNS, SUMS, Section, runs_of};
+use crate::packed::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, runs_of};
 use crate::packed::model::{CONTEXTS, Counts, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
 use crate::packed::rules::Rules;
@@ -332,30 +333,43 @@ impl Packer<'_> {
         front.seal(ROOT);
 
         // What is not packed: imagery, and what edits appended.
-        let packed_bytes = at.next_multiple_of(PAGE);
-        write(&vec![0; (packed_bytes - at) as usize], at)?;
-        let behind = header.file_bytes - directory_end;
+        let (first, last) = (directory_end / PAGE, header.file_bytes.div_ceil(PAGE));
+        let place = at;
         let mut chunk = vec![0; CHUNK_BYTES];
-        let mut done = 0;
-        while done < behind {
-            let count = to_usize((behind - done).min(CHUNK_BYTES as u64))?;
-            source.read_at(directory_end + done, &mut chunk[..count])?;
-            write(&chunk[..count], packed_bytes + done)?;
-            done += count as u64;
+        while at - place < (last - first) * PAGE {
+            let from = directory_end + (at - place);
+            let count = to_usize(header.file_bytes.saturating_sub(from).min(CHUNK_BYTES as u64))?;
+            source.read_at(from, &mut chunk[..count])?;
+            let whole = count.next_multiple_of(PAGE_BYTES);
+            chunk[count..whole].fill(0);
+            write(&chunk[..whole], at)?;
+            at += whole as u64;
         }
+        let run = match u32::try_from(last - first) {
+            Ok(0) => None,
+            Ok(pages) => {
+                Some(Run { first: page_at(file.target(), directory_end)?, pages, place, table: None })
+            }
+            Err(_) => return Err(refused(terrain.path(), "it is too large")),
+        };
         write(&front.bytes, FRONT)?;
-        let container = Container {
+        let sections = front.sections;
+        let container = |packed_bytes| Container {
             packed_bytes,
             pages: built.header().stored_pages,
-            unpacked_bytes: header.file_bytes,
-            sections: front.sections,
+            sections: sections.clone(),
         };
-        let end = container.end(directory_end);
+        let mut end = container(at).end(first, at);
+        if let Some(run) = run {
+            let block = end.with(run, at).1;
+            write(&block, at)?;
+            end = container(at + block.len() as u64).end(first, at).with(run, at).0;
+        }
         for (slot, page) in (0..).zip(&slots) {
             let page = if page.iter().all(|byte| *byte == 0) { page.clone() } else { end.to_file(page) };
             write(&page[..], slot * PAGE)?;
         }
-        Ok(packed_bytes + behind)
+        Ok(end.end)
     }
 }
 

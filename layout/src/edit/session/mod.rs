@@ -3,6 +3,7 @@
 //! [`EditSession::apply`] changes the ground at once, in memory. [`EditSession::commit`] makes everything since the last commit durable, as one batch. Undo and redo are commits of
 //! their own: a header that leads to a state that is in the file already. One session at a time may have a file; readers need not stop.
 
+mod bases;
 mod checked_state;
 pub(crate) mod commit;
 pub(crate) mod compact;
@@ -29,6 +30,7 @@ use crate::file::tail::{Attempt, Attempted, Tail};
 use crate::read::opened::Opened;
 use crate::read::terrain::Terrain;
 use crate::remedy::Remedy;
+use bases::Bases;
 use commit::{CommitJob, Content};
 use picture::Picture;
 use std::path::{Path, PathBuf};
@@ -316,7 +318,8 @@ impl EditSession {
             label,
         };
         let lineage = Lineage::read(self.source(), old)?;
-        CommitJob::new(tail, old, &self.directory, &lineage, content).map(Some)
+        let bases = Bases::new(&tail, Arc::clone(self.editor.terrain()), old, &lineage.original)?;
+        CommitJob::new(tail, old, &self.directory, &lineage, bases, content).map(Some)
     }
 
     /// Takes notice of what became of a commit.
@@ -347,7 +350,7 @@ impl EditSession {
         let committed = Committed { pages: job.pages(), bytes: job.bytes(), places };
         job.entries.iter().for_each(|(logical, entry)| self.directory.entries[*logical] = *entry);
         job.leaves.iter().for_each(|(leaf, entry)| self.directory.root[*leaf] = *entry);
-        self.slots.flip(job.next.page, job.next.header);
+        self.slots.flip(job.next.page, job.next.header, job.tail.packed_end().cloned());
         if let Some(section) = job.section {
             self.picture.committed(section);
         }
