@@ -10,6 +10,7 @@ use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::journal::Commit;
+use crate::file::packed_end::PackedEnd;
 use crate::file::source::Source;
 #[cfg(feature = "files")]
 use crate::file::source::{MapSource, PreadSource};
@@ -168,6 +169,11 @@ impl Terrain {
         let imagery = self.header.imagery.map_or(0, |place| place.bytes);
         (self.source.packed_bytes().unwrap_or(self.header.file_bytes).saturating_sub(imagery)) as f64
             / (f64::from(wide) * f64::from(high))
+    }
+
+    /// Bytes that were appended to a packed file since it was packed: edits, their history, imagery; `None` for a terrain that is not packed.
+    pub fn appended_bytes(&self) -> Option<u64> {
+        self.source.packed_end().map(PackedEnd::appended_bytes)
     }
 
     /// The source it reads from.

@@ -50,6 +50,11 @@ impl Source for LayeredSource<'_> {
         self.split + self.overlay.byte_count()
     }
 
+    /// Of both.
+    fn packed_bytes(&self) -> Option<u64> {
+        Some(self.base.packed_bytes()? + self.overlay.byte_count())
+    }
+
     fn own_start(&self) -> u64 {
         self.split
     }
