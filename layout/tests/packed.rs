@@ -90,6 +90,97 @@ proptest! {
     }
 }
 
+/// One step of a life of a terrain.
+#[derive(Debug, Clone)]
+enum Step {
+    Set {
+        at: [u32; 2],
+        size: [u32; 2],
+        height_m: f64,
+    },
+    Undo,
+    Redo,
+    /// Opened again.
+    Reopen,
+    Compact,
+}
+
+fn step() -> impl Strategy<Value = Step> {
+    let set = (0u32..300, 0u32..300, 1u32..70, 1u32..50, 700i32..1300);
+    prop_oneof![
+        4 => set.prop_map(|(x, y, wide, high, h)| Step::Set { at: [x, y], size: [wide, high], height_m: h.into() }),
+        1 => Just(Step::Undo),
+        1 => Just(Step::Redo),
+        1 => Just(Step::Reopen),
+        1 => Just(Step::Compact),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Packed terrain and the terrain file lead the same life: after every step each record is the same, for a reader that was there before, too; and unpacked it is that file.
+    #[test]
+    fn edited_packed_terrain_is_the_edited_terrain(
+        wide in 2u32..300, high in 2u32..300, voids in 0u32..3, steps in prop::collection::vec(step(), 1..14),
+    ) {
+        let bench = Bench::of(&build_bytes(&dem([wide, high], 40, voids), &options()).unwrap()).unwrap();
+        let (plain, packed, back) = (&bench.plain, &bench.packed, bench.plain.with_file_name("back.iqt"));
+        let mut sessions = [plain, packed].map(|path| EditSession::open(path).unwrap());
+        let mut reader = Terrain::open_unmapped(packed).unwrap();
+        for (i, step) in steps.iter().enumerate() {
+            match step {
+                Step::Set { at, size, height_m } => {
+                    let [west, south] = [at[0].min(wide - 1), at[1].min(high - 1)];
+                    let [east, north] = [(west + size[0]).min(wide - 1), (south + size[1]).min(high - 1)];
+                    let rect = SampleRect { west, south, east, north };
+                    let edit = Edit::Set { area: Area::Rect(rect), height_m: *height_m };
+                    let done = sessions.each_mut().map(|session| {
+                        session.apply(std::slice::from_ref(&edit)).map(drop).map_err(|e| e.to_string().len() > 9)
+                    });
+                    prop_assert_eq!(done[0], done[1]);
+                    let [a, b] = sessions.each_mut().map(|session| session.commit(&format!("{i}")).unwrap());
+                    prop_assert_eq!(&a.places, &b.places);
+                    prop_assert!(b.bytes <= a.bytes + 200);
+                    // Where a commit says that pages lie, a reader from before finds them.
+                    for (page, entry) in b.places {
+                        reader.checked_page_at(page, entry).unwrap();
+                    }
+                }
+                Step::Undo => {
+                    let [a, b] = sessions.each_mut().map(|session| session.undo().unwrap());
+                    prop_assert_eq!(a, b);
+                }
+                Step::Redo => {
+                    let [a, b] = sessions.each_mut().map(|session| session.redo().unwrap());
+                    prop_assert_eq!(a, b);
+                }
+                Step::Reopen | Step::Compact => {
+                    drop(sessions);
+                    if matches!(step, Step::Compact) {
+                        for path in [plain, packed] {
+                            compact(&SystemDisk, path, None, path, &Silent).unwrap();
+                        }
+                    }
+                    reader = Terrain::open_unmapped(packed).unwrap();
+                    prop_assert!(reader.appended_bytes().is_some());
+                    sessions = [plain, packed].map(|path| EditSession::open(path).unwrap());
+                }
+            }
+            assert_same(&Terrain::open(plain).unwrap(), &Terrain::open(packed).unwrap());
+        }
+        drop(sessions);
+        unpack(&SystemDisk, packed, &back, &Silent).unwrap();
+        prop_assert!(bench.bytes(&back) == bench.bytes(plain));
+        let again = plain.with_file_name("again.iqt");
+        pack(&SystemDisk, plain, &again, &Silent).unwrap();
+        unpack(&SystemDisk, &again, &back, &Silent).unwrap();
+        prop_assert!(bench.bytes(&back) == bench.bytes(plain));
+        let report = verify(&Terrain::open_unmapped(packed).unwrap(), &|_| {}).unwrap();
+        prop_assert!(report.is_sound());
+    }
+}
+
 /// Larger than a tile of the second group, in every way of reading.
 #[test]
 fn packed_terrain_is_read_in_every_way() {
