@@ -7,5 +7,6 @@ pub(crate) mod compact;
 pub(crate) mod labels;
 pub(crate) mod nodes;
 pub(crate) mod patch;
+mod piece;
 pub(crate) mod tree;
 pub(crate) mod vertices;
