@@ -1,12 +1,10 @@
 //! The mesh itself: the bin-tree array, its places in clusters, vertices, splitting and merging.
 
 pub(crate) mod bounds;
-pub(crate) mod build;
 pub(crate) mod clusters;
 pub(crate) mod compact;
 pub(crate) mod labels;
 pub(crate) mod nodes;
 pub(crate) mod patch;
-mod piece;
 pub(crate) mod tree;
 pub(crate) mod vertices;

@@ -2,8 +2,8 @@
 //!
 //! Invariant: numbers of children follow from the order of their parents. Cost: some sixty bytes a split vertex of a piece, eight a vertex of a level.
 
-use super::clusters::CLUSTER;
-use super::nodes::NONE;
+use crate::refine::kinetic::mesh::clusters::CLUSTER;
+use crate::refine::kinetic::mesh::nodes::NONE;
 use std::ops::Range;
 use terrasoar_layout::grid::GridPoint;
 
@@ -36,7 +36,7 @@ pub(super) struct Parent<R> {
     pub(super) node: u32,
     pub(super) raw: R,
     pub(super) point: GridPoint,
-    /// The leaf's [body](super::nodes::body): ends of the edge, and apexes.
+    /// The leaf's [body](crate::refine::kinetic::mesh::nodes::body): ends of the edge, and apexes.
     pub(super) body: [u32; 4],
     /// The label of the first child of side 0. Children are made in turn from there, the first and the last of side 0, then those of side 1.
     pub(super) first: u8,

@@ -9,17 +9,17 @@
 //! level by level, make where places are packed. Near places are dealt out in the same order, with room left in each cluster for those that come later; vertices that come
 //! one after another in a level lie together on the ground.
 //!
-//! Invariant: afterwards all is as after splits one by one: `super::nodes` holds, each word is in a queue, and the patch tells every slot that shows something or has shown something before.
+//! Invariant: afterwards all is as after splits one by one: `super::super::mesh::nodes` holds, each word is in a queue, and the patch tells every slot that shows something or has shown something before.
 //! Cost: some fifty nanoseconds a node on one thread, a third of it for memory that is touched for the first time.
 
-use super::clusters::{CLUSTER, Dealing};
-use super::labels::{child_point, first_child, is_on_border, level_of, orientation};
-use super::nodes::{CENTRE, NO_VERTEX, NONE, Node, SPLIT, STATUS, UNREAD, body};
 use super::piece::{Line, Parent, Piece, Places};
 use crate::refine::kinetic::capacity::grow;
 use crate::refine::kinetic::frame::collect::enter;
 use crate::refine::kinetic::frame::shown::Shown;
 use crate::refine::kinetic::hands::{both, change, extend, extend_by, gather};
+use crate::refine::kinetic::mesh::clusters::{CLUSTER, Dealing};
+use crate::refine::kinetic::mesh::labels::{child_point, first_child, is_on_border, level_of, orientation};
+use crate::refine::kinetic::mesh::nodes::{CENTRE, NO_VERTEX, NONE, Node, SPLIT, STATUS, UNREAD, body};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::kinetic::{Kinetic, MeshVertex, Patch};
