@@ -46,7 +46,9 @@ impl Mirror {
         let known = |v: Option<MeshVertex>| {
             v.map(|v| MeshVertex { ends: [v.ends[0].min(v.ends[1]), v.ends[0].max(v.ends[1])], ..v })
         };
-        for (slot, corners) in self.triangles.iter().enumerate().filter(|(_, [a, b, _])| a != b) {
+        let slots = self.draws.iter().flat_map(|range| range.clone());
+        let held = slots.filter_map(|slot| Some((slot, self.triangles.get(slot as usize)?)));
+        for (slot, corners) in held.filter(|(_, [a, b, _])| a != b) {
             for v in corners.iter().map(|v| *v as usize) {
                 assert_eq!(
                     known(self.vertices[v]),

@@ -10,7 +10,7 @@ use web_time::Instant;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Budget {
-    /// Vertex tests of one frame. The last split may go beyond it by the tests of its children, at most 3.
+    /// Vertex tests of one frame; a split of the finest level, after which none is made, counts as one. The last split may go beyond it by the tests of its children, at most 3.
     pub tests: Option<u64>,
     /// Time from the first test of one frame to its last split. Exceeded by no more than some 6,000 tests or 32 splits, and by the merges, which always go
     /// through. Results then depend on the machine's speed, as nothing else here does.

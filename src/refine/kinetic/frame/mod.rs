@@ -2,9 +2,11 @@
 
 pub(crate) mod ahead;
 pub(crate) mod budget;
+pub(crate) mod build;
 pub(crate) mod collect;
 pub(crate) mod edited;
 pub(crate) mod jump;
+mod piece;
 pub(crate) mod resolve;
 pub(crate) mod shown;
 pub(crate) mod whole;

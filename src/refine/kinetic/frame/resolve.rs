@@ -129,7 +129,8 @@ impl<S: RecordStore> Kinetic<S> {
                     }
                     let before = engine.fresh.len();
                     if engine.split(node) {
-                        allowance.charge(engine.fresh.len() - before);
+                        // At the finest level there are no children to be tested.
+                        allowance.charge((engine.fresh.len() - before).max(usize::from(level == 0)));
                     } else {
                         // Its other parent may be among the untested.
                         engine.to_split[level].push(node);

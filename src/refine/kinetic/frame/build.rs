@@ -9,16 +9,17 @@
 //! level by level, make where places are packed. Near places are dealt out in the same order, with room left in each cluster for those that come later; vertices that come
 //! one after another in a level lie together on the ground.
 //!
-//! Invariant: afterwards all is as after splits one by one: `super::nodes` holds, each word is in a queue, and the patch tells every slot that shows something or has shown something before.
+//! Invariant: afterwards all is as after splits one by one: `super::super::mesh::nodes` holds, each word is in a queue, and the patch tells every slot that shows something or has shown something before.
 //! Cost: some fifty nanoseconds a node on one thread, a third of it for memory that is touched for the first time.
 
-use super::clusters::{CLUSTER, Dealing};
-use super::labels::{child_point, first_child, is_on_border, level_of, orientation};
-use super::nodes::{CENTRE, NO_VERTEX, NONE, Node, SPLIT, STATUS, UNREAD, body};
+use super::piece::{Line, Parent, Piece, Places};
 use crate::refine::kinetic::capacity::grow;
 use crate::refine::kinetic::frame::collect::enter;
 use crate::refine::kinetic::frame::shown::Shown;
 use crate::refine::kinetic::hands::{both, change, extend, extend_by, gather};
+use crate::refine::kinetic::mesh::clusters::{CLUSTER, Dealing};
+use crate::refine::kinetic::mesh::labels::{child_point, first_child, is_on_border, level_of, orientation};
+use crate::refine::kinetic::mesh::nodes::{CENTRE, NO_VERTEX, NONE, Node, SPLIT, STATUS, UNREAD, body};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::kinetic::{Kinetic, MeshVertex, Patch};
@@ -41,114 +42,6 @@ const PARENTS_AHEAD: usize = 8;
 const CLUSTERS_SHARE: usize = 16;
 /// Nodes that are put into a near cluster, so that most of those that come later find room beside their parents.
 const NEAR_FILL: u32 = CLUSTER as u32 * 7 / 8;
-
-/// Where nodes are put, one after another.
-#[derive(Debug, Clone, Copy)]
-struct Places {
-    /// Nodes of a cluster.
-    fill: u32,
-}
-
-impl Places {
-    /// The place of the node with a number.
-    #[inline(always)]
-    fn place(self, number: u32) -> u32 {
-        let cluster = CLUSTER as u32;
-        if self.fill == cluster { number } else { number / self.fill * cluster + number % self.fill }
-    }
-
-    /// The number of the node at a place, if that takes one.
-    #[inline(always)]
-    fn number(self, place: u32) -> Option<u32> {
-        let within = place % CLUSTER as u32;
-        (within < self.fill).then(|| place / CLUSTER as u32 * self.fill + within)
-    }
-}
-
-/// A vertex that is split, as the passes over its piece need it.
-#[derive(Debug, Clone, Copy)]
-struct Parent<R> {
-    node: u32,
-    raw: R,
-    point: GridPoint,
-    /// The leaf's [`body`]: ends of the edge, and apexes.
-    body: [u32; 4],
-    /// By label: which split vertex of the level shares that child, or [`NONE`].
-    sharers: [u32; 4],
-    /// Bit l: it makes the child with label l. Bit 4 + s: it has a triangle on side s.
-    makes: u8,
-    /// How many children those before it in the piece make.
-    first: u32,
-}
-
-impl<R> Parent<R> {
-    /// Which of the piece's children is the one with `label` that this vertex makes.
-    #[inline(always)]
-    fn child(&self, label: usize) -> u32 {
-        self.first + (self.makes & ((1 << label) - 1)).count_ones()
-    }
-
-    /// Ends of the edge of the child with `label`, as its triangle of side 0 has them; side 0's first child has the label `first`.
-    #[inline(always)]
-    fn ends(&self, label: usize, first: usize) -> [u32; 2] {
-        let [p, q, apex, other] = self.body;
-        // First and last child of side 0, then of side 1, whose edge runs the other way.
-        let [p, q] = match (label + 4 - first) & 3 {
-            0 => [apex, p],
-            3 => [q, apex],
-            2 => [other, q],
-            _ => [p, other],
-        };
-        if label >> 1 == 0 { [p, q] } else { [q, p] }
-    }
-}
-
-/// The vertices of a level.
-#[derive(Debug, Default)]
-struct Line {
-    level: u32,
-    /// Their places.
-    range: Range<u32>,
-    /// Those that are split.
-    split: Vec<u32>,
-    /// By place: which split vertex it is, or [`NONE`].
-    ranks: Vec<u32>,
-}
-
-impl Line {
-    /// Goes on to the next level, whose vertices are yet to come.
-    fn start(&mut self, level: u32, at: u32) {
-        (self.level, self.range) = (level, at..at);
-        self.split.clear();
-        self.ranks.clear();
-    }
-
-    #[inline(always)]
-    fn rank(&self, node: u32) -> u32 {
-        self.ranks.get(node.wrapping_sub(self.range.start) as usize).copied().unwrap_or(NONE)
-    }
-}
-
-/// Split vertices of a level, one after another, and their children.
-struct Piece<R> {
-    /// Which split vertex of the level comes first.
-    start: usize,
-    parents: Vec<Parent<R>>,
-    /// Children to be made: which parent of the piece makes it, times 4, and its label there.
-    births: Vec<u32>,
-    /// The vertex slot of the level's first split vertex.
-    base: u32,
-    /// The number of the piece's first child, or annex.
-    next: u32,
-    places: Places,
-}
-
-impl<R> Piece<R> {
-    /// Children, or annexes.
-    fn made(&self, level: u32) -> u32 {
-        (if level == 0 { self.parents.len() } else { self.births.len() }) as u32
-    }
-}
 
 impl<S: RecordStore> Kinetic<S> {
     /// Makes the mesh for a view of one that has been planted in this frame.
@@ -277,9 +170,10 @@ impl<S: RecordStore> Kinetic<S> {
                 raw: node.raw,
                 point: node.point,
                 body: [p, q, apex, other],
-                sharers: [NONE; 4],
+                first: first_child(orientation(node.point), line.level) as u8,
                 makes: 0,
-                first: 0,
+                sharers: [NONE; 4],
+                before: 0,
             };
             for side in (0..2).filter(|side| node.parents[*side] != NONE) {
                 parent.makes |= 16 << side;
@@ -288,12 +182,11 @@ impl<S: RecordStore> Kinetic<S> {
                 }
                 let own = 2 * side + orientation(node.point);
                 let around = &all[node.parents[side] as usize].body;
-                let first = first_child(own, line.level);
                 // The neighbours around the parent share the children beside it.
-                for (label, turn) in [(first, 3), ((first + 3) & 3, 1)] {
-                    let sharer = line.rank(around[(own + turn) & 3]);
-                    parent.sharers[label] = sharer;
-                    parent.makes |= u8::from(sharer == NONE || sharer > rank) << label;
+                for (turn, step) in [(2 * side, 3), (2 * side + 1, 1)] {
+                    let sharer = line.rank(around[(own + step) & 3]);
+                    parent.sharers[turn] = sharer;
+                    parent.makes |= u8::from(sharer == NONE || sharer > rank) << turn;
                 }
             }
             parent
@@ -301,11 +194,11 @@ impl<S: RecordStore> Kinetic<S> {
         births.clear();
         for (i, parent) in parents.iter_mut().enumerate() {
             self.triangles += (parent.makes >> 4).count_ones() as usize;
-            parent.first = births.len() as u32;
-            let mut labels = parent.makes & 15;
-            while labels != 0 {
-                births.push((i as u32) << 2 | labels.trailing_zeros());
-                labels &= labels - 1;
+            parent.before = births.len() as u32;
+            let mut turns = parent.makes & 15;
+            while turns != 0 {
+                births.push((i as u32) << 2 | turns.trailing_zeros());
+                turns &= turns - 1;
             }
         }
         self.work.splits += parents.len() as u64;
@@ -348,14 +241,15 @@ impl<S: RecordStore> Kinetic<S> {
                     continue;
                 }
                 for (label, child) in node.body[..4].iter_mut().enumerate() {
-                    let sharer = parent.sharers[label];
+                    let turn = parent.turn(label);
+                    let sharer = parent.sharers[turn];
                     let opposite = (label + 2) & 3;
-                    *child = if parent.makes >> label & 1 == 1 {
-                        places.place(next + parent.child(label))
+                    *child = if parent.makes >> turn & 1 == 1 {
+                        places.place(next + parent.child(turn))
                     } else if sharer == NONE {
                         NONE
                     } else if let Some(i) = (sharer as usize).checked_sub(*start) {
-                        places.place(next + parents[i].child(opposite))
+                        places.place(next + parents[i].child(parents[i].turn(opposite)))
                     } else {
                         before[line.split[sharer as usize] as usize].body[opposite]
                     };
@@ -373,25 +267,28 @@ impl<S: RecordStore> Kinetic<S> {
             let Parent { node, raw, .. } = parents[i];
             Node { parents: [node, NONE], ..Node::free(raw) }
         };
-        let point_of =
-            |birth: u32| child_point(parents[birth as usize >> 2].point, level, birth as usize & 3);
+        let point_of = |birth: u32| {
+            let parent = &parents[birth as usize >> 2];
+            child_point(parent.point, level, parent.turn(birth as usize & 3))
+        };
         let child = |number: usize| {
             if let Some(later) = births.get(number + FETCH_AHEAD) {
                 records.prefetch(slot_of(k, point_of(*later)));
             }
             let birth = births[number];
-            let (i, label) = (birth as usize >> 2, birth as usize & 3);
+            let (i, turn) = (birth as usize >> 2, birth as usize & 3);
             let parent = &parents[i];
+            let label = parent.turn(turn);
             let here = base + (start + i) as u32;
             let point = point_of(birth);
             let (raw, word) = tested(records, judge, point, parent.raw);
-            let [p, q] = parent.ends(label, first_child(orientation(parent.point), level));
+            let [p, q] = parent.ends(turn, label);
             let mut node = Node { word, raw, point, parents: [NONE; 2], body: [NONE; 6] };
             (node.body[body::P], node.body[body::Q]) = (p, q);
             let side = label >> 1;
             node.parents[side] = parent.node;
             node.body[body::APEX + side] = here;
-            let sharer = parent.sharers[label];
+            let sharer = parent.sharers[turn];
             if sharer != NONE {
                 node.parents[1 - side] = line.split[sharer as usize];
                 node.body[body::APEX + 1 - side] = base + sharer;
