@@ -263,23 +263,104 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
     return out
 
 
+def slot_of(k, x, y):
+    """Where the unpacked file has the record of a grid point (section 2)."""
+    n = 1 << k
+    if x % n == 0 and y % n == 0:
+        return {(0, 0): 0, (n, 0): 1, (n, n): 2, (0, n): 3}[x, y]
+    spread = lambda v: sum((v >> i & 1) << 2 * i for i in range(v.bit_length()))
+    t = ((x | y) & -(x | y)).bit_length() - 1
+    d, u, w = k - 1 - t, x >> t, y >> t
+    if u % 2 and w % 2:
+        return (5 * 4**d + 7) // 3 + 2 * spread(w >> 1) + spread(u >> 1 ^ w >> 1)
+    a, b = (u + w - 1) // 2, (w - u + 2 ** (d + 1) - 1) // 2
+    return (8 * 4**d + 7) // 3 + 2 * spread(a ^ 2**d - 1) + spread(a ^ b ^ 2**d)
+
+
+class Unpacked:
+    """Pages of the unpacked file: those that are packed, made of records by slot, and those in runs (9.8)."""
+
+    def __init__(self, data, header, sections, by_slot):
+        self.data, self.by_slot = data, by_slot
+        present, at, is_present, shift, run = [], 0, False, 0, 0
+        for byte in sections[2]:
+            run, shift = run | (byte & 127) << shift, shift + 7
+            if byte < 128:
+                present += range(at, at + run) if is_present else []
+                at, is_present, shift, run = at + run, not is_present, 0, 0
+        self.present, leaves = present, sorted({page // 256 for page in present})
+        sums = struct.unpack(f"<{len(present)}I", sections[3])
+        tables = {leaf: bytearray(4096) for leaf in leaves}
+        for i, page in enumerate(present):
+            struct.pack_into("<III", tables[page // 256], page % 256 * 16, 3 + i, sums[i], 1)
+        root = bytearray(-(-16 * struct.unpack_from("<I", header, 0x7C)[0] // 4096) * 4096)
+        for i, leaf in enumerate(leaves):
+            struct.pack_into("<III", root, 16 * leaf, 3 + len(present) + i, zlib.crc32(tables[leaf]), 1)
+        behind = b"".join(tables[leaf] for leaf in leaves) + root
+        self.behind = [behind[at:at + 4096] for at in range(0, len(behind), 4096)]
+        self.first, self.runs = 3 + len(present) + len(self.behind), []
+        offset, sum_, count = struct.unpack_from("<QII", header, 0x1E8)
+        while count:
+            block = data[offset:offset + 16 + 24 * count]
+            assert zlib.crc32(block) == sum_
+            self.runs = [struct.unpack_from("<IIQII", block, 16 + 24 * i) for i in range(count)] + self.runs
+            offset, sum_, count = struct.unpack_from("<QII", block)
+
+    def page(self, number):
+        if number < 3 + len(self.present):
+            first = 1024 * self.present[number - 3]
+            return struct.pack("<1024I", *(self.by_slot.get(first + i, INERT) for i in range(1024)))
+        if number < self.first:
+            return self.behind[number - 3 - len(self.present)]
+        first, pages, at, kind, sum_ = next(run for run in self.runs if run[0] <= number < run[0] + run[1])
+        if kind == 0:
+            return self.data[at + 4096 * (number - first):][:4096]
+        table = self.data[at:at + 6 * pages]
+        assert kind == 1 and zlib.crc32(table) == sum_
+        entries = [struct.unpack_from("<IH", table, 6 * i) for i in range(pages)]
+        at += 6 * pages + sum(length for _, length in entries[:number - first])
+        base, length = entries[number - first]
+        page = self.data[at:at + length]
+        page = page if length == 4096 else zlib.decompress(page, -15)
+        return bytes(a ^ b for a, b in zip(page, self.page(base))) if base else page
+
+    def edited(self, header):
+        """Records of pages that were appended, by slot, as far as the directory leads to them (section 5)."""
+        root_page, leaves, sum_ = struct.unpack_from("<III", header, 0x78)
+        root = b"".join(self.page(root_page + i) for i in range(-(-16 * leaves // 4096)))[:16 * leaves]
+        assert zlib.crc32(root) == sum_
+        found = {}
+        for i, (leaf, sum_, _, _) in enumerate(struct.iter_unpack("<4I", root)):
+            if leaf < self.first:
+                continue
+            entries = self.page(leaf)
+            assert zlib.crc32(entries) == sum_
+            for j, (number, sum_, _, _) in enumerate(struct.iter_unpack("<4I", entries)):
+                if number >= self.first:
+                    page = self.page(number)
+                    assert zlib.crc32(page) == sum_
+                    found.update(enumerate(struct.unpack("<1024I", page), 1024 * (256 * i + j)))
+        return found
+
+
 def main(packed, target):
     with open(packed, "rb") as file:
         data = file.read()
-    header = data[:4096]
+    slots = [data[at:at + 4096] for at in (0, 4096)]
+    slots = [page for page in slots if zlib.crc32(page[:0xFFC]) == struct.unpack_from("<I", page, 0xFFC)[0]]
+    header = max(slots, key=lambda page: struct.unpack_from("<I", page, 0x1C))
     assert header[:10] == b"\x89IQT\r\n\x1a\n\2\0" and struct.unpack_from("<H", header, 0x100) == (1,)
-    assert zlib.crc32(header[:0xFFC]) == struct.unpack_from("<I", header, 0xFFC)[0]
     sections = {}
     for i in range(header[0x107]):
         kind, sum_, offset, length = struct.unpack_from("<IIQQ", header, 0x120 + 24 * i)
         sections[kind] = data[offset:offset + length]
-        assert kind == 6 or zlib.crc32(sections[kind]) == sum_
+        assert zlib.crc32(sections[kind]) == sum_
     k, (wide, high) = header[0x10], struct.unpack_from("<II", header, 0x14)
     spacing, (step,) = struct.unpack_from("<dd", header, 0x20), struct.unpack_from("<d", header, 0x38)
     (top,), (steps,) = struct.unpack_from("<d", header, 0x50), struct.unpack_from("<I", header, 0x58)
     of_context, rules = tables(sections[1]), Rules(step, top, steps, spacing)
     groups = [(3 * g, min(6, k - 3 * g), k - 3 * g <= 6) for g in range(-(-max(k - 6, 0) // 3) + 1)]
-    samples, leaf = [INERT] * (wide * high), 0
+    by_slot, leaf = {}, 0
     for stride_log, octaves, is_top in reversed(groups):
         shift, side = stride_log + octaves, 1 << k - stride_log - octaves
         tiles = [min(side, (size - 1 >> shift) + 2) for size in (wide, high)]
@@ -306,8 +387,9 @@ def main(packed, target):
                 is_last = [at[axis] + 1 == side for axis in (0, 1)]
                 for (x, y), record in tile(coders, rules, octaves, stride_log, is_top, is_last).items():
                     x, y = (at[0] << shift) + (x << stride_log), (at[1] << shift) + (y << stride_log)
-                    if x < wide and y < high:
-                        samples[y * wide + x] = record
+                    by_slot[slot_of(k, x, y)] = record
+    by_slot.update(Unpacked(data, header, sections, by_slot).edited(header))
+    samples = [by_slot.get(slot_of(k, x, y), INERT) for y in range(high) for x in range(wide)]
     with open(target, "wb") as file:
         file.write(struct.pack(f"<{len(samples)}I", *samples))
 

@@ -15,6 +15,7 @@ use terrasoar::stream::{ModelDisk, Prefetch, Streamed};
 use terrasoar::view::View;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
+use terrasoar_layout::edit::{Crater, Edit, EditSession};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::packing::pack;
 use terrasoar_layout::progress::Silent;
@@ -22,7 +23,7 @@ use terrasoar_layout::read::kinds::ByKind;
 use terrasoar_layout::read::terrain::Terrain;
 
 #[test]
-fn engines_fly_packed_terrain_as_the_terrain() {
+fn engines_fly_edited_packed_terrain_as_the_terrain() {
     for (samples, holes) in [([257, 257], false), ([330, 190], true)] {
         let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| {
             let is_hole = holes && x + y > 0 && (noise(5, y / 9, x / 7) < 0.05 || noise(6, y, x) < 0.001);
@@ -32,6 +33,17 @@ fn engines_fly_packed_terrain_as_the_terrain() {
         let [plain, packed] = ["plain.iqt", "packed.iqt"].map(|name| folder.path().join(name));
         build(&dem, &plain, &BuildOptions::default().spacing_m([10.0, 12.0]), &Silent).unwrap();
         pack(&SystemDisk, &plain, &packed, &Silent).unwrap();
+        // Craters on the way, one of them undone.
+        for path in [&plain, &packed] {
+            let mut session = EditSession::open(path).unwrap();
+            for i in 0..4 {
+                let centre_m = [700.0 + 300.0 * f64::from(i), 1300.0 - 200.0 * f64::from(i)];
+                let crater = Crater { centre_m, direction_deg: 40.0, radius_m: 150.0, depth_m: 60.0 };
+                session.apply(&[Edit::Crater(crater)]).unwrap();
+                session.commit("crater").unwrap();
+            }
+            session.undo().unwrap().unwrap();
+        }
         let plain = Terrain::open(&plain).unwrap();
         let whole = Terrain::open(&packed).unwrap();
         let streamed = Arc::new(Terrain::open_unmapped(&packed).unwrap());

@@ -65,7 +65,15 @@ fn keys(engine: &impl Engine) -> HashSet<TriangleKey> {
 
 fn refines(terrain: &Terrain, views: &[View], culling: Culling, is_sound: bool) {
     let is_small = terrain.grid().k() <= MOST_K;
-    with_records!(terrain.records().expect("a mapped terrain lends its bytes"), records => {
+    // Packed terrain whose pages cannot all be unpacked lends none.
+    let Some(records) = terrain.records() else {
+        assert!(
+            terrain.appended_bytes().is_some() && !is_sound,
+            "a terrain that reads does not lend its bytes"
+        );
+        return;
+    };
+    with_records!(records, records => {
         let mut soar = Soar::new(records.clone(), culling);
         let mut smart = Smart::new(records.clone(), culling);
         let mut kinetic = Kinetic::new(records.clone(), culling);

@@ -6,7 +6,7 @@ use terrasoar_layout::dem::{Georeference, HorizontalUnit, MemoryDem, SampleType}
 use terrasoar_layout::edit::{Area, Crater, Edit, SampleRect};
 use terrasoar_layout::imagery::{Paint, Scorch};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::testing::{Seed, seeds};
+use terrasoar_layout::testing::{Seed, packed_seeds, seeds};
 
 /// A terrain of 60 x 50 samples that lies somewhere: its south-west sample at 1000, 4000 of EPSG 32610, 10 m a sample. With some voids.
 pub(crate) static PLAIN: LazyLock<Vec<u8>> = LazyLock::new(|| {
@@ -40,11 +40,15 @@ pub(crate) static TERRAINS: LazyLock<Vec<Seed>> =
 pub(crate) static OVERLAYS: LazyLock<Vec<Seed>> =
     LazyLock::new(|| seeds().into_iter().filter(|seed| seed.files.overlay.is_some()).collect());
 
+/// Sound packed files.
+pub(crate) static PACKED: LazyLock<Vec<Seed>> = LazyLock::new(packed_seeds);
+
 /// Makes them now, so that their memory is not counted as a body's.
 pub(crate) fn make_all() {
     LazyLock::force(&PLAIN);
     LazyLock::force(&TERRAINS);
     LazyLock::force(&OVERLAYS);
+    LazyLock::force(&PACKED);
 }
 
 /// A crater at a place in metres.

@@ -15,6 +15,7 @@ mod land;
 mod memory;
 pub mod mutation;
 mod overlay_sealed;
+mod packed;
 mod scratch;
 mod seeds;
 mod take_out;
@@ -144,6 +145,8 @@ targets! {
     terrain_sealed { is_text: false, fixed_mib: 160, per_byte: 64 }
     /// The same of an overlay over a sound terrain.
     overlay_sealed { is_text: false, fixed_mib: 160, per_byte: 64 }
+    /// The same of a packed file, whose pages take little of it.
+    packed { is_text: false, fixed_mib: 160, per_byte: 1024 }
 }
 
 fn run(name: &str, data: &[u8]) {

@@ -179,6 +179,11 @@ fn sealed_terrains() {
 }
 
 #[test]
+fn packed_terrains() {
+    replay("packed");
+}
+
+#[test]
 fn sealed_overlays() {
     replay("overlay_sealed");
 }

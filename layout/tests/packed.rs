@@ -10,7 +10,7 @@ use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::SampleType;
-use terrasoar_layout::edit::{EditSession, compact};
+use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, compact_packed};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::source::MemorySource;
 use terrasoar_layout::grid::GridPoint;
@@ -90,6 +90,97 @@ proptest! {
     }
 }
 
+/// One step of a life of a terrain.
+#[derive(Debug, Clone)]
+enum Step {
+    Set {
+        at: [u32; 2],
+        size: [u32; 2],
+        height_m: f64,
+    },
+    Undo,
+    Redo,
+    /// Opened again.
+    Reopen,
+    Compact,
+}
+
+fn step() -> impl Strategy<Value = Step> {
+    let set = (0u32..300, 0u32..300, 1u32..70, 1u32..50, 700i32..1300);
+    prop_oneof![
+        4 => set.prop_map(|(x, y, wide, high, h)| Step::Set { at: [x, y], size: [wide, high], height_m: h.into() }),
+        1 => Just(Step::Undo),
+        1 => Just(Step::Redo),
+        1 => Just(Step::Reopen),
+        1 => Just(Step::Compact),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Packed terrain and the terrain file lead the same life: after every step each record is the same, for a reader that was there before, too; and unpacked it is that file.
+    #[test]
+    fn edited_packed_terrain_is_the_edited_terrain(
+        wide in 2u32..300, high in 2u32..300, voids in 0u32..3, steps in prop::collection::vec(step(), 1..14),
+    ) {
+        let bench = Bench::of(&build_bytes(&dem([wide, high], 40, voids), &options()).unwrap()).unwrap();
+        let (plain, packed, back) = (&bench.plain, &bench.packed, bench.plain.with_file_name("back.iqt"));
+        let mut sessions = [plain, packed].map(|path| EditSession::open(path).unwrap());
+        let mut reader = Terrain::open_unmapped(packed).unwrap();
+        for (i, step) in steps.iter().enumerate() {
+            match step {
+                Step::Set { at, size, height_m } => {
+                    let [west, south] = [at[0].min(wide - 1), at[1].min(high - 1)];
+                    let [east, north] = [(west + size[0]).min(wide - 1), (south + size[1]).min(high - 1)];
+                    let rect = SampleRect { west, south, east, north };
+                    let edit = Edit::Set { area: Area::Rect(rect), height_m: *height_m };
+                    let done = sessions.each_mut().map(|session| {
+                        session.apply(std::slice::from_ref(&edit)).map(drop).map_err(|e| e.to_string().len() > 9)
+                    });
+                    prop_assert_eq!(done[0], done[1]);
+                    let [a, b] = sessions.each_mut().map(|session| session.commit(&format!("{i}")).unwrap());
+                    prop_assert_eq!(&a.places, &b.places);
+                    prop_assert!(b.bytes <= a.bytes + 200);
+                    // Where a commit says that pages lie, a reader from before finds them.
+                    for (page, entry) in b.places {
+                        reader.checked_page_at(page, entry).unwrap();
+                    }
+                }
+                Step::Undo => {
+                    let [a, b] = sessions.each_mut().map(|session| session.undo().unwrap());
+                    prop_assert_eq!(a, b);
+                }
+                Step::Redo => {
+                    let [a, b] = sessions.each_mut().map(|session| session.redo().unwrap());
+                    prop_assert_eq!(a, b);
+                }
+                Step::Reopen | Step::Compact => {
+                    drop(sessions);
+                    if matches!(step, Step::Compact) {
+                        for path in [plain, packed] {
+                            compact(&SystemDisk, path, None, path, &Silent).unwrap();
+                        }
+                    }
+                    reader = Terrain::open_unmapped(packed).unwrap();
+                    prop_assert!(reader.appended_bytes().is_some());
+                    sessions = [plain, packed].map(|path| EditSession::open(path).unwrap());
+                }
+            }
+            assert_same(&Terrain::open(plain).unwrap(), &Terrain::open(packed).unwrap());
+        }
+        drop(sessions);
+        unpack(&SystemDisk, packed, &back, &Silent).unwrap();
+        prop_assert!(bench.bytes(&back) == bench.bytes(plain));
+        let again = plain.with_file_name("again.iqt");
+        pack(&SystemDisk, plain, &again, &Silent).unwrap();
+        unpack(&SystemDisk, &again, &back, &Silent).unwrap();
+        prop_assert!(bench.bytes(&back) == bench.bytes(plain));
+        let report = verify(&Terrain::open_unmapped(packed).unwrap(), &|_| {}).unwrap();
+        prop_assert!(report.is_sound());
+    }
+}
+
 /// Larger than a tile of the second group, in every way of reading.
 #[test]
 fn packed_terrain_is_read_in_every_way() {
@@ -132,29 +223,25 @@ fn what_is_not_supported_is_refused() {
     let exact = build_bytes(&dem([90, 70], 3, 0), &options().record(Some(RecordKind::Exact8))).unwrap();
     let error = Bench::of(&exact).err().unwrap().to_string();
     assert!(error.contains("compact ones"), "{error}");
-    let error = EditSession::open(&bench.packed).err().unwrap().to_string();
-    assert!(error.contains("terrasoar unpack"), "{error}");
+    let error = Terrain::open_with_overlay(&bench.packed, &bench.packed).err().unwrap().to_string();
+    assert!(error.contains("no overlay"), "{error}");
     assert!(!out.exists());
-    // Whoever would write to it is refused before a byte is written.
-    let before = bench.bytes(&bench.packed);
-    let picture = || MemoryImage::from_fn([21, 10], |x, y| [x as u8 * 9, y as u8 * 20, 7, 255]);
-    for error in [
-        draped(&bench.packed, picture(), &DrapeOptions::default()).err(),
-        compact(&SystemDisk, &bench.packed, None, &bench.packed, &Silent).err(),
-        EditSession::open_overlay(&bench.packed, &out).err(),
-        Terrain::open_with_overlay(&bench.packed, &bench.packed).err(),
-    ] {
-        let error = error.unwrap().to_string();
-        assert!(error.contains("terrasoar unpack"), "{error}");
-    }
-    assert!(bench.bytes(&bench.packed) == before);
-    assert!(!out.exists());
-    // Compacted to another file it is unpacked.
+    // Compacted it is the same.
     compact(&SystemDisk, &bench.packed, None, &out, &Silent).unwrap();
-    assert!(bench.bytes(&out) == bytes);
+    assert!(bench.bytes(&out) == bench.bytes(&bench.packed));
+    let error = compact_packed(&SystemDisk, &exact_file(&out), None, &out, &Silent).unwrap_err().to_string();
+    assert!(error.contains("compact ones"), "{error}");
 }
 
-/// A picture comes along; and an edited terrain is written anew first.
+/// A terrain with exact records, beside `path`.
+fn exact_file(path: &Path) -> PathBuf {
+    let exact = path.with_file_name("exact.iqt");
+    let options = options().record(Some(RecordKind::Exact8));
+    std::fs::write(&exact, build_bytes(&dem([90, 70], 3, 0), &options).unwrap()).unwrap();
+    exact
+}
+
+/// A picture comes along.
 #[test]
 fn pictures_are_packed_too() {
     let folder = tempfile::tempdir().unwrap();
@@ -240,9 +327,7 @@ fn seal_all(bytes: &mut [u8], leaf_tiles: &[usize]) {
                 put(bytes, from + 12 * i + 8, leaf..leaf + 24 * tiles);
             }
         }
-        if kind != 6 {
-            put(bytes, at + 4, from..from + count);
-        }
+        put(bytes, at + 4, from..from + count);
     }
     seal(bytes);
 }
@@ -277,14 +362,14 @@ fn damage_is_told() {
         let mut damaged = packed.clone();
         match round % 4 {
             0 => damaged.truncate(below(packed.len())),
-            1 => damaged[below(packed.len())] ^= 1 << below(8),
+            1 => damaged[(8192 + below(packed.len() - 4096)) % packed.len()] ^= 1 << below(8),
             // Behind the header, and sealed.
             2 => {
-                damaged[4096 + below(packed.len() - 4096)] ^= 1 << below(8);
+                damaged[8192 + below(packed.len() - 8192)] ^= 1 << below(8);
                 seal_all(&mut damaged, &[1, 16]);
             }
             _ => {
-                let at = 0x100 + below(0x100);
+                let at = 0x100 + below(0x80);
                 damaged[at] = below(256) as u8;
                 seal_all(&mut damaged, &[1, 16]);
             }
@@ -308,14 +393,34 @@ fn a_reader_written_from_the_specification_agrees() {
         let out = bench.plain.with_file_name("records");
         let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
         assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-        let found = bench.bytes(&out);
-        let plain = Terrain::open(&bench.plain).unwrap();
-        let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
-        for (i, record) in found.chunks_exact(4).enumerate() {
-            let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
-            let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));
-            assert_eq!(record, records.raw(slot).to_le_bytes(), "{size:?}: {x}, {y}");
+        check_records(&bench.bytes(&out), &bench.plain, size);
+        // Edited, and back by one commit.
+        for path in [&bench.plain, &bench.packed] {
+            let mut session = EditSession::open(path).unwrap();
+            for (i, height_m) in [(0, 901.0), (1, 950.0), (2, 1000.0)] {
+                let rect =
+                    SampleRect { west: i, south: i, east: (i + 40).min(size[0] - 1), north: size[1] - 1 };
+                if i < size[1] {
+                    session.apply(&[Edit::Set { area: Area::Rect(rect), height_m }]).unwrap();
+                    session.commit("set").unwrap();
+                }
+            }
+            session.undo().unwrap();
         }
-        assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
+        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        check_records(&bench.bytes(&out), &bench.plain, size);
     }
+}
+
+/// Whether `found` is the record of each sample of the terrain file.
+fn check_records(found: &[u8], plain: &Path, size: [u32; 2]) {
+    let plain = Terrain::open(plain).unwrap();
+    let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
+    for (i, record) in found.chunks_exact(4).enumerate() {
+        let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
+        let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));
+        assert_eq!(record, records.raw(slot).to_le_bytes(), "{size:?}: {x}, {y}");
+    }
+    assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
 }

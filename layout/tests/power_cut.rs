@@ -26,6 +26,21 @@ fn build_at(disk: &dyn Disk, path: &Path, tilt: u32) {
     build_on(disk, &dem, path, &options, &Silent).unwrap();
 }
 
+fn build_packed_at(path: &Path) {
+    let dem = MemoryDem::from_fn([110, 70], SampleType::I16, |x, y| {
+        f64::from((x * 7 + y * 13) % 100 + x / 3 + y / 2)
+    });
+    let options = BuildOptions::default().spacing_m([10.0; 2]).packed(true);
+    build_on(&SystemDisk, &dem, path, &options, &Silent).unwrap();
+}
+
+/// Makes a terrain to begin with.
+fn prepare(is_packed: bool) -> impl Fn(&Path) {
+    move |path| if is_packed { build_packed_at(path) } else { build_at(&SystemDisk, path, 1) }
+}
+
+const FORMS: [bool; 2] = [false, true];
+
 fn image(seed: u32) -> MemoryImage {
     MemoryImage::from_fn([300, 200], move |x, y| [x as u8, y as u8, (x / 16 + seed) as u8, 255])
 }
@@ -131,8 +146,8 @@ impl Story {
 
 #[test]
 fn edits_undone_and_redone() {
-    for overlay in [None, Some("o.iqo")] {
-        let mut story = Story::begin(|path| build_at(&SystemDisk, path, 1), overlay);
+    for (overlay, is_packed) in [None, Some("o.iqo")].into_iter().flat_map(|o| FORMS.map(|form| (o, form))) {
+        let mut story = Story::begin(prepare(is_packed), overlay);
         let mut session = story.session();
         if overlay.is_some() {
             // An overlay without edits shows what the base does; that it is there is told too.
@@ -154,31 +169,33 @@ fn edits_undone_and_redone() {
 
 #[test]
 fn pictures_and_paint() {
-    let mut story = Story::begin(|path| build_at(&SystemDisk, path, 1), None);
-    let options = DrapeOptions::default();
-    let drape = |story: &mut Story, seed| {
-        drape_on(&*story.disk, &story.terrain(), &[Box::new(image(seed))], &options, &Silent).unwrap();
+    for is_packed in FORMS {
+        let mut story = Story::begin(prepare(is_packed), None);
+        let options = DrapeOptions::default();
+        let drape = |story: &mut Story, seed| {
+            drape_on(&*story.disk, &story.terrain(), &[Box::new(image(seed))], &options, &Silent).unwrap();
+            story.told();
+        };
+        drape(&mut story, 1);
+        let mut session = story.session();
+        for step in 0..3 {
+            let scorch = Paint::Scorch(Scorch {
+                centre_m: [200.0 + 150.0 * f64::from(step), 300.0],
+                radius_m: 60.0,
+                direction_deg: 40.0,
+                strength: 0.9,
+            });
+            session.apply_and_paint(&[set(step)], &[scorch]).unwrap();
+            session.commit("scorch").unwrap();
+            story.told();
+        }
+        session.undo().unwrap();
         story.told();
-    };
-    drape(&mut story, 1);
-    let mut session = story.session();
-    for step in 0..3 {
-        let scorch = Paint::Scorch(Scorch {
-            centre_m: [200.0 + 150.0 * f64::from(step), 300.0],
-            radius_m: 60.0,
-            direction_deg: 40.0,
-            strength: 0.9,
-        });
-        session.apply_and_paint(&[set(step)], &[scorch]).unwrap();
-        session.commit("scorch").unwrap();
-        story.told();
+        drop(session);
+        drape(&mut story, 2);
+        assert!(story.states.windows(2).all(|pair| pair[0] != pair[1]));
+        story.check();
     }
-    session.undo().unwrap();
-    story.told();
-    drop(session);
-    drape(&mut story, 2);
-    assert!(story.states.windows(2).all(|pair| pair[0] != pair[1]));
-    story.check();
 }
 
 #[test]
@@ -195,13 +212,13 @@ fn builds_new_and_in_the_place_of_others() {
 /// A file that is written anew and commits before and after it.
 #[test]
 fn files_written_anew() {
-    let edited = |path: &Path| {
-        build_at(&SystemDisk, path, 1);
-        let mut session = EditSession::open(path).unwrap();
-        session.apply(&[set(1)]).unwrap();
-        session.commit("before").unwrap();
-    };
-    for is_widened in [false, true] {
+    for (is_widened, is_packed) in FORMS.into_iter().flat_map(|is| FORMS.map(|form| (is, form))) {
+        let edited = |path: &Path| {
+            prepare(is_packed)(path);
+            let mut session = EditSession::open(path).unwrap();
+            session.apply(&[set(1)]).unwrap();
+            session.commit("before").unwrap();
+        };
         let mut story = Story::begin(edited, None);
         let commit = |story: &mut Story, i: u32| {
             let mut session = story.session();

@@ -23,8 +23,8 @@ Examples:
 
 Bounds are least x and y and greatest x and y of the samples' own places (not of pixels around them), in the elevation model's coordinates; the row below them says how to get from
 samples to coordinates. In --json, sample_to_crs are the six numbers m of it: a sample so many columns east and rows north of the south-west one, both from 0, lies at
-x = m0 + m1 column + m2 row, y = m3 + m4 column + m5 row. bounds, bounds_wgs84, sample_to_crs and height_step_m are null where there are none, and unpacked_bytes where the
-terrain is not packed. unused_bytes are bytes that nothing
+x = m0 + m1 column + m2 row, y = m3 + m4 column + m5 row. bounds, bounds_wgs84, sample_to_crs and height_step_m are null where there are none, and unpacked_bytes and appended_bytes
+(what edits, their history and imagery have added since it was packed) where the terrain is not packed. unused_bytes are bytes that nothing
 leads to; history_bytes those that undo and redo need, or that edits made after an undo left behind.")]
 pub(super) struct Args {
     #[command(flatten)]
@@ -78,6 +78,8 @@ struct Info {
     file_bytes: u64,
     /// Of the terrain file that it was made of, where the terrain is packed.
     unpacked_bytes: Option<u64>,
+    /// Appended to the packed file since it was packed, where the terrain is packed.
+    appended_bytes: Option<u64>,
     bytes_per_sample: f64,
     /// The file with the edits, if they lie apart.
     overlay: Option<String>,
@@ -142,6 +144,8 @@ impl Info {
         let packed_bytes = terrain.source().packed_bytes();
         let commits = history(terrain)?;
         let beside = unused_bytes(terrain)?;
+        // In a packed file they take less than the pages that they are.
+        let beside = terrain.appended_bytes().map_or(beside, |appended| beside.min(appended));
         let [unused_bytes, history_bytes] = if commits.is_empty() { [beside, 0] } else { [0, beside] };
         Ok(Self {
             path: args.file.display().to_string(),
@@ -174,6 +178,7 @@ impl Info {
             generation: header.generation,
             file_bytes: packed_bytes.unwrap_or(header.file_bytes),
             unpacked_bytes: packed_bytes.map(|_| header.file_bytes),
+            appended_bytes: terrain.appended_bytes(),
             bytes_per_sample: terrain.bytes_per_sample(),
             overlay: args.overlay.as_ref().map(|overlay| overlay.display().to_string()),
             commits: commits.len() as u64,
@@ -226,6 +231,14 @@ impl Info {
         ];
         let at = rows.iter().position(|(name, _)| *name == "records").unwrap_or(rows.len());
         rows.splice(at..at, self.siting.rows());
+        if let Some(appended @ 1..) = self.appended_bytes {
+            let at = rows.len() - 1;
+            let words = format!(
+                "{} bytes since it was packed: edits, their history, imagery; terrasoar compact packs the ground as it is",
+                grouped(appended)
+            );
+            rows.insert(at, ("appended", words));
+        }
         if let Some(overlay) = &self.overlay {
             rows.insert(1, ("with edits in", overlay.clone()));
         }
@@ -269,7 +282,7 @@ impl Info {
         if self.unused_bytes > 0 {
             rows.push(("unused", format!("{} bytes that nothing leads to", grouped(self.unused_bytes))));
         }
-        if self.history_bytes > 0 {
+        if self.history_bytes > 0 && self.unpacked_bytes.is_none() {
             let bytes = grouped(self.history_bytes);
             rows.push((
                 "history keeps",

@@ -32,6 +32,7 @@ use crate::file::header::{ErrorKind, Header, SpacingOrigin};
 use crate::grid::Grid;
 use crate::grid::order::corners;
 use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
+use crate::packing::publish_packed;
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::remedy::Remedy;
@@ -106,6 +107,8 @@ pub fn build_on(
     header.check_numbers()?;
     let threads = rayon::current_num_threads() as u64;
     let memory = MemoryPlan::new(&grid, info.sample_type, options, threads, dem.memory_bytes())?;
+    // What will have the name comes first: it knows what has the name now.
+    let packed = options.packed.then(|| AtomicFile::create(out)).transpose()?;
     let file = AtomicFile::create(out)?;
     let advance = |n| progress.advance(n);
 
@@ -139,6 +142,11 @@ pub fn build_on(
     let code = HeightCode::choose(info, options.z_scale, &stats, options.record, options.head_room);
     let height_range_m = survey::check_heights(info, &code, &stats)?;
     let steepest_m = survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
+    if options.packed && code.kind != RecordKind::Compact {
+        return Err(LayoutError::Usage(
+            "these heights take exact records, and only compact ones can be packed; choose compact records, which round heights to steps, or leave the terrain as it is".into(),
+        ));
+    }
     header.record_kind = code.kind;
     header.scale = survey::record_scale(&grid, &code, height_range_m, steepest_m);
     header.has_voids = stats.voids > 0;
@@ -150,8 +158,11 @@ pub fn build_on(
     let work =
         Work { spool: &spool, code, fills: None, tile: memory.tile, file: &file, disk, advance: &advance };
     work.run_kind(&mut header)?;
-    progress.stage("syncing", 0);
     drop(spool);
+    if let Some(packed) = packed {
+        return Ok(publish_packed(disk, file, packed, None, progress)?.0);
+    }
+    progress.stage("syncing", 0);
     publish_terrain(disk, file, None)
 }
 

@@ -28,6 +28,8 @@ pub struct BuildOptions {
     /// of 16,384 height steps, or a quarter more than the terrain's. It costs some 0.1 % of triangles, and more where a terrain is that tall: its smallest errors grow
     /// by up to a quarter.
     pub head_room: bool,
+    /// Whether the file is packed: the terrain file is built without a name first, and packed from there, so that it takes the room of both. Compact records only. The default is no.
+    pub packed: bool,
     /// Largest side of a tile in steps, a power of two from 2 to 256. Smaller tiles save memory and cost time; the file is the same.
     pub largest_tile: u32,
 }
@@ -43,6 +45,7 @@ impl Default for BuildOptions {
             nodata: None,
             fill_voids: 0,
             head_room: true,
+            packed: false,
             largest_tile: LARGEST_TILE,
         }
     }
@@ -87,6 +90,11 @@ impl BuildOptions {
     /// These options with or without room for heights that the terrain does not have yet.
     pub fn head_room(self, head_room: bool) -> Self {
         Self { head_room, ..self }
+    }
+
+    /// These options with a file that is packed, or not.
+    pub fn packed(self, packed: bool) -> Self {
+        Self { packed, ..self }
     }
 
     /// These options with another largest side of a tile in steps.

@@ -26,7 +26,7 @@ pub use operations::window::{HeightWindow, SampleRect};
 #[cfg(feature = "files")]
 pub use session::commit::CommitJob;
 #[cfg(feature = "files")]
-pub use session::compact::{Compacted, compact};
+pub use session::compact::{Compacted, compact, compact_packed};
 #[cfg(feature = "files")]
 pub use session::picture::Repainted;
 #[cfg(feature = "files")]

@@ -8,7 +8,6 @@
 //! replace can. On other systems no other writer is kept out: macOS has such a lock, but no safe function for it. Nor is one kept out on file systems without locks.
 
 use crate::error::LayoutError;
-use crate::file::version::{is_packed, only_read};
 use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,7 +48,6 @@ impl WriteLock {
                 return Err(taken(path));
             }
             let locked = Locked(file);
-            check_writable(&locked.0, path)?;
             // Whoever had the lock may have put another file in its place between our opening and locking it.
             if is_named(&locked.0, path) {
                 return Ok(Self { locked: Arc::new(locked) });
@@ -107,16 +105,6 @@ impl ReplaceLock {
 
 fn taken(path: &Path) -> LayoutError {
     LayoutError::Usage(format!("{}: another program is writing to it; wait until it is done", path.display()))
-}
-
-/// Packed terrain is only read: nothing of what appends to a terrain file knows what it looks like.
-fn check_writable(file: &File, path: &Path) -> Result<(), LayoutError> {
-    let mut start = [0; 16];
-    match super::disk::read_at(file, &mut start, 0) {
-        Ok(()) if is_packed(&start) => Err(only_read(path)),
-        // What is too short, or cannot be read, is for those to tell who read it.
-        _ => Ok(()),
-    }
 }
 
 fn check_regular(file: &File, path: &Path) -> Result<(), LayoutError> {

@@ -9,6 +9,7 @@
 //! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
 //! * `publish`: a terrain file that does not open is not published; `seen`: a terrain that was edited meanwhile is not replaced.
 //! * `version`: packed terrain is told from a terrain file.
+//! * `packed_end`: where a packed file grows.
 //! * `opening`: opening a pipe does not wait.
 
 #[cfg(feature = "files")]
@@ -27,6 +28,7 @@ pub(crate) mod lock;
 pub mod opening;
 #[cfg(feature = "files")]
 pub(crate) mod overlay;
+pub(crate) mod packed_end;
 #[cfg(feature = "files")]
 mod seen;
 pub(crate) mod slots;

@@ -8,7 +8,7 @@ use super::bytes::{PAGE_BYTES, Page, checksum, get_text, get_u32, get_u64, put_t
 use super::disk::Disk;
 use super::header::{Header, seal};
 use super::journal::{Lineage, State};
-use super::source::{LayeredSource, MapSource, PreadSource, Source, split_of};
+use super::source::{LayeredSource, PreadSource, Source, split_of};
 use super::structure::read_directory;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
@@ -53,7 +53,7 @@ impl Base {
 /// As [`AtomicFile`]'s; damage of the base's picture; I/O.
 pub(crate) fn create_overlay(
     disk: &dyn Disk,
-    base: &PreadSource,
+    base: &dyn Source,
     slots: &Slots,
     overlay: &Path,
 ) -> Result<(), LayoutError> {
@@ -124,8 +124,8 @@ pub(crate) struct Overlaid {
 
 impl Overlaid {
     /// Reads the header slots of both.
-    pub(crate) fn read(base: &mut PreadSource, overlay: &mut PreadSource) -> Result<Self, LayoutError> {
-        let found = Slots::read(&*base, 0)?;
+    pub(crate) fn read(base: &mut dyn Source, overlay: &mut PreadSource) -> Result<Self, LayoutError> {
+        let found = Slots::read(base, 0)?;
         // What the header counts was in the file before the header was, and may not have been when the file was opened.
         base.measure_again()?;
         if overlay.byte_count() < FIRST_PAGES * PAGE_BYTES as u64 {
@@ -160,31 +160,25 @@ impl Overlaid {
         }
         let picture = get_u32(&slots.current[..], 0x100);
         // A header says where a picture lies and not what is in it. Overlays of before it was noted say 0.
-        if is_same && picture != 0 && picture_of(&*base, &found.header)? != picture {
+        if is_same && picture != 0 && picture_of(base, &found.header)? != picture {
             return Err(written_anew(overlay.path(), base.path()));
         }
         Ok(Self { slots, split, has_grown: !is_same, generation: wanted.generation, picture })
     }
 
-    /// Both as one source, mapped or not.
+    /// Both as one source.
     ///
     /// # Errors
     /// [`LayoutError::Usage`] if the base no longer holds the state that the overlay was made over; a damaged journal of the overlay, without which that cannot be known; I/O.
     pub(crate) fn source(
         &self,
-        base: PreadSource,
-        overlay: PreadSource,
-        is_mapped: bool,
+        base: Box<dyn Source>,
+        overlay: Box<dyn Source>,
     ) -> Result<Box<dyn Source>, LayoutError> {
         if self.has_grown {
-            let both = LayeredSource::new(Box::new(&base), self.split, Box::new(&overlay), true);
+            let both = LayeredSource::new(Box::new(&*base), self.split, Box::new(&*overlay), true);
             self.check_older_state(&both, base.path())?;
         }
-        let [base, overlay]: [Box<dyn Source>; 2] = if is_mapped {
-            [Box::new(MapSource::map(base)?), Box::new(MapSource::map(overlay)?)]
-        } else {
-            [Box::new(base), Box::new(overlay)]
-        };
         Ok(Box::new(LayeredSource::new(base, self.split, overlay, self.has_grown)))
     }
 

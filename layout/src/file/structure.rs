@@ -7,11 +7,9 @@
 use super::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use super::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, absent};
 use super::header::{Header, INERT_PAGE};
-#[cfg(feature = "files")]
-use super::source::PreadSource;
 use super::source::Source;
 use crate::error::LayoutError;
-use crate::file::version::{is_packed, only_read};
+use crate::file::version::{is_another, is_packed};
 use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind};
 use std::path::Path;
 
@@ -27,7 +25,7 @@ pub(crate) fn read_structure(source: &dyn Source) -> Result<(Header, Vec<Entry>)
 
 /// As [`read_structure`], of a file that others may append to at this moment.
 #[cfg(feature = "files")]
-pub(crate) fn read_growing(file: &mut PreadSource) -> Result<(Header, Vec<Entry>), LayoutError> {
+pub(crate) fn read_growing(file: &mut dyn Source) -> Result<(Header, Vec<Entry>), LayoutError> {
     // The header first and then the length: what a header counts was in the file before the header was.
     let (header, inert) = read_front(file)?;
     file.measure_again()?;
@@ -45,7 +43,7 @@ fn read_front(source: &dyn Source) -> Result<(Header, Box<Page>), LayoutError> {
         let have = (length as usize).min(start.len());
         source.read_at(0, &mut start[..have])?;
         if is_packed(&start[..have]) {
-            return Err(only_read(path));
+            return Err(is_another(path));
         }
         let have = have.min(8);
         return Err(if have > 0 && super::header::MAGIC.starts_with(&start[..have]) {

@@ -6,15 +6,18 @@
 //! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers such a header, so that the next write goes behind what it counts and takes the next generation.
 
 use super::bytes::{PAGE_BYTES, Page};
+use super::directory::page_at;
 use super::disk::Disk;
 use super::header::Header;
 use super::lock::WriteLock;
+use super::packed_end::{PackedEnd, Run, packed_run};
 use super::slots::Slots;
+use super::source::Source;
 use crate::error::LayoutError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 const PAGE: u64 = PAGE_BYTES as u64;
 
@@ -23,6 +26,8 @@ const PAGE: u64 = PAGE_BYTES as u64;
 pub(crate) struct Attempted {
     generation: u32,
     file_bytes: u64,
+    /// Where a packed file may end.
+    place: u64,
 }
 
 impl Attempted {
@@ -36,6 +41,7 @@ impl Attempted {
         if attempt.header_begun.load(Ordering::Acquire) {
             self.generation = self.generation.max(attempt.generation);
             self.file_bytes = self.file_bytes.max(attempt.file_bytes);
+            self.place = self.place.max(attempt.place.load(Ordering::Acquire));
         }
     }
 }
@@ -45,6 +51,8 @@ impl Attempted {
 pub(crate) struct Attempt {
     generation: u32,
     file_bytes: u64,
+    /// Where a packed file ends with it.
+    place: AtomicU64,
     header_begun: AtomicBool,
 }
 
@@ -59,10 +67,24 @@ pub(crate) struct Tail {
     begin: u64,
     /// The generation after all that were tried.
     generation: u32,
-    /// The current header as it stands in the file.
+    /// The current header as it stands in the terrain file.
     current: Box<Page>,
     /// Byte from the file's start at which the next header goes.
     header_offset: u64,
+    /// Where the file grows, if it is packed.
+    packed: Option<PackedTail>,
+}
+
+/// What a packed file's end has besides.
+#[derive(Debug)]
+struct PackedTail {
+    before: PackedEnd,
+    /// Where what is written first goes in the file.
+    place: u64,
+    /// Length of what was packed, and the checksum of its table.
+    packed: OnceLock<(u64, u32)>,
+    /// As the header makes it.
+    after: OnceLock<PackedEnd>,
 }
 
 /// Whose end it is.
@@ -118,14 +140,23 @@ impl Tail {
                 path.display()
             )));
         };
+        let packed = slots.packed_end.as_ref().map(|before| PackedTail {
+            place: before.end.max(attempted.place),
+            before: before.clone(),
+            packed: OnceLock::new(),
+            after: OnceLock::new(),
+        });
+        // In a packed file what an attempt left has its place, and counts for nothing.
+        let tried = if packed.is_some() { 0 } else { attempted.file_bytes };
         Ok(Self {
             path: path.to_owned(),
             file,
             start,
-            begin: old.file_bytes.max(attempted.file_bytes).next_multiple_of(PAGE),
+            begin: old.file_bytes.max(tried).next_multiple_of(PAGE),
             generation,
             current: slots.current.clone(),
             header_offset: slots.next_offset(),
+            packed,
         })
     }
 
@@ -153,7 +184,41 @@ impl Tail {
     /// Writes `bytes` at `offset`, which lies behind everything that counts.
     pub(crate) fn write(&self, disk: &dyn Disk, bytes: &[u8], offset: u64) -> Result<(), LayoutError> {
         debug_assert!(offset >= self.begin);
-        self.put(disk, bytes, offset - self.start)
+        self.put(disk, bytes, self.place_of(offset))
+    }
+
+    /// Writes whole pages from the tail's begin on. In a packed file each is packed as the difference to one of `bases`, page numbers that `source` reads; 0 stands for none.
+    pub(crate) fn write_pages(
+        &self,
+        disk: &dyn Disk,
+        data: &[u8],
+        bases: &[u32],
+        source: &dyn Source,
+    ) -> Result<(), LayoutError> {
+        let Some(packed) = &self.packed else { return self.write(disk, data, self.begin) };
+        let run = packed_run(data, bases, source)?;
+        let _ = packed.packed.set((run.bytes.len() as u64, run.table));
+        self.put(disk, &run.bytes, packed.place)
+    }
+
+    /// Where the file grows once the header counts, if it is packed.
+    pub(crate) fn packed_end(&self) -> Option<&PackedEnd> {
+        let packed = self.packed.as_ref()?;
+        Some(packed.after.get().unwrap_or(&packed.before))
+    }
+
+    /// Bytes by which a packed file has grown.
+    pub(crate) fn packed_growth(&self) -> Option<u64> {
+        let packed = self.packed.as_ref()?;
+        Some(packed.after.get().map_or(0, |after| after.end - packed.before.end))
+    }
+
+    /// Where in the file the byte `offset` of the terrain lies, one behind everything that counts.
+    fn place_of(&self, offset: u64) -> u64 {
+        match &self.packed {
+            Some(packed) => packed.place + offset.saturating_sub(self.begin),
+            None => offset - self.start,
+        }
     }
 
     fn put(&self, disk: &dyn Disk, bytes: &[u8], place: u64) -> Result<(), LayoutError> {
@@ -185,6 +250,7 @@ impl Tail {
         let attempt = Attempt {
             generation: header.generation,
             file_bytes: header.file_bytes,
+            place: AtomicU64::new(0),
             header_begun: AtomicBool::new(false),
         };
         Ok(NextHeader { page, header, attempt: Arc::new(attempt) })
@@ -195,6 +261,9 @@ impl Tail {
     /// # Errors
     /// [`LayoutError::Io`], or [`LayoutError::Usage`] if the file was replaced under its name. The file reads as before then, or as after if only the last sync failed.
     pub(crate) fn flip(&self, disk: &dyn Disk, next: &NextHeader) -> Result<(), LayoutError> {
+        if let Some(packed) = &self.packed {
+            self.put_block(disk, packed, next)?;
+        }
         self.sync(disk)?;
         if let TailFile::Live(lock) = &self.file
             && !lock.is_of(&self.path)
@@ -205,14 +274,34 @@ impl Tail {
             )));
         }
         next.attempt.header_begun.store(true, Ordering::Release);
-        self.put(disk, &next.page[..], self.header_offset)?;
+        let page = self.packed_end().map(|end| end.to_file(&next.page));
+        self.put(disk, &page.as_ref().unwrap_or(&next.page)[..], self.header_offset)?;
         self.sync(disk)
     }
 
-    /// Gives back what was written, whose header was never begun. Failing here costs space only.
+    /// Writes where the pages lie that a header counts besides those of the one before.
+    fn put_block(&self, disk: &dyn Disk, packed: &PackedTail, next: &NextHeader) -> Result<(), LayoutError> {
+        let pages = next.header.file_bytes.div_ceil(PAGE).saturating_sub(self.begin / PAGE);
+        let mut end = packed.before.end;
+        if pages > 0 {
+            let (bytes, table) =
+                packed.packed.get().map_or((pages * PAGE, None), |(b, sum)| (*b, Some(*sum)));
+            let [first, pages] = [page_at(&self.path, self.begin)?, page_at(&self.path, pages * PAGE)?];
+            let run = Run { first, pages, place: packed.place, table };
+            let (after, block) = packed.before.with(run, packed.place + bytes);
+            self.put(disk, &block, packed.place + bytes)?;
+            end = after.end;
+            let _ = packed.after.set(after);
+        }
+        next.attempt.place.store(end, Ordering::Release);
+        Ok(())
+    }
+
+    /// Gives back what was written, whose header was never begun, of a terrain that had `length` bytes. Failing here costs space only.
     pub(crate) fn give_up(&self, disk: &dyn Disk, next: Option<&NextHeader>, length: u64) {
         if next.is_none_or(|next| !next.attempt.header_begun.load(Ordering::Acquire)) {
-            let _ = disk.set_len(self.file(), length);
+            let place = self.packed.as_ref().map_or(length, |packed| packed.place);
+            let _ = disk.set_len(self.file(), place);
         }
     }
 }

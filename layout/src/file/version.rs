@@ -14,10 +14,7 @@ pub(crate) fn is_packed(start: &[u8]) -> bool {
     start.len() >= 10 && start[..8] == MAGIC && get_u16(start, 8) == PACKED_VERSION
 }
 
-/// What is said to those who need the terrain file itself.
-pub(crate) fn only_read(path: &Path) -> LayoutError {
-    LayoutError::unsupported(
-        path,
-        "the terrain is packed, and packed terrain is only read; make a file that can be changed of it with `terrasoar unpack`",
-    )
+/// What is said to those who take packed terrain for the terrain file that it reads as.
+pub(crate) fn is_another(path: &Path) -> LayoutError {
+    LayoutError::unsupported(path, "this is packed terrain, and its bytes are not those of a terrain file")
 }

@@ -1,11 +1,12 @@
 //! What a packed file begins with: its header, and where its sections lie (FORMAT.md, section 9.1).
 //!
-//! The header is that of the terrain file that it was made of, but for the version and a few fields that say what is different. Invariant: sections that [`Container::parse`] returned lie in the file.
+//! A header page is that of the terrain file that it reads as, but for the version and a few fields that say what is different. Invariant: sections that [`Container::parse`] returned lie in the file.
 
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u16, get_u32, get_u64, put_u16, put_u32, put_u64};
-use crate::file::header::seal;
-use crate::file::version::PACKED_VERSION;
+use crate::file::header::Header;
+use crate::file::packed_end::{FIELDS, FRONT, PACKED_BYTES, PackedEnd, from_file};
+use crate::file::version::{MAGIC, PACKED_VERSION};
 use crate::words::number;
 use std::path::Path;
 
@@ -26,16 +27,12 @@ pub(crate) const RUNS: u32 = 2;
 pub(crate) const SUMS: u32 = 3;
 /// Where directory leaves lie.
 pub(crate) const ROOT: u32 = 4;
-/// The header slot of the terrain file that is not current.
-pub(crate) const OTHER_SLOT: u32 = 5;
-/// What lies behind the directory in the terrain file: imagery.
-pub(crate) const TAIL: u32 = 6;
 
 /// A part of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Section {
     pub(crate) kind: u32,
-    /// CRC-32 of its bytes; 0 for the tail, which has checksums of its own.
+    /// CRC-32 of its bytes.
     pub(crate) checksum: u32,
     pub(crate) offset: u64,
     pub(crate) bytes: u64,
@@ -44,30 +41,24 @@ pub(crate) struct Section {
 /// What the header of a packed file says besides what the terrain's does.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Container {
-    /// Minor version of the terrain file.
-    pub(crate) minor: u16,
-    /// Whether the current header was in the second slot.
-    pub(crate) is_second: bool,
-    /// Length of the packed file.
+    /// Length of the file when it was packed; what was appended follows.
     pub(crate) packed_bytes: u64,
+    /// Record pages that are packed.
+    pub(crate) pages: u64,
     pub(crate) sections: Vec<Section>,
 }
 
 impl Container {
-    /// The header page of the packed file, of that of the terrain file.
-    pub(crate) fn to_page(&self, current: &Page) -> Box<Page> {
-        let mut page = Box::new(*current);
+    /// The end of the file with this front, `end` bytes long, whose terrain file has `first` as the first page that is not packed.
+    pub(crate) fn end(&self, first: u64, end: u64) -> PackedEnd {
+        let mut page = [0; PAGE_BYTES];
         let p = &mut page[..];
-        put_u16(p, 0x008, PACKED_VERSION);
-        put_u16(p, 0x00a, 0);
-        p[0x100..0x200].fill(0);
         put_u16(p, 0x100, SCHEME);
-        put_u16(p, 0x102, self.minor);
-        p[0x104] = u8::from(self.is_second);
         p[0x105] = super::shape::TILE_LOG as u8;
         p[0x106] = super::shape::OCTAVES as u8;
         p[0x107] = self.sections.len() as u8;
-        put_u64(p, 0x108, self.packed_bytes);
+        put_u64(p, PACKED_BYTES, self.packed_bytes);
+        put_u64(p, 0x110, self.pages);
         for (i, section) in self.sections.iter().enumerate().take(MOST_SECTIONS) {
             let at = SECTION_TABLE + i * SECTION_BYTES;
             put_u32(p, at, section.kind);
@@ -75,12 +66,13 @@ impl Container {
             put_u64(p, at + 8, section.offset);
             put_u64(p, at + 16, section.bytes);
         }
-        seal(&mut page);
-        page
+        let mut fields = Box::new([0; 0x100]);
+        fields.copy_from_slice(&page[FIELDS]);
+        PackedEnd::of_new(fields, first, end)
     }
 
-    /// Reads and checks a header page; gives the terrain file's current one, too.
-    pub(crate) fn parse(path: &Path, page: &Page, length: u64) -> Result<(Self, Box<Page>), LayoutError> {
+    /// Reads and checks a header page of a file of `length` bytes.
+    pub(crate) fn parse(path: &Path, page: &Page, length: u64) -> Result<Self, LayoutError> {
         let p = &page[..];
         let damaged = |problem: &str| {
             LayoutError::damaged(
@@ -104,11 +96,10 @@ impl Container {
         if [p[0x105], p[0x106]] != [super::shape::TILE_LOG as u8, super::shape::OCTAVES as u8] {
             return Err(unknown("the terrain is packed in tiles of another size".into()));
         }
-        let (count, is_second) = (usize::from(p[0x107]), p[0x104]);
-        if count > MOST_SECTIONS || is_second > 1 {
+        let (count, packed_bytes) = (usize::from(p[0x107]), get_u64(p, PACKED_BYTES));
+        if count > MOST_SECTIONS {
             return Err(damaged("a field of the packed terrain is out of range"));
         }
-        let packed_bytes = get_u64(p, 0x108);
         if packed_bytes > length {
             return Err(LayoutError::damaged(
                 path,
@@ -131,11 +122,11 @@ impl Container {
             if section.kind & MAY_BE_SKIPPED != 0 {
                 continue;
             }
-            if !(MODEL..=TAIL).contains(&section.kind) {
+            if !(MODEL..=ROOT).contains(&section.kind) {
                 return Err(unknown(format!("the packed terrain has a section of kind {}", section.kind)));
             }
             let end = section.offset.checked_add(section.bytes);
-            if section.offset < PAGE_BYTES as u64 || end.is_none_or(|end| end > packed_bytes) {
+            if section.offset < FRONT || end.is_none_or(|end| end > packed_bytes) {
                 return Err(damaged("a section lies outside the file"));
             }
             if sections.iter().any(|other| other.kind == section.kind) {
@@ -143,19 +134,31 @@ impl Container {
             }
             sections.push(section);
         }
-        let minor = get_u16(p, 0x102);
-        let mut current = Box::new(*page);
-        put_u16(&mut current[..], 0x008, 1);
-        put_u16(&mut current[..], 0x00a, minor);
-        current[0x100..0x200].fill(0);
-        seal(&mut current);
-        Ok((Self { minor, is_second: is_second == 1, packed_bytes, sections }, current))
+        Ok(Self { packed_bytes, pages: get_u64(p, 0x110), sections })
     }
 
     /// The section of a kind; one without bytes if there is none.
     pub(crate) fn section(&self, kind: u32) -> Section {
         let found = self.sections.iter().find(|section| section.kind == kind).copied();
-        found.unwrap_or(Section { kind, checksum: 0, offset: PAGE_BYTES as u64, bytes: 0 })
+        found.unwrap_or(Section { kind, checksum: 0, offset: FRONT, bytes: 0 })
+    }
+}
+
+/// The header page that counts of the two slots, and what it says.
+pub(super) fn current_of<'p>(
+    path: &Path,
+    pages: [&'p Page; 2],
+    length: u64,
+) -> Result<(Container, Header, &'p Page), LayoutError> {
+    let read = |page: &'p Page| {
+        let container = Container::parse(path, page, length)?;
+        Ok::<_, LayoutError>((container, Header::parse(path, &from_file(page))?, page))
+    };
+    match pages.map(read) {
+        [Ok(a), Ok(b)] => Ok(if b.1.generation > a.1.generation { b } else { a }),
+        [Ok(it), Err(_)] | [Err(_), Ok(it)] => Ok(it),
+        // A slot that was never written says nothing.
+        [Err(a), Err(b)] => Err(if pages[0][..8] == MAGIC { a } else { b }),
     }
 }
 

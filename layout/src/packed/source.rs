@@ -1,7 +1,7 @@
 //! A packed file read as the terrain file that it was made of: its bytes, unpacked as they are asked for.
 //!
 //! Everything that reads a terrain reads this one: the header, directory, pages and imagery are those of the terrain file, at their places there, so that a record page that is read is checked
-//! against the directory's checksum, whatever it was unpacked from. Only what writes, and what maps, needs the terrain file itself.
+//! against the directory's checksum, whatever it was unpacked from. What was appended since is there page by page, and is read as it is. Only what maps needs the terrain file itself.
 //!
 //! Invariant: memory is what the front of the file takes, and tiles in a quarter of what the pool over it was given, [`MOST_CACHE_BYTES`] at most. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
@@ -9,8 +9,9 @@ mod records;
 #[cfg(feature = "testing")]
 mod stages;
 
+use super::appended::Appended;
 use super::cache::Cache;
-use super::container::{Container, MODEL, OTHER_SLOT, ROOT, RUNS, SUMS, Section, TAIL, present_pages};
+use super::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, current_of, present_pages};
 use super::model::{DecodeTables, Model};
 use super::places::{LEAF_BYTES, TilePlace};
 use super::rules::Rules;
@@ -21,6 +22,7 @@ use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
 use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::file::header::{Header, INERT_PAGE};
+use crate::file::packed_end::{PackedEnd, Run, from_file};
 use crate::file::source::Source;
 use crate::file::structure::inert_page;
 use crate::grid::record::RecordKind;
@@ -52,6 +54,11 @@ pub(crate) struct PackedSource {
     sums: Vec<u32>,
     /// For each leaf of the terrain file's directory that is present, its number and the place of its first page in `present`.
     leaves: Vec<(u32, usize)>,
+    /// First page of the root of the directory that is packed.
+    root_page: u64,
+    /// What is not packed, as it was when the file was opened, and as it is.
+    end: PackedEnd,
+    appended: Appended,
     /// The root of the terrain file's directory, made when it is first asked for.
     root: OnceLock<Vec<u8>>,
     groups: Groups,
@@ -76,40 +83,38 @@ impl PackedSource {
     ///
     /// # Errors
     /// A damaged front; a way of packing that is not known; I/O.
-    pub(crate) fn open(inner: Box<dyn Source>) -> Result<Self, LayoutError> {
+    pub(crate) fn open(mut inner: Box<dyn Source>) -> Result<Self, LayoutError> {
         let length = inner.byte_count();
         let path = inner.path().to_owned();
         let path = &*path;
         let mut first = vec![0; to_usize(length.min(FIRST_READ))?];
         inner.read_at(0, &mut first)?;
-        let Some(page) = first.first_chunk::<PAGE_BYTES>() else {
+        let [Some(a), Some(b)] =
+            [0, PAGE_BYTES].map(|at| first.get(at..).and_then(<[u8]>::first_chunk::<PAGE_BYTES>))
+        else {
             let problem = format!("the file is cut short: it has {length} bytes; copy it again");
             return Err(LayoutError::damaged(path, format!("byte {length}"), problem));
         };
-        let (container, current) = Container::parse(path, page, length)?;
+        let (container, header, page) = current_of(path, [a, b], length)?;
+        let (slots, page) = ([a, b].map(|page| from_file(page)), Box::new(*page));
         let front = Front::read(&*inner, &container, first)?;
-        let mut other = Box::new([0; PAGE_BYTES]);
-        let other_bytes = front.section(&*inner, &container.section(OTHER_SLOT), "other header")?;
-        if !other_bytes.is_empty() {
-            let whole = other_bytes.first_chunk().ok_or_else(|| odd(path, "other header"))?;
-            other = Box::new(*whole);
+        if header.record_kind != RecordKind::Compact {
+            let problem = "it holds what packed terrain does not: exact records";
+            return Err(LayoutError::damaged_terrain(path, "header".into(), problem));
         }
-        let slots = if container.is_second { [other, current] } else { [current, other] };
-        let header = Header::current(path, &slots[0], &slots[1])?;
-        let place = check_shape(path, &header)?;
         // The checksums first: what a file claims to hold is bounded by their bytes.
         let sums = front.section(&*inner, &container.section(SUMS), "page checksums")?;
-        if sums.len() as u64 != 4 * header.stored_pages {
+        if Some(sums.len() as u64) != container.pages.checked_mul(4) {
             return Err(odd(path, "page checksums"));
         }
         let runs = front.section(&*inner, &container.section(RUNS), "record pages")?;
-        let present = present_pages(&runs, header.record_pages(), header.stored_pages)
+        let present = present_pages(&runs, header.record_pages(), container.pages)
             .ok_or_else(|| odd(path, "record pages"))?;
         let sums = (0..present.len()).map(|i| get_u32(&sums, 4 * i)).collect();
         let leaves = leaves_of(&present);
-        if u64::from(header.root_page) != FIRST_PAGE + header.stored_pages + leaves.len() as u64 {
-            return Err(odd(path, "record pages"));
-        }
+        let root_page = FIRST_PAGE + container.pages + leaves.len() as u64;
+        let root_pages = (header.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE);
+        let first_page = root_page + root_pages;
         let model = front.section(&*inner, &container.section(MODEL), "tables")?;
         let tables = DecodeTables::of(&Model::parse(&model).ok_or_else(|| odd(path, "tables"))?);
         let groups = Groups::of(&header.grid);
@@ -118,10 +123,20 @@ impl PackedSource {
         if root.len() != groups.leaves * LEAF_BYTES {
             return Err(odd(path, "tile directory"));
         }
-        let tail = container.section(TAIL).bytes;
-        if place + tail != header.file_bytes {
-            return Err(odd(path, "imagery"));
+        // The header first and then the length: what a header counts was in the file before the header was.
+        inner.measure_again()?;
+        let end = PackedEnd::read(&*inner, &page, first_page)?;
+        let length = inner.byte_count();
+        if length < end.end {
+            let problem =
+                format!("the file is cut short: it has {length} bytes of {}; copy it again", end.end);
+            return Err(LayoutError::damaged(path, format!("byte {length}"), problem));
         }
+        if header.file_bytes.div_ceil(PAGE) != end.pages() {
+            return Err(odd(path, "appended pages"));
+        }
+        let appended = Appended::default();
+        appended.learn(&end.runs);
         Ok(Self {
             tile_leaves: (0..groups.leaves)
                 .map(|i| (get_u64(&root, i * LEAF_BYTES), get_u32(&root, i * LEAF_BYTES + 8)))
@@ -136,6 +151,9 @@ impl PackedSource {
             lends_whole: false,
             whole: OnceLock::new(),
             root: OnceLock::new(),
+            root_page,
+            end,
+            appended,
             inner,
             container,
             header,
@@ -175,22 +193,22 @@ impl PackedSource {
         Some(bytes)
     }
 
-    /// One page of the terrain file, other than of imagery.
+    /// One page of the terrain file, of those that are packed.
     fn page(&self, number: u64, page: &mut Page) -> Result<(), LayoutError> {
-        let stored = self.header.stored_pages;
+        let stored = self.container.pages;
         match number {
             0 | 1 => *page = *self.slots[number as usize],
             2 => *page = *self.inert,
             _ if number - FIRST_PAGE < stored => {
                 self.record_page(self.present[(number - FIRST_PAGE) as usize], page)?;
             }
-            _ if number < u64::from(self.header.root_page) => {
+            _ if number < self.root_page => {
                 let at = (number - FIRST_PAGE - stored) as usize;
                 page.copy_from_slice(&self.directory_leaf(at));
             }
             _ => {
                 let root = self.root.get_or_init(|| self.directory_root());
-                let at = (number - u64::from(self.header.root_page)) as usize * PAGE_BYTES;
+                let at = (number - self.root_page) as usize * PAGE_BYTES;
                 page.fill(0);
                 let bytes = root.get(at..).unwrap_or_default();
                 let count = bytes.len().min(PAGE_BYTES);
@@ -216,18 +234,13 @@ impl PackedSource {
     /// The root of the terrain file's directory.
     fn directory_root(&self) -> Vec<u8> {
         let mut bytes = vec![0; self.header.root_entries() as usize * ENTRY_BYTES];
-        let first = (FIRST_PAGE + self.header.stored_pages) as u32;
+        let first = (FIRST_PAGE + self.container.pages) as u32;
         for (at, (number, _)) in self.leaves.iter().enumerate() {
             let sum = checksum(&self.directory_leaf(at));
             let entry = Entry { page: first + at as u32, checksum: sum, generation: 1 };
             entry.write(&mut bytes, *number as usize);
         }
         bytes
-    }
-
-    /// Where imagery begins in the terrain file.
-    fn tail_start(&self) -> u64 {
-        self.header.file_bytes - self.container.section(TAIL).bytes
     }
 }
 
@@ -241,8 +254,12 @@ impl Source for PackedSource {
         self.header.file_bytes
     }
 
+    fn packed_end(&self) -> Option<&PackedEnd> {
+        Some(&self.end)
+    }
+
     fn packed_bytes(&self) -> Option<u64> {
-        Some(self.container.packed_bytes)
+        Some(self.end.end)
     }
 
     fn take_share(&self, cache_bytes: u64) -> u64 {
@@ -259,20 +276,14 @@ impl Source for PackedSource {
     }
 
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
-        let end = offset.checked_add(buffer.len() as u64).filter(|end| *end <= self.header.file_bytes);
-        if end.is_none() {
-            return Err(LayoutError::damaged(
-                self.path(),
-                format!("byte {offset}"),
-                "the data ends before it",
-            ));
-        }
-        let tail = self.tail_start();
         let (mut at, mut rest) = (offset, buffer);
         let mut page = Box::new([0; PAGE_BYTES]);
         while !rest.is_empty() {
-            if at >= tail {
-                return self.inner.read_at(self.container.section(TAIL).offset + (at - tail), rest);
+            if at / PAGE >= self.end.first {
+                let packed = |number, page: &mut Page| self.packed_page(number, page);
+                let count = self.appended.read(&*self.inner, at, rest, || self.runs_now(), packed)?;
+                (at, rest) = (at + count as u64, &mut rest[count..]);
+                continue;
             }
             let within = (at % PAGE) as usize;
             let count = rest.len().min(PAGE_BYTES - within);
@@ -285,12 +296,12 @@ impl Source for PackedSource {
     }
 }
 
-/// The first bytes of a file: as far as one more read reaches all sections but imagery.
+/// The first bytes of a file: as far as one more read reaches all sections.
 struct Front(Vec<u8>);
 
 impl Front {
     fn read(inner: &dyn Source, container: &Container, first: Vec<u8>) -> Result<Self, LayoutError> {
-        let needed = container.sections.iter().filter(|section| section.kind != TAIL);
+        let needed = container.sections.iter();
         let end = needed.clone().map(|section| section.offset + section.bytes).max().unwrap_or(0);
         let sum: u64 = needed.map(|section| section.bytes).sum();
         let mut bytes = first;
@@ -331,14 +342,24 @@ fn odd(path: &Path, place: &'static str) -> LayoutError {
     LayoutError::damaged_terrain(path, place.into(), "they are not what the header says")
 }
 
-/// Whether a header is one of a file that can have been packed; where its directory ends.
-fn check_shape(path: &Path, header: &Header) -> Result<u64, LayoutError> {
-    if header.record_kind != RecordKind::Compact || header.history.is_some() {
-        let problem = "it holds what packed terrain does not: exact records, or a journal";
-        return Err(LayoutError::damaged_terrain(path, "header".into(), problem));
+impl PackedSource {
+    /// What was appended up to now.
+    fn runs_now(&self) -> Result<Vec<Run>, LayoutError> {
+        let mut slots = [[0; PAGE_BYTES]; 2];
+        self.inner.read_at(0, slots.as_flattened_mut())?;
+        let [a, b] = &slots;
+        let (_, _, page) = current_of(self.path(), [a, b], u64::MAX)?;
+        Ok(PackedEnd::read(&*self.inner, page, self.end.first)?.runs)
     }
-    let root_pages = (header.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE);
-    Ok((u64::from(header.root_page) + root_pages) * PAGE)
+
+    /// A page that an appended one is a difference to.
+    fn packed_page(&self, number: u64, page: &mut Page) -> Result<(), LayoutError> {
+        if number >= self.end.first {
+            let problem = "it is the difference to a page that is not packed";
+            return Err(LayoutError::damaged_terrain(self.path(), "appended page".into(), problem));
+        }
+        self.page(number, page)
+    }
 }
 
 /// Leaves of the terrain file's directory that hold pages which are present, and the place of the first in `present`.

@@ -6,4 +6,5 @@ mod pack;
 mod unpack;
 
 pub use pack::{Packed, pack};
+pub(crate) use pack::{check_kind, publish_packed};
 pub use unpack::unpack;

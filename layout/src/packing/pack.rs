@@ -6,15 +6,18 @@
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
-use crate::file::directory::{put_all_leaves, root_bytes};
+use crate::file::directory::{page_at, put_all_leaves, root_bytes};
 use crate::file::disk::Disk;
 use crate::file::header::{Header, INERT_PAGE};
+use crate::file::lock::WriteLock;
+use crate::file::packed_end::{FRONT, Run};
+use crate::file::slots::Slots;
 use crate::file::source::{PreadSource, Source};
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
-use crate::grid::record::Compact;
+use crate::grid::record::{Compact, RecordKind};
 use crate::packed::coder::{Encoder, PlainEncoder};
-use crate::packed::container::{Container, MODEL, OTHER_SLOT, ROOT, RUNS, SUMS, Section, TAIL, runs_of};
+use crate::packed::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, runs_of};
 use crate::packed::model::{CONTEXTS, Counts, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
 use crate::packed::rules::Rules;
@@ -24,6 +27,7 @@ use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
 use crate::packed::walk::{Scratch, walk};
 use crate::progress::Progress;
+use crate::publish::publish_terrain;
 use crate::read::kinds::ByKind;
 use crate::read::records::Records;
 use crate::read::terrain::Terrain;
@@ -48,30 +52,56 @@ pub struct Packed {
     pub bytes_per_sample: f64,
 }
 
-/// Packs the terrain file `from` into a new file `to`. It reads as the terrain file does, pages and imagery included.
+/// Packs the terrain file `from` into a new file `to`. It reads as the terrain file does, pages, imagery and history included.
+///
+/// What the terrain was before all edits is packed, as a build or a compaction left it. What was appended to it since, its history with it, is taken over as it is.
 ///
 /// # Errors
-/// Damage and I/O of the terrain; I/O of `to`; [`LayoutError::Unsupported`] for a terrain with exact records, one that was edited since it was built or written anew, and one that is packed already.
+/// Damage and I/O of the terrain; I/O of `to`; [`LayoutError::Unsupported`] for a terrain with exact records, one that other programs laid out, and one that is packed already.
 pub fn pack(disk: &dyn Disk, from: &Path, to: &Path, progress: &dyn Progress) -> Result<Packed, LayoutError> {
     let terrain = Terrain::open(from)?;
-    check_packable(&terrain)?;
-    let Some(ByKind::Compact(records)) = terrain.records() else {
-        return Err(refused(from, "its records are exact ones; only compact ones can be packed"));
-    };
-    check_pages(&terrain, progress)?;
+    if terrain.source().packed_bytes().is_some() {
+        return Err(refused(from, "it is packed already"));
+    }
+    // What edits have not touched.
+    let built = terrain.header().history.map(|_| Terrain::open_original(from)).transpose()?;
     let file = AtomicFile::create(to)?;
-    let packer = Packer {
-        records,
-        groups: Groups::of(terrain.grid()),
-        rules: Rules::new(terrain.grid(), &terrain.header().scale),
-        progress,
-    };
-    let bytes = packer.write(disk, &terrain, &file)?;
-    compare(&terrain, &file, progress)?;
-    let [wide, high] = terrain.grid().samples().map(f64::from);
-    let imagery = terrain.header().imagery.map_or(0, |place| place.bytes);
+    let packed = pack_into(disk, &terrain, built.as_ref().unwrap_or(&terrain), &file, progress)?;
     progress.stage("syncing", 0);
     file.publish_on(disk)?;
+    Ok(packed)
+}
+
+/// Packs `terrain`, which is mapped and was `built` before all edits, into `file`, which is not published yet.
+///
+/// # Errors
+/// As [`pack`].
+pub(crate) fn pack_into(
+    disk: &dyn Disk,
+    terrain: &Terrain,
+    built: &Terrain,
+    file: &AtomicFile,
+    progress: &dyn Progress,
+) -> Result<Packed, LayoutError> {
+    check_kind(terrain.path(), terrain.header().record_kind)?;
+    check_pages(terrain, progress)?;
+    if built.instance() != terrain.instance() {
+        check_pages(built, progress)?;
+    }
+    let directory_end = check_packable(built)?;
+    let Some(ByKind::Compact(records)) = built.records() else {
+        return Err(refused(terrain.path(), "its records are not in memory's reach"));
+    };
+    let packer = Packer {
+        records,
+        groups: Groups::of(built.grid()),
+        rules: Rules::new(built.grid(), &built.header().scale),
+        progress,
+    };
+    let bytes = packer.write(disk, terrain, built, directory_end, file)?;
+    compare(terrain, file, progress)?;
+    let [wide, high] = terrain.grid().samples().map(f64::from);
+    let imagery = terrain.header().imagery.map_or(0, |place| place.bytes);
     Ok(Packed {
         bytes_before: terrain.header().file_bytes,
         bytes,
@@ -79,30 +109,71 @@ pub fn pack(disk: &dyn Disk, from: &Path, to: &Path, progress: &dyn Progress) ->
     })
 }
 
+/// Packs the terrain file `plain`, which never gets a name, into `file`, and publishes that as [`publish_terrain`] does. The header, and the length of the packed file.
+///
+/// # Errors
+/// As [`pack`].
+pub(crate) fn publish_packed(
+    disk: &dyn Disk,
+    plain: AtomicFile,
+    file: AtomicFile,
+    over: Option<&WriteLock>,
+    progress: &dyn Progress,
+) -> Result<(Header, u64), LayoutError> {
+    let packed = {
+        let terrain = Terrain::mapped(read_back(&plain)?)?;
+        pack_into(disk, &terrain, &terrain, &file, progress)?
+    };
+    drop(plain);
+    progress.stage("syncing", 0);
+    Ok((publish_terrain(disk, file, over)?, packed.bytes))
+}
+
+/// The bytes of a file that has no name yet.
+fn read_back(file: &AtomicFile) -> Result<PreadSource, LayoutError> {
+    let path = file.target();
+    let again = file
+        .file()
+        .try_clone()
+        .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
+    PreadSource::over(path, again)
+}
+
+/// Whether records of this kind can be packed.
+///
+/// # Errors
+/// [`LayoutError::Unsupported`] for exact ones.
+pub(crate) fn check_kind(path: &Path, kind: RecordKind) -> Result<(), LayoutError> {
+    match kind {
+        RecordKind::Compact => Ok(()),
+        RecordKind::Exact8 | RecordKind::Exact16 => {
+            Err(refused(path, "its records are exact ones; only compact ones can be packed"))
+        }
+    }
+}
+
 fn refused(path: &Path, problem: &str) -> LayoutError {
     LayoutError::unsupported(path, format!("the terrain cannot be packed: {problem}"))
 }
 
-/// Whether a file is laid out as a build leaves it: then its directory follows from which pages there are.
-fn check_packable(terrain: &Terrain) -> Result<(), LayoutError> {
-    let (path, header) = (terrain.path(), terrain.header());
-    if terrain.source().packed_bytes().is_some() {
-        return Err(refused(path, "it is packed already"));
-    }
-    let in_order = "it was edited, or other programs wrote it; write it anew with `terrasoar compact` first";
+/// Whether a file is laid out as a build leaves it: then its directory follows from which pages there are. Where that ends.
+fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
+    let (path, header) = (built.path(), built.header());
+    let in_order =
+        "other programs wrote it, in an order of their own; write it anew with `terrasoar compact --packed`";
     let mut next = INERT_PAGE;
-    for entry in terrain.entries().iter().filter(|entry| entry.is_present()) {
+    for entry in built.entries().iter().filter(|entry| entry.is_present()) {
         next += 1;
         if entry.page != next || entry.generation != 1 {
             return Err(refused(path, in_order));
         }
     }
-    let (root, page) = put_all_leaves(terrain.entries(), next + 1, |_, _| Ok(()))?;
+    let (root, page) = put_all_leaves(built.entries(), next + 1, |_, _| Ok(()))?;
     let root = root_bytes(&root);
-    let is_in_order = header.history.is_none()
-        && [header.root_page, header.root_checksum] == [page, root.checksum]
-        && u64::from(page) * PAGE + root.bytes.len() as u64 <= header.file_bytes;
-    if is_in_order { Ok(()) } else { Err(refused(path, in_order)) }
+    let end = u64::from(page) * PAGE + root.bytes.len() as u64;
+    let is_in_order =
+        [header.root_page, header.root_checksum] == [page, root.checksum] && end <= header.file_bytes;
+    if is_in_order { Ok(end) } else { Err(refused(path, in_order)) }
 }
 
 /// Holds every record page against its checksum: through a map nobody would.
@@ -184,8 +255,15 @@ impl Packer<'_> {
         Some(Made { segments: encoders.map(PlainEncoder::finish) })
     }
 
-    /// Writes the whole file; its length.
-    fn write(&self, disk: &dyn Disk, terrain: &Terrain, file: &AtomicFile) -> Result<u64, LayoutError> {
+    /// Writes the whole file: what was `built`, whose directory ends at `directory_end`, and what `terrain` has behind it. Its length.
+    fn write(
+        &self,
+        disk: &dyn Disk,
+        terrain: &Terrain,
+        built: &Terrain,
+        directory_end: u64,
+        file: &AtomicFile,
+    ) -> Result<u64, LayoutError> {
         let tiles: Vec<(usize, TileId)> = self.groups.tiles().collect();
         let samples = tiles.iter().map(|(_, id)| self.samples_of(*id)).sum();
         self.progress.stage("counting", samples);
@@ -196,17 +274,14 @@ impl Packer<'_> {
         let slots = header_slots(source, header)?;
         let mut front = Front::default();
         front.put(MODEL, &model.to_bytes());
-        front.put(RUNS, &runs_of(terrain.entries().iter().map(|entry| entry.is_present())));
-        let present = terrain.entries().iter().filter(|entry| entry.is_present());
+        front.put(RUNS, &runs_of(built.entries().iter().map(|entry| entry.is_present())));
+        let present = built.entries().iter().filter(|entry| entry.is_present());
         let sums: Vec<u8> = present.flat_map(|entry| entry.checksum.to_le_bytes()).collect();
         front.put(SUMS, &sums);
-        if slots.other.iter().any(|byte| *byte != 0) {
-            front.put(OTHER_SLOT, &slots.other[..]);
-        }
         let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
         // Leaves have their place before it is known what they hold.
         let leaf_sizes = self.groups.leaf_sizes();
-        let first_leaf = PAGE + front.bytes.len() as u64;
+        let first_leaf = FRONT + front.bytes.len() as u64;
         let mut at = first_leaf;
         let leaf_offsets: Vec<u64> = leaf_sizes
             .iter()
@@ -257,31 +332,44 @@ impl Packer<'_> {
         }
         front.seal(ROOT);
 
-        // Imagery.
-        let root_pages = (header.root_entries() * 16).div_ceil(PAGE);
-        let tail_start = (u64::from(header.root_page) + root_pages) * PAGE;
-        let tail_bytes = header.file_bytes - tail_start;
-        if tail_bytes > 0 {
-            front.sections.push(Section { kind: TAIL, checksum: 0, offset: at, bytes: tail_bytes });
-            let mut chunk = vec![0; CHUNK_BYTES];
-            let mut done = 0;
-            while done < tail_bytes {
-                let count = to_usize((tail_bytes - done).min(CHUNK_BYTES as u64))?;
-                source.read_at(tail_start + done, &mut chunk[..count])?;
-                write(&chunk[..count], at + done)?;
-                done += count as u64;
-            }
-            at += tail_bytes;
+        // What is not packed: imagery, and what edits appended.
+        let (first, last) = (directory_end / PAGE, header.file_bytes.div_ceil(PAGE));
+        let place = at;
+        let mut chunk = vec![0; CHUNK_BYTES];
+        while at - place < (last - first) * PAGE {
+            let from = directory_end + (at - place);
+            let count = to_usize(header.file_bytes.saturating_sub(from).min(CHUNK_BYTES as u64))?;
+            source.read_at(from, &mut chunk[..count])?;
+            let whole = count.next_multiple_of(PAGE_BYTES);
+            chunk[count..whole].fill(0);
+            write(&chunk[..whole], at)?;
+            at += whole as u64;
         }
-        let container = Container {
-            minor: u16::from_le_bytes([slots.current[0x00a], slots.current[0x00b]]),
-            is_second: slots.is_second,
-            packed_bytes: at,
-            sections: front.sections,
+        let run = match u32::try_from(last - first) {
+            Ok(0) => None,
+            Ok(pages) => {
+                Some(Run { first: page_at(file.target(), directory_end)?, pages, place, table: None })
+            }
+            Err(_) => return Err(refused(terrain.path(), "it is too large")),
         };
-        write(&front.bytes, PAGE)?;
-        write(&container.to_page(&slots.current)[..], 0)?;
-        Ok(at)
+        write(&front.bytes, FRONT)?;
+        let sections = front.sections;
+        let container = |packed_bytes| Container {
+            packed_bytes,
+            pages: built.header().stored_pages,
+            sections: sections.clone(),
+        };
+        let mut end = container(at).end(first, at);
+        if let Some(run) = run {
+            let block = end.with(run, at).1;
+            write(&block, at)?;
+            end = container(at + block.len() as u64).end(first, at).with(run, at).0;
+        }
+        for (slot, page) in (0..).zip(&slots) {
+            let page = if page.iter().all(|byte| *byte == 0) { page.clone() } else { end.to_file(page) };
+            write(&page[..], slot * PAGE)?;
+        }
+        Ok(end.end)
     }
 }
 
@@ -301,7 +389,7 @@ impl Front {
     /// Appends a section; where it begins behind the header.
     fn put(&mut self, kind: u32, bytes: &[u8]) -> usize {
         let at = self.bytes.len();
-        let offset = PAGE + at as u64;
+        let offset = FRONT + at as u64;
         self.bytes.extend(bytes);
         self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
         at
@@ -310,43 +398,38 @@ impl Front {
     /// The checksum of a section that was filled in meanwhile.
     fn seal(&mut self, kind: u32) {
         for section in self.sections.iter_mut().filter(|section| section.kind == kind) {
-            let from = (section.offset - PAGE) as usize;
+            let from = (section.offset - FRONT) as usize;
             section.checksum = checksum(&self.bytes[from..from + section.bytes as usize]);
         }
     }
 }
 
-/// The two header pages of a terrain file.
-struct HeaderSlots {
-    current: Box<Page>,
-    other: Box<Page>,
-    is_second: bool,
-}
-
-fn header_slots(source: &dyn Source, header: &Header) -> Result<HeaderSlots, LayoutError> {
-    let (mut first, mut second) = (Box::new([0; PAGE_BYTES]), Box::new([0; PAGE_BYTES]));
-    source.read_at(0, &mut first[..])?;
-    source.read_at(PAGE, &mut second[..])?;
-    let is_it = |page: &Page| Header::parse(source.path(), page).is_ok_and(|found| found == *header);
-    Ok(if is_it(&first) {
-        HeaderSlots { current: first, other: second, is_second: false }
-    } else {
-        HeaderSlots { current: second, other: first, is_second: true }
-    })
+/// The two header pages of a terrain file; zeros for the one that does not count, should it be no header.
+fn header_slots(source: &dyn Source, header: &Header) -> Result<[Box<Page>; 2], LayoutError> {
+    let mut slots = [0, 1].map(|_| Box::new([0; PAGE_BYTES]));
+    for (slot, page) in (0..).zip(&mut slots) {
+        source.read_at(slot * PAGE, &mut page[..])?;
+        let is_one = Header::parse(source.path(), page)
+            .is_ok_and(|found| found.record_kind == header.record_kind && found.grid == header.grid);
+        if !is_one {
+            page.fill(0);
+        }
+    }
+    Ok(slots)
 }
 
 /// Whether what was written reads as the terrain file, byte for byte.
 fn compare(terrain: &Terrain, file: &AtomicFile, progress: &dyn Progress) -> Result<(), LayoutError> {
-    let path = file.target();
-    let again = file
-        .file()
-        .try_clone()
-        .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
-    let packed = PackedSource::open(Box::new(PreadSource::over(path, again)?))?;
+    let packed = PackedSource::open(Box::new(read_back(file)?))?;
     let bytes = terrain.header().file_bytes;
     progress.stage("comparing", bytes / 4);
-    (0..bytes.div_ceil(CHUNK_BYTES as u64)).into_par_iter().try_for_each(|chunk| {
-        let from = chunk * CHUNK_BYTES as u64;
+    if Slots::read(terrain.source(), 0)?.current != Slots::read(&packed, 0)?.current {
+        return Err(refused(terrain.path(), "its header holds what no build writes"));
+    }
+    // The header page that does not count may hold anything.
+    let first = 2 * PAGE;
+    (0..(bytes - first).div_ceil(CHUNK_BYTES as u64)).into_par_iter().try_for_each(|chunk| {
+        let from = first + chunk * CHUNK_BYTES as u64;
         let count = to_usize((bytes - from).min(CHUNK_BYTES as u64))?;
         let (mut ours, mut theirs) = (vec![0; count], vec![0; count]);
         terrain.source().read_at(from, &mut ours)?;

@@ -1,20 +1,25 @@
 //! A terrain opened together with an overlay of edits (see [`overlay`](crate::file::overlay)), so that both read as one file.
 
+use super::opened::Opened;
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::file::overlay::Overlaid;
-use crate::file::source::PreadSource;
+use crate::file::source::{MapSource, PreadSource};
 use crate::file::structure::{read_directory, read_growing};
 use std::path::Path;
 
 /// The base with its overlay as one terrain.
 fn open_layers(base: &Path, overlay: &Path, is_mapped: bool) -> Result<Terrain, LayoutError> {
-    let mut base_file = PreadSource::open(base)?;
+    let mut base_file = Opened::of(PreadSource::open(base)?)?;
     // The base must be a sound terrain by itself.
-    read_growing(&mut base_file)?;
+    read_growing(base_file.source_mut())?;
     let mut overlay_file = PreadSource::open(overlay)?;
-    let overlaid = Overlaid::read(&mut base_file, &mut overlay_file)?;
-    let source = overlaid.source(base_file, overlay_file, is_mapped)?;
+    let overlaid = Overlaid::read(base_file.source_mut(), &mut overlay_file)?;
+    let source = if is_mapped {
+        overlaid.source(base_file.into_lender()?, Box::new(MapSource::map(overlay_file)?))
+    } else {
+        overlaid.source(base_file.into_source(), Box::new(overlay_file))
+    }?;
     let entries = read_directory(&*source, &overlaid.slots.header)?;
     Ok(Terrain::of(source, overlaid.slots.header, entries))
 }

@@ -8,6 +8,8 @@ pub mod kinds;
 #[cfg(feature = "files")]
 pub(crate) mod layers;
 pub mod loader;
+#[cfg(feature = "files")]
+pub(crate) mod opened;
 pub mod pool;
 pub mod prefetch;
 pub mod records;

@@ -10,6 +10,7 @@ use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::journal::Commit;
+use crate::file::packed_end::PackedEnd;
 use crate::file::source::Source;
 #[cfg(feature = "files")]
 use crate::file::source::{MapSource, PreadSource};
@@ -58,6 +59,12 @@ impl Terrain {
         if starts_packed(&file)? {
             return Self::over(Box::new(PackedSource::open(Box::new(file))?.lending_whole()));
         }
+        Self::mapped(file)
+    }
+
+    /// Opens and maps a file that is the terrain file itself.
+    #[cfg(feature = "files")]
+    pub(crate) fn mapped(file: PreadSource) -> Result<Self, LayoutError> {
         let (file, header, entries) = open_settled(file)?;
         Ok(Self::of(Box::new(MapSource::map(file)?), header, entries))
     }
@@ -164,6 +171,11 @@ impl Terrain {
             / (f64::from(wide) * f64::from(high))
     }
 
+    /// Bytes that were appended to a packed file since it was packed: edits, their history, imagery; `None` for a terrain that is not packed.
+    pub fn appended_bytes(&self) -> Option<u64> {
+        self.source.packed_end().map(PackedEnd::appended_bytes)
+    }
+
     /// The source it reads from.
     pub fn source(&self) -> &dyn Source {
         &*self.source
@@ -247,7 +259,7 @@ impl Terrain {
 }
 
 /// Whether a source holds packed terrain.
-fn starts_packed(source: &dyn Source) -> Result<bool, LayoutError> {
+pub(crate) fn starts_packed(source: &dyn Source) -> Result<bool, LayoutError> {
     let mut start = [0; 16];
     let have = source.byte_count().min(start.len() as u64) as usize;
     source.read_at(0, &mut start[..have])?;

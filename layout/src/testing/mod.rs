@@ -7,6 +7,8 @@
 //! | [`Sealed`] | a terrain file, and perhaps an overlay over it, mutated and sealed by a recipe of mutations |
 //! | [`seeds`] | small sound files to begin with |
 //! | `Stages`, `Way` | what unpacking is made of, to be measured |
+//! | [`mutate_packed`], [`reseal_packed`] | the same for packed files |
+//! | [`seeds`], [`packed_seeds`] | small sound files to begin with |
 //! | [`exercise`] | everything that this crate does with a file |
 //!
 //! Invariant: mutating and sealing never panic or take long, whatever the bytes; equal recipes give equal files. Cost: a few checksums of the file.
@@ -14,6 +16,7 @@
 mod exercise;
 mod image;
 mod mutation;
+mod packed;
 mod parts;
 mod seal;
 mod sealed;
@@ -23,6 +26,7 @@ mod seeds;
 pub use crate::packed::stages::{Stages, Way};
 pub use exercise::exercise;
 pub use mutation::Mutation;
+pub use packed::{mutate_packed, reseal_packed};
 pub use seal::{Counts, reseal, reseal_overlay};
 pub use sealed::Sealed;
-pub use seeds::{Seed, seeds};
+pub use seeds::{Seed, packed_seeds, seeds};

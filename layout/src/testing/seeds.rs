@@ -5,8 +5,10 @@ use crate::build::{BuildOptions, build};
 use crate::dem::{MemoryDem, SampleType};
 use crate::edit::{Area, Edit, EditSession};
 use crate::error::LayoutError;
+use crate::file::disk::SystemDisk;
 use crate::grid::record::RecordKind;
 use crate::imagery::{DrapeOptions, Extent, Fill, MemoryImage, Paint, Region, TileFormat, drape};
+use crate::packing::pack;
 use crate::progress::Silent;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -27,6 +29,41 @@ pub struct Seed {
 pub fn seeds() -> Vec<Seed> {
     static SEEDS: OnceLock<Vec<Seed>> = OnceLock::new();
     SEEDS.get_or_init(|| make().expect("the temporary folder can be written to")).clone()
+}
+
+/// Packed ones: as built, with imagery, and edited, painted and draped since they were packed. Made once a process.
+///
+/// # Panics
+/// If the temporary folder cannot be written to.
+pub fn packed_seeds() -> Vec<Seed> {
+    static SEEDS: OnceLock<Vec<Seed>> = OnceLock::new();
+    SEEDS.get_or_init(|| make_packed().expect("the temporary folder can be written to")).clone()
+}
+
+fn make_packed() -> Result<Vec<Seed>, LayoutError> {
+    let folder =
+        tempfile::tempdir().map_err(|e| LayoutError::io(Path::new("."), "cannot make a folder", e))?;
+    let [plain, path] = ["plain.iqt", "t.iqt"].map(|name| folder.path().join(name));
+    let mut seeds = Vec::new();
+    for name in ["packed", "packed islands", "packed edits", "edited", "draped and painted"] {
+        match name {
+            "packed islands" => islands(&plain)?,
+            _ => terrain(&plain, RecordKind::Compact)?,
+        }
+        if name == "packed edits" {
+            edit(EditSession::open(&plain)?, false)?;
+        }
+        pack(&SystemDisk, &plain, &path, &Silent)?;
+        if name == "draped and painted" {
+            picture(&path, TileFormat::Bc1)?;
+        }
+        if !name.starts_with("packed") {
+            edit(EditSession::open(&path)?, name != "edited")?;
+        }
+        let terrain = std::fs::read(&path).map_err(|e| LayoutError::io(&path, "cannot read", e))?;
+        seeds.push(Seed { name, files: Sealed { terrain, overlay: None } });
+    }
+    Ok(seeds)
 }
 
 fn make() -> Result<Vec<Seed>, LayoutError> {

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect};
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::packing::pack;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -22,6 +24,21 @@ impl Bench {
         let options = BuildOptions::default().spacing_m([10.0; 2]);
         build(&dem, &bench.terrain(), &options, &Silent).unwrap();
         bench
+    }
+
+    /// The same, packed.
+    pub fn packed() -> Self {
+        let bench = Self::new();
+        let plain = bench.path("plain.iqt");
+        std::fs::rename(bench.terrain(), &plain).unwrap();
+        pack(&SystemDisk, &plain, &bench.terrain(), &Silent).unwrap();
+        std::fs::remove_file(&plain).unwrap();
+        bench
+    }
+
+    /// Both ways to hold it, one after the other.
+    pub fn both() -> impl Iterator<Item = Self> {
+        [Self::new, Self::packed].into_iter().map(|make| make())
     }
 
     pub fn path(&self, name: &str) -> PathBuf {

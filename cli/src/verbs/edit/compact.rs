@@ -10,18 +10,20 @@ use anyhow::Result;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
-use terrasoar_layout::edit::{Compacted, compact};
+use terrasoar_layout::edit::{Compacted, compact, compact_packed};
 use terrasoar_layout::file::disk::SystemDisk;
 
 /// Write a terrain file anew without what edits left behind.
 ///
 /// The ground and the imagery stay as they are, pages come in order again, and the history ends: what was edited can no longer be undone or redone, and it says so. Without -o the file itself
-/// is replaced, when the new one is complete; programs that have it open go on reading the old one. With --overlay, -o is the terrain with those edits.
+/// is replaced, when the new one is complete; programs that have it open go on reading the old one. With --overlay, -o is the terrain with those edits. Packed
+/// terrain stays packed; until it is complete that takes the room of the terrain file that it is made of as well.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   terrasoar compact alps.iqt
   terrasoar compact alps.iqt -o small.iqt
+  terrasoar compact alps.iqt --packed -o smallest.iqt
   terrasoar compact alps.iqt --overlay what-if.iqo -o new-alps.iqt
 
 Fields of --json: file, output, bytes_before, bytes_after, pages, seconds.")]
@@ -31,6 +33,9 @@ pub(crate) struct Args {
     /// File to write instead of replacing the terrain file
     #[arg(short, long, value_name = "OUT.iqt")]
     output: Option<PathBuf>,
+    /// Write packed terrain, in a third to a tenth of the bytes; what is packed stays so in any case
+    #[arg(long)]
+    packed: bool,
     #[command(flatten)]
     force: Force,
     /// Print one JSON object
@@ -69,14 +74,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     let progress = Meter::new("records");
     let TerrainArgs { file, overlay } = &args.terrain;
-    let Compacted { header, bytes_before, commits_before, .. } =
-        compact(&SystemDisk, file, overlay.as_deref(), out, &progress)?;
+    let rewrite = if args.packed { compact_packed } else { compact };
+    let Compacted { header, bytes_before, bytes, commits_before, .. } =
+        rewrite(&SystemDisk, file, overlay.as_deref(), out, &progress)?;
     drop(progress);
     let answer = Answer {
         file: overlay.as_ref().unwrap_or(file).display().to_string(),
         output: out.display().to_string(),
         bytes_before,
-        bytes_after: header.file_bytes,
+        bytes_after: bytes,
         pages: header.stored_pages,
         seconds: start.elapsed().as_secs_f64(),
     };

@@ -3,8 +3,9 @@
 //! Nothing that a header leads to is ever written over. Killed at any moment the file holds a whole number of batches; readers that have it open keep what they opened.
 //! Cost: the pages that changed, the directory leaves that lead to them, the root; two syncs.
 
+use super::bases::Bases;
 use crate::error::LayoutError;
-use crate::file::bytes::{Page, checksum};
+use crate::file::bytes::{PAGE_BYTES, Page, checksum};
 use crate::file::directory::{Directory, page_at, put_leaf, root_bytes};
 use crate::file::disk::Disk;
 use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
@@ -29,9 +30,11 @@ pub(crate) struct Content<'c> {
 /// A commit that is ready to be written, on any thread. Dropped without having run it wrote nothing, and the session finds that out.
 #[derive(Debug)]
 pub struct CommitJob {
-    tail: Tail,
+    pub(crate) tail: Tail,
     /// What goes behind the file's end.
     data: Vec<u8>,
+    /// What its pages differ little from, in a packed file.
+    bases: Option<Bases>,
     pub(crate) next: NextHeader,
     /// Directory entries that change with it: (logical page or leaf, entry).
     pub(crate) entries: Vec<(usize, Entry)>,
@@ -46,9 +49,9 @@ impl CommitJob {
         self.entries.len() as u64
     }
 
-    /// Bytes by which the file grows.
+    /// Bytes by which the file grows; of a packed one by which it has grown.
     pub fn bytes(&self) -> u64 {
-        self.data.len() as u64
+        self.tail.packed_growth().unwrap_or(self.data.len() as u64)
     }
 
     /// How far it has come.
@@ -62,13 +65,16 @@ impl CommitJob {
         old: &Header,
         directory: &Directory,
         lineage: &Lineage,
+        mut bases: Option<Bases>,
         mut content: Content<'_>,
     ) -> Result<Self, LayoutError> {
         let (begin, generation) = (tail.begin(), tail.generation());
         let mut data = content.section.as_mut().map_or_else(Vec::new, |s| std::mem::take(&mut s.bytes));
         let next_page = |data: &Vec<u8>| page_at(tail.path(), begin + data.len() as u64);
         let mut entries = Vec::with_capacity(content.pages.len());
+        bases.iter_mut().for_each(|bases| bases.none(data.len() / PAGE_BYTES));
         for (logical, page) in &content.pages {
+            bases.as_mut().map_or(Ok(()), |bases| bases.record_page(*logical as usize))?;
             let entry = Entry { page: next_page(&data)?, checksum: checksum(&page[..]), generation };
             entries.push((*logical as usize, entry));
             data.extend_from_slice(&page[..]);
@@ -80,6 +86,7 @@ impl CommitJob {
             let last = (first + ENTRIES_PER_LEAF).min(directory.entries.len());
             let mut all = directory.entries[first..last].to_vec();
             of_leaf.iter().for_each(|(logical, entry)| all[logical - first] = *entry);
+            bases.iter_mut().for_each(|bases| bases.leaf(leaf));
             let entry = put_leaf(&all, next_page(&data)?, generation, |bytes| {
                 data.extend_from_slice(bytes);
                 Ok(())
@@ -98,21 +105,31 @@ impl CommitJob {
             error_top_m: content.header.scale.error_top_m,
             imagery: content.section.as_ref().map_or(old.imagery, |section| Some(section.place)),
         };
+        bases.iter_mut().for_each(|bases| bases.root(root.bytes.len() / PAGE_BYTES));
         data.extend_from_slice(&root.bytes);
         let commit_page = next_page(&data)?;
         data.extend_from_slice(&lineage.commit(state, content.edits, content.label).to_page()[..]);
+        bases.iter_mut().for_each(|bases| bases.none(1));
         let next = tail.next_header(Header {
             file_bytes: begin + data.len() as u64,
             history: Some(History { commit_page, tip_page: commit_page }),
             ..state.put_into(old)
         })?;
-        Ok(Self { tail, data, next, entries, leaves, section: content.section })
+        Ok(Self { tail, data, bases, next, entries, leaves, section: content.section })
     }
 
     /// A header alone: another state that is in the file already.
     pub(crate) fn turn(tail: Tail, header: Header) -> Result<Self, LayoutError> {
         let next = tail.next_header(header)?;
-        Ok(Self { tail, data: Vec::new(), next, entries: Vec::new(), leaves: Vec::new(), section: None })
+        Ok(Self {
+            tail,
+            data: Vec::new(),
+            bases: None,
+            next,
+            entries: Vec::new(),
+            leaves: Vec::new(),
+            section: None,
+        })
     }
 
     /// Brings it to the disk.
@@ -129,8 +146,10 @@ impl CommitJob {
     /// # Errors
     /// As [`CommitJob::run`].
     pub fn run_on(&self, disk: &dyn Disk) -> Result<(), LayoutError> {
-        if !self.data.is_empty() {
-            self.tail.write(disk, &self.data, self.tail.begin())?;
+        match &self.bases {
+            Some(bases) => self.tail.write_pages(disk, &self.data, bases.pages(), bases.source())?,
+            None if self.data.is_empty() => {}
+            None => self.tail.write(disk, &self.data, self.tail.begin())?,
         }
         self.tail.flip(disk, &self.next)
     }

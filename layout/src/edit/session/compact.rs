@@ -12,6 +12,7 @@ use crate::file::slots::Slots;
 use crate::file::structure::inert_page;
 use crate::file::tail::Tail;
 use crate::imagery::{Append, Imagery, MadeTile};
+use crate::packing::{check_kind, publish_packed};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -29,11 +30,13 @@ pub struct Compacted {
     pub header: Header,
     /// Bytes of the old one, with its overlay if it had one.
     pub bytes_before: u64,
+    /// Bytes of the new file.
+    pub bytes: u64,
     /// Commits that could be undone or redone in the old one; 0 if its journal cannot be read.
     pub commits_before: u64,
 }
 
-/// Writes the terrain file `file` with the edits of `overlay`, if there is one, as it is now to `out`: the same records and imagery, in order, without journal. `out` may be `file` itself, by
+/// Writes the terrain file `file` with the edits of `overlay`, if there is one, as it is now to `out`: the same records and imagery, in order, without journal. A packed terrain stays packed. `out` may be `file` itself, by
 /// whatever name; nobody else writes to it from before it is read until it is replaced. `out` appears when it is complete.
 ///
 /// # Errors
@@ -45,17 +48,58 @@ pub fn compact(
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Compacted, LayoutError> {
+    write_anew(disk, file, overlay, out, false, progress)
+}
+
+/// As [`compact`], and the new file is packed. It takes the room of a terrain file that is not packed beside `out`, until that is complete.
+///
+/// # Errors
+/// As [`compact`] and [`pack`](crate::packing::pack).
+pub fn compact_packed(
+    disk: &dyn Disk,
+    file: &Path,
+    overlay: Option<&Path>,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Compacted, LayoutError> {
+    write_anew(disk, file, overlay, out, true, progress)
+}
+
+fn write_anew(
+    disk: &dyn Disk,
+    file: &Path,
+    overlay: Option<&Path>,
+    out: &Path,
+    packs: bool,
+    progress: &dyn Progress,
+) -> Result<Compacted, LayoutError> {
     // The lock comes first: what is committed before it is read, and nothing is committed after it.
     let lock = lock_if_same(file, out)?;
     let terrain = match overlay {
         Some(overlay) => Terrain::open_with_overlay_unmapped(file, overlay)?,
         None => Terrain::open_unmapped(file)?,
     };
-    let bytes_before = terrain.source().byte_count();
+    let packs = packs || terrain.source().packed_bytes().is_some();
+    if packs {
+        check_kind(file, terrain.header().record_kind)?;
+    }
+    let source = terrain.source();
+    let bytes_before = source.packed_bytes().unwrap_or_else(|| source.byte_count());
     // A file whose journal is damaged is written anew all the same.
     let commits_before = crate::edit::history(&terrain).map_or(0, |commits| commits.len() as u64);
-    let header = rewrite(disk, &terrain, AtomicFile::create(out)?, lock.as_ref(), progress)?;
-    Ok(Compacted { header, bytes_before, commits_before })
+    let new = AtomicFile::create(out)?;
+    let (header, bytes) = if packs {
+        let plain = AtomicFile::create(out)?;
+        rewrite(disk, &terrain, &plain, progress)?;
+        publish_packed(disk, plain, new, lock.as_ref(), progress)?
+    } else {
+        rewrite(disk, &terrain, &new, progress)?;
+        progress.stage("syncing", 0);
+        let header = publish_terrain(disk, new, lock.as_ref())?;
+        let bytes = header.file_bytes;
+        (header, bytes)
+    };
+    Ok(Compacted { header, bytes_before, bytes, commits_before })
 }
 
 /// The lock of `file` if it is to be replaced.
@@ -71,16 +115,13 @@ fn lock_if_same(file: &Path, out: &Path) -> Result<Option<WriteLock>, LayoutErro
 fn rewrite(
     disk: &dyn Disk,
     terrain: &Terrain,
-    file: AtomicFile,
-    over: Option<&WriteLock>,
+    file: &AtomicFile,
     progress: &dyn Progress,
-) -> Result<Header, LayoutError> {
+) -> Result<(), LayoutError> {
     progress.stage("compacting", terrain.header().stored_pages * terrain.header().records_per_page());
-    let mut writer = Writer { disk, file: &file, chunk: Vec::with_capacity(CHUNK_BYTES), offset: 0 };
+    let mut writer = Writer { disk, file, chunk: Vec::with_capacity(CHUNK_BYTES), offset: 0 };
     let slots = write_terrain(&mut writer, terrain, progress)?;
-    copy_imagery(disk, &file, slots, terrain)?;
-    progress.stage("syncing", 0);
-    publish_terrain(disk, file, over)
+    copy_imagery(disk, file, slots, terrain).map(drop)
 }
 
 /// Writes on and on.
@@ -151,7 +192,7 @@ fn write_terrain(
     };
     let page = header.to_page();
     writer.write(&page[..], 0)?;
-    Ok(Slots { current: page, current_slot: 0, header })
+    Ok(Slots { current: page, current_slot: 0, header, packed_end: None })
 }
 
 /// Copies the imagery of `terrain`, if it has any, behind the file with these header slots, which is not published yet; returns the file's header.

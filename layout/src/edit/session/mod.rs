@@ -3,6 +3,7 @@
 //! [`EditSession::apply`] changes the ground at once, in memory. [`EditSession::commit`] makes everything since the last commit durable, as one batch. Undo and redo are commits of
 //! their own: a header that leads to a state that is in the file already. One session at a time may have a file; readers need not stop.
 
+mod bases;
 mod checked_state;
 pub(crate) mod commit;
 pub(crate) mod compact;
@@ -26,8 +27,10 @@ use crate::file::slots::Slots;
 use crate::file::source::{PreadSource, Source};
 use crate::file::structure::{read_directory, read_growing, read_root, read_structure};
 use crate::file::tail::{Attempt, Attempted, Tail};
+use crate::read::opened::Opened;
 use crate::read::terrain::Terrain;
 use crate::remedy::Remedy;
+use bases::Bases;
 use commit::{CommitJob, Content};
 use picture::Picture;
 use std::path::{Path, PathBuf};
@@ -104,7 +107,7 @@ impl EditSession {
     /// As [`EditSession::open`].
     pub fn open_on(disk: Arc<dyn Disk + Send>, path: &Path) -> Result<Self, LayoutError> {
         let lock = take_lock(path)?;
-        let source = Box::new(over(path, &lock)?);
+        let source = Opened::of(over(path, &lock)?)?.into_source();
         let (header, entries) = read_structure(&*source)?;
         let slots = Slots::read(&*source, 0)?;
         let terrain = Terrain::of(source, header, entries);
@@ -129,13 +132,14 @@ impl EditSession {
         base: &Path,
         overlay: &Path,
     ) -> Result<Self, LayoutError> {
-        let mut base_file = PreadSource::open(base)?;
-        read_growing(&mut base_file)?;
-        create_overlay(&*disk, &base_file, &Slots::read(&base_file, 0)?, overlay)?;
+        let mut base_file = Opened::of(PreadSource::open(base)?)?;
+        let look = base_file.source_mut();
+        read_growing(look)?;
+        create_overlay(&*disk, look, &Slots::read(look, 0)?, overlay)?;
         let lock = take_lock(overlay)?;
         let mut overlay_file = over(overlay, &lock)?;
-        let overlaid = Overlaid::read(&mut base_file, &mut overlay_file)?;
-        let source = overlaid.source(base_file, overlay_file, false)?;
+        let overlaid = Overlaid::read(base_file.source_mut(), &mut overlay_file)?;
+        let source = overlaid.source(base_file.into_source(), Box::new(overlay_file))?;
         let Overlaid { slots, split: start, .. } = overlaid;
         let entries = read_directory(&*source, &slots.header)?;
         let terrain = Terrain::of(source, slots.header.clone(), entries);
@@ -314,7 +318,8 @@ impl EditSession {
             label,
         };
         let lineage = Lineage::read(self.source(), old)?;
-        CommitJob::new(tail, old, &self.directory, &lineage, content).map(Some)
+        let bases = Bases::new(&tail, Arc::clone(self.editor.terrain()), old, &lineage.original)?;
+        CommitJob::new(tail, old, &self.directory, &lineage, bases, content).map(Some)
     }
 
     /// Takes notice of what became of a commit.
@@ -345,7 +350,7 @@ impl EditSession {
         let committed = Committed { pages: job.pages(), bytes: job.bytes(), places };
         job.entries.iter().for_each(|(logical, entry)| self.directory.entries[*logical] = *entry);
         job.leaves.iter().for_each(|(leaf, entry)| self.directory.root[*leaf] = *entry);
-        self.slots.flip(job.next.page, job.next.header);
+        self.slots.flip(job.next.page, job.next.header, job.tail.packed_end().cloned());
         if let Some(section) = job.section {
             self.picture.committed(section);
         }

@@ -115,7 +115,7 @@ impl EditSession {
         let changes = self.editor.replace(replacement);
         self.picture.turn_to(turn);
         self.directory = checked.directory;
-        self.slots.flip(job.next.page, job.next.header);
+        self.slots.flip(job.next.page, job.next.header, job.tail.packed_end().cloned());
         Ok(changes)
     }
 }

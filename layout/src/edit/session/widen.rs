@@ -9,6 +9,7 @@ use crate::file::header::Header;
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
 use crate::grid::record::RecordKind;
+use crate::packing::publish_packed;
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -16,7 +17,7 @@ use std::path::Path;
 
 /// Rewrites the terrain file at `path` with room for the heights of `room` beside its own, and for slopes as steep as all of them over one sample. No height and nothing of the
 /// imagery changes; errors and radii are rounded up in another scale; where 16 bits do not hold the steps, records take 8 bytes instead of 4. The journal ends: what was edited before can no longer be undone. Readers go on reading
-/// the old file. Returns the new header.
+/// the old file. Packed terrain stays packed, unless its records take 8 bytes then, which are not packed. Returns the new header.
 ///
 /// # Errors
 /// Damage and I/O; [`LayoutError::Usage`] while another program writes to it, for a file with other names (hard links), which would keep the old contents, and as
@@ -33,10 +34,14 @@ pub fn widen(
     let terrain = Terrain::open(path)?;
     let file = AtomicFile::create(path)?;
     let header = rebuild_into(disk, &terrain, &file, Some(room), memory_mib, progress)?;
-    let slots = Slots { current: header.to_page(), current_slot: 0, header };
-    copy_imagery(disk, &file, slots, &terrain)?;
+    let slots = Slots { current: header.to_page(), current_slot: 0, header, packed_end: None };
+    let rewritten = copy_imagery(disk, &file, slots, &terrain)?;
+    let packs = terrain.source().packed_bytes().is_some() && rewritten.record_kind == RecordKind::Compact;
     // Windows replaces no file that is mapped.
     drop(terrain);
+    if packs {
+        return Ok(publish_packed(disk, file, AtomicFile::create(path)?, Some(&lock), progress)?.0);
+    }
     progress.stage("syncing", 0);
     publish_terrain(disk, file, Some(&lock))
 }

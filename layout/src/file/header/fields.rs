@@ -7,7 +7,7 @@ use super::{ErrorKind, Header, History, INERT_PAGE, ImageryPlace, SpacingOrigin}
 use crate::dem::HorizontalUnit;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64};
-use crate::file::version::{PACKED_VERSION, only_read};
+use crate::file::version::{PACKED_VERSION, is_another};
 use crate::grid::Grid;
 use crate::grid::record::{RecordKind, RecordScale};
 use std::path::Path;
@@ -52,7 +52,7 @@ impl Fields<'_> {
         }
         let major = get_u16(p, 0x008);
         if major == PACKED_VERSION {
-            return Err(only_read(self.path));
+            return Err(is_another(self.path));
         }
         if major != 1 {
             return Err(LayoutError::unsupported(

@@ -54,6 +54,11 @@ impl Source for LayeredSource<'_> {
         self.base.take_share(cache_bytes)
     }
 
+    /// Of both.
+    fn packed_bytes(&self) -> Option<u64> {
+        Some(self.base.packed_bytes()? + self.overlay.byte_count())
+    }
+
     fn own_start(&self) -> u64 {
         self.split
     }

@@ -29,8 +29,44 @@ pub use testing::{CountingSource, FailingSource, Fault, HostileSource, Hostility
 #[cfg(all(feature = "files", target_os = "linux"))]
 pub use uring::UringSource;
 
+use super::packed_end::PackedEnd;
 use crate::error::LayoutError;
 use std::path::Path;
+
+/// For a look through a source that is needed on.
+impl<S: Source + ?Sized> Source for &S {
+    fn path(&self) -> &Path {
+        (**self).path()
+    }
+
+    fn base_path(&self) -> Option<&Path> {
+        (**self).base_path()
+    }
+
+    fn base_has_grown(&self) -> bool {
+        (**self).base_has_grown()
+    }
+
+    fn byte_count(&self) -> u64 {
+        (**self).byte_count()
+    }
+
+    fn packed_bytes(&self) -> Option<u64> {
+        (**self).packed_bytes()
+    }
+
+    fn packed_end(&self) -> Option<&PackedEnd> {
+        (**self).packed_end()
+    }
+
+    fn own_start(&self) -> u64 {
+        (**self).own_start()
+    }
+
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
+        (**self).read_at(offset, buffer)
+    }
+}
 
 /// One of several reads that are made together.
 #[derive(Debug)]
@@ -77,6 +113,19 @@ pub trait Source: Send + Sync {
     fn take_share(&self, cache_bytes: u64) -> u64 {
         let _ = cache_bytes;
         0
+    }
+
+    /// Where a packed file grows; `None` for one that is not packed.
+    fn packed_end(&self) -> Option<&PackedEnd> {
+        None
+    }
+
+    /// Takes the length as it is now for that when it was opened.
+    ///
+    /// # Errors
+    /// [`LayoutError::Io`].
+    fn measure_again(&mut self) -> Result<(), LayoutError> {
+        Ok(())
     }
 
     /// Offset at which the header slots lie: 0, or where an overlay begins behind its base.

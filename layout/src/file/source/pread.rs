@@ -55,31 +55,6 @@ impl PreadSource {
     pub(super) fn file(&self) -> &File {
         &self.file
     }
-
-    /// Takes the file's length as it is now for that when it was opened.
-    pub(crate) fn measure_again(&mut self) -> Result<(), LayoutError> {
-        let meta = self
-            .file
-            .metadata()
-            .map_err(|e| LayoutError::io(&self.path, "cannot ask for the file's length", e))?;
-        self.byte_count = meta.len();
-        Ok(())
-    }
-}
-
-/// For a look through a file that is needed on.
-impl Source for &PreadSource {
-    fn path(&self) -> &Path {
-        (**self).path()
-    }
-
-    fn byte_count(&self) -> u64 {
-        (**self).byte_count()
-    }
-
-    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
-        (**self).read_at(offset, buffer)
-    }
 }
 
 impl Source for PreadSource {
@@ -89,6 +64,15 @@ impl Source for PreadSource {
 
     fn byte_count(&self) -> u64 {
         self.byte_count
+    }
+
+    fn measure_again(&mut self) -> Result<(), LayoutError> {
+        let meta = self
+            .file
+            .metadata()
+            .map_err(|e| LayoutError::io(&self.path, "cannot ask for the file's length", e))?;
+        self.byte_count = meta.len();
+        Ok(())
     }
 
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
