@@ -17,7 +17,7 @@ const ROUNDS: usize = 7;
 type Failure = Box<dyn std::error::Error>;
 type Stage = (&'static str, fn(&mut Stages) -> Result<(), Failure>);
 
-const STAGES: [Stage; 5] = [
+const STAGES: [Stage; 6] = [
     ("values alone", |stages| {
         stages.values();
         Ok(())
@@ -27,7 +27,8 @@ const STAGES: [Stage; 5] = [
         Ok(())
     }),
     ("tiles", |stages| Ok(stages.tiles()?)),
-    ("pages", |stages| Ok(stages.pages()?)),
+    ("pages, neighbours together", |stages| Ok(stages.neighbours()?)),
+    ("pages, in the file's order", |stages| Ok(stages.pages()?)),
     ("checksums of pages alone", |stages| {
         stages.checksums();
         Ok(())
@@ -115,7 +116,7 @@ fn main() -> Result<(), Failure> {
             STAGES.iter().enumerate().flat_map(|stage| ways.iter().zip(&least).map(move |way| (stage, way)))
         {
             // Stages by themselves are portable.
-            if way.is_portable() || ["tiles", "pages"].contains(name) {
+            if way.is_portable() || !name.ends_with("alone") {
                 println!("| {name} | {} | {:.0} |", way.name(), records_mb / least[i]);
             }
         }

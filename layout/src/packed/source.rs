@@ -35,8 +35,8 @@ const PAGE: u64 = PAGE_BYTES as u64;
 const MOST_CACHE_BYTES: usize = 16 << 20;
 /// Part of a pool's memory that its tiles take, up to that.
 const TILES_SHARE: u64 = 4;
-/// Bytes of the whole that are unpacked at a time.
-const WHOLE_BYTES: usize = 256 << 10;
+/// Pages of the whole that are unpacked at a time.
+const WHOLE_PAGES: usize = 256;
 /// First record page of a terrain file as a build leaves it.
 const FIRST_PAGE: u64 = INERT_PAGE as u64 + 1;
 /// What opening reads first.
@@ -179,14 +179,17 @@ impl PackedSource {
         bytes.try_reserve_exact(usize::try_from(self.header.file_bytes).ok()?).ok()?;
         bytes.resize(bytes.capacity(), 0);
         bytes.truncate(self.header.file_bytes as usize);
-        let fill = |(i, chunk): (usize, &mut [u8])| self.read_at((i * WHOLE_BYTES) as u64, chunk).ok();
+        let mut pages: Vec<(u64, &mut [u8])> = (0..).zip(bytes.chunks_mut(PAGE_BYTES)).collect();
+        // Pages that lie side by side one after the other, so that a tile is unpacked once for all of them.
+        pages.sort_by_cached_key(|(number, _)| self.place_of(*number));
+        let fill = |(number, page): &mut (u64, &mut [u8])| self.read_at(*number * PAGE, page).ok();
         #[cfg(feature = "files")]
         {
             use rayon::prelude::*;
-            bytes.par_chunks_mut(WHOLE_BYTES).enumerate().map(fill).collect::<Option<()>>()?;
+            pages.par_iter_mut().with_min_len(WHOLE_PAGES).map(fill).collect::<Option<()>>()?;
         }
         #[cfg(not(feature = "files"))]
-        bytes.chunks_mut(WHOLE_BYTES).enumerate().map(fill).collect::<Option<()>>()?;
+        pages.iter_mut().map(fill).collect::<Option<()>>()?;
         Some(bytes)
     }
 

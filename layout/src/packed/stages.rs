@@ -38,6 +38,8 @@ pub struct Stages {
     tiles: Vec<Tile>,
     scratch: Scratch,
     records: u64,
+    /// Record pages by their place on the ground.
+    by_place: Vec<u64>,
 }
 
 struct Tile {
@@ -131,7 +133,7 @@ impl Stages {
             tiles.push(Tile { id, shape, place, bytes, segments });
         }
         let records = source.record_pages() * (PAGE_BYTES as u64 / 4);
-        Ok(Self { source, tiles, scratch, records })
+        Ok(Self { source, tiles, scratch, records, by_place: Vec::new() })
     }
 
     /// Records of all pages that are present.
@@ -180,7 +182,24 @@ impl Stages {
         Ok(())
     }
 
-    /// All record pages, tiles unpacked anew as far as they are not kept.
+    /// All record pages, neighbours one after the other, as those do who unpack the whole; tiles are unpacked anew as far as they are not kept.
+    ///
+    /// # Errors
+    /// Damage.
+    pub fn neighbours(&mut self) -> Result<(), LayoutError> {
+        if self.by_place.is_empty() {
+            self.by_place = (3..3 + self.source.record_pages()).collect();
+            self.by_place.sort_by_cached_key(|number| self.source.place_of(*number));
+        }
+        let mut page = vec![0; PAGE_BYTES];
+        for number in &self.by_place {
+            self.source.read_at(number * PAGE_BYTES as u64, &mut page)?;
+            black_box(&mut page);
+        }
+        Ok(())
+    }
+
+    /// All record pages in the order of the file.
     ///
     /// # Errors
     /// Damage.

@@ -14,6 +14,7 @@ use terrasoar_lab::iobench::{
     fly_pooled, time,
 };
 use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// The counting run of all readers, and the block length it used.
 pub(super) fn counted(args: &Args, views: &[View], progress: &Meter) -> Result<(Vec<Run>, f64)> {
@@ -79,7 +80,7 @@ pub(super) fn is_plain(run: &Run) -> bool {
     run.layout == LayoutKind::Ours && run.preload == Prefetch::None
 }
 
-/// Times each engine over the file as it is; the file must not be mapped meanwhile.
+/// Times each engine over the file as it is; the file must not be mapped meanwhile. A packed one has no map to be timed.
 pub(super) fn measured(
     args: &Args,
     views: &[View],
@@ -87,6 +88,9 @@ pub(super) fn measured(
     progress: &Meter,
 ) -> Result<Vec<(Reader, Timed)>> {
     if !args.layouts.contains(&LayoutKind::Ours) || !args.prefetch.contains(&Prefetch::None) {
+        return Ok(Vec::new());
+    }
+    if Terrain::open_unmapped(&args.file)?.source().packed_bytes().is_some() {
         return Ok(Vec::new());
     }
     let culling = args.quality.quality().culling;

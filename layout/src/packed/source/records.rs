@@ -1,14 +1,14 @@
 //! Record pages of a packed file: tiles are read, unpacked, kept, and their records put where pages have them.
 
-use super::{PackedSource, odd};
+use super::{FIRST_PAGE, PackedSource, odd};
 use crate::error::LayoutError;
 use crate::file::bytes::{Page, checksum};
 use crate::file::source::Source;
-use crate::grid::order::point_of;
+use crate::grid::order::{point_of, spread};
 use crate::packed::blocks::{MOST_TILES, Piece, pieces, tiles_of};
 use crate::packed::coder::Decoder;
 use crate::packed::places::{PLACE_BYTES, TilePlace};
-use crate::packed::shape::{TileId, TileShape};
+use crate::packed::shape::{TILE_LOG, TileId, TileShape};
 use crate::packed::tile::{INERT, TileRecords};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
@@ -101,6 +101,20 @@ impl PackedSource {
         } else {
             Err(damaged("it holds something else than a tile"))
         }
+    }
+
+    /// Where a page of the terrain file lies on the ground, as a number that is near for pages near each other; those that are no record pages come first.
+    pub(in crate::packed) fn place_of(&self, number: u64) -> u64 {
+        let present =
+            number.checked_sub(FIRST_PAGE).and_then(|at| self.present.get(usize::try_from(at).ok()?));
+        let Some(logical) = present else { return 0 };
+        let per_page = self.header.records_per_page();
+        let first = u64::from(*logical) * per_page;
+        // Its middle, or whatever is no ghost.
+        let mut slots = (first + per_page / 2..first + per_page).chain(first..first + per_page / 2);
+        let point = slots.find_map(|slot| point_of(self.header.grid.k(), slot));
+        let [x, y] = point.map_or([0; 2], |p| [p.x(), p.y()].map(|v| u64::from(v >> TILE_LOG)));
+        1 + (spread(y) << 1 | spread(x))
     }
 
     /// Fills a record page.
