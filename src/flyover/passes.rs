@@ -28,6 +28,8 @@ struct PhaseTimer {
 }
 
 impl Probe for PhaseTimer {
+    const HEARS_READS: bool = false;
+
     fn phase(&mut self, phase: Phase) {
         let now = Instant::now();
         if let Some(spent) = self.phases_us.get_mut(self.phase) {

@@ -13,7 +13,7 @@ pub struct StreamOptions {
     pub cache_bytes: u64,
     /// Threads that read, as many reads as are under way at once; 4 by default.
     pub threads: usize,
-    /// Longest that the first update waits for its pages; half a second by default. Later ones never wait.
+    /// Longest that the first update waits for its pages; half a second by default. Later ones never wait, and with a wait of zero none does.
     pub first_wait: Duration,
     /// Where what lies out of view is left out.
     pub culling: Culling,

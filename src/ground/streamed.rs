@@ -86,7 +86,7 @@ impl<C: RecordCodec> StreamedMesh<C> {
 impl<C: RecordCodec> MeshEngine for StreamedMesh<C> {
     fn update(&mut self, view: &View) -> Refined {
         // The first mesh is asked for as a whole, so the patches on the way to it are not missed.
-        if !std::mem::replace(&mut self.begun, true) {
+        if !std::mem::replace(&mut self.begun, true) && self.first_wait > Duration::ZERO {
             self.streamed.fill(view, self.first_wait, &mut self.reads);
         }
         self.frame = self.streamed.update(view, &mut self.reads);
@@ -184,7 +184,10 @@ impl<C: RecordCodec> MeshEngine for StreamedMesh<C> {
     }
 
     fn is_waiting(&self) -> bool {
-        self.frame.outstanding > 0 || self.streamed.has_wants()
+        let work = &self.frame.work;
+        // What a budget leaves undone is done by the next updates; what none of them gets on with stays as it is.
+        let is_late = work.late > work.unread && (work.tests > 0 || work.slots_written > 0);
+        is_late || self.frame.outstanding > 0 || self.streamed.has_wants()
     }
 
     fn lacks_pages(&self) -> bool {

@@ -60,7 +60,7 @@ pub struct Work {
     /// Those of them whose own record is away.
     pub unread: u64,
     /// Largest error on the screen that late vertices may leave, in pixels, the ground being a sample spacing away at the least; 0 if none exceeds the
-    /// tolerance.
+    /// tolerance. With a budget of time, and more than 8,192 late vertices, the largest of so many of them.
     pub late_error_px: f64,
 }
 
@@ -79,6 +79,9 @@ pub enum Phase {
 
 /// Hears what a refinement does. The methods are empty unless a listener wants them.
 pub trait Probe {
+    /// Whether [`Probe::read`] does anything.
+    const HEARS_READS: bool = true;
+
     /// The record at `slot` was read.
     #[inline(always)]
     fn read(&mut self, slot: u64) {
@@ -96,7 +99,9 @@ pub trait Probe {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unobserved;
 
-impl Probe for Unobserved {}
+impl Probe for Unobserved {
+    const HEARS_READS: bool = false;
+}
 
 /// A refinement algorithm over one terrain.
 pub trait Engine {

@@ -57,12 +57,13 @@ const MOST_LINES: usize = 450;
 /// Most crates that a program which embeds the engine compiles, the engine's own included.
 const MOST_CRATES: usize = 55;
 
-/// The only files with unsafe code: a map, an io_uring, a hint to the processor, a library's name, a signal.
-const UNSAFE: [&str; 5] = [
+/// The only files with unsafe code: a map, an io_uring, a hint to the processor, instructions that not every processor has, a library's name, a signal.
+const UNSAFE: [&str; 6] = [
     "cli/src/verbs/signals.rs",
     "layout/src/file/source/map.rs",
     "layout/src/file/source/uring.rs",
     "layout/src/imagery/encode.rs",
+    "layout/src/packed/wide.rs",
     "layout/src/read/prefetch.rs",
 ];
 

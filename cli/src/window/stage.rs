@@ -1,14 +1,16 @@
 //! The terrain on show: an opened file, its ground and its scene, opened, exchanged and closed as one.
 //!
 //! The file is not mapped: pages of it are read by threads into memory of a fixed size, so that no frame waits for storage and nothing that happens to the file
-//! while it is on show ends the program.
+//! while it is on show ends the program. The mesh has a few milliseconds of each frame: at the start, and where the eye leaps, it is coarse at once and finer with every frame.
 
 use super::heights::SceneGround;
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 use terrasoar::ground::{Ground, Refined, StreamOptions};
 use terrasoar::refine::Culling;
+use terrasoar::refine::kinetic::Budget;
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::read::terrain::Terrain;
@@ -17,6 +19,18 @@ use terrasoar_scene::scene::{Drawn, Scene, SceneOptions, TileService};
 
 /// Normal tiles a frame: each takes some 2 ms, and more would be felt.
 const TILES_A_FRAME: usize = 3;
+
+/// What refining may take of a frame. The first picture, and the one after a leap, is coarse; each after it is finer.
+const REFINING: Duration = Duration::from_millis(4);
+
+/// How a terrain on show is streamed: no frame waits for its pages or for its mesh.
+fn streaming(culling: Culling, cache_bytes: u64) -> StreamOptions {
+    StreamOptions::default()
+        .culling(culling)
+        .cache_bytes(cache_bytes)
+        .first_wait(Duration::ZERO)
+        .budget(Budget::default().time(REFINING))
+}
 
 /// A terrain on show.
 pub(crate) struct Stage {
@@ -32,8 +46,7 @@ impl Stage {
     /// # Errors
     /// What [`Ground::streamed`] and [`Scene::new`] say.
     pub(crate) fn new(terrain: Terrain, gpu: &Gpu, culling: Culling, cache_bytes: u64) -> Result<Self> {
-        let how = StreamOptions::default().culling(culling).cache_bytes(cache_bytes);
-        let ground = Ground::streamed(Arc::new(terrain), &how)?;
+        let ground = Ground::streamed(Arc::new(terrain), &streaming(culling, cache_bytes))?;
         let options = SceneOptions::default().tiles(TileService::AFrame(TILES_A_FRAME));
         let scene = Scene::new(&ground, gpu, options)?;
         Ok(Self { ground, scene, culling, cache_bytes })
@@ -122,5 +135,54 @@ impl Stage {
     /// Its heights.
     pub(crate) fn heights(&self) -> SceneGround<'_> {
         SceneGround::new(&self.ground)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Instant;
+    use terrasoar_layout::build::{BuildOptions, build};
+    use terrasoar_layout::dem::{MemoryDem, SampleType};
+    use terrasoar_layout::progress::Silent;
+
+    /// Refines for a view until nothing is on its way; tells the triangles of the first frame and of the last.
+    fn come_to_rest(ground: &mut Ground<'_>, view: &View) -> [u64; 2] {
+        let (begun, first) = (Instant::now(), ground.update(view).triangles);
+        loop {
+            let refined = ground.update(view);
+            if !ground.is_waiting() && refined.work.late == 0 {
+                return [first, refined.triangles];
+            }
+            assert!(begun.elapsed() < Duration::from_secs(120), "{refined:?}");
+        }
+    }
+
+    /// At the start and after a leap to a place whose pages are all in memory.
+    #[test]
+    fn a_picture_is_coarse_at_once_and_fine_in_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("land.iqt");
+        let steep = |x: u32, y: u32| f64::from((x * 37 ^ y * 91) % 61 + (x ^ y) % 512);
+        let dem = MemoryDem::from_fn([1025; 2], SampleType::I16, steep);
+        build(&dem, &path, &BuildOptions::default().spacing_m([10.0; 2]), &Silent).unwrap();
+        let open = || Arc::new(Terrain::open_unmapped(&path).unwrap());
+        let views = [
+            View::new([5000.0, 500.0, 2000.0], 0.0, -25.0).tolerance_px(0.5),
+            View::new([5000.0, 9500.0, 2500.0], 180.0, -25.0).tolerance_px(0.5),
+        ];
+        for culling in Culling::ALL {
+            let mut whole =
+                Ground::streamed(open(), &StreamOptions::default().culling(culling).cache_bytes(64 << 20))
+                    .unwrap();
+            let all = views.each_ref().map(|view| come_to_rest(&mut whole, view)[1]);
+            assert!(all[0] > 300_000, "{all:?} are made in one frame");
+            let mut shown = Ground::streamed(open(), &streaming(culling, 64 << 20)).unwrap();
+            for i in [0, 1, 0, 1] {
+                let [first, last] = come_to_rest(&mut shown, &views[i]);
+                assert_eq!(last, all[i], "{culling:?}, view {i}");
+                assert!(2 * first < last, "{culling:?}, view {i}: {first} of {last} in the first frame");
+            }
+        }
     }
 }

@@ -5,12 +5,13 @@
 use super::shape::TileId;
 use super::tile::TileRecords;
 use std::collections::{HashMap, VecDeque};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Tiles in memory. A full cache drops one that was not asked for since the last round.
 #[derive(Debug)]
 pub(crate) struct Cache {
-    most_bytes: usize,
+    most_bytes: AtomicUsize,
     inner: Mutex<Inner>,
 }
 
@@ -29,7 +30,12 @@ struct Kept {
 
 impl Cache {
     pub(crate) fn new(most_bytes: usize) -> Self {
-        Self { most_bytes, inner: Mutex::default() }
+        Self { most_bytes: AtomicUsize::new(most_bytes), inner: Mutex::default() }
+    }
+
+    /// From now on no more than so many bytes are kept, one tile excepted.
+    pub(crate) fn set_most_bytes(&self, most_bytes: usize) {
+        self.most_bytes.store(most_bytes, Ordering::Relaxed);
     }
 
     /// A tile that goes down to octave `finest`, counted from its own finest.
@@ -48,7 +54,7 @@ impl Cache {
             Some(before) => inner.bytes -= before.tile.bytes(),
             None => inner.round.push_back(id),
         }
-        while inner.bytes > self.most_bytes && inner.round.len() > 1 {
+        while inner.bytes > self.most_bytes.load(Ordering::Relaxed) && inner.round.len() > 1 {
             let Some(first) = inner.round.pop_front() else { break };
             match inner.tiles.get_mut(&first) {
                 Some(kept) if kept.is_recent && first != id => {
@@ -72,8 +78,14 @@ mod tests {
     fn tiles_take_no_more_than_they_may() {
         let shape = TileShape { stride_log: 0, tile_log: 6, is_top: false, is_last: [false; 2] };
         let tile = |finest| Arc::new(TileRecords::inert(&shape, finest));
-        let cache = Cache::new(10 * tile(0).bytes());
+        let mut most_bytes = 10 * tile(0).bytes();
+        let cache = Cache::new(most_bytes);
         for i in 0..1000u32 {
+            if i == 500 {
+                most_bytes = 4 * tile(0).bytes();
+                cache.set_most_bytes(most_bytes);
+                cache.put(TileId { group: 1, at: [0; 2] }, tile(0));
+            }
             let id = TileId { group: 0, at: [i % 40, i / 40 % 3] };
             let finest = i % 3;
             if cache.get(id, finest).is_none() {
@@ -81,7 +93,7 @@ mod tests {
             }
             assert!(cache.get(id, finest).is_some_and(|tile| tile.finest <= finest));
             let inner = cache.inner.lock().unwrap();
-            assert!(inner.bytes <= cache.most_bytes);
+            assert!(inner.bytes <= most_bytes);
             assert_eq!(inner.bytes, inner.tiles.values().map(|kept| kept.tile.bytes()).sum::<usize>());
             assert_eq!(inner.round.len(), inner.tiles.len());
         }

@@ -4,13 +4,17 @@
 //! several independent steps at hand. Invariant: decoding never reads outside the bytes, and [`Decoder::finish`] says whether all of them, and nothing else, were used.
 
 use super::bits::{BitReader, BitWriter};
-use super::model::{Counts, DecodeTables, ERRORS, Model, SCALE, SCALE_LOG};
-use super::token::{BASES, token_of};
+use super::model::{Counts, DecodeTable, DecodeTables, ERRORS, Model, SCALE_LOG};
+use super::token::{BASES, TOKENS, token_of};
 
 /// What a state is before the first and after the last symbol.
 const START: u32 = 1 << 16;
 /// Most states that take turns.
 const MOST_LANES: usize = 32;
+/// Contexts that a row of values may be in, counted from its first.
+const SPAN: usize = 64;
+/// Values that are decoded at a time; all numbers of lanes divide it.
+const ROW: usize = 1024;
 
 /// Either way through the values of a tile: walking over it is the same for both.
 pub(crate) trait Coder {
@@ -148,7 +152,6 @@ pub(crate) struct Decoder<'b> {
     /// Words taken.
     at: usize,
     bits: BitReader<'b>,
-    tokens: Vec<u8>,
 }
 
 impl<'b> Decoder<'b> {
@@ -171,7 +174,7 @@ impl<'b> Decoder<'b> {
             (words, bits) = (of_words.as_chunks().0, rest);
         }
         let bits = BitReader::new(bits);
-        Some(Self { tables, states, lanes, words, at: 0, bits, tokens: Vec::new() })
+        Some(Self { tables, states, lanes, words, at: 0, bits })
     }
 
     /// Whether all of the segment was used, and led back to where encoding began.
@@ -179,58 +182,103 @@ impl<'b> Decoder<'b> {
         self.at == self.words.len() && self.bits.is_at_end() && self.states.iter().all(|s| *s == START)
     }
 
-    /// The token that a state stands for, and the state after it.
+    /// Tokens and bits beside them to values.
     #[inline(always)]
-    fn step(&self, context: usize, state: u32) -> (u8, u32) {
-        let table = usize::from(self.tables.table_of[context]);
-        let entry = self.tables.tables[table][state as usize & (SCALE - 1)];
-        // No state is above 2^32 - 1 after it: the frequency is at most 2^11, and what is above the low bits less than 2^21.
-        (entry as u8, ((entry >> 8) & 0xfff).wrapping_mul(state >> SCALE_LOG).wrapping_add(entry >> 20))
+    fn expand(&mut self, tokens: &[u8], values: &mut [u16]) {
+        for (tokens, values) in tokens.chunks(16).zip(values.chunks_mut(16)) {
+            if tokens.iter().fold(0, |all, token| all | token) < 16 {
+                values.iter_mut().zip(tokens).for_each(|(value, token)| *value = u16::from(*token));
+                continue;
+            }
+            self.bits.take_some(|bits| {
+                for (value, token) in values.iter_mut().zip(tokens) {
+                    let (base, count) = BASES[usize::from(*token) % TOKENS];
+                    *value = base.wrapping_add(bits.take(count.into()) as u16);
+                }
+            });
+        }
     }
 
-    fn tokens(&mut self, first: u16, contexts: &[u8]) {
-        let mut tokens = std::mem::take(&mut self.tokens);
-        tokens.clear();
-        tokens.resize(contexts.len(), 0);
-        let mask = self.lanes - 1;
-        let (mut states, mut at, words) = (self.states, self.at, self.words);
-        for (turn, (token, context)) in tokens.iter_mut().zip(contexts).enumerate() {
-            let state = &mut states[turn & mask & (MOST_LANES - 1)];
-            let (found, mut next) = self.step(usize::from(first) + usize::from(*context), *state);
+    /// Tokens of a row, whose contexts are below [`SPAN`].
+    #[inline(always)]
+    fn tokens<const LANES: usize>(&mut self, first: u16, contexts: &[u8], tokens: &mut [u8]) {
+        let mut states = *self.states.first_chunk::<LANES>().unwrap_or(&[START; LANES]);
+        let tables: [&DecodeTable; SPAN] =
+            std::array::from_fn(|i| self.tables.of_context(usize::from(first) + i));
+        let mut at = self.at;
+        let mut tokens = tokens.chunks_exact_mut(LANES);
+        let mut contexts = contexts.chunks_exact(LANES);
+        for (tokens, contexts) in tokens.by_ref().zip(contexts.by_ref()) {
+            // A turn takes a word a lane at most; behind the last there are zeros.
+            let mut last = [[0; 2]; LANES];
+            let words = match self.words.get(at..).and_then(|words| words.first_chunk::<LANES>()) {
+                Some(words) => words,
+                None => {
+                    let rest = self.words.get(at..).unwrap_or_default();
+                    last[..rest.len()].copy_from_slice(rest);
+                    &last
+                }
+            };
+            let mut taken = 0;
+            for lane in 0..LANES {
+                let (token, next) = tables[usize::from(contexts[lane]) % SPAN].step(states[lane]);
+                tokens[lane] = token;
+                // Without a branch, which nothing foretells.
+                let word = u32::from(u16::from_le_bytes(words[taken % LANES]));
+                let is_low = u32::from(next < START);
+                states[lane] = next << (16 * is_low) | word & is_low.wrapping_neg();
+                taken += is_low as usize;
+            }
+            at += taken;
+        }
+        let rest = tokens.into_remainder().iter_mut().zip(contexts.remainder());
+        for ((token, context), state) in rest.zip(&mut states) {
+            let next;
+            (*token, next) = tables[usize::from(*context) % SPAN].step(*state);
+            *state = next;
             if next < START {
-                next = next << 16 | u32::from(u16::from_le_bytes(words.get(at).copied().unwrap_or_default()));
+                let word = self.words.get(at).copied().unwrap_or_default();
+                *state = next << 16 | u32::from(u16::from_le_bytes(word));
                 at += 1;
             }
-            (*token, *state) = (found, next);
         }
-        (self.states, self.at, self.tokens) = (states, at, tokens);
+        self.at = at;
+        self.states[..LANES].copy_from_slice(&states);
     }
 }
 
 impl Coder for Decoder<'_> {
+    #[inline(always)]
     fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
         if self.lanes == 0 {
             let bits = plain_bits(first);
             values.iter_mut().for_each(|value| *value = self.bits.take(bits) as u16);
             return;
         }
-        self.tokens(first, contexts);
-        for (value, token) in values.iter_mut().zip(&self.tokens) {
-            *value = u16::from(*token);
-            if *token >= 16 {
-                let (base, bits) = BASES[usize::from(*token) & 63];
-                *value = base.wrapping_add(self.bits.take(bits.into()) as u16);
+        for (contexts, values) in contexts.chunks(ROW).zip(values.chunks_mut(ROW)) {
+            let mut tokens = [0; ROW];
+            let tokens = &mut tokens[..contexts.len()];
+            match self.lanes {
+                1 => self.tokens::<1>(first, contexts, tokens),
+                2 => self.tokens::<2>(first, contexts, tokens),
+                4 => self.tokens::<4>(first, contexts, tokens),
+                8 => self.tokens::<8>(first, contexts, tokens),
+                16 => self.tokens::<16>(first, contexts, tokens),
+                _ => self.tokens::<MOST_LANES>(first, contexts, tokens),
             }
+            self.expand(tokens, values);
         }
     }
 
+    #[inline(always)]
     fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
         if self.lanes == 0 {
             *value = self.bits.take(plain_bits(context)) as u16;
             return;
         }
         let lane = turn & (self.lanes - 1) & (MOST_LANES - 1);
-        let (token, mut next) = self.step(usize::from(context), self.states[lane]);
+        let table = self.tables.of_context(usize::from(context));
+        let (token, mut next) = table.step(self.states[lane]);
         if next < START {
             let word = self.words.get(self.at).copied().unwrap_or_default();
             next = next << 16 | u32::from(u16::from_le_bytes(word));
@@ -241,6 +289,7 @@ impl Coder for Decoder<'_> {
         *value = base.wrapping_add(self.bits.take(bits.into()) as u16);
     }
 
+    #[inline(always)]
     fn raw(&mut self, bits: u32, value: &mut u16) {
         *value = self.bits.take(bits) as u16;
     }

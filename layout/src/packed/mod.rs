@@ -1,15 +1,17 @@
 //! Packed terrain: the records of a terrain in a tenth of the room, every bit of them (FORMAT.md, section 9).
 //!
 //! * `shape`: how a terrain is cut into groups of tiles, each of which is read by itself.
-//! * `walk`: the way through a tile, for writing and reading; `plane` predicts heights, `rules` knows what follows from them.
+//! * `walk`: the way through a tile, for writing and reading, `wide` with the instructions there are; `plane` predicts heights, `rules` knows what follows from them.
 //! * `container`, `places`, `source`: a packed file, read as the terrain file that it was made of. Module `packing` makes one, and that terrain file again.
 //! * `appended`: what was appended to it since.
+//! * `tile`, `blocks`: a tile's records, and where those of a page lie in tiles.
 //! * `coder`, `model`, `token`, `bits`: values into bytes and back.
 //!
 //! Invariant: what is read is what was written, or an error; no bytes make reading panic, or take memory beyond a tile's.
 
 mod appended;
 mod bits;
+mod blocks;
 mod cache;
 pub(crate) mod coder;
 pub(crate) mod container;
@@ -19,9 +21,12 @@ mod plane;
 pub(crate) mod rules;
 pub(crate) mod shape;
 pub(crate) mod source;
+#[cfg(feature = "testing")]
+pub(crate) mod stages;
 pub(crate) mod tile;
 pub(crate) mod token;
 pub(crate) mod walk;
+pub(crate) mod wide;
 
 #[cfg(test)]
 mod tests;

@@ -178,27 +178,56 @@ fn take_table(bits: &mut BitReader<'_>) -> Option<Frequencies> {
     Some(table)
 }
 
-/// What decoding looks up: for each context, by the low bits of a state, token, frequency and place in it.
+/// What decoding looks up.
 #[derive(Debug)]
 pub(crate) struct DecodeTables {
-    pub(crate) table_of: Vec<u16>,
-    /// Token in 8 bits, frequency in 12, place in 12.
-    pub(crate) tables: Vec<[u32; SCALE]>,
+    table_of: Vec<u16>,
+    tables: Vec<DecodeTable>,
+}
+
+/// One table: small, so that those in use stay near the processor.
+#[derive(Debug, Clone)]
+pub(crate) struct DecodeTable {
+    /// Token by the low bits of a state.
+    tokens: [u8; SCALE],
+    /// Of each token the frequency in 16 bits, and above it its first number.
+    frequencies: [u32; TOKENS],
 }
 
 impl DecodeTables {
     pub(crate) fn of(model: &Model) -> Self {
-        let mut tables = vec![[0; SCALE]; model.tables.len()];
-        for (table, frequencies) in tables.iter_mut().zip(&model.tables) {
-            let mut at = 0;
-            for (token, frequency) in frequencies.iter().enumerate() {
-                for place in 0..u32::from(*frequency) {
-                    table[at] = token as u32 | u32::from(*frequency) << 8 | place << 20;
-                    at += 1;
-                }
-            }
+        Self { table_of: model.table_of.clone(), tables: model.tables.iter().map(DecodeTable::of).collect() }
+    }
+
+    /// The table of a context.
+    #[inline(always)]
+    pub(crate) fn of_context(&self, context: usize) -> &DecodeTable {
+        &self.tables[usize::from(self.table_of[context])]
+    }
+}
+
+impl DecodeTable {
+    fn of(frequencies: &Frequencies) -> Self {
+        let mut table = Self { tokens: [0; SCALE], frequencies: [0; TOKENS] };
+        let mut first = 0;
+        for (token, frequency) in frequencies.iter().enumerate() {
+            let next = first + usize::from(*frequency);
+            table.tokens[first..next].fill(token as u8);
+            table.frequencies[token] = u32::from(*frequency) | (first as u32) << 16;
+            first = next;
         }
-        Self { table_of: model.table_of.clone(), tables }
+        table
+    }
+
+    /// The token that a state stands for, and the state after it.
+    #[inline(always)]
+    pub(crate) fn step(&self, state: u32) -> (u8, u32) {
+        let low = state & (SCALE as u32 - 1);
+        let token = self.tokens[low as usize];
+        let of_token = self.frequencies[usize::from(token) % TOKENS];
+        // No state is above 2^32 - 1 after it: the frequency is at most 2^11, and what is above the low bits less than 2^21.
+        let next = (of_token & 0xffff).wrapping_mul(state >> SCALE_LOG);
+        (token, next.wrapping_add(low).wrapping_sub(of_token >> 16))
     }
 }
 

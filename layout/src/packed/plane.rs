@@ -14,12 +14,14 @@ pub(crate) struct Plane<T> {
 
 impl<T: Copy + Default> Plane<T> {
     /// So many columns and rows, besides the ring. What is in it is not said.
+    #[inline(always)]
     pub(crate) fn resize(&mut self, wide: usize, high: usize) {
         self.row = wide + 2;
         self.cells.resize(self.row * (high + 2), T::default());
     }
 
     /// As [`Plane::resize`], filled with `value`, the ring too.
+    #[inline(always)]
     pub(crate) fn fill(&mut self, wide: usize, high: usize, value: T) {
         self.resize(wide, high);
         self.cells.fill(value);
@@ -49,40 +51,38 @@ impl<T: Copy + Default> Plane<T> {
     }
 }
 
-/// The three lattices that refine a square lattice of `m` cells a side to the next.
+/// A square lattice of `m` cells a side, and what refines it to the next.
 #[derive(Debug, Default)]
 pub(crate) struct Lattices<T> {
     /// The lattice itself, of m + 1 vertices a side.
     pub(crate) coarse: Plane<T>,
     /// Centres of its cells, m x m.
     pub(crate) whites: Plane<T>,
-    /// Midpoints of the edges that run east: m in each of m + 1 rows.
-    pub(crate) east: Plane<T>,
-    /// Midpoints of the edges that run north: m + 1 in each of m rows.
-    pub(crate) north: Plane<T>,
     next: Plane<T>,
 }
 
 impl<T: Copy + Default> Lattices<T> {
-    /// Makes room for the vertices that refine `m` cells a side.
-    pub(crate) fn begin(&mut self, m: usize) {
+    /// Takes the whites of `m` cells a side, row by row.
+    #[inline(always)]
+    pub(crate) fn take_whites(&mut self, m: usize, whites: &[T]) {
         self.whites.resize(m, m);
-        self.east.resize(m, m + 1);
-        self.north.resize(m + 1, m);
+        for (j, row) in whites.chunks_exact(m).enumerate() {
+            self.whites.row_mut(0, j as isize, m).copy_from_slice(row);
+        }
     }
 
-    /// Takes all of them together for the next coarse lattice.
-    pub(crate) fn merge(&mut self, m: usize) {
+    /// Takes lattice, whites, and midpoints of edges that run `east` and `north`, m in each of m + 1 rows and m + 1 in each of m, together for the next coarse lattice.
+    #[inline(always)]
+    pub(crate) fn merge(&mut self, m: usize, east: &[T], north: &[T]) {
         let side = 2 * m + 1;
         self.next.resize(side, side);
-        for j in 0..=m {
+        for (j, east) in east.chunks_exact(m).enumerate() {
             let y = j as isize;
-            let even = self.next.row_mut(0, 2 * y, side);
-            interleave(even, self.coarse.row(0, y, m + 1), self.east.row(0, y, m));
-            if j < m {
-                let odd = self.next.row_mut(0, 2 * y + 1, side);
-                interleave(odd, self.north.row(0, y, m + 1), self.whites.row(0, y, m));
-            }
+            interleave(self.next.row_mut(0, 2 * y, side), self.coarse.row(0, y, m + 1), east);
+        }
+        for (j, north) in north.chunks_exact(m + 1).enumerate() {
+            let y = j as isize;
+            interleave(self.next.row_mut(0, 2 * y + 1, side), north, self.whites.row(0, y, m));
         }
         std::mem::swap(&mut self.coarse, &mut self.next);
     }
@@ -100,6 +100,7 @@ fn interleave<T: Copy>(row: &mut [T], even: &[T], odd: &[T]) {
 
 impl Lattices<i32> {
     /// Continues the coarse lattice in straight lines over the border.
+    #[inline(always)]
     pub(crate) fn ring_coarse(&mut self, m: usize) {
         let (e, m) = (&mut self.coarse, m as isize);
         for y in 0..=m {
@@ -113,6 +114,7 @@ impl Lattices<i32> {
     }
 
     /// Continues the whites over the border, so that the border's edges have the mean of either side.
+    #[inline(always)]
     pub(crate) fn ring_whites(&mut self, m: usize) {
         let (e, w, m) = (&self.coarse, &mut self.whites, m as isize);
         for y in 0..m {
@@ -126,6 +128,7 @@ impl Lattices<i32> {
     }
 
     /// Predictions and classes of all whites, row by row.
+    #[inline(always)]
     pub(crate) fn predict_whites(&self, m: usize, predicted: &mut [i32], classes: &mut [u8]) {
         for (j, (predicted, classes)) in
             predicted.chunks_exact_mut(m).zip(classes.chunks_exact_mut(m)).enumerate()
@@ -137,6 +140,7 @@ impl Lattices<i32> {
     }
 
     /// Predictions and classes of all blacks: those on edges that run east, row by row, then the others.
+    #[inline(always)]
     pub(crate) fn predict_blacks(&self, m: usize, predicted: &mut [i32], classes: &mut [u8]) {
         let of_east = m * (m + 1);
         let (east, north) = predicted.split_at_mut(of_east);
@@ -158,22 +162,50 @@ impl Lattices<i32> {
     }
 }
 
+/// Vertices of a row that are predicted together.
+const TOGETHER: usize = 8;
+
 /// Predictions and classes of a row, from two opposite pairs of corners and the eight vertices around.
 #[inline(always)]
 fn predict(near: [&[i32]; 4], far: [&[i32]; 8], predicted: &mut [i32], classes: &mut [u8]) {
     let count = predicted.len();
-    let (near, far) = (near.map(|row| &row[..count]), far.map(|row| &row[..count]));
-    let classes = &mut classes[..count];
-    for i in 0..count {
-        let [a, b, c, d] = near.map(|row| row[i]);
-        let around: i32 = far.iter().map(|row| row[i]).sum();
-        let corners = a + b + c + d;
-        predicted[i] = (10 * corners - around + 16) >> 5;
-        let twist = (a + b - c - d).abs();
-        let curve = (2 * corners - around).abs();
-        let range = a.max(b).max(c.max(d)) - a.min(b).min(c.min(d));
-        classes[i] = class_of(8 * twist + curve + 2 * range);
+    let mut done = 0;
+    // The last ones together with some that were predicted before.
+    while done < count && count >= TOGETHER {
+        let from = done.min(count - TOGETHER);
+        predict_some::<TOGETHER>(near, far, from, predicted, classes);
+        done = from + TOGETHER;
     }
+    (done..count).for_each(|from| predict_some::<1>(near, far, from, predicted, classes));
+}
+
+/// Some of a row, by copies of it: then the compiler knows that what is written is none of what is read.
+#[inline(always)]
+fn predict_some<const N: usize>(
+    near: [&[i32]; 4],
+    far: [&[i32]; 8],
+    from: usize,
+    predicted: &mut [i32],
+    classes: &mut [u8],
+) {
+    let copy = |row: &[i32]| {
+        let mut copy = [0; N];
+        copy.copy_from_slice(&row[from..from + N]);
+        copy
+    };
+    let ([a, b, c, d], far) = (near.map(copy), far.map(copy));
+    let (mut heights, mut of_classes) = ([0; N], [0; N]);
+    for i in 0..N {
+        let around: i32 = far.iter().map(|row| row[i]).sum();
+        let corners = a[i] + b[i] + c[i] + d[i];
+        heights[i] = (10 * corners - around + 16) >> 5;
+        let twist = (a[i] + b[i] - c[i] - d[i]).abs();
+        let curve = (2 * corners - around).abs();
+        let range = a[i].max(b[i]).max(c[i].max(d[i])) - a[i].min(b[i]).min(c[i].min(d[i]));
+        of_classes[i] = class_of(8 * twist + curve + 2 * range);
+    }
+    predicted[from..from + N].copy_from_slice(&heights);
+    classes[from..from + N].copy_from_slice(&of_classes);
 }
 
 /// Half octaves of a number from 4 on, as a class.
@@ -204,7 +236,6 @@ mod tests {
         let m = 6;
         let mut lattices = Lattices::default();
         lattices.coarse.resize(m + 1, m + 1);
-        lattices.begin(m);
         for (x, y) in (0..=m as isize).flat_map(|y| (0..=m as isize).map(move |x| (x, y))) {
             lattices.coarse.set(x, y, f(x as f64, y as f64).round() as i32);
         }

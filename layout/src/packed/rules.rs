@@ -19,9 +19,9 @@ const SLOPE_STEPS: u32 = 16;
 #[derive(Debug)]
 pub(crate) struct Rules {
     /// Error code by |2v - b - d|.
-    step: Vec<u8>,
+    step: Box<[u8; 1 << 17]>,
     /// Radius code at level 1 by the difference to a child beside, and to one north or south.
-    radius: [Vec<u8>; 2],
+    radius: [Box<[u8; 1 << 16]>; 2],
     /// Radius code of a slope by octave and steps of the difference across it.
     slope: Vec<[u8; 256]>,
 }
@@ -36,7 +36,7 @@ impl Rules {
             raw.map_or(TOP_ERROR, |raw| raw.to_le_bytes()[2])
         };
         let radius = |spacing_m: f64| {
-            filled(1 << 16, |apart| {
+            filled(|apart| {
                 let rise_m = apart as f64 * step_m;
                 let radius_m = (spacing_m * spacing_m + rise_m * rise_m).sqrt() * RADIUS_MARGIN;
                 let raw = codec.encode(1, 0.0, VertexClass::Plain, 0.0, radius_m);
@@ -54,23 +54,22 @@ impl Rules {
             })
         };
         Self {
-            step: filled(1 << 17, error),
+            step: filled(error),
             radius: grid.spacing_m().map(radius),
             slope: (0..grid.k()).map(slope).collect(),
         }
     }
 
-    /// Error code of a vertex alone, by how far twice its height is from the sum of the heights at its edge's ends.
+    /// Error codes of vertices alone, by how far twice their height is from the sum of the heights at their edge's ends.
     #[inline(always)]
-    pub(crate) fn step(&self, apart: i32) -> u8 {
-        self.step[apart.unsigned_abs() as usize & ((1 << 17) - 1)]
+    pub(crate) fn steps(&self) -> &[u8; 1 << 17] {
+        &self.step
     }
 
-    /// Radius code of a vertex of level 1 by its largest differences to its children beside it, and north and south.
+    /// Radius codes that vertices of level 1 have for their largest differences to children beside them (0), or north and south (1).
     #[inline(always)]
-    pub(crate) fn radius(&self, beside: i32, along: i32) -> u8 {
-        let code = |axis: usize, apart: i32| self.radius[axis][apart as usize & 0xffff];
-        code(0, beside).max(code(1, along))
+    pub(crate) fn radii(&self, axis: usize) -> &[u8; 1 << 16] {
+        &self.radius[axis]
     }
 
     /// Radius codes that slopes make at an octave.
@@ -82,22 +81,24 @@ impl Rules {
 /// Place of a difference among those of [`Rules::slopes`].
 #[inline(always)]
 pub(crate) fn slope_place(apart: i32) -> usize {
-    let apart = apart.clamp(1, 65_535) as u32;
-    let octaves = apart.ilog2();
-    (octaves * SLOPE_STEPS + (apart << 4 >> octaves) % SLOPE_STEPS) as usize & 255
+    // Exponent and four bits behind the leading one; whole numbers this small are exact.
+    let bits = (apart.clamp(1, 65_535) as f32).to_bits() >> 19;
+    bits.wrapping_sub(127 * SLOPE_STEPS) as usize & 255
 }
 
 /// A rising function of 0.. with byte values, asked some 20 times for each value it has.
-fn filled(count: usize, code: impl Fn(usize) -> u8) -> Vec<u8> {
-    let mut table = Vec::with_capacity(count);
-    while table.len() < count {
-        let here = code(table.len());
-        let (mut same, mut other) = (table.len(), count);
+fn filled<const COUNT: usize>(code: impl Fn(usize) -> u8) -> Box<[u8; COUNT]> {
+    let mut table = Box::new([0; COUNT]);
+    let mut from = 0;
+    while from < COUNT {
+        let here = code(from);
+        let (mut same, mut other) = (from, COUNT);
         while same + 1 < other {
             let middle = (same + other) / 2;
             if code(middle) == here { same = middle } else { other = middle }
         }
-        table.resize(same + 1, here);
+        table[from..=same].fill(here);
+        from = same + 1;
     }
     table
 }
@@ -109,8 +110,13 @@ mod tests {
     #[test]
     fn tables_hold_what_is_asked_of_every_number() {
         let squares = |i: usize| ((i as f64).sqrt() / 2.0) as u8;
-        assert_eq!(filled(9000, squares), (0..9000).map(squares).collect::<Vec<_>>());
+        assert_eq!(filled::<9000>(squares).to_vec(), (0..9000).map(squares).collect::<Vec<_>>());
         assert_eq!(slope_place(0), 0);
+        for apart in 1..65_536u32 {
+            let octaves = apart.ilog2();
+            let part = (apart << 4 >> octaves) % SLOPE_STEPS;
+            assert_eq!(slope_place(apart as i32), (octaves * SLOPE_STEPS + part) as usize);
+        }
         assert_eq!(slope_place(65_535), 255);
         assert!((0..65_535).all(|apart| slope_place(apart) <= slope_place(apart + 1)));
     }

@@ -3,20 +3,22 @@
 //! Everything that reads a terrain reads this one: the header, directory, pages and imagery are those of the terrain file, at their places there, so that a record page that is read is checked
 //! against the directory's checksum, whatever it was unpacked from. What was appended since is there page by page, and is read as it is. Only what maps needs the terrain file itself.
 //!
-//! Invariant: memory is what the front of the file takes, and that of [`CACHE_BYTES`] of tiles. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
+//! Invariant: memory is what the front of the file takes, and tiles in a quarter of what the pool over it was given, [`MOST_CACHE_BYTES`] at most. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
 mod growth;
+mod records;
+#[cfg(feature = "testing")]
+mod stages;
 
 use super::appended::Appended;
 use super::cache::Cache;
-use super::coder::Decoder;
 use super::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, current_of, present_pages};
 use super::model::{DecodeTables, Model};
-use super::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
+use super::places::{LEAF_BYTES, TilePlace};
 use super::rules::Rules;
-use super::shape::{Groups, TileId, TileShape};
-use super::tile::{INERT, TileRecords};
-use super::walk::{Scratch, walk};
+use super::shape::Groups;
+use super::walk::Scratch;
+use super::wide::Width;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
 use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
@@ -24,14 +26,16 @@ use crate::file::header::{Header, INERT_PAGE};
 use crate::file::packed_end::{PackedEnd, from_file};
 use crate::file::source::Source;
 use crate::file::structure::inert_page;
-use crate::grid::order::point_of;
 use crate::grid::record::RecordKind;
 use std::path::Path;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::atomic::AtomicU64;
+use std::sync::{Mutex, OnceLock};
 
 const PAGE: u64 = PAGE_BYTES as u64;
-/// Tiles kept unpacked.
-const CACHE_BYTES: usize = 16 << 20;
+/// Bytes of tiles kept unpacked, at most, and where no pool of pages has said how many.
+const MOST_CACHE_BYTES: usize = 16 << 20;
+/// Part of a pool's memory that its tiles take, up to that.
+const TILES_SHARE: u64 = 4;
 /// Bytes of the whole that are unpacked at a time.
 const WHOLE_BYTES: usize = 256 << 10;
 /// First record page of a terrain file as a build leaves it.
@@ -67,6 +71,9 @@ pub(crate) struct PackedSource {
     tables: DecodeTables,
     cache: Cache,
     scratch: Mutex<Vec<Scratch>>,
+    width: Width,
+    /// Tiles that were unpacked.
+    unpacked: AtomicU64,
     /// Whether the whole may be unpacked for those who need it, and what came of that.
     lends_whole: bool,
     whole: OnceLock<Option<Vec<u8>>>,
@@ -138,8 +145,10 @@ impl PackedSource {
             tiles: (0..groups.leaves).map(|_| OnceLock::new()).collect(),
             rules: Rules::new(&header.grid, &header.scale),
             inert: inert_page(header.record_kind),
-            cache: Cache::new(CACHE_BYTES),
+            cache: Cache::new(MOST_CACHE_BYTES),
             scratch: Mutex::default(),
+            width: Width::best(),
+            unpacked: AtomicU64::new(0),
             lends_whole: false,
             whole: OnceLock::new(),
             root: OnceLock::new(),
@@ -180,121 +189,6 @@ impl PackedSource {
         #[cfg(not(feature = "files"))]
         bytes.chunks_mut(WHOLE_BYTES).enumerate().map(fill).collect::<Option<()>>()?;
         Some(bytes)
-    }
-
-    /// Where the tile directory's leaf `leaf` says its tiles lie.
-    fn leaf(&self, leaf: usize) -> Result<&[TilePlace], LayoutError> {
-        let known = &self.tiles[leaf];
-        if let Some(places) = known.get() {
-            return Ok(places);
-        }
-        let count = self.leaf_sizes[leaf];
-        let (offset, sum) = self.tile_leaves[leaf];
-        let mut places = vec![TilePlace::default(); count];
-        if offset > 0 {
-            let damaged = |problem: &str| {
-                LayoutError::damaged_terrain(self.path(), format!("tile directory leaf {leaf}"), problem)
-            };
-            let mut bytes = vec![0; count * PLACE_BYTES];
-            let end = offset.checked_add(bytes.len() as u64);
-            if end.is_none_or(|end| end > self.container.packed_bytes) {
-                return Err(damaged("it lies outside the file"));
-            }
-            self.inner.read_at(offset, &mut bytes)?;
-            if checksum(&bytes) != sum {
-                return Err(damaged("the checksum does not match"));
-            }
-            places.iter_mut().enumerate().for_each(|(i, place)| *place = TilePlace::read(&bytes, i));
-        }
-        let _ = known.set(places.into());
-        known.get().map(|places| &**places).ok_or_else(|| odd(self.path(), "tile directory"))
-    }
-
-    /// The records of a tile down to octave `finest`, counted from its own finest; `None` if they are all inert.
-    fn tile(&self, id: TileId, finest: u32) -> Result<Option<Arc<TileRecords>>, LayoutError> {
-        let Some((leaf, within)) = self.groups.leaf_of(id) else { return Ok(None) };
-        if let Some(tile) = self.cache.get(id, finest) {
-            return Ok(Some(tile));
-        }
-        let place = self.leaf(leaf)?[within];
-        if !place.is_present() {
-            return Ok(None);
-        }
-        let shape = self.groups.shape(id);
-        let segments = TileShape::segment_of(finest.min(shape.tile_log.saturating_sub(1))) + 1;
-        let tile = Arc::new(self.unpack(id, &shape, &place, segments)?);
-        self.cache.put(id, Arc::clone(&tile));
-        Ok(Some(tile))
-    }
-
-    /// Reads and unpacks a tile.
-    fn unpack(
-        &self,
-        id: TileId,
-        shape: &TileShape,
-        place: &TilePlace,
-        segments: usize,
-    ) -> Result<TileRecords, LayoutError> {
-        let damaged = |problem: &str| {
-            let [x, y] = id.at;
-            let stride = 1u64 << shape.stride_log;
-            LayoutError::damaged_terrain(self.path(), format!("tile {x}, {y} of stride {stride}"), problem)
-        };
-        let mut bytes = vec![0; place.bytes(segments)];
-        if place.offset.saturating_add(bytes.len() as u64) > self.container.packed_bytes {
-            return Err(damaged("it lies outside the file"));
-        }
-        self.inner.read_at(place.offset, &mut bytes)?;
-        let mut decoders = Vec::with_capacity(segments);
-        let mut rest = &bytes[..];
-        for s in 0..segments {
-            let (segment, after) = rest.split_at(place.lengths[s].into());
-            if checksum(segment) != place.checksums[s] {
-                return Err(damaged("the checksum does not match"));
-            }
-            let wrong = || damaged("it holds something else than a tile");
-            decoders.push(Decoder::new(&self.tables, segment).ok_or_else(wrong)?);
-            rest = after;
-        }
-        let scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut scratch = scratch.unwrap_or_default();
-        let records = walk(shape, &self.rules, &mut scratch, &mut decoders, None);
-        self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
-        if decoders.iter().all(Decoder::finish) {
-            Ok(records)
-        } else {
-            Err(damaged("it holds something else than a tile"))
-        }
-    }
-
-    /// Fills a record page.
-    fn record_page(&self, logical: u32, page: &mut Page) -> Result<(), LayoutError> {
-        let k = self.header.grid.k();
-        let mut near: Vec<(TileId, Option<Arc<TileRecords>>)> = Vec::new();
-        let first = u64::from(logical) * self.header.records_per_page();
-        for (slot, place) in (first..).zip(page.as_chunks_mut::<4>().0) {
-            let mut record = INERT;
-            if let Some(p) = point_of(k, slot) {
-                let octave = self.groups.octave(p);
-                let (id, at) = self.groups.tile_of(p, octave);
-                let finest = octave.saturating_sub(self.groups.groups[usize::from(id.group)].stride_log);
-                let is_it = |(known, tile): &(TileId, Option<Arc<TileRecords>>)| {
-                    *known == id && tile.as_ref().is_none_or(|tile| tile.finest <= finest)
-                };
-                let found = match near.iter().position(is_it) {
-                    Some(found) => found,
-                    None => {
-                        near.push((id, self.tile(id, finest)?));
-                        near.len() - 1
-                    }
-                };
-                record = near[found].1.as_ref().map_or(INERT, |tile| tile.at(at));
-                // The next vertex is likely to be in the same tile.
-                near.swap(0, found);
-            }
-            *place = record.to_le_bytes();
-        }
-        Ok(())
     }
 
     /// One page of the terrain file, of those that are packed.
@@ -364,6 +258,12 @@ impl Source for PackedSource {
 
     fn packed_bytes(&self) -> Option<u64> {
         Some(self.end.end)
+    }
+
+    fn take_share(&self, cache_bytes: u64) -> u64 {
+        let share = (cache_bytes / TILES_SHARE).min(MOST_CACHE_BYTES as u64);
+        self.cache.set_most_bytes(share as usize);
+        share
     }
 
     fn bytes(&self) -> Option<&[u8]> {

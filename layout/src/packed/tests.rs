@@ -7,6 +7,7 @@ use super::shape::{SEGMENTS, TileShape};
 use super::tile::{INERT, TileRecords};
 use super::token::TOKENS;
 use super::walk::{Scratch, walk};
+use super::wide::Width;
 use crate::grid::Grid;
 use crate::grid::record::RecordScale;
 use crate::mix::Random;
@@ -72,6 +73,19 @@ fn given(shape: &TileShape, records: &TileRecords, finest: u32) -> Vec<([u32; 2]
     .collect()
 }
 
+/// A tile by one way of reading, and whether its segments were used up.
+fn read(
+    width: Width,
+    shape: &TileShape,
+    rules: &Rules,
+    tables: &DecodeTables,
+    segments: &[Vec<u8>],
+) -> (TileRecords, bool) {
+    let mut decoders: Vec<_> = segments.iter().map(|bytes| Decoder::new(tables, bytes).unwrap()).collect();
+    let found = width.read(shape, rules, &mut Scratch::default(), &mut decoders);
+    (found, decoders.iter().all(Decoder::finish))
+}
+
 fn shapes() -> impl Strategy<Value = TileShape> {
     (prop_oneof![Just(0u32), Just(3), Just(6)], 1u32..=6, any::<bool>(), any::<[bool; 2]>()).prop_map(
         |(stride_log, tile_log, is_top, is_last)| TileShape {
@@ -102,6 +116,11 @@ proptest! {
                 segments[..count].iter().map(|bytes| Decoder::new(&tables, bytes).unwrap()).collect();
             let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
             prop_assert!(decoders.iter().all(|decoder| decoder.finish()));
+            for width in Width::all() {
+                let (other, is_whole) = read(width, &shape, &rules, &tables, &segments[..count]);
+                prop_assert!(is_whole && other.finest == found.finest);
+                prop_assert_eq!(given(&shape, &other, found.finest), given(&shape, &found, found.finest));
+            }
             let finest = ((SEGMENTS - count) as u32).min(shape.tile_log);
             prop_assert_eq!(found.finest, finest);
             prop_assert_eq!(given(&shape, &found, finest), given(&shape, &truth, finest));
@@ -136,10 +155,11 @@ proptest! {
                 _ => segment.extend(&bytes),
             }
         }
-        let decoders: Vec<_> = segments.iter().map_while(|bytes| Decoder::new(&tables, bytes)).collect();
-        if !decoders.is_empty() {
-            let mut decoders = decoders;
-            walk(&shape, &rules, &mut Scratch::default(), &mut decoders, None);
+        let segments: Vec<_> = segments.into_iter().take_while(|bytes| Decoder::new(&tables, bytes).is_some()).collect();
+        if !segments.is_empty() {
+            let found = Width::all().into_iter().map(|width| read(width, &shape, &rules, &tables, &segments));
+            let found: Vec<_> = found.collect();
+            prop_assert!(found.iter().all(|other| *other == found[0]));
         }
     }
 }

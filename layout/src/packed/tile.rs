@@ -1,47 +1,86 @@
-//! A tile as its vertices' records in rows.
+//! The records of a tile, octave by octave.
+//!
+//! Of an octave of m x m cells come its whites, then those on edges that run east, then the others, each row by row: the order in which they are coded. So what a tile unpacks to is written from front to
+//! back, and a place has its index by arithmetic.
 
 use super::shape::TileShape;
 
 /// The record of an inert vertex.
 pub(crate) const INERT: u32 = 0xff00_0000;
 
-/// Records of a tile, down to some octave. Those that the tile does not give are inert ones, or whatever else.
+/// Records of a tile, down to some octave. Those that the tile does not give are whatever they are.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct TileRecords {
-    /// The finest octave there is.
+    /// The finest octave there is, counted from the tile's own finest.
     pub(crate) finest: u32,
-    side: usize,
+    tile_log: u32,
     records: Vec<u32>,
+}
+
+/// Where the vertices that refine `m` cells a side begin: behind those of the coarser lattice.
+const fn first_of(m: usize) -> usize {
+    (m + 1) * (m + 1)
+}
+
+/// Index of a place, in steps of a tile of 2^`tile_log` steps.
+#[inline(always)]
+pub(crate) const fn index_of(tile_log: u32, [x, y]: [u32; 2]) -> usize {
+    let octave = (x | y).trailing_zeros();
+    if octave >= tile_log {
+        return (x >> tile_log) as usize + 2 * (y >> tile_log) as usize;
+    }
+    let m = 1 << (tile_log - octave - 1);
+    let (x, y) = ((x >> octave) as usize, (y >> octave) as usize);
+    let (i, j) = (x / 2, y / 2);
+    first_of(m)
+        + match (x % 2, y % 2) {
+            (1, 1) => j * m + i,
+            (1, _) => m * m + j * m + i,
+            _ => m * m + m * (m + 1) + j * (m + 1) + i,
+        }
 }
 
 impl TileRecords {
     /// All inert, down to octave `finest`, counted from the tile's own finest.
     pub(crate) fn inert(shape: &TileShape, finest: u32) -> Self {
         let finest = finest.min(shape.tile_log);
-        let side = (1 << (shape.tile_log - finest)) + 1;
-        Self { finest, side, records: vec![INERT; side * side] }
+        let count = first_of(1 << (shape.tile_log - finest));
+        Self { finest, tile_log: shape.tile_log, records: vec![INERT; count] }
     }
 
     /// As [`TileRecords::inert`], of what `record` says of every vertex in steps of the tile.
     pub(crate) fn from_fn(shape: &TileShape, mut record: impl FnMut([u32; 2]) -> u32) -> Self {
-        let side = (1 << shape.tile_log) + 1;
-        let records = (0..side * side).map(|i| record([(i % side) as u32, (i / side) as u32])).collect();
-        Self { finest: 0, side, records }
+        let mut all = Self::inert(shape, 0);
+        let side = 0..=1 << shape.tile_log;
+        side.clone().for_each(|y| side.clone().for_each(|x| all.set([x, y], record([x, y]))));
+        all
     }
 
-    /// The record at a place in steps of the tile.
+    /// The record at a place in steps of the tile; an inert one if it is finer than what there is.
     #[inline(always)]
     pub(crate) fn at(&self, at: [u32; 2]) -> u32 {
-        let [x, y] = at.map(|v| (v >> self.finest) as usize);
-        self.records.get(y * self.side + x).copied().unwrap_or(INERT)
+        self.records.get(index_of(self.tile_log, at)).copied().unwrap_or(INERT)
     }
 
-    #[inline(always)]
     pub(crate) fn set(&mut self, at: [u32; 2], record: u32) {
-        let [x, y] = at.map(|v| (v >> self.finest) as usize);
-        if let Some(place) = self.records.get_mut(y * self.side + x) {
+        if let Some(place) = self.records.get_mut(index_of(self.tile_log, at)) {
             *place = record;
         }
+    }
+
+    /// All records, by [`index_of`].
+    pub(crate) fn all(&self) -> &[u32] {
+        &self.records
+    }
+
+    /// The vertices that refine `m` cells a side; none if they are finer than what there is.
+    pub(crate) fn refining(&self, m: usize) -> &[u32] {
+        self.records.get(first_of(m)..first_of(2 * m)).unwrap_or_default()
+    }
+
+    /// As [`TileRecords::refining`].
+    pub(crate) fn refining_mut(&mut self, m: usize) -> &mut [u32] {
+        self.records.get_mut(first_of(m)..first_of(2 * m)).unwrap_or_default()
     }
 
     /// Bytes it takes.
@@ -64,5 +103,23 @@ impl TileRecords {
             };
             !is_given || self.at([x, y]) == INERT
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_place_has_an_index_of_its_own() {
+        for tile_log in 0..=6 {
+            let shape = TileShape { stride_log: 0, tile_log, is_top: true, is_last: [true; 2] };
+            let tile = TileRecords::from_fn(&shape, |[x, y]| y << 8 | x);
+            let side = 0..=1 << tile_log;
+            for [x, y] in side.clone().flat_map(|y| side.clone().map(move |x| [x, y])) {
+                assert_eq!(tile.at([x, y]), y << 8 | x);
+            }
+            assert_eq!(tile.all().len(), ((1 << tile_log) + 1) * ((1 << tile_log) + 1));
+        }
     }
 }

@@ -11,9 +11,10 @@ use super::coder::Coder;
 use super::model::{HEIGHT_CLASSES, HEIGHTS};
 use super::plane::Lattices;
 use super::rules::{Rules, TOP_ERROR};
-use super::shape::TileShape;
+use super::shape::{TILE_LOG, TileShape};
 use super::tile::{INERT, TileRecords};
 use super::token::{folded, unfolded};
+use std::ops::Range;
 
 /// What a vertex is.
 const ORDINARY: u8 = 0;
@@ -22,24 +23,47 @@ const IS_FRINGE: u8 = 2;
 /// First error code of fringe vertices.
 const FRINGE_CODE: u8 = 248;
 
-/// What a thread keeps from tile to tile.
-#[derive(Debug, Default)]
+/// Most vertices of an octave of a tile.
+const MOST: usize = {
+    let m = 1 << (TILE_LOG - 1);
+    m * m + 2 * m * (m + 1)
+};
+
+/// What a thread keeps from tile to tile: flat rows have room for the vertices of an octave, whites first, then those on edges that run east, then the others.
+#[derive(Debug)]
 pub(crate) struct Scratch {
     heights: Lattices<i32>,
     errors: Lattices<u8>,
     radii: Lattices<u8>,
-    /// Of the octave's vertices, whites first, then those on edges that run east, then the others.
+    /// Of octaves that have others than ordinary ones.
     kinds: Vec<u8>,
     flat_heights: Vec<i32>,
     flat_errors: Vec<u8>,
     flat_radii: Vec<u8>,
     contexts: Vec<u8>,
-    most_errors: Vec<u8>,
-    radius_contexts: Vec<u8>,
-    least_radii: Vec<u8>,
+    values: Vec<u16>,
+    codes: codes::Rows,
     chosen: Vec<u32>,
     chosen_contexts: Vec<u8>,
-    values: Vec<u16>,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self {
+            heights: Lattices::default(),
+            errors: Lattices::default(),
+            radii: Lattices::default(),
+            kinds: vec![0; MOST],
+            flat_heights: vec![0; MOST],
+            flat_errors: vec![0; MOST],
+            flat_radii: vec![0; MOST],
+            contexts: vec![0; MOST],
+            values: vec![0; MOST],
+            codes: codes::Rows::default(),
+            chosen: Vec::with_capacity(MOST),
+            chosen_contexts: Vec::with_capacity(MOST),
+        }
+    }
 }
 
 /// One octave of a tile.
@@ -65,11 +89,8 @@ impl Octave {
         self.whites() + 2 * self.easts()
     }
 
-    /// Place of a vertex in steps of the tile.
-    #[inline(always)]
-    fn place(&self, i: usize) -> [u32; 2] {
-        let [x, y] = self.lattice_place(i);
-        [(x as u32) << self.octave, (y as u32) << self.octave]
+    fn blacks(&self) -> Range<usize> {
+        self.whites()..self.count()
     }
 
     #[inline(always)]
@@ -95,6 +116,7 @@ impl Octave {
 }
 
 /// Takes a tile's values through `segments`, as many as there are. Reading makes `truth` out of nothing; writing gives the records, which come out as they went in.
+#[inline(always)]
 pub(crate) fn walk<C: Coder>(
     shape: &TileShape,
     rules: &Rules,
@@ -110,19 +132,22 @@ pub(crate) fn walk<C: Coder>(
     for octave in (finest..shape.tile_log).rev() {
         let m = 1usize << (shape.tile_log - octave - 1);
         let Some(coder) = segments.get_mut(TileShape::segment_of(octave)) else { break };
+        let is_finest = octave == finest;
         let octave = Octave { octave, m, is_last: shape.is_last };
-        scratch.heights.begin(m);
         scratch.heights.ring_coarse(m);
         if octave.octave < shape.delivered() {
             if octave.octave + 1 == shape.delivered() {
                 scratch.errors.coarse.fill(m + 1, m + 1, TOP_ERROR);
                 scratch.radii.coarse.fill(m + 1, m + 1, 0);
             }
-            deliver(shape, rules, scratch, coder, truth, &octave, &mut records);
+            deliver(shape, rules, scratch, coder, truth, &octave, is_finest, &mut records);
         } else {
-            heights(scratch, coder, truth, &octave, 3, false);
+            heights(scratch, coder, truth.map(|truth| truth.refining(m)), &octave, 3, false);
         }
-        scratch.heights.merge(m);
+        if !is_finest {
+            let (east, north) = scratch.flat_heights[octave.blacks()].split_at(octave.easts());
+            scratch.heights.merge(m, east, north);
+        }
     }
     records
 }
@@ -162,6 +187,8 @@ fn some_height(shape: &TileShape, truth: &TileRecords) -> u16 {
 }
 
 /// An octave of which the tile gives the records.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "the walk's own, taken apart")]
 fn deliver<C: Coder>(
     shape: &TileShape,
     rules: &Rules,
@@ -169,140 +196,126 @@ fn deliver<C: Coder>(
     coder: &mut C,
     truth: Option<&TileRecords>,
     octave: &Octave,
+    is_finest: bool,
     records: &mut TileRecords,
 ) {
-    let (m, count) = (octave.m, octave.count());
-    for flat in [&mut scratch.kinds, &mut scratch.flat_errors, &mut scratch.flat_radii] {
-        flat.clear();
-        flat.resize(count, 0);
-    }
+    let truth = truth.map(|truth| truth.refining(octave.m));
     let is_special = special::kinds(scratch, coder, truth, octave);
     if is_special {
         special::fringe(scratch, coder, truth, octave);
     }
-    let coded = octave.octave.min(3) as usize;
-    heights(scratch, coder, truth, octave, coded, is_special);
-    scratch.errors.begin(m);
-    scratch.radii.begin(m);
+    heights(scratch, coder, truth, octave, octave.octave.min(3) as usize, is_special);
     if shape.stride_log + octave.octave == 0 {
-        codes::derived(rules, scratch, octave);
-        special::others(scratch, coder, truth, octave);
+        codes::derived(rules, scratch, octave, is_special);
+        special::others(scratch, coder, truth, octave, is_special);
     } else {
         codes::coded(rules, scratch, coder, truth, octave, shape.stride_log + octave.octave, is_special);
     }
-    store(scratch, octave, records);
-    if octave.octave > 0 {
+    store(scratch, records.refining_mut(octave.m));
+    if !is_finest {
         unknown_border(scratch, octave);
-        scratch.errors.merge(m);
-        scratch.radii.merge(m);
+        let (m, easts) = (octave.m, octave.easts());
+        let (east, north) = scratch.flat_errors[octave.blacks()].split_at(easts);
+        scratch.errors.merge(m, east, north);
+        let (east, north) = scratch.flat_radii[octave.blacks()].split_at(easts);
+        scratch.radii.merge(m, east, north);
     }
 }
 
 /// All heights of an octave: whites, then blacks.
+#[inline(always)]
 fn heights<C: Coder>(
     scratch: &mut Scratch,
     coder: &mut C,
-    truth: Option<&TileRecords>,
+    truth: Option<&[u32]>,
     octave: &Octave,
     coded: usize,
     is_special: bool,
 ) {
-    let (m, whites, count) = (octave.m, octave.whites(), octave.count());
-    scratch.flat_heights.resize(count, 0);
-    scratch.contexts.resize(count.max(scratch.contexts.len()), 0);
+    let (m, whites) = (octave.m, octave.whites());
     let first = HEIGHTS + 2 * coded as u16 * HEIGHT_CLASSES;
-    let classes = &mut scratch.contexts[..count];
-    scratch.heights.predict_whites(m, &mut scratch.flat_heights[..whites], &mut classes[..whites]);
-    residuals(scratch, coder, truth, octave, 0..whites, first, is_special);
-    for (j, row) in scratch.flat_heights[..whites].chunks_exact(m).enumerate() {
-        scratch.heights.whites.row_mut(0, j as isize, m).copy_from_slice(row);
-    }
-    scratch.heights.ring_whites(m);
-    let classes = &mut scratch.contexts[whites..count];
-    scratch.heights.predict_blacks(m, &mut scratch.flat_heights[whites..], classes);
-    residuals(scratch, coder, truth, octave, whites..count, first + HEIGHT_CLASSES, is_special);
-    let (east, north) = scratch.flat_heights[whites..].split_at(octave.easts());
-    for (j, row) in east.chunks_exact(m).enumerate() {
-        scratch.heights.east.row_mut(0, j as isize, m).copy_from_slice(row);
-    }
-    for (j, row) in north.chunks_exact(m + 1).enumerate() {
-        scratch.heights.north.row_mut(0, j as isize, m + 1).copy_from_slice(row);
-    }
+    let Scratch { heights, flat_heights, contexts, .. } = scratch;
+    heights.predict_whites(m, &mut flat_heights[..whites], &mut contexts[..whites]);
+    residuals(scratch, coder, truth, 0..whites, first, is_special);
+    let Scratch { heights, flat_heights, contexts, .. } = scratch;
+    heights.take_whites(m, &flat_heights[..whites]);
+    heights.ring_whites(m);
+    heights.predict_blacks(m, &mut flat_heights[octave.blacks()], &mut contexts[octave.blacks()]);
+    residuals(scratch, coder, truth, octave.blacks(), first + HEIGHT_CLASSES, is_special);
 }
 
 /// Makes heights of what was predicted for some vertices. Those that are inert have none.
+#[inline(always)]
 fn residuals<C: Coder>(
     scratch: &mut Scratch,
     coder: &mut C,
-    truth: Option<&TileRecords>,
-    octave: &Octave,
-    range: std::ops::Range<usize>,
+    truth: Option<&[u32]>,
+    range: Range<usize>,
     first: u16,
     is_special: bool,
 ) {
     let Scratch { flat_heights, contexts, kinds, values, chosen, chosen_contexts, .. } = scratch;
-    let true_residual = |i: usize, predicted: i32| {
-        let record = truth.map_or(INERT, |truth| truth.at(octave.place(i)));
+    let (heights, contexts) = (&mut flat_heights[range.clone()], &contexts[range.clone()]);
+    let truth = truth.map(|truth| &truth[range.clone()]);
+    let true_residual = |record: u32, predicted: i32| {
         let height = if record == INERT { predicted.clamp(0, 0xffff) } else { (record & 0xffff) as i32 };
         folded(height - predicted)
     };
     if is_special {
+        let kinds = &kinds[range];
         chosen.clear();
-        chosen.extend(range.clone().filter(|i| kinds[*i] != IS_INERT).map(|i| i as u32));
+        chosen.extend((0..kinds.len()).filter(|i| kinds[*i] != IS_INERT).map(|i| i as u32));
         chosen_contexts.clear();
         chosen_contexts.extend(chosen.iter().map(|i| contexts[*i as usize]));
-        values.resize(chosen.len(), 0);
-        if truth.is_some() {
+        let values = &mut values[..chosen.len()];
+        if let Some(truth) = truth {
             for (value, i) in values.iter_mut().zip(&*chosen) {
-                *value = true_residual(*i as usize, flat_heights[*i as usize]);
+                *value = true_residual(truth[*i as usize], heights[*i as usize]);
             }
         }
         coder.values(first, chosen_contexts, values);
-        for i in range.filter(|i| kinds[*i] == IS_INERT) {
-            flat_heights[i] = flat_heights[i].clamp(0, 0xffff);
+        for (height, _) in heights.iter_mut().zip(kinds).filter(|(_, kind)| **kind == IS_INERT) {
+            *height = (*height).clamp(0, 0xffff);
         }
         for (i, value) in chosen.iter().zip(&*values) {
-            let height = &mut flat_heights[*i as usize];
+            let height = &mut heights[*i as usize];
             *height = (*height + unfolded(*value)) & 0xffff;
         }
         return;
     }
-    values.resize(range.len(), 0);
-    if truth.is_some() {
-        for (value, i) in values.iter_mut().zip(range.clone()) {
-            *value = true_residual(i, flat_heights[i]);
+    let values = &mut values[..heights.len()];
+    if let Some(truth) = truth {
+        for ((value, height), record) in values.iter_mut().zip(&*heights).zip(truth) {
+            *value = true_residual(*record, *height);
         }
     }
-    coder.values(first, &contexts[range.clone()], values);
-    for (height, value) in flat_heights[range].iter_mut().zip(&*values) {
+    coder.values(first, contexts, values);
+    for (height, value) in heights.iter_mut().zip(&*values) {
         *height = (*height + unfolded(*value)) & 0xffff;
     }
 }
 
-/// Puts an octave's records where they belong.
-fn store(scratch: &Scratch, octave: &Octave, records: &mut TileRecords) {
-    for i in 0..octave.count() {
-        if octave.is_given(i) {
-            let (error, radius) = (scratch.flat_errors[i], scratch.flat_radii[i]);
-            let height = scratch.flat_heights[i] as u16;
-            let [low, high] = if (error, radius) == (0, 255) { [0; 2] } else { height.to_le_bytes() };
-            records.set(octave.place(i), u32::from_le_bytes([low, high, error, radius]));
-        }
+/// Puts an octave's records together.
+#[inline(always)]
+fn store(scratch: &Scratch, records: &mut [u32]) {
+    let codes = scratch.flat_errors.iter().zip(&scratch.flat_radii);
+    for ((record, height), (error, radius)) in records.iter_mut().zip(&scratch.flat_heights).zip(codes) {
+        let codes = u32::from(*error) << 16 | u32::from(*radius) << 24;
+        *record = if codes == INERT { INERT } else { *height as u32 & 0xffff | codes };
     }
 }
 
 /// What another tile gives is not known here.
+#[inline(always)]
 fn unknown_border(scratch: &mut Scratch, octave: &Octave) {
-    let m = octave.m;
-    let (errors, radii) = (&mut scratch.errors, &mut scratch.radii);
-    if !octave.is_last[1] {
-        errors.east.row_mut(0, m as isize, m).fill(TOP_ERROR);
-        radii.east.row_mut(0, m as isize, m).fill(0);
-    }
-    if !octave.is_last[0] {
-        for j in 0..m as isize {
-            errors.north.set(m as isize, j, TOP_ERROR);
-            radii.north.set(m as isize, j, 0);
+    let Scratch { flat_errors, flat_radii, .. } = scratch;
+    for (flat, unknown) in [(flat_errors, TOP_ERROR), (flat_radii, 0)] {
+        let (east, north) = flat[octave.blacks()].split_at_mut(octave.easts());
+        if !octave.is_last[1] {
+            east[octave.m * octave.m..].fill(unknown);
+        }
+        if !octave.is_last[0] {
+            north.chunks_exact_mut(octave.m + 1).for_each(|row| row[octave.m] = unknown);
         }
     }
 }

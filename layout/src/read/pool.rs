@@ -41,11 +41,12 @@ pub struct PagePool<C> {
 }
 
 impl<C: RecordCodec> PagePool<C> {
-    /// A pool for `terrain` of at most `cache_bytes`, 72 KiB at the least, holding page 0. Reads that page.
+    /// A pool for `terrain` of at most `cache_bytes`, 72 KiB at the least, holding page 0. Reads that page. Over packed terrain up to a quarter of them is for what pages are unpacked from.
     ///
     /// # Errors
     /// As [`Terrain::checked_page`].
     pub fn new(terrain: &Terrain, shape: RecordShape<C>, cache_bytes: u64) -> Result<Self, LayoutError> {
+        let cache_bytes = cache_bytes - terrain.source().take_share(cache_bytes).min(cache_bytes);
         let most = terrain.entries().len() + STAYING;
         let capacity = usize::try_from(cache_bytes / PAGE_BYTES as u64).unwrap_or(usize::MAX);
         let capacity = capacity.clamp(STAYING + LEAST_PAGES, most.max(STAYING + LEAST_PAGES));

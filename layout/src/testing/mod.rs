@@ -7,6 +7,7 @@
 //! | [`Sealed`] | a terrain file, and perhaps an overlay over it, mutated and sealed by a recipe of mutations |
 //! | [`mutate_packed`], [`reseal_packed`] | the same for packed files |
 //! | [`seeds`], [`packed_seeds`] | small sound files to begin with |
+//! | `Stages`, `Way` | what unpacking is made of, to be measured |
 //! | [`exercise`] | everything that this crate does with a file |
 //!
 //! Invariant: mutating and sealing never panic or take long, whatever the bytes; equal recipes give equal files. Cost: a few checksums of the file.
@@ -20,6 +21,8 @@ mod seal;
 mod sealed;
 mod seeds;
 
+#[cfg(feature = "testing")]
+pub use crate::packed::stages::{Stages, Way};
 pub use exercise::exercise;
 pub use mutation::Mutation;
 pub use packed::{mutate_packed, reseal_packed};

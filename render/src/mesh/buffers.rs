@@ -111,13 +111,6 @@ impl MeshBuffers {
         let index_capacity =
             self.capacity("the mesh's triangles", self.indices.size(), triangle_end * TRIANGLE_BYTES)?;
         let bytes = 4 * self.packer.words.len() as u64;
-        if bytes + 16 > self.limit_bytes {
-            return Err(RenderError::TooLarge {
-                what: "a single patch",
-                needed_bytes: bytes,
-                limit_bytes: self.limit_bytes,
-            });
-        }
         let slots = self.triangle_slots.max(u32::try_from(triangle_end).unwrap_or(u32::MAX));
         self.draws.set(patch.draws, slots)?;
         self.triangle_slots = slots;
@@ -156,11 +149,10 @@ impl MeshBuffers {
             (vertices, &self.packer.words[..vertex_words], VERTEX_WORDS, &self.scatter_vertices),
             (triangles, &self.packer.words[vertex_words..], TRIANGLE_WORDS, &self.scatter_triangles),
         ] {
-            // A dispatch has at most so many groups along x; a whole mesh may take several.
-            let most = self.limit_groups.saturating_mul(WORKGROUP).min(1 << 24) as usize;
             if count == 0 {
                 continue;
             }
+            let most = entries_a_dispatch(self.limit_groups, self.limit_bytes, entry_words);
             for part in words.chunks(most * entry_words) {
                 // A buffer of its own, so that several patches may lie in one submission.
                 let upload = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -207,6 +199,12 @@ impl MeshBuffers {
     }
 }
 
+/// Entries of a patch that one dispatch can take: it has at most so many groups along x, and what it reads is bound as one buffer. A whole mesh may take several.
+fn entries_a_dispatch(limit_groups: u32, limit_bytes: u64, entry_words: usize) -> usize {
+    let by_groups = u64::from(limit_groups.saturating_mul(WORKGROUP).min(1 << 24));
+    by_groups.min(limit_bytes / (4 * entry_words as u64)).max(1) as usize
+}
+
 #[derive(Clone, Copy)]
 enum Kind {
     Vertices,
@@ -238,4 +236,20 @@ fn grow(
     let new = create(device, kind, size);
     encoder.copy_buffer_to_buffer(old, 0, &new, 0, old.size());
     new
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_part_of_a_patch_is_larger_than_what_a_device_binds() {
+        for limit_bytes in [36, 1 << 16, 1 << 27, 1 << 31] {
+            for entry_words in [VERTEX_WORDS, TRIANGLE_WORDS] {
+                let most = entries_a_dispatch(65_535, limit_bytes, entry_words) as u64;
+                assert!(most >= 1 && most * 4 * entry_words as u64 <= limit_bytes);
+                assert!(most <= 65_535 * 64);
+            }
+        }
+    }
 }

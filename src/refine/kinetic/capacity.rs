@@ -19,6 +19,10 @@ pub(super) fn settle<T: Copy + Send + 'static>(list: &mut Vec<T>, used: usize) {
     let bytes = list.capacity() * size_of::<T>();
     if bytes > SMALL_BYTES && used < list.capacity() / UNUSED {
         let least = (4 * used).max(SMALL_BYTES / size_of::<T>());
+        // What is in use now is given back by the next frame.
+        if list.len() > list.capacity() / 2 {
+            return;
+        }
         if bytes < LARGE_BYTES {
             return list.shrink_to(least);
         }
@@ -28,13 +32,22 @@ pub(super) fn settle<T: Copy + Send + 'static>(list: &mut Vec<T>, used: usize) {
     }
 }
 
+/// Gives back what an array holds beyond its length, if that is most of it: less than one part in `parts` is in use.
+pub(in crate::refine::kinetic) fn give_back<T: Copy + Send + 'static>(array: &mut Vec<T>, parts: usize) {
+    if array.capacity() * size_of::<T>() > LARGE_BYTES && array.len() < array.capacity() / parts {
+        let mut small = Vec::with_capacity(array.len() + array.len() / 8);
+        small.extend_from_slice(array);
+        give_up(std::mem::replace(array, small));
+    }
+}
+
 /// Gives memory back beside the frame: the system takes a millisecond for some ten megabytes.
 #[cfg(feature = "files")]
-fn give_up<T: Send + 'static>(list: Vec<T>) {
+pub(in crate::refine::kinetic) fn give_up<T: Send + 'static>(list: Vec<T>) {
     rayon::spawn(move || drop(list));
 }
 
 #[cfg(not(feature = "files"))]
-fn give_up<T>(list: Vec<T>) {
+pub(in crate::refine::kinetic) fn give_up<T>(list: Vec<T>) {
     drop(list);
 }

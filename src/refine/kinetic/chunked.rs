@@ -1,13 +1,13 @@
 //! An array that grows without moving: it is kept in chunks of equal length, so that no frame copies what the frames before have made.
 //!
-//! Invariant: all chunks but the last one are full. Cost: one more look-up an access, into a list of chunks that stays in the nearest cache.
+//! Invariant: all chunks but the last one in use are full. Cost: one more look-up an access, into a list of chunks that stays in the nearest cache.
 
 use terrasoar_layout::read::prefetch::prefetch;
 
 /// An array of `T` in chunks of 2^BITS elements.
 #[derive(Debug, Clone)]
 pub(crate) struct Chunked<T, const BITS: u32> {
-    /// All full but the last one.
+    /// All full but the last one, and those after it, which are empty.
     chunks: Vec<Vec<T>>,
     len: usize,
 }
@@ -33,6 +33,17 @@ impl<T: Copy, const BITS: u32> Chunked<T, BITS> {
         self.chunks[at >> BITS].push(value);
         self.len += 1;
         at
+    }
+
+    /// Takes all elements out; memory stays.
+    pub(crate) fn clear(&mut self) {
+        self.chunks.iter_mut().for_each(Vec::clear);
+        self.len = 0;
+    }
+
+    /// Takes out the chunks that hold nothing.
+    pub(crate) fn take_empty(&mut self) -> Vec<Vec<T>> {
+        self.chunks.split_off(self.len.div_ceil(1 << BITS))
     }
 
     /// Asks memory for an element, which may not be there.

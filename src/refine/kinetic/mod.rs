@@ -18,6 +18,7 @@
 mod capacity;
 mod chunked;
 mod frame;
+mod hands;
 mod mesh;
 mod time;
 
@@ -51,6 +52,8 @@ use time::queue::{Entry, Queue};
 
 /// Levels of the largest terrain.
 const LEVELS: usize = 32;
+/// Late vertices that are asked for their error in a frame whose time is bounded: evenly out of all that are late.
+const MOST_ASSESSED: usize = 8192;
 /// Sweeps of a queue in one frame.
 const MOST_SWEEPS: usize = 16;
 
@@ -96,6 +99,8 @@ pub struct Kinetic<S: RecordStore> {
     waiting: Vec<Entry>,
     patch: Patch,
     edits: Edits,
+    /// Whether arrays may hold more than the mesh needs, for it was larger before a jump.
+    is_roomy: bool,
     work: Work,
 }
 
@@ -132,6 +137,7 @@ impl<S: RecordStore> Kinetic<S> {
             waiting: Vec::new(),
             patch: Patch::default(),
             edits: Edits::default(),
+            is_roomy: false,
             work: Work::default(),
             records,
         }
@@ -200,16 +206,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     fn patch_vertex(&self, point: GridPoint, vertex: &Vertex, ends: [u32; 2]) -> MeshVertex {
-        let folded = self.records.grid().fold(point);
-        MeshVertex {
-            x: folded.x(),
-            y: folded.y(),
-            height_m: vertex.height_m as f32,
-            error_m: vertex.error_m as f32,
-            radius_m: vertex.radius_m as f32,
-            ends,
-            flags: if self.records.grid().is_corner(point) { MeshVertex::NO_LEVEL } else { level_of(point) },
-        }
+        MeshVertex::of(&self.records, point, vertex, ends)
     }
 
     /// The vertex of a node, from the record it holds.
@@ -219,7 +216,7 @@ impl<S: RecordStore> Kinetic<S> {
         self.records.decode(node.raw, level_of(node.point))
     }
 
-    /// Counts what is late and how far the largest error of it exceeds the tolerance.
+    /// Counts what is late and how far the largest error of it exceeds the tolerance. Where time counts, [`MOST_ASSESSED`] vertices at the most are asked for their error.
     fn assess_late(&mut self, metric: &Metric, view: &View) {
         let [dx, dy] = self.records.grid().spacing_m();
         let nearest_m = dx.min(dy);
@@ -231,12 +228,14 @@ impl<S: RecordStore> Kinetic<S> {
             let shows = sighting.is_selected() && !culled;
             if shows { sighting.error_px(view.tolerance_px, nearest_m) } else { 0.0 }
         };
-        let (mut late, mut late_error_px) = (0, 0.0f64);
+        let (mut late, mut late_error_px) = (0u64, 0.0f64);
+        let all = self.late.len() + self.to_split.iter().map(Vec::len).sum::<usize>();
+        let apart = if self.budget.time.is_some() { all.div_ceil(MOST_ASSESSED).max(1) as u64 } else { 1 };
         for node in
             self.late.iter().chain(self.to_split.iter().flatten()).filter(|node| self.nodes.is_live(**node))
         {
             late += 1;
-            if !self.nodes.is_split(*node) {
+            if late.is_multiple_of(apart) && !self.nodes.is_split(*node) {
                 late_error_px = late_error_px.max(error_px(*node));
             }
         }
@@ -277,6 +276,7 @@ impl<S: RecordStore> Kinetic<S> {
         settle(&mut self.patch.vertices, used);
         settle(&mut self.patch.triangles, used);
         self.edits.settle(self.nodes.clusters.taken());
+        self.give_back_room();
     }
 
     /// A record of the first page.
@@ -333,17 +333,22 @@ impl<S: RecordStore> Engine for Kinetic<S> {
         self.patch.clear();
         self.tell_edits();
         probe.phase(Phase::Scan);
-        if self.nodes.is_empty() {
-            self.plant(probe);
-        }
         self.take_arrivals();
         self.collect(pose, probe);
         let judge = Judge::new(metric, &self.clocks, self.culling == Culling::Vertices);
-        let mut allowance = Allowance::new(self.budget);
-        self.test_fresh(&judge, probe);
-        self.test_due(&judge, &mut allowance, probe);
-        probe.phase(Phase::Apply);
-        self.apply(&judge, &mut allowance, probe);
+        let is_planted = self.nodes.is_empty();
+        if is_planted {
+            self.plant(probe);
+        }
+        if is_planted && self.budget == Budget::default() {
+            self.build(&judge, probe);
+        } else {
+            let mut allowance = Allowance::new(self.budget);
+            self.test_fresh(&judge, probe);
+            self.test_due(&judge, &mut allowance, probe);
+            probe.phase(Phase::Apply);
+            self.apply(&judge, &mut allowance, probe);
+        }
         if !S::IS_COMPLETE {
             self.look(&judge);
         }

@@ -55,6 +55,10 @@ impl Source for LayeredSource<'_> {
         Some(self.base.packed_bytes()? + self.overlay.byte_count())
     }
 
+    fn take_share(&self, cache_bytes: u64) -> u64 {
+        self.base.take_share(cache_bytes)
+    }
+
     fn own_start(&self) -> u64 {
         self.split
     }

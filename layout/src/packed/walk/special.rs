@@ -3,7 +3,7 @@
 use super::{FRINGE_CODE, IS_FRINGE, IS_INERT, ORDINARY, Octave, Scratch};
 use crate::packed::coder::Coder;
 use crate::packed::model::{FRINGE_ERRORS, FRINGE_RADII, KINDS, OTHER_ERRORS, OTHER_RADII};
-use crate::packed::tile::{INERT, TileRecords};
+use crate::packed::tile::INERT;
 use crate::packed::token::{folded8, unfolded8};
 
 /// Kinds of an inert, fringe or ordinary vertex.
@@ -15,12 +15,11 @@ const OTHERS: u16 = KINDS + KIND_COUNT * KIND_COUNT;
 pub(super) fn kinds<C: Coder>(
     scratch: &mut Scratch,
     coder: &mut C,
-    truth: Option<&TileRecords>,
+    truth: Option<&[u32]>,
     octave: &Octave,
 ) -> bool {
     if let Some(truth) = truth {
-        for (i, kind) in scratch.kinds.iter_mut().enumerate() {
-            let record = truth.at(octave.place(i));
+        for ((i, kind), &record) in scratch.kinds.iter_mut().enumerate().zip(truth) {
             *kind = match record.to_le_bytes()[2] {
                 _ if record == INERT => IS_INERT,
                 FRINGE_CODE.. if octave.is_given(i) => IS_FRINGE,
@@ -28,7 +27,8 @@ pub(super) fn kinds<C: Coder>(
             };
         }
     }
-    let mut is_special = u16::from(scratch.kinds.iter().any(|kind| *kind != ORDINARY));
+    let is_any = truth.is_some() && scratch.kinds[..octave.count()].iter().any(|kind| *kind != ORDINARY);
+    let mut is_special = u16::from(is_any);
     coder.raw(1, &mut is_special);
     if is_special == 0 {
         return false;
@@ -44,8 +44,7 @@ pub(super) fn kinds<C: Coder>(
             _ => ORDINARY,
         };
     }
-    for (i, kind) in scratch.kinds.iter().enumerate().filter(|(_, kind)| **kind == IS_INERT) {
-        debug_assert_eq!(*kind, IS_INERT);
+    for i in (0..octave.count()).filter(|i| scratch.kinds[*i] == IS_INERT) {
         (scratch.flat_errors[i], scratch.flat_radii[i]) = (0, 255);
     }
     true
@@ -65,14 +64,9 @@ fn before(octave: &Octave, i: usize) -> [Option<usize>; 2] {
 }
 
 /// Codes of the fringe vertices, each after the one before it.
-pub(super) fn fringe<C: Coder>(
-    scratch: &mut Scratch,
-    coder: &mut C,
-    truth: Option<&TileRecords>,
-    octave: &Octave,
-) {
+pub(super) fn fringe<C: Coder>(scratch: &mut Scratch, coder: &mut C, truth: Option<&[u32]>, octave: &Octave) {
     let of: Vec<usize> = (0..octave.count()).filter(|i| scratch.kinds[*i] == IS_FRINGE).collect();
-    let codes = |i: usize| truth.map_or([0; 2], |truth| codes_of(truth.at(octave.place(i))));
+    let codes = |i: usize| truth.map_or([0; 2], |truth| codes_of(truth[i]));
     let mut last = 0;
     for (turn, &i) in of.iter().enumerate() {
         let [error, radius] = codes(i);
@@ -90,16 +84,19 @@ pub(super) fn fringe<C: Coder>(
 pub(super) fn others<C: Coder>(
     scratch: &mut Scratch,
     coder: &mut C,
-    truth: Option<&TileRecords>,
+    truth: Option<&[u32]>,
     octave: &Octave,
+    is_special: bool,
 ) {
-    let is_asked = |scratch: &Scratch, i: usize| scratch.kinds[i] == ORDINARY && octave.is_given(i);
+    let is_asked =
+        |scratch: &Scratch, i: usize| (!is_special || scratch.kinds[i] == ORDINARY) && octave.is_given(i);
     let differs = |scratch: &Scratch, i: usize| {
-        let codes = truth.map(|truth| codes_of(truth.at(octave.place(i))));
+        let codes = truth.map(|truth| codes_of(truth[i]));
         codes.is_some_and(|codes| codes != [scratch.flat_errors[i], scratch.flat_radii[i]])
     };
     let count = octave.count();
-    let mut are_any = u16::from((0..count).any(|i| is_asked(scratch, i) && differs(scratch, i)));
+    let are_any = truth.is_some() && (0..count).any(|i| is_asked(scratch, i) && differs(scratch, i));
+    let mut are_any = u16::from(are_any);
     coder.raw(1, &mut are_any);
     if are_any == 0 {
         return;
@@ -118,7 +115,7 @@ pub(super) fn others<C: Coder>(
         if !is_other[i] {
             continue;
         }
-        let [error, radius] = truth.map_or([0; 2], |truth| codes_of(truth.at(octave.place(i))));
+        let [error, radius] = truth.map_or([0; 2], |truth| codes_of(truth[i]));
         for (context, code, truth) in [
             (OTHER_ERRORS, &mut scratch.flat_errors[i], error),
             (OTHER_RADII, &mut scratch.flat_radii[i], radius),

@@ -26,6 +26,8 @@ use terrasoar_layout::read::store::RecordStore;
 
 /// Vertices that the looks of one frame may test, two to five milliseconds; the rest is looked at in the next.
 const TESTS_A_FRAME: usize = 8000;
+/// The same where the time of a frame is bounded.
+const TESTS_IN_TIME: usize = 2000;
 /// Tests of one look after which it remembers what it has tested. A vertex has two parents, so that a look which goes down many levels would come by the finest ones as
 /// often as there are ways to them: few where errors shrink from level to level, as they do in sound files and near no void, and 2^32 elsewhere.
 const TESTS_UNREMEMBERED: usize = 64;
@@ -98,6 +100,13 @@ impl Ahead {
             + self.seen.capacity() * size_of::<GridPoint>()
     }
 
+    /// Forgets all nodes.
+    pub(crate) fn clear(&mut self) {
+        self.far.clear();
+        self.looks.clear();
+        self.blocked.clear();
+    }
+
     /// Takes in what the clocks did in this frame.
     pub(crate) fn keep_pace(&mut self, clocks: &Clocks) {
         self.frame += 1;
@@ -159,7 +168,8 @@ impl<S: RecordStore> Kinetic<S> {
         ahead.blocked = blocked;
         let mut looked = 0;
         let mut tests = 0;
-        while tests < TESTS_A_FRAME && looked < ahead.looks.len() {
+        let most = if self.budget.time.is_some() { TESTS_IN_TIME } else { TESTS_A_FRAME };
+        while tests < most && looked < ahead.looks.len() {
             let node = ahead.looks[looked];
             looked += 1;
             if self.may_split(node) {

@@ -12,7 +12,7 @@ use web_time::Instant;
 pub struct Budget {
     /// Vertex tests of one frame. The last split may go beyond it by the tests of its children, at most 3.
     pub tests: Option<u64>,
-    /// Time from the first test of one frame to its last split. Exceeded by no more than 256 tests or 32 splits, and by the merges, which always go
+    /// Time from the first test of one frame to its last split. Exceeded by no more than some 6,000 tests or 32 splits, and by the merges, which always go
     /// through. Results then depend on the machine's speed, as nothing else here does.
     pub time: Option<Duration>,
 }
@@ -31,6 +31,8 @@ impl Budget {
 
 /// Splits between two looks at the clock.
 const STRIDE: u32 = 32;
+/// Splits whose children are tested before more are split, where time counts.
+const ROUND: usize = 2048;
 /// Tests between two looks at the clock.
 const BATCH: usize = 256;
 
@@ -42,6 +44,8 @@ pub(crate) struct Allowance {
     /// Tests kept for the children of splits that wait.
     kept: usize,
     stride: u32,
+    /// Splits left in this round.
+    round: usize,
     over: bool,
 }
 
@@ -50,7 +54,7 @@ impl Allowance {
         let until = budget.time.map(|time| Instant::now() + time);
         let tests = budget.tests.unwrap_or(u64::MAX);
         let kept = budget.tests.map_or(0, |tests| usize::try_from(tests.div_ceil(2)).unwrap_or(usize::MAX));
-        Self { tests, until, kept, stride: STRIDE - 1, over: false }
+        Self { tests, until, kept, stride: STRIDE - 1, round: 0, over: false }
     }
 
     /// How many of `wanted` tests may be made before asking again; takes them off. While splits wait, half is kept for them, lest tests alone use up every
@@ -66,16 +70,27 @@ impl Allowance {
         allowed
     }
 
-    /// Whether one more vertex may be split.
-    #[inline]
-    pub(crate) fn split(&mut self) -> bool {
-        self.tests > 0 && !(self.until.is_some() && self.is_over_by_now())
+    /// Whether time counts.
+    pub(crate) fn counts_time(&self) -> bool {
+        self.until.is_some()
     }
 
-    /// Takes off tests that will be made.
+    /// Begins a round of splits; their children are tested when it is over.
+    pub(crate) fn start_round(&mut self) {
+        self.round = if self.counts_time() { ROUND } else { usize::MAX };
+    }
+
+    /// Whether one more vertex may be split in this round.
+    #[inline]
+    pub(crate) fn split(&mut self) -> bool {
+        self.tests > 0 && self.round > 0 && !(self.counts_time() && self.is_over_by_now())
+    }
+
+    /// Takes off a split and the tests that will be made of its children.
     #[inline]
     pub(crate) fn charge(&mut self, tests: usize) {
         self.tests = self.tests.saturating_sub(tests as u64);
+        self.round = self.round.saturating_sub(1);
     }
 
     fn is_over_by_now(&mut self) -> bool {

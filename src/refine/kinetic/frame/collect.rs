@@ -9,7 +9,7 @@ use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS};
 use crate::refine::kinetic::time::certificate::{expiry_of, with_certificate};
 use crate::refine::kinetic::time::clocks::{BANDS, HORIZON, Kind, clock_id};
 use crate::refine::kinetic::time::course::Pose;
-use crate::refine::kinetic::time::queue::Entry;
+use crate::refine::kinetic::time::queue::{Entry, Queue};
 use crate::refine::{Phase, Probe};
 use terrasoar_layout::read::prefetch::prefetch;
 use terrasoar_layout::read::store::RecordStore;
@@ -20,6 +20,9 @@ impl<S: RecordStore> Kinetic<S> {
         let moved = self.clocks.move_to(pose);
         if let Some(ahead) = &mut self.ahead {
             ahead.keep_pace(&self.clocks);
+        }
+        if self.has_jumped(moved.clocks) {
+            self.uproot();
         }
         let mut clocks = moved.clocks;
         while clocks != 0 {
@@ -75,15 +78,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// Enters a word under its expiry.
     #[inline(always)]
     pub(crate) fn enter(&mut self, clock: usize, entry: Entry) {
-        if !S::IS_COMPLETE
-            && let Some(ahead) = &mut self.ahead
-        {
-            if u64::from(expiry_of(entry.word)) > ahead.until[clock] {
-                return ahead.far.enter(clock, entry);
-            }
-            ahead.near(entry);
-        }
-        self.queue.enter(clock, entry);
+        enter::<S>(&mut self.queue, &mut self.ahead, clock, entry);
     }
 
     /// Makes due those nodes whose word still is the one that was entered.
@@ -125,4 +120,23 @@ impl<S: RecordStore> Kinetic<S> {
         }
         self.waiting = waiting;
     }
+}
+
+/// Enters a word under its expiry: into the queue, or into the one that is looked at some frames before.
+#[inline(always)]
+pub(crate) fn enter<S: RecordStore>(
+    queue: &mut Queue,
+    ahead: &mut Option<Box<Ahead>>,
+    clock: usize,
+    entry: Entry,
+) {
+    if !S::IS_COMPLETE
+        && let Some(ahead) = ahead
+    {
+        if u64::from(expiry_of(entry.word)) > ahead.until[clock] {
+            return ahead.far.enter(clock, entry);
+        }
+        ahead.near(entry);
+    }
+    queue.enter(clock, entry);
 }

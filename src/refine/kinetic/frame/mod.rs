@@ -4,6 +4,7 @@ pub(crate) mod ahead;
 pub(crate) mod budget;
 pub(crate) mod collect;
 pub(crate) mod edited;
+pub(crate) mod jump;
 pub(crate) mod resolve;
 pub(crate) mod shown;
 pub(crate) mod whole;

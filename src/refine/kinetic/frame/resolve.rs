@@ -108,22 +108,37 @@ impl<S: RecordStore> Kinetic<S> {
             if engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == SPLIT {
                 engine.merge(node);
             }
+            true
         });
         loop {
-            list.clear();
+            allowance.start_round();
             // From coarse to fine, so that parents have split before their children.
-            list.extend(self.to_split.iter_mut().rev().flat_map(|nodes| nodes.drain(..)));
-            self.in_order(&list, |engine, node| {
-                let wanted = engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == ACTIVE;
-                let before = engine.fresh.len();
-                let split = wanted && allowance.split() && engine.split(node);
-                allowance.charge(engine.fresh.len() - before);
-                if wanted && !split {
-                    // Its other parent may be among the untested; or it waits for the next frame.
-                    let level = level_of(engine.nodes.get(node).point);
-                    engine.to_split[level as usize].push(node);
+            for level in (0..self.to_split.len()).rev() {
+                if self.to_split[level].is_empty() || !allowance.split() {
+                    continue;
                 }
-            });
+                list.clear();
+                list.append(&mut self.to_split[level]);
+                let done = self.in_order(&list, |engine, node| {
+                    let wanted = engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == ACTIVE;
+                    if !wanted {
+                        return true;
+                    }
+                    if !allowance.split() {
+                        return false;
+                    }
+                    let before = engine.fresh.len();
+                    if engine.split(node) {
+                        allowance.charge(engine.fresh.len() - before);
+                    } else {
+                        // Its other parent may be among the untested.
+                        engine.to_split[level].push(node);
+                    }
+                    true
+                });
+                // The rest waits for the next round, or the next frame.
+                self.to_split[level].extend_from_slice(&list[done..]);
+            }
             if self.fresh.is_empty() {
                 break;
             }
@@ -135,16 +150,19 @@ impl<S: RecordStore> Kinetic<S> {
         self.list = list;
     }
 
-    /// Does something to each node, and asks memory for what comes after it meanwhile.
+    /// Does something to each node until that says no, and asks memory for what comes after it meanwhile. Tells how many nodes it was done to.
     #[inline(always)]
-    fn in_order(&mut self, nodes: &[u32], mut each: impl FnMut(&mut Self, u32)) {
+    fn in_order(&mut self, nodes: &[u32], mut each: impl FnMut(&mut Self, u32) -> bool) -> usize {
         for (i, node) in nodes.iter().enumerate() {
             for (ahead, distance) in FETCH_AHEAD {
                 if let Some(later) = nodes.get(i + distance) {
                     self.fetch(*later, ahead);
                 }
             }
-            each(self, *node);
+            if !each(self, *node) {
+                return i;
+            }
         }
+        nodes.len()
     }
 }

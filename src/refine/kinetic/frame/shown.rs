@@ -7,14 +7,46 @@ use crate::mesh::has_area;
 use crate::metric::Metric;
 use crate::refine::Culling;
 use crate::refine::kinetic::Kinetic;
+use crate::refine::kinetic::mesh::bounds::Bounds;
 use crate::refine::kinetic::mesh::clusters::{Clusters, Dealing};
-use terrasoar_layout::read::store::RecordStore;
+use crate::refine::kinetic::mesh::labels::level_of;
+use crate::refine::kinetic::mesh::nodes::Nodes;
+use crate::refine::kinetic::mesh::vertices::Vertices;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::read::store::{RawOf, RecordStore};
 
-impl<S: RecordStore> Kinetic<S> {
-    /// What a slot of `node` sends to the GPU: nothing where voids touch or padding takes the area.
+/// What slots show follows from these alone.
+pub(crate) struct Shown<'k, S: RecordStore> {
+    pub records: &'k S,
+    pub nodes: &'k Nodes<RawOf<S>>,
+    pub vertices: &'k Vertices,
+}
+
+impl<S: RecordStore> Shown<'_, S> {
+    /// What a slot of `node` with these corners sends to the GPU: nothing where voids touch or padding takes the area.
     #[inline(always)]
-    pub(crate) fn shown(&self, node: u32, corners: Option<[u32; 3]>) -> [u32; 3] {
+    pub(crate) fn corners(&self, node: u32, corners: Option<[u32; 3]>) -> [u32; 3] {
         corners.filter(|corners| self.is_drawn(node, corners)).unwrap_or([0; 3])
+    }
+
+    /// Folded position and height of a vertex.
+    #[inline(always)]
+    pub(crate) fn place_of(&self, vertex: u32) -> [f32; 3] {
+        let v = self.vertices.get(vertex);
+        let folded = self.records.grid().fold(GridPoint::new(v.x, v.y));
+        // Columns and rows are below 2^24: exact.
+        [folded.x() as f32, folded.y() as f32, v.height_m]
+    }
+
+    /// The box around a cluster's triangles.
+    pub(crate) fn bounds(&self, cluster: usize) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for node in self.nodes.clusters.places_of(cluster) {
+            for vertex in self.nodes.triangles(node).into_iter().flatten().flatten() {
+                bounds.include(self.place_of(vertex));
+            }
+        }
+        bounds
     }
 
     /// As [`crate::mesh::is_drawn`].
@@ -28,10 +60,26 @@ impl<S: RecordStore> Kinetic<S> {
             return true;
         }
         if self.nodes.is_live(node) && !self.nodes.is_split(node) {
-            self.nodes.is_unread(node) || self.vertex_of(node).class.is_plain()
+            let leaf = self.nodes.get(node);
+            let vertex = || self.records.decode(leaf.raw, level_of(leaf.point));
+            self.nodes.is_unread(node) || vertex().class.is_plain()
         } else {
             corners.iter().all(|v| !self.vertices.is_void(*v))
         }
+    }
+}
+
+impl<S: RecordStore> Kinetic<S> {
+    /// What slots show.
+    #[inline(always)]
+    pub(crate) fn shows(&self) -> Shown<'_, S> {
+        Shown { records: &self.records, nodes: &self.nodes, vertices: &self.vertices }
+    }
+
+    /// What a slot of `node` with these corners sends to the GPU.
+    #[inline(always)]
+    pub(crate) fn shown(&self, node: u32, corners: Option<[u32; 3]>) -> [u32; 3] {
+        self.shows().corners(node, corners)
     }
 
     /// Lists the slots that show something else than in the frame before.

@@ -69,6 +69,10 @@ impl BoundsColumns {
             .for_each(|c| c.truncate(shorter));
     }
 
+    pub(crate) fn clear(&mut self) {
+        self.least.iter_mut().chain(&mut self.largest).chain([&mut self.beyond]).for_each(Vec::clear);
+    }
+
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         self.least

@@ -64,6 +64,8 @@ pub(crate) struct Clusters {
     empty: Vec<u32>,
     /// Clusters with slots that have changed.
     written: Vec<u32>,
+    /// Clusters that are not there, of whose slots receivers of patches still have what a mesh before this one showed.
+    stale: Range<usize>,
     taken: usize,
 }
 
@@ -77,6 +79,7 @@ impl Clusters {
             first_open: 0,
             empty: Vec::new(),
             written: Vec::new(),
+            stale: 0..0,
             taken: 0,
         }
     }
@@ -166,12 +169,56 @@ impl Clusters {
     }
 
     fn new_cluster(&mut self) -> usize {
-        self.clusters.push(Cluster { taken: [0; 2], written: [[0; 2]; 2], spill: (NONE, 0), use_count: 0 });
+        let cluster = self.clusters.len();
+        let is_stale = self.stale.contains(&cluster);
+        let written = if is_stale { [[u64::MAX; 2]; 2] } else { [[0; 2]; 2] };
+        if is_stale {
+            self.stale.start = cluster + 1;
+            self.written.push(cluster as u32);
+        }
+        self.clusters.push(Cluster { taken: [0; 2], written, spill: (NONE, 0), use_count: 0 });
         self.bounds.push_empty();
-        let cluster = self.clusters.len() - 1;
         self.open.resize(cluster / 64 + 1, 0);
         self.open[cluster / 64] |= 1 << (cluster % 64);
         cluster
+    }
+
+    /// Gives all places back. What slots have shown is told again as clusters are taken.
+    pub(crate) fn clear(&mut self) {
+        self.stale = 0..self.stale.end.max(self.clusters.len());
+        self.empty_lists();
+    }
+
+    fn empty_lists(&mut self) {
+        self.clusters.clear();
+        self.bounds.clear();
+        self.open.clear();
+        self.empty.clear();
+        self.written.clear();
+        (self.first_open, self.taken) = (0, 0);
+    }
+
+    /// How many slots may have shown something before all places were given back.
+    pub(crate) fn stale_slots(&self) -> usize {
+        2 * CLUSTER * self.stale.end
+    }
+
+    /// Takes so many places, `fill` in each cluster, in the place of all that were taken. No slot is noted: all are to be told.
+    pub(crate) fn fill(&mut self, nodes: usize, fill: usize) {
+        self.empty_lists();
+        for cluster in 0..nodes.div_ceil(fill) {
+            self.new_cluster();
+            let taken = (nodes - cluster * fill).min(fill);
+            self.clusters[cluster].taken = [0, 64].map(|from| {
+                u64::MAX.checked_shr(64 - taken.saturating_sub(from).min(64) as u32).unwrap_or(0)
+            });
+            self.clusters[cluster].written = [[0; 2]; 2];
+            if self.clusters[cluster].is_full() {
+                self.open[cluster / 64] &= !(1 << (cluster % 64));
+            }
+        }
+        self.written.clear();
+        self.taken = nodes;
     }
 
     /// Gives a place back.

@@ -1,6 +1,7 @@
 //! The mesh itself: the bin-tree array, its places in clusters, vertices, splitting and merging.
 
 pub(crate) mod bounds;
+pub(crate) mod build;
 pub(crate) mod clusters;
 pub(crate) mod compact;
 pub(crate) mod labels;

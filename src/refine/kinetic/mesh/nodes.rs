@@ -22,7 +22,7 @@ pub(crate) const SPLIT: u32 = 1 << 30;
 /// The bits of a word that are no certificate.
 pub(crate) const STATUS: u32 = ACTIVE | SPLIT;
 /// The word of a free node, and of an annex: no live word has this certificate.
-const NO_VERTEX: u32 = SPLIT - 1;
+pub(crate) const NO_VERTEX: u32 = SPLIT - 1;
 /// The word of a node whose record has not come yet: nor has any this one.
 pub(crate) const UNREAD: u32 = NO_VERTEX - (1 << EXPIRY_BITS);
 /// No node, no vertex.
@@ -56,6 +56,13 @@ pub(crate) struct Node<R> {
     pub parents: [u32; 2],
     /// By state: see [`body`].
     pub body: [u32; 6],
+}
+
+impl<R> Node<R> {
+    /// A place that holds nothing; some record fills it.
+    pub(crate) fn free(raw: R) -> Self {
+        Self { word: NO_VERTEX, raw, point: GridPoint::default(), parents: [NONE; 2], body: [NONE; 6] }
+    }
 }
 
 /// The bin-tree array.
@@ -120,21 +127,15 @@ impl<R: Copy> Nodes<R> {
 
     /// A new annex of `owner`, beside it.
     pub(crate) fn create_annex(&mut self, owner: u32) -> u32 {
-        let raw = self.get(owner).raw;
-        let parents = [owner, NONE];
-        self.place(
-            owner,
-            Node { word: NO_VERTEX, raw, point: GridPoint::default(), parents, body: [NONE; 6] },
-        )
+        let annex = Node { parents: [owner, NONE], ..Node::free(self.get(owner).raw) };
+        self.place(owner, annex)
     }
 
     fn place(&mut self, beside: u32, record: Node<R>) -> u32 {
         let node = self.clusters.take(beside);
         if self.all.len() < self.clusters.places() {
-            let (parents, body) = ([NONE; 2], [NONE; 6]);
-            let free = Node { word: NO_VERTEX, parents, body, ..record };
             grow(&mut self.all, CLUSTER);
-            self.all.resize(self.clusters.places(), free);
+            self.all.resize(self.clusters.places(), Node::free(record.raw));
         }
         *self.get_mut(node) = record;
         node
@@ -185,6 +186,7 @@ impl<R: Copy> Nodes<R> {
     }
 
     /// What the two slots of a place show: triangles of vertex slots, counter-clockwise, apex first.
+    #[inline]
     pub(crate) fn triangles(&self, node: u32) -> [Option<[u32; 3]>; 2] {
         let Node { word, parents, body, point, .. } = self.get(node);
         if *word & !STATUS == NO_VERTEX {

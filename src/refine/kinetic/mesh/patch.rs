@@ -1,6 +1,10 @@
 //! What a frame changed in the mesh: all that is needed to bring a GPU's copy of it up to date.
 
+use super::labels::level_of;
 use std::ops::Range;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::grid::record::Vertex;
+use terrasoar_layout::read::store::RecordStore;
 
 /// One vertex of the mesh, as a device holds it: 32 bytes, these fields in this order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +30,21 @@ pub struct MeshVertex {
 impl MeshVertex {
     /// Level of a vertex that splits no edge.
     pub const NO_LEVEL: u32 = 255;
+
+    /// A vertex at a grid point, on the edge between two slots.
+    #[inline(always)]
+    pub(crate) fn of(records: &impl RecordStore, point: GridPoint, vertex: &Vertex, ends: [u32; 2]) -> Self {
+        let folded = records.grid().fold(point);
+        Self {
+            x: folded.x(),
+            y: folded.y(),
+            height_m: vertex.height_m as f32,
+            error_m: vertex.error_m as f32,
+            radius_m: vertex.radius_m as f32,
+            ends,
+            flags: if records.grid().is_corner(point) { Self::NO_LEVEL } else { level_of(point) },
+        }
+    }
 }
 
 /// The change of one frame. Applied in order to the meshes of all frames before, it gives this frame's.

@@ -4,7 +4,6 @@
 //! each of a node's one or two, a merge the reverse. Cost: six slots, at most four nodes made or freed. Most of the time is the wait for memory, which
 //! [`Kinetic::fetch`] shortens by prefetching a node's relatives some splits ahead.
 
-use super::bounds::Bounds;
 use super::labels::{child_point, level_of};
 use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
 use crate::refine::kinetic::Kinetic;
@@ -47,32 +46,19 @@ impl<S: RecordStore> Kinetic<S> {
         self.nodes.clusters.touch(node, side);
     }
 
-    /// Folded position and height of a vertex.
-    #[inline(always)]
-    fn place_of(&self, vertex: u32) -> [f32; 3] {
-        let v = self.vertices.get(vertex);
-        let folded = self.records.grid().fold(GridPoint::new(v.x, v.y));
-        // Columns and rows are below 2^24: exact.
-        [folded.x() as f32, folded.y() as f32, v.height_m]
-    }
-
     /// Widens the bounds of a node's cluster to contain vertices.
     #[inline(always)]
     pub(crate) fn cover<const N: usize>(&mut self, node: u32, vertices: &[u32; N]) {
         if self.nodes.clusters.has_bounds() {
-            let places = vertices.map(|v| self.place_of(v));
+            let shown = self.shows();
+            let places = vertices.map(|v| shown.place_of(v));
             self.nodes.clusters.cover(node, &places);
         }
     }
 
     /// Makes the bounds of a cluster anew, which merges and edits leave too large.
     pub(crate) fn tighten(&mut self, cluster: usize) {
-        let mut bounds = Bounds::EMPTY;
-        for node in self.nodes.clusters.places_of(cluster) {
-            for vertex in self.nodes.triangles(node).into_iter().flatten().flatten() {
-                bounds.include(self.place_of(vertex));
-            }
-        }
+        let bounds = self.shows().bounds(cluster);
         self.nodes.clusters.set_bounds(cluster, bounds);
     }
 

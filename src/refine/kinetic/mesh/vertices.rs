@@ -3,7 +3,8 @@
 //! It lies beside the bin-tree array but has an order of its own, so that nodes moved in that array move no vertex on the GPU. The first
 //! five slots are the square's corners and its centre. Cost: 13 bytes a vertex, half a vertex a triangle.
 
-use crate::refine::kinetic::capacity::grow;
+use crate::refine::kinetic::capacity::{give_back, grow};
+use crate::refine::kinetic::hands::extend;
 use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::Vertex;
@@ -31,6 +32,39 @@ impl Vertices {
         grow(&mut self.void, 1);
         self.void.push(is_void);
         self.all.len() as u32 - 1
+    }
+
+    /// Places vertices at the end, where none has been removed, by their points, heights and whether they are void.
+    pub(crate) fn append(
+        &mut self,
+        count: usize,
+        place: impl Fn(usize) -> (GridPoint, f32) + Sync + Send,
+        is_void: impl Fn(usize) -> bool + Sync + Send,
+    ) {
+        extend(&mut self.all, count, |i| {
+            let (at, height_m) = place(i);
+            StripVertex { x: at.x(), y: at.y(), height_m }
+        });
+        extend(&mut self.void, count, is_void);
+    }
+
+    /// Slots, those that are free included.
+    pub(crate) fn len(&self) -> u32 {
+        self.all.len() as u32
+    }
+
+    /// Gives all slots back; memory stays.
+    pub(crate) fn clear(&mut self) {
+        self.all.clear();
+        self.void.clear();
+        self.free.clear();
+    }
+
+    /// Gives memory back if less than one part in `parts` of it is in use.
+    pub(crate) fn give_back(&mut self, parts: usize) {
+        give_back(&mut self.all, parts);
+        give_back(&mut self.void, parts);
+        give_back(&mut self.free, parts);
     }
 
     /// Moves a vertex up or down.

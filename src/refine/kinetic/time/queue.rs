@@ -9,6 +9,7 @@
 //! enter, the same for each level on the way out, nothing for entries whose turn has not come. All entries lie in chunks of one pool.
 
 use super::clocks::{CLOCKS, EXPIRY_BITS};
+use crate::refine::kinetic::capacity::give_up;
 use crate::refine::kinetic::chunked::Chunked;
 
 /// Bits of a digit.
@@ -49,7 +50,27 @@ struct Wheel {
     now: u32,
     /// Bit s of level l: slot s holds something.
     occupied: [u64; LEVELS],
+    /// Entries of a level.
+    counts: [u32; LEVELS],
     heads: [[u32; SLOTS]; LEVELS],
+}
+
+const EMPTY: Wheel =
+    Wheel { now: 0, occupied: [0; LEVELS], counts: [0; LEVELS], heads: [[NONE; SLOTS]; LEVELS] };
+
+/// The slots of a level that are over as a whole when a wheel moves on to `now`: up to the one that holds the new tick, or all of a turn that is over. Whether the turn is
+/// the same, so that levels above have none.
+#[inline(always)]
+fn over(then: u32, now: u32, level: usize) -> (u64, bool) {
+    let shift = level as u32 * DIGIT;
+    let same_turn = then >> (shift + DIGIT) == now >> (shift + DIGIT);
+    let digit = (now >> shift) % SLOTS as u32;
+    let over = match (same_turn, level) {
+        (false, _) => u64::MAX,
+        (true, 0) => u64::MAX >> (SLOTS as u32 - 1 - digit),
+        (true, _) => (1 << digit) - 1,
+    };
+    (over, same_turn)
 }
 
 /// The queue of one engine.
@@ -67,9 +88,8 @@ pub(crate) struct Queue {
 
 impl Queue {
     pub(crate) fn new() -> Self {
-        let wheel = Wheel { now: 0, occupied: [0; LEVELS], heads: [[NONE; SLOTS]; LEVELS] };
         Self {
-            wheels: vec![wheel; CLOCKS].into(),
+            wheels: vec![EMPTY; CLOCKS].into(),
             chunks: Chunked::default(),
             free: NONE,
             moving: Vec::new(),
@@ -96,6 +116,7 @@ impl Queue {
         let slot = (expiry >> (level * DIGIT)) as usize % SLOTS;
         let level = (level as usize).min(LEVELS - 1);
         wheel.occupied[level] |= 1 << slot;
+        wheel.counts[level] += 1;
         let head = &mut wheel.heads[level][slot];
         if *head != NONE {
             let chunk = &mut self.chunks[*head as usize];
@@ -130,15 +151,8 @@ impl Queue {
         let (then, now) = (wheel.now, now as u32);
         wheel.now = now;
         for level in 0..LEVELS {
-            let shift = level as u32 * DIGIT;
-            let same_turn = then >> (shift + DIGIT) == now >> (shift + DIGIT);
-            let digit = (now >> shift) % SLOTS as u32;
-            // Slots that are over as a whole: up to the one that holds the new tick, or all of a turn that is over.
-            let over = match (same_turn, level) {
-                (false, _) => u64::MAX,
-                (true, 0) => u64::MAX >> (SLOTS as u32 - 1 - digit),
-                (true, _) => (1 << digit) - 1,
-            };
+            let (over, same_turn) = over(then, now, level);
+            let digit = (now >> (level as u32 * DIGIT)) % SLOTS as u32;
             let mut slots = self.wheels[clock].occupied[level] & over;
             let mut heads = slots;
             while heads != 0 {
@@ -157,6 +171,44 @@ impl Queue {
                 return;
             }
         }
+    }
+
+    /// About how many entries would be over if a wheel moved on to tick `now`: those of levels that would be over as a whole, and of others the share of their slots.
+    pub(crate) fn count_over(&self, clock: usize, now: u64) -> usize {
+        let wheel = &self.wheels[clock];
+        if now >= 1 << EXPIRY_BITS {
+            return wheel.counts.iter().map(|count| *count as usize).sum();
+        }
+        let now = now as u32;
+        let mut count = 0;
+        for level in 0..LEVELS {
+            let (over, same_turn) = over(wheel.now, now, level);
+            let occupied = wheel.occupied[level];
+            if occupied != 0 {
+                let share = u64::from((occupied & over).count_ones()) * u64::from(wheel.counts[level]);
+                count += (share / u64::from(occupied.count_ones())) as usize;
+            }
+            if same_turn {
+                break;
+            }
+        }
+        count
+    }
+
+    /// Takes all entries out; memory stays, and so do the wheels' ticks.
+    pub(crate) fn clear(&mut self) {
+        for wheel in &mut self.wheels {
+            if wheel.occupied != [0; LEVELS] {
+                *wheel = Wheel { now: wheel.now, ..EMPTY };
+            }
+        }
+        self.chunks.clear();
+        (self.free, self.entries) = (NONE, 0);
+    }
+
+    /// Gives back chunks that hold nothing since all entries were taken out.
+    pub(crate) fn give_back(&mut self) {
+        give_up(self.chunks.take_empty());
     }
 
     /// Takes all entries of a clock out.
@@ -224,6 +276,7 @@ impl Queue {
             let chunk = &mut self.chunks[at as usize];
             chunk.entries[..chunk.used as usize].iter().for_each(|entry| each(*entry));
             self.entries -= chunk.used as usize;
+            self.wheels[clock].counts[level] -= chunk.used;
             let next = std::mem::replace(&mut chunk.next, self.free);
             self.free = at;
             at = next;

@@ -1,0 +1,170 @@
+//! Record pages of a packed file: tiles are read, unpacked, kept, and their records put where pages have them.
+
+use super::{PackedSource, odd};
+use crate::error::LayoutError;
+use crate::file::bytes::{Page, checksum};
+use crate::file::source::Source;
+use crate::grid::order::point_of;
+use crate::packed::blocks::{MOST_TILES, Piece, pieces, tiles_of};
+use crate::packed::coder::Decoder;
+use crate::packed::places::{PLACE_BYTES, TilePlace};
+use crate::packed::shape::{TileId, TileShape};
+use crate::packed::tile::{INERT, TileRecords};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
+
+/// Tiles that the last records lay in.
+type Near = Vec<(TileId, Option<Arc<TileRecords>>)>;
+
+impl PackedSource {
+    /// Where the tile directory's leaf `leaf` says its tiles lie.
+    pub(super) fn leaf(&self, leaf: usize) -> Result<&[TilePlace], LayoutError> {
+        let known = &self.tiles[leaf];
+        if let Some(places) = known.get() {
+            return Ok(places);
+        }
+        let count = self.leaf_sizes[leaf];
+        let (offset, sum) = self.tile_leaves[leaf];
+        let mut places = vec![TilePlace::default(); count];
+        if offset > 0 {
+            let damaged = |problem: &str| {
+                LayoutError::damaged_terrain(self.path(), format!("tile directory leaf {leaf}"), problem)
+            };
+            let mut bytes = vec![0; count * PLACE_BYTES];
+            let end = offset.checked_add(bytes.len() as u64);
+            if end.is_none_or(|end| end > self.container.packed_bytes) {
+                return Err(damaged("it lies outside the file"));
+            }
+            self.inner.read_at(offset, &mut bytes)?;
+            if checksum(&bytes) != sum {
+                return Err(damaged("the checksum does not match"));
+            }
+            places.iter_mut().enumerate().for_each(|(i, place)| *place = TilePlace::read(&bytes, i));
+        }
+        let _ = known.set(places.into());
+        known.get().map(|places| &**places).ok_or_else(|| odd(self.path(), "tile directory"))
+    }
+
+    /// The records of a tile down to octave `finest`, counted from its own finest; `None` if they are all inert.
+    fn tile(&self, id: TileId, finest: u32) -> Result<Option<Arc<TileRecords>>, LayoutError> {
+        let Some((leaf, within)) = self.groups.leaf_of(id) else { return Ok(None) };
+        if let Some(tile) = self.cache.get(id, finest) {
+            return Ok(Some(tile));
+        }
+        let place = self.leaf(leaf)?[within];
+        if !place.is_present() {
+            return Ok(None);
+        }
+        let shape = self.groups.shape(id);
+        let segments = TileShape::segment_of(finest.min(shape.tile_log.saturating_sub(1))) + 1;
+        let tile = Arc::new(self.unpack(id, &shape, &place, segments)?);
+        self.unpacked.fetch_add(1, Ordering::Relaxed);
+        self.cache.put(id, Arc::clone(&tile));
+        Ok(Some(tile))
+    }
+
+    /// Reads and unpacks a tile.
+    pub(in crate::packed) fn unpack(
+        &self,
+        id: TileId,
+        shape: &TileShape,
+        place: &TilePlace,
+        segments: usize,
+    ) -> Result<TileRecords, LayoutError> {
+        let damaged = |problem: &str| {
+            let [x, y] = id.at;
+            let stride = 1u64 << shape.stride_log;
+            LayoutError::damaged_terrain(self.path(), format!("tile {x}, {y} of stride {stride}"), problem)
+        };
+        let mut bytes = vec![0; place.bytes(segments)];
+        if place.offset.saturating_add(bytes.len() as u64) > self.container.packed_bytes {
+            return Err(damaged("it lies outside the file"));
+        }
+        self.inner.read_at(place.offset, &mut bytes)?;
+        let mut decoders = Vec::with_capacity(segments);
+        let mut rest = &bytes[..];
+        for s in 0..segments {
+            let (segment, after) = rest.split_at(place.lengths[s].into());
+            if checksum(segment) != place.checksums[s] {
+                return Err(damaged("the checksum does not match"));
+            }
+            let wrong = || damaged("it holds something else than a tile");
+            decoders.push(Decoder::new(&self.tables, segment).ok_or_else(wrong)?);
+            rest = after;
+        }
+        let scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut scratch = scratch.unwrap_or_default();
+        let records = self.width.read(shape, &self.rules, &mut scratch, &mut decoders);
+        self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+        if decoders.iter().all(Decoder::finish) {
+            Ok(records)
+        } else {
+            Err(damaged("it holds something else than a tile"))
+        }
+    }
+
+    /// Fills a record page.
+    pub(super) fn record_page(&self, logical: u32, page: &mut Page) -> Result<(), LayoutError> {
+        let k = self.header.grid.k();
+        let first = u64::from(logical) * self.header.records_per_page();
+        let page = page.as_chunks_mut::<4>().0;
+        page.fill(INERT.to_le_bytes());
+        let slots = first..first + page.len() as u64;
+        let mut near = Near::default();
+        for piece in pieces(&self.groups, k, slots) {
+            match piece {
+                Piece::Single(slots) => {
+                    let places = &mut page[(slots.start - first) as usize..];
+                    for (slot, place) in slots.zip(places) {
+                        *place = self.record(slot, &mut near)?.to_le_bytes();
+                    }
+                }
+                Piece::Block { first: from, slots, block, group, tile } => {
+                    let records = &mut page[(from - first) as usize..][..slots.len()];
+                    let mut tiles: [Option<Arc<TileRecords>>; MOST_TILES] = [const { None }; MOST_TILES];
+                    for (number, id) in tiles_of(&self.groups, block, &slots, group, tile) {
+                        match id {
+                            Some(id) => tiles[number] = self.tile(id, block.octave())?,
+                            // Ghosts, and vertices of the square's border, whose records the tile inside has.
+                            None => {
+                                for i in block.slots_in(number, &slots) {
+                                    let within = i - slots.start;
+                                    records[within] =
+                                        self.record(from + within as u64, &mut near)?.to_le_bytes();
+                                }
+                            }
+                        }
+                    }
+                    block.gather(
+                        &slots,
+                        &tiles.each_ref().map(|tile| tile.as_ref().map(|t| t.all())),
+                        records,
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// One record.
+    fn record(&self, slot: u64, near: &mut Near) -> Result<u32, LayoutError> {
+        let Some(p) = point_of(self.header.grid.k(), slot) else { return Ok(INERT) };
+        let octave = self.groups.octave(p);
+        let (id, at) = self.groups.tile_of(p, octave);
+        let finest = octave.saturating_sub(self.groups.groups[usize::from(id.group)].stride_log);
+        let is_it = |(known, tile): &(TileId, Option<Arc<TileRecords>>)| {
+            *known == id && tile.as_ref().is_none_or(|tile| tile.finest <= finest)
+        };
+        let found = match near.iter().position(is_it) {
+            Some(found) => found,
+            None => {
+                near.push((id, self.tile(id, finest)?));
+                near.len() - 1
+            }
+        };
+        let record = near[found].1.as_ref().map_or(INERT, |tile| tile.at(at));
+        // The next vertex is likely to be in the same tile.
+        near.swap(0, found);
+        Ok(record)
+    }
+}

@@ -1,0 +1,50 @@
+//! What the benchmark of unpacking looks at.
+
+use super::PackedSource;
+use crate::error::LayoutError;
+use crate::file::source::Source;
+use crate::packed::model::DecodeTables;
+use crate::packed::places::TilePlace;
+use crate::packed::rules::Rules;
+use crate::packed::shape::{TileId, TileShape};
+use crate::packed::wide::Width;
+
+impl PackedSource {
+    pub(in crate::packed) fn set_width(&mut self, width: Width) {
+        self.width = width;
+    }
+
+    pub(in crate::packed) fn packed(&self) -> &dyn Source {
+        &*self.inner
+    }
+
+    pub(in crate::packed) fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    pub(in crate::packed) fn tables(&self) -> &DecodeTables {
+        &self.tables
+    }
+
+    /// Record pages that are present.
+    pub(in crate::packed) fn record_pages(&self) -> u64 {
+        self.header.stored_pages
+    }
+
+    pub(in crate::packed) fn tiles_unpacked(&self) -> u64 {
+        self.unpacked.load(std::sync::atomic::Ordering::Relaxed)
+    }
+
+    /// All tiles that are present.
+    pub(in crate::packed) fn all_tiles(&self) -> Result<Vec<(TileId, TileShape, TilePlace)>, LayoutError> {
+        let mut all = Vec::new();
+        for (_, id) in self.groups.tiles() {
+            let Some((leaf, within)) = self.groups.leaf_of(id) else { continue };
+            let place = self.leaf(leaf)?[within];
+            if place.is_present() {
+                all.push((id, self.groups.shape(id), place));
+            }
+        }
+        Ok(all)
+    }
+}

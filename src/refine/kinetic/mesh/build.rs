@@ -1,0 +1,467 @@
+//! A whole mesh at once, level by level, by many hands: the first one, and the one after a jump of the eye.
+//!
+//! Splits one by one would make the same mesh. But where nothing is there yet, all vertices of a level are known when those of the level above are: they are the children of its split
+//! vertices. So a level is a few passes over arrays, piece by piece so that a piece stays in the cache. Vertices that are to be split are numbered; their children are counted, numbered, made and
+//! tested; the split ones are told their children; words of the children go into the queue, and those that stay leaves into the patch. Each element is made from what the passes before have left,
+//! so that threads share a pass and no one waits for another.
+//!
+//! A child of two split vertices is made by the one that comes first. Numbers follow from the order of levels and of their parents: nodes, slots and words are those that splits one by one,
+//! level by level, make where places are packed. Near places are dealt out in the same order, with room left in each cluster for those that come later; vertices that come
+//! one after another in a level lie together on the ground.
+//!
+//! Invariant: afterwards all is as after splits one by one: `super::nodes` holds, each word is in a queue, and the patch tells every slot that shows something or has shown something before.
+//! Cost: some fifty nanoseconds a node on one thread, a third of it for memory that is touched for the first time.
+
+use super::clusters::{CLUSTER, Dealing};
+use super::labels::{child_point, first_child, is_on_border, level_of, orientation};
+use super::nodes::{CENTRE, NO_VERTEX, NONE, Node, SPLIT, STATUS, UNREAD, body};
+use crate::refine::kinetic::capacity::grow;
+use crate::refine::kinetic::frame::collect::enter;
+use crate::refine::kinetic::frame::shown::Shown;
+use crate::refine::kinetic::hands::{both, change, extend, extend_by, gather};
+use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of};
+use crate::refine::kinetic::time::queue::Entry;
+use crate::refine::kinetic::{Kinetic, MeshVertex, Patch};
+use crate::refine::{Phase, Probe};
+use std::ops::Range;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::read::prefetch::prefetch;
+use terrasoar_layout::read::store::{RawOf, RecordStore};
+
+/// Nodes of a mesh that has only been planted: the centre and four roots.
+const PLANTED: u32 = 5;
+/// Split vertices of a piece.
+const PIECE: usize = 1 << 14;
+/// Children ahead whose record memory is asked for.
+const FETCH_AHEAD: usize = 12;
+/// Split vertices ahead whose parents memory is asked for.
+const PARENTS_AHEAD: usize = 8;
+/// Clusters that one thread takes at the least, to find their bounds.
+const CLUSTERS_SHARE: usize = 16;
+/// Nodes that are put into a near cluster, so that most of those that come later find room beside their parents.
+const NEAR_FILL: u32 = CLUSTER as u32 * 7 / 8;
+
+/// Where nodes are put, one after another.
+#[derive(Debug, Clone, Copy)]
+struct Places {
+    /// Nodes of a cluster.
+    fill: u32,
+}
+
+impl Places {
+    /// The place of the node with a number.
+    #[inline(always)]
+    fn place(self, number: u32) -> u32 {
+        let cluster = CLUSTER as u32;
+        if self.fill == cluster { number } else { number / self.fill * cluster + number % self.fill }
+    }
+
+    /// The number of the node at a place, if that takes one.
+    #[inline(always)]
+    fn number(self, place: u32) -> Option<u32> {
+        let within = place % CLUSTER as u32;
+        (within < self.fill).then(|| place / CLUSTER as u32 * self.fill + within)
+    }
+}
+
+/// A vertex that is split, as the passes over its piece need it.
+#[derive(Debug, Clone, Copy)]
+struct Parent<R> {
+    node: u32,
+    raw: R,
+    point: GridPoint,
+    /// The leaf's [`body`]: ends of the edge, and apexes.
+    body: [u32; 4],
+    /// By label: which split vertex of the level shares that child, or [`NONE`].
+    sharers: [u32; 4],
+    /// Bit l: it makes the child with label l. Bit 4 + s: it has a triangle on side s.
+    makes: u8,
+    /// How many children those before it in the piece make.
+    first: u32,
+}
+
+impl<R> Parent<R> {
+    /// Which of the piece's children is the one with `label` that this vertex makes.
+    #[inline(always)]
+    fn child(&self, label: usize) -> u32 {
+        self.first + (self.makes & ((1 << label) - 1)).count_ones()
+    }
+
+    /// Ends of the edge of the child with `label`, as its triangle of side 0 has them; side 0's first child has the label `first`.
+    #[inline(always)]
+    fn ends(&self, label: usize, first: usize) -> [u32; 2] {
+        let [p, q, apex, other] = self.body;
+        // First and last child of side 0, then of side 1, whose edge runs the other way.
+        let [p, q] = match (label + 4 - first) & 3 {
+            0 => [apex, p],
+            3 => [q, apex],
+            2 => [other, q],
+            _ => [p, other],
+        };
+        if label >> 1 == 0 { [p, q] } else { [q, p] }
+    }
+}
+
+/// The vertices of a level.
+#[derive(Debug, Default)]
+struct Line {
+    level: u32,
+    /// Their places.
+    range: Range<u32>,
+    /// Those that are split.
+    split: Vec<u32>,
+    /// By place: which split vertex it is, or [`NONE`].
+    ranks: Vec<u32>,
+}
+
+impl Line {
+    /// Goes on to the next level, whose vertices are yet to come.
+    fn start(&mut self, level: u32, at: u32) {
+        (self.level, self.range) = (level, at..at);
+        self.split.clear();
+        self.ranks.clear();
+    }
+
+    #[inline(always)]
+    fn rank(&self, node: u32) -> u32 {
+        self.ranks.get(node.wrapping_sub(self.range.start) as usize).copied().unwrap_or(NONE)
+    }
+}
+
+/// Split vertices of a level, one after another, and their children.
+struct Piece<R> {
+    /// Which split vertex of the level comes first.
+    start: usize,
+    parents: Vec<Parent<R>>,
+    /// Children to be made: which parent of the piece makes it, times 4, and its label there.
+    births: Vec<u32>,
+    /// The vertex slot of the level's first split vertex.
+    base: u32,
+    /// The number of the piece's first child, or annex.
+    next: u32,
+    places: Places,
+}
+
+impl<R> Piece<R> {
+    /// Children, or annexes.
+    fn made(&self, level: u32) -> u32 {
+        (if level == 0 { self.parents.len() } else { self.births.len() }) as u32
+    }
+}
+
+impl<S: RecordStore> Kinetic<S> {
+    /// Makes the mesh for a view of one that has been planted in this frame.
+    pub(crate) fn build<P: Probe>(&mut self, judge: &Judge, probe: &mut P) {
+        probe.phase(Phase::Test);
+        let fill = if self.nodes.clusters.dealing() == Dealing::Near { NEAR_FILL } else { CLUSTER as u32 };
+        let places = Places { fill };
+        let stale = self.nodes.clusters.stale_slots();
+        self.fresh.clear();
+        self.nodes.all.truncate(PLANTED as usize);
+        self.test_roots(judge);
+        let mut nodes = PLANTED;
+        let (mut line, mut below) = (Line::default(), Line::default());
+        line.start(level_of(self.nodes.get(1).point), 1);
+        self.list_slots(0..1, stale);
+        self.survey(1..PLANTED, &mut line, stale);
+        let (parents, births) = (Vec::new(), Vec::new());
+        let mut piece = Piece { start: 0, parents, births, base: 0, next: 0, places };
+        while !line.split.is_empty() {
+            let at = self.nodes.all.len() as u32;
+            below.start(line.level.saturating_sub(1), at);
+            piece.base = self.vertices.len();
+            for start in (0..line.split.len()).step_by(PIECE) {
+                (piece.start, piece.next) = (start, nodes);
+                self.number(&line, &mut piece);
+                self.place_vertices(&line, &piece);
+                nodes += piece.made(line.level);
+                let children = self.nodes.all.len() as u32..places.place(nodes - 1) + 1;
+                self.make_children(judge, &children, &line, &piece);
+                self.tell_parents(&line, &piece);
+                if line.level > 0 {
+                    self.survey(children, &mut below, stale);
+                }
+            }
+            if line.level == 0 {
+                break;
+            }
+            std::mem::swap(&mut line, &mut below);
+        }
+        drop((piece, below));
+        if line.level == 0 {
+            self.list_slots(line.range.start as usize..self.nodes.all.len(), stale);
+        }
+        self.finish(nodes, fill, stale);
+        probe.phase(Phase::Apply);
+        let k = self.records.grid().k();
+        let nodes = self.nodes.all[1..].iter().filter(|_| P::HEARS_READS);
+        for node in nodes.filter(|node| node.word & !STATUS != NO_VERTEX && node.word != UNREAD) {
+            probe.read(slot_of(k, node.point));
+        }
+    }
+
+    fn test_roots(&mut self, judge: &Judge) {
+        let side_steps = self.records.grid().side_steps();
+        for node in 1..PLANTED {
+            let record = self.nodes.get(node);
+            let (raw, word) = tested(&self.records, judge, record.point, record.raw);
+            let is_split = word & ACTIVE != 0 && self.nodes.is_complete(node, side_steps);
+            let record = self.nodes.get_mut(node);
+            record.raw = raw;
+            record.word = word | if is_split { SPLIT } else { 0 };
+        }
+    }
+
+    /// Takes new vertices into their level: those that are split are listed, words go into the queue, leaves into the patch. At the finest level slots wait until split vertices
+    /// have their own.
+    fn survey(&mut self, range: Range<u32>, line: &mut Line, stale: usize) {
+        let all = &self.nodes.all;
+        let from = range.start as usize;
+        let known = line.split.len();
+        gather(&mut line.split, range.len(), |part, list| {
+            let nodes = all[from + part.start..from + part.end].iter().zip(range.start + part.start as u32..);
+            list.extend(nodes.filter(|(node, _)| node.word & ACTIVE != 0).map(|(_, place)| place));
+        });
+        // Those whose other parent is not there wait for it, as in every frame.
+        let is_split = |place: &u32| all[*place as usize].word & SPLIT != 0;
+        if !line.split[known..].iter().all(is_split) {
+            let active = line.split.split_off(known);
+            for place in active {
+                let list =
+                    if is_split(&place) { &mut line.split } else { &mut self.to_split[line.level as usize] };
+                list.push(place);
+            }
+        }
+        line.range.end = range.end;
+        line.ranks.resize(line.range.len(), NONE);
+        for (place, rank) in line.split[known..].iter().zip(known as u32..) {
+            line.ranks[(place - line.range.start) as usize] = rank;
+        }
+        let (queue, ahead, unread) = (&mut self.queue, &mut self.ahead, &mut self.unread);
+        let shown = Shown { records: &self.records, nodes: &self.nodes, vertices: &self.vertices };
+        let patch = &mut self.patch;
+        let vertices = &mut self.work.tests;
+        let enter_words = || {
+            for (node, place) in all[from..range.end as usize].iter().zip(range.clone()) {
+                let word = node.word & !SPLIT;
+                if word & !STATUS == NO_VERTEX {
+                    continue;
+                }
+                *vertices += 1;
+                if !S::IS_COMPLETE && word == UNREAD {
+                    unread.push(place);
+                } else {
+                    enter::<S>(queue, ahead, clock_of(word), Entry { node: place, word });
+                }
+            }
+        };
+        let slots = if line.level > 0 { from..range.end as usize } else { 0..0 };
+        both(range.len(), enter_words, || list_slots(patch, &shown, slots, stale));
+    }
+
+    /// Numbers the children of split vertices of a level, from `piece.start` on.
+    fn number(&mut self, line: &Line, piece: &mut Piece<RawOf<S>>) {
+        let Piece { start, parents, births, .. } = piece;
+        let all = &self.nodes.all;
+        parents.clear();
+        extend(parents, PIECE.min(line.split.len() - *start), |i| {
+            let (rank, place) = ((*start + i) as u32, line.split[*start + i]);
+            if let Some(later) = line.split.get(rank as usize + PARENTS_AHEAD) {
+                all[*later as usize].parents.iter().for_each(|parent| prefetch(all, *parent as usize));
+            }
+            let node = &all[place as usize];
+            let [p, q, apex, other, ..] = node.body;
+            let mut parent = Parent {
+                node: place,
+                raw: node.raw,
+                point: node.point,
+                body: [p, q, apex, other],
+                sharers: [NONE; 4],
+                makes: 0,
+                first: 0,
+            };
+            for side in (0..2).filter(|side| node.parents[*side] != NONE) {
+                parent.makes |= 16 << side;
+                if line.level == 0 {
+                    continue;
+                }
+                let own = 2 * side + orientation(node.point);
+                let around = &all[node.parents[side] as usize].body;
+                let first = first_child(own, line.level);
+                // The neighbours around the parent share the children beside it.
+                for (label, turn) in [(first, 3), ((first + 3) & 3, 1)] {
+                    let sharer = line.rank(around[(own + turn) & 3]);
+                    parent.sharers[label] = sharer;
+                    parent.makes |= u8::from(sharer == NONE || sharer > rank) << label;
+                }
+            }
+            parent
+        });
+        births.clear();
+        for (i, parent) in parents.iter_mut().enumerate() {
+            self.triangles += (parent.makes >> 4).count_ones() as usize;
+            parent.first = births.len() as u32;
+            let mut labels = parent.makes & 15;
+            while labels != 0 {
+                births.push((i as u32) << 2 | labels.trailing_zeros());
+                labels &= labels - 1;
+            }
+        }
+        self.work.splits += parents.len() as u64;
+    }
+
+    /// Gives split vertices their slots.
+    fn place_vertices(&mut self, line: &Line, piece: &Piece<RawOf<S>>) {
+        let (records, parents) = (&self.records, &piece.parents);
+        let here = piece.base + piece.start as u32;
+        let sent = self.patch.vertices.len();
+        extend(&mut self.patch.vertices, parents.len(), |i| {
+            let Parent { point, raw, body, .. } = parents[i];
+            let vertex = records.decode(raw, line.level);
+            let ends = [body[body::P], body[body::Q]];
+            (here + i as u32, MeshVertex::of(records, point, &vertex, ends))
+        });
+        let sent = &self.patch.vertices[sent..];
+        let is_void = |i: usize| records.decode(parents[i].raw, line.level).class.is_void();
+        self.vertices.append(
+            parents.len(),
+            |i| (parents[i].point, sent[i].1.height_m),
+            |i| records.shape().has_voids && is_void(i),
+        );
+    }
+
+    /// Makes split nodes of leaves: they have their own vertices, and the places of their children.
+    fn tell_parents(&mut self, line: &Line, piece: &Piece<RawOf<S>>) {
+        let Piece { start, parents, base, next, places, .. } = piece;
+        let (Some(first), Some(last)) = (parents.first(), parents.last()) else { return };
+        let (before, leaves) = self.nodes.all.split_at_mut(first.node as usize);
+        let leaves = &mut leaves[..(last.node - first.node) as usize + 1];
+        let ranks = &line.ranks[(first.node - line.range.start) as usize..];
+        change(leaves, |at, part| {
+            for (node, rank) in part.iter_mut().zip(&ranks[at..]).filter(|(_, rank)| **rank != NONE) {
+                let i = *rank as usize - start;
+                let parent = &parents[i];
+                node.body[body::HERE] = base + rank;
+                if line.level == 0 {
+                    node.body[body::ANNEX] = places.place(next + i as u32);
+                    continue;
+                }
+                for (label, child) in node.body[..4].iter_mut().enumerate() {
+                    let sharer = parent.sharers[label];
+                    let opposite = (label + 2) & 3;
+                    *child = if parent.makes >> label & 1 == 1 {
+                        places.place(next + parent.child(label))
+                    } else if sharer == NONE {
+                        NONE
+                    } else if let Some(i) = (sharer as usize).checked_sub(*start) {
+                        places.place(next + parents[i].child(opposite))
+                    } else {
+                        before[line.split[sharer as usize] as usize].body[opposite]
+                    };
+                }
+            }
+        });
+    }
+
+    /// Makes and tests the children of a piece, or its annexes, at the places of `range`.
+    fn make_children(&mut self, judge: &Judge, range: &Range<u32>, line: &Line, piece: &Piece<RawOf<S>>) {
+        let Piece { start, parents, births, base, next, places } = piece;
+        let (level, records) = (line.level, &self.records);
+        let (k, side_steps) = (records.grid().k(), records.grid().side_steps());
+        let annex = |i: usize| {
+            let Parent { node, raw, .. } = parents[i];
+            Node { parents: [node, NONE], ..Node::free(raw) }
+        };
+        let point_of =
+            |birth: u32| child_point(parents[birth as usize >> 2].point, level, birth as usize & 3);
+        let child = |number: usize| {
+            if let Some(later) = births.get(number + FETCH_AHEAD) {
+                records.prefetch(slot_of(k, point_of(*later)));
+            }
+            let birth = births[number];
+            let (i, label) = (birth as usize >> 2, birth as usize & 3);
+            let parent = &parents[i];
+            let here = base + (start + i) as u32;
+            let point = point_of(birth);
+            let (raw, word) = tested(records, judge, point, parent.raw);
+            let [p, q] = parent.ends(label, first_child(orientation(parent.point), level));
+            let mut node = Node { word, raw, point, parents: [NONE; 2], body: [NONE; 6] };
+            (node.body[body::P], node.body[body::Q]) = (p, q);
+            let side = label >> 1;
+            node.parents[side] = parent.node;
+            node.body[body::APEX + side] = here;
+            let sharer = parent.sharers[label];
+            if sharer != NONE {
+                node.parents[1 - side] = line.split[sharer as usize];
+                node.body[body::APEX + 1 - side] = base + sharer;
+            }
+            if word & ACTIVE != 0 && (sharer != NONE || is_on_border(point, side_steps)) {
+                node.word |= SPLIT;
+            }
+            node
+        };
+        let made = piece.made(level);
+        let nothing = Node::free(parents[0].raw);
+        extend(&mut self.nodes.all, range.len(), |i| {
+            match places.number(range.start + i as u32).and_then(|number| number.checked_sub(*next)) {
+                Some(number) if number < made => {
+                    if level == 0 {
+                        annex(number as usize)
+                    } else {
+                        child(number as usize)
+                    }
+                }
+                _ => nothing,
+            }
+        });
+    }
+
+    /// Lists what the slots of some places show.
+    fn list_slots(&mut self, range: Range<usize>, stale: usize) {
+        let shown = Shown { records: &self.records, nodes: &self.nodes, vertices: &self.vertices };
+        list_slots(&mut self.patch, &shown, range, stale);
+    }
+
+    /// Brings the clusters to the nodes that have been made.
+    fn finish(&mut self, nodes: u32, fill: u32, stale: usize) {
+        let made = self.nodes.all.len();
+        let free = Node::free(self.nodes.get(CENTRE).raw);
+        self.nodes.clusters.fill(nodes as usize, fill as usize);
+        self.nodes.all.resize(self.nodes.clusters.places(), free);
+        self.list_slots(made..self.nodes.all.len(), stale);
+        if self.nodes.clusters.has_bounds() {
+            let mut bounds = Vec::new();
+            let shown = Shown { records: &self.records, nodes: &self.nodes, vertices: &self.vertices };
+            extend_by(CLUSTERS_SHARE, &mut bounds, self.nodes.clusters.len(), |cluster| {
+                shown.bounds(cluster)
+            });
+            for (cluster, bounds) in bounds.into_iter().enumerate() {
+                self.nodes.clusters.set_bounds(cluster, bounds);
+            }
+        }
+    }
+}
+
+/// Lists the slots of places that show something, and those below `stale` that do not.
+fn list_slots<S: RecordStore>(patch: &mut Patch, shown: &Shown<'_, S>, places: Range<usize>, stale: usize) {
+    grow(&mut patch.triangles, 2 * places.len());
+    gather(&mut patch.triangles, places.len(), |part, list| {
+        for place in places.start + part.start..places.start + part.end {
+            for (side, corners) in shown.nodes.triangles(place as u32).into_iter().enumerate() {
+                let slot = 2 * place + side;
+                if corners.is_some() || slot < stale {
+                    list.push((slot as u32, shown.corners(place as u32, corners)));
+                }
+            }
+        }
+    });
+}
+
+/// The record at a point and its word; `raw` stands in for a record that is away.
+#[inline(always)]
+fn tested<S: RecordStore>(records: &S, judge: &Judge, point: GridPoint, raw: RawOf<S>) -> (RawOf<S>, u32) {
+    let Some(raw) = records.get(slot_of(records.grid().k(), point)) else { return (raw, UNREAD) };
+    let vertex = records.decode(raw, level_of(point));
+    (raw, judge.word(&judge.metric().sight(records.grid().position_m(point), &vertex)))
+}
