@@ -424,3 +424,36 @@ fn check_records(found: &[u8], plain: &Path, size: [u32; 2]) {
     }
     assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
 }
+
+/// An overlay made over a terrain file is one over the packed terrain, and the other way round; also once the packed terrain was edited itself.
+#[test]
+fn overlays_lie_over_either() {
+    let bench = Bench::of(&build_bytes(&dem([200, 150], 3, 0), &options()).unwrap()).unwrap();
+    let overlay = bench.plain.with_file_name("o.iqo");
+    let set = |i: u32| {
+        let rect = SampleRect { west: 20 * i, south: 10 * i, east: 20 * i + 15, north: 10 * i + 12 };
+        Edit::Set { area: Area::Rect(rect), height_m: f64::from(900 + i) }
+    };
+    for (i, base) in (1..).zip([&bench.plain, &bench.packed, &bench.plain, &bench.packed]) {
+        let mut session = EditSession::open_overlay(base, &overlay).unwrap();
+        session.apply(&[set(i)]).unwrap();
+        session.commit("set").unwrap();
+        drop(session);
+        let over = |base: &Path| Terrain::open_with_overlay(base, &overlay).unwrap();
+        assert_same(&over(&bench.plain), &over(&bench.packed));
+        assert_eq!(
+            over(&bench.packed).height_m(f64::from(400 * i), f64::from(250 * i)).unwrap(),
+            Some(f64::from(900 + i))
+        );
+    }
+    let before = Terrain::open_with_overlay(&bench.plain, &overlay).unwrap();
+    let mut session = EditSession::open(&bench.packed).unwrap();
+    session.apply(&[set(1), set(6)]).unwrap();
+    session.commit("set").unwrap();
+    drop(session);
+    for after in [Terrain::open_with_overlay, Terrain::open_with_overlay_unmapped] {
+        let after = after(&bench.packed, &overlay).unwrap();
+        assert!(after.base_has_grown());
+        assert_same(&before, &after);
+    }
+}

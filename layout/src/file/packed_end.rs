@@ -7,10 +7,13 @@ use super::bytes::{
     PAGE_BYTES, Page, checksum, get_u16, get_u32, get_u64, put_u16, put_u32, put_u64, to_usize,
 };
 use super::header::seal;
-use super::source::Source;
 use super::version::{MAGIC, PACKED_VERSION};
 use crate::error::LayoutError;
 use std::ops::Range;
+use std::path::Path;
+
+/// Fills a buffer with the bytes at an offset.
+pub(crate) type ReadAt<'r> = dyn Fn(u64, &mut [u8]) -> Result<(), LayoutError> + 'r;
 
 const PAGE: u64 = PAGE_BYTES as u64;
 /// Bytes before all else: two header slots.
@@ -126,19 +129,27 @@ impl PackedEnd {
         self.end.saturating_sub(self.packed_bytes)
     }
 
-    /// Of a file with this header page.
+    /// Of a file with this header page, whose bytes `read_at` reads.
     ///
     /// # Errors
     /// [`LayoutError::Damaged`] if the list of runs is not what the header says; I/O.
-    pub(crate) fn read(source: &dyn Source, page: &Page, first: u64) -> Result<Self, LayoutError> {
-        let damaged = |problem: &str| {
-            LayoutError::damaged_terrain(source.path(), "list of what was appended".into(), problem)
-        };
+    pub(crate) fn read(
+        path: &Path,
+        page: &Page,
+        first: u64,
+        read_at: &ReadAt<'_>,
+    ) -> Result<Self, LayoutError> {
+        let damaged =
+            |problem: &str| LayoutError::damaged_terrain(path, "list of what was appended".into(), problem);
         let outside = || damaged("it lies outside the file");
         let mut fields = Box::new([0; 0x100]);
         fields.copy_from_slice(&page[FIELDS]);
         let (end, newest) = (get_u64(page, END), BlockPlace::read(page, BLOCK));
         let mut this = Self { newest, ..Self::of_new(fields, first, end) };
+        // What comes next is written at the end, and must not be written over anything.
+        if end < this.packed_bytes || end < FRONT {
+            return Err(outside());
+        }
         let (mut at, mut limit) = (newest, end);
         let mut blocks: Vec<Vec<Run>> = Vec::new();
         while at != BlockPlace::default() {
@@ -152,7 +163,7 @@ impl PackedEnd {
             if at.offset < FRONT || block_end.is_none() {
                 return Err(outside());
             }
-            source.read_at(at.offset, &mut bytes)?;
+            read_at(at.offset, &mut bytes)?;
             if checksum(&bytes) != at.checksum {
                 return Err(damaged("the checksum does not match"));
             }
@@ -286,9 +297,9 @@ pub(crate) fn unpacked_page(bytes: &[u8], base: Option<&Page>, page: &mut Page) 
     Some(())
 }
 
-/// A run of pages on its way to the disk: table and pages. `bases` has a page for each, which `source` reads; 0 for none.
+/// A run of pages on its way to the disk: table and pages. `bases` has a page for each, which `read_at` reads of the terrain file; 0 for none.
 #[cfg(feature = "files")]
-pub(crate) fn packed_run(data: &[u8], bases: &[u32], source: &dyn Source) -> Result<PackedRun, LayoutError> {
+pub(crate) fn packed_run(data: &[u8], bases: &[u32], read_at: &ReadAt<'_>) -> Result<PackedRun, LayoutError> {
     const LEVEL: u8 = 6;
     let (pages, _) = data.as_chunks::<PAGE_BYTES>();
     let mut table = vec![0; pages.len() * ENTRY_BYTES];
@@ -297,7 +308,7 @@ pub(crate) fn packed_run(data: &[u8], bases: &[u32], source: &dyn Source) -> Res
     for (i, (page, number)) in pages.iter().zip(bases).enumerate() {
         let mut difference = *page;
         if *number > 0 {
-            source.read_at(u64::from(*number) * PAGE, &mut base[..])?;
+            read_at(u64::from(*number) * PAGE, &mut base[..])?;
             difference.iter_mut().zip(&*base).for_each(|(byte, base)| *byte ^= base);
         }
         let mut bytes = miniz_oxide::deflate::compress_to_vec(&difference, LEVEL);

@@ -196,7 +196,7 @@ impl Tail {
         source: &dyn Source,
     ) -> Result<(), LayoutError> {
         let Some(packed) = &self.packed else { return self.write(disk, data, self.begin) };
-        let run = packed_run(data, bases, source)?;
+        let run = packed_run(data, bases, &|offset, buffer| source.read_at(offset, buffer))?;
         let _ = packed.packed.set((run.bytes.len() as u64, run.table));
         self.put(disk, &run.bytes, packed.place)
     }

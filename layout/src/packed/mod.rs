@@ -3,8 +3,8 @@
 //! * `shape`: how a terrain is cut into groups of tiles, each of which is read by itself.
 //! * `walk`: the way through a tile, for writing and reading, `wide` with the instructions there are; `plane` predicts heights, `rules` knows what follows from them.
 //! * `container`, `places`, `source`: a packed file, read as the terrain file that it was made of. Module `packing` makes one, and that terrain file again.
-//! * `tile`, `blocks`: a tile's records, and where those of a page lie in tiles.
 //! * `appended`: what was appended to it since.
+//! * `tile`, `blocks`: a tile's records, and where those of a page lie in tiles.
 //! * `coder`, `model`, `token`, `bits`: values into bytes and back.
 //!
 //! Invariant: what is read is what was written, or an error; no bytes make reading panic, or take memory beyond a tile's.

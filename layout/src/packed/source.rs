@@ -5,6 +5,7 @@
 //!
 //! Invariant: memory is what the front of the file takes, and tiles in a quarter of what the pool over it was given, [`MOST_CACHE_BYTES`] at most. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
+mod growth;
 mod records;
 #[cfg(feature = "testing")]
 mod stages;
@@ -22,7 +23,7 @@ use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
 use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::file::header::{Header, INERT_PAGE};
-use crate::file::packed_end::{PackedEnd, Run, from_file};
+use crate::file::packed_end::{PackedEnd, from_file};
 use crate::file::source::Source;
 use crate::file::structure::inert_page;
 use crate::grid::record::RecordKind;
@@ -96,7 +97,7 @@ impl PackedSource {
             return Err(LayoutError::damaged(path, format!("byte {length}"), problem));
         };
         let (container, header, page) = current_of(path, [a, b], length)?;
-        let (slots, page) = ([a, b].map(|page| from_file(page)), Box::new(*page));
+        let (slots, page) = ([a, b].map(from_file), Box::new(*page));
         let front = Front::read(&*inner, &container, first)?;
         if header.record_kind != RecordKind::Compact {
             let problem = "it holds what packed terrain does not: exact records";
@@ -125,7 +126,7 @@ impl PackedSource {
         }
         // The header first and then the length: what a header counts was in the file before the header was.
         inner.measure_again()?;
-        let end = PackedEnd::read(&*inner, &page, first_page)?;
+        let end = PackedEnd::read(path, &page, first_page, &|at, buffer| inner.read_at(at, buffer))?;
         let length = inner.byte_count();
         if length < end.end {
             let problem =
@@ -280,8 +281,7 @@ impl Source for PackedSource {
         let mut page = Box::new([0; PAGE_BYTES]);
         while !rest.is_empty() {
             if at / PAGE >= self.end.first {
-                let packed = |number, page: &mut Page| self.packed_page(number, page);
-                let count = self.appended.read(&*self.inner, at, rest, || self.runs_now(), packed)?;
+                let count = self.read_appended(at, rest)?;
                 (at, rest) = (at + count as u64, &mut rest[count..]);
                 continue;
             }
@@ -340,26 +340,6 @@ impl Front {
 /// A part that contradicts the header.
 fn odd(path: &Path, place: &'static str) -> LayoutError {
     LayoutError::damaged_terrain(path, place.into(), "they are not what the header says")
-}
-
-impl PackedSource {
-    /// What was appended up to now.
-    fn runs_now(&self) -> Result<Vec<Run>, LayoutError> {
-        let mut slots = [[0; PAGE_BYTES]; 2];
-        self.inner.read_at(0, slots.as_flattened_mut())?;
-        let [a, b] = &slots;
-        let (_, _, page) = current_of(self.path(), [a, b], u64::MAX)?;
-        Ok(PackedEnd::read(&*self.inner, page, self.end.first)?.runs)
-    }
-
-    /// A page that an appended one is a difference to.
-    fn packed_page(&self, number: u64, page: &mut Page) -> Result<(), LayoutError> {
-        if number >= self.end.first {
-            let problem = "it is the difference to a page that is not packed";
-            return Err(LayoutError::damaged_terrain(self.path(), "appended page".into(), problem));
-        }
-        self.page(number, page)
-    }
 }
 
 /// Leaves of the terrain file's directory that hold pages which are present, and the place of the first in `present`.

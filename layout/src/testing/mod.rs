@@ -5,10 +5,9 @@
 //! | [`reseal`], [`reseal_overlay`] | makes every checksum right, bottom up |
 //! | [`Mutation`] | one change of a part that matters, told by eight bytes |
 //! | [`Sealed`] | a terrain file, and perhaps an overlay over it, mutated and sealed by a recipe of mutations |
-//! | [`seeds`] | small sound files to begin with |
-//! | `Stages`, `Way` | what unpacking is made of, to be measured |
 //! | [`mutate_packed`], [`reseal_packed`] | the same for packed files |
 //! | [`seeds`], [`packed_seeds`] | small sound files to begin with |
+//! | `Stages`, `Way` | what unpacking is made of, to be measured |
 //! | [`exercise`] | everything that this crate does with a file |
 //!
 //! Invariant: mutating and sealing never panic or take long, whatever the bytes; equal recipes give equal files. Cost: a few checksums of the file.

@@ -50,13 +50,13 @@ impl Source for LayeredSource<'_> {
         self.split + self.overlay.byte_count()
     }
 
-    fn take_share(&self, cache_bytes: u64) -> u64 {
-        self.base.take_share(cache_bytes)
-    }
-
     /// Of both.
     fn packed_bytes(&self) -> Option<u64> {
         Some(self.base.packed_bytes()? + self.overlay.byte_count())
+    }
+
+    fn take_share(&self, cache_bytes: u64) -> u64 {
+        self.base.take_share(cache_bytes)
     }
 
     fn own_start(&self) -> u64 {

@@ -59,6 +59,10 @@ impl<S: Source + ?Sized> Source for &S {
         (**self).packed_end()
     }
 
+    fn take_share(&self, cache_bytes: u64) -> u64 {
+        (**self).take_share(cache_bytes)
+    }
+
     fn own_start(&self) -> u64 {
         (**self).own_start()
     }
@@ -109,12 +113,6 @@ pub trait Source: Send + Sync {
         None
     }
 
-    /// Bytes, of the `cache_bytes` that a pool of pages is given, that this source takes for itself: what it unpacks is kept in them. The pool that was made last decides.
-    fn take_share(&self, cache_bytes: u64) -> u64 {
-        let _ = cache_bytes;
-        0
-    }
-
     /// Where a packed file grows; `None` for one that is not packed.
     fn packed_end(&self) -> Option<&PackedEnd> {
         None
@@ -126,6 +124,12 @@ pub trait Source: Send + Sync {
     /// [`LayoutError::Io`].
     fn measure_again(&mut self) -> Result<(), LayoutError> {
         Ok(())
+    }
+
+    /// Bytes, of the `cache_bytes` that a pool of pages is given, that this source takes for itself: what it unpacks is kept in them. The pool that was made last decides.
+    fn take_share(&self, cache_bytes: u64) -> u64 {
+        let _ = cache_bytes;
+        0
     }
 
     /// Offset at which the header slots lie: 0, or where an overlay begins behind its base.
