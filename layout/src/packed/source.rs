@@ -96,7 +96,7 @@ impl PackedSource {
             return Err(LayoutError::damaged(path, format!("byte {length}"), problem));
         };
         let (container, header, page) = current_of(path, [a, b], length)?;
-        let (slots, page) = ([a, b].map(|page| from_file(page)), Box::new(*page));
+        let (slots, page) = ([a, b].map(from_file), Box::new(*page));
         let front = Front::read(&*inner, &container, first)?;
         if header.record_kind != RecordKind::Compact {
             let problem = "it holds what packed terrain does not: exact records";
