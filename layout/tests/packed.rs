@@ -2,63 +2,23 @@
 
 mod common;
 
+use common::build_bytes;
 use common::drape::{draped, land, same_picture};
-use common::{MemoryDem, build_bytes};
+use common::packed::{Bench, dem, options};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::BuildOptions;
-use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, compact_packed};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::source::MemorySource;
-use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
 use terrasoar_layout::packing::{pack, unpack};
 use terrasoar_layout::progress::Silent;
-use terrasoar_layout::read::kinds::ByKind;
 use terrasoar_layout::read::loader::{Loader, Outcome, PageRequest};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
-
-/// Hills with voids, as rough as asked.
-fn dem(size: [u32; 2], roughness: u32, voids: u32) -> MemoryDem {
-    MemoryDem::from_fn(size, SampleType::I16, move |x, y| {
-        if voids > 0 && x + y > 0 && (x / 13 + 3 * (y / 17)) % 7 < voids {
-            return f64::NAN;
-        }
-        let (u, v) = (f64::from(x), f64::from(y));
-        let rough = f64::from((x * 31 + y * 57) ^ (x * y)) % f64::from(1 + roughness);
-        (900.0 + 200.0 * (u * 0.031).sin() + 150.0 * (v * 0.043).cos() + rough).round()
-    })
-}
-
-fn options() -> BuildOptions {
-    BuildOptions::default().record(Some(RecordKind::Compact)).spacing_m([20.0, 25.0])
-}
-
-struct Bench {
-    _folder: tempfile::TempDir,
-    plain: PathBuf,
-    packed: PathBuf,
-}
-
-impl Bench {
-    fn of(bytes: &[u8]) -> Result<Self, LayoutError> {
-        let folder = tempfile::tempdir().unwrap();
-        let (plain, packed) = (folder.path().join("plain.iqt"), folder.path().join("packed.iqt"));
-        std::fs::write(&plain, bytes).unwrap();
-        pack(&SystemDisk, &plain, &packed, &Silent)?;
-        Ok(Self { _folder: folder, plain, packed })
-    }
-
-    fn bytes(&self, path: &Path) -> Vec<u8> {
-        std::fs::read(path).unwrap()
-    }
-}
 
 fn open(bytes: Vec<u8>) -> Result<Terrain, LayoutError> {
     Terrain::from_source(Box::new(MemorySource::new("packed", bytes)))
@@ -377,52 +337,6 @@ fn damage_is_told() {
         told += usize::from(look(damaged).is_err());
     }
     assert!(told > 900, "{told}");
-}
-
-/// Another reader, written from FORMAT.md alone, finds the same records.
-#[test]
-fn a_reader_written_from_the_specification_agrees() {
-    let python = |args: &[&std::ffi::OsStr]| std::process::Command::new("python3").args(args).output();
-    if python(&["--version".as_ref()]).is_err() {
-        eprintln!("no Python here: not compared");
-        return;
-    }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data-scripts/read_packed.py");
-    for (size, roughness, voids) in [([150, 131], 4, 2), ([70, 9], 900, 0), ([3, 2], 0, 0)] {
-        let bench = Bench::of(&build_bytes(&dem(size, roughness, voids), &options()).unwrap()).unwrap();
-        let out = bench.plain.with_file_name("records");
-        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
-        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-        check_records(&bench.bytes(&out), &bench.plain, size);
-        // Edited, and back by one commit.
-        for path in [&bench.plain, &bench.packed] {
-            let mut session = EditSession::open(path).unwrap();
-            for (i, height_m) in [(0, 901.0), (1, 950.0), (2, 1000.0)] {
-                let rect =
-                    SampleRect { west: i, south: i, east: (i + 40).min(size[0] - 1), north: size[1] - 1 };
-                if i < size[1] {
-                    session.apply(&[Edit::Set { area: Area::Rect(rect), height_m }]).unwrap();
-                    session.commit("set").unwrap();
-                }
-            }
-            session.undo().unwrap();
-        }
-        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
-        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-        check_records(&bench.bytes(&out), &bench.plain, size);
-    }
-}
-
-/// Whether `found` is the record of each sample of the terrain file.
-fn check_records(found: &[u8], plain: &Path, size: [u32; 2]) {
-    let plain = Terrain::open(plain).unwrap();
-    let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
-    for (i, record) in found.chunks_exact(4).enumerate() {
-        let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
-        let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));
-        assert_eq!(record, records.raw(slot).to_le_bytes(), "{size:?}: {x}, {y}");
-    }
-    assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
 }
 
 /// An overlay made over a terrain file is one over the packed terrain, and the other way round; also once the packed terrain was edited itself.

@@ -160,7 +160,7 @@ fn refused(path: &Path, problem: &str) -> LayoutError {
 fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
     let (path, header) = (built.path(), built.header());
     let in_order =
-        "other programs wrote it, in an order of their own; write it anew with `terrasoar compact --packed`";
+        "other programs wrote it, in an order of their own; write it anew with `terrasoar compact`";
     let mut next = INERT_PAGE;
     for entry in built.entries().iter().filter(|entry| entry.is_present()) {
         next += 1;

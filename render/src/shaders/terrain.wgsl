@@ -87,7 +87,10 @@ fn own_vertex(@builtin(vertex_index) i: u32) -> OwnPoint {
 @fragment
 fn own_fragment(p: OwnPoint) -> @location(0) vec4<f32> {
     var g = ground_at(SharedPoint(p.position, p.from_eye_m, p.cells, p.height_from_origin_m));
-    let a_pixel = sqrt(pow(dpdx(p.corner), vec3(2.0)) + pow(dpdy(p.corner), vec3(2.0)));
+    // Products, not powers: of negative numbers those are undefined, and graphics cards make no number of them.
+    let east = dpdx(p.corner);
+    let down = dpdy(p.corner);
+    let a_pixel = sqrt(east * east + down * down);
     let away_px = p.corner / max(a_pixel, vec3(1e-9));
     let nearest_px = min(away_px.x, min(away_px.y, away_px.z));
     // Half of a line lies on either side of the edge.

@@ -51,7 +51,9 @@ fn checkerboard(gpu: &Gpu) -> Outcome {
     show_all(&mut scene, &image, &view);
     let picture = scene.draw(&view, &bare());
     let right = off(&picture, &view, &image, [0.0; 2]);
-    ensure(right < 3.0, || format!("the picture is off by up to {right:.1} of 255"))?;
+    // Graphics cards have 256 steps between two texels; in dark colours a step of light is several of 255.
+    let most = if gpu.capabilities.software { 3.0 } else { 8.0 };
+    ensure(right < most, || format!("the picture is off by up to {right:.1} of 255"))?;
     // Edges are four pixels wide, so the test sees far less than half a texel.
     for moved in [[0.1, 0.0], [0.0, 0.1], [-0.1, 0.0], [0.0, -0.1]] {
         let wrong = off(&picture, &view, &image, moved);

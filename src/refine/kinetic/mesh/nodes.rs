@@ -103,16 +103,16 @@ impl<R: Copy> Nodes<R> {
         self.all.get_mut(node as usize).map(|node| &mut node.word).filter(|word| **word & !SPLIT == entered)
     }
 
-    /// Whether the place holds a vertex.
+    /// Whether the place holds a vertex. Lists of nodes may name places that have been given up since, beyond the array's end too.
     #[inline(always)]
     pub(crate) fn is_live(&self, node: u32) -> bool {
-        self.get(node).word & !STATUS != NO_VERTEX
+        self.all.get(node as usize).is_some_and(|node| node.word & !STATUS != NO_VERTEX)
     }
 
     /// Whether the node waits for its record.
     #[inline(always)]
     pub(crate) fn is_unread(&self, node: u32) -> bool {
-        self.get(node).word == UNREAD
+        self.all.get(node as usize).is_some_and(|node| node.word == UNREAD)
     }
 
     #[inline(always)]

@@ -70,13 +70,16 @@ impl<S: RecordStore> Kinetic<S> {
         if ahead == 2 {
             return both_lines(node);
         }
-        let parents = self.nodes.get(node).parents.into_iter().filter(|parent| *parent != NONE);
+        // The place may have been given up since.
+        let Some(node) = self.nodes.all.get(node as usize) else { return };
+        let parents = node.parents.into_iter().filter(|parent| *parent != NONE);
         if ahead == 1 {
             parents.for_each(both_lines);
         } else {
             // The neighbours around each parent, which its body names.
             parents.for_each(|parent| {
-                self.nodes.get(parent).body[..4].iter().for_each(|child| both_lines(*child))
+                let parent = self.nodes.all.get(parent as usize);
+                parent.into_iter().flat_map(|parent| &parent.body[..4]).for_each(|child| both_lines(*child))
             });
         }
     }

@@ -1,0 +1,47 @@
+//! Terrain for tests of packed files, and both files of it.
+
+use super::MemoryDem;
+use std::path::{Path, PathBuf};
+use terrasoar_layout::LayoutError;
+use terrasoar_layout::build::BuildOptions;
+use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::grid::record::RecordKind;
+use terrasoar_layout::packing::pack;
+use terrasoar_layout::progress::Silent;
+
+/// Hills with voids, as rough as asked.
+pub fn dem(size: [u32; 2], roughness: u32, voids: u32) -> MemoryDem {
+    MemoryDem::from_fn(size, SampleType::I16, move |x, y| {
+        if voids > 0 && x + y > 0 && (x / 13 + 3 * (y / 17)) % 7 < voids {
+            return f64::NAN;
+        }
+        let (u, v) = (f64::from(x), f64::from(y));
+        let rough = f64::from((x * 31 + y * 57) ^ (x * y)) % f64::from(1 + roughness);
+        (900.0 + 200.0 * (u * 0.031).sin() + 150.0 * (v * 0.043).cos() + rough).round()
+    })
+}
+
+pub fn options() -> BuildOptions {
+    BuildOptions::default().record(Some(RecordKind::Compact)).spacing_m([20.0, 25.0])
+}
+
+pub struct Bench {
+    _folder: tempfile::TempDir,
+    pub plain: PathBuf,
+    pub packed: PathBuf,
+}
+
+impl Bench {
+    pub fn of(bytes: &[u8]) -> Result<Self, LayoutError> {
+        let folder = tempfile::tempdir().unwrap();
+        let (plain, packed) = (folder.path().join("plain.iqt"), folder.path().join("packed.iqt"));
+        std::fs::write(&plain, bytes).unwrap();
+        pack(&SystemDisk, &plain, &packed, &Silent)?;
+        Ok(Self { _folder: folder, plain, packed })
+    }
+
+    pub fn bytes(&self, path: &Path) -> Vec<u8> {
+        std::fs::read(path).unwrap()
+    }
+}

@@ -1,0 +1,58 @@
+//! Packed files are what FORMAT.md says: a reader written from it alone, in another language, finds the same records.
+
+mod common;
+
+use common::build_bytes;
+use common::packed::{Bench, dem, options};
+use std::path::Path;
+use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect};
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::terrain::Terrain;
+
+/// Another reader, written from FORMAT.md alone, finds the same records.
+#[test]
+fn a_reader_written_from_the_specification_agrees() {
+    let python = |args: &[&std::ffi::OsStr]| std::process::Command::new("python3").args(args).output();
+    if python(&["--version".as_ref()]).is_err() {
+        eprintln!("no Python here: not compared");
+        return;
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data-scripts/read_packed.py");
+    for (size, roughness, voids) in [([150, 131], 4, 2), ([70, 9], 900, 0), ([3, 2], 0, 0)] {
+        let bench = Bench::of(&build_bytes(&dem(size, roughness, voids), &options()).unwrap()).unwrap();
+        let out = bench.plain.with_file_name("records");
+        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        check_records(&bench.bytes(&out), &bench.plain, size);
+        // Edited, and back by one commit.
+        for path in [&bench.plain, &bench.packed] {
+            let mut session = EditSession::open(path).unwrap();
+            for (i, height_m) in [(0, 901.0), (1, 950.0), (2, 1000.0)] {
+                let rect =
+                    SampleRect { west: i, south: i, east: (i + 40).min(size[0] - 1), north: size[1] - 1 };
+                if i < size[1] {
+                    session.apply(&[Edit::Set { area: Area::Rect(rect), height_m }]).unwrap();
+                    session.commit("set").unwrap();
+                }
+            }
+            session.undo().unwrap();
+        }
+        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        check_records(&bench.bytes(&out), &bench.plain, size);
+    }
+}
+
+/// Whether `found` is the record of each sample of the terrain file.
+fn check_records(found: &[u8], plain: &Path, size: [u32; 2]) {
+    let plain = Terrain::open(plain).unwrap();
+    let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
+    for (i, record) in found.chunks_exact(4).enumerate() {
+        let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
+        let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));
+        assert_eq!(record, records.raw(slot).to_le_bytes(), "{size:?}: {x}, {y}");
+    }
+    assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
+}
