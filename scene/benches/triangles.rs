@@ -123,6 +123,9 @@ fn tolerance_px(
     Ok(Some(coarse))
 }
 
+/// A column of the table.
+type Figure = fn(&Frame) -> f64;
+
 /// What a frame took: milliseconds and bytes.
 #[derive(Default)]
 struct Frame {
@@ -179,7 +182,7 @@ fn fly(
     gpu.watch.check()?;
     println!("{:.2} million triangles, {tolerance_px:.4} px\n", first.triangles / 1e6);
     println!("| | first frame | median | 95 % | 99 % | most |\n|---|---|---|---|---|---|");
-    let rows: [(&str, fn(&Frame) -> f64); 6] = [
+    let rows: [(&str, Figure); 6] = [
         ("device, ms", |f| f.device_ms),
         ("engine's update, ms", |f| f.update_ms),
         ("renderer, processor, ms", |f| f.renderer_ms),

@@ -164,7 +164,7 @@ mod tests {
     fn a_picture_is_coarse_at_once_and_fine_in_the_end() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("land.iqt");
-        let steep = |x: u32, y: u32| f64::from((x * 37 ^ y * 91) % 61 + (x ^ y) % 512);
+        let steep = |x: u32, y: u32| f64::from(((x * 37) ^ (y * 91)) % 61 + (x ^ y) % 512);
         let dem = MemoryDem::from_fn([1025; 2], SampleType::I16, steep);
         build(&dem, &path, &BuildOptions::default().spacing_m([10.0; 2]), &Silent).unwrap();
         let open = || Arc::new(Terrain::open_unmapped(&path).unwrap());
