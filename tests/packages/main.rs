@@ -19,7 +19,7 @@ const PACKAGES: [(&str, u64); 7] = [
     ("terrasoar-render", 500_000),
     ("terrasoar-scene", 350_000),
     ("terrasoar-lab", 400_000),
-    ("terrasoar-cli", 700_000),
+    ("terrasoar-cli", 750_000),
 ];
 
 /// What no package holds: tests, their data, pictures, elevation data.
