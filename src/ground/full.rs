@@ -29,21 +29,12 @@ impl<'a, C: RecordCodec> FullMesh<'a, C> {
 
     fn vertex(&self, point: GridPoint, slot: u32, slot_of: impl Fn(GridPoint) -> Option<u32>) -> MeshVertex {
         let grid = self.records.grid();
-        let (vertex, folded, middle) =
-            (self.records.vertex_at(point), grid.fold(point), grid.side_steps() / 2);
+        let middle = grid.side_steps() / 2;
         // Corners and the centre split no edge.
         let own = grid.is_corner(point) || point == GridPoint::new(middle, middle);
         let ends =
             if own { [slot; 2] } else { grid.edge_ends(point).map(|end| slot_of(end).unwrap_or(slot)) };
-        MeshVertex {
-            x: folded.x(),
-            y: folded.y(),
-            height_m: vertex.height_m as f32,
-            error_m: vertex.error_m as f32,
-            radius_m: vertex.radius_m as f32,
-            ends,
-            flags: if grid.is_corner(point) { MeshVertex::NO_LEVEL } else { grid.level(point) },
-        }
+        MeshVertex::of(&self.records, point, &self.records.vertex_at(point), ends)
     }
 }
 
