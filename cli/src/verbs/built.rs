@@ -6,6 +6,7 @@ use super::terrain;
 use serde::Serialize;
 use std::path::Path;
 use terrasoar_layout::build::compact_step_m;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::file::header::Header;
 use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::words::number;
@@ -36,7 +37,10 @@ impl Built {
     pub(super) fn of(out: &Path, header: &Header, chosen: bool, bytes: u64, seconds: f64) -> Self {
         let samples = header.grid.samples();
         let compact_step_m = compact_step_m(header).filter(|_| chosen);
-        let share = RecordKind::Compact.bytes() as f64 / header.record_kind.bytes() as f64;
+        // Of its pages those with records alone become fewer.
+        let times = (header.record_kind.bytes() / RecordKind::Compact.bytes()) as u64;
+        let fewer = header.stored_pages - header.stored_pages.div_ceil(times);
+        let compact_bytes = header.file_bytes.saturating_sub(fewer * PAGE_BYTES as u64);
         Self {
             file: out.display().to_string(),
             samples,
@@ -47,7 +51,7 @@ impl Built {
             height_step_m: (header.record_kind == RecordKind::Compact).then_some(header.scale.height_step_m),
             heights_rounded: header.heights_rounded,
             compact_step_m,
-            compact_bytes: compact_step_m.map(|_| (header.file_bytes as f64 * share) as u64),
+            compact_bytes: compact_step_m.map(|_| compact_bytes),
             nodata_samples: header.nodata_samples,
             bytes,
             bytes_per_sample: bytes as f64 / samples.map(f64::from).iter().product::<f64>(),
