@@ -133,7 +133,7 @@ fn steps_that_do_not_fit_are_refused_with_the_smallest_that_does() {
 
 #[test]
 fn flat_ground_takes_any_step() {
-    let dem = MemoryDem::from_fn([9, 9], SampleType::F64, |_, _| 1234.567_89);
+    let dem = MemoryDem::from_fn([9, 9], SampleType::F64, |_, _| 1_234.567_89);
     for step_m in [1e-4, 1.0, 1e6] {
         let options = BuildOptions::default().height_step_m(step_m);
         let terrain = open_bytes(build_bytes(&dem, &options).unwrap()).unwrap();
