@@ -31,39 +31,57 @@ struct Around {
 impl Around {
     fn white(scratch: &Scratch, octave: &Octave, i: usize) -> Self {
         let (x, y) = ((i % octave.m) as isize, (i / octave.m) as isize);
-        let e = |dx, dy| scratch.heights.coarse.at(x + dx, y + dy);
-        let corners = [e(0, 0), e(1, 1), e(1, 0), e(0, 1)];
-        let is_rising = (x ^ y) & 1 == 0;
-        let (ends, parents) = if is_rising {
-            ([corners[0], corners[1]], [(1, 0), (0, 1)])
-        } else {
-            ([corners[2], corners[3]], [(0, 0), (1, 1)])
-        };
+        let e = |(dx, dy): (isize, isize)| scratch.heights.coarse.at(x + dx, y + dy);
+        let [edge, parents] = diagonals(x, y);
+        let (ends, apexes) = (edge.map(e), parents.map(e));
         Self {
             ends,
-            range: range(corners),
+            range: range([ends[0], ends[1], apexes[0], apexes[1]]),
             errors: parents.map(|(dx, dy)| scratch.errors.coarse.at(x + dx, y + dy)),
             radii: parents.map(|(dx, dy)| scratch.radii.coarse.at(x + dx, y + dy)),
         }
     }
 
     fn black(scratch: &Scratch, octave: &Octave, i: usize) -> Self {
-        let (m, i) = (octave.m, i - octave.whites());
-        let is_east = i < octave.easts();
-        let (i, wide) = if is_east { (i, m) } else { (i - octave.easts(), m + 1) };
-        let (x, y) = ((i % wide) as isize, (i / wide) as isize);
-        let (end, before) = if is_east { ((1, 0), (0, -1)) } else { ((0, 1), (-1, 0)) };
-        let e = |dx, dy| scratch.heights.coarse.at(x + dx, y + dy);
-        let w = |dx, dy| scratch.heights.whites.at(x + dx, y + dy);
-        let ends = [e(0, 0), e(end.0, end.1)];
-        let whites = [before, (0, 0)];
+        let (x, y, is_east) = black_place(octave, i);
+        let ends = black_ends(scratch, octave, i);
+        let whites = [if is_east { (0, -1) } else { (-1, 0) }, (0, 0)];
+        let apexes = whites.map(|(dx, dy)| scratch.heights.whites.at(x + dx, y + dy));
         Self {
             ends,
-            range: range([ends[0], ends[1], w(before.0, before.1), w(0, 0)]),
+            range: range([ends[0], ends[1], apexes[0], apexes[1]]),
             errors: whites.map(|(dx, dy)| scratch.errors.whites.at(x + dx, y + dy)),
             radii: whites.map(|(dx, dy)| scratch.radii.whites.at(x + dx, y + dy)),
         }
     }
+}
+
+/// Steps from a white's south-west corner to the ends of its edge, and to the other corners of its cell.
+fn diagonals(x: isize, y: isize) -> [[(isize, isize); 2]; 2] {
+    let (rising, falling) = ([(0, 0), (1, 1)], [(1, 0), (0, 1)]);
+    if (x ^ y) & 1 == 0 { [rising, falling] } else { [falling, rising] }
+}
+
+/// Heights at the ends of a white's edge.
+fn white_ends(scratch: &Scratch, octave: &Octave, i: usize) -> [f64; 2] {
+    let (x, y) = ((i % octave.m) as isize, (i / octave.m) as isize);
+    diagonals(x, y)[0].map(|(dx, dy)| scratch.heights.coarse.at(x + dx, y + dy))
+}
+
+/// Column and row of a black one among those of its lattice, and whether its edge runs east.
+fn black_place(octave: &Octave, i: usize) -> (isize, isize, bool) {
+    let i = i - octave.whites();
+    let is_east = i < octave.easts();
+    let (i, wide) = if is_east { (i, octave.m) } else { (i - octave.easts(), octave.m + 1) };
+    ((i % wide) as isize, (i / wide) as isize, is_east)
+}
+
+/// Heights at the ends of a black one's edge.
+fn black_ends(scratch: &Scratch, octave: &Octave, i: usize) -> [f64; 2] {
+    let (x, y, is_east) = black_place(octave, i);
+    let (dx, dy) = if is_east { (1, 0) } else { (0, 1) };
+    let e = &scratch.heights.coarse;
+    [e.at(x, y), e.at(x + dx, y + dy)]
 }
 
 fn range([a, b, c, d]: [f64; 4]) -> f64 {
@@ -74,14 +92,14 @@ fn range([a, b, c, d]: [f64; 4]) -> f64 {
 pub(super) fn derived(rules: &Rules, scratch: &mut Scratch, octave: &Octave) {
     let (m, whites, easts) = (octave.m, octave.whites(), octave.easts());
     for i in whites..octave.count() {
-        let Around { ends: [b, d], .. } = Around::black(scratch, octave, i);
+        let [b, d] = black_ends(scratch, octave, i);
         if scratch.kinds[i] == ORDINARY {
             scratch.flat_errors[i] = rules.step(scratch.values[i], b, d);
             scratch.flat_radii[i] = 0;
         }
     }
     for i in (0..whites).filter(|i| scratch.kinds[*i] == ORDINARY) {
-        let Around { ends: [b, d], .. } = Around::white(scratch, octave, i);
+        let [b, d] = white_ends(scratch, octave, i);
         let v = scratch.values[i];
         let north = whites + easts + i / m * (m + 1) + i % m;
         let children = [north, north + 1, whites + i, whites + i + m];
