@@ -23,7 +23,7 @@ fn dem(size: [u32; 2], sample_type: SampleType, rough_m: f64, voids: u32) -> Mem
             return f64::NAN;
         }
         let (u, v) = (f64::from(x), f64::from(y));
-        let rough = f64::from((x * 31 + y * 57) ^ (x * y) % 977) / 977.0 * rough_m;
+        let rough = f64::from(((x * 31 + y * 57) ^ (x * y)) % 977) / 977.0 * rough_m;
         let height = 20.0 * (u * 0.031).sin() + 15.0 * (v * 0.043).cos() + rough;
         if sample_type == SampleType::F32 { f64::from(height as f32) } else { height }
     })
@@ -189,7 +189,7 @@ fn packed_bytes_are_what_they_were() {
                 return f64::NAN;
             }
             let height = f64::from(x * x) / 64.0 - f64::from(y * (x + 3)) / 129.0
-                + f64::from((x * 37 ^ y * 11) % 64) / 1021.0;
+                + f64::from(((x * 37) ^ (y * 11)) % 64) / 1021.0;
             if sample_type == SampleType::F32 { f64::from(height as f32) } else { height }
         });
         let bench = Bench::of(&build_bytes(&dem, &options()).unwrap()).unwrap();

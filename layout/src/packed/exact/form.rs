@@ -136,7 +136,7 @@ impl Form {
     }
 
     #[inline(always)]
-    fn from_ordered(self, place: u64) -> u64 {
+    fn bits_at(self, place: u64) -> u64 {
         let sign = 1 << (self.height_bits() - 1);
         if place & sign != 0 { place ^ sign } else { !place & (u64::MAX >> (64 - self.height_bits())) }
     }
@@ -151,7 +151,7 @@ impl Form {
     #[inline(always)]
     pub(super) fn restored(self, residual: u64, predicted: u64) -> u64 {
         let place = self.ordered(predicted).wrapping_add(unfolded(residual));
-        self.from_ordered(place & (u64::MAX >> (64 - self.height_bits())))
+        self.bits_at(place & (u64::MAX >> (64 - self.height_bits())))
     }
 }
 
