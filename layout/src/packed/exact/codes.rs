@@ -4,7 +4,7 @@ use super::form::{Parts, folded, unfolded};
 use super::heights::half_octaves;
 use super::numbers::{Row, row, shift};
 use super::rules::Rules;
-use super::walk::{Scratch, UNKNOWN};
+use super::scratch::{Scratch, UNKNOWN};
 use crate::packed::coder::Coder;
 use crate::packed::model::{ERRORS, RADII};
 use crate::packed::walk::{ORDINARY, Octave};

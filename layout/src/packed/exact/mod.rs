@@ -15,6 +15,7 @@ mod form;
 mod heights;
 mod numbers;
 mod rules;
+mod scratch;
 mod special;
 mod walk;
 
@@ -23,4 +24,5 @@ mod tests;
 
 pub(crate) use form::Form;
 pub(crate) use rules::Rules;
-pub(crate) use walk::{Scratch, walk};
+pub(crate) use scratch::Scratch;
+pub(crate) use walk::walk;

@@ -2,7 +2,7 @@
 
 use super::form::{Form, Parts, folded, unfolded};
 use super::numbers::single;
-use super::walk::Scratch;
+use super::scratch::Scratch;
 use crate::packed::coder::Coder;
 use crate::packed::model::{FRINGE_ERRORS, FRINGE_RADII, KINDS, OTHER_ERRORS, OTHER_RADII};
 use crate::packed::walk::{IS_FRINGE, IS_INERT, ORDINARY, Octave};
