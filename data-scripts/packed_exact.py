@@ -149,7 +149,8 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
             e[x, size + s] = e[x - s, size] + e[x + s, size] - e[x, size - s]
         is_east = lambda p: p[0] // s % 2 == 1
         diamond = lambda p: [(-1, 0), (1, 0), (0, -1), (0, 1)] if is_east(p) else [(0, -1), (0, 1), (-1, 0), (1, 0)]
-        knights = lambda p: [(-2, -1), (-2, 1), (2, -1), (2, 1), (-1, -2), (1, -2), (-1, 2), (1, 2)]
+        wide, tall = [(-2, -1), (-2, 1), (2, -1), (2, 1)], [(-1, -2), (1, -2), (-1, 2), (1, 2)]
+        knights = lambda p: wide + tall if is_east(p) else tall + wide  # the order of a sum decides its last bit
         heights(easts + norths, 64 * q + 32, diamond, knights)
         if not gives:
             continue
