@@ -9,7 +9,7 @@ use crate::file::header::Header;
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
 use crate::grid::record::RecordKind;
-use crate::packing::publish_packed;
+use crate::packing::{Check, publish_packed};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -40,7 +40,15 @@ pub fn widen(
     // Windows replaces no file that is mapped.
     drop(terrain);
     if packs {
-        return Ok(publish_packed(disk, file, AtomicFile::create(path)?, Some(&lock), progress)?.0);
+        return Ok(publish_packed(
+            disk,
+            file,
+            AtomicFile::create(path)?,
+            Some(&lock),
+            Check::Pages,
+            progress,
+        )?
+        .0);
     }
     progress.stage("syncing", 0);
     publish_terrain(disk, file, Some(&lock))

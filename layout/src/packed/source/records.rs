@@ -105,7 +105,7 @@ impl PackedSource {
     }
 
     /// Where a page of the terrain file lies on the ground, as a number that is near for pages near each other; those that are no record pages come first.
-    pub(in crate::packed) fn place_of(&self, number: u64) -> u64 {
+    pub(crate) fn place_of(&self, number: u64) -> u64 {
         let present =
             number.checked_sub(FIRST_PAGE).and_then(|at| self.present.get(usize::try_from(at).ok()?));
         let Some(logical) = present else { return 0 };
