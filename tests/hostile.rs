@@ -45,7 +45,7 @@ fn path(terrain: &Terrain) -> Vec<View> {
 
 fn compact(terrain: &Terrain) -> Records<'_, Compact> {
     match terrain.records() {
-        Some(ByKind::Compact(records)) => records,
+        Ok(ByKind::Compact(records)) => records,
         _ => panic!("the test terrain has compact records in memory"),
     }
 }

@@ -47,7 +47,7 @@ fn engines_fly_edited_packed_terrain_as_the_terrain() {
         let plain = Terrain::open(&plain).unwrap();
         let whole = Terrain::open(&packed).unwrap();
         let streamed = Arc::new(Terrain::open_unmapped(&packed).unwrap());
-        let (Some(ByKind::Compact(plain_records)), Some(ByKind::Compact(records)), ByKind::Compact(pool)) =
+        let (Ok(ByKind::Compact(plain_records)), Ok(ByKind::Compact(records)), ByKind::Compact(pool)) =
             (plain.records(), whole.records(), streamed.pool(64 << 20).unwrap())
         else {
             panic!("compact records")

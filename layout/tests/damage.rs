@@ -51,7 +51,7 @@ impl Random {
 fn use_terrain(terrain: &Terrain) -> Result<VerifyReport, LayoutError> {
     let grid = *terrain.grid();
     let n = grid.side_steps();
-    if let Some(records) = terrain.records() {
+    if let Ok(records) = terrain.records() {
         let mut sum = 0.0;
         with_records!(records, records => {
             for y in 0..=n {
@@ -225,7 +225,7 @@ fn records_that_break_their_promises_are_found_behind_right_checksums() {
     let place = |p: GridPoint| {
         let slot = slot_of(grid.k(), p) as usize;
         let page = slot / 1024;
-        (page, terrain.entries()[page].page as usize * PAGE + slot % 1024 * 4)
+        (page, terrain.entry(page as u64).unwrap().page as usize * PAGE + slot % 1024 * 4)
     };
     let mut tried = 0;
     for y in (0..37).step_by(4) {

@@ -48,7 +48,7 @@ fn a_reader_written_from_the_specification_agrees() {
 /// Whether `found` is the record of each sample of the terrain file.
 fn check_records(found: &[u8], plain: &Path, size: [u32; 2]) {
     let plain = Terrain::open(plain).unwrap();
-    let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
+    let Ok(ByKind::Compact(records)) = plain.records() else { panic!() };
     for (i, record) in found.chunks_exact(4).enumerate() {
         let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
         let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));

@@ -89,7 +89,7 @@ pub(crate) fn pack_into(
         check_pages(built, progress)?;
     }
     let directory_end = check_packable(built)?;
-    let Some(ByKind::Compact(records)) = built.records() else {
+    let ByKind::Compact(records) = built.records()? else {
         return Err(refused(terrain.path(), "its records are not in memory's reach"));
     };
     let packer = Packer {
@@ -162,13 +162,13 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
     let in_order =
         "other programs wrote it, in an order of their own; write it anew with `terrasoar compact`";
     let mut next = INERT_PAGE;
-    for entry in built.entries().iter().filter(|entry| entry.is_present()) {
+    for (_, entry) in built.present_pages()? {
         next += 1;
         if entry.page != next || entry.generation != 1 {
             return Err(refused(path, in_order));
         }
     }
-    let (root, page) = put_all_leaves(built.entries(), next + 1, |_, _| Ok(()))?;
+    let (root, page) = put_all_leaves(built.table().leaves(), next + 1, |_, _| Ok(()))?;
     let root = root_bytes(&root);
     let end = u64::from(page) * PAGE + root.bytes.len() as u64;
     let is_in_order =
@@ -180,9 +180,9 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
 fn check_pages(terrain: &Terrain, progress: &dyn Progress) -> Result<(), LayoutError> {
     let per_page = terrain.header().records_per_page();
     progress.stage("checking", terrain.header().stored_pages * per_page);
-    (0..terrain.entries().len() as u64)
+    let present: Vec<u64> = terrain.present_pages()?.map(|(page, _)| page).collect();
+    present
         .into_par_iter()
-        .filter(|page| terrain.entries()[*page as usize].is_present())
         .try_for_each(|page| terrain.checked_page(page).map(|_| progress.advance(per_page)))
 }
 
@@ -274,9 +274,11 @@ impl Packer<'_> {
         let slots = header_slots(source, header)?;
         let mut front = Front::default();
         front.put(MODEL, &model.to_bytes());
-        front.put(RUNS, &runs_of(built.entries().iter().map(|entry| entry.is_present())));
-        let present = built.entries().iter().filter(|entry| entry.is_present());
-        let sums: Vec<u8> = present.flat_map(|entry| entry.checksum.to_le_bytes()).collect();
+        front.put(RUNS, &runs_of((0..built.page_count()).map(|page| {
+            built.known_entry(page).is_some_and(|entry| entry.is_present())
+        })));
+        let present = built.present_pages()?;
+        let sums: Vec<u8> = present.flat_map(|(_, entry)| entry.checksum.to_le_bytes()).collect();
         front.put(SUMS, &sums);
         let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
         // Leaves have their place before it is known what they hold.

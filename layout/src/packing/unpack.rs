@@ -69,8 +69,8 @@ fn check(terrain: &Terrain, file: &AtomicFile, progress: &dyn Progress) -> Resul
         .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
     let unpacked = Terrain::from_source(Box::new(crate::file::source::PreadSource::over(path, again)?))?;
     let per_page = terrain.header().records_per_page();
-    (0..unpacked.entries().len() as u64)
+    let present: Vec<u64> = unpacked.present_pages()?.map(|(page, _)| page).collect();
+    present
         .into_par_iter()
-        .filter(|page| unpacked.entries()[*page as usize].is_present())
         .try_for_each(|page| unpacked.checked_page(page).map(|_| progress.advance(per_page)))
 }
