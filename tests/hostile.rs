@@ -73,7 +73,7 @@ fn catches_up<C: RecordCodec, F: Fetch>(streamed: &mut Streamed<C, F>, view: &Vi
 
 fn names_a_page(error: &LayoutError) -> bool {
     let text = error.to_string();
-    text.contains("record page") || text.contains("injected failure")
+    text.contains("record page") || text.contains("directory leaf") || text.contains("injected failure")
 }
 
 fn withstands(fault: Fault) {

@@ -105,9 +105,17 @@ pub fn verify_pages(terrain: &Terrain) -> u64 {
 /// Checks the whole file on the current rayon pool. `progress` hears how many more pages are done, [`verify_pages`] in sum.
 ///
 /// # Errors
-/// Only if the file cannot be read, and damage of the directory, without which nothing is known of its pages; what else is wrong in it is the report's business.
+/// Only if the file cannot be read; what is wrong in it is the report's business. Of a file with a damaged directory it says that alone.
 pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<VerifyReport, LayoutError> {
-    let present: Vec<u32> = terrain.present_pages()?.map(|(page, _)| page as u32).collect();
+    // Without the directory nothing is known of what it leads to.
+    let present: Vec<u32> = match terrain.present_pages() {
+        Ok(pages) => pages.map(|(page, _)| page as u32).collect(),
+        Err(LayoutError::Damaged { place, problem, .. }) => {
+            let problems = vec![Problem { place, problem }];
+            return Ok(VerifyReport { problems, problem_count: 1, ..VerifyReport::default() });
+        }
+        Err(other) => return Err(other),
+    };
     let findings = structure::check(terrain);
     let (damaged, wrong_sums) = checksums(terrain, &present, progress)?;
     let (grid, scale) = (terrain.grid(), &terrain.header().scale);

@@ -304,10 +304,7 @@ fn damage_is_told() {
         let terrain = open(damaged)?;
         for page in 0..terrain.page_count() {
             let read = terrain.checked_page(page)?;
-            assert!(
-                plain.page_count() != terrain.page_count()
-                    || read == plain.checked_page(page).unwrap()
-            );
+            assert!(plain.page_count() != terrain.page_count() || read == plain.checked_page(page).unwrap());
         }
         Ok(())
     };

@@ -8,8 +8,8 @@ use super::bytes::{PAGE_BYTES, Page, checksum, get_text, get_u32, get_u64, put_t
 use super::disk::Disk;
 use super::header::{Header, seal};
 use super::journal::{Lineage, State};
-use super::source::{LayeredSource, PreadSource, Source, split_of};
 use super::page_table::PageTable;
+use super::source::{LayeredSource, PreadSource, Source, split_of};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::slots::Slots;

@@ -117,7 +117,7 @@ impl PageTable {
 
     /// The entries of every leaf as far as they were read, none for absent ones.
     #[cfg(feature = "files")]
-    pub(crate) fn leaves(&self) -> impl Iterator<Item = &[Entry]> + '_ {
+    pub(crate) fn leaves(&self) -> impl Iterator<Item = &[Entry]> + Clone + '_ {
         self.leaves.iter().map(|leaf| leaf.get().map_or(&[][..], |leaf| &leaf[..]))
     }
 

@@ -17,7 +17,8 @@ use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::{Compact, RecordKind};
 use crate::packed::coder::{Encoder, PlainEncoder};
-use crate::packed::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, runs_of};
+use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS, Section};
+use crate::packed::leaves::packed_leaves;
 use crate::packed::model::{CONTEXTS, Counts, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
 use crate::packed::rules::Rules;
@@ -274,12 +275,10 @@ impl Packer<'_> {
         let slots = header_slots(source, header)?;
         let mut front = Front::default();
         front.put(MODEL, &model.to_bytes());
-        front.put(RUNS, &runs_of((0..built.page_count()).map(|page| {
-            built.known_entry(page).is_some_and(|entry| entry.is_present())
-        })));
-        let present = built.present_pages()?;
-        let sums: Vec<u8> = present.flat_map(|(_, entry)| entry.checksum.to_le_bytes()).collect();
-        front.put(SUMS, &sums);
+        built.check_directory()?;
+        let [runs, index, blocks] = packed_leaves(built.table().leaves());
+        front.put(RUNS, &runs);
+        front.put(INDEX, &index);
         let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
         // Leaves have their place before it is known what they hold.
         let leaf_sizes = self.groups.leaf_sizes();
@@ -333,6 +332,9 @@ impl Packer<'_> {
             write(&bytes, *offset)?;
         }
         front.seal(ROOT);
+        front.list(BLOCKS, &blocks, at);
+        write(&blocks, at)?;
+        at += blocks.len() as u64;
 
         // What is not packed: imagery, and what edits appended.
         let (first, last) = (directory_end / PAGE, header.file_bytes.div_ceil(PAGE));
@@ -395,6 +397,11 @@ impl Front {
         self.bytes.extend(bytes);
         self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
         at
+    }
+
+    /// Lists a section that lies elsewhere.
+    fn list(&mut self, kind: u32, bytes: &[u8], offset: u64) {
+        self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
     }
 
     /// The checksum of a section that was filled in meanwhile.

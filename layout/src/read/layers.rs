@@ -4,8 +4,8 @@ use super::opened::Opened;
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::file::overlay::Overlaid;
-use crate::file::source::{MapSource, PreadSource};
 use crate::file::page_table::PageTable;
+use crate::file::source::{MapSource, PreadSource};
 use crate::file::structure::read_growing;
 use std::path::Path;
 

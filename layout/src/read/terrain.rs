@@ -6,6 +6,7 @@
 //!
 //! Invariant: every page number that is handed out lies inside the file as its header counts it.
 
+use super::opening::{Found, Opening};
 use super::store::RecordShape;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
@@ -17,14 +18,10 @@ use crate::file::page_table::PageTable;
 use crate::file::source::Source;
 #[cfg(feature = "files")]
 use crate::file::source::{MapSource, PreadSource};
-#[cfg(feature = "files")]
-use crate::file::structure::read_growing;
-use crate::file::structure::{inert_page, read_structure};
-use crate::file::version::is_packed;
+use crate::file::structure::inert_page;
 use crate::grid::order::slot_of;
 use crate::grid::record::{AnyCodec, Vertex};
 use crate::grid::{Grid, GridPoint};
-use crate::packed::source::PackedSource;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -58,18 +55,18 @@ impl Terrain {
     /// As FORMAT.md, section 6: not a terrain file, another version, truncated or damaged; or I/O.
     #[cfg(feature = "files")]
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
-        let file = PreadSource::open(path)?;
-        if starts_packed(&file)? {
-            return Self::over(Box::new(PackedSource::open(Box::new(file))?.lending_whole()));
-        }
-        Self::mapped(file)
+        Self::mapped(PreadSource::open(path)?)
     }
 
-    /// Opens and maps a file that is the terrain file itself.
+    /// Opens and maps a file, or opens a packed one that is to be unpacked for [`Terrain::records`].
     #[cfg(feature = "files")]
-    pub(crate) fn mapped(file: PreadSource) -> Result<Self, LayoutError> {
-        let (file, header, table) = open_settled(file)?;
-        Ok(Self::of(Box::new(MapSource::map(file)?), header, table))
+    pub(crate) fn mapped(mut file: PreadSource) -> Result<Self, LayoutError> {
+        Ok(match Opening::of(&mut file)?.into_found()? {
+            Found::Plain(header, table) => Self::of(Box::new(MapSource::map(file)?), header, table),
+            Found::Packed(packed, header, table) => {
+                Self::of(Box::new(packed.over(Box::new(file)).lending_whole()), header, table)
+            }
+        })
     }
 
     /// Opens the file at `path` without mapping it: for [`Terrain::pool`], whose pages are read. Files that others may truncate raise no signal then.
@@ -78,12 +75,7 @@ impl Terrain {
     /// As [`Terrain::open`].
     #[cfg(feature = "files")]
     pub fn open_unmapped(path: &Path) -> Result<Self, LayoutError> {
-        let file = PreadSource::open(path)?;
-        if starts_packed(&file)? {
-            return Self::from_source(Box::new(file));
-        }
-        let (file, header, table) = open_settled(file)?;
-        Ok(Self::of(Box::new(file), header, table))
+        Self::from_source(Box::new(PreadSource::open(path)?))
     }
 
     /// Opens the file at `path` as it was before all edits that its journal knows; as it is, if it has none. Mapped.
@@ -117,17 +109,20 @@ impl Terrain {
     ///
     /// # Errors
     /// As [`Terrain::open`].
-    pub fn from_source(source: Box<dyn Source>) -> Result<Self, LayoutError> {
-        if starts_packed(&*source)? {
-            return Self::over(Box::new(PackedSource::open(source)?));
-        }
-        Self::over(source)
+    pub fn from_source(mut source: Box<dyn Source>) -> Result<Self, LayoutError> {
+        let opening = Opening::of(&mut *source)?;
+        Self::opened(opening, source)
     }
 
-    /// Opens a source that is the terrain file itself.
-    fn over(source: Box<dyn Source>) -> Result<Self, LayoutError> {
-        let (header, table) = read_structure(&*source)?;
-        Ok(Self::of(source, header, table))
+    /// The terrain of a file that was opened, read from `source` from now on.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] if [`Opening::next`] needs more of it.
+    pub fn opened(opening: Opening, source: Box<dyn Source>) -> Result<Self, LayoutError> {
+        Ok(match opening.into_found()? {
+            Found::Plain(header, table) => Self::of(source, header, table),
+            Found::Packed(packed, header, table) => Self::of(Box::new(packed.over(source)), header, table),
+        })
     }
 
     /// Page of each logical page, counted from [`INERT_PAGE`].
@@ -300,19 +295,4 @@ impl Terrain {
         let Header { grid, height_range_m, has_voids, .. } = self.header;
         RecordShape { codec, grid, height_range_m, has_voids }
     }
-}
-
-/// Whether a source holds packed terrain.
-pub(crate) fn starts_packed(source: &dyn Source) -> Result<bool, LayoutError> {
-    let mut start = [0; 16];
-    let have = source.byte_count().min(start.len() as u64) as usize;
-    source.read_at(0, &mut start[..have])?;
-    Ok(is_packed(&start[..have]))
-}
-
-/// Opens and checks a file that others may append to at this moment.
-#[cfg(feature = "files")]
-fn open_settled(mut file: PreadSource) -> Result<(PreadSource, Header, PageTable), LayoutError> {
-    let (header, table) = read_growing(&mut file)?;
-    Ok((file, header, table))
 }

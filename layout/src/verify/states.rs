@@ -252,4 +252,3 @@ impl<'t> States<'t> {
 fn root_of(state: &State) -> (u32, u32, u64) {
     (state.root_page, state.root_checksum, state.stored_pages)
 }
-

@@ -92,7 +92,10 @@ impl CommitJob {
             })?;
             leaves.push((leaf, entry));
         }
-        let added = entries.iter().filter(|(logical, _)| !directory.known(*logical as u64).is_some_and(|old| old.is_present())).count();
+        let added = entries
+            .iter()
+            .filter(|(logical, _)| !directory.known(*logical as u64).is_some_and(|old| old.is_present()))
+            .count();
         let mut root = directory.root().to_vec();
         leaves.iter().for_each(|(leaf, entry)| root[*leaf] = *entry);
         let root = root_bytes(&root);

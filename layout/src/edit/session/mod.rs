@@ -230,8 +230,7 @@ impl EditSession {
         if needs_original && self.slots.header.history.is_some() {
             let header = Header { history: None, ..self.original.put_into(&self.slots.header) };
             let table = PageTable::open_beside(self.source(), &header, &self.directory)?;
-            let original =
-                Terrain::of(Box::new(Borrowed(Arc::clone(self.editor.terrain()))), header, table);
+            let original = Terrain::of(Box::new(Borrowed(Arc::clone(self.editor.terrain()))), header, table);
             self.editor.set_original(Arc::new(original));
         }
         let changes = self.editor.apply(edits)?;
