@@ -61,7 +61,7 @@ pub fn fly(path: &Path, overlay: Option<&Path>) -> bool {
         // What takes all records refuses; what reads page by page reads what there is.
         let quality = quality(Culling::Vertices, 1.0);
         assert!(replay(&terrain, &frames, quality, EngineKind::Soar, &mut |_| {}).is_err());
-        let view = |frame: &_| Frame::view(frame, quality.viewport, quality.tolerance_px);
+        let view = |frame: &FlightFrame| frame.view(quality.viewport, quality.tolerance_px);
         stream(&terrain, &frames.iter().map(view).collect::<Vec<View>>());
         return true;
     }

@@ -3,6 +3,8 @@
 //! Everything that reads a terrain reads this one: the header, directory, pages and imagery are those of the terrain file, at their places there, so that a record page that is read is checked
 //! against the directory's checksum, whatever it was unpacked from. What was appended since is there page by page, and is read as it is. Only what maps needs the terrain file itself.
 //!
+//! Opening reads the front, which lists the directory's leaves and the tile directory's; both kinds of leaves are read when they are needed.
+//!
 //! Invariant: memory is what the front of the file takes, and tiles in a quarter of what the pool over it was given, [`MOST_CACHE_BYTES`] at most. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
 mod growth;

@@ -3,6 +3,7 @@
 //! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name. So whatever the file holds, what is packed is the same, or packing fails and says
 //! so. Cost: each vertex is looked up twice and unpacked once; memory is a few megabytes, and 16 bytes a record page.
 
+use super::front::Front;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
@@ -17,7 +18,7 @@ use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::{Compact, RecordKind};
 use crate::packed::coder::{Encoder, PlainEncoder};
-use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS, Section};
+use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
 use crate::packed::leaves::packed_leaves;
 use crate::packed::model::{CONTEXTS, Counts, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
@@ -380,37 +381,6 @@ impl Packer<'_> {
 fn sum(mut a: Counts, b: Counts) -> Counts {
     a.iter_mut().flatten().zip(b.iter().flatten()).for_each(|(a, b)| *a += b);
     a
-}
-
-/// Sections behind the header.
-#[derive(Default)]
-struct Front {
-    bytes: Vec<u8>,
-    sections: Vec<Section>,
-}
-
-impl Front {
-    /// Appends a section; where it begins behind the header.
-    fn put(&mut self, kind: u32, bytes: &[u8]) -> usize {
-        let at = self.bytes.len();
-        let offset = FRONT + at as u64;
-        self.bytes.extend(bytes);
-        self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
-        at
-    }
-
-    /// Lists a section that lies elsewhere.
-    fn list(&mut self, kind: u32, bytes: &[u8], offset: u64) {
-        self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
-    }
-
-    /// The checksum of a section that was filled in meanwhile.
-    fn seal(&mut self, kind: u32) {
-        for section in self.sections.iter_mut().filter(|section| section.kind == kind) {
-            let from = (section.offset - FRONT) as usize;
-            section.checksum = checksum(&self.bytes[from..from + section.bytes as usize]);
-        }
-    }
 }
 
 /// The two header pages of a terrain file; zeros for the one that does not count, should it be no header.

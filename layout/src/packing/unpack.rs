@@ -37,7 +37,7 @@ pub fn unpack(
         let when_full = "cannot write the terrain file, for which there is no room; make some on its disk, or name an output on another";
         LayoutError::write(file.target(), "cannot write the terrain file", when_full, e)
     };
-    // Record pages are checked one by one; what is around them follows from what opening has checked.
+    // Record pages are checked one by one; what is around them follows from what was checked when it was read.
     let chunks = bytes.div_ceil(CHUNK_BYTES as u64);
     for first in (0..chunks).step_by(CHUNKS_AT_ONCE as usize) {
         let made: Vec<Vec<u8>> = (first..chunks.min(first + CHUNKS_AT_ONCE))

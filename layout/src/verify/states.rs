@@ -60,7 +60,7 @@ pub(super) struct States<'t> {
 }
 
 impl<'t> States<'t> {
-    /// Begins with the state that the terrain is in, which opening has checked.
+    /// Begins with the state that the terrain is in, whose whole directory was checked.
     pub(super) fn of(terrain: &'t Terrain) -> Result<Self, LayoutError> {
         let (source, header) = (terrain.source(), terrain.header());
         let state = State::of(header);

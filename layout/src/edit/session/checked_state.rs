@@ -1,7 +1,7 @@
-//! A state that the file is to go to, checked as opening checks it, before any header names it.
+//! A state that the file is to go to, its whole directory checked, before any header names it.
 //!
-//! Undo and redo write nothing but a header. Without this check a nonsensical journal could lead to a file that does not open. Cost: that of opening the file, less the
-//! leaves that the state has in common with the one that is known.
+//! Undo and redo write nothing but a header. Without this check a nonsensical journal could lead to a file that does not open. Cost: that of reading its
+//! directory, less the leaves that the state has in common with the one that is known.
 
 use crate::error::LayoutError;
 use crate::file::bytes::{Page, get_u64};
