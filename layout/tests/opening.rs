@@ -15,7 +15,7 @@ use terrasoar_layout::packing::pack;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::opening::{Opening, Step};
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_layout::testing::{Counts, reseal, seeds};
+use terrasoar_layout::testing::{Counts, packed_seeds, reseal, seeds};
 
 const PAGE: usize = 4096;
 /// What opening reads first.
@@ -113,6 +113,66 @@ fn a_large_file_opens_as_a_small_one_does() {
     }
     terrain.check_directory().unwrap();
     assert!(source.counts().0 < 30, "leaves that lie one after the other are read together");
+}
+
+/// Packed terrain of 65,537 x 65,537 samples, all pages of which are said to be present: 28 GB unpacked. Only the front is there, the rest is a hole. Its bytes in front of the directory's blocks.
+fn huge_packed(path: &Path) -> u64 {
+    let seed = packed_seeds().into_iter().find(|seed| seed.name == "packed").unwrap().files.terrain;
+    let number = |at: usize| u64::from_le_bytes(seed[at..at + 8].try_into().unwrap()) as usize;
+    let records = 4 + 5 * ((1u64 << 32) - 1) / 3;
+    let pages = records.div_ceil(1024);
+    let leaves = pages.div_ceil(256);
+    let root_page = 3 + pages + leaves;
+    let root: Vec<u8> = (0..leaves).flat_map(|i| [(3 + pages + i) as u32, 0, 1, 0]).flat_map(u32::to_le_bytes).collect();
+    // Tables as they are; one run of present leaves; how many pages each has; no tile. Groups have 1,024, 128, 16, 2 and 1 tiles a side, 16 x 16 of them a leaf.
+    let tables = seed[number(0x128)..number(0x128) + number(0x130)].to_vec();
+    let run = vec![0, leaves as u8 | 128, (leaves >> 7) as u8 | 128, (leaves >> 14) as u8];
+    let last = pages - 256 * (leaves - 1);
+    let index: Vec<u8> = (1..=leaves).flat_map(|i| [if i < leaves { 255 } else { (last - 1) as u8 }, 0, 0, 0, 0]).collect();
+    let tiles = vec![0; 12 * (64 * 64 + 8 * 8 + 1 + 1 + 1)];
+    let mut bytes = vec![0; 2 * PAGE];
+    bytes[..PAGE].copy_from_slice(&seed[..PAGE]);
+    let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
+    let (mut at, mut sections) = (2 * PAGE as u64, Vec::new());
+    for (kind, section) in (1u32..).zip([&tables, &run, &index, &tiles]) {
+        sections.push((kind, crc32fast::hash(section), at, section.len() as u64));
+        at += section.len() as u64;
+    }
+    let blocks = 4 * pages + if last < 256 { 32 } else { 0 };
+    sections.push((5, 0, at, blocks));
+    let end = at + blocks;
+    for (i, (kind, sum, offset, length)) in sections.into_iter().enumerate() {
+        put(0x120 + 24 * i, &[kind.to_le_bytes(), sum.to_le_bytes()].concat());
+        put(0x128 + 24 * i, &[offset.to_le_bytes(), length.to_le_bytes()].concat());
+    }
+    let file_bytes = root_page * PAGE as u64 + (root.len() as u64).next_multiple_of(PAGE as u64);
+    put(0x010, &[16]);
+    put(0x014, &[65_537u32.to_le_bytes(), 65_537u32.to_le_bytes()].concat());
+    put(0x060, &0u64.to_le_bytes());
+    put(0x068, &[pages.to_le_bytes(), pages.to_le_bytes()].concat());
+    put(0x078, &[root_page as u32, leaves as u32, crc32fast::hash(&root)].map(u32::to_le_bytes).concat());
+    put(0x088, &file_bytes.to_le_bytes());
+    put(0x108, &[end.to_le_bytes(), pages.to_le_bytes()].concat());
+    put(0x1e0, &end.to_le_bytes());
+    let sum = crc32fast::hash(&bytes[..0xffc]);
+    bytes[0xffc..0x1000].copy_from_slice(&sum.to_le_bytes());
+    [tables, run, index, tiles].iter().for_each(|section| bytes.extend_from_slice(section));
+    std::fs::write(path, bytes).unwrap();
+    std::fs::OpenOptions::new().write(true).open(path).unwrap().set_len(end).unwrap();
+    at
+}
+
+#[test]
+fn a_large_packed_file_opens_as_a_small_one_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("huge.iqt");
+    let front = huge_packed(&path);
+    let (terrain, source) = counted(PreadSource::open(&path).unwrap());
+    assert!(terrain.header().file_bytes > 28_000_000_000 && front < 256 << 10, "{front}");
+    assert_eq!(source.counts(), (2, front));
+    // A page takes its leaf's block, which is no such one.
+    assert!(terrain.entry(3_000_000).unwrap_err().to_string().contains("directory leaf 11718"));
+    assert_eq!(source.counts(), (3, front + 1024));
 }
 
 /// A file opened from bytes that are handed over is the file opened from the disk, and no byte is asked for that it has not.

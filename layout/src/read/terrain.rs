@@ -175,7 +175,7 @@ impl Terrain {
         self.table.entry(&*self.source, logical_page)
     }
 
-    /// Whether a logical record page is present, as far as that is known without reading its directory leaf.
+    /// Where a logical record page lies, if that is known without reading: its directory leaf is absent, or was read before.
     pub fn known_entry(&self, logical_page: u64) -> Option<Entry> {
         self.table.known(logical_page)
     }
