@@ -123,12 +123,14 @@ fn huge_packed(path: &Path) -> u64 {
     let pages = records.div_ceil(1024);
     let leaves = pages.div_ceil(256);
     let root_page = 3 + pages + leaves;
-    let root: Vec<u8> = (0..leaves).flat_map(|i| [(3 + pages + i) as u32, 0, 1, 0]).flat_map(u32::to_le_bytes).collect();
+    let root: Vec<u8> =
+        (0..leaves).flat_map(|i| [(3 + pages + i) as u32, 0, 1, 0]).flat_map(u32::to_le_bytes).collect();
     // Tables as they are; one run of present leaves; how many pages each has; no tile. Groups have 1,024, 128, 16, 2 and 1 tiles a side, 16 x 16 of them a leaf.
     let tables = seed[number(0x128)..number(0x128) + number(0x130)].to_vec();
     let run = vec![0, leaves as u8 | 128, (leaves >> 7) as u8 | 128, (leaves >> 14) as u8];
     let last = pages - 256 * (leaves - 1);
-    let index: Vec<u8> = (1..=leaves).flat_map(|i| [if i < leaves { 255 } else { (last - 1) as u8 }, 0, 0, 0, 0]).collect();
+    let index: Vec<u8> =
+        (1..=leaves).flat_map(|i| [if i < leaves { 255 } else { (last - 1) as u8 }, 0, 0, 0, 0]).collect();
     let tiles = vec![0; 12 * (64 * 64 + 8 * 8 + 1 + 1 + 1)];
     let mut bytes = vec![0; 2 * PAGE];
     bytes[..PAGE].copy_from_slice(&seed[..PAGE]);
