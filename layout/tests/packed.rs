@@ -382,6 +382,10 @@ fn what_records_take_is_what_is_unpacked() {
     let (mut once, mut pages) = (0, 0);
     for page in 0..terrain.header().record_pages() {
         let fresh = open(bytes.clone()).unwrap();
+        // Absent pages are not unpacked, though the tiles that their records would lie in may be there.
+        if !fresh.entry(page).unwrap().is_present() {
+            continue;
+        }
         assert_eq!(fresh.source().unpacking().unwrap().unpacked().tiles, 0);
         fresh.checked_page(page).unwrap();
         let unpacked = fresh.source().unpacking().unwrap().unpacked();
