@@ -6,6 +6,6 @@ mod front;
 mod pack;
 mod unpack;
 
+pub(crate) use pack::publish_packed;
 pub use pack::{Packed, pack};
-pub(crate) use pack::{check_kind, publish_packed};
 pub use unpack::unpack;
