@@ -1,4 +1,4 @@
-//! What is written between the header pages and the tiles: the sections of a packed file.
+//! Sections of a packed file on their way to the disk (FORMAT.md, section 9.1).
 
 use crate::file::bytes::checksum;
 use crate::file::packed_end::FRONT;
@@ -19,6 +19,11 @@ impl Front {
         self.bytes.extend(bytes);
         self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
         at
+    }
+
+    /// Lists a section that lies elsewhere.
+    pub(super) fn list(&mut self, kind: u32, bytes: &[u8], offset: u64) {
+        self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
     }
 
     /// The checksum of a section that was filled in meanwhile.

@@ -17,7 +17,8 @@ use crate::file::packed_end::{FRONT, Run};
 use crate::file::source::{PreadSource, Source};
 use crate::grid::record::RecordCodec;
 use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
-use crate::packed::container::{Container, MODEL, ROOT, RUNS, SUMS, runs_of};
+use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
+use crate::packed::leaves::packed_leaves;
 use crate::packed::model::{CONTEXTS, Counts, DecodeTables, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
 use crate::packed::shape::{Groups, SEGMENTS, TileId};
@@ -104,9 +105,7 @@ pub(crate) fn pack_into(
         }
     }
     let directory_end = check_packable(built)?;
-    let Some(records) = built.records() else {
-        return Err(refused(terrain.path(), "its records are not in memory's reach"));
-    };
+    let records = built.records()?;
     let (groups, way) = (Groups::of(built.grid()), Way::of(built.header()));
     let bytes = with_records!(records, records => {
         let packer = Packer { path: terrain.path(), records, groups, way, width: Width::best(), check, progress };
@@ -163,13 +162,13 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
     let in_order =
         "other programs wrote it, in an order of their own; write it anew with `terrasoar compact`";
     let mut next = INERT_PAGE;
-    for entry in built.entries().iter().filter(|entry| entry.is_present()) {
+    for (_, entry) in built.present_pages()? {
         next += 1;
         if entry.page != next || entry.generation != 1 {
             return Err(refused(path, in_order));
         }
     }
-    let (root, page) = put_all_leaves(built.entries(), next + 1, |_, _| Ok(()))?;
+    let (root, page) = put_all_leaves(built.table().leaves(), next + 1, |_, _| Ok(()))?;
     let root = root_bytes(&root);
     let end = u64::from(page) * PAGE + root.bytes.len() as u64;
     let is_in_order =
@@ -181,9 +180,9 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
 fn check_pages(terrain: &Terrain, progress: &dyn Progress) -> Result<(), LayoutError> {
     let per_page = terrain.header().records_per_page();
     progress.stage("checking", terrain.header().stored_pages * per_page);
-    (0..terrain.entries().len() as u64)
+    let present: Vec<u64> = terrain.present_pages()?.map(|(page, _)| page).collect();
+    present
         .into_par_iter()
-        .filter(|page| terrain.entries()[*page as usize].is_present())
         .try_for_each(|page| terrain.checked_page(page).map(|_| progress.advance(per_page)))
 }
 
@@ -308,10 +307,10 @@ impl<C: RecordCodec> Packer<'_, C> {
         let slots = header_slots(source, header)?;
         let mut front = Front::default();
         front.put(MODEL, &model.to_bytes());
-        front.put(RUNS, &runs_of(built.entries().iter().map(|entry| entry.is_present())));
-        let present = built.entries().iter().filter(|entry| entry.is_present());
-        let sums: Vec<u8> = present.flat_map(|entry| entry.checksum.to_le_bytes()).collect();
-        front.put(SUMS, &sums);
+        built.check_directory()?;
+        let [runs, index, blocks] = packed_leaves(built.table().leaves());
+        front.put(RUNS, &runs);
+        front.put(INDEX, &index);
         let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
         // Leaves have their place before it is known what they hold.
         let leaf_sizes = self.groups.leaf_sizes();
@@ -365,6 +364,9 @@ impl<C: RecordCodec> Packer<'_, C> {
             write(&bytes, *offset)?;
         }
         front.seal(ROOT);
+        front.list(BLOCKS, &blocks, at);
+        write(&blocks, at)?;
+        at += blocks.len() as u64;
 
         // What is not packed: imagery, and what edits appended.
         let (first, last) = (directory_end / PAGE, header.file_bytes.div_ceil(PAGE));
