@@ -1,20 +1,45 @@
 //! What was packed against the terrain file that it was made of, before it gets its name.
 
-use super::pack::{CHUNK_BYTES, Check, read_back, refused};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, to_usize};
 use crate::file::header::INERT_PAGE;
 use crate::file::slots::Slots;
-use crate::file::source::Source;
+use crate::file::source::{PreadSource, Source};
 use crate::packed::source::PackedSource;
 use crate::progress::Progress;
 use crate::read::terrain::Terrain;
 use rayon::prelude::*;
+use std::path::Path;
 
 const PAGE: u64 = PAGE_BYTES as u64;
+/// Bytes compared, or copied, at a time.
+pub(super) const CHUNK_BYTES: usize = 256 << 10;
 /// Pages that a thread compares one after the other.
 const PAGES: usize = 64;
+
+/// How it is made sure that what was packed is the terrain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Check {
+    /// All that the file reads as is compared, page by page: whatever laid the terrain out.
+    Pages,
+    /// Each tile is unpacked again where it was packed: for terrain that was built a moment ago, which holds nothing beside what tiles give.
+    Tiles,
+}
+
+/// The bytes of a file that has no name yet.
+pub(super) fn read_back(file: &AtomicFile) -> Result<PreadSource, LayoutError> {
+    let path = file.target();
+    let again = file
+        .file()
+        .try_clone()
+        .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
+    PreadSource::over(path, again)
+}
+
+pub(super) fn refused(path: &Path, problem: &str) -> LayoutError {
+    LayoutError::unsupported(path, format!("the terrain cannot be packed: {problem}"))
+}
 
 /// Whether what was written reads as the terrain file, byte for byte: of record pages where `check` asks for it.
 pub(super) fn compare(

@@ -8,6 +8,7 @@ mod gather;
 mod pack;
 mod unpack;
 
-pub(crate) use pack::{Check, publish_packed};
+pub(crate) use compare::Check;
+pub(crate) use pack::publish_packed;
 pub use pack::{Packed, pack};
 pub use unpack::unpack;

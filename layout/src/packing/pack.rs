@@ -3,7 +3,7 @@
 //! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name ([`Check`] says how). So whatever the file holds, what is packed is the same, or packing
 //! fails and says so. Cost: each vertex is looked up and unpacked once; memory is a few megabytes, and 24 bytes a record page.
 
-use super::compare::compare;
+use super::compare::{CHUNK_BYTES, Check, compare, read_back, refused};
 use super::front::Front;
 use super::gather::tile_of;
 use crate::error::LayoutError;
@@ -14,7 +14,7 @@ use crate::file::disk::Disk;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
 use crate::file::packed_end::{FRONT, Run};
-use crate::file::source::{PreadSource, Source};
+use crate::file::source::Source;
 use crate::grid::record::RecordCodec;
 use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
 use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
@@ -37,21 +37,10 @@ use std::path::Path;
 const PAGE: u64 = PAGE_BYTES as u64;
 /// Tiles packed before they are written.
 const TILES_AT_ONCE: usize = 4096;
-/// Bytes compared, or copied, at a time.
-pub(super) const CHUNK_BYTES: usize = 256 << 10;
 
 /// Tiles of which all are counted, and of more one in so many.
 const TILES_COUNTED: usize = 1024;
 const TILES_A_SAMPLE: u32 = 8;
-
-/// How it is made sure that what was packed is the terrain.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Check {
-    /// All that the file reads as is compared, page by page: whatever laid the terrain out.
-    Pages,
-    /// Each tile is unpacked again where it was packed: for terrain that was built a moment ago, which holds nothing beside what tiles give.
-    Tiles,
-}
 
 /// What became of a terrain that was packed.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,20 +131,6 @@ pub(crate) fn publish_packed(
     Ok((publish_terrain(disk, file, over)?, packed.bytes))
 }
 
-/// The bytes of a file that has no name yet.
-pub(super) fn read_back(file: &AtomicFile) -> Result<PreadSource, LayoutError> {
-    let path = file.target();
-    let again = file
-        .file()
-        .try_clone()
-        .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
-    PreadSource::over(path, again)
-}
-
-pub(super) fn refused(path: &Path, problem: &str) -> LayoutError {
-    LayoutError::unsupported(path, format!("the terrain cannot be packed: {problem}"))
-}
-
 /// Whether a file is laid out as a build leaves it: then its directory follows from which pages there are. Where that ends.
 fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
     let (path, header) = (built.path(), built.header());
@@ -222,7 +197,7 @@ impl<C: RecordCodec> Packer<'_, C> {
     /// Whether a tile's values are counted, of the finest group of many tiles one in a few: those that chance takes, so that no pattern of the ground's is in step with them.
     fn is_counted(&self, number: usize, tiles: usize, id: TileId) -> bool {
         let chance = (number as u32).wrapping_mul(0x9e37_79b1) >> 16;
-        tiles <= TILES_COUNTED || id.group > 0 || chance % TILES_A_SAMPLE == 0
+        tiles <= TILES_COUNTED || id.group > 0 || chance.is_multiple_of(TILES_A_SAMPLE)
     }
 
     /// Counts what occurs.
