@@ -440,3 +440,6 @@ fn unexpected(path: &Path) -> LayoutError {
     let end = std::io::Error::other("rewriting it came to an unexpected end; open it again");
     LayoutError::io(path, "cannot edit the file any more", end)
 }
+
+#[cfg(test)]
+mod tests;
