@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use terrasoar::ground::Edited;
 use terrasoar::{Crater, Edit, Error, Ground, StreamOptions, Terrain, View};
-use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::build::{BuildOptions, HeightRoom, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{EditSession, HeightWindow, SampleRect, history, room_for, widen};
 use terrasoar_layout::file::disk::SystemDisk;
@@ -65,6 +65,17 @@ fn by_hand(sample_type: SampleType, batches: &[&[Edit]]) -> HeightWindow {
         }
         session.commit("by hand").unwrap();
     }
+    drop(session);
+    heights_in(&path)
+}
+
+/// What edits come to in the file rewritten with room for anything.
+fn in_a_wide_file(edits: &[Edit]) -> HeightWindow {
+    let (_folder, path) = land(SampleType::I16);
+    widen(&SystemDisk, &path, HeightRoom { lowest_m: -1e8, highest_m: 1e8 }, 512, &Silent).unwrap();
+    let mut session = EditSession::open(&path).unwrap();
+    session.apply(edits).unwrap();
+    session.commit("all").unwrap();
     drop(session);
     heights_in(&path)
 }
@@ -243,8 +254,9 @@ fn what_cannot_be_made_is_told_and_all_else_is() {
     settle(&mut ground);
     check_shown(&mut ground, &path);
     drop(ground);
-    let batches: &[&[Edit]] = &[&[crater(500.0, 20.0)], &[crater(1900.0, 20.0)], &[crater(1900.0, 20.0)]];
-    assert!(heights_in(&path) == by_hand(SampleType::I16, batches));
+    // The file was rewritten before that came out, and its records round no height any more.
+    let edits = [crater(500.0, 20.0), crater(1900.0, 20.0), crater(1900.0, 20.0)];
+    assert!(heights_in(&path) == in_a_wide_file(&edits));
 }
 
 #[test]
