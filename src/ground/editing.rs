@@ -149,7 +149,7 @@ impl Ground<'_> {
             )));
         }
         if let Some(Editing::Here(hand)) = self.editing.take() {
-            self.seen = Box::new(hand.session.header().clone());
+            self.seen = hand.session.header().state();
         }
         Ok(())
     }
@@ -262,7 +262,7 @@ impl Ground<'_> {
                     )));
                 }
             };
-            let session = open_session(terrain, &self.seen)?;
+            let session = open_session(terrain, self.seen)?;
             self.editing = Some(Editing::Here(Box::new(Hand::of(session, terrain.path()))));
         }
         match &mut self.editing {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{Changes, CommitJob, Committed, Edit, EditSession, room_for};
 use terrasoar_layout::file::entries::Entry;
-use terrasoar_layout::file::header::Header;
+use terrasoar_layout::file::header::FileState;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -156,7 +156,7 @@ impl Hand {
             Err((None, error)) => return Err((None, lost(error, &unsaved))),
         };
         match EditSession::open_on(disk, &path) {
-            Ok(session) if is_same(session.header(), &header) => {
+            Ok(session) if session.header().state() == header.state() => {
                 Ok((Self { refused, ..Self::of(session, &path) }, unsaved))
             }
             Ok(_) => Err((None, lost(edited_by_another(&path), &unsaved))),
@@ -169,18 +169,12 @@ impl Hand {
 ///
 /// # Errors
 /// As [`EditSession::open`]; [`LayoutError::Usage`] if the file is another by now.
-pub(super) fn open_session(terrain: &Terrain, seen: &Header) -> Result<EditSession, LayoutError> {
+pub(super) fn open_session(terrain: &Terrain, seen: FileState) -> Result<EditSession, LayoutError> {
     let session = match terrain.base_path() {
         Some(base) => EditSession::open_overlay(base, terrain.path())?,
         None => EditSession::open(terrain.path())?,
     };
-    if is_same(session.header(), seen) { Ok(session) } else { Err(edited_by_another(terrain.path())) }
-}
-
-/// Whether two headers lead to the same records. A file that was rewritten begins its generations anew.
-fn is_same(a: &Header, b: &Header) -> bool {
-    let records = |h: &Header| (h.generation, h.root_page, h.root_checksum, h.record_kind);
-    records(a) == records(b) && a.scale == b.scale
+    if session.header().state() == seen { Ok(session) } else { Err(edited_by_another(terrain.path())) }
 }
 
 fn edited_by_another(path: &Path) -> LayoutError {

@@ -47,7 +47,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::SampleRect;
 use terrasoar_layout::file::entries::Entry;
-use terrasoar_layout::file::header::Header;
+use terrasoar_layout::file::header::FileState;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Ground that is flown over.
@@ -61,7 +61,7 @@ pub struct Ground<'t> {
     #[cfg(feature = "files")]
     editing: Option<Editing>,
     /// The state of the file that is shown while there is no editing session.
-    seen: Box<Header>,
+    seen: FileState,
     /// The first opened terrain's number.
     land: u64,
     options: StreamOptions,
@@ -121,7 +121,7 @@ impl<'t> Ground<'t> {
             Opened::Mapped(terrain) => terrain,
             Opened::Streamed(terrain) => terrain,
         };
-        let (seen, land) = (Box::new(opened.header().clone()), opened.instance());
+        let (seen, land) = (opened.header().state(), opened.instance());
         Self {
             engine,
             terrain,

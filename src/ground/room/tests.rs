@@ -40,7 +40,7 @@ fn whatever_call_fails_nothing_is_told_as_saved_that_is_not() {
         ground.editing = Some(Editing::Here(Box::new(Hand::of(session, &path))));
         ground.update(&view);
         ground.edit(&[crater(400.0, 15.0)]).unwrap();
-        assert_eq!(ground.edit(&[crater(600.0, 5000.0)]).unwrap(), Edited::Later);
+        assert_eq!(ground.edit(&[crater(600.0, 60_000.0)]).unwrap(), Edited::Later);
         ground.edit(&[crater(800.0, 15.0)]).unwrap();
         let outcome = ground.commit("all").unwrap().wait();
         ground.finish_edits();
