@@ -141,9 +141,9 @@ impl Writing {
         self.ticket.clone()
     }
 
-    /// Whether the thread has come to its end.
+    /// Whether it is known what became of the commit: the thread is at its end then.
     pub(super) fn is_over(&self) -> bool {
-        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+        self.ticket.is_done()
     }
 
     /// Waits for the thread, and gives what it leaves.
