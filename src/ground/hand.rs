@@ -17,6 +17,9 @@ use terrasoar_layout::read::terrain::Terrain;
 /// Pages, and where they lie in the file.
 pub(super) type Places = Vec<(u64, Entry)>;
 
+/// Batches of edits, in their order.
+pub(super) type Batches = VecDeque<Vec<Edit>>;
+
 /// A session and what is not on the disk.
 pub(super) struct Hand {
     /// Dropped before the session: the commit under way is brought to the disk while the right to edit is still held.
@@ -24,7 +27,7 @@ pub(super) struct Hand {
     pub(super) session: EditSession,
     pub(super) path: PathBuf,
     /// Batches that are not on the disk, in their order.
-    unsaved: VecDeque<Vec<Edit>>,
+    unsaved: Batches,
     /// So many of them, the first ones, are in the commit under way.
     in_writing: usize,
     /// Why edits since the last commit were refused that had been taken on.
@@ -35,7 +38,7 @@ impl Hand {
     /// With a session of the file at `path`.
     pub(super) fn of(session: EditSession, path: &Path) -> Self {
         let path = path.to_owned();
-        Self { session, writing: None, path, unsaved: VecDeque::new(), in_writing: 0, refused: None }
+        Self { session, writing: None, path, unsaved: Batches::new(), in_writing: 0, refused: None }
     }
 
     /// Applies a batch in memory, all of it or, on an error, nothing.
@@ -144,7 +147,7 @@ impl Hand {
         self,
         heights_m: [f64; 2],
         memory_mib: u64,
-    ) -> Result<(Self, VecDeque<Vec<Edit>>), (Option<Box<Self>>, LayoutError)> {
+    ) -> Result<(Self, Batches), (Option<Box<Self>>, LayoutError)> {
         let Self { session, path, unsaved, refused, .. } = self;
         let (disk, room) = (session.disk(), room_for(session.header(), heights_m));
         let header = match session.widen(room, memory_mib, &Silent) {
@@ -185,7 +188,7 @@ fn edited_by_another(path: &Path) -> LayoutError {
 }
 
 /// An error after which edits are gone.
-fn lost(error: LayoutError, unsaved: &VecDeque<Vec<Edit>>) -> LayoutError {
+fn lost(error: LayoutError, unsaved: &Batches) -> LayoutError {
     match unsaved.iter().map(Vec::len).sum::<usize>() {
         0 => error,
         1 => LayoutError::Usage(format!("{error}; one edit that was not on the disk is lost")),

@@ -8,7 +8,7 @@
 //! that are lost by it. Cost: that of a build from records, and a second pool of pages at the end; frames have no part in it.
 
 use super::engine::MeshEngine;
-use super::hand::{Hand, Places};
+use super::hand::{Batches, Hand, Places};
 use super::options::StreamOptions;
 use super::streamed::streamed;
 use super::ticket::{CommitFailed, Promise};
@@ -338,7 +338,7 @@ impl Maker {
         }
     }
 
-    fn make_again(mut self, batches: VecDeque<Vec<Edit>>) -> Self {
+    fn make_again(mut self, batches: Batches) -> Self {
         for batch in batches {
             match self.hand.apply(&batch) {
                 Ok((_, patch)) => self.edited(patch),
