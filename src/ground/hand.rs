@@ -20,6 +20,9 @@ pub(super) type Places = Vec<(u64, Entry)>;
 /// Batches of edits, in their order.
 pub(super) type Batches = VecDeque<Vec<Edit>>;
 
+/// What is left of a hand after an error, and the error.
+pub(super) type Failed = (Option<Box<Hand>>, LayoutError);
+
 /// A session and what is not on the disk.
 pub(super) struct Hand {
     /// Dropped before the session: the commit under way is brought to the disk while the right to edit is still held.
@@ -143,11 +146,7 @@ impl Hand {
     ///
     /// # Errors
     /// What kept it from that. The hand comes back as it was, unless the file has other contents now.
-    pub(super) fn widened(
-        self,
-        heights_m: [f64; 2],
-        memory_mib: u64,
-    ) -> Result<(Self, Batches), (Option<Box<Self>>, LayoutError)> {
+    pub(super) fn widened(self, heights_m: [f64; 2], memory_mib: u64) -> Result<(Self, Batches), Failed> {
         let Self { session, path, unsaved, refused, .. } = self;
         let (disk, room) = (session.disk(), room_for(session.header(), heights_m));
         let header = match session.widen(room, memory_mib, &Silent) {
