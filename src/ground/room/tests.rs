@@ -32,7 +32,11 @@ fn whatever_call_fails_nothing_is_told_as_saved_that_is_not() {
     let old = [400.0, 600.0, 800.0].map(|x| height_m(&path, x));
     let view = View::new([600.0, 100.0, 1500.0], 0.0, -40.0);
     let (mut refused, mut unsaved, mut fine) = (0, 0, 0);
-    for call in 0..60 {
+    for call in 0..400 {
+        // Past the last call nothing fails.
+        if fine > 2 {
+            break;
+        }
         std::fs::write(&path, &whole).unwrap();
         let terrain = Arc::new(Terrain::open_unmapped(&path).unwrap());
         let mut ground = Ground::streamed(terrain, &StreamOptions::default()).unwrap();
@@ -73,5 +77,5 @@ fn whatever_call_fails_nothing_is_told_as_saved_that_is_not() {
         assert!(verify(&Terrain::open_unmapped(&path).unwrap(), &|_| {}).unwrap().is_sound());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "call {call}");
     }
-    assert!(refused > 3 && unsaved > 1 && fine > 1, "{refused} refused, {unsaved} not saved, {fine} fine");
+    assert!(refused > 3 && unsaved > 1 && fine > 2, "{refused} refused, {unsaved} not saved, {fine} fine");
 }
