@@ -110,10 +110,17 @@ impl<'t> Ground<'t> {
         Ok(Ground::new(engine, Opened::Streamed(terrain), *options))
     }
 
-    /// Ground whose records are all in memory or mapped; `None` if the terrain's source lends no bytes.
-    pub fn mapped(terrain: &'t Terrain, engine: PictureEngine, culling: Culling) -> Option<Self> {
+    /// Ground whose records are all in memory or mapped.
+    ///
+    /// # Errors
+    /// Damage of the directory, all of which is read; a terrain whose source lends no bytes.
+    pub fn mapped(
+        terrain: &'t Terrain,
+        engine: PictureEngine,
+        culling: Culling,
+    ) -> Result<Self, LayoutError> {
         let options = StreamOptions::default();
-        Some(Self::new(mapped::mapped(terrain, engine, culling)?, Opened::Mapped(terrain), options))
+        Ok(Self::new(mapped::mapped(terrain, engine, culling)?, Opened::Mapped(terrain), options))
     }
 
     fn new(engine: Box<dyn MeshEngine + 't>, terrain: Opened<'t>, options: StreamOptions) -> Self {
