@@ -49,7 +49,7 @@ impl GridPoint {
     /// the two ends of every longest edge above the finest level.
     #[inline(always)]
     pub const fn midpoint(self, other: Self) -> Self {
-        // Both sums are even and below 2^18, so no bit crosses from one half into the other.
+        // Both sums are even and below 2^22, so no bit crosses from one half into the other.
         Self((self.0 + other.0) >> 1)
     }
 
