@@ -213,6 +213,12 @@ pub trait DemSource: Sync {
         0
     }
 
+    /// Windows outside of which every sample is void, as far as that is known before samples are read; they may overlap. A build takes memory and time for what lies in them
+    /// alone. `None` if it is not known.
+    fn windows_with_heights(&self) -> Option<Vec<Window>> {
+        None
+    }
+
     /// Pushes every sample exactly once into `sink`, decoding on the current rayon pool where the
     /// format allows it. Holds a few windows at a time, never the whole grid.
     ///
