@@ -18,7 +18,7 @@ use crate::remedy::Remedy;
 use crate::words::number;
 
 /// Largest supported `k`: a square of 65,537 samples a side.
-pub(crate) const MAX_K: u32 = 16;
+pub(crate) const MAX_K: u32 = 20;
 
 /// A grid coordinate: column x (east) and row y (north), each at most 65,536.
 ///
