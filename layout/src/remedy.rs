@@ -33,6 +33,8 @@ pub enum Remedy {
     Reproject,
     /// Another factor on heights: [`BuildOptions::z_scale`](crate::build::BuildOptions::z_scale).
     HeightFactor,
+    /// Larger steps between heights: [`BuildOptions::height_step_m`](crate::build::BuildOptions::height_step_m).
+    HeightStep,
     /// More memory, in `memory_mib` of the options.
     Memory {
         /// Mebibytes that are enough, where known.

@@ -210,6 +210,21 @@ fn floats_of_even_steps_stay_compact_and_forced_compact_rounds() {
 }
 
 #[test]
+fn heights_in_steps_that_were_asked_for_keep_their_promises() {
+    for (step_m, error) in [(0.05, ErrorKind::Bounded), (13.0, ErrorKind::Bounded), (0.7, ErrorKind::Step)] {
+        for samples in [[33, 30], [40, 17]] {
+            let dem = MemoryDem::from_fn(samples, SampleType::F64, |x, y| {
+                if (x, y) == (7, 8) || x + y > 50 { f64::NAN } else { rugged(4, x, y) * 1.000_1 }
+            });
+            let options = BuildOptions::default().height_step_m(step_m).error(error).spacing_m([3.0, 4.0]);
+            let terrain = terrain_of(&dem, &options);
+            assert_eq!(terrain.header().record_kind, RecordKind::Compact);
+            check(&dem, &terrain, step_m * (0.5 + 1e-9));
+        }
+    }
+}
+
+#[test]
 fn cliffs_spikes_and_flats_fit_the_records() {
     let cliff = |x: u32, _| if x > 16 { 60_000.0 } else { 0.0 };
     let spike = |x: u32, y: u32| if (x, y) == (9, 9) { 30_000.0 } else { -20_000.0 };

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, compact_packed};
 use terrasoar_layout::file::disk::SystemDisk;
-use terrasoar_layout::file::source::MemorySource;
+use terrasoar_layout::file::source::{MemorySource, PackedNeed};
 use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
 use terrasoar_layout::packing::{pack, unpack};
@@ -370,4 +370,38 @@ fn overlays_lie_over_either() {
         assert!(after.base_has_grown());
         assert_same(&before, &after);
     }
+}
+
+/// What records are said to take is what reading their page unpacks: the same tiles, and as many bytes where none was unpacked twice.
+#[test]
+fn what_records_take_is_what_is_unpacked() {
+    let bench = Bench::of(&build_bytes(&dem([700, 421], 5, 2), &options()).unwrap()).unwrap();
+    let bytes = bench.bytes(&bench.packed);
+    let terrain = open(bytes.clone()).unwrap();
+    let per_page = terrain.header().records_per_page();
+    let need = |slots: std::ops::Range<u64>| {
+        terrain.source().unpacking().unwrap().need_of(&slots.collect::<Vec<u64>>()).unwrap()
+    };
+    let (mut once, mut pages) = (0, 0);
+    for page in 0..terrain.header().record_pages() {
+        let fresh = open(bytes.clone()).unwrap();
+        assert_eq!(fresh.source().unpacking().unwrap().unpacked().tiles, 0);
+        fresh.checked_page(page).unwrap();
+        let unpacked = fresh.source().unpacking().unwrap().unpacked();
+        let need = need(page * per_page..(page + 1) * per_page);
+        assert!(
+            need.tiles <= unpacked.tiles && need.bytes <= unpacked.bytes,
+            "{page}: {need:?} {unpacked:?}"
+        );
+        if need.tiles == unpacked.tiles {
+            assert_eq!(need.bytes, unpacked.bytes, "{page}");
+            once += 1;
+        }
+        pages += 1;
+    }
+    assert!(once > pages / 2, "{once} of {pages}");
+    assert_eq!(need(0..0), PackedNeed::default());
+    let all = need(0..terrain.header().record_pages() * per_page);
+    assert!(all.bytes < bytes.len() as u64 && all.bytes > bytes.len() as u64 / 2, "{all:?}");
+    assert!(Terrain::open(&bench.plain).unwrap().source().unpacking().is_none());
 }

@@ -1,8 +1,9 @@
 //! `terrasoar build`: a DEM in, a terrain file out.
 
-use super::output::{complain, grouped, print};
+use super::built::Built;
+use super::output::{complain, print, print_json};
 use super::outputs::{Force, Kind};
-use super::progress::{Meter, short};
+use super::progress::Meter;
 use super::tiles::Tiles;
 use super::{WrongUsage, parse, remedy, terrain};
 use anyhow::{Context, Result};
@@ -35,6 +36,7 @@ Examples:
   terrasoar build terrain.pmtiles --bounds 7,46,8,47 --reproject utm -o valais.iqt
   terrasoar build world.tif --reproject utm --resolution 30 -o metric.iqt
   terrasoar build srtm-folder --fill-voids 20 -o whole.iqt
+  terrasoar build lidar.tif --height-step 0.01 -o lidar.iqt
 
 Room on the output's disk: some 4 bytes a sample for the file (8 or 16 with exact records), and while building another 4 (8 where single
 precision does not hold the samples), unless --memory holds them. Voids take none. With --packed the terrain file is made beside the packed one, and takes that room until it is packed.
@@ -49,7 +51,13 @@ default, and highest the order of names changes nothing. A file that is missing 
 
 Voids, samples without data, are counted and left as they are. --fill-voids N fills regions of voids that border each other east, west, north or south and whose box is
 at most N samples wide and high: each sample becomes the mean of its neighbours, as in a soap film over the rim, rounded to the steps of the data. How many is said,
-and kept in the file (terrasoar info).")]
+and kept in the file (terrasoar info).
+
+Heights of floating point are kept exactly unless something else is asked for. --height-step M rounds them, and whole numbers too, to the nearest multiple of M metres: no sample moves
+by more than half of it. The build says which step would fit, where records are exact. A step that is too fine for the range of heights is refused, with the smallest that fits.
+
+Fields of --json: file, samples, spacing_m, height_range_m, record, record_bytes, height_step_m (null for exact records), heights_rounded, compact_step_m and compact_bytes
+(what compact records would round to and take; null unless exact ones were chosen for the data), nodata_samples, bytes, bytes_per_sample, seconds.")]
 pub(super) struct Args {
     /// Elevation data: a file, several, folders, or patterns such as 'tiles/*.tif'
     #[arg(required = true, value_name = "IN")]
@@ -74,6 +82,9 @@ pub(super) struct Args {
     /// Kind of record; without it the smallest that keeps every height exactly. Compact rounds heights to 65,536 steps where it must
     #[arg(long, value_name = "KIND")]
     record: Option<RecordWord>,
+    /// Round heights to whole multiples of M metres, in compact records
+    #[arg(long, value_name = "M", value_parser = parse::positive)]
+    height_step: Option<f64>,
     /// Error to store: bounded keeps the promise on the screen, step is the measure of the SOAR papers
     #[arg(long, value_name = "KIND", default_value = "bounded")]
     error: ErrorWord,
@@ -86,6 +97,9 @@ pub(super) struct Args {
     /// Fill holes of up to N samples across, either way, smoothly from their rims; larger ones stay void
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_FILL)), hide_default_value = true)]
     fill_voids: u32,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     several: Several,
     #[command(flatten)]
@@ -204,6 +218,7 @@ impl Args {
                 RecordWord::Compact => RecordKind::Compact,
                 RecordWord::Exact => RecordKind::Exact8,
             }))
+            .height_step_m(self.height_step)
             .error(match self.error {
                 ErrorWord::Bounded => ErrorKind::Bounded,
                 ErrorWord::Step => ErrorKind::Step,
@@ -296,7 +311,11 @@ pub(super) fn run(args: &Args) -> Result<()> {
     } else {
         header.file_bytes
     };
-    print(&summary(&args.output, &header, bytes, seconds))
+    let built = Built::of(&args.output, &header, args.record.is_none(), bytes, seconds);
+    if let Some(note) = built.compact_note() {
+        complain(&note);
+    }
+    if args.json { print_json(&built) } else { print(&built.text(&header)) }
 }
 
 /// The spacing decides slopes and speeds, so where it came from is printed if it was not stated.
@@ -313,31 +332,4 @@ fn warn_about_spacing(header: &Header) {
             terrain::spacing(header)
         )),
     }
-}
-
-fn summary(out: &Path, header: &Header, bytes: u64, seconds: f64) -> String {
-    let [wide, high] = header.grid.samples().map(u64::from);
-    let samples = wide * high;
-    let voids = match header.nodata_samples {
-        0 => "no voids".to_owned(),
-        voids => format!("{} voids ({:.3} %)", grouped(voids), 100.0 * voids as f64 / samples as f64),
-    };
-    let filled = header.about.origins.iter().find(|(what, _)| what == "voids");
-    let filled = filled.map(|(_, words)| format!("; {words}")).unwrap_or_default();
-    format!(
-        "{}: {} x {} samples in {seconds:.1} s ({} samples/s), {} bytes ({:.2} a sample)\n\
-         {} records of {} bytes, {} error, spacing {} ({})\n\
-         {voids}{filled}",
-        out.display(),
-        grouped(wide),
-        grouped(high),
-        short(samples as f64 / seconds.max(1e-9)),
-        grouped(bytes),
-        bytes as f64 / samples as f64,
-        header.record_kind.name(),
-        header.record_kind.bytes(),
-        header.error_kind.name(),
-        terrain::spacing(header),
-        terrain::spacing_origin(header)
-    )
 }

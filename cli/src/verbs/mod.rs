@@ -6,6 +6,7 @@
 
 mod area;
 mod build;
+mod built;
 mod cache;
 mod cap;
 mod clock;

@@ -3,7 +3,7 @@
 use crate::support::{Bench, fields, text};
 use serde_json::Value;
 
-const RUN_FIELDS: [&str; 37] = [
+const RUN_FIELDS: [&str; 39] = [
     "engine",
     "layout",
     "source",
@@ -17,6 +17,8 @@ const RUN_FIELDS: [&str; 37] = [
     "distinct_lines_per_frame_mean",
     "distinct_units_per_frame_mean",
     "needed_mb",
+    "packed_needed_mb",
+    "packed_tiles_per_frame_mean",
     "realtime_mb",
     "preloaded_mb",
     "realtime_mb_max",
@@ -130,6 +132,36 @@ fn counts_repeat_and_are_replays() {
     }
     let [soar, mesh] = ["soar", "mesh"].map(|engine| find(&value, engine, "row", "none"));
     assert_eq!(soar["pages_touched_total"], mesh["pages_touched_total"]);
+}
+
+/// A packed file has the pages of the one it was made of, and is told by tiles besides.
+#[test]
+fn packed_files_are_counted_by_tiles_too() {
+    let bench = Bench::with_flight();
+    bench.good(&["pack", "land.iqt", "-o", "packed.iqt"]);
+    let flags = ["--engines", "kinetic", "--layouts", "row,ours", "--prefetch", "none", "--fps", "0"];
+    let plain = bench.json(&with(&flags));
+    let mut packed = flags.to_vec();
+    packed.splice(0..0, ["iobench", "packed.iqt", "--flight", "land.flight"]);
+    let value = bench.json(&[&packed[..], &["--json", "--frames", "f.csv"]].concat());
+    for engine in ["kinetic", "mesh"] {
+        let [plain, packed] = [&plain, &value].map(|v| find(v, engine, "ours", "none"));
+        assert_eq!(plain["pages_touched_total"], packed["pages_touched_total"]);
+        assert!(plain["packed_needed_mb"].is_null(), "{plain}");
+        let needed = packed["packed_needed_mb"].as_f64().unwrap();
+        assert!(needed > 0.0, "{packed}");
+        assert!(packed["packed_tiles_per_frame_mean"].as_f64().unwrap() > 0.0);
+        assert!(find(&value, engine, "row", "none")["packed_needed_mb"].is_null());
+    }
+    let pool = runs(&value).iter().find(|run| run["source"] == "pool").unwrap();
+    for field in ["tiles_unpacked", "tiles_mb", "unpack_ms_mean"] {
+        assert!(pool["stream"][field].as_f64().unwrap() > 0.0, "{pool}");
+        assert!(runs(&plain).iter().all(|run| run["stream"][field].is_null()), "{plain}");
+    }
+    let (_, csv) = bench.table("f.csv");
+    assert!(csv.lines().next().unwrap().ends_with(",tiles,tile_bytes"), "{csv}");
+    let table = bench.good(&packed);
+    assert!(table.contains("the file is packed\n  kinetic needs "), "{table}");
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod edit_lines;
 mod edit_processes;
 mod engines;
 mod harmless;
+mod height_steps;
 mod hostile_imports;
 mod iobench;
 #[cfg(unix)]

@@ -16,7 +16,9 @@ use terrasoar::refine::soar::Soar;
 use terrasoar::refine::{Culling, Engine, Probe};
 use terrasoar::stream::ExtendedView;
 use terrasoar::view::View;
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::file::source::{PackedNeed, Unpacking};
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::terrain::Terrain;
@@ -92,7 +94,7 @@ impl CountOptions {
 /// Flies `views` with one reader and counts. `done` hears the number of frames finished.
 ///
 /// # Errors
-/// [`IoBenchError::NotInAddressSpace`]; [`IoBenchError::NoDeadlines`] if preloading by deadline is asked for.
+/// [`IoBenchError::NotInAddressSpace`]; [`IoBenchError::NoDeadlines`] if preloading by deadline is asked for; a damaged directory of a packed file.
 pub fn count(
     terrain: &Terrain,
     views: &[View],
@@ -108,8 +110,8 @@ pub fn count(
         .records()
         .ok_or_else(|| IoBenchError::NotInAddressSpace(terrain.path().display().to_string()))?;
     let mut counts: Vec<LayoutCount<'_>> =
-        options.layouts.iter().map(|kind| LayoutCount::new(Layout::new(*kind, terrain), options)).collect();
-    with_records!(records, records => {
+        options.layouts.iter().map(|kind| LayoutCount::new(terrain, *kind, options)).collect();
+    let flown = with_records!(records, records => {
         let mut sink = Sink { records: &records, views, culling, options, counts: &mut counts, done };
         match reader.engine() {
             EngineKind::Naive => sink.fly(Naive::new(records.clone(), culling)),
@@ -118,6 +120,7 @@ pub fn count(
             EngineKind::Kinetic => sink.fly(Kinetic::new(records.clone(), culling)),
         }
     });
+    flown?;
     Ok(counts.into_iter().flat_map(|count| count.into_runs(reader)).collect())
 }
 
@@ -142,7 +145,7 @@ struct Sink<'s, 't, C: RecordCodec> {
 }
 
 impl<C: RecordCodec> Sink<'_, '_, C> {
-    fn fly(&mut self, mut engine: impl Engine) {
+    fn fly(&mut self, mut engine: impl Engine) -> Result<(), LayoutError> {
         let mut reads = Reads::default();
         let extends = self.options.preloads.contains(&Prefetch::Frustum);
         let mut before: Option<&View> = None;
@@ -150,7 +153,7 @@ impl<C: RecordCodec> Sink<'_, '_, C> {
             reads.0.clear();
             engine.update(view, &mut reads);
             for count in self.counts.iter_mut() {
-                count.frame(i as u64, &reads.0);
+                count.frame(i as u64, &reads.0)?;
             }
             if extends {
                 let plain = ExtendedView::plain(view).slots(self.records, self.culling);
@@ -165,12 +168,15 @@ impl<C: RecordCodec> Sink<'_, '_, C> {
             before = Some(view);
             (self.done)(i as u64 + 1);
         }
+        Ok(())
     }
 }
 
 /// The counts of one layout.
 struct LayoutCount<'t> {
     layout: Layout<'t>,
+    /// Of the terrain file itself, if it is packed.
+    unpacking: Option<&'t dyn Unpacking>,
     lines: Vec<u64>,
     pages: Vec<u64>,
     modes: Vec<Mode>,
@@ -189,7 +195,7 @@ struct Mode {
 }
 
 impl<'t> LayoutCount<'t> {
-    fn new(layout: Layout<'t>, options: &CountOptions) -> Self {
+    fn new(terrain: &'t Terrain, kind: LayoutKind, options: &CountOptions) -> Self {
         let mode = |kind: &Prefetch| Mode {
             kind: *kind,
             cache: page_cache(options.cache_pages),
@@ -197,7 +203,8 @@ impl<'t> LayoutCount<'t> {
             preloaded: 0,
         };
         Self {
-            layout,
+            layout: Layout::new(kind, terrain),
+            unpacking: terrain.source().unpacking().filter(|_| kind == LayoutKind::Ours),
             lines: Vec::new(),
             pages: Vec::new(),
             modes: options.preloads.iter().map(mode).collect(),
@@ -224,8 +231,12 @@ impl<'t> LayoutCount<'t> {
         self.pages.dedup();
     }
 
-    fn frame(&mut self, frame: u64, slots: &[u64]) {
+    fn frame(&mut self, frame: u64, slots: &[u64]) -> Result<(), LayoutError> {
         self.gather(slots);
+        let PackedNeed { tiles, bytes: tile_bytes } = match self.unpacking {
+            Some(unpacking) => unpacking.need_of(slots)?,
+            None => PackedNeed::default(),
+        };
         let mut units: Vec<u64> = self.lines.iter().map(|line| line / LINES_PER_UNIT).collect();
         units.dedup();
         for mode in &mut self.modes {
@@ -242,8 +253,11 @@ impl<'t> LayoutCount<'t> {
                 units: units.len() as u64,
                 realtime_pages: missing as u64,
                 preloaded_pages: std::mem::take(&mut mode.preloaded),
+                tiles,
+                tile_bytes,
             });
         }
+        Ok(())
     }
 
     /// Loads pages of `extension` that are not of the view, whose records are at `plain`.
@@ -267,13 +281,14 @@ impl<'t> LayoutCount<'t> {
     }
 
     fn into_runs(self, reader: Reader) -> impl Iterator<Item = Run> {
-        let (layout, trace) = (self.layout, self.trace);
+        let (layout, trace, counts_tiles) = (self.layout, self.trace, self.unpacking.is_some());
         self.modes.into_iter().map(move |mode| Run {
             reader,
             layout: layout.kind(),
             preload: mode.kind,
             record_bytes: layout.record_bytes(),
             file_bytes: layout.file_bytes(),
+            counts_tiles,
             frames: mode.frames,
             trace: if mode.kind == Prefetch::None { trace.clone() } else { None },
         })

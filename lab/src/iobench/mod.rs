@@ -155,6 +155,10 @@ pub struct FrameIo {
     pub realtime_pages: u64,
     /// Pages loaded ahead since the frame before.
     pub preloaded_pages: u64,
+    /// Distinct tiles of a packed file that they lie in; 0 for files that are not packed.
+    pub tiles: u64,
+    /// Bytes of these tiles' segments in the file.
+    pub tile_bytes: u64,
 }
 
 /// The counts of one flight: a reader, a layout, a way of preloading.
@@ -170,6 +174,8 @@ pub struct Run {
     pub record_bytes: u64,
     /// Bytes of a file in this layout.
     pub file_bytes: u64,
+    /// Whether tiles of a packed file are counted.
+    pub counts_tiles: bool,
     /// The frames.
     pub frames: Vec<FrameIo>,
     /// Pages of each frame in the order they were first read, if asked for; with [`Prefetch::None`] only.

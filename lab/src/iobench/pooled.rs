@@ -12,7 +12,7 @@ use terrasoar::refine::{Culling, Unobserved};
 use terrasoar::stream::{Prefetch, StreamFrame, Streamed, ThreadFetch};
 use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::file::source::resident_bytes;
+use terrasoar_layout::file::source::{Unpacked, resident_bytes};
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::loader::{Loader, LoaderStats};
 use terrasoar_layout::read::terrain::Terrain;
@@ -136,6 +136,8 @@ pub struct Pooled {
     pub frames: Vec<StreamFrame>,
     /// What reading took, cold, the first frame included.
     pub loader: LoaderStats,
+    /// What was unpacked meanwhile; `None` for a file that is not packed.
+    pub unpacked: Option<Unpacked>,
     /// Bytes that storage delivered meanwhile; `None` where not known.
     pub storage_bytes: Option<u64>,
 }
@@ -158,6 +160,7 @@ impl Pooled {
             preload: prefetch,
             record_bytes: terrain.header().record_kind.bytes() as u64,
             file_bytes: terrain.header().file_bytes,
+            counts_tiles: false,
             frames: self.frames.iter().enumerate().map(frame).collect(),
             trace: None,
         }
@@ -176,7 +179,7 @@ pub fn fly_pooled(
 ) -> Result<Pooled, IoBenchError> {
     let was_forgotten = forget(path)?;
     let (knows_peak, before) = (kernel::reset_peak_memory(), kernel::read_bytes());
-    let (cold, frames, loader) = pass(path, views, options, &mut |i| done(i))?;
+    let (cold, frames, loader, unpacked) = pass(path, views, options, &mut |i| done(i))?;
     let storage_bytes = kernel::read_bytes().zip(before).map(|(now, then)| now - then);
     let peak_memory_bytes = if knows_peak { kernel::peak_memory_bytes() } else { None };
     let resident_bytes = resident_bytes(path)?;
@@ -185,11 +188,13 @@ pub fn fly_pooled(
         timed: Timed { resident_bytes, was_forgotten, cold, warm, peak_memory_bytes },
         frames,
         loader,
+        unpacked,
         storage_bytes,
     })
 }
 
-type Pass = (Vec<super::UpdateCost>, Vec<StreamFrame>, LoaderStats);
+type Pass = (Vec<super::UpdateCost>, Vec<StreamFrame>, LoaderStats, Option<Unpacked>);
+type Flown = (Vec<super::UpdateCost>, Vec<StreamFrame>, LoaderStats);
 
 fn pass(
     path: &Path,
@@ -199,11 +204,12 @@ fn pass(
 ) -> Result<Pass, IoBenchError> {
     let terrain = Arc::new(options.read_by.open(path)?);
     let loader = ThreadFetch::from(Loader::start(Arc::clone(&terrain), options.read_by.threads())?);
-    Ok(with_records!(terrain.pool(options.cache_bytes)?, pool => {
+    let (costs, frames, loader) = with_records!(terrain.pool(options.cache_bytes)?, pool => {
         let mut streamed = Streamed::new(pool, loader, options.culling, options.prefetch);
         options.block_m.into_iter().for_each(|block_m| streamed.set_block_m(block_m));
         fly(streamed, views, options.frames_per_second, done)
-    }))
+    });
+    Ok((costs, frames, loader, terrain.source().unpacking().map(|unpacking| unpacking.unpacked())))
 }
 
 fn fly<C: RecordCodec>(
@@ -211,7 +217,7 @@ fn fly<C: RecordCodec>(
     views: &[View],
     frames_per_second: f64,
     done: &mut dyn FnMut(u64),
-) -> Pass {
+) -> Flown {
     let (mut costs, mut frames) = (Vec::with_capacity(views.len()), Vec::with_capacity(views.len()));
     let span = if frames_per_second > 0.0 {
         Duration::from_secs_f64(1.0 / frames_per_second)

@@ -89,6 +89,10 @@ pub struct IoRun {
     pub distinct_units_per_frame_mean: Option<f64>,
     /// MB of the distinct pages a frame needs, mean.
     pub needed_mb: f64,
+    /// MB of a packed file that the records a frame needs take, whole segments of tiles, mean; `None` for what is not counted over a packed file.
+    pub packed_needed_mb: Option<f64>,
+    /// Distinct tiles of it a frame.
+    pub packed_tiles_per_frame_mean: Option<f64>,
     /// MB of those that were not in the cache when the frame needed them, mean.
     pub realtime_mb: f64,
     /// MB loaded ahead a frame, mean.
@@ -159,6 +163,12 @@ pub struct StreamCost {
     pub read_ms_mean: f64,
     /// Longest, milliseconds.
     pub read_ms_max: f64,
+    /// Tiles of a packed file that were unpacked, the first frame's included; `None` for one that is not packed.
+    pub tiles_unpacked: Option<u64>,
+    /// MB of them in the file.
+    pub tiles_mb: Option<f64>,
+    /// Mean time of unpacking one, in a loader's thread, milliseconds.
+    pub unpack_ms_mean: Option<f64>,
 }
 
 impl StreamCost {
@@ -177,6 +187,11 @@ impl StreamCost {
             reads,
             read_ms_mean: time.as_secs_f64() * 1e3 / reads.max(1) as f64,
             read_ms_max: longest.as_secs_f64() * 1e3,
+            tiles_unpacked: pooled.unpacked.map(|unpacked| unpacked.tiles),
+            tiles_mb: pooled.unpacked.map(|unpacked| unpacked.bytes as f64 / 1e6),
+            unpack_ms_mean: pooled
+                .unpacked
+                .map(|unpacked| unpacked.time.as_secs_f64() * 1e3 / unpacked.tiles.max(1) as f64),
         }
     }
 }
@@ -220,6 +235,8 @@ impl IoRun {
             distinct_lines_per_frame_mean: run.counts_lines().then(|| mean(|f| f.lines)),
             distinct_units_per_frame_mean: run.counts_lines().then(|| mean(|f| f.units)),
             needed_mb: pages_mb(mean(|f| f.pages)),
+            packed_needed_mb: run.counts_tiles.then(|| mean(|f| f.tile_bytes) / 1e6),
+            packed_tiles_per_frame_mean: run.counts_tiles.then(|| mean(|f| f.tiles)),
             realtime_mb: pages_mb(mean(|f| f.realtime_pages)),
             preloaded_mb: pages_mb(mean(|f| f.preloaded_pages)),
             realtime_mb_max: pages_mb(realtime.clone().max().unwrap_or(0) as f64),
@@ -329,6 +346,8 @@ mod tests {
             units: 4,
             realtime_pages: *realtime,
             preloaded_pages: 1,
+            tiles: 3,
+            tile_bytes: 2_000,
         };
         Run {
             reader: Reader::Mesh,
@@ -336,6 +355,7 @@ mod tests {
             preload: Prefetch::None,
             record_bytes: 4,
             file_bytes: 1_000_000,
+            counts_tiles: true,
             frames: realtime.iter().enumerate().map(frame).collect(),
             trace: None,
         }
@@ -346,6 +366,9 @@ mod tests {
         let sums = IoRun::of(&run(&[10, 0, 4, 2]));
         assert_eq!((sums.late_pages, sums.late_frames), (6, 2));
         assert_eq!(sums.realtime_mb, 2.0 * 4096.0 / 1e6);
+        assert_eq!((sums.packed_needed_mb, sums.packed_tiles_per_frame_mean), (Some(0.002), Some(3.0)));
+        let plain = Run { counts_tiles: false, ..run(&[10, 0, 4, 2]) };
+        assert_eq!(IoRun::of(&plain).packed_needed_mb, None);
         assert_eq!(sums.realtime_mb_max, 4.0 * 4096.0 / 1e6);
         assert_eq!(sums.first_frame_mb, 10.0 * 4096.0 / 1e6);
         assert_eq!((sums.pages_touched_total, sums.record_bytes_touched_total), (40, 1600));

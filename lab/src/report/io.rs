@@ -18,7 +18,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use terrasoar::sink::{FileSink, FolderSink};
 
-pub(super) const HEADER: &str = "engine,layout,source,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes";
+pub(super) const HEADER: &str = "engine,layout,source,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes,tiles,tile_bytes";
 
 /// All that goes into a report.
 #[derive(Debug, Clone, Copy)]
@@ -97,7 +97,18 @@ fn write_run(to: &mut dyn Write, run: &Run, timed: Option<&Timed>) -> std::io::R
     let words = [run.reader.name(), run.layout.name(), run.reader.source(), run.preload.name()].join(",");
     for (i, f) in run.frames.iter().enumerate() {
         // Named one by one, so that a new field cannot be forgotten.
-        let FrameIo { frame, reads, record_bytes, pages, lines, units, realtime_pages, preloaded_pages } = f;
+        let FrameIo {
+            frame,
+            reads,
+            record_bytes,
+            pages,
+            lines,
+            units,
+            realtime_pages,
+            preloaded_pages,
+            tiles,
+            tile_bytes,
+        } = f;
         let [lines, units] = [lines, units].map(|count| cell(run.counts_lines().then_some(*count)));
         write!(
             to,
@@ -108,12 +119,14 @@ fn write_run(to: &mut dyn Write, run: &Run, timed: Option<&Timed>) -> std::io::R
         let faults = cold.and_then(|c| c.faults);
         writeln!(
             to,
-            "{},{},{},{},{}",
+            "{},{},{},{},{},{},{}",
             cell(warm.map(|c: &UpdateCost| neat_ms(c.ms))),
             cell(cold.map(|c| neat_ms(c.ms))),
             cell(faults.map(|f| f.major)),
             cell(faults.map(|f| f.minor)),
             cell(cold.and_then(|c| c.read_bytes)),
+            cell(run.counts_tiles.then_some(*tiles)),
+            cell(run.counts_tiles.then_some(*tile_bytes)),
         )?;
     }
     Ok(())
@@ -147,6 +160,7 @@ pub(super) mod tests {
                         units: scale,
                         realtime_pages: if frame == 0 { 10 * scale } else { frame },
                         preloaded_pages: 1,
+                        ..FrameIo::default()
                     });
                     let run = Run {
                         reader,
@@ -154,6 +168,7 @@ pub(super) mod tests {
                         preload,
                         record_bytes: 4,
                         file_bytes: 1 << 30,
+                        counts_tiles: false,
                         frames: frames.collect(),
                         trace: None,
                     };

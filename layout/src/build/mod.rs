@@ -22,6 +22,7 @@ mod saturate;
 mod scan;
 mod spacing;
 mod spool;
+mod step;
 mod survey;
 mod writer;
 
@@ -55,6 +56,7 @@ use spool::Spool;
 use std::path::Path;
 use std::sync::atomic::AtomicU32;
 use std::sync::mpsc::SyncSender;
+pub use step::compact_step_m;
 use survey::HeightCode;
 use writer::{PageWriter, PlacedPages, page_queue, write_pages};
 
@@ -97,6 +99,7 @@ pub fn build_on(
         ))
         .mended_by(Remedy::HeightFactor));
     }
+    step::check(options.height_step_m, options.record)?;
     if options.fill_voids > MAX_FILL {
         return Err(LayoutError::Usage(format!(
             "holes up to {} samples across are too large to be filled; the largest is {MAX_FILL}",
@@ -145,7 +148,10 @@ pub fn build_on(
     let stats = spool.stats();
 
     progress.stage("surveying", samples);
-    let code = HeightCode::choose(info, options.z_scale, &stats, options.record, options.head_room);
+    let code = match options.height_step_m {
+        Some(step_m) => step::in_steps(info, options.z_scale, &stats, step_m, options.head_room)?,
+        None => HeightCode::choose(info, options.z_scale, &stats, options.record, options.head_room),
+    };
     let height_range_m = survey::check_heights(info, &code, &stats)?;
     let steepest_m = survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
     if options.packed && code.kind != RecordKind::Compact {

@@ -18,6 +18,9 @@ pub struct BuildOptions {
     pub memory_mib: u64,
     /// Record kind; `None` chooses the smallest that keeps every height exactly. Either exact kind stands for both.
     pub record: Option<RecordKind>,
+    /// Metres between the heights of compact records, more than 0 and finite: every sample is rounded to the nearest whole multiple of it. `None`, the default,
+    /// leaves it to `record`. It goes with compact records alone, and [`build()`](super::build()) refuses steps of which the range of heights has more than records count.
+    pub height_step_m: Option<f64>,
     /// Kind of error to store.
     pub error: ErrorKind,
     /// Raw value that means "no data", beside what the DEM declares.
@@ -41,6 +44,7 @@ impl Default for BuildOptions {
             z_scale: 1.0,
             memory_mib: 512,
             record: None,
+            height_step_m: None,
             error: ErrorKind::Bounded,
             nodata: None,
             fill_voids: 0,
@@ -70,6 +74,11 @@ impl BuildOptions {
     /// These options with this kind of records, instead of the smallest that keeps every height exactly.
     pub fn record(self, record: impl Into<Option<RecordKind>>) -> Self {
         Self { record: record.into(), ..self }
+    }
+
+    /// These options with heights rounded to whole multiples of so many metres.
+    pub fn height_step_m(self, height_step_m: impl Into<Option<f64>>) -> Self {
+        Self { height_step_m: height_step_m.into(), ..self }
     }
 
     /// These options with another kind of error to store.

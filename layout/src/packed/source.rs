@@ -6,6 +6,7 @@
 //! Invariant: memory is what the front of the file takes, and tiles in a quarter of what the pool over it was given, [`MOST_CACHE_BYTES`] at most. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
 mod growth;
+mod meter;
 mod records;
 #[cfg(feature = "testing")]
 mod stages;
@@ -24,11 +25,11 @@ use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize}
 use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::packed_end::{PackedEnd, from_file};
-use crate::file::source::Source;
+use crate::file::source::{Source, Unpacking};
 use crate::file::structure::inert_page;
 use crate::grid::record::RecordKind;
+use meter::Meter;
 use std::path::Path;
-use std::sync::atomic::AtomicU64;
 use std::sync::{Mutex, OnceLock};
 
 const PAGE: u64 = PAGE_BYTES as u64;
@@ -72,8 +73,7 @@ pub(crate) struct PackedSource {
     cache: Cache,
     scratch: Mutex<Vec<Scratch>>,
     width: Width,
-    /// Tiles that were unpacked.
-    unpacked: AtomicU64,
+    meter: Meter,
     /// Whether the whole may be unpacked for those who need it, and what came of that.
     lends_whole: bool,
     whole: OnceLock<Option<Vec<u8>>>,
@@ -148,7 +148,7 @@ impl PackedSource {
             cache: Cache::new(MOST_CACHE_BYTES),
             scratch: Mutex::default(),
             width: Width::best(),
-            unpacked: AtomicU64::new(0),
+            meter: Meter::default(),
             lends_whole: false,
             whole: OnceLock::new(),
             root: OnceLock::new(),
@@ -261,6 +261,10 @@ impl Source for PackedSource {
 
     fn packed_bytes(&self) -> Option<u64> {
         Some(self.end.end)
+    }
+
+    fn unpacking(&self) -> Option<&dyn Unpacking> {
+        Some(self)
     }
 
     fn take_share(&self, cache_bytes: u64) -> u64 {

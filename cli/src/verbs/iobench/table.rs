@@ -60,6 +60,7 @@ pub(super) fn text(bench: &IoBench) -> String {
         out += &scratch_text(bench);
     }
     out += &stream_text(bench);
+    out += &packed_text(bench);
     out += &fitting_text(bench);
     if bench.runs.iter().any(|r| r.was_cold == Some(false)) {
         out += "the file was not cold: it lies on no disk, or another program has it mapped; cold figures are of a file in memory\n";
@@ -141,6 +142,30 @@ fn stream_text(bench: &IoBench) -> String {
         bench.reads,
         columns(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
     )
+}
+
+/// What a packed file takes to be read, if it is one.
+fn packed_text(bench: &IoBench) -> String {
+    let counted = bench.runs.iter().filter_map(|r| {
+        let (mb, tiles) = (r.packed_needed_mb?, r.packed_tiles_per_frame_mean?);
+        let share = mb / r.needed_mb.max(f64::MIN_POSITIVE);
+        Some(format!(
+            "  {} needs {tiles:.1} tiles, {mb:.3} MB a frame, {share:.2} of its pages unpacked\n",
+            r.engine
+        ))
+    });
+    let flown = bench.runs.iter().filter_map(|r| {
+        let s = r.stream.as_ref()?;
+        let (tiles, mb, ms) = (s.tiles_unpacked?, s.tiles_mb?, s.unpack_ms_mean?);
+        Some(format!(
+            "  {} over the pool, preloading {}: {} tiles of {mb:.2} MB were unpacked in all, {ms:.3} ms each\n",
+            r.engine,
+            r.prefetch,
+            grouped(tiles)
+        ))
+    });
+    let lines: Vec<String> = counted.chain(flown).collect();
+    if lines.is_empty() { String::new() } else { format!("the file is packed\n{}", lines.concat()) }
 }
 
 fn scratch_text(bench: &IoBench) -> String {

@@ -1,6 +1,6 @@
 //! A terrain file and what was written behind it in another file, as one: the base up to a whole page, then the overlay (FORMAT.md, section 7.3).
 
-use super::Source;
+use super::{Source, Unpacking};
 use crate::error::LayoutError;
 use crate::file::bytes::PAGE_BYTES;
 use std::path::Path;
@@ -53,6 +53,10 @@ impl Source for LayeredSource<'_> {
     /// Of both.
     fn packed_bytes(&self) -> Option<u64> {
         Some(self.base.packed_bytes()? + self.overlay.byte_count())
+    }
+
+    fn unpacking(&self) -> Option<&dyn Unpacking> {
+        self.base.unpacking()
     }
 
     fn take_share(&self, cache_bytes: u64) -> u64 {

@@ -13,6 +13,7 @@ mod memory;
 mod pread;
 #[cfg(any(test, feature = "testing"))]
 mod testing;
+mod unpacking;
 #[cfg(all(feature = "files", target_os = "linux"))]
 mod uring;
 
@@ -25,6 +26,7 @@ pub use memory::MemorySource;
 pub use pread::PreadSource;
 #[cfg(any(test, feature = "testing"))]
 pub use testing::{CountingSource, FailingSource, Fault, HostileSource, Hostility};
+pub use unpacking::{PackedNeed, Unpacked, Unpacking};
 
 #[cfg(all(feature = "files", target_os = "linux"))]
 pub use uring::UringSource;
@@ -57,6 +59,10 @@ impl<S: Source + ?Sized> Source for &S {
 
     fn packed_end(&self) -> Option<&PackedEnd> {
         (**self).packed_end()
+    }
+
+    fn unpacking(&self) -> Option<&dyn Unpacking> {
+        (**self).unpacking()
     }
 
     fn take_share(&self, cache_bytes: u64) -> u64 {
@@ -115,6 +121,11 @@ pub trait Source: Send + Sync {
 
     /// Where a packed file grows; `None` for one that is not packed.
     fn packed_end(&self) -> Option<&PackedEnd> {
+        None
+    }
+
+    /// What unpacking takes, of a source that unpacks what it gives; `None` for all others.
+    fn unpacking(&self) -> Option<&dyn Unpacking> {
         None
     }
 

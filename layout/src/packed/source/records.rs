@@ -10,8 +10,8 @@ use crate::packed::coder::Decoder;
 use crate::packed::places::{PLACE_BYTES, TilePlace};
 use crate::packed::shape::{TILE_LOG, TileId, TileShape};
 use crate::packed::tile::{INERT, TileRecords};
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
+use std::time::Instant;
 
 /// Tiles that the last records lay in.
 type Near = Vec<(TileId, Option<Arc<TileRecords>>)>;
@@ -58,7 +58,6 @@ impl PackedSource {
         let shape = self.groups.shape(id);
         let segments = TileShape::segment_of(finest.min(shape.tile_log.saturating_sub(1))) + 1;
         let tile = Arc::new(self.unpack(id, &shape, &place, segments)?);
-        self.unpacked.fetch_add(1, Ordering::Relaxed);
         self.cache.put(id, Arc::clone(&tile));
         Ok(Some(tile))
     }
@@ -81,6 +80,7 @@ impl PackedSource {
             return Err(damaged("it lies outside the file"));
         }
         self.inner.read_at(place.offset, &mut bytes)?;
+        let begun = Instant::now();
         let mut decoders = Vec::with_capacity(segments);
         let mut rest = &bytes[..];
         for s in 0..segments {
@@ -97,6 +97,7 @@ impl PackedSource {
         let records = self.width.read(shape, &self.rules, &mut scratch, &mut decoders);
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
         if decoders.iter().all(Decoder::finish) {
+            self.meter.count(bytes.len(), begun.elapsed());
             Ok(records)
         } else {
             Err(damaged("it holds something else than a tile"))

@@ -32,7 +32,7 @@ impl PackedSource {
     }
 
     pub(in crate::packed) fn tiles_unpacked(&self) -> u64 {
-        self.unpacked.load(std::sync::atomic::Ordering::Relaxed)
+        self.meter.so_far().tiles
     }
 
     /// All tiles that are present.
