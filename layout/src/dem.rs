@@ -187,7 +187,8 @@ pub trait SampleSink: Sync {
     /// Whatever keeps the sink from storing them, such as a full disk; the source stops and passes it on.
     fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError>;
 
-    /// As [`put`](SampleSink::put) of voids alone, of a window of any size.
+    /// As [`put`](SampleSink::put) of voids alone, of a window of any size. A build takes neither time nor memory for them, so a source that knows of
+    /// regions without heights says so here.
     ///
     /// # Errors
     /// As [`put`](SampleSink::put).
@@ -211,12 +212,6 @@ pub trait DemSource: Sync {
     /// Memory in bytes that [`stream`](DemSource::stream) takes beyond a megabyte or two a thread.
     fn memory_bytes(&self) -> u64 {
         0
-    }
-
-    /// Windows outside of which every sample is void, as far as that is known before samples are read; they may overlap. A build takes memory and time for what lies in them
-    /// alone. `None` if it is not known.
-    fn windows_with_heights(&self) -> Option<Vec<Window>> {
-        None
     }
 
     /// Pushes every sample exactly once into `sink`, decoding on the current rayon pool where the

@@ -63,6 +63,9 @@ use writer::{PageWriter, PlacedPages, page_queue, write_pages};
 /// Longest text in a header; it has room for 254 bytes.
 const MAX_TEXT_CHARS: usize = 254;
 
+/// Largest `k` of which the memory for heights everywhere is asked for before samples are read: 65,537 a side.
+const LARGEST_FULL_K: u32 = 16;
+
 /// Longest warning that is kept.
 const MAX_WARNING_CHARS: usize = 500;
 
@@ -114,8 +117,10 @@ pub fn build_on(
     header.check_numbers()?;
     let threads = rayon::current_num_threads() as u64;
     let plan = |land: &Land| MemoryPlan::new(&grid, land, info.sample_type, options, threads, dem.memory_bytes());
-    let windows = dem.windows_with_heights();
-    let memory = plan(&Land::in_windows(grid.samples(), windows.as_deref()))?;
+    // Squares that large have heights everywhere in no file, so what they take is not known before they were read.
+    let is_known = grid.k() <= LARGEST_FULL_K;
+    let land = if is_known { Land::in_windows(grid.samples(), None) } else { Land::none(grid.samples()) };
+    let memory = plan(&land)?;
     // What will have the name comes first: it knows what has the name now.
     let packed = options.packed.then(|| AtomicFile::create(out)).transpose()?;
     let file = AtomicFile::create(out)?;
@@ -167,8 +172,8 @@ pub fn build_on(
     header.nodata_samples = stats.voids;
 
     progress.stage("building", samples);
-    // Now that it is known where heights are, larger tiles may fit. They change no byte.
-    let tile = plan(spool.land()).map_or(memory.tile, |plan| plan.tile.max(memory.tile));
+    // Now that it is known where heights are, larger tiles may fit, or smaller ones alone. They change no byte.
+    let tile = plan(spool.land())?.tile;
     let work = Work { spool: &spool, code, fills: None, tile, file: &file, disk, advance: &advance };
     work.run_kind(&mut header)?;
     drop(spool);

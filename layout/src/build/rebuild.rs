@@ -83,10 +83,6 @@ impl<C: RecordCodec> DemSource for OwnHeights<'_, C> {
         &self.info
     }
 
-    fn windows_with_heights(&self) -> Option<Vec<Window>> {
-        Some(self.land.clone())
-    }
-
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
         let (high, k) = (self.info.samples_high, self.records.grid().k());
         self.sea.iter().try_for_each(|window| sink.put_void(*window))?;

@@ -303,6 +303,7 @@ mod tests {
     use super::*;
     use crate::grid::Grid;
 
+    /// Squares larger than those that files have, too: the order itself has no end.
     fn grid(k: u32) -> Grid {
         Grid { k, samples: [(1 << k) + 1; 2], spacing_m: [1.0; 2] }
     }

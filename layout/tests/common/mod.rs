@@ -71,12 +71,6 @@ impl DemSource for Islands {
         &self.info
     }
 
-    fn windows_with_heights(&self) -> Option<Vec<Window>> {
-        let side = self.info.samples_high;
-        let window = |i: &Island| Window { col: i.west, row: side - i.south - i.high, width: i.wide, height: i.high };
-        Some(self.islands.iter().map(window).collect())
-    }
-
     /// Windows of voids between the islands, of any size, and islands some rows at a time.
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
         let side = self.info.samples_wide;
