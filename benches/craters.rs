@@ -3,9 +3,9 @@
 //! Questions: how long does a crater take on one thread, where its pages are in memory and where they are not; how many records does it change; how many a second are
 //! made in batches? Data: a terrain file named on the command line, 4,097 x 4,097 samples for docs/figures.md. Command:
 //!
-//!     cargo bench --bench craters -- TERRAIN.iqt [--craters N]
+//!     cargo bench --bench craters -- TERRAIN.iqt [--craters N] [--packed]
 //!
-//! The terrain is copied first, with room for heights beyond its own. Edits stay in memory; the file is not written to. Prints Markdown. Keep runs under benches/runs/.
+//! The terrain is copied first, with room for heights beyond its own. Edits stay in memory; the file is not written to. With `--packed` the copy is packed and its pages are unpacked as they are needed, beside the same craters over the copy as it was. Prints Markdown. Keep runs under benches/runs/.
 
 #[path = "support/craters.rs"]
 mod craters;
@@ -16,14 +16,22 @@ use std::sync::Arc;
 use std::time::Instant;
 use terrasoar_layout::edit::{Edit, Editor};
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::packing::pack;
+use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
+
+const HEAD: &str =
+    "| craters | refused | median, us | 99 %, us | worst, us | a second | samples | records | pages |
+|---|---|---|---|---|---|---|---|---|";
 
 fn main() -> Result<(), Failure> {
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
-    let (mut count, mut path) = (10_000, None);
+    let (mut count, mut path, mut is_packed) = (10_000, None, false);
     while let Some(word) = words.next() {
         match word.as_str() {
             "--craters" => count = words.next().ok_or("--craters wants a number")?.parse()?,
+            "--packed" => is_packed = true,
             _ => path = Some(PathBuf::from(word)),
         }
     }
@@ -37,19 +45,29 @@ fn main() -> Result<(), Failure> {
     let terrain = with_room(&path, &folder.path().join("roomy.iqt"))?;
     let [wide, high] = terrain.grid().samples();
     println!("{} x {} samples, {} craters of 16 x 16 samples, one thread\n", wide, high, count);
-    println!(
-        "| craters | refused | median, us | 99 %, us | worst, us | a second | samples | records | pages |"
-    );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("{HEAD}");
     let craters = anywhere(&terrain, count);
-    let mut editor = Editor::new(Arc::clone(&terrain));
-    one_by_one("pages read as needed", &mut editor, &craters)?;
-    editor.roll_back();
-    one_by_one("pages in memory", &mut editor, &craters)?;
-    one_by_one("the same again, on top", &mut editor, &craters)?;
-    editor.roll_back();
-    batches(&mut editor, &craters, 1000)?;
+    let batches_took = all(&terrain, "", &craters)?;
+    println!("\n{batches_took}");
+    if is_packed {
+        let packed = folder.path().join("packed.iqt");
+        pack(&SystemDisk, terrain.path(), &packed, &Silent)?;
+        println!("\nPacked:\n\n{HEAD}");
+        let batches_took = all(&Arc::new(Terrain::open_unmapped(&packed)?), "packed, ", &craters)?;
+        println!("\n{batches_took}");
+    }
     Ok(())
+}
+
+/// A line a way of making craters, and how batches went.
+fn all(terrain: &Arc<Terrain>, name: &str, craters: &[Edit]) -> Result<String, Failure> {
+    let mut editor = Editor::new(Arc::clone(terrain));
+    one_by_one(&format!("{name}pages read as needed"), &mut editor, craters)?;
+    editor.roll_back();
+    one_by_one(&format!("{name}pages in memory"), &mut editor, craters)?;
+    one_by_one(&format!("{name}the same again, on top"), &mut editor, craters)?;
+    editor.roll_back();
+    batches(&mut editor, craters, 1000)
 }
 
 /// Craters wherever there is ground for them.
@@ -99,7 +117,7 @@ fn one_by_one(name: &str, editor: &mut Editor, craters: &[Edit]) -> Result<(), F
     Ok(())
 }
 
-fn batches(editor: &mut Editor, craters: &[Edit], size: usize) -> Result<(), Failure> {
+fn batches(editor: &mut Editor, craters: &[Edit], size: usize) -> Result<String, Failure> {
     let mut made = 0;
     let start = Instant::now();
     for batch in craters.chunks(size) {
@@ -110,6 +128,5 @@ fn batches(editor: &mut Editor, craters: &[Edit], size: usize) -> Result<(), Fai
         }
     }
     let took = start.elapsed().as_secs_f64();
-    println!("\nIn batches of {size}: {made} craters in {took:.3} s, {:.0} a second.", made as f64 / took);
-    Ok(())
+    Ok(format!("In batches of {size}: {made} craters in {took:.3} s, {:.0} a second.", made as f64 / took))
 }

@@ -6,13 +6,12 @@ use common::build_bytes;
 use common::drape::{draped, land, same_picture};
 use common::packed::{Bench, dem, options};
 use proptest::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, compact_packed};
+use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::source::{MemorySource, PackedNeed};
-use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
 use terrasoar_layout::packing::{pack, unpack};
 use terrasoar_layout::progress::Silent;
@@ -180,25 +179,12 @@ fn what_is_not_supported_is_refused() {
     assert!(error.contains("packed already"), "{error}");
     let error = unpack(&SystemDisk, &bench.plain, &out, &Silent).unwrap_err().to_string();
     assert!(error.contains("not packed"), "{error}");
-    let exact = build_bytes(&dem([90, 70], 3, 0), &options().record(Some(RecordKind::Exact8))).unwrap();
-    let error = Bench::of(&exact).err().unwrap().to_string();
-    assert!(error.contains("compact ones"), "{error}");
     let error = Terrain::open_with_overlay(&bench.packed, &bench.packed).err().unwrap().to_string();
     assert!(error.contains("no overlay"), "{error}");
     assert!(!out.exists());
     // Compacted it is the same.
     compact(&SystemDisk, &bench.packed, None, &out, &Silent).unwrap();
     assert!(bench.bytes(&out) == bench.bytes(&bench.packed));
-    let error = compact_packed(&SystemDisk, &exact_file(&out), None, &out, &Silent).unwrap_err().to_string();
-    assert!(error.contains("compact ones"), "{error}");
-}
-
-/// A terrain with exact records, beside `path`.
-fn exact_file(path: &Path) -> PathBuf {
-    let exact = path.with_file_name("exact.iqt");
-    let options = options().record(Some(RecordKind::Exact8));
-    std::fs::write(&exact, build_bytes(&dem([90, 70], 3, 0), &options).unwrap()).unwrap();
-    exact
 }
 
 /// A picture comes along.

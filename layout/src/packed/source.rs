@@ -16,9 +16,8 @@ use super::cache::Cache;
 use super::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, current_of, present_pages};
 use super::model::{DecodeTables, Model};
 use super::places::{LEAF_BYTES, TilePlace};
-use super::rules::Rules;
 use super::shape::Groups;
-use super::walk::Scratch;
+use super::way::{Scratch, Way};
 use super::wide::Width;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
@@ -27,7 +26,6 @@ use crate::file::header::{Header, INERT_PAGE};
 use crate::file::packed_end::{PackedEnd, from_file};
 use crate::file::source::{Source, Unpacking};
 use crate::file::structure::inert_page;
-use crate::grid::record::RecordKind;
 use meter::Meter;
 use std::path::Path;
 use std::sync::{Mutex, OnceLock};
@@ -68,7 +66,7 @@ pub(crate) struct PackedSource {
     /// Where leaves of tiles lie, and what they hold, once they were needed.
     tile_leaves: Vec<(u64, u32)>,
     tiles: Vec<OnceLock<Box<[TilePlace]>>>,
-    rules: Rules,
+    way: Way,
     tables: DecodeTables,
     cache: Cache,
     scratch: Mutex<Vec<Scratch>>,
@@ -99,10 +97,6 @@ impl PackedSource {
         let (container, header, page) = current_of(path, [a, b], length)?;
         let (slots, page) = ([a, b].map(from_file), Box::new(*page));
         let front = Front::read(&*inner, &container, first)?;
-        if header.record_kind != RecordKind::Compact {
-            let problem = "it holds what packed terrain does not: exact records";
-            return Err(LayoutError::damaged_terrain(path, "header".into(), problem));
-        }
         // The checksums first: what a file claims to hold is bounded by their bytes.
         let sums = front.section(&*inner, &container.section(SUMS), "page checksums")?;
         if Some(sums.len() as u64) != container.pages.checked_mul(4) {
@@ -143,7 +137,7 @@ impl PackedSource {
                 .map(|i| (get_u64(&root, i * LEAF_BYTES), get_u32(&root, i * LEAF_BYTES + 8)))
                 .collect(),
             tiles: (0..groups.leaves).map(|_| OnceLock::new()).collect(),
-            rules: Rules::new(&header.grid, &header.scale),
+            way: Way::of(&header),
             inert: inert_page(header.record_kind),
             cache: Cache::new(MOST_CACHE_BYTES),
             scratch: Mutex::default(),

@@ -5,6 +5,6 @@
 mod pack;
 mod unpack;
 
+pub(crate) use pack::publish_packed;
 pub use pack::{Packed, pack};
-pub(crate) use pack::{check_kind, publish_packed};
 pub use unpack::unpack;

@@ -15,22 +15,21 @@ use crate::file::slots::Slots;
 use crate::file::source::{PreadSource, Source};
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
-use crate::grid::record::{Compact, RecordKind};
+use crate::grid::record::RecordCodec;
 use crate::packed::coder::{Encoder, PlainEncoder};
 use crate::packed::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, runs_of};
 use crate::packed::model::{CONTEXTS, Counts, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
-use crate::packed::rules::Rules;
 use crate::packed::shape::{Groups, SEGMENTS, TileId};
 use crate::packed::source::PackedSource;
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
-use crate::packed::walk::{Scratch, walk};
+use crate::packed::way::{Scratch, Way};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
-use crate::read::kinds::ByKind;
 use crate::read::records::Records;
 use crate::read::terrain::Terrain;
+use crate::with_records;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -57,7 +56,7 @@ pub struct Packed {
 /// What the terrain was before all edits is packed, as a build or a compaction left it. What was appended to it since, its history with it, is taken over as it is.
 ///
 /// # Errors
-/// Damage and I/O of the terrain; I/O of `to`; [`LayoutError::Unsupported`] for a terrain with exact records, one that other programs laid out, and one that is packed already.
+/// Damage and I/O of the terrain; I/O of `to`; [`LayoutError::Unsupported`] for a terrain that other programs laid out, and one that is packed already.
 pub fn pack(disk: &dyn Disk, from: &Path, to: &Path, progress: &dyn Progress) -> Result<Packed, LayoutError> {
     let terrain = Terrain::open(from)?;
     if terrain.source().packed_bytes().is_some() {
@@ -83,22 +82,19 @@ pub(crate) fn pack_into(
     file: &AtomicFile,
     progress: &dyn Progress,
 ) -> Result<Packed, LayoutError> {
-    check_kind(terrain.path(), terrain.header().record_kind)?;
     check_pages(terrain, progress)?;
     if built.instance() != terrain.instance() {
         check_pages(built, progress)?;
     }
     let directory_end = check_packable(built)?;
-    let Some(ByKind::Compact(records)) = built.records() else {
+    let Some(records) = built.records() else {
         return Err(refused(terrain.path(), "its records are not in memory's reach"));
     };
-    let packer = Packer {
-        records,
-        groups: Groups::of(built.grid()),
-        rules: Rules::new(built.grid(), &built.header().scale),
-        progress,
-    };
-    let bytes = packer.write(disk, terrain, built, directory_end, file)?;
+    let (groups, way) = (Groups::of(built.grid()), Way::of(built.header()));
+    let bytes = with_records!(records, records => {
+        let packer = Packer { records, groups, way, progress };
+        packer.write(disk, terrain, built, directory_end, file)?
+    });
     compare(terrain, file, progress)?;
     let [wide, high] = terrain.grid().samples().map(f64::from);
     let imagery = terrain.header().imagery.map_or(0, |place| place.bytes);
@@ -137,19 +133,6 @@ fn read_back(file: &AtomicFile) -> Result<PreadSource, LayoutError> {
         .try_clone()
         .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
     PreadSource::over(path, again)
-}
-
-/// Whether records of this kind can be packed.
-///
-/// # Errors
-/// [`LayoutError::Unsupported`] for exact ones.
-pub(crate) fn check_kind(path: &Path, kind: RecordKind) -> Result<(), LayoutError> {
-    match kind {
-        RecordKind::Compact => Ok(()),
-        RecordKind::Exact8 | RecordKind::Exact16 => {
-            Err(refused(path, "its records are exact ones; only compact ones can be packed"))
-        }
-    }
 }
 
 fn refused(path: &Path, problem: &str) -> LayoutError {
@@ -191,25 +174,28 @@ struct Made {
     segments: [Vec<u8>; SEGMENTS],
 }
 
-struct Packer<'p> {
-    records: Records<'p, Compact>,
+struct Packer<'p, C: RecordCodec> {
+    records: Records<'p, C>,
     groups: Groups,
-    rules: Rules,
+    way: Way,
     progress: &'p dyn Progress,
 }
 
-impl Packer<'_> {
+impl<C: RecordCodec> Packer<'_, C> {
     /// The records of a tile; `None` if all that it gives are inert.
     fn records_of(&self, id: TileId) -> Option<TileRecords> {
         let group = &self.groups.groups[usize::from(id.group)];
         let shape = self.groups.shape(id);
         let first = id.at.map(|v| v << (group.stride_log + group.tile_log));
         let k = self.records.grid().k();
-        let records = TileRecords::from_fn(&shape, |at| {
+        let inert = self.way.inert();
+        let records = TileRecords::gathered(&shape, inert, |at, words| {
             let [x, y] = [0, 1].map(|axis| first[axis] + (at[axis] << group.stride_log));
-            self.records.raw(slot_of(k, GridPoint::new(x, y)))
+            let mut bytes = [0; 16];
+            C::write(self.records.raw(slot_of(k, GridPoint::new(x, y))), &mut bytes);
+            words.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
         });
-        (!records.gives_nothing(&shape)).then_some(records)
+        (!records.gives_nothing(&shape, inert)).then_some(records)
     }
 
     fn samples_of(&self, id: TileId) -> u64 {
@@ -219,13 +205,13 @@ impl Packer<'_> {
     fn encoded(&self, id: TileId, scratch: &mut Scratch) -> Option<[Encoder; SEGMENTS]> {
         let records = self.records_of(id)?;
         let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        walk(&self.groups.shape(id), &self.rules, scratch, &mut encoders, Some(&records));
+        self.way.write(&self.groups.shape(id), scratch, &mut encoders, &records);
         Some(encoders)
     }
 
     /// Counts what occurs.
     fn model(&self, tiles: &[(usize, TileId)]) -> Model {
-        let none = || (vec![[0; TOKENS]; CONTEXTS], Scratch::default());
+        let none = || (vec![[0; TOKENS]; CONTEXTS], self.way.scratch());
         let counts = tiles
             .par_chunks(64)
             .fold(none, |(mut counts, mut scratch), tiles| {
@@ -251,7 +237,7 @@ impl Packer<'_> {
         }
         // Nothing that was counted is lacking; should it ever be, values are stored as they are.
         let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
-        walk(&self.groups.shape(id), &self.rules, scratch, &mut encoders, self.records_of(id).as_ref());
+        self.way.write(&self.groups.shape(id), scratch, &mut encoders, &self.records_of(id)?);
         Some(Made { segments: encoders.map(PlainEncoder::finish) })
     }
 
@@ -302,7 +288,7 @@ impl Packer<'_> {
             let made: Vec<Option<Made>> = tiles
                 .par_iter()
                 .with_min_len(16)
-                .map_init(Scratch::default, |scratch, (_, id)| self.make(*id, &model, scratch))
+                .map_init(|| self.way.scratch(), |scratch, (_, id)| self.make(*id, &model, scratch))
                 .collect();
             let mut bytes = Vec::new();
             for ((leaf, _), made) in tiles.iter().zip(made) {

@@ -12,7 +12,7 @@ use crate::file::slots::Slots;
 use crate::file::structure::inert_page;
 use crate::file::tail::Tail;
 use crate::imagery::{Append, Imagery, MadeTile};
-use crate::packing::{check_kind, publish_packed};
+use crate::packing::publish_packed;
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -80,9 +80,6 @@ fn write_anew(
         None => Terrain::open_unmapped(file)?,
     };
     let packs = packs || terrain.source().packed_bytes().is_some();
-    if packs {
-        check_kind(file, terrain.header().record_kind)?;
-    }
     let source = terrain.source();
     let bytes_before = source.packed_bytes().unwrap_or_else(|| source.byte_count());
     // A file whose journal is damaged is written anew all the same.

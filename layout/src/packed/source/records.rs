@@ -9,7 +9,7 @@ use crate::packed::blocks::{MOST_TILES, Piece, pieces, tiles_of};
 use crate::packed::coder::Decoder;
 use crate::packed::places::{PLACE_BYTES, TilePlace};
 use crate::packed::shape::{TILE_LOG, TileId, TileShape};
-use crate::packed::tile::{INERT, TileRecords};
+use crate::packed::tile::TileRecords;
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
@@ -93,8 +93,8 @@ impl PackedSource {
             rest = after;
         }
         let scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut scratch = scratch.unwrap_or_default();
-        let records = self.width.read(shape, &self.rules, &mut scratch, &mut decoders);
+        let mut scratch = scratch.unwrap_or_else(|| self.way.scratch());
+        let records = self.way.read(self.width, shape, &mut scratch, &mut decoders);
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
         if decoders.iter().all(Decoder::finish) {
             self.meter.count(bytes.len(), begun.elapsed());
@@ -122,20 +122,21 @@ impl PackedSource {
     pub(super) fn record_page(&self, logical: u32, page: &mut Page) -> Result<(), LayoutError> {
         let k = self.header.grid.k();
         let first = u64::from(logical) * self.header.records_per_page();
+        page.copy_from_slice(&self.inert[..]);
         let page = page.as_chunks_mut::<4>().0;
-        page.fill(INERT.to_le_bytes());
-        let slots = first..first + page.len() as u64;
+        let words = self.way.words();
+        let slots = first..first + (page.len() / words) as u64;
         let mut near = Near::default();
         for piece in pieces(&self.groups, k, slots) {
             match piece {
                 Piece::Single(slots) => {
-                    let places = &mut page[(slots.start - first) as usize..];
-                    for (slot, place) in slots.zip(places) {
-                        *place = self.record(slot, &mut near)?.to_le_bytes();
+                    let places = &mut page[words * (slots.start - first) as usize..];
+                    for (slot, place) in slots.zip(places.chunks_exact_mut(words)) {
+                        self.record(slot, &mut near, place)?;
                     }
                 }
                 Piece::Block { first: from, slots, block, group, tile } => {
-                    let records = &mut page[(from - first) as usize..][..slots.len()];
+                    let records = &mut page[words * (from - first) as usize..][..words * slots.len()];
                     let mut tiles: [Option<Arc<TileRecords>>; MOST_TILES] = [const { None }; MOST_TILES];
                     for (number, id) in tiles_of(&self.groups, block, &slots, group, tile) {
                         match id {
@@ -144,26 +145,27 @@ impl PackedSource {
                             None => {
                                 for i in block.slots_in(number, &slots) {
                                     let within = i - slots.start;
-                                    records[within] =
-                                        self.record(from + within as u64, &mut near)?.to_le_bytes();
+                                    let record = &mut records[words * within..][..words];
+                                    self.record(from + within as u64, &mut near, record)?;
                                 }
                             }
                         }
                     }
-                    block.gather(
-                        &slots,
-                        &tiles.each_ref().map(|tile| tile.as_ref().map(|t| t.all())),
-                        records,
-                    );
+                    let tiles = tiles.each_ref().map(|tile| tile.as_ref().map(|t| t.all()));
+                    if words == 1 {
+                        block.gather(&slots, &tiles, records);
+                    } else {
+                        block.gather_words(&slots, &tiles, records, words);
+                    }
                 }
             }
         }
         Ok(())
     }
 
-    /// One record.
-    fn record(&self, slot: u64, near: &mut Near) -> Result<u32, LayoutError> {
-        let Some(p) = point_of(self.header.grid.k(), slot) else { return Ok(INERT) };
+    /// Puts one record where an inert one is.
+    fn record(&self, slot: u64, near: &mut Near, to: &mut [[u8; 4]]) -> Result<(), LayoutError> {
+        let Some(p) = point_of(self.header.grid.k(), slot) else { return Ok(()) };
         let octave = self.groups.octave(p);
         let (id, at) = self.groups.tile_of(p, octave);
         let finest = octave.saturating_sub(self.groups.groups[usize::from(id.group)].stride_log);
@@ -177,9 +179,11 @@ impl PackedSource {
                 near.len() - 1
             }
         };
-        let record = near[found].1.as_ref().map_or(INERT, |tile| tile.at(at));
+        if let Some(tile) = &near[found].1 {
+            to.iter_mut().zip(tile.words_at(at)).for_each(|(to, from)| *to = from.to_le_bytes());
+        }
         // The next vertex is likely to be in the same tile.
         near.swap(0, found);
-        Ok(record)
+        Ok(())
     }
 }
