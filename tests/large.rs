@@ -220,8 +220,3 @@ fn check(side: u32) {
 fn islands_in_a_square_of_17_bits() {
     check(131_073);
 }
-
-#[test]
-fn islands_in_a_square_of_18_bits() {
-    check(262_145);
-}

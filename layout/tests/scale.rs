@@ -183,12 +183,3 @@ fn squares_of_17_bits_a_side() {
     assert_eq!(terrain.grid().k(), 17);
     descend(&islands(side), &terrain);
 }
-
-#[test]
-fn squares_of_18_bits_a_side() {
-    let folder = tempfile::tempdir().unwrap();
-    let side = 262_145;
-    let terrain = check(side, &folder.path().join("islands.iqt"));
-    assert_eq!(terrain.grid().k(), 18);
-    descend(&islands(side), &terrain);
-}
