@@ -286,17 +286,26 @@ class Unpacked:
     def __init__(self, data, header, sections, by_slot, inert):
         self.data, self.by_slot, self.inert = data, by_slot, inert
         self.in_page = 4096 // len(inert)
-        present, at, is_present, shift, run = [], 0, False, 0, 0
+        leaves, at, is_present, shift, run = [], 0, False, 0, 0
         for byte in sections[2]:
             run, shift = run | (byte & 127) << shift, shift + 7
             if byte < 128:
-                present += range(at, at + run) if is_present else []
+                leaves += range(at, at + run) if is_present else []
                 at, is_present, shift, run = at + run, not is_present, 0, 0
-        self.present, leaves = present, sorted({page // 256 for page in present})
-        sums = struct.unpack(f"<{len(present)}I", sections[3])
-        tables = {leaf: bytearray(4096) for leaf in leaves}
-        for i, page in enumerate(present):
-            struct.pack_into("<III", tables[page // 256], page % 256 * 16, 3 + i, sums[i], 1)
+        self.present = present = []
+        tables, at = {leaf: bytearray(4096) for leaf in leaves}, 0
+        for leaf, (less, sum_) in zip(leaves, struct.iter_unpack("<BI", sections[3]), strict=True):
+            bits = (1 << 256) - 1
+            if less < 255:
+                bits, at = int.from_bytes(sections[5][at:at + 32], "little"), at + 32
+            here = [i for i in range(256) if bits >> i & 1]
+            assert len(here) == less + 1
+            for i in here:
+                struct.pack_into("<I4sI", tables[leaf], 16 * i, 3 + len(present), sections[5][at:at + 4], 1)
+                present.append(256 * leaf + i)
+                at += 4
+            assert zlib.crc32(tables[leaf]) == sum_
+        assert at == len(sections[5]) and len(present) == struct.unpack_from("<Q", header, 0x110)[0]
         root = bytearray(-(-16 * struct.unpack_from("<I", header, 0x7C)[0] // 4096) * 4096)
         for i, leaf in enumerate(leaves):
             struct.pack_into("<III", root, 16 * leaf, 3 + len(present) + i, zlib.crc32(tables[leaf]), 1)

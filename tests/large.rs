@@ -114,7 +114,15 @@ fn flight(terrain: &Terrain, at: [u32; 2]) -> impl Iterator<Item = FlightFrame> 
         [(f64::from(at[0]) + x) * SPACING_M[0] / wide, (f64::from(at[1]) + y) * SPACING_M[1] / high]
     };
     let frames: Vec<FlightFrame> = (0..16)
-        .map(|i| frame(terrain, place(60.0 + 5.0 * f64::from(i), 20.0 + 3.0 * f64::from(i)), 1400.0, 5.0 * f64::from(i), -30.0))
+        .map(|i| {
+            frame(
+                terrain,
+                place(60.0 + 5.0 * f64::from(i), 20.0 + 3.0 * f64::from(i)),
+                1400.0,
+                5.0 * f64::from(i),
+                -30.0,
+            )
+        })
         .collect();
     frames.into_iter()
 }
@@ -136,12 +144,10 @@ fn fly(dem: &Islands, path: &Path) {
     for at in dem.at.iter().copied() {
         let views: Vec<View> = views(flight(&terrain, at), 1.0);
         for culling in Culling::ALL {
-            let Some(ByKind::Compact(records)) = terrain.records() else { panic!("compact records") };
+            let Ok(ByKind::Compact(records)) = terrain.records() else { panic!("compact records") };
             let mut soar = over(Soar::new(records.clone(), culling));
-            let mut engines = [
-                over(Smart::new(records.clone(), culling)),
-                over(Kinetic::new(records.clone(), culling)),
-            ];
+            let mut engines =
+                [over(Smart::new(records.clone(), culling)), over(Kinetic::new(records.clone(), culling))];
             for view in &views {
                 let expected = keys(&soar(view));
                 assert!(expected.len() > 50, "{}", expected.len());
@@ -153,7 +159,7 @@ fn fly(dem: &Islands, path: &Path) {
         let ByKind::Compact(pool) = streamed.pool(16 << 20).unwrap() else { panic!("compact records") };
         let disk = ModelDisk::new(Arc::clone(&streamed), 40, 1);
         let mut flown = Streamed::new(pool, disk, Culling::Vertices, Prefetch::default());
-        let Some(ByKind::Compact(records)) = terrain.records() else { panic!("compact records") };
+        let Ok(ByKind::Compact(records)) = terrain.records() else { panic!("compact records") };
         let mut expected = over(Soar::new(records, Culling::Vertices));
         for view in &views {
             let frames = (0..500).find(|_| flown.update(view, &mut Unobserved).work.late == 0);
@@ -191,7 +197,10 @@ fn check(side: u32) {
     drop(session);
     let edited = check_sound(&plain);
     let centre = |terrain: &Terrain, at: [u32; 2]| {
-        terrain.height_m((f64::from(at[0]) + 100.0) * SPACING_M[0], (f64::from(at[1]) + 100.0) * SPACING_M[1]).unwrap().unwrap()
+        terrain
+            .height_m((f64::from(at[0]) + 100.0) * SPACING_M[0], (f64::from(at[1]) + 100.0) * SPACING_M[1])
+            .unwrap()
+            .unwrap()
     };
     for at in dem.at.iter().copied() {
         let before = dem.height(at[0] + 100, at[1] + 100).unwrap();

@@ -65,13 +65,13 @@ fn engines_fly_edited_packed_terrain_as_the_terrain() {
         let whole = Terrain::open(&packed).unwrap();
         let streamed = Arc::new(Terrain::open_unmapped(&packed).unwrap());
         match (plain.records(), whole.records(), streamed.pool(64 << 20).unwrap()) {
-            (Some(ByKind::Compact(a)), Some(ByKind::Compact(b)), ByKind::Compact(pool)) => {
+            (Ok(ByKind::Compact(a)), Ok(ByKind::Compact(b)), ByKind::Compact(pool)) => {
                 fly(&plain, a, b, pool, &streamed);
             }
-            (Some(ByKind::Exact8(a)), Some(ByKind::Exact8(b)), ByKind::Exact8(pool)) => {
+            (Ok(ByKind::Exact8(a)), Ok(ByKind::Exact8(b)), ByKind::Exact8(pool)) => {
                 fly(&plain, a, b, pool, &streamed);
             }
-            (Some(ByKind::Exact16(a)), Some(ByKind::Exact16(b)), ByKind::Exact16(pool)) => {
+            (Ok(ByKind::Exact16(a)), Ok(ByKind::Exact16(b)), ByKind::Exact16(pool)) => {
                 fly(&plain, a, b, pool, &streamed);
             }
             _ => panic!("three kinds of records of one terrain"),

@@ -36,8 +36,8 @@ fn options() -> BuildOptions {
 /// Whether every page of two terrains is the same.
 fn assert_same(a: &Terrain, b: &Terrain) {
     assert_eq!(a.header(), b.header());
-    assert_eq!(a.entries(), b.entries());
-    for page in (0..a.entries().len() as u64).rev() {
+    assert!(a.present_pages().unwrap().eq(b.present_pages().unwrap()));
+    for page in (0..a.page_count()).rev() {
         assert!(a.checked_page(page).unwrap() == b.checked_page(page).unwrap(), "page {page}");
     }
 }
@@ -139,11 +139,10 @@ fn damage_is_told() {
         let (packed, plain) = (bench.bytes(&bench.packed), open_bytes(bytes).unwrap());
         let look = |damaged: Vec<u8>| -> Result<(), terrasoar_layout::LayoutError> {
             let terrain = open_bytes(damaged)?;
-            for page in 0..terrain.entries().len() as u64 {
+            for page in 0..terrain.page_count() {
                 let read = terrain.checked_page(page)?;
                 assert!(
-                    terrain.entries().len() != plain.entries().len()
-                        || read == plain.checked_page(page).unwrap()
+                    terrain.page_count() != plain.page_count() || read == plain.checked_page(page).unwrap()
                 );
             }
             Ok(())
@@ -181,7 +180,7 @@ fn damage_is_told() {
 #[test]
 fn packed_bytes_are_what_they_were() {
     for (sample_type, length, sum) in
-        [(SampleType::F32, 51_547, 406_407_020), (SampleType::F64, 134_252, 3_193_243_401)]
+        [(SampleType::F32, 51_553, 4_152_384_434), (SampleType::F64, 134_277, 2_859_103_161)]
     {
         // By whole numbers alone, so that every machine makes the same.
         let dem = MemoryDem::from_fn([150, 110], sample_type, |x, y| {

@@ -27,18 +27,15 @@ impl<'f> Band<'f> {
     pub(super) fn new(grid: Grid, coarse_step: u32, fills: Option<&'f Fills<'f>>) -> Self {
         // Rows of the data on the coarse grid, and one for the data's far border.
         let coarse_rows = (grid.samples()[1] - 1).div_ceil(coarse_step) as usize + 1;
-        Self {
-            grid,
-            fills,
-            first: 0,
-            rows: VecDeque::new(),
-            coarse_step,
-            coarse: vec![None; coarse_rows],
-        }
+        Self { grid, fills, first: 0, rows: VecDeque::new(), coarse_step, coarse: vec![None; coarse_rows] }
     }
 
     /// Reads the coarse samples of all rows ahead of the window, so that triangles larger than it have their corners.
-    pub(super) fn preload_coarse(&mut self, mut reader: RowReader<'_>, spool: &Spool<'_>) -> Result<(), LayoutError> {
+    pub(super) fn preload_coarse(
+        &mut self,
+        mut reader: RowReader<'_>,
+        spool: &Spool<'_>,
+    ) -> Result<(), LayoutError> {
         let high = self.grid.samples()[1];
         // Void rows have no corners, and get their codes when the window comes there.
         for y in (0..high).step_by(self.coarse_step as usize).chain([high - 1]) {

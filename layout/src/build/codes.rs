@@ -69,7 +69,11 @@ impl RowCodes {
         if let [run] = &runs[..]
             && is_whole(run)
         {
-            let codes = runs.into_iter().map(|(first, codes)| CodeRun { first, codes: codes.into(), voids: Box::default() });
+            let codes = runs.into_iter().map(|(first, codes)| CodeRun {
+                first,
+                codes: codes.into(),
+                voids: Box::default(),
+            });
             return Self { step: 1, runs: codes.collect(), gaps: vec![Gap::Level(f64::NAN); 2] };
         }
         let mut codes: Vec<CodeRun> = runs
@@ -213,7 +217,8 @@ impl Row {
             if from >= end {
                 continue;
             }
-            let (place, here) = ((from - first) as usize..(end - first) as usize, (from - run.first) as usize);
+            let (place, here) =
+                ((from - first) as usize..(end - first) as usize, (from - run.first) as usize);
             let count = place.len();
             let to = &mut to[place];
             if run.voids.is_empty() {

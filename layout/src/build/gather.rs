@@ -28,13 +28,13 @@ pub(super) fn gather<C: RecordCodec>(
     // Rows of the block that are not kept belong to other parts of it.
     let mut rows: [Piece<'_, C::Raw>; ROWS] = std::array::from_fn(|_| Piece::none());
     for (place, row) in rows.iter_mut().zip(south..=north) {
-        *place = records
-            .row(shape.level(), row)
-            .map_or(Piece::none(), |row| row.piece(west, east + 1, C::INERT));
+        *place =
+            records.row(shape.level(), row).map_or(Piece::none(), |row| row.piece(west, east + 1, C::INERT));
     }
     let is_inert = |row: &Piece<'_, C::Raw>| {
         let count = row.values.len();
-        let columns = west.saturating_sub(row.from).min(count)..(east + 1).saturating_sub(row.from).min(count);
+        let columns =
+            west.saturating_sub(row.from).min(count)..(east + 1).saturating_sub(row.from).min(count);
         // Without an early end the comparison takes many records at once.
         row.values[columns].iter().fold(true, |all, raw| all & (*raw == C::INERT))
     };

@@ -43,8 +43,10 @@ impl Land {
         let [wide, high] = samples;
         let whole = [Window { col: 0, row: 0, width: wide, height: high }];
         for window in windows.unwrap_or(&whole) {
-            let (east, end) =
-                (window.col.saturating_add(window.width).min(wide), window.row.saturating_add(window.height).min(high));
+            let (east, end) = (
+                window.col.saturating_add(window.width).min(wide),
+                window.row.saturating_add(window.height).min(high),
+            );
             if window.col < east && window.row < end {
                 let (south, north) = (high - end, high - 1 - window.row);
                 (south >> BLOCK_LOG2..=north >> BLOCK_LOG2)
@@ -130,7 +132,8 @@ impl Land {
     /// Most blocks with heights in two rows of blocks side by side, and most runs of them.
     pub(super) fn widest(&self) -> [u64; 2] {
         let rows = self.has_any.len() as u32;
-        let both = |row: u32| self.runs(row * BLOCK..=((row + 1).min(rows - 1) * BLOCK).min(self.samples[1] - 1));
+        let both =
+            |row: u32| self.runs(row * BLOCK..=((row + 1).min(rows - 1) * BLOCK).min(self.samples[1] - 1));
         (0..rows).map(both).fold([0; 2], |most, runs| {
             let blocks = runs.iter().map(|run| u64::from((run.end - run.start).div_ceil(BLOCK))).sum::<u64>();
             [most[0].max(blocks), most[1].max(runs.len() as u64)]

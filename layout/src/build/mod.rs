@@ -43,8 +43,8 @@ use crate::words::{harmless, number};
 use band::{Band, Fills};
 use codes::{Row, RowReader};
 pub use fill::MAX_FILL;
-use levels::{LevelRow, LevelShape, Levels};
 use land::Land;
+use levels::{LevelRow, LevelShape, Levels};
 use memory::MemoryPlan;
 pub use options::BuildOptions;
 use rayon::prelude::*;
@@ -116,7 +116,8 @@ pub fn build_on(
     // What is wrong already need not be waited for.
     header.check_numbers()?;
     let threads = rayon::current_num_threads() as u64;
-    let plan = |land: &Land| MemoryPlan::new(&grid, land, info.sample_type, options, threads, dem.memory_bytes());
+    let plan =
+        |land: &Land| MemoryPlan::new(&grid, land, info.sample_type, options, threads, dem.memory_bytes());
     // Squares that large have heights everywhere in no file, so what they take is not known before they were read.
     let is_known = grid.k() <= LARGEST_FULL_K;
     let land = if is_known { Land::in_windows(grid.samples(), None) } else { Land::none(grid.samples()) };

@@ -141,7 +141,9 @@ fn blocks_near(k: u32, shape: &LevelShape, land: &Land) -> Vec<u64> {
 fn is_near(k: u32, shape: &LevelShape, land: &Land, offset: u64, order: u32) -> bool {
     let reach = i64::from(shape.reach());
     let mut clipped = [[0; 2]; 2];
-    for ((place, [from, to]), limit) in clipped.iter_mut().zip(block_bounds(k, shape, offset, order)).zip(shape.limit()) {
+    for ((place, [from, to]), limit) in
+        clipped.iter_mut().zip(block_bounds(k, shape, offset, order)).zip(shape.limit())
+    {
         if to < 0 || from > i64::from(limit) {
             return false;
         }
@@ -269,13 +271,18 @@ mod tests {
         let islands = [[30, 40], [600, 41], [601, 700], [1024, 899], [0, 899], [512, 512]];
         islands.iter().for_each(|[x, y]| land.mark(*x..*x + 1, *y));
         let plan = Plan::new(&grid, &land, 16);
-        let planned: Vec<std::ops::Range<u64>> =
-            plan.levels.iter().flat_map(|level| &level.parts).map(|part| part.first()..part.first() + part.count()).collect();
+        let planned: Vec<std::ops::Range<u64>> = plan
+            .levels
+            .iter()
+            .flat_map(|level| &level.parts)
+            .map(|part| part.first()..part.first() + part.count())
+            .collect();
         let mut alive: Vec<GridPoint> = Vec::new();
         let n = grid.side_steps();
         let images = |v: u32, count: u32| v..if v + 1 == count { n + 1 } else { v + 1 };
         for [x, y] in islands {
-            let at = images(y, samples[1]).flat_map(|y| images(x, samples[0]).map(move |x| GridPoint::new(x, y)));
+            let at =
+                images(y, samples[1]).flat_map(|y| images(x, samples[0]).map(move |x| GridPoint::new(x, y)));
             alive.extend(at.filter(|p| !grid.is_corner(*p) && !grid.is_beyond(*p, grid.level(*p))));
         }
         let mut seen = std::collections::BTreeSet::new();

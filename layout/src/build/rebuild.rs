@@ -52,7 +52,8 @@ impl<'t, C: RecordCodec> OwnHeights<'t, C> {
 fn cells<C: RecordCodec>(records: &Records<'_, C>) -> [Vec<Window>; 2] {
     let grid = records.grid();
     let (k, n, [wide, high]) = (grid.k(), grid.side_steps(), grid.samples());
-    let is_void = |x: u32, y: u32| records.vertex_at(GridPoint::new(x.min(wide - 1), y.min(high - 1))).class.is_void();
+    let is_void =
+        |x: u32, y: u32| records.vertex_at(GridPoint::new(x.min(wide - 1), y.min(high - 1))).class.is_void();
     let (mut land, mut sea) = (Vec::new(), Vec::new());
     let mut waiting = vec![(0, 0, n)];
     while let Some((west, south, side)) = waiting.pop() {
@@ -63,10 +64,13 @@ fn cells<C: RecordCodec>(records: &Records<'_, C>) -> [Vec<Window>; 2] {
         let centre = GridPoint::new(west + side / 2, south + side / 2);
         // All of a cell but its corners is below its centre.
         let is_sea = records.raw(slot_of(k, centre)) == C::INERT
-            && [(west, south), (east, south), (west, north), (east, north)].into_iter().all(|(x, y)| is_void(x, y));
+            && [(west, south), (east, south), (west, north), (east, north)]
+                .into_iter()
+                .all(|(x, y)| is_void(x, y));
         if !is_sea && side > BLOCK {
             let half = side / 2;
-            waiting.extend([0, half].into_iter().flat_map(|y| [0, half].map(|x| (west + x, south + y, half))));
+            waiting
+                .extend([0, half].into_iter().flat_map(|y| [0, half].map(|x| (west + x, south + y, half))));
             continue;
         }
         // The last cells have the far border, too.
@@ -129,12 +133,13 @@ pub(crate) fn rebuild_into(
     memory_mib: u64,
     progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
-    let Some(records) = terrain.records() else {
+    if !terrain.lends_records() {
         return Err(LayoutError::Usage(format!(
             "{}: building it anew needs a mapped or in-memory terrain",
             terrain.path().display()
         )));
-    };
+    }
+    let records = terrain.records()?;
     with_records!(records, records => rebuild_kind(disk, terrain, records, file, room, memory_mib, progress))
 }
 

@@ -77,9 +77,9 @@ impl<C: RecordCodec> Saturator<C> {
                 continue;
             }
             let own_m = match scanned {
-                Some(cells) if !folded => {
-                    cells.get(column - columns.start).map_or(0.0, |cell| f64::from(f32::from_bits(cell.load(Ordering::Relaxed))))
-                }
+                Some(cells) if !folded => cells
+                    .get(column - columns.start)
+                    .map_or(0.0, |cell| f64::from(f32::from_bits(cell.load(Ordering::Relaxed)))),
                 _ => f64::NAN,
             };
             // Nearly every vertex: all around it is there, nothing folds, nothing is void.
@@ -199,7 +199,9 @@ impl<'r, C: RecordCodec> ChildRows<'r, C> {
         let half = s / 2;
         let rows = match (level, shape.is_white()) {
             (0, _) => [Piece::none(), Piece::none(), Piece::none()],
-            (_, true) => [child(y - s, west, east)?, child(y, west - s, east + s)?, child(y + s, west, east)?],
+            (_, true) => {
+                [child(y - s, west, east)?, child(y, west - s, east + s)?, child(y + s, west, east)?]
+            }
             (_, false) => {
                 let west = west.saturating_sub(half);
                 [child(y - half, west, east + half)?, Piece::none(), child(y + half, west, east + half)?]

@@ -73,7 +73,9 @@ fn failed(file: &AtomicFile, e: std::io::Error) -> LayoutError {
 
 /// What is said where page numbers end.
 fn too_long(file: &AtomicFile) -> LayoutError {
-    page_at(file.target(), u64::MAX).err().unwrap_or_else(|| LayoutError::Usage("the file would be too long".into()))
+    page_at(file.target(), u64::MAX)
+        .err()
+        .unwrap_or_else(|| LayoutError::Usage("the file would be too long".into()))
 }
 
 impl<'a, C: RecordCodec> PageWriter<'a, C> {

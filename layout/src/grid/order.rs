@@ -364,7 +364,8 @@ mod tests {
     fn slots_of_large_squares_are_those_of_the_definition() {
         for k in 1..=20 {
             let corners = corners(k);
-            for p in places(k.max(17)).map(|p| GridPoint::new(p.x() & ((1 << k) - 1), p.y() & ((1 << k) - 1))) {
+            for p in places(k.max(17)).map(|p| GridPoint::new(p.x() & ((1 << k) - 1), p.y() & ((1 << k) - 1)))
+            {
                 if !corners.contains(&p) {
                     assert_eq!(u128::from(slot_of(k, p)), defined_slot(k, p), "{p:?} of {k}");
                 }
@@ -384,7 +385,11 @@ mod tests {
                 let (t, is_white) = (level / 2, level & 1);
                 let cell = BlockCells::new(k, level, offset / BLOCK_SLOTS * BLOCK_SLOTS)
                     .cell((offset % BLOCK_SLOTS) as usize);
-                assert_eq!(cell, ((p.y() >> (t + is_white)) as usize, (p.x() >> (t + 1)) as usize), "{p:?} of {k}");
+                assert_eq!(
+                    cell,
+                    ((p.y() >> (t + is_white)) as usize, (p.x() >> (t + 1)) as usize),
+                    "{p:?} of {k}"
+                );
                 largest = largest.max(slot);
             }
             assert!(largest > 1 << (2 * k), "{largest}");

@@ -2,6 +2,7 @@
 //!
 //! Packed terrain is opened as any other: [`Terrain::open`](crate::read::terrain::Terrain::open). How it is read, and how a tile is coded, is module `packed`.
 
+mod front;
 mod pack;
 mod unpack;
 

@@ -3,6 +3,7 @@
 //! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name. So whatever the file holds, what is packed is the same, or packing fails and says
 //! so. Cost: each vertex is looked up twice and unpacked once; memory is a few megabytes, and 16 bytes a record page.
 
+use super::front::Front;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
@@ -17,7 +18,8 @@ use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::RecordCodec;
 use crate::packed::coder::{Encoder, PlainEncoder};
-use crate::packed::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, runs_of};
+use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
+use crate::packed::leaves::packed_leaves;
 use crate::packed::model::{CONTEXTS, Counts, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
 use crate::packed::shape::{Groups, SEGMENTS, TileId};
@@ -87,9 +89,7 @@ pub(crate) fn pack_into(
         check_pages(built, progress)?;
     }
     let directory_end = check_packable(built)?;
-    let Some(records) = built.records() else {
-        return Err(refused(terrain.path(), "its records are not in memory's reach"));
-    };
+    let records = built.records()?;
     let (groups, way) = (Groups::of(built.grid()), Way::of(built.header()));
     let bytes = with_records!(records, records => {
         let packer = Packer { records, groups, way, progress };
@@ -145,13 +145,13 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
     let in_order =
         "other programs wrote it, in an order of their own; write it anew with `terrasoar compact`";
     let mut next = INERT_PAGE;
-    for entry in built.entries().iter().filter(|entry| entry.is_present()) {
+    for (_, entry) in built.present_pages()? {
         next += 1;
         if entry.page != next || entry.generation != 1 {
             return Err(refused(path, in_order));
         }
     }
-    let (root, page) = put_all_leaves(built.entries(), next + 1, |_, _| Ok(()))?;
+    let (root, page) = put_all_leaves(built.table().leaves(), next + 1, |_, _| Ok(()))?;
     let root = root_bytes(&root);
     let end = u64::from(page) * PAGE + root.bytes.len() as u64;
     let is_in_order =
@@ -163,9 +163,9 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
 fn check_pages(terrain: &Terrain, progress: &dyn Progress) -> Result<(), LayoutError> {
     let per_page = terrain.header().records_per_page();
     progress.stage("checking", terrain.header().stored_pages * per_page);
-    (0..terrain.entries().len() as u64)
+    let present: Vec<u64> = terrain.present_pages()?.map(|(page, _)| page).collect();
+    present
         .into_par_iter()
-        .filter(|page| terrain.entries()[*page as usize].is_present())
         .try_for_each(|page| terrain.checked_page(page).map(|_| progress.advance(per_page)))
 }
 
@@ -266,10 +266,10 @@ impl<C: RecordCodec> Packer<'_, C> {
         let slots = header_slots(source, header)?;
         let mut front = Front::default();
         front.put(MODEL, &model.to_bytes());
-        front.put(RUNS, &runs_of(built.entries().iter().map(|entry| entry.is_present())));
-        let present = built.entries().iter().filter(|entry| entry.is_present());
-        let sums: Vec<u8> = present.flat_map(|entry| entry.checksum.to_le_bytes()).collect();
-        front.put(SUMS, &sums);
+        built.check_directory()?;
+        let [runs, index, blocks] = packed_leaves(built.table().leaves());
+        front.put(RUNS, &runs);
+        front.put(INDEX, &index);
         let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
         // Leaves have their place before it is known what they hold.
         let leaf_sizes = self.groups.leaf_sizes();
@@ -323,6 +323,9 @@ impl<C: RecordCodec> Packer<'_, C> {
             write(&bytes, *offset)?;
         }
         front.seal(ROOT);
+        front.list(BLOCKS, &blocks, at);
+        write(&blocks, at)?;
+        at += blocks.len() as u64;
 
         // What is not packed: imagery, and what edits appended.
         let (first, last) = (directory_end / PAGE, header.file_bytes.div_ceil(PAGE));
@@ -368,32 +371,6 @@ impl<C: RecordCodec> Packer<'_, C> {
 fn sum(mut a: Counts, b: Counts) -> Counts {
     a.iter_mut().flatten().zip(b.iter().flatten()).for_each(|(a, b)| *a += b);
     a
-}
-
-/// Sections behind the header.
-#[derive(Default)]
-struct Front {
-    bytes: Vec<u8>,
-    sections: Vec<Section>,
-}
-
-impl Front {
-    /// Appends a section; where it begins behind the header.
-    fn put(&mut self, kind: u32, bytes: &[u8]) -> usize {
-        let at = self.bytes.len();
-        let offset = FRONT + at as u64;
-        self.bytes.extend(bytes);
-        self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
-        at
-    }
-
-    /// The checksum of a section that was filled in meanwhile.
-    fn seal(&mut self, kind: u32) {
-        for section in self.sections.iter_mut().filter(|section| section.kind == kind) {
-            let from = (section.offset - FRONT) as usize;
-            section.checksum = checksum(&self.bytes[from..from + section.bytes as usize]);
-        }
-    }
 }
 
 /// The two header pages of a terrain file; zeros for the one that does not count, should it be no header.

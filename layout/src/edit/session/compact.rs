@@ -2,10 +2,10 @@
 
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
-use crate::file::bytes::PAGE_BYTES;
+use crate::file::bytes::{PAGE_BYTES, to_usize};
 use crate::file::directory::{page_at, put_all_leaves, root_bytes};
 use crate::file::disk::Disk;
-use crate::file::entries::{Entry, absent};
+use crate::file::entries::{ENTRIES_PER_LEAF, Entry, absent};
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
@@ -166,15 +166,15 @@ fn write_terrain(
     writer.put(&[0; 2 * PAGE_BYTES])?;
     debug_assert_eq!(writer.page()?, INERT_PAGE);
     writer.put(&inert_page(old.record_kind)[..])?;
-    let mut entries = absent(terrain.entries().len());
-    let pages = (0u64..).zip(terrain.entries()).zip(&mut entries);
-    for ((logical, entry), place) in pages.filter(|((_, entry), _)| entry.is_present()) {
+    let mut entries = absent(to_usize(terrain.page_count())?);
+    for (logical, entry) in terrain.present_pages()? {
         let page = terrain.checked_page(logical)?;
-        *place = Entry { page: writer.page()?, generation: 1, ..*entry };
+        entries[logical as usize] = Entry { page: writer.page()?, generation: 1, ..entry };
         writer.put(&page[..])?;
         progress.advance(old.records_per_page());
     }
-    let (root, root_page) = put_all_leaves(&entries, writer.page()?, |_, bytes| writer.put(bytes))?;
+    let (root, root_page) =
+        put_all_leaves(entries.chunks(ENTRIES_PER_LEAF), writer.page()?, |_, bytes| writer.put(bytes))?;
     let root = root_bytes(&root);
     writer.put(&root.bytes)?;
     writer.flush()?;

@@ -35,7 +35,7 @@ impl PackedSource {
             if end.is_none_or(|end| end > self.container.packed_bytes) {
                 return Err(damaged("it lies outside the file"));
             }
-            self.inner.read_at(offset, &mut bytes)?;
+            self.read_packed(offset, &mut bytes)?;
             if checksum(&bytes) != sum {
                 return Err(damaged("the checksum does not match"));
             }
@@ -79,7 +79,7 @@ impl PackedSource {
         if place.offset.saturating_add(bytes.len() as u64) > self.container.packed_bytes {
             return Err(damaged("it lies outside the file"));
         }
-        self.inner.read_at(place.offset, &mut bytes)?;
+        self.read_packed(place.offset, &mut bytes)?;
         let begun = Instant::now();
         let mut decoders = Vec::with_capacity(segments);
         let mut rest = &bytes[..];
@@ -106,11 +106,10 @@ impl PackedSource {
 
     /// Where a page of the terrain file lies on the ground, as a number that is near for pages near each other; those that are no record pages come first.
     pub(in crate::packed) fn place_of(&self, number: u64) -> u64 {
-        let present =
-            number.checked_sub(FIRST_PAGE).and_then(|at| self.present.get(usize::try_from(at).ok()?));
-        let Some(logical) = present else { return 0 };
+        let nth = number.checked_sub(FIRST_PAGE).filter(|nth| *nth < self.container.pages);
+        let Some(logical) = nth.and_then(|nth| self.logical(nth).ok()) else { return 0 };
         let per_page = self.header.records_per_page();
-        let first = u64::from(*logical) * per_page;
+        let first = logical * per_page;
         // Its middle, or whatever is no ghost.
         let mut slots = (first + per_page / 2..first + per_page).chain(first..first + per_page / 2);
         let point = slots.find_map(|slot| point_of(self.header.grid.k(), slot));
@@ -119,9 +118,9 @@ impl PackedSource {
     }
 
     /// Fills a record page.
-    pub(super) fn record_page(&self, logical: u32, page: &mut Page) -> Result<(), LayoutError> {
+    pub(super) fn record_page(&self, logical: u64, page: &mut Page) -> Result<(), LayoutError> {
         let k = self.header.grid.k();
-        let first = u64::from(logical) * self.header.records_per_page();
+        let first = logical * self.header.records_per_page();
         page.copy_from_slice(&self.inert[..]);
         let page = page.as_chunks_mut::<4>().0;
         let words = self.way.words();
