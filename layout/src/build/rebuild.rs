@@ -140,7 +140,7 @@ fn rebuild_kind<C: RecordCodec>(
         None => (same_code(old), old.scale),
         Some(room) => {
             progress.stage("surveying", samples);
-            let code = roomy_code(old, room)?;
+            let code = roomy_code(terrain.path(), old, room)?;
             let steepest_m = super::survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
             (code, roomy_scale(old, &code, room, steepest_m))
         }
@@ -204,11 +204,12 @@ fn range_with(old: &Header, room: HeightRoom) -> [f64; 2] {
 }
 
 /// The smallest kind of records that keeps the terrain's heights exactly and has room for others.
-fn roomy_code(old: &Header, room: HeightRoom) -> Result<HeightCode, LayoutError> {
+fn roomy_code(path: &Path, old: &Header, room: HeightRoom) -> Result<HeightCode, LayoutError> {
     let [low, high] = range_with(old, room);
     if !(low.abs() <= 1e9 && high.abs() <= 1e9) {
         return Err(LayoutError::Usage(format!(
-            "heights from {low} to {high} m are beyond a million kilometres; a terrain does not go there"
+            "{}: heights from {low} to {high} m are beyond a million kilometres; a terrain does not go there",
+            path.display()
         )));
     }
     let same = same_code(old);
