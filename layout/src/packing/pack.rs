@@ -15,6 +15,8 @@ use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
 use crate::file::packed_end::{FRONT, Run};
 use crate::file::source::Source;
+use crate::grid::GridPoint;
+use crate::grid::order::slot_of;
 use crate::grid::record::RecordCodec;
 use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
 use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
@@ -180,6 +182,15 @@ impl<C: RecordCodec> Packer<'_, C> {
     /// The records of a tile; `None` if all that it gives are inert.
     fn records_of(&self, id: TileId) -> Option<TileRecords> {
         let (shape, inert) = (self.groups.shape(id), self.way.inert());
+        // All that it gives lies below its centre, unless it gives the corners of the square, too.
+        let group = &self.groups.groups[usize::from(id.group)];
+        let (shift, half) =
+            (group.stride_log + group.tile_log, 1 << (group.stride_log + group.tile_log) >> 1);
+        let [x, y] = id.at.map(|v| (v << shift) + half);
+        let centre = slot_of(self.records.grid().k(), GridPoint::new(x, y));
+        if !shape.is_top && self.records.raw(centre) == C::INERT {
+            return None;
+        }
         let records = tile_of(&self.records, &self.groups, id, inert);
         (!records.gives_nothing(&shape, inert)).then_some(records)
     }
