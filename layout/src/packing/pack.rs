@@ -179,18 +179,32 @@ struct Packer<'p, C: RecordCodec> {
 }
 
 impl<C: RecordCodec> Packer<'_, C> {
-    /// The records of a tile; `None` if all that it gives are inert.
-    fn records_of(&self, id: TileId) -> Option<TileRecords> {
-        let (shape, inert) = (self.groups.shape(id), self.way.inert());
-        // All that it gives lies below its centre, unless it gives the corners of the square, too.
+    /// Whether a tile may give anything but inert records. All that it gives lies below its centre, unless it gives the corners of the square, too.
+    fn may_hold(&self, id: TileId) -> bool {
         let group = &self.groups.groups[usize::from(id.group)];
         let (shift, half) =
             (group.stride_log + group.tile_log, 1 << (group.stride_log + group.tile_log) >> 1);
         let [x, y] = id.at.map(|v| (v << shift) + half);
         let centre = slot_of(self.records.grid().k(), GridPoint::new(x, y));
-        if !shape.is_top && self.records.raw(centre) == C::INERT {
+        group.is_top || self.records.raw(centre) != C::INERT
+    }
+
+    /// Which leaves of the tile directory may hold anything, and the tiles of these: what is void takes no room.
+    fn listed(&self) -> (Vec<bool>, Vec<(usize, TileId)>) {
+        let mut holds = vec![false; self.groups.leaves];
+        for (leaf, id) in self.groups.tiles() {
+            holds[leaf] = holds[leaf] || self.may_hold(id);
+        }
+        let tiles = self.groups.tiles().filter(|(leaf, _)| holds[*leaf]).collect();
+        (holds, tiles)
+    }
+
+    /// The records of a tile; `None` if all that it gives are inert.
+    fn records_of(&self, id: TileId) -> Option<TileRecords> {
+        if !self.may_hold(id) {
             return None;
         }
+        let (shape, inert) = (self.groups.shape(id), self.way.inert());
         let records = tile_of(&self.records, &self.groups, id, inert);
         (!records.gives_nothing(&shape, inert)).then_some(records)
     }
@@ -281,7 +295,7 @@ impl<C: RecordCodec> Packer<'_, C> {
         directory_end: u64,
         file: &AtomicFile,
     ) -> Result<u64, LayoutError> {
-        let tiles: Vec<(usize, TileId)> = self.groups.tiles().collect();
+        let (holds, tiles) = self.listed();
         let samples = tiles.iter().map(|(_, id)| self.samples_of(*id)).sum();
         let counted = tiles.iter().enumerate().filter(|(i, (_, id))| self.is_counted(*i, tiles.len(), *id));
         self.progress.stage("counting", counted.map(|(_, (_, id))| self.samples_of(*id)).sum());
@@ -299,7 +313,8 @@ impl<C: RecordCodec> Packer<'_, C> {
         front.put(INDEX, &index);
         let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
         // Leaves have their place before it is known what they hold.
-        let leaf_sizes = self.groups.leaf_sizes();
+        let mut leaf_sizes = self.groups.leaf_sizes();
+        leaf_sizes.iter_mut().zip(&holds).filter(|(_, holds)| !**holds).for_each(|(size, _)| *size = 0);
         let first_leaf = FRONT + front.bytes.len() as u64;
         let mut at = first_leaf;
         let leaf_offsets: Vec<u64> = leaf_sizes
