@@ -57,7 +57,7 @@ fn main() -> Result<(), Failure> {
         "| where | culling | triangles | editor, ms | pages, ms | ground_changed, ms | update, ms | both, ms | update without, ms | records | pages | sent | tests | splits | merges |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
-    with_records!(terrain.records().ok_or("not in memory")?, records => {
+    with_records!(terrain.records()?, records => {
         for (name, samples) in [("all over", f64::INFINITY), ("near", 300.0)] {
             for culling in Culling::ALL {
                 let bombed = bomb(&terrain, &records, culling, samples, count, frames)?;

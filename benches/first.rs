@@ -49,13 +49,13 @@ fn main() -> Result<(), Failure> {
     };
     let terrain = Terrain::open(&path)?;
     if let Some(threads) = only {
-        return with_records!(terrain.records().ok_or("not in memory")?, records => only_jumps(&terrain, &records, threads));
+        return with_records!(terrain.records()?, records => only_jumps(&terrain, &records, threads));
     }
     println!(
         "| tolerance px | culling | triangles | soar, first ms | soar, later ms | split by split ms | at once, 1 thread ms | 2 threads ms | jump, 1 thread ms | 2 threads ms | 1 / 2 threads | at once / soar, first | jump / soar, later |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
-    with_records!(terrain.records().ok_or("not in memory")?, records => {
+    with_records!(terrain.records()?, records => {
         for tolerance_px in [1.0, 0.5, 0.25] {
             for culling in Culling::ALL {
                 measure(&terrain, &records, tolerance_px, culling, rounds)?;

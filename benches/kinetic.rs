@@ -52,7 +52,7 @@ fn main() -> Result<(), Failure> {
         return Ok(());
     };
     let terrain = Terrain::open(&path)?;
-    with_records!(terrain.records().ok_or("not in memory")?, records => {
+    with_records!(terrain.records()?, records => {
         match profile {
             Some(percent) => fly_only(&terrain, &records, frames, percent),
             None if only_walks => walking(&terrain, &records),

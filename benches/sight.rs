@@ -48,7 +48,7 @@ fn main() -> Result<(), Failure> {
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
         let [wide, high] = terrain.grid().samples();
         println!("## {name}: {wide} x {high} samples, {:.1} m apart\n", terrain.grid().spacing_m()[0]);
-        with_records!(terrain.records().ok_or("not in memory")?, records => {
+        with_records!(terrain.records()?, records => {
             triangles(&terrain, &records)?;
             flights(&terrain, &records, frames)?;
         });

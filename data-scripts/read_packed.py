@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
 """Reads a packed terrain file (.iqt of version 2) after FORMAT.md, section 9, and writes its records.
 
-    read_packed.py PACKED.iqt OUT.u32
+    read_packed.py PACKED.iqt OUT
 
-OUT.u32 has the record of every sample as 4 bytes: height code, error code, radius code; rows from the south, in a row from the west.
+OUT has the record of every sample, of 4, 8 or 16 bytes as section 3 has it; rows from the south, in a row from the west.
 It is a second reader, for comparison; it needs nothing but Python, and it is slow.
 """
 import math
 import struct
 import sys
 import zlib
+
+sys.dont_write_bytecode = True
+import packed_exact  # noqa: E402
 
 INERT = 0xFF000000
 
@@ -280,19 +283,29 @@ def slot_of(k, x, y):
 class Unpacked:
     """Pages of the unpacked file: those that are packed, made of records by slot, and those in runs (9.8)."""
 
-    def __init__(self, data, header, sections, by_slot):
-        self.data, self.by_slot = data, by_slot
-        present, at, is_present, shift, run = [], 0, False, 0, 0
+    def __init__(self, data, header, sections, by_slot, inert):
+        self.data, self.by_slot, self.inert = data, by_slot, inert
+        self.in_page = 4096 // len(inert)
+        leaves, at, is_present, shift, run = [], 0, False, 0, 0
         for byte in sections[2]:
             run, shift = run | (byte & 127) << shift, shift + 7
             if byte < 128:
-                present += range(at, at + run) if is_present else []
+                leaves += range(at, at + run) if is_present else []
                 at, is_present, shift, run = at + run, not is_present, 0, 0
-        self.present, leaves = present, sorted({page // 256 for page in present})
-        sums = struct.unpack(f"<{len(present)}I", sections[3])
-        tables = {leaf: bytearray(4096) for leaf in leaves}
-        for i, page in enumerate(present):
-            struct.pack_into("<III", tables[page // 256], page % 256 * 16, 3 + i, sums[i], 1)
+        self.present = present = []
+        tables, at = {leaf: bytearray(4096) for leaf in leaves}, 0
+        for leaf, (less, sum_) in zip(leaves, struct.iter_unpack("<BI", sections[3]), strict=True):
+            bits = (1 << 256) - 1
+            if less < 255:
+                bits, at = int.from_bytes(sections[5][at:at + 32], "little"), at + 32
+            here = [i for i in range(256) if bits >> i & 1]
+            assert len(here) == less + 1
+            for i in here:
+                struct.pack_into("<I4sI", tables[leaf], 16 * i, 3 + len(present), sections[5][at:at + 4], 1)
+                present.append(256 * leaf + i)
+                at += 4
+            assert zlib.crc32(tables[leaf]) == sum_
+        assert at == len(sections[5]) and len(present) == struct.unpack_from("<Q", header, 0x110)[0]
         root = bytearray(-(-16 * struct.unpack_from("<I", header, 0x7C)[0] // 4096) * 4096)
         for i, leaf in enumerate(leaves):
             struct.pack_into("<III", root, 16 * leaf, 3 + len(present) + i, zlib.crc32(tables[leaf]), 1)
@@ -308,8 +321,8 @@ class Unpacked:
 
     def page(self, number):
         if number < 3 + len(self.present):
-            first = 1024 * self.present[number - 3]
-            return struct.pack("<1024I", *(self.by_slot.get(first + i, INERT) for i in range(1024)))
+            first = self.in_page * self.present[number - 3]
+            return b"".join(self.by_slot.get(first + i, self.inert) for i in range(self.in_page))
         if number < self.first:
             return self.behind[number - 3 - len(self.present)]
         first, pages, at, kind, sum_ = next(run for run in self.runs if run[0] <= number < run[0] + run[1])
@@ -339,7 +352,8 @@ class Unpacked:
                 if number >= self.first:
                     page = self.page(number)
                     assert zlib.crc32(page) == sum_
-                    found.update(enumerate(struct.unpack("<1024I", page), 1024 * (256 * i + j)))
+                    records = (page[at:at + len(self.inert)] for at in range(0, 4096, len(self.inert)))
+                    found.update(enumerate(records, self.in_page * (256 * i + j)))
         return found
 
 
@@ -358,7 +372,12 @@ def main(packed, target):
     k, (wide, high) = header[0x10], struct.unpack_from("<II", header, 0x14)
     spacing, (step,) = struct.unpack_from("<dd", header, 0x20), struct.unpack_from("<d", header, 0x38)
     (top,), (steps,) = struct.unpack_from("<d", header, 0x50), struct.unpack_from("<I", header, 0x58)
-    of_context, rules = tables(sections[1]), Rules(step, top, steps, spacing)
+    of_context, kind = tables(sections[1]), header[0x11]
+    if kind == 1:
+        rules, inert, read = Rules(step, top, steps, spacing), struct.pack("<I", INERT), tile
+    else:
+        (base,) = struct.unpack_from("<d", header, 0x30)
+        rules, inert, read = packed_exact.Rules(kind, step, base, spacing, k), packed_exact.INERT[kind], packed_exact.tile
     groups = [(3 * g, min(6, k - 3 * g), k - 3 * g <= 6) for g in range(-(-max(k - 6, 0) // 3) + 1)]
     by_slot, leaf = {}, 0
     for stride_log, octaves, is_top in reversed(groups):
@@ -385,13 +404,12 @@ def main(packed, target):
                     continue
                 coders = [Segment(segment, of_context) for segment in segments]
                 is_last = [at[axis] + 1 == side for axis in (0, 1)]
-                for (x, y), record in tile(coders, rules, octaves, stride_log, is_top, is_last).items():
+                for (x, y), record in read(coders, rules, octaves, stride_log, is_top, is_last).items():
                     x, y = (at[0] << shift) + (x << stride_log), (at[1] << shift) + (y << stride_log)
-                    by_slot[slot_of(k, x, y)] = record
-    by_slot.update(Unpacked(data, header, sections, by_slot).edited(header))
-    samples = [by_slot.get(slot_of(k, x, y), INERT) for y in range(high) for x in range(wide)]
+                    by_slot[slot_of(k, x, y)] = record if kind > 1 else struct.pack("<I", record)
+    by_slot.update(Unpacked(data, header, sections, by_slot, inert).edited(header))
     with open(target, "wb") as file:
-        file.write(struct.pack(f"<{len(samples)}I", *samples))
+        file.write(b"".join(by_slot.get(slot_of(k, x, y), inert) for y in range(high) for x in range(wide)))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ pub struct Terrain {
 }
 
 impl Terrain {
-    /// Opens the terrain file at `path`. Reads its header and directory, 8 bytes a page of 4 KiB.
+    /// Opens the terrain file at `path`. Reads its header and the root of its directory, 16 bytes a mebibyte; what they lead to is read and checked when it is needed.
     ///
     /// # Errors
     /// Not a terrain file, another version, truncated or damaged; I/O.
@@ -105,7 +105,7 @@ pub struct MappedTerrain {
 }
 
 impl MappedTerrain {
-    /// Checks the file at `path` by plain reads, then maps it.
+    /// Checks the front of the file at `path` by plain reads, then maps it. What that leads to is checked when it is needed.
     ///
     /// # Errors
     /// As [`Terrain::open`].
@@ -125,11 +125,9 @@ impl MappedTerrain {
     /// Ground to fly over with all records in memory: no page is ever late. It cannot be edited.
     ///
     /// # Errors
-    /// [`LayoutError::Usage`] if the file lends no bytes, which one that was opened here always does.
+    /// Damage of the directory, all of which is read; packed terrain that cannot be unpacked as a whole.
     pub fn ground(&self, engine: PictureEngine, culling: Culling) -> Result<Ground<'_>, LayoutError> {
-        Ground::mapped(&self.file, engine, culling).ok_or_else(|| {
-            LayoutError::Usage(format!("{}: it is not in memory as a whole", self.file.path().display()))
-        })
+        Ground::mapped(&self.file, engine, culling)
     }
 
     /// The file beneath, with all that it says: for [`replay`](crate::flyover::replay), for example.

@@ -108,7 +108,7 @@ impl<F: Fetch> Flight<F> {
             self.streamed.fill(&view, Duration::from_secs(1), &mut Unobserved);
         }
         let reopened = Terrain::open(path).unwrap();
-        let Some(ByKind::Compact(records)) = reopened.records() else { unreachable!() };
+        let Ok(ByKind::Compact(records)) = reopened.records() else { unreachable!() };
         let mut soar = Soar::new(records, Culling::Vertices);
         soar.update(&view, &mut Unobserved);
         let mesh = triangles(&soar);

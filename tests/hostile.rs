@@ -30,7 +30,12 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// The bytes of a terrain file of some 110 pages.
 fn file_bytes() -> Vec<u8> {
-    let terrain = rugged_terrain([257, 257], 6, false);
+    bytes_of(257)
+}
+
+/// The bytes of a terrain file of so many samples a side.
+fn bytes_of(side: u32) -> Vec<u8> {
+    let terrain = rugged_terrain([side, side], 6, false);
     let mut bytes = vec![0; terrain.source().byte_count() as usize];
     terrain.source().read_at(0, &mut bytes).unwrap();
     bytes
@@ -45,7 +50,7 @@ fn path(terrain: &Terrain) -> Vec<View> {
 
 fn compact(terrain: &Terrain) -> Records<'_, Compact> {
     match terrain.records() {
-        Some(ByKind::Compact(records)) => records,
+        Ok(ByKind::Compact(records)) => records,
         _ => panic!("the test terrain has compact records in memory"),
     }
 }
@@ -73,7 +78,7 @@ fn catches_up<C: RecordCodec, F: Fetch>(streamed: &mut Streamed<C, F>, view: &Vi
 
 fn names_a_page(error: &LayoutError) -> bool {
     let text = error.to_string();
-    text.contains("record page") || text.contains("injected failure")
+    text.contains("record page") || text.contains("directory leaf") || text.contains("injected failure")
 }
 
 fn withstands(fault: Fault) {
@@ -191,4 +196,29 @@ fn a_file_replaced() {
     }
     catches_up(&mut streamed, &path(&terrain)[30], &sound);
     assert!(streamed.take_error().is_none());
+}
+
+/// A directory leaf is damaged. Ground whose pages it leads to stays coarse, and that is told each time such a page is needed: it never counts as ground without detail.
+#[test]
+fn a_damaged_directory_leaf_is_told() {
+    let mut bytes = bytes_of(513);
+    let sound = Terrain::from_source(Box::new(MemorySource::new("sound", bytes.clone()))).unwrap();
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let root = word(0x078) * PAGE_BYTES;
+    let leaf = word(root + 16) * PAGE_BYTES;
+    assert!(leaf > 0, "it has a second leaf");
+    bytes[leaf + 4] ^= 1;
+    let terrain = Arc::new(Terrain::from_source(Box::new(MemorySource::new("damaged", bytes))).unwrap());
+    let mut streamed = flight(&terrain);
+    let (mut told, mut unread) = (0, 0);
+    for view in path(&terrain) {
+        streamed.fill(&view, PATIENCE, &mut Unobserved);
+        unread += u64::from(streamed.update(&view, &mut Unobserved).work.unread > 0);
+        while let Some(error) = streamed.take_error() {
+            assert!(error.to_string().contains("directory leaf 1: the checksum does not match"), "{error}");
+            told += 1;
+        }
+        check_conforming(&compact(&sound), &triangles(streamed.engine()));
+    }
+    assert!(told > 0 && unread > 0, "{told} told, {unread} frames coarse");
 }

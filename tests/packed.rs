@@ -17,21 +17,38 @@ use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Crater, Edit, EditSession};
 use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::grid::record::{RecordCodec, RecordKind};
 use terrasoar_layout::packing::pack;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::pool::PagePool;
+use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::terrain::Terrain;
 
 #[test]
 fn engines_fly_edited_packed_terrain_as_the_terrain() {
-    for (samples, holes) in [([257, 257], false), ([330, 190], true)] {
-        let dem = MemoryDem::from_fn(samples, SampleType::I16, |x, y| {
+    let compact = (SampleType::I16, None);
+    let exact = |sample_type| (sample_type, Some(RecordKind::Exact8));
+    for (samples, holes, (sample_type, record)) in [
+        ([257, 257], false, compact),
+        ([330, 190], true, compact),
+        ([260, 190], true, exact(SampleType::F32)),
+        ([150, 130], false, exact(SampleType::F64)),
+    ] {
+        let dem = MemoryDem::from_fn(samples, sample_type, |x, y| {
             let is_hole = holes && x + y > 0 && (noise(5, y / 9, x / 7) < 0.05 || noise(6, y, x) < 0.001);
-            if is_hole { f64::NAN } else { rugged(6, x, y) }
+            let height = rugged(6, x, y);
+            match sample_type {
+                _ if is_hole => f64::NAN,
+                SampleType::F32 => f64::from((height * 1.01) as f32),
+                SampleType::F64 => height * 1.01,
+                _ => height,
+            }
         });
         let folder = tempfile::tempdir().unwrap();
         let [plain, packed] = ["plain.iqt", "packed.iqt"].map(|name| folder.path().join(name));
-        build(&dem, &plain, &BuildOptions::default().spacing_m([10.0, 12.0]), &Silent).unwrap();
+        let options = BuildOptions::default().spacing_m([10.0, 12.0]).record(record);
+        build(&dem, &plain, &options, &Silent).unwrap();
         pack(&SystemDisk, &plain, &packed, &Silent).unwrap();
         // Craters on the way, one of them undone.
         for path in [&plain, &packed] {
@@ -47,45 +64,62 @@ fn engines_fly_edited_packed_terrain_as_the_terrain() {
         let plain = Terrain::open(&plain).unwrap();
         let whole = Terrain::open(&packed).unwrap();
         let streamed = Arc::new(Terrain::open_unmapped(&packed).unwrap());
-        let (Some(ByKind::Compact(plain_records)), Some(ByKind::Compact(records)), ByKind::Compact(pool)) =
-            (plain.records(), whole.records(), streamed.pool(64 << 20).unwrap())
-        else {
-            panic!("compact records")
-        };
-        let path = (0..24).map(|i| {
-            let along = 0.1 + f64::from(i) * 0.025;
-            frame(&plain, [0.4, along], 1300.0, 15.0 + 4.0 * f64::from(i), -25.0)
-        });
-        for culling in Culling::ALL {
-            let mut expected = Soar::new(plain_records.clone(), culling);
-            let mut engines: [Flown<'_>; 4] = [
-                over(Soar::new(records.clone(), culling)),
-                over(Smart::new(records.clone(), culling)),
-                over(Naive::new(records.clone(), culling)),
-                over(Kinetic::new(records.clone(), culling)),
-            ];
-            for view in views(path.clone(), 1.0) {
-                expected.update(&view, &mut Unobserved);
-                let expected = keys(&triangles(&expected));
-                assert!(expected.len() > 50);
-                for engine in &mut engines {
-                    assert!(keys(&engine(&view)) == expected);
-                }
+        match (plain.records(), whole.records(), streamed.pool(64 << 20).unwrap()) {
+            (Ok(ByKind::Compact(a)), Ok(ByKind::Compact(b)), ByKind::Compact(pool)) => {
+                fly(&plain, a, b, pool, &streamed);
+            }
+            (Ok(ByKind::Exact8(a)), Ok(ByKind::Exact8(b)), ByKind::Exact8(pool)) => {
+                fly(&plain, a, b, pool, &streamed);
+            }
+            (Ok(ByKind::Exact16(a)), Ok(ByKind::Exact16(b)), ByKind::Exact16(pool)) => {
+                fly(&plain, a, b, pool, &streamed);
+            }
+            _ => panic!("three kinds of records of one terrain"),
+        }
+    }
+}
+
+/// Every engine over the records of the whole, and one over a pool, draws what is drawn of the terrain file.
+fn fly<C: RecordCodec>(
+    plain: &Terrain,
+    plain_records: Records<'_, C>,
+    records: Records<'_, C>,
+    pool: PagePool<C>,
+    streamed: &Arc<Terrain>,
+) {
+    let path = (0..24).map(|i| {
+        let along = 0.1 + f64::from(i) * 0.025;
+        frame(plain, [0.4, along], 1300.0, 15.0 + 4.0 * f64::from(i), -25.0)
+    });
+    for culling in Culling::ALL {
+        let mut expected = Soar::new(plain_records.clone(), culling);
+        let mut engines: [Flown<'_>; 4] = [
+            over(Soar::new(records.clone(), culling)),
+            over(Smart::new(records.clone(), culling)),
+            over(Naive::new(records.clone(), culling)),
+            over(Kinetic::new(records.clone(), culling)),
+        ];
+        for view in views(path.clone(), 1.0) {
+            expected.update(&view, &mut Unobserved);
+            let expected = keys(&triangles(&expected));
+            assert!(expected.len() > 50);
+            for engine in &mut engines {
+                assert!(keys(&engine(&view)) == expected);
             }
         }
-        let mut flown = Streamed::new(
-            pool,
-            ModelDisk::new(Arc::clone(&streamed), 40, 1),
-            Culling::Vertices,
-            Prefetch::default(),
-        );
-        let mut expected = Soar::new(plain_records.clone(), Culling::Vertices);
-        for view in views(path, 1.0) {
-            let frames = (0..500).find(|_| flown.update(&view, &mut Unobserved).work.late == 0);
-            assert!(frames.is_some(), "pages stay late");
-            expected.update(&view, &mut Unobserved);
-            assert!(keys(&triangles(flown.engine())) == keys(&triangles(&expected)));
-        }
+    }
+    let mut flown = Streamed::new(
+        pool,
+        ModelDisk::new(Arc::clone(streamed), 40, 1),
+        Culling::Vertices,
+        Prefetch::default(),
+    );
+    let mut expected = Soar::new(plain_records.clone(), Culling::Vertices);
+    for view in views(path, 1.0) {
+        let frames = (0..500).find(|_| flown.update(&view, &mut Unobserved).work.late == 0);
+        assert!(frames.is_some(), "pages stay late");
+        expected.update(&view, &mut Unobserved);
+        assert!(keys(&triangles(flown.engine())) == keys(&triangles(&expected)));
     }
 }
 

@@ -37,22 +37,24 @@ pub(crate) fn notes_of(terrain: &Terrain) -> Vec<(String, String)> {
 /// Cost: a pass over the directory, a word for each page of records.
 fn heights_note(terrain: &Terrain) -> Option<String> {
     if terrain.header().history.is_none() && terrain.base_path().is_none() {
-        return Some(digest(terrain));
+        return digest(terrain);
     }
     let file = Terrain::open_unmapped(terrain.base_path().unwrap_or(terrain.path())).ok()?;
-    Some(digest(&file.into_original().ok()?))
+    digest(&file.into_original().ok()?)
 }
 
-/// FNV-1a over the grid and the checksums of the pages of records, in 16 hexadecimal digits.
-fn digest(terrain: &Terrain) -> String {
+/// FNV-1a over the grid and the checksums of the pages of records, in 16 hexadecimal digits. `None` if the directory cannot be read.
+fn digest(terrain: &Terrain) -> Option<String> {
+    terrain.check_directory().ok()?;
     let grid = terrain.grid();
     let shape = grid.samples().into_iter().map(u64::from).chain(grid.spacing_m().map(f64::to_bits));
     // Where a page lies in the file says nothing of heights.
-    let pages = terrain.entries().iter().map(|entry| u64::from(entry.checksum));
+    let pages = (0..terrain.page_count())
+        .map(|page| u64::from(terrain.known_entry(page).unwrap_or_default().checksum));
     let hash = shape.chain(pages).flat_map(u64::to_le_bytes).fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
     });
-    format!("{hash:016x}")
+    Some(format!("{hash:016x}"))
 }
 
 /// Whether an eye is over the terrain.

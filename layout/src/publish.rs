@@ -1,6 +1,6 @@
-//! A finished terrain file gets its name only if it opens.
+//! A finished terrain file gets its name only if it opens, and all of its directory reads.
 //!
-//! What was written is read back from the file as opening reads it: header, directory, inert page, the imagery's directory. A file that would be refused when it is opened is not published, and
+//! What was written is read back from the file: header, the whole directory, inert page, the imagery's directory. A file that would be refused when it is opened is not published, and
 //! the file that had the name stays.
 
 use crate::error::LayoutError;
@@ -36,6 +36,7 @@ fn check_opens(file: &AtomicFile) -> Result<Header, LayoutError> {
         .try_clone()
         .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
     let terrain = Terrain::from_source(Box::new(PreadSource::over(path, again)?))?;
+    terrain.check_directory()?;
     Imagery::open(&terrain)?;
     Ok(terrain.header().clone())
 }

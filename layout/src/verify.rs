@@ -1,7 +1,7 @@
 //! Whether a terrain file is sound: every page matches its checksum, every page number is used once, and records are as section 3 of FORMAT.md
 //! promises.
 //!
-//! Opening checks header, directory and inert page. This checks the rest, in passes. `structure` looks at what the directory says besides page numbers,
+//! Opening checks header, directory root and inert page. This checks the rest: the leaves of the directory first, then, in passes, all that they lead to. `structure` looks at what the directory says besides page numbers,
 //! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children, `imagery` reads the tiles. Of an edited file
 //! `journal` looks at all states that it can go back and forth to, by checksums and page numbers; how their records are nested is checked of the current one alone.
 //! Cost: each page is read some ten times; each thread holds a few hundred kilobytes at most, and there is the directory. Some bytes are not checked, because nothing depends
@@ -91,7 +91,7 @@ impl Findings {
 
 /// What is told apart when a page is named.
 fn record_page(terrain: &Terrain, page: usize) -> String {
-    match terrain.entries().get(page) {
+    match terrain.known_entry(page as u64) {
         Some(entry) if entry.is_present() => format!("record page {page} (file page {})", entry.page),
         _ => format!("record page {page} (absent)"),
     }
@@ -105,11 +105,18 @@ pub fn verify_pages(terrain: &Terrain) -> u64 {
 /// Checks the whole file on the current rayon pool. `progress` hears how many more pages are done, [`verify_pages`] in sum.
 ///
 /// # Errors
-/// Only if the file cannot be read; what is wrong in it is the report's business.
+/// Only if the file cannot be read; what is wrong in it is the report's business. Of a file with a damaged directory it says that alone.
 pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<VerifyReport, LayoutError> {
+    // Without the directory nothing is known of what it leads to.
+    let present: Vec<u32> = match terrain.present_pages() {
+        Ok(pages) => pages.map(|(page, _)| page as u32).collect(),
+        Err(LayoutError::Damaged { place, problem, .. }) => {
+            let problems = vec![Problem { place, problem }];
+            return Ok(VerifyReport { problems, problem_count: 1, ..VerifyReport::default() });
+        }
+        Err(other) => return Err(other),
+    };
     let findings = structure::check(terrain);
-    let present: Vec<u32> =
-        (0u32..).zip(terrain.entries()).filter(|(_, e)| e.is_present()).map(|(page, _)| page).collect();
     let (damaged, wrong_sums) = checksums(terrain, &present, progress)?;
     let (grid, scale) = (terrain.grid(), &terrain.header().scale);
     let (records, vertices) = match terrain.header().record_kind {
@@ -146,7 +153,7 @@ fn checksums(
         let mut bytes = Box::new([0; PAGE_BYTES]);
         let mut damaged = Vec::new();
         for &page in pages {
-            let entry = terrain.entries()[page as usize];
+            let entry = terrain.entry(page.into())?;
             terrain.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, &mut bytes[..])?;
             if checksum(&bytes[..]) != entry.checksum {
                 damaged.push(page);

@@ -428,5 +428,10 @@ fn open_entries(bytes: &[u8], folder: &Path, generation: u32) -> Vec<u32> {
     let path = folder.join("look.iqt");
     std::fs::write(&path, bytes).unwrap();
     let terrain = Terrain::open_unmapped(&path).unwrap();
-    terrain.entries().iter().filter(|entry| entry.generation == generation).map(|entry| entry.page).collect()
+    terrain
+        .present_pages()
+        .unwrap()
+        .filter(|(_, e)| e.generation == generation)
+        .map(|(_, e)| e.page)
+        .collect()
 }

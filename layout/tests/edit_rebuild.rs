@@ -47,7 +47,7 @@ impl Bench {
         let mut bytes = self.bytes.clone();
         for logical in self.editor.edited_pages() {
             let page = self.editor.edited_page(logical).unwrap();
-            let at = self.terrain().entries()[logical as usize].page as usize * 4096;
+            let at = self.terrain().entry(logical).unwrap().page as usize * 4096;
             bytes[at..at + 4096].copy_from_slice(page);
         }
         // Exact records may have got a larger error top, which a build is to know.
@@ -62,7 +62,7 @@ impl Bench {
         let rebuilt = self.rebuilt();
         let grid = *self.terrain().grid();
         let n = grid.side_steps();
-        for logical in 0..self.terrain().entries().len() as u64 {
+        for logical in 0..self.terrain().page_count() {
             if self.page(logical) != rebuilt.checked_page(logical).unwrap() {
                 // Which one, for whoever has to mend it.
                 let per_page = self.terrain().header().records_per_page();
@@ -199,7 +199,7 @@ proptest! {
         }
         // Taking all back gives the file's bytes.
         bench.editor.roll_back();
-        for logical in 0..bench.terrain().entries().len() as u64 {
+        for logical in 0..bench.terrain().page_count() {
             prop_assert!(bench.page(logical) == bench.terrain().checked_page(logical).unwrap());
         }
     }
@@ -273,7 +273,7 @@ fn heights_beyond_the_range_are_refused_and_nothing_changes() {
     let window = HeightWindow::new(outside, vec![1.0; outside.count()]).unwrap();
     assert!(matches!(bench.editor.set_heights(&window).unwrap_err(), LayoutError::Usage(_)));
     assert_eq!(bench.editor.uncommitted(), Vec::<u64>::new());
-    for logical in 0..bench.terrain().entries().len() as u64 {
+    for logical in 0..bench.terrain().page_count() {
         assert!(bench.page(logical) == bench.terrain().checked_page(logical).unwrap());
     }
 }

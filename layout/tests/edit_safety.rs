@@ -160,7 +160,7 @@ fn a_turn_that_memory_cannot_follow_is_not_made() {
     let mut session = EditSession::open(&path).unwrap();
     let before = session.header().clone();
     let terrain = Arc::clone(session.editor().terrain());
-    let newest = terrain.entries().iter().map(|entry| entry.page).max().unwrap();
+    let newest = terrain.present_pages().unwrap().map(|(_, entry)| entry.page).max().unwrap();
     let mut bytes = std::fs::read(&path).unwrap();
     bytes[newest as usize * 4096 + 77] ^= 1;
     std::fs::write(&path, &bytes).unwrap();

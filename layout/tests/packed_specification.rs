@@ -2,14 +2,17 @@
 
 mod common;
 
-use common::build_bytes;
 use common::packed::{Bench, dem, options};
+use common::{MemoryDem, build_bytes};
 use std::path::Path;
+use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
-use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::grid::record::{RecordCodec, RecordKind};
+use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::terrain::Terrain;
+use terrasoar_layout::with_records;
 
 /// Another reader, written from FORMAT.md alone, finds the same records.
 #[test]
@@ -20,8 +23,22 @@ fn a_reader_written_from_the_specification_agrees() {
         return;
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data-scripts/read_packed.py");
-    for (size, roughness, voids) in [([150, 131], 4, 2), ([70, 9], 900, 0), ([3, 2], 0, 0)] {
-        let bench = Bench::of(&build_bytes(&dem(size, roughness, voids), &options()).unwrap()).unwrap();
+    for (size, roughness, voids, exact) in [
+        ([150, 131], 4, 2, None),
+        ([70, 9], 900, 0, None),
+        ([3, 2], 0, 0, None),
+        ([150, 131], 4, 2, Some(SampleType::F32)),
+        ([140, 70], 4, 1, Some(SampleType::F64)),
+        ([3, 2], 0, 0, Some(SampleType::F32)),
+    ] {
+        let bytes = match exact {
+            None => build_bytes(&dem(size, roughness, voids), &options()),
+            Some(sample_type) => build_bytes(
+                &uneven(size, roughness, voids, sample_type),
+                &options().record(Some(RecordKind::Exact8)),
+            ),
+        };
+        let bench = Bench::of(&bytes.unwrap()).unwrap();
         let out = bench.plain.with_file_name("records");
         let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
         assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
@@ -45,14 +62,28 @@ fn a_reader_written_from_the_specification_agrees() {
     }
 }
 
+/// Heights that no step divides.
+fn uneven(size: [u32; 2], roughness: u32, voids: u32, sample_type: SampleType) -> MemoryDem {
+    let even = dem(size, roughness, voids);
+    MemoryDem::from_fn(size, sample_type, |x, y| {
+        let height = even.sample(x, y) / 7.0 - 130.0;
+        if sample_type == SampleType::F32 { f64::from(height as f32) } else { height }
+    })
+}
+
 /// Whether `found` is the record of each sample of the terrain file.
 fn check_records(found: &[u8], plain: &Path, size: [u32; 2]) {
     let plain = Terrain::open(plain).unwrap();
-    let Some(ByKind::Compact(records)) = plain.records() else { panic!() };
-    for (i, record) in found.chunks_exact(4).enumerate() {
+    with_records!(plain.records().unwrap(), records => check_kind(found, &plain, records, size));
+}
+
+fn check_kind<C: RecordCodec>(found: &[u8], plain: &Terrain, records: Records<'_, C>, size: [u32; 2]) {
+    for (i, record) in found.chunks_exact(C::BYTES).enumerate() {
         let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
         let slot = slot_of(plain.grid().k(), GridPoint::new(x, y));
-        assert_eq!(record, records.raw(slot).to_le_bytes(), "{size:?}: {x}, {y}");
+        let mut expected = vec![0; C::BYTES];
+        C::write(records.raw(slot), &mut expected);
+        assert_eq!(record, expected, "{size:?}: {x}, {y}");
     }
-    assert_eq!(found.len(), 4 * (size[0] * size[1]) as usize);
+    assert_eq!(found.len(), C::BYTES * (size[0] * size[1]) as usize);
 }

@@ -80,8 +80,10 @@ fn bomb(leaf_pages: &[u32], leaves: impl Fn(usize) -> u32) -> Vec<u8> {
     bytes
 }
 
+/// What is said where all of it is asked for.
 fn refusal(terrain: Vec<u8>) -> String {
-    Sealed { terrain, overlay: None }.open().expect_err("it is refused").to_string()
+    let opened = Sealed { terrain, overlay: None }.open();
+    opened.and_then(|terrain| terrain.check_directory()).expect_err("it is refused").to_string()
 }
 
 #[test]

@@ -80,8 +80,7 @@ fn main() -> Result<(), Failure> {
 
 /// The ground of a mapped terrain.
 fn mapped(terrain: &Terrain) -> Result<Ground<'_>, Failure> {
-    Ok(Ground::mapped(terrain, PictureEngine::Kinetic, Culling::Vertices)
-        .ok_or("the terrain is not mapped")?)
+    Ok(Ground::mapped(terrain, PictureEngine::Kinetic, Culling::Vertices)?)
 }
 
 /// A list of figures and its percentiles.

@@ -95,7 +95,7 @@ fn main() -> Result<(), Failure> {
 
 /// The ground of a mapped terrain.
 fn mapped(terrain: &Terrain, engine: PictureEngine) -> Result<Ground<'_>, Failure> {
-    Ok(Ground::mapped(terrain, engine, Culling::default()).ok_or("the terrain is not mapped")?)
+    Ok(Ground::mapped(terrain, engine, Culling::default())?)
 }
 
 /// The tolerance at which the first view has a mesh of so many triangles, by halving.

@@ -32,8 +32,10 @@ impl<'a> Studio<'a> {
         viewport: Viewport,
     ) -> Result<Self, SceneError> {
         let gpu = Gpu::headless_blocking()?;
-        let ground = Ground::mapped(terrain, engine, culling)
-            .ok_or_else(|| SceneError::NotInAddressSpace(terrain.path().display().to_string()))?;
+        if !terrain.lends_records() {
+            return Err(SceneError::NotInAddressSpace(terrain.path().display().to_string()));
+        }
+        let ground = Ground::mapped(terrain, engine, culling)?;
         let scene = Scene::new(&ground, &gpu, SceneOptions::default())?;
         let offscreen = offscreen(&gpu, viewport)?;
         Ok(Self { gpu, ground, scene, offscreen, viewport })

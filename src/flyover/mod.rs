@@ -299,7 +299,10 @@ fn timed(mut stats: Vec<FrameStats>, times: Vec<FrameTimes>, kind: EngineKind) -
 }
 
 fn records_of(terrain: &Terrain) -> Result<terrasoar_layout::read::kinds::AnyRecords<'_>, ReplayError> {
-    terrain.records().ok_or_else(|| ReplayError::NotInAddressSpace(terrain.path().display().to_string()))
+    if !terrain.lends_records() {
+        return Err(ReplayError::NotInAddressSpace(terrain.path().display().to_string()));
+    }
+    Ok(terrain.records()?)
 }
 
 /// Mean over pairs of consecutive frames of the share of the second one's triangles that the first did not have, in percent.

@@ -7,6 +7,7 @@ use crate::refine::kinetic::{Budget, Kinetic, Patch};
 use crate::refine::{Culling, Engine};
 use crate::stream::{HeightAt, height_at};
 use crate::view::View;
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::terrain::Terrain;
@@ -22,13 +23,16 @@ pub enum PictureEngine {
     Soar,
 }
 
-/// An engine over a terrain; none if the terrain's source lends no bytes.
+/// An engine over a terrain.
+///
+/// # Errors
+/// As [`Terrain::records`].
 pub(super) fn mapped(
     terrain: &Terrain,
     engine: PictureEngine,
     culling: Culling,
-) -> Option<Box<dyn MeshEngine + '_>> {
-    Some(with_records!(terrain.records()?, records => match engine {
+) -> Result<Box<dyn MeshEngine + '_>, LayoutError> {
+    Ok(with_records!(terrain.records()?, records => match engine {
         PictureEngine::Kinetic => Box::new(Mapped {
             engine: Kinetic::new(records.clone(), culling),
             reads: Reads::over(&records),

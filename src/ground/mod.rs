@@ -100,9 +100,16 @@ impl<'t> Ground<'t> {
         Ok(Ground::new(engine, Opened::Streamed(terrain)))
     }
 
-    /// Ground whose records are all in memory or mapped; `None` if the terrain's source lends no bytes.
-    pub fn mapped(terrain: &'t Terrain, engine: PictureEngine, culling: Culling) -> Option<Self> {
-        Some(Self::new(mapped::mapped(terrain, engine, culling)?, Opened::Mapped(terrain)))
+    /// Ground whose records are all in memory or mapped.
+    ///
+    /// # Errors
+    /// Damage of the directory, all of which is read; a terrain whose source lends no bytes.
+    pub fn mapped(
+        terrain: &'t Terrain,
+        engine: PictureEngine,
+        culling: Culling,
+    ) -> Result<Self, LayoutError> {
+        Ok(Self::new(mapped::mapped(terrain, engine, culling)?, Opened::Mapped(terrain)))
     }
 
     fn new(engine: Box<dyn MeshEngine + 't>, terrain: Opened<'t>) -> Self {

@@ -91,9 +91,10 @@ pub fn simplify(terrain: &Terrain, options: &SimplifyOptions) -> Result<IndexedM
             "{shown}: its errors are steps from level to level, which bound no distance from the ground; build it again with bounded errors"
         )));
     }
-    let Some(records) = terrain.records() else {
+    if !terrain.lends_records() {
         return Err(LayoutError::Usage(format!("{shown}: a mesh needs a mapped or in-memory terrain")));
-    };
+    }
+    let records = terrain.records()?;
     let [wide, high] = terrain.grid().samples();
     let whole = Rectangle { from: [0; 2], to: [wide - 1, high - 1] };
     let rectangle = options.window.map_or(whole, |window| {

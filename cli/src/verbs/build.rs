@@ -65,7 +65,7 @@ pub(super) struct Args {
     /// Terrain file to write
     #[arg(short, long, value_name = "OUT.iqt")]
     output: PathBuf,
-    /// Write packed terrain, in a third to a tenth of the bytes; compact records only
+    /// Write packed terrain, in a third to a tenth of the bytes
     #[arg(long)]
     packed: bool,
     #[command(flatten)]

@@ -115,9 +115,10 @@ struct Painter<'t> {
 
 impl<'t> Painter<'t> {
     fn new(terrain: &'t Terrain, options: &ColourOptions, texels: [u32; 2]) -> Result<Self, LayoutError> {
-        if terrain.records().is_none() {
+        if !terrain.lends_records() {
             return Err(LayoutError::Usage("the terrain must be opened as a map to be coloured".into()));
         }
+        terrain.check_directory()?;
         let [low, high] = terrain.header().height_range_m;
         let spacing_m = terrain.grid().spacing_m();
         let texel_m = spacing_m[0].max(spacing_m[1]) / f64::from(options.texels_a_sample);
@@ -202,7 +203,8 @@ impl Heights {
         let to = [0, 1].map(|i| (first[i] + TILE / painter.fine + 3).min(samples[i] - 1));
         let [wide, high] = [0, 1].map(|i| (to[i] - from[i] + 1) as usize);
         let mut metres = Vec::with_capacity(wide * high);
-        if let Some(records) = painter.terrain.records() {
+        // The directory was checked before.
+        if let Ok(records) = painter.terrain.records() {
             with_records!(records, records => {
                 for y in from[1]..=to[1] {
                     metres.extend((from[0]..=to[0]).map(|x| records.vertex_at(GridPoint::new(x, y)).height_m as f32));

@@ -106,9 +106,10 @@ pub fn count(
     if options.preloads.contains(&Prefetch::Deadline) {
         return Err(IoBenchError::NoDeadlines { reader });
     }
-    let records = terrain
-        .records()
-        .ok_or_else(|| IoBenchError::NotInAddressSpace(terrain.path().display().to_string()))?;
+    if !terrain.lends_records() {
+        return Err(IoBenchError::NotInAddressSpace(terrain.path().display().to_string()));
+    }
+    let records = terrain.records()?;
     let mut counts: Vec<LayoutCount<'_>> =
         options.layouts.iter().map(|kind| LayoutCount::new(terrain, *kind, options)).collect();
     let flown = with_records!(records, records => {

@@ -61,8 +61,7 @@ pub fn time(
     let terrain = Terrain::open(path)?;
     // With what the system read ahead while the file was opened, which may be all of it.
     let was_forgotten = forget(path)?;
-    let records =
-        terrain.records().ok_or_else(|| IoBenchError::NotInAddressSpace(path.display().to_string()))?;
+    let records = terrain.records()?;
     with_records!(records, records => {
         let knows_peak = kernel::reset_peak_memory();
         let cold = fly(&records, views, culling, reader, 0, done);

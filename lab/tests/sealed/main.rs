@@ -56,7 +56,7 @@ fn without_nesting() -> Vec<u8> {
     let mut bytes = vec![0; terrain.source().byte_count() as usize];
     terrain.source().read_at(0, &mut bytes).unwrap();
     let mut random = Random::new(7);
-    for entry in terrain.entries().iter().filter(|entry| entry.is_present()) {
+    for (_, entry) in terrain.present_pages().unwrap() {
         let page = &mut bytes[entry.page as usize * PAGE_BYTES..][..PAGE_BYTES];
         for record in page.chunks_exact_mut(4) {
             // An endless error, or none.
@@ -124,7 +124,7 @@ fn due_all_at_once() -> Vec<u8> {
             continue;
         }
         let slot = slot_of(grid.k(), point) as usize;
-        let page = terrain.entries()[slot * 4 / PAGE_BYTES].page as usize;
+        let page = terrain.entry((slot * 4 / PAGE_BYTES) as u64).unwrap().page as usize;
         let error = if grid.level(point) > 13 { 1 + random.below(247) as u8 } else { 251 };
         bytes[page * PAGE_BYTES + slot * 4 % PAGE_BYTES + 2] = error;
     }

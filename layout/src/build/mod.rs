@@ -148,11 +148,6 @@ pub fn build_on(
     };
     let height_range_m = survey::check_heights(info, &code, &stats)?;
     let steepest_m = survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
-    if options.packed && code.kind != RecordKind::Compact {
-        return Err(LayoutError::Usage(
-            "these heights take exact records, and only compact ones can be packed; choose compact records, which round heights to steps, or leave the terrain as it is".into(),
-        ));
-    }
     header.record_kind = code.kind;
     header.scale = survey::record_scale(&grid, &code, height_range_m, steepest_m);
     header.has_voids = stats.voids > 0;

@@ -31,7 +31,7 @@ pub struct BuildOptions {
     /// of 16,384 height steps, or a quarter more than the terrain's. It costs some 0.1 % of triangles, and more where a terrain is that tall: its smallest errors grow
     /// by up to a quarter.
     pub head_room: bool,
-    /// Whether the file is packed: the terrain file is built without a name first, and packed from there, so that it takes the room of both. Compact records only. The default is no.
+    /// Whether the file is packed: the terrain file is built without a name first, and packed from there, so that it takes the room of both. The default is no.
     pub packed: bool,
     /// Largest side of a tile in steps, a power of two from 2 to 256. Smaller tiles save memory and cost time; the file is the same.
     pub largest_tile: u32,

@@ -92,12 +92,13 @@ pub(crate) fn rebuild_into(
     memory_mib: u64,
     progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
-    let Some(records) = terrain.records() else {
+    if !terrain.lends_records() {
         return Err(LayoutError::Usage(format!(
             "{}: building it anew needs a mapped or in-memory terrain",
             terrain.path().display()
         )));
-    };
+    }
+    let records = terrain.records()?;
     with_records!(records, records => rebuild_kind(disk, terrain, records, file, room, memory_mib, progress))
 }
 

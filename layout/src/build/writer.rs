@@ -12,7 +12,7 @@ use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum};
 use crate::file::directory::{put_all_leaves, root_bytes};
 use crate::file::disk::Disk;
-use crate::file::entries::Entry;
+use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::structure::inert_page;
 use crate::grid::Grid;
@@ -158,7 +158,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     /// Writes what remains, closes gaps, and gives `header` its places.
     pub(super) fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
         let end = self.close_gaps()?;
-        let (root, page) = put_all_leaves(&self.entries, end, |page, leaf| {
+        let (root, page) = put_all_leaves(self.entries.chunks(ENTRIES_PER_LEAF), end, |page, leaf| {
             self.disk
                 .write_at(self.file.file(), leaf, u64::from(page) * PAGE)
                 .map_err(|e| failed(self.file, e))

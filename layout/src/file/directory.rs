@@ -3,7 +3,7 @@
 //! Builds, rewritten files and commits all write it here. Invariant: no page number is handed out that 32 bits do not hold.
 
 use super::bytes::{PAGE_BYTES, checksum};
-use super::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use super::entries::{ENTRY_BYTES, Entry, leaf_page};
 use crate::error::LayoutError;
 use std::path::Path;
 
@@ -20,15 +20,6 @@ pub(crate) fn page_at(path: &Path, offset: u64) -> Result<u32, LayoutError> {
             path.display()
         ))
     })
-}
-
-/// A directory in memory.
-#[derive(Debug, Clone)]
-pub(crate) struct Directory {
-    /// One a logical record page.
-    pub(crate) entries: Vec<Entry>,
-    /// One a leaf.
-    pub(crate) root: Vec<Entry>,
 }
 
 /// A root on its way to the disk.
@@ -60,16 +51,16 @@ pub(crate) fn put_leaf(
     Ok(Entry { page, checksum: checksum(&bytes), generation })
 }
 
-/// Writes all leaves of a new file by `put`, which is told the page that each goes to, from `first_page` on. Leaves without pages are left out. Returns the root and
+/// Writes all `leaves` of a new file, each from at most 256 entries, by `put`, which is told the page that each goes to, from `first_page` on. Leaves without pages are left out. Returns the root and
 /// the first page behind them.
-pub(crate) fn put_all_leaves(
-    entries: &[Entry],
+pub(crate) fn put_all_leaves<'e>(
+    leaves: impl Iterator<Item = &'e [Entry]>,
     first_page: u32,
     mut put: impl FnMut(u32, &[u8]) -> Result<(), LayoutError>,
 ) -> Result<(Vec<Entry>, u32), LayoutError> {
     let mut page = first_page;
-    let mut root = Vec::with_capacity(entries.len().div_ceil(ENTRIES_PER_LEAF));
-    for of_leaf in entries.chunks(ENTRIES_PER_LEAF) {
+    let mut root = Vec::new();
+    for of_leaf in leaves {
         root.push(if of_leaf.iter().any(|entry| entry.is_present()) {
             let entry = put_leaf(of_leaf, page, 1, |bytes| put(page, bytes))?;
             page += 1;
@@ -84,6 +75,7 @@ pub(crate) fn put_all_leaves(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::file::entries::ENTRIES_PER_LEAF;
 
     #[test]
     fn a_file_has_an_end() {
@@ -97,7 +89,7 @@ mod tests {
         let mut entries = vec![Entry::default(); 2 * ENTRIES_PER_LEAF + 3];
         entries[ENTRIES_PER_LEAF + 1] = Entry { page: 3, checksum: 7, generation: 1 };
         let mut put = Vec::new();
-        let (root, end) = put_all_leaves(&entries, 9, |page, bytes| {
+        let (root, end) = put_all_leaves(entries.chunks(ENTRIES_PER_LEAF), 9, |page, bytes| {
             put.push((page, bytes.len()));
             Ok(())
         })

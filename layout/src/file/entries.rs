@@ -1,9 +1,9 @@
 //! The page directory: logical record page -> where it lies and its checksum (FORMAT.md, section 5).
 //!
-//! On disk it has two levels, so that an edit rewrites one leaf and the root and a mostly void terrain has a small one. In memory it is flat.
+//! On disk it has two levels, so that an edit rewrites one leaf and the root and a mostly void terrain has a small one. So it has in memory ([`page_table`](super::page_table)), but where all of it is
+//! written.
 //!
-//! Cost: 12 bytes a logical page. The system gives memory only for leaves that are there, because entries of absent leaves are zeros that are never written. Otherwise a file of 1.7 MB, a
-//! void square of 2^16 steps in the largest records, would take 340 MB. A file of 20 KB takes 1.6 MB at most.
+//! Cost: 12 bytes an entry.
 
 mod uses;
 
@@ -54,14 +54,6 @@ impl Entry {
 /// The table of a terrain of so many logical pages, all of them absent. Memory is taken as entries are written.
 pub(crate) fn absent(logical_pages: usize) -> Vec<Entry> {
     bytemuck::zeroed_vec(logical_pages)
-}
-
-/// A copy that takes memory for what is present alone, as the table itself does.
-pub(crate) fn copy_of(entries: &[Entry]) -> Vec<Entry> {
-    let mut copy = absent(entries.len());
-    let present = copy.iter_mut().zip(entries).filter(|(_, entry)| **entry != Entry::default());
-    present.for_each(|(place, entry)| *place = *entry);
-    copy
 }
 
 /// Entries a leaf page.

@@ -3,7 +3,7 @@
 //! * [`atomic`]: a new file appears under its name only when it is complete, keeps what the name stood for (a link, a mode, an owner), and its name is on the disk too.
 //! * `lock`: one writer at a time, by a lock on the file itself, whatever name it is reached by.
 //! * `tail`: a file grows behind its end, and one write of a header makes that count. Edits, undo, pictures and overlays all go through it.
-//! * `directory`: where pages lie, written behind them.
+//! * `directory`: where pages lie, written behind them; `page_table`: where they lie, read on need.
 //! * `journal`: what commits led to and what was before them.
 //! * `slots`: which of a file's two headers counts.
 //! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
@@ -29,6 +29,7 @@ pub mod opening;
 #[cfg(feature = "files")]
 pub(crate) mod overlay;
 pub(crate) mod packed_end;
+pub(crate) mod page_table;
 #[cfg(feature = "files")]
 mod seen;
 pub(crate) mod slots;

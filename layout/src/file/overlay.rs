@@ -8,8 +8,8 @@ use super::bytes::{PAGE_BYTES, Page, checksum, get_text, get_u32, get_u64, put_t
 use super::disk::Disk;
 use super::header::{Header, seal};
 use super::journal::{Lineage, State};
+use super::page_table::PageTable;
 use super::source::{LayeredSource, PreadSource, Source, split_of};
-use super::structure::read_directory;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::slots::Slots;
@@ -199,7 +199,8 @@ impl Overlaid {
             LayoutError::Damaged { .. } => written_anew(both.path(), base),
             other => other,
         };
-        let entries = read_directory(both, &header).map_err(anew)?;
+        let pages = PageTable::open(both, &header).map_err(anew)?;
+        pages.check(both).map_err(anew)?;
         // A picture changes neither the directory nor any page in it.
         if picture_of(both, &header).map_err(anew)? != self.picture {
             return Err(written_anew(both.path(), base));
@@ -207,7 +208,7 @@ impl Overlaid {
         let mut page = [0; PAGE_BYTES];
         // Pages as built came all at once, with a header behind them.
         let of_last = |generation| generation == self.generation && generation > 1;
-        for entry in entries.iter().filter(|entry| entry.is_present() && of_last(entry.generation)) {
+        for (_, entry) in pages.present().filter(|(_, entry)| of_last(entry.generation)) {
             both.read_at(u64::from(entry.page) * PAGE_BYTES as u64, &mut page)?;
             if checksum(&page) != entry.checksum {
                 return Err(written_anew(both.path(), base));

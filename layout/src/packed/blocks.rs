@@ -82,6 +82,24 @@ impl Block {
         }
     }
 
+    /// The same of records of so many `words`, each four bytes of `records`.
+    pub(super) fn gather_words(
+        &self,
+        slots: &Range<usize>,
+        tiles: &[Option<&[u32]>; MOST_TILES],
+        records: &mut [[u8; 4]],
+        words: usize,
+    ) {
+        let bits = place_bits(self.octave);
+        for (record, place) in records.chunks_exact_mut(words).zip(&self.places[slots.clone()]) {
+            let tile = tiles[usize::from(place >> bits) % MOST_TILES].unwrap_or_default();
+            let first = words * (usize::from(*place) & ((1 << bits) - 1));
+            if let Some(found) = tile.get(first..first + words) {
+                record.iter_mut().zip(found).for_each(|(to, from)| *to = from.to_le_bytes());
+            }
+        }
+    }
+
     /// Those of these slots that lie in a tile.
     pub(super) fn slots_in(&self, number: usize, slots: &Range<usize>) -> impl Iterator<Item = usize> {
         let bits = place_bits(self.octave);

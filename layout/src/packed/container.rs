@@ -21,12 +21,14 @@ const MAY_BE_SKIPPED: u32 = 1 << 31;
 
 /// Tables of the coder.
 pub(crate) const MODEL: u32 = 1;
-/// Runs of absent and present record pages.
+/// Runs of absent and present directory leaves of the terrain file.
 pub(crate) const RUNS: u32 = 2;
-/// Checksums of present record pages.
-pub(crate) const SUMS: u32 = 3;
-/// Where directory leaves lie.
+/// Pages and checksum of each leaf that is present.
+pub(crate) const INDEX: u32 = 3;
+/// Where leaves of the tile directory lie.
 pub(crate) const ROOT: u32 = 4;
+/// Which pages the leaves have, and their checksums: read leaf by leaf.
+pub(crate) const BLOCKS: u32 = 5;
 
 /// A part of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,7 +124,7 @@ impl Container {
             if section.kind & MAY_BE_SKIPPED != 0 {
                 continue;
             }
-            if !(MODEL..=ROOT).contains(&section.kind) {
+            if !(MODEL..=BLOCKS).contains(&section.kind) {
                 return Err(unknown(format!("the packed terrain has a section of kind {}", section.kind)));
             }
             let end = section.offset.checked_add(section.bytes);
@@ -159,77 +161,5 @@ pub(super) fn current_of<'p>(
         [Ok(it), Err(_)] | [Err(_), Ok(it)] => Ok(it),
         // A slot that was never written says nothing.
         [Err(a), Err(b)] => Err(if pages[0][..8] == MAGIC { a } else { b }),
-    }
-}
-
-/// Runs of absent and present pages in turn, absent ones first, seven bits a byte, the low ones first.
-pub(crate) fn runs_of(is_present: impl Iterator<Item = bool>) -> Vec<u8> {
-    let (mut bytes, mut now, mut run) = (Vec::new(), false, 0u64);
-    let mut put = |mut run: u64| {
-        while run >= 128 {
-            bytes.push(run as u8 | 128);
-            run >>= 7;
-        }
-        bytes.push(run as u8);
-    };
-    for present in is_present {
-        if present != now {
-            put(run);
-            (now, run) = (present, 0);
-        }
-        run += 1;
-    }
-    put(run);
-    bytes
-}
-
-/// Numbers of the present pages, of which there are `count` among `pages`. `None` if the bytes say anything else.
-pub(crate) fn present_pages(bytes: &[u8], pages: u64, count: u64) -> Option<Vec<u32>> {
-    let mut present = Vec::new();
-    let (mut at, mut is_present, mut bytes) = (0u64, false, bytes.iter());
-    while at < pages {
-        let mut run = 0u64;
-        for shift in (0..).step_by(7) {
-            let byte = bytes.next().filter(|_| shift < 63)?;
-            run |= u64::from(byte & 127) << shift;
-            if byte & 128 == 0 {
-                break;
-            }
-        }
-        let end = at.checked_add(run).filter(|end| *end <= pages)?;
-        if is_present {
-            if present.len() as u64 + run > count {
-                return None;
-            }
-            present.extend((at..end).map(|page| page as u32));
-        }
-        (at, is_present) = (end, !is_present);
-    }
-    (bytes.next().is_none() && present.len() as u64 == count).then_some(present)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn runs_come_back(pages in prop::collection::vec((any::<bool>(), 1usize..400), 0..30)) {
-            let all: Vec<bool> = pages.iter().flat_map(|(present, count)| vec![*present; *count]).collect();
-            let bytes = runs_of(all.iter().copied());
-            let expected: Vec<u32> = (0u32..).zip(&all).filter(|(_, p)| **p).map(|(i, _)| i).collect();
-            let count = expected.len() as u64;
-            if !all.is_empty() {
-                prop_assert_eq!(present_pages(&bytes, all.len() as u64, count), Some(expected));
-                prop_assert_eq!(present_pages(&bytes, all.len() as u64, count + 1), None);
-                prop_assert_eq!(present_pages(&bytes[..bytes.len() - 1], all.len() as u64, count), None);
-            }
-        }
-
-        #[test]
-        fn any_bytes_are_runs_or_none(bytes in prop::collection::vec(any::<u8>(), 0..40), pages in 0u64..3000, count in 0u64..3000) {
-            present_pages(&bytes, pages, count);
-        }
     }
 }

@@ -2,7 +2,9 @@
 //!
 //! * `shape`: how a terrain is cut into groups of tiles, each of which is read by itself.
 //! * `walk`: the way through a tile, for writing and reading, `wide` with the instructions there are; `plane` predicts heights, `rules` knows what follows from them.
+//! * `exact`: the same of exact records; `way`: either of the two.
 //! * `container`, `places`, `source`: a packed file, read as the terrain file that it was made of. Module `packing` makes one, and that terrain file again.
+//! * `leaves`: directory leaves of that file, each from its block.
 //! * `appended`: what was appended to it since.
 //! * `tile`, `blocks`: a tile's records, and where those of a page lie in tiles.
 //! * `coder`, `model`, `token`, `bits`: values into bytes and back.
@@ -15,6 +17,8 @@ mod blocks;
 mod cache;
 pub(crate) mod coder;
 pub(crate) mod container;
+pub(crate) mod exact;
+pub(crate) mod leaves;
 pub(crate) mod model;
 pub(crate) mod places;
 mod plane;
@@ -26,6 +30,7 @@ pub(crate) mod stages;
 pub(crate) mod tile;
 pub(crate) mod token;
 pub(crate) mod walk;
+pub(crate) mod way;
 pub(crate) mod wide;
 
 #[cfg(test)]

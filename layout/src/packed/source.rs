@@ -3,6 +3,8 @@
 //! Everything that reads a terrain reads this one: the header, directory, pages and imagery are those of the terrain file, at their places there, so that a record page that is read is checked
 //! against the directory's checksum, whatever it was unpacked from. What was appended since is there page by page, and is read as it is. Only what maps needs the terrain file itself.
 //!
+//! Opening reads the front, which lists the directory's leaves and the tile directory's; both kinds of leaves are read when they are needed.
+//!
 //! Invariant: memory is what the front of the file takes, and tiles in a quarter of what the pool over it was given, [`MOST_CACHE_BYTES`] at most. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
 mod growth;
@@ -13,21 +15,20 @@ mod stages;
 
 use super::appended::Appended;
 use super::cache::Cache;
-use super::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, current_of, present_pages};
+use super::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS, Section, current_of};
+use super::leaves::PackedLeaves;
 use super::model::{DecodeTables, Model};
 use super::places::{LEAF_BYTES, TilePlace};
-use super::rules::Rules;
 use super::shape::Groups;
-use super::walk::Scratch;
+use super::way::{Scratch, Way};
 use super::wide::Width;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
-use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use crate::file::entries::ENTRY_BYTES;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::packed_end::{PackedEnd, from_file};
 use crate::file::source::{Source, Unpacking};
 use crate::file::structure::inert_page;
-use crate::grid::record::RecordKind;
 use meter::Meter;
 use std::path::Path;
 use std::sync::{Mutex, OnceLock};
@@ -42,7 +43,7 @@ const WHOLE_PAGES: usize = 256;
 /// First record page of a terrain file as a build leaves it.
 const FIRST_PAGE: u64 = INERT_PAGE as u64 + 1;
 /// What opening reads first.
-const FIRST_READ: u64 = 64 << 10;
+pub(crate) const FIRST_READ: u64 = 64 << 10;
 
 /// A packed terrain file.
 pub(crate) struct PackedSource {
@@ -51,11 +52,10 @@ pub(crate) struct PackedSource {
     header: Header,
     slots: [Box<Page>; 2],
     inert: Box<Page>,
-    /// Logical page of each that is present, and its checksum.
-    present: Vec<u32>,
-    sums: Vec<u32>,
-    /// For each leaf of the terrain file's directory that is present, its number and the place of its first page in `present`.
-    leaves: Vec<(u32, usize)>,
+    /// The file's first bytes, which were read at once: small files, and the coarsest tiles of others, are in them.
+    front: Vec<u8>,
+    /// Leaves of the terrain file's directory that are present.
+    leaves: PackedLeaves,
     /// First page of the root of the directory that is packed.
     root_page: u64,
     /// What is not packed, as it was when the file was opened, and as it is.
@@ -68,7 +68,7 @@ pub(crate) struct PackedSource {
     /// Where leaves of tiles lie, and what they hold, once they were needed.
     tile_leaves: Vec<(u64, u32)>,
     tiles: Vec<OnceLock<Box<[TilePlace]>>>,
-    rules: Rules,
+    way: Way,
     tables: DecodeTables,
     cache: Cache,
     scratch: Mutex<Vec<Scratch>>,
@@ -99,21 +99,12 @@ impl PackedSource {
         let (container, header, page) = current_of(path, [a, b], length)?;
         let (slots, page) = ([a, b].map(from_file), Box::new(*page));
         let front = Front::read(&*inner, &container, first)?;
-        if header.record_kind != RecordKind::Compact {
-            let problem = "it holds what packed terrain does not: exact records";
-            return Err(LayoutError::damaged_terrain(path, "header".into(), problem));
-        }
-        // The checksums first: what a file claims to hold is bounded by their bytes.
-        let sums = front.section(&*inner, &container.section(SUMS), "page checksums")?;
-        if Some(sums.len() as u64) != container.pages.checked_mul(4) {
-            return Err(odd(path, "page checksums"));
-        }
-        let runs = front.section(&*inner, &container.section(RUNS), "record pages")?;
-        let present = present_pages(&runs, header.record_pages(), container.pages)
-            .ok_or_else(|| odd(path, "record pages"))?;
-        let sums = (0..present.len()).map(|i| get_u32(&sums, 4 * i)).collect();
-        let leaves = leaves_of(&present);
-        let root_page = FIRST_PAGE + container.pages + leaves.len() as u64;
+        let runs = front.section(&*inner, &container.section(RUNS), "directory leaves")?;
+        let index = front.section(&*inner, &container.section(INDEX), "list of directory leaves")?;
+        let pages = [header.record_pages(), container.pages];
+        let leaves = PackedLeaves::parse(&runs, &index, &container.section(BLOCKS), pages, FIRST_PAGE)
+            .ok_or_else(|| odd(path, "directory leaves"))?;
+        let root_page = FIRST_PAGE + container.pages + leaves.count();
         let root_pages = (header.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE);
         let first_page = root_page + root_pages;
         let model = front.section(&*inner, &container.section(MODEL), "tables")?;
@@ -143,7 +134,7 @@ impl PackedSource {
                 .map(|i| (get_u64(&root, i * LEAF_BYTES), get_u32(&root, i * LEAF_BYTES + 8)))
                 .collect(),
             tiles: (0..groups.leaves).map(|_| OnceLock::new()).collect(),
-            rules: Rules::new(&header.grid, &header.scale),
+            way: Way::of(&header),
             inert: inert_page(header.record_kind),
             cache: Cache::new(MOST_CACHE_BYTES),
             scratch: Mutex::default(),
@@ -159,13 +150,18 @@ impl PackedSource {
             container,
             header,
             slots,
-            present,
-            sums,
+            front: front.into_kept(),
             leaves,
             groups,
             leaf_sizes,
             tables,
         })
+    }
+
+    /// The same, read from `inner` from now on: the file whose front was read.
+    pub(crate) fn over(mut self, inner: Box<dyn Source>) -> Self {
+        self.inner = inner;
+        self
     }
 
     /// Lends all bytes of the terrain file, unpacked when they are first asked for: what takes all records needs them all in memory.
@@ -201,14 +197,15 @@ impl PackedSource {
             0 | 1 => *page = *self.slots[number as usize],
             2 => *page = *self.inert,
             _ if number - FIRST_PAGE < stored => {
-                self.record_page(self.present[(number - FIRST_PAGE) as usize], page)?;
+                self.record_page(self.logical(number - FIRST_PAGE)?, page)?;
             }
             _ if number < self.root_page => {
                 let at = (number - FIRST_PAGE - stored) as usize;
-                page.copy_from_slice(&self.directory_leaf(at));
+                let read = |offset, buffer: &mut [u8]| self.read_packed(offset, buffer);
+                page.copy_from_slice(&self.leaves.page(self.path(), at, read)?);
             }
             _ => {
-                let root = self.root.get_or_init(|| self.directory_root());
+                let root = self.root.get_or_init(|| self.leaves.root(self.header.root_entries(), stored));
                 let at = (number - self.root_page) as usize * PAGE_BYTES;
                 page.fill(0);
                 let bytes = root.get(at..).unwrap_or_default();
@@ -219,29 +216,21 @@ impl PackedSource {
         Ok(())
     }
 
-    /// A leaf of the terrain file's directory, of those that are present.
-    fn directory_leaf(&self, at: usize) -> Vec<u8> {
-        let (number, first) = self.leaves[at];
-        let end = self.leaves.get(at + 1).map_or(self.present.len(), |(_, next)| *next);
-        let mut entries = vec![Entry::default(); ENTRIES_PER_LEAF];
-        for i in first..end {
-            let within = self.present[i] as usize - number as usize * ENTRIES_PER_LEAF;
-            entries[within] =
-                Entry { page: (FIRST_PAGE as usize + i) as u32, checksum: self.sums[i], generation: 1 };
-        }
-        leaf_page(&entries)
+    /// The logical page that is the `nth` of those that are packed.
+    fn logical(&self, nth: u64) -> Result<u64, LayoutError> {
+        self.leaves.logical(self.path(), nth, |offset, buffer| self.read_packed(offset, buffer))
     }
 
-    /// The root of the terrain file's directory.
-    fn directory_root(&self) -> Vec<u8> {
-        let mut bytes = vec![0; self.header.root_entries() as usize * ENTRY_BYTES];
-        let first = (FIRST_PAGE + self.container.pages) as u32;
-        for (at, (number, _)) in self.leaves.iter().enumerate() {
-            let sum = checksum(&self.directory_leaf(at));
-            let entry = Entry { page: first + at as u32, checksum: sum, generation: 1 };
-            entry.write(&mut bytes, *number as usize);
+    /// Fills `buffer` with bytes of the packed file that are never written over.
+    fn read_packed(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
+        let known = usize::try_from(offset)
+            .ok()
+            .and_then(|from| self.front.get(from..from.checked_add(buffer.len())?));
+        match known {
+            Some(bytes) => buffer.copy_from_slice(bytes),
+            None => self.inner.read_at(offset, buffer)?,
         }
-        bytes
+        Ok(())
     }
 }
 
@@ -305,7 +294,8 @@ struct Front(Vec<u8>);
 
 impl Front {
     fn read(inner: &dyn Source, container: &Container, first: Vec<u8>) -> Result<Self, LayoutError> {
-        let needed = container.sections.iter();
+        // Blocks of leaves are read one by one.
+        let needed = container.sections.iter().filter(|section| section.kind != BLOCKS);
         let end = needed.clone().map(|section| section.offset + section.bytes).max().unwrap_or(0);
         let sum: u64 = needed.map(|section| section.bytes).sum();
         let mut bytes = first;
@@ -316,6 +306,13 @@ impl Front {
             inner.read_at(from as u64, &mut bytes[from..])?;
         }
         Ok(Self(bytes))
+    }
+
+    /// What is kept of it.
+    fn into_kept(mut self) -> Vec<u8> {
+        self.0.truncate(FIRST_READ as usize);
+        self.0.shrink_to_fit();
+        self.0
     }
 
     fn section(
@@ -344,16 +341,4 @@ impl Front {
 /// A part that contradicts the header.
 fn odd(path: &Path, place: &'static str) -> LayoutError {
     LayoutError::damaged_terrain(path, place.into(), "they are not what the header says")
-}
-
-/// Leaves of the terrain file's directory that hold pages which are present, and the place of the first in `present`.
-fn leaves_of(present: &[u32]) -> Vec<(u32, usize)> {
-    let mut leaves: Vec<(u32, usize)> = Vec::new();
-    for (at, page) in present.iter().enumerate() {
-        let leaf = page / ENTRIES_PER_LEAF as u32;
-        if leaves.last().is_none_or(|(last, _)| *last != leaf) {
-            leaves.push((leaf, at));
-        }
-    }
-    leaves
 }

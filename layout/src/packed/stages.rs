@@ -113,6 +113,11 @@ impl Stages {
     pub fn open(bytes: Vec<u8>) -> Result<Self, LayoutError> {
         let inner = MemorySource::new("packed", bytes);
         let source = PackedSource::open(Box::new(inner))?;
+        let Some(rules) = source.rules() else {
+            return Err(LayoutError::Usage(
+                "its records are exact; the stages are those of compact ones".into(),
+            ));
+        };
         let mut scratch = Scratch::default();
         let mut tiles = Vec::new();
         for (id, shape, place) in source.all_tiles()? {
@@ -126,7 +131,7 @@ impl Stages {
                 segments.push(Noting { decoder, noted: Recorded::default() });
                 rest = after;
             }
-            walk(&shape, source.rules(), &mut scratch, &mut segments, None);
+            walk(&shape, rules, &mut scratch, &mut segments, None);
             let mut noted: Vec<Recorded> = segments.into_iter().map(|segment| segment.noted).collect();
             noted.resize(SEGMENTS, Recorded::default());
             let segments: [Recorded; SEGMENTS] = noted.try_into().unwrap_or_default();
@@ -165,9 +170,10 @@ impl Stages {
 
     /// All that is made of values: predictions, contexts, codes, records in the order of tiles.
     pub fn making(&mut self) {
+        let Some(rules) = self.source.rules() else { return };
         for tile in &self.tiles {
             let mut segments = tile.segments.each_ref().map(|noted| Giving { noted, row: 0, single: 0 });
-            black_box(walk(&tile.shape, self.source.rules(), &mut self.scratch, &mut segments, None));
+            black_box(walk(&tile.shape, rules, &mut self.scratch, &mut segments, None));
         }
     }
 

@@ -14,6 +14,8 @@ pub(crate) struct TileRecords {
     /// The finest octave there is, counted from the tile's own finest.
     pub(crate) finest: u32,
     tile_log: u32,
+    /// Words of 4 bytes a record: 1 of compact ones, 2 or 4 of exact ones.
+    words: usize,
     records: Vec<u32>,
 }
 
@@ -41,22 +43,43 @@ pub(crate) const fn index_of(tile_log: u32, [x, y]: [u32; 2]) -> usize {
 }
 
 impl TileRecords {
-    /// All inert, down to octave `finest`, counted from the tile's own finest.
+    /// All inert compact ones, down to octave `finest`, counted from the tile's own finest.
     pub(crate) fn inert(shape: &TileShape, finest: u32) -> Self {
-        let finest = finest.min(shape.tile_log);
-        let count = first_of(1 << (shape.tile_log - finest));
-        Self { finest, tile_log: shape.tile_log, records: vec![INERT; count] }
+        Self::filled(shape, finest, &[INERT])
     }
 
-    /// As [`TileRecords::inert`], of what `record` says of every vertex in steps of the tile.
-    pub(crate) fn from_fn(shape: &TileShape, mut record: impl FnMut([u32; 2]) -> u32) -> Self {
-        let mut all = Self::inert(shape, 0);
+    /// All the record of these words, down to octave `finest`.
+    pub(crate) fn filled(shape: &TileShape, finest: u32, record: &[u32]) -> Self {
+        let finest = finest.min(shape.tile_log);
+        let count = first_of(1 << (shape.tile_log - finest));
+        Self { finest, tile_log: shape.tile_log, words: record.len(), records: record.repeat(count) }
+    }
+
+    /// What `record` says of every vertex in steps of the tile; it is handed the words of an inert one.
+    pub(crate) fn gathered(
+        shape: &TileShape,
+        inert: &[u32],
+        mut record: impl FnMut([u32; 2], &mut [u32]),
+    ) -> Self {
+        let mut all = Self::filled(shape, 0, inert);
         let side = 0..=1 << shape.tile_log;
-        side.clone().for_each(|y| side.clone().for_each(|x| all.set([x, y], record([x, y]))));
+        side.clone().for_each(|y| side.clone().for_each(|x| record([x, y], all.words_mut([x, y]))));
         all
     }
 
-    /// The record at a place in steps of the tile; an inert one if it is finer than what there is.
+    /// The words of the record at a place in steps of the tile; none if it is finer than what there is.
+    pub(crate) fn words_at(&self, at: [u32; 2]) -> &[u32] {
+        let first = self.words * index_of(self.tile_log, at);
+        self.records.get(first..first + self.words).unwrap_or_default()
+    }
+
+    /// As [`TileRecords::words_at`].
+    pub(crate) fn words_mut(&mut self, at: [u32; 2]) -> &mut [u32] {
+        let first = self.words * index_of(self.tile_log, at);
+        self.records.get_mut(first..first + self.words).unwrap_or_default()
+    }
+
+    /// The compact record at a place in steps of the tile; an inert one if it is finer than what there is.
     #[inline(always)]
     pub(crate) fn at(&self, at: [u32; 2]) -> u32 {
         self.records.get(index_of(self.tile_log, at)).copied().unwrap_or(INERT)
@@ -68,19 +91,19 @@ impl TileRecords {
         }
     }
 
-    /// All records, by [`index_of`].
+    /// The words of all records, by [`index_of`].
     pub(crate) fn all(&self) -> &[u32] {
         &self.records
     }
 
-    /// The vertices that refine `m` cells a side; none if they are finer than what there is.
+    /// The words of the vertices that refine `m` cells a side; none if they are finer than what there is.
     pub(crate) fn refining(&self, m: usize) -> &[u32] {
-        self.records.get(first_of(m)..first_of(2 * m)).unwrap_or_default()
+        self.records.get(self.words * first_of(m)..self.words * first_of(2 * m)).unwrap_or_default()
     }
 
     /// As [`TileRecords::refining`].
     pub(crate) fn refining_mut(&mut self, m: usize) -> &mut [u32] {
-        self.records.get_mut(first_of(m)..first_of(2 * m)).unwrap_or_default()
+        self.records.get_mut(self.words * first_of(m)..self.words * first_of(2 * m)).unwrap_or_default()
     }
 
     /// Bytes it takes.
@@ -89,7 +112,7 @@ impl TileRecords {
     }
 
     /// Whether all records that a tile gives are inert ones.
-    pub(crate) fn gives_nothing(&self, shape: &TileShape) -> bool {
+    pub(crate) fn gives_nothing(&self, shape: &TileShape, inert: &[u32]) -> bool {
         let last = 1 << shape.tile_log;
         let step_log = shape.delivered();
         let mut places = (0..=last).flat_map(|y| (0..=last).map(move |x: u32| [x, y]));
@@ -101,8 +124,16 @@ impl TileRecords {
                     && (x < last || shape.is_last[0])
                     && (y < last || shape.is_last[1])
             };
-            !is_given || self.at([x, y]) == INERT
+            !is_given || self.words_at([x, y]) == inert
         })
+    }
+}
+
+#[cfg(test)]
+impl TileRecords {
+    /// Compact records, by what `record` says of every vertex in steps of the tile.
+    pub(crate) fn from_fn(shape: &TileShape, mut record: impl FnMut([u32; 2]) -> u32) -> Self {
+        Self::gathered(shape, &[INERT], |at, words| words[0] = record(at))
     }
 }
 

@@ -17,14 +17,14 @@ use super::token::{folded, unfolded};
 use std::ops::Range;
 
 /// What a vertex is.
-const ORDINARY: u8 = 0;
-const IS_INERT: u8 = 1;
-const IS_FRINGE: u8 = 2;
+pub(super) const ORDINARY: u8 = 0;
+pub(super) const IS_INERT: u8 = 1;
+pub(super) const IS_FRINGE: u8 = 2;
 /// First error code of fringe vertices.
 const FRINGE_CODE: u8 = 248;
 
 /// Most vertices of an octave of a tile.
-const MOST: usize = {
+pub(super) const MOST: usize = {
     let m = 1 << (TILE_LOG - 1);
     m * m + 2 * m * (m + 1)
 };
@@ -68,28 +68,28 @@ impl Default for Scratch {
 
 /// One octave of a tile.
 #[derive(Debug, Clone, Copy)]
-struct Octave {
+pub(super) struct Octave {
     /// Counted from the tile's finest.
-    octave: u32,
+    pub(super) octave: u32,
     /// Cells a side of the lattice it refines.
-    m: usize,
-    is_last: [bool; 2],
+    pub(super) m: usize,
+    pub(super) is_last: [bool; 2],
 }
 
 impl Octave {
-    fn whites(&self) -> usize {
+    pub(super) fn whites(&self) -> usize {
         self.m * self.m
     }
 
-    fn easts(&self) -> usize {
+    pub(super) fn easts(&self) -> usize {
         self.m * (self.m + 1)
     }
 
-    fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.whites() + 2 * self.easts()
     }
 
-    fn blacks(&self) -> Range<usize> {
+    pub(super) fn blacks(&self) -> Range<usize> {
         self.whites()..self.count()
     }
 
@@ -107,9 +107,22 @@ impl Octave {
         [2 * (i % (m + 1)), 2 * (i / (m + 1)) + 1]
     }
 
+    /// The vertices of the same lattice west and south of one.
+    pub(super) fn before(&self, i: usize) -> [Option<usize>; 2] {
+        let (first, wide) = if i < self.whites() {
+            (0, self.m)
+        } else if i < self.whites() + self.easts() {
+            (self.whites(), self.m)
+        } else {
+            (self.whites() + self.easts(), self.m + 1)
+        };
+        let within = i - first;
+        [(!within.is_multiple_of(wide)).then(|| i - 1), (within >= wide).then(|| i - wide)]
+    }
+
     /// Whether the tile gives the record of a vertex.
     #[inline(always)]
-    fn is_given(&self, i: usize) -> bool {
+    pub(super) fn is_given(&self, i: usize) -> bool {
         let [x, y] = self.lattice_place(i);
         (x < 2 * self.m || self.is_last[0]) && (y < 2 * self.m || self.is_last[1])
     }

@@ -2,9 +2,10 @@
 //!
 //! Packed terrain is opened as any other: [`Terrain::open`](crate::read::terrain::Terrain::open). How it is read, and how a tile is coded, is module `packed`.
 
+mod front;
 mod pack;
 mod unpack;
 
+pub(crate) use pack::publish_packed;
 pub use pack::{Packed, pack};
-pub(crate) use pack::{check_kind, publish_packed};
 pub use unpack::unpack;

@@ -3,6 +3,7 @@
 //! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name. So whatever the file holds, what is packed is the same, or packing fails and says
 //! so. Cost: each vertex is looked up twice and unpacked once; memory is a few megabytes, and 16 bytes a record page.
 
+use super::front::Front;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
@@ -15,22 +16,22 @@ use crate::file::slots::Slots;
 use crate::file::source::{PreadSource, Source};
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
-use crate::grid::record::{Compact, RecordKind};
+use crate::grid::record::RecordCodec;
 use crate::packed::coder::{Encoder, PlainEncoder};
-use crate::packed::container::{Container, MODEL, ROOT, RUNS, SUMS, Section, runs_of};
+use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
+use crate::packed::leaves::packed_leaves;
 use crate::packed::model::{CONTEXTS, Counts, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
-use crate::packed::rules::Rules;
 use crate::packed::shape::{Groups, SEGMENTS, TileId};
 use crate::packed::source::PackedSource;
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
-use crate::packed::walk::{Scratch, walk};
+use crate::packed::way::{Scratch, Way};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
-use crate::read::kinds::ByKind;
 use crate::read::records::Records;
 use crate::read::terrain::Terrain;
+use crate::with_records;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -57,7 +58,7 @@ pub struct Packed {
 /// What the terrain was before all edits is packed, as a build or a compaction left it. What was appended to it since, its history with it, is taken over as it is.
 ///
 /// # Errors
-/// Damage and I/O of the terrain; I/O of `to`; [`LayoutError::Unsupported`] for a terrain with exact records, one that other programs laid out, and one that is packed already.
+/// Damage and I/O of the terrain; I/O of `to`; [`LayoutError::Unsupported`] for a terrain that other programs laid out, and one that is packed already.
 pub fn pack(disk: &dyn Disk, from: &Path, to: &Path, progress: &dyn Progress) -> Result<Packed, LayoutError> {
     let terrain = Terrain::open(from)?;
     if terrain.source().packed_bytes().is_some() {
@@ -83,22 +84,17 @@ pub(crate) fn pack_into(
     file: &AtomicFile,
     progress: &dyn Progress,
 ) -> Result<Packed, LayoutError> {
-    check_kind(terrain.path(), terrain.header().record_kind)?;
     check_pages(terrain, progress)?;
     if built.instance() != terrain.instance() {
         check_pages(built, progress)?;
     }
     let directory_end = check_packable(built)?;
-    let Some(ByKind::Compact(records)) = built.records() else {
-        return Err(refused(terrain.path(), "its records are not in memory's reach"));
-    };
-    let packer = Packer {
-        records,
-        groups: Groups::of(built.grid()),
-        rules: Rules::new(built.grid(), &built.header().scale),
-        progress,
-    };
-    let bytes = packer.write(disk, terrain, built, directory_end, file)?;
+    let records = built.records()?;
+    let (groups, way) = (Groups::of(built.grid()), Way::of(built.header()));
+    let bytes = with_records!(records, records => {
+        let packer = Packer { records, groups, way, progress };
+        packer.write(disk, terrain, built, directory_end, file)?
+    });
     compare(terrain, file, progress)?;
     let [wide, high] = terrain.grid().samples().map(f64::from);
     let imagery = terrain.header().imagery.map_or(0, |place| place.bytes);
@@ -139,19 +135,6 @@ fn read_back(file: &AtomicFile) -> Result<PreadSource, LayoutError> {
     PreadSource::over(path, again)
 }
 
-/// Whether records of this kind can be packed.
-///
-/// # Errors
-/// [`LayoutError::Unsupported`] for exact ones.
-pub(crate) fn check_kind(path: &Path, kind: RecordKind) -> Result<(), LayoutError> {
-    match kind {
-        RecordKind::Compact => Ok(()),
-        RecordKind::Exact8 | RecordKind::Exact16 => {
-            Err(refused(path, "its records are exact ones; only compact ones can be packed"))
-        }
-    }
-}
-
 fn refused(path: &Path, problem: &str) -> LayoutError {
     LayoutError::unsupported(path, format!("the terrain cannot be packed: {problem}"))
 }
@@ -162,13 +145,13 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
     let in_order =
         "other programs wrote it, in an order of their own; write it anew with `terrasoar compact`";
     let mut next = INERT_PAGE;
-    for entry in built.entries().iter().filter(|entry| entry.is_present()) {
+    for (_, entry) in built.present_pages()? {
         next += 1;
         if entry.page != next || entry.generation != 1 {
             return Err(refused(path, in_order));
         }
     }
-    let (root, page) = put_all_leaves(built.entries(), next + 1, |_, _| Ok(()))?;
+    let (root, page) = put_all_leaves(built.table().leaves(), next + 1, |_, _| Ok(()))?;
     let root = root_bytes(&root);
     let end = u64::from(page) * PAGE + root.bytes.len() as u64;
     let is_in_order =
@@ -180,9 +163,9 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
 fn check_pages(terrain: &Terrain, progress: &dyn Progress) -> Result<(), LayoutError> {
     let per_page = terrain.header().records_per_page();
     progress.stage("checking", terrain.header().stored_pages * per_page);
-    (0..terrain.entries().len() as u64)
+    let present: Vec<u64> = terrain.present_pages()?.map(|(page, _)| page).collect();
+    present
         .into_par_iter()
-        .filter(|page| terrain.entries()[*page as usize].is_present())
         .try_for_each(|page| terrain.checked_page(page).map(|_| progress.advance(per_page)))
 }
 
@@ -191,25 +174,28 @@ struct Made {
     segments: [Vec<u8>; SEGMENTS],
 }
 
-struct Packer<'p> {
-    records: Records<'p, Compact>,
+struct Packer<'p, C: RecordCodec> {
+    records: Records<'p, C>,
     groups: Groups,
-    rules: Rules,
+    way: Way,
     progress: &'p dyn Progress,
 }
 
-impl Packer<'_> {
+impl<C: RecordCodec> Packer<'_, C> {
     /// The records of a tile; `None` if all that it gives are inert.
     fn records_of(&self, id: TileId) -> Option<TileRecords> {
         let group = &self.groups.groups[usize::from(id.group)];
         let shape = self.groups.shape(id);
         let first = id.at.map(|v| v << (group.stride_log + group.tile_log));
         let k = self.records.grid().k();
-        let records = TileRecords::from_fn(&shape, |at| {
+        let inert = self.way.inert();
+        let records = TileRecords::gathered(&shape, inert, |at, words| {
             let [x, y] = [0, 1].map(|axis| first[axis] + (at[axis] << group.stride_log));
-            self.records.raw(slot_of(k, GridPoint::new(x, y)))
+            let mut bytes = [0; 16];
+            C::write(self.records.raw(slot_of(k, GridPoint::new(x, y))), &mut bytes);
+            words.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
         });
-        (!records.gives_nothing(&shape)).then_some(records)
+        (!records.gives_nothing(&shape, inert)).then_some(records)
     }
 
     fn samples_of(&self, id: TileId) -> u64 {
@@ -219,13 +205,13 @@ impl Packer<'_> {
     fn encoded(&self, id: TileId, scratch: &mut Scratch) -> Option<[Encoder; SEGMENTS]> {
         let records = self.records_of(id)?;
         let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        walk(&self.groups.shape(id), &self.rules, scratch, &mut encoders, Some(&records));
+        self.way.write(&self.groups.shape(id), scratch, &mut encoders, &records);
         Some(encoders)
     }
 
     /// Counts what occurs.
     fn model(&self, tiles: &[(usize, TileId)]) -> Model {
-        let none = || (vec![[0; TOKENS]; CONTEXTS], Scratch::default());
+        let none = || (vec![[0; TOKENS]; CONTEXTS], self.way.scratch());
         let counts = tiles
             .par_chunks(64)
             .fold(none, |(mut counts, mut scratch), tiles| {
@@ -251,7 +237,7 @@ impl Packer<'_> {
         }
         // Nothing that was counted is lacking; should it ever be, values are stored as they are.
         let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
-        walk(&self.groups.shape(id), &self.rules, scratch, &mut encoders, self.records_of(id).as_ref());
+        self.way.write(&self.groups.shape(id), scratch, &mut encoders, &self.records_of(id)?);
         Some(Made { segments: encoders.map(PlainEncoder::finish) })
     }
 
@@ -274,10 +260,10 @@ impl Packer<'_> {
         let slots = header_slots(source, header)?;
         let mut front = Front::default();
         front.put(MODEL, &model.to_bytes());
-        front.put(RUNS, &runs_of(built.entries().iter().map(|entry| entry.is_present())));
-        let present = built.entries().iter().filter(|entry| entry.is_present());
-        let sums: Vec<u8> = present.flat_map(|entry| entry.checksum.to_le_bytes()).collect();
-        front.put(SUMS, &sums);
+        built.check_directory()?;
+        let [runs, index, blocks] = packed_leaves(built.table().leaves());
+        front.put(RUNS, &runs);
+        front.put(INDEX, &index);
         let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
         // Leaves have their place before it is known what they hold.
         let leaf_sizes = self.groups.leaf_sizes();
@@ -302,7 +288,7 @@ impl Packer<'_> {
             let made: Vec<Option<Made>> = tiles
                 .par_iter()
                 .with_min_len(16)
-                .map_init(Scratch::default, |scratch, (_, id)| self.make(*id, &model, scratch))
+                .map_init(|| self.way.scratch(), |scratch, (_, id)| self.make(*id, &model, scratch))
                 .collect();
             let mut bytes = Vec::new();
             for ((leaf, _), made) in tiles.iter().zip(made) {
@@ -331,6 +317,9 @@ impl Packer<'_> {
             write(&bytes, *offset)?;
         }
         front.seal(ROOT);
+        front.list(BLOCKS, &blocks, at);
+        write(&blocks, at)?;
+        at += blocks.len() as u64;
 
         // What is not packed: imagery, and what edits appended.
         let (first, last) = (directory_end / PAGE, header.file_bytes.div_ceil(PAGE));
@@ -376,32 +365,6 @@ impl Packer<'_> {
 fn sum(mut a: Counts, b: Counts) -> Counts {
     a.iter_mut().flatten().zip(b.iter().flatten()).for_each(|(a, b)| *a += b);
     a
-}
-
-/// Sections behind the header.
-#[derive(Default)]
-struct Front {
-    bytes: Vec<u8>,
-    sections: Vec<Section>,
-}
-
-impl Front {
-    /// Appends a section; where it begins behind the header.
-    fn put(&mut self, kind: u32, bytes: &[u8]) -> usize {
-        let at = self.bytes.len();
-        let offset = FRONT + at as u64;
-        self.bytes.extend(bytes);
-        self.sections.push(Section { kind, checksum: checksum(bytes), offset, bytes: bytes.len() as u64 });
-        at
-    }
-
-    /// The checksum of a section that was filled in meanwhile.
-    fn seal(&mut self, kind: u32) {
-        for section in self.sections.iter_mut().filter(|section| section.kind == kind) {
-            let from = (section.offset - FRONT) as usize;
-            section.checksum = checksum(&self.bytes[from..from + section.bytes as usize]);
-        }
-    }
 }
 
 /// The two header pages of a terrain file; zeros for the one that does not count, should it be no header.

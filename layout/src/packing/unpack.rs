@@ -37,7 +37,7 @@ pub fn unpack(
         let when_full = "cannot write the terrain file, for which there is no room; make some on its disk, or name an output on another";
         LayoutError::write(file.target(), "cannot write the terrain file", when_full, e)
     };
-    // Record pages are checked one by one; what is around them follows from what opening has checked.
+    // Record pages are checked one by one; what is around them follows from what was checked when it was read.
     let chunks = bytes.div_ceil(CHUNK_BYTES as u64);
     for first in (0..chunks).step_by(CHUNKS_AT_ONCE as usize) {
         let made: Vec<Vec<u8>> = (first..chunks.min(first + CHUNKS_AT_ONCE))
@@ -69,8 +69,8 @@ fn check(terrain: &Terrain, file: &AtomicFile, progress: &dyn Progress) -> Resul
         .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
     let unpacked = Terrain::from_source(Box::new(crate::file::source::PreadSource::over(path, again)?))?;
     let per_page = terrain.header().records_per_page();
-    (0..unpacked.entries().len() as u64)
+    let present: Vec<u64> = unpacked.present_pages()?.map(|(page, _)| page).collect();
+    present
         .into_par_iter()
-        .filter(|page| unpacked.entries()[*page as usize].is_present())
         .try_for_each(|page| unpacked.checked_page(page).map(|_| progress.advance(per_page)))
 }

@@ -30,7 +30,8 @@ impl<'t> Heights<'t> {
 
     /// As [`Heights::new`], with room for so many pages of 4 KiB, rounded up to a power of two.
     pub fn with_pages(terrain: &'t Terrain, pages: usize) -> Self {
-        let needed = pages.min(terrain.entries().len()).max(1).next_power_of_two();
+        let needed =
+            pages.min(usize::try_from(terrain.page_count()).unwrap_or(usize::MAX)).max(1).next_power_of_two();
         Self { terrain, kept: (0..needed).map(|_| None).collect() }
     }
 

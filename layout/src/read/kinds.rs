@@ -36,17 +36,27 @@ macro_rules! with_records {
 }
 
 impl Terrain {
-    /// The records as refinement reads them. `None` if the source cannot lend its bytes as one slice.
-    pub fn records(&self) -> Option<AnyRecords<'_>> {
-        let bytes = Slices {
-            first: self.source().bytes()?,
-            behind: self.source().bytes_behind().unwrap_or_default(),
+    /// The records as refinement reads them. Reads and checks the whole directory.
+    ///
+    /// # Errors
+    /// As [`Terrain::check_directory`]; [`LayoutError::Unsupported`] if the source cannot lend its bytes, as [`Terrain::lends_records`] says.
+    pub fn records(&self) -> Result<AnyRecords<'_>, LayoutError> {
+        self.check_directory()?;
+        let Some(first) = self.source().bytes() else {
+            let problem = "its records are not in this process's memory, neither mapped nor unpacked there";
+            return Err(LayoutError::unsupported(self.path(), problem));
         };
-        Some(match self.codec().clone() {
-            AnyCodec::Compact(codec) => ByKind::Compact(Records::new(self, bytes, codec)),
-            AnyCodec::Exact8(codec) => ByKind::Exact8(Records::new(self, bytes, codec)),
-            AnyCodec::Exact16(codec) => ByKind::Exact16(Records::new(self, bytes, codec)),
+        let bytes = Slices { first, behind: self.source().bytes_behind().unwrap_or_default() };
+        Ok(match self.codec().clone() {
+            AnyCodec::Compact(codec) => ByKind::Compact(Records::new(self, bytes, codec)?),
+            AnyCodec::Exact8(codec) => ByKind::Exact8(Records::new(self, bytes, codec)?),
+            AnyCodec::Exact16(codec) => ByKind::Exact16(Records::new(self, bytes, codec)?),
         })
+    }
+
+    /// Whether the source lends its bytes, which [`Terrain::records`] needs.
+    pub fn lends_records(&self) -> bool {
+        self.source().bytes().is_some()
     }
 
     /// A pool of at most `cache_bytes` for the pages of this terrain, whatever its source.

@@ -4,8 +4,9 @@ use super::opened::Opened;
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::file::overlay::Overlaid;
+use crate::file::page_table::PageTable;
 use crate::file::source::{MapSource, PreadSource};
-use crate::file::structure::{read_directory, read_growing};
+use crate::file::structure::read_growing;
 use std::path::Path;
 
 /// The base with its overlay as one terrain.
@@ -20,8 +21,8 @@ fn open_layers(base: &Path, overlay: &Path, is_mapped: bool) -> Result<Terrain, 
     } else {
         overlaid.source(base_file.into_source(), Box::new(overlay_file))
     }?;
-    let entries = read_directory(&*source, &overlaid.slots.header)?;
-    Ok(Terrain::of(source, overlaid.slots.header, entries))
+    let table = PageTable::open(&*source, &overlaid.slots.header)?;
+    Ok(Terrain::of(source, overlaid.slots.header, table))
 }
 
 impl Terrain {

@@ -1,4 +1,4 @@
-//! An opened terrain file: [`terrain`]. The way from a slot to a vertex goes through mapped [`records`], or through a [`pool`] of pages that are read.
+//! An opened terrain file: [`terrain`], opened by [`opening`]. The way from a slot to a vertex goes through mapped [`records`], or through a [`pool`] of pages that are read.
 //!
 //! Engines are written for the trait in [`store`], which all of these have.
 
@@ -10,6 +10,7 @@ pub(crate) mod layers;
 pub mod loader;
 #[cfg(feature = "files")]
 pub(crate) mod opened;
+pub mod opening;
 pub mod pool;
 pub mod prefetch;
 pub mod records;

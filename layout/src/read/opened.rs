@@ -3,7 +3,7 @@
 use crate::error::LayoutError;
 use crate::file::source::{MapSource, PreadSource, Source};
 use crate::packed::source::PackedSource;
-use crate::read::terrain::starts_packed;
+use crate::read::opening::starts_packed;
 
 /// An opened file.
 pub(crate) enum Opened {

@@ -12,6 +12,7 @@ use super::store::{RawOf, RecordShape, RecordStore, byte_in_page, page_of};
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
+use crate::file::entries::ENTRIES_PER_LEAF;
 use crate::file::structure::inert_page;
 use crate::grid::record::RecordCodec;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -47,18 +48,17 @@ impl<C: RecordCodec> PagePool<C> {
     /// As [`Terrain::checked_page`].
     pub fn new(terrain: &Terrain, shape: RecordShape<C>, cache_bytes: u64) -> Result<Self, LayoutError> {
         let cache_bytes = cache_bytes - terrain.source().take_share(cache_bytes).min(cache_bytes);
-        let most = terrain.entries().len() + STAYING;
+        let count = to_usize(terrain.page_count())?;
+        let most = count.saturating_add(STAYING);
         let capacity = usize::try_from(cache_bytes / PAGE_BYTES as u64).unwrap_or(usize::MAX);
         let capacity = capacity.clamp(STAYING + LEAST_PAGES, most.max(STAYING + LEAST_PAGES));
-        // Zeros that are never written take no memory: most of a void terrain.
-        let mut frames = vec![0; terrain.entries().len()];
-        let present = terrain.entries().iter().zip(&mut frames).filter(|(entry, _)| entry.is_present());
-        present.for_each(|(_, frame)| *frame = AWAY);
+        // Page 0 stays, so its leaf is read first.
+        let first = terrain.checked_page(0)?;
         let mut pool = Self {
             shape,
             // Zeroed lazily by the system: memory is taken as pages come.
             bytes: vec![0; capacity * PAGE_BYTES],
-            frames,
+            frames: frames_of(terrain, count),
             held: Vec::with_capacity(capacity),
             recent: (0..capacity).map(|_| AtomicBool::new(false)).collect(),
             capacity,
@@ -67,11 +67,11 @@ impl<C: RecordCodec> PagePool<C> {
         // The inert page is no logical page; nothing looks it up.
         pool.held.push(AWAY);
         pool.bytes[..PAGE_BYTES].copy_from_slice(&inert_page(terrain.header().record_kind)[..]);
-        pool.install(0, &*terrain.checked_page(0)?)?;
+        pool.install(0, &first)?;
         Ok(pool)
     }
 
-    /// Whether a logical page is here. Absent pages always are; pages past the last one never.
+    /// Whether a logical page is here. Absent pages are, as soon as it is known that they are absent; pages past the last one never.
     #[inline(always)]
     pub fn is_resident(&self, logical_page: u64) -> bool {
         self.frames.get(logical_page as usize).is_some_and(|frame| *frame != AWAY)
@@ -89,6 +89,11 @@ impl<C: RecordCodec> PagePool<C> {
                 self.frames.len()
             )));
         };
+        if known == AWAY && self.bytes[..PAGE_BYTES] == page[..] {
+            // An absent page whose directory leaf had not been read.
+            self.frames[at] = 0;
+            return Ok(());
+        }
         let frame = match known {
             AWAY if self.held.len() < self.capacity => {
                 self.held.push(AWAY);
@@ -160,6 +165,22 @@ impl<C: RecordCodec> PagePool<C> {
     pub fn pages_held(&self) -> usize {
         self.held.len()
     }
+}
+
+/// Frames of all logical pages while none is here: absent ones read as inert, of others, and where a directory leaf was not read yet, it is not known.
+fn frames_of(terrain: &Terrain, count: usize) -> Vec<u32> {
+    // Zeros that are never written take no memory: most of a void terrain.
+    let mut frames = vec![0; count];
+    let table = terrain.table();
+    let leaves = frames.chunks_mut(ENTRIES_PER_LEAF).zip(table.root()).enumerate();
+    for (i, (leaf, _)) in leaves.filter(|(_, (_, here))| here.is_present()) {
+        for (page, frame) in ((i * ENTRIES_PER_LEAF) as u64..).zip(leaf) {
+            if table.known(page).is_none_or(|entry| entry.is_present()) {
+                *frame = AWAY;
+            }
+        }
+    }
+    frames
 }
 
 impl<C: RecordCodec> RecordStore for PagePool<C> {

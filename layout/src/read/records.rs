@@ -5,6 +5,7 @@
 use super::prefetch::prefetch;
 use super::store::{CompleteStore, RecordShape, RecordStore, byte_in_page, page_of};
 use super::terrain::Terrain;
+use crate::error::LayoutError;
 use crate::file::bytes::PAGE_BYTES;
 use crate::file::header::INERT_PAGE;
 use crate::grid::order::slot_of;
@@ -48,8 +49,10 @@ pub struct Records<'a, C: RecordCodec> {
 }
 
 impl<'a, C: RecordCodec> Records<'a, C> {
-    pub(crate) fn new(terrain: &'a Terrain, bytes: Slices<'a>, codec: C) -> Self {
-        Self { bytes, pages: terrain.pages(), shape: terrain.shape(codec) }
+    /// # Errors
+    /// As [`Terrain::check_directory`].
+    pub(crate) fn new(terrain: &'a Terrain, bytes: Slices<'a>, codec: C) -> Result<Self, LayoutError> {
+        Ok(Self { bytes, pages: terrain.pages()?, shape: terrain.shape(codec) })
     }
 
     /// Grid shape and spacing.

@@ -2,8 +2,11 @@
 //!
 //! [`Terrain`] owns the source and has the header. Refinement holds [`Records`](super::records::Records).
 //!
-//! Invariant: every page number in the table lies inside the source as it was when it was opened.
+//! Leaves of the directory are read and checked when one of their pages is first asked for ([`Terrain::entry`]); [`Terrain::check_directory`] reads and checks them all.
+//!
+//! Invariant: every page number that is handed out lies inside the file as its header counts it.
 
+use super::opening::{Found, Opening};
 use super::store::RecordShape;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
@@ -11,17 +14,14 @@ use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::journal::Commit;
 use crate::file::packed_end::PackedEnd;
+use crate::file::page_table::PageTable;
 use crate::file::source::Source;
 #[cfg(feature = "files")]
 use crate::file::source::{MapSource, PreadSource};
-#[cfg(feature = "files")]
-use crate::file::structure::read_growing;
-use crate::file::structure::{read_directory, read_structure};
-use crate::file::version::is_packed;
+use crate::file::structure::inert_page;
 use crate::grid::order::slot_of;
 use crate::grid::record::{AnyCodec, Vertex};
 use crate::grid::{Grid, GridPoint};
-use crate::packed::source::PackedSource;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -30,7 +30,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct Terrain {
     source: Box<dyn Source>,
     header: Header,
-    entries: Vec<Entry>,
+    table: PageTable,
     /// Page of each logical page, counted from the inert page, which absent ones read as. Made when records are first asked for.
     pages: OnceLock<Vec<u32>>,
     codec: OnceLock<Box<AnyCodec>>,
@@ -55,18 +55,18 @@ impl Terrain {
     /// As FORMAT.md, section 6: not a terrain file, another version, truncated or damaged; or I/O.
     #[cfg(feature = "files")]
     pub fn open(path: &Path) -> Result<Self, LayoutError> {
-        let file = PreadSource::open(path)?;
-        if starts_packed(&file)? {
-            return Self::over(Box::new(PackedSource::open(Box::new(file))?.lending_whole()));
-        }
-        Self::mapped(file)
+        Self::mapped(PreadSource::open(path)?)
     }
 
-    /// Opens and maps a file that is the terrain file itself.
+    /// Opens and maps a file, or opens a packed one that is to be unpacked for [`Terrain::records`].
     #[cfg(feature = "files")]
-    pub(crate) fn mapped(file: PreadSource) -> Result<Self, LayoutError> {
-        let (file, header, entries) = open_settled(file)?;
-        Ok(Self::of(Box::new(MapSource::map(file)?), header, entries))
+    pub(crate) fn mapped(mut file: PreadSource) -> Result<Self, LayoutError> {
+        Ok(match Opening::of(&mut file)?.into_found()? {
+            Found::Plain(header, table) => Self::of(Box::new(MapSource::map(file)?), header, table),
+            Found::Packed(packed, header, table) => {
+                Self::of(Box::new(packed.over(Box::new(file)).lending_whole()), header, table)
+            }
+        })
     }
 
     /// Opens the file at `path` without mapping it: for [`Terrain::pool`], whose pages are read. Files that others may truncate raise no signal then.
@@ -75,12 +75,7 @@ impl Terrain {
     /// As [`Terrain::open`].
     #[cfg(feature = "files")]
     pub fn open_unmapped(path: &Path) -> Result<Self, LayoutError> {
-        let file = PreadSource::open(path)?;
-        if starts_packed(&file)? {
-            return Self::from_source(Box::new(file));
-        }
-        let (file, header, entries) = open_settled(file)?;
-        Ok(Self::of(Box::new(file), header, entries))
+        Self::from_source(Box::new(PreadSource::open(path)?))
     }
 
     /// Opens the file at `path` as it was before all edits that its journal knows; as it is, if it has none. Mapped.
@@ -100,42 +95,51 @@ impl Terrain {
         let Some(history) = self.header.history else { return Ok(self) };
         let tip = Commit::read(&*self.source, &self.header, history.tip_page)?;
         let header = Header { history: None, ..tip.original.put_into(&self.header) };
-        let entries = read_directory(&*self.source, &header)?;
-        Ok(Self::of(self.source, header, entries))
+        let table = PageTable::open_beside(&*self.source, &header, &self.table)?;
+        Ok(Self::of(self.source, header, table))
     }
 
-    pub(crate) fn of(source: Box<dyn Source>, header: Header, entries: Vec<Entry>) -> Self {
+    pub(crate) fn of(source: Box<dyn Source>, header: Header, table: PageTable) -> Self {
         static INSTANCES: AtomicU64 = AtomicU64::new(0);
         let instance = INSTANCES.fetch_add(1, Ordering::Relaxed);
-        Self { source, header, entries, pages: OnceLock::new(), codec: OnceLock::new(), instance }
+        Self { source, header, table, pages: OnceLock::new(), codec: OnceLock::new(), instance }
     }
 
     /// Opens any source.
     ///
     /// # Errors
     /// As [`Terrain::open`].
-    pub fn from_source(source: Box<dyn Source>) -> Result<Self, LayoutError> {
-        if starts_packed(&*source)? {
-            return Self::over(Box::new(PackedSource::open(source)?));
-        }
-        Self::over(source)
+    pub fn from_source(mut source: Box<dyn Source>) -> Result<Self, LayoutError> {
+        let opening = Opening::of(&mut *source)?;
+        Self::opened(opening, source)
     }
 
-    /// Opens a source that is the terrain file itself.
-    fn over(source: Box<dyn Source>) -> Result<Self, LayoutError> {
-        let (header, entries) = read_structure(&*source)?;
-        Ok(Self::of(source, header, entries))
+    /// The terrain of a file that was opened, read from `source` from now on.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`] if [`Opening::next`] needs more of it.
+    pub fn opened(opening: Opening, source: Box<dyn Source>) -> Result<Self, LayoutError> {
+        Ok(match opening.into_found()? {
+            Found::Plain(header, table) => Self::of(source, header, table),
+            Found::Packed(packed, header, table) => Self::of(Box::new(packed.over(source)), header, table),
+        })
     }
 
     /// Page of each logical page, counted from [`INERT_PAGE`].
-    pub(crate) fn pages(&self) -> &[u32] {
-        self.pages.get_or_init(|| {
+    ///
+    /// # Errors
+    /// As [`Terrain::check_directory`].
+    pub(crate) fn pages(&self) -> Result<&[u32], LayoutError> {
+        self.check_directory()?;
+        let count = to_usize(self.page_count())?;
+        Ok(self.pages.get_or_init(|| {
             // Zeros that are never written take no memory: most of a void terrain.
-            let mut pages = vec![0; self.entries.len()];
-            let present = self.entries.iter().zip(&mut pages).filter(|(entry, _)| entry.is_present());
-            present.for_each(|(entry, page)| *page = entry.page - INERT_PAGE);
+            let mut pages = vec![0; count];
+            for (logical, entry) in self.table.present() {
+                pages[logical as usize] = entry.page - INERT_PAGE;
+            }
             pages
-        })
+        }))
     }
 
     /// A number that no other opened terrain of this process has, the same file opened twice included: what was made for one is not for another.
@@ -158,9 +162,45 @@ impl Terrain {
         &self.header.grid
     }
 
-    /// The directory: one entry a logical record page.
-    pub fn entries(&self) -> &[Entry] {
-        &self.entries
+    /// Logical record pages: those that the square has, whether they are present or not.
+    pub fn page_count(&self) -> u64 {
+        self.table.pages()
+    }
+
+    /// Where a logical record page lies: its entry in the directory, an absent one for a page that there is not. Reads the directory leaf that it is in if none of its pages was asked for before.
+    ///
+    /// # Errors
+    /// [`LayoutError::Damaged`] naming the leaf if it does not match its checksum, or the entry in it that leads out of the file; I/O.
+    pub fn entry(&self, logical_page: u64) -> Result<Entry, LayoutError> {
+        self.table.entry(&*self.source, logical_page)
+    }
+
+    /// Where a logical record page lies, if that is known without reading: its directory leaf is absent, or was read before.
+    pub fn known_entry(&self, logical_page: u64) -> Option<Entry> {
+        self.table.known(logical_page)
+    }
+
+    /// Reads all directory leaves that were not read yet, and checks the directory as a whole. Pages that [`Terrain::entry`] gives are each where they should be; that none of them has two
+    /// uses, and that there are as many as the header says, only this finds. Whoever takes all records calls it, and whoever writes.
+    ///
+    /// # Errors
+    /// As [`Terrain::entry`]; [`LayoutError::Damaged`] for a page with two uses, and for another number of pages than the header says.
+    pub fn check_directory(&self) -> Result<(), LayoutError> {
+        self.table.check(&*self.source)
+    }
+
+    /// All record pages that are present, in logical order, and where they lie. Reads the whole directory.
+    ///
+    /// # Errors
+    /// As [`Terrain::check_directory`].
+    pub fn present_pages(&self) -> Result<impl Iterator<Item = (u64, Entry)> + '_, LayoutError> {
+        self.check_directory()?;
+        Ok(self.table.present())
+    }
+
+    /// The directory, as far as it was read.
+    pub(crate) fn table(&self) -> &PageTable {
+        &self.table
     }
 
     /// Bytes per sample of the DEM, everything but imagery counted.
@@ -186,8 +226,7 @@ impl Terrain {
     /// # Errors
     /// [`LayoutError::Damaged`] naming the page if it does not match; I/O.
     pub fn checked_page(&self, logical_page: u64) -> Result<Box<Page>, LayoutError> {
-        let entry = self.entries.get(to_usize(logical_page)?).copied();
-        self.checked_page_at(logical_page, entry.unwrap_or_default())
+        self.checked_page_at(logical_page, self.entry(logical_page)?)
     }
 
     /// One record page where `entry` says it lies: where a commit has written it since the terrain was opened, or where it lay in another state of the file. Sources that read reach
@@ -196,18 +235,18 @@ impl Terrain {
     /// # Errors
     /// As [`Terrain::checked_page`].
     pub fn checked_page_at(&self, logical_page: u64, entry: Entry) -> Result<Box<Page>, LayoutError> {
-        if to_usize(logical_page)? >= self.entries.len() {
+        let count = self.page_count();
+        if logical_page >= count {
             return Err(LayoutError::Usage(format!(
-                "page {logical_page} does not exist; the file has {}",
-                self.entries.len()
+                "page {logical_page} does not exist; the file has {count}"
             )));
         }
-        let mut page = Box::new([0; PAGE_BYTES]);
-        let number = if entry.is_present() { entry.page } else { INERT_PAGE };
-        self.source.read_at(u64::from(number) * PAGE_BYTES as u64, &mut page[..])?;
-        if entry.is_present() {
-            self.check_page(logical_page, entry, &page)?;
+        if !entry.is_present() {
+            return Ok(inert_page(self.header.record_kind));
         }
+        let mut page = Box::new([0; PAGE_BYTES]);
+        self.source.read_at(u64::from(entry.page) * PAGE_BYTES as u64, &mut page[..])?;
+        self.check_page(logical_page, entry, &page)?;
         Ok(page)
     }
 
@@ -256,19 +295,4 @@ impl Terrain {
         let Header { grid, height_range_m, has_voids, .. } = self.header;
         RecordShape { codec, grid, height_range_m, has_voids }
     }
-}
-
-/// Whether a source holds packed terrain.
-pub(crate) fn starts_packed(source: &dyn Source) -> Result<bool, LayoutError> {
-    let mut start = [0; 16];
-    let have = source.byte_count().min(start.len() as u64) as usize;
-    source.read_at(0, &mut start[..have])?;
-    Ok(is_packed(&start[..have]))
-}
-
-/// Opens and checks a file that others may append to at this moment.
-#[cfg(feature = "files")]
-fn open_settled(mut file: PreadSource) -> Result<(PreadSource, Header, Vec<Entry>), LayoutError> {
-    let (header, entries) = read_growing(&mut file)?;
-    Ok((file, header, entries))
 }

@@ -71,7 +71,7 @@ fn look(terrain: &Terrain) {
     let grid = *terrain.grid();
     let n = grid.side_steps();
     let step = (n / 16).max(1);
-    if let Some(records) = terrain.records() {
+    if let Ok(records) = terrain.records() {
         with_records!(records, records => {
             for (x, y) in (0..=n).step_by(step as usize).flat_map(|y| (0..=n).map(move |x| (x, y))) {
                 let v = records.vertex_at(GridPoint::new(x, y));

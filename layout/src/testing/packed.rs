@@ -1,11 +1,13 @@
 //! Packed files with nonsense in them and right checksums.
 //!
-//! A recipe changes bytes where something is decided: fields of a header slot, sections, places of tiles, segments, blocks and tables of what was appended. Then every checksum is made right again, from the
-//! bottom up: segments, tables of runs, leaves, blocks, sections, header slots. Record pages keep theirs, as tiles have none of pages. Invariant and cost are those of this module.
+//! A recipe changes bytes where something is decided: fields of a header slot, sections, blocks of directory leaves, places of tiles, segments, blocks and tables of what was appended. Then every checksum is
+//! made right again, from the bottom up: segments, tables of runs, leaves, blocks, sections, the root of a directory that is packed, header slots. Record pages keep theirs, as tiles have none of pages.
+//! Invariant and cost are those of this module.
 
 use crate::file::bytes::{PAGE_BYTES, checksum, get_u16, get_u32, get_u64};
 use crate::grid::Grid;
-use crate::packed::container::ROOT;
+use crate::packed::container::{BLOCKS, INDEX, ROOT, RUNS, Section};
+use crate::packed::leaves::{INDEX_BYTES, PackedLeaves};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES};
 use crate::packed::shape::{Groups, SEGMENTS};
 use std::ops::Range;
@@ -17,6 +19,8 @@ const MOST_BLOCKS: usize = 64;
 const SECTIONS: usize = 0x120;
 const BLOCK: usize = 0x1e8;
 const TABLE_ENTRY: usize = 6;
+/// Logical pages of a grid whose directory is sealed.
+const MOST_PAGES: u64 = 1 << 22;
 
 /// Changes a packed file by a recipe, eight bytes a change: which part (2), where in it (4), how (1), a value (1); and seals it.
 pub fn mutate_packed(file: &mut [u8], recipe: &[u8]) {
@@ -47,6 +51,7 @@ pub fn reseal_packed(file: &mut [u8]) {
             }
             seal(file, block.named_at + 8, block.range());
         }
+        seal_directory(file, slot);
         let sizes = leaf_sizes(file, slot);
         for section in sections(file, slot) {
             let range = range_of(file, section);
@@ -112,6 +117,47 @@ fn sections(file: &[u8], slot: usize) -> impl Iterator<Item = usize> + use<> {
 fn range_of(file: &[u8], section: usize) -> Range<usize> {
     let from = number(file, section + 8, 8);
     from..from.saturating_add(number(file, section + 16, 8))
+}
+
+/// Makes the checksums of directory leaves those of what their blocks say, and that of the root, where the header names the one that is packed.
+fn seal_directory(file: &mut [u8], slot: usize) {
+    const FIRST_PAGE: u64 = 3;
+    let of_kind = |kind: u32| {
+        let found = sections(file, slot).find(|at| number(file, *at, 4) == kind as usize);
+        found.map(|at| range_of(file, at)).filter(|range| range.start <= range.end && range.end <= file.len())
+    };
+    let (Some(runs), Some(index), Some(blocks)) = (of_kind(RUNS), of_kind(INDEX), of_kind(BLOCKS)) else {
+        return;
+    };
+    let section = Section {
+        kind: BLOCKS,
+        checksum: 0,
+        offset: blocks.start as u64,
+        bytes: (blocks.end - blocks.start) as u64,
+    };
+    let record_pages = get_u64(file, slot + 0x068);
+    let pages = [record_pages.min(MOST_PAGES), get_u64(file, slot + 0x110)];
+    let parse = |file: &[u8]| {
+        PackedLeaves::parse(&file[runs.clone()], &file[index.clone()], &section, pages, FIRST_PAGE)
+    };
+    let Some(leaves) = parse(file) else { return };
+    for (at, entry) in index.clone().step_by(INDEX_BYTES).enumerate() {
+        let page = leaves.unchecked_page(at, |offset, block| {
+            let from = offset as usize;
+            block.copy_from_slice(&file[from..from + block.len()]);
+            Ok(())
+        });
+        if let Some(sum) = page.ok().flatten().map(|page| checksum(&page)) {
+            file[entry + 1..entry + 5].copy_from_slice(&sum.to_le_bytes());
+        }
+    }
+    let root_page = FIRST_PAGE + pages[1] + leaves.count();
+    if u64::from(get_u32(file, slot + 0x078)) == root_page
+        && let Some(leaves) = parse(file)
+    {
+        let root = leaves.root(pages[0].div_ceil(256), pages[1]);
+        file[slot + 0x080..slot + 0x084].copy_from_slice(&checksum(&root).to_le_bytes());
+    }
 }
 
 fn leaf_sizes(file: &[u8], slot: usize) -> Vec<usize> {

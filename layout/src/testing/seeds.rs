@@ -45,9 +45,20 @@ fn make_packed() -> Result<Vec<Seed>, LayoutError> {
         tempfile::tempdir().map_err(|e| LayoutError::io(Path::new("."), "cannot make a folder", e))?;
     let [plain, path] = ["plain.iqt", "t.iqt"].map(|name| folder.path().join(name));
     let mut seeds = Vec::new();
-    for name in ["packed", "packed islands", "packed edits", "edited", "draped and painted"] {
+    let names = [
+        "packed",
+        "packed islands",
+        "packed edits",
+        "packed, exact 8",
+        "packed, exact 16",
+        "edited",
+        "draped and painted",
+    ];
+    for name in names {
         match name {
             "packed islands" => islands(&plain)?,
+            "packed, exact 8" => terrain(&plain, RecordKind::Exact8)?,
+            "packed, exact 16" => terrain(&plain, RecordKind::Exact16)?,
             _ => terrain(&plain, RecordKind::Compact)?,
         }
         if name == "packed edits" {

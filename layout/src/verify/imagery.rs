@@ -23,9 +23,9 @@ pub(super) fn check(
     let Some(place) = terrain.header().imagery else { return Ok((0, Findings::default())) };
     let mut findings = Findings::default();
     let section = place.offset / PAGE_BYTES as u64..place.end() / PAGE_BYTES as u64;
-    for (page, entry) in terrain.entries().iter().enumerate() {
+    for (page, entry) in terrain.present_pages()? {
         if section.contains(&u64::from(entry.page)) {
-            findings.add(super::record_page(terrain, page), "its page lies in the imagery section");
+            findings.add(super::record_page(terrain, page as usize), "its page lies in the imagery section");
         }
     }
     let imagery = match Imagery::open(terrain) {
@@ -39,7 +39,7 @@ pub(super) fn check(
     };
     let places = places_of(&imagery);
     // Painted tiles lie between the pages of edits.
-    for (page, entry) in terrain.entries().iter().enumerate().filter(|(_, entry)| entry.is_present()) {
+    for (page, entry) in terrain.present_pages()? {
         let number = u64::from(entry.page);
         let behind = places.partition_point(|(first, ..)| *first <= number);
         if let Some((first, pages, id)) = behind.checked_sub(1).map(|i| places[i])
@@ -47,7 +47,7 @@ pub(super) fn check(
             && !section.contains(&number)
         {
             let problem = format!("its page is also that of imagery {}", crate::imagery::tile_name(id));
-            findings.add(super::record_page(terrain, page), problem);
+            findings.add(super::record_page(terrain, page as usize), problem);
         }
     }
     let ids: Vec<TileId> = imagery.shape().ids().filter(|id| imagery.has_tile(*id)).collect();

@@ -59,7 +59,7 @@ pub(super) fn check<C: RecordCodec>(
             header: terrain.header(),
             reach: &reach,
             edges: &edges,
-            looks_up: present.len() < terrain.entries().len(),
+            looks_up: (present.len() as u64) < terrain.page_count(),
             records: Cache::new(terrain, codec, damaged),
         };
         let mut tally = Tally::default();
@@ -100,7 +100,8 @@ impl<'a, C: RecordCodec> Cache<'a, C> {
     }
 
     fn is_absent(&self, slot: u64) -> bool {
-        self.terrain.entries().get(page_of::<C>(slot) as usize).is_none_or(|e| !e.is_present())
+        // All leaves were read before.
+        self.terrain.known_entry(page_of::<C>(slot)).is_none_or(|entry| !entry.is_present())
     }
 
     fn page(&mut self, page: u32) -> Result<&Page, LayoutError> {
@@ -108,7 +109,7 @@ impl<'a, C: RecordCodec> Cache<'a, C> {
         let (whose, bytes) = place.get_or_insert_with(|| (u32::MAX, Box::new([0; PAGE_BYTES])));
         if *whose != page {
             *whose = u32::MAX;
-            let entry = self.terrain.entries().get(page as usize).copied().unwrap_or_default();
+            let entry = self.terrain.entry(page.into())?;
             let number = if entry.is_present() { entry.page } else { INERT_PAGE };
             self.terrain.source().read_at(u64::from(number) * PAGE_BYTES as u64, &mut bytes[..])?;
             *whose = page;

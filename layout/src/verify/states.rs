@@ -8,10 +8,10 @@
 use super::Findings;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, checksum, to_usize};
-use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses, copy_of};
+use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, PageUses};
 use crate::file::header::Header;
 use crate::file::journal::State;
-use crate::file::structure::{read_leaf, read_root};
+use crate::file::page_table::{Leaf, PageTable, present, read_leaf, read_root};
 use crate::imagery::Imagery;
 use crate::read::terrain::Terrain;
 use rayon::prelude::*;
@@ -47,8 +47,7 @@ pub(super) struct States<'t> {
     names: Vec<String>,
     /// The sound state looked at last: its header, root, entries, and the pages that these take.
     header: Header,
-    root: Vec<Entry>,
-    entries: Vec<Entry>,
+    table: PageTable,
     uses: PageUses,
     journal: Vec<u32>,
     /// Roots and imagery seen.
@@ -61,7 +60,7 @@ pub(super) struct States<'t> {
 }
 
 impl<'t> States<'t> {
-    /// Begins with the state that the terrain is in, which opening has checked.
+    /// Begins with the state that the terrain is in, whose whole directory was checked.
     pub(super) fn of(terrain: &'t Terrain) -> Result<Self, LayoutError> {
         let (source, header) = (terrain.source(), terrain.header());
         let state = State::of(header);
@@ -69,8 +68,7 @@ impl<'t> States<'t> {
             terrain,
             names: Vec::new(),
             header: header.clone(),
-            root: read_root(source, header)?,
-            entries: copy_of(terrain.entries()),
+            table: terrain.table().clone(),
             uses: PageUses::new(source, header.file_bytes)?,
             journal: Vec::new(),
             roots: BTreeSet::from([root_of(&state)]),
@@ -95,9 +93,9 @@ impl<'t> States<'t> {
     fn take_all(&mut self) -> Result<(), LayoutError> {
         let source = self.terrain.source();
         self.uses = PageUses::new(source, self.terrain.header().file_bytes)?;
-        self.uses.take_root(source, &self.header, &self.root)?;
-        for (i, _) in self.root.iter().enumerate().filter(|(_, leaf)| leaf.is_present()) {
-            self.uses.take_entries(source, i * ENTRIES_PER_LEAF, leaf_of(&self.entries, i))?;
+        self.uses.take_root(source, &self.header, self.table.root())?;
+        for (i, _) in self.table.root().iter().enumerate().filter(|(_, leaf)| leaf.is_present()) {
+            self.uses.take_entries(source, i * ENTRIES_PER_LEAF, &self.table.read_leaf(i))?;
         }
         // They were free before.
         self.journal.iter().for_each(|page| _ = self.uses.take((*page).into(), 1));
@@ -148,15 +146,13 @@ impl<'t> States<'t> {
         let source = self.terrain.source();
         self.spend(header.root_entries() * ENTRY_BYTES as u64, "directory root")?;
         let root = read_root(source, header)?;
-        let differing: Vec<usize> = (0..root.len()).filter(|i| root[*i] != self.root[*i]).collect();
+        let differing: Vec<usize> = (0..root.len()).filter(|i| root[*i] != self.table.root()[*i]).collect();
         let mut leaves = Vec::new();
         for i in differing {
-            let mut leaf = vec![Entry::default(); leaf_of(&self.entries, i).len()];
             if root[i].is_present() {
                 self.spend(PAGE, &format!("directory leaf {i}"))?;
-                read_leaf(source, header, i, root[i], &mut leaf)?;
             }
-            leaves.push((i, leaf));
+            leaves.push((i, read_leaf(source, header, i, root[i])?));
         }
         let taken = self.exchange(header, &root, &leaves);
         if taken.is_err() {
@@ -166,16 +162,15 @@ impl<'t> States<'t> {
         let state = (self.names.len() - 1) as u32;
         for (i, leaf) in leaves {
             let first = i * ENTRIES_PER_LEAF;
-            for ((logical, ours), theirs) in (first..).zip(&mut self.entries[first..]).zip(leaf) {
-                if *ours != theirs && theirs.is_present() {
-                    let Entry { page, checksum, .. } = theirs;
-                    let (bytes, index) = (PAGE_BYTES as u32, logical as u32);
-                    self.wanted.push(Wanted { page, bytes, checksum, is_tile: false, index, state });
-                }
-                *ours = theirs;
+            let ours = self.table.read_leaf(i);
+            let pairs = (first..).zip(ours.iter().zip(&leaf));
+            for (logical, (_, theirs)) in pairs.filter(|(_, (a, b))| a != b && b.is_present()) {
+                let Entry { page, checksum, .. } = *theirs;
+                let (bytes, index) = (PAGE_BYTES as u32, logical as u32);
+                self.wanted.push(Wanted { page, bytes, checksum, is_tile: false, index, state });
             }
+            self.table.set_leaf(i, root[i], leaf);
         }
-        self.root = root;
         self.header = header.clone();
         Ok(())
     }
@@ -185,15 +180,15 @@ impl<'t> States<'t> {
         &mut self,
         header: &Header,
         root: &[Entry],
-        leaves: &[(usize, Vec<Entry>)],
+        leaves: &[(usize, Leaf)],
     ) -> Result<(), LayoutError> {
         let source = self.terrain.source();
-        self.uses.give_back_root(&self.header, &self.root);
+        self.uses.give_back_root(&self.header, self.table.root());
         let mut stored = self.header.stored_pages;
         for (i, _) in leaves {
-            let ours = leaf_of(&self.entries, *i);
-            self.uses.give_back_entries(ours);
-            stored -= present(ours);
+            let ours = self.table.read_leaf(*i);
+            self.uses.give_back_entries(&ours);
+            stored -= present(&ours);
         }
         self.uses.take_root(source, header, root)?;
         for (i, leaf) in leaves {
@@ -256,14 +251,4 @@ impl<'t> States<'t> {
 /// What tells one root from another.
 fn root_of(state: &State) -> (u32, u32, u64) {
     (state.root_page, state.root_checksum, state.stored_pages)
-}
-
-/// The entries of a leaf.
-fn leaf_of(entries: &[Entry], i: usize) -> &[Entry] {
-    let first = i * ENTRIES_PER_LEAF;
-    &entries[first..(first + ENTRIES_PER_LEAF).min(entries.len())]
-}
-
-fn present(entries: &[Entry]) -> u64 {
-    entries.iter().filter(|entry| entry.is_present()).count() as u64
 }

@@ -1,6 +1,6 @@
 //! What the directory says besides page numbers: which generation wrote each page, and that entries of absent pages are empty. It also checks whether the header's numbers of voids agree.
 //!
-//! Opening has checked checksums of root and leaves, that every page lies in the file, and that none has two uses. Cost: a look at each entry.
+//! What [`Terrain::check_directory`] finds was checked before: checksums of root and leaves, that every page lies in the file, and that none has two uses. Cost: a look at each entry.
 
 use super::{Findings, record_page};
 use crate::file::entries::Entry;
@@ -9,7 +9,8 @@ use crate::read::terrain::Terrain;
 pub(super) fn check(terrain: &Terrain) -> Findings {
     let header = terrain.header();
     let mut findings = Findings::default();
-    for (page, entry) in terrain.entries().iter().enumerate() {
+    for (page, entry) in terrain.table().listed() {
+        let page = page as usize;
         if entry.is_present() {
             if !(1..=header.generation).contains(&entry.generation) {
                 let problem = format!(
@@ -18,7 +19,7 @@ pub(super) fn check(terrain: &Terrain) -> Findings {
                 );
                 findings.add(record_page(terrain, page), problem);
             }
-        } else if *entry != Entry::default() {
+        } else if entry != Entry::default() {
             findings.add(record_page(terrain, page), "the directory has a checksum or generation for it");
         }
     }

@@ -260,8 +260,8 @@ fn refused(gpu: &Gpu) -> Outcome {
     ensure(matches!(said, Some(SceneError::AnotherTerrain(_))), || format!("{said:?}"))?;
     // Another ground of the same opened terrain takes over.
     let expected = rig.draw(&view, &look);
-    let mut second =
-        Ground::mapped(puget_sound(), Default::default(), Default::default()).ok_or("not mapped")?;
+    let mut second = Ground::mapped(puget_sound(), Default::default(), Default::default())
+        .map_err(|error| error.to_string())?;
     second.update(&view);
     rig.ground = second;
     let seen = rig.draw(&view, &look);

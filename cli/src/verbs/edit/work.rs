@@ -241,14 +241,11 @@ impl Work<'_> {
         self.progress.note(&format!(
             "note: {file}: {problem}: rewriting it with room for {lowest} to {highest} m{ends}"
         ));
-        let was_packed = Terrain::open_unmapped(self.target.file)?.appended_bytes().is_some();
         let new = widen(&SystemDisk, self.target.file, room, WIDEN_MIB, self.progress)?;
         if new.record_kind != header.record_kind {
             let bytes = new.record_kind.bytes();
-            let unpacked =
-                if was_packed { ", and the terrain is no longer packed: only compact ones are" } else { "" };
             complain(&format!(
-                "note: {file}: records take {bytes} bytes now instead of {}{unpacked}",
+                "note: {file}: records take {bytes} bytes now instead of {}",
                 header.record_kind.bytes()
             ));
         }

@@ -68,7 +68,7 @@ pub(crate) struct Pages<C: RecordCodec> {
 
 impl<C: RecordCodec> Pages<C> {
     pub(crate) fn new(terrain: Arc<Terrain>) -> Self {
-        let count = terrain.entries().len();
+        let count = usize::try_from(terrain.page_count()).unwrap_or(usize::MAX);
         Self {
             k: terrain.grid().k(),
             terrain,

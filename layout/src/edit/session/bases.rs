@@ -7,8 +7,8 @@ use crate::error::LayoutError;
 use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
 use crate::file::header::Header;
 use crate::file::journal::State;
+use crate::file::page_table::{Leaf, read_leaf, read_root};
 use crate::file::source::Source;
-use crate::file::structure::{read_leaf, read_root};
 use crate::file::tail::Tail;
 use crate::read::terrain::Terrain;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ pub(crate) struct Bases {
     original: Header,
     root: Vec<Entry>,
     /// The leaf that was asked for last.
-    leaf: Option<(usize, Vec<Entry>)>,
+    leaf: Option<(usize, Box<Leaf>)>,
     pages: Vec<u32>,
 }
 
@@ -56,10 +56,9 @@ impl Bases {
     pub(crate) fn record_page(&mut self, logical: usize) -> Result<(), LayoutError> {
         let (at, within) = (logical / ENTRIES_PER_LEAF, logical % ENTRIES_PER_LEAF);
         if self.leaf.as_ref().is_none_or(|(known, _)| *known != at) {
-            let mut entries = vec![Entry::default(); ENTRIES_PER_LEAF];
             let here = self.root.get(at).copied().unwrap_or_default();
-            read_leaf(self.terrain.source(), &self.original, at, here, &mut entries)?;
-            self.leaf = Some((at, entries));
+            let entries = read_leaf(self.terrain.source(), &self.original, at, here)?;
+            self.leaf = Some((at, Box::new(entries)));
         }
         let entry = self.leaf.as_ref().map(|(_, entries)| entries[within]);
         self.push(entry.unwrap_or_default().page);

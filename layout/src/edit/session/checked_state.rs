@@ -1,21 +1,20 @@
-//! A state that the file is to go to, checked as opening checks it, before any header names it.
+//! A state that the file is to go to, its whole directory checked, before any header names it.
 //!
-//! Undo and redo write nothing but a header. Without this check a nonsensical journal could lead to a file that does not open. Cost: that of opening the file, less the
-//! leaves that the state has in common with the one that is known.
+//! Undo and redo write nothing but a header. Without this check a nonsensical journal could lead to a file that does not open. Cost: that of reading its
+//! directory, less the leaves that the state has in common with the one that is known.
 
 use crate::error::LayoutError;
 use crate::file::bytes::{Page, get_u64};
-use crate::file::directory::Directory;
 use crate::file::entries::Entry;
 use crate::file::header::Header;
-use crate::file::structure::read_directory_beside;
+use crate::file::page_table::PageTable;
 use crate::imagery::Imagery;
 use crate::read::terrain::Terrain;
 
 /// A state that opens.
 pub(super) struct CheckedState {
     /// Its directory.
-    pub(super) directory: Directory,
+    pub(super) directory: PageTable,
     /// Logical pages whose entries are others than those known, and their entries.
     pub(super) differing: Vec<(usize, Entry)>,
 }
@@ -26,7 +25,7 @@ pub(super) struct CheckedState {
 /// What opening the file in that state would say.
 pub(super) fn check_state(
     terrain: &Terrain,
-    known: &Directory,
+    known: &PageTable,
     page: &Page,
 ) -> Result<CheckedState, LayoutError> {
     read_state(terrain, known, page).map_err(|error| match error {
@@ -38,15 +37,13 @@ pub(super) fn check_state(
     })
 }
 
-fn read_state(terrain: &Terrain, known: &Directory, page: &Page) -> Result<CheckedState, LayoutError> {
+fn read_state(terrain: &Terrain, known: &PageTable, page: &Page) -> Result<CheckedState, LayoutError> {
     let magic = get_u64(page, 0).to_le_bytes();
     let header = Header::parse_as(terrain.path(), page, magic)?;
-    let (root, entries) =
-        read_directory_beside(terrain.source(), &header, Some((&known.root, &known.entries)))?;
+    let directory = PageTable::open_beside(terrain.source(), &header, known)?;
+    directory.check(terrain.source())?;
     if let Some(place) = header.imagery {
         Imagery::open_at(terrain, place, header.file_bytes)?;
     }
-    let pairs = entries.iter().zip(&known.entries).enumerate();
-    let differing = pairs.filter(|(_, (theirs, ours))| theirs != ours).map(|(i, (theirs, _))| (i, *theirs));
-    Ok(CheckedState { differing: differing.collect(), directory: Directory { entries, root } })
+    Ok(CheckedState { differing: known.differing(&directory), directory })
 }

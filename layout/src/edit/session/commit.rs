@@ -6,11 +6,12 @@
 use super::bases::Bases;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum};
-use crate::file::directory::{Directory, page_at, put_leaf, root_bytes};
+use crate::file::directory::{page_at, put_leaf, root_bytes};
 use crate::file::disk::Disk;
 use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
 use crate::file::header::{Header, History};
 use crate::file::journal::{Lineage, State};
+use crate::file::page_table::PageTable;
 use crate::file::tail::{Attempt, NextHeader, Tail};
 use crate::imagery::PaintedSection;
 use std::sync::Arc;
@@ -63,7 +64,7 @@ impl CommitJob {
     pub(crate) fn new(
         tail: Tail,
         old: &Header,
-        directory: &Directory,
+        directory: &PageTable,
         lineage: &Lineage,
         mut bases: Option<Bases>,
         mut content: Content<'_>,
@@ -82,10 +83,8 @@ impl CommitJob {
         let mut leaves = Vec::new();
         for of_leaf in entries.chunk_by(|a, b| a.0 / ENTRIES_PER_LEAF == b.0 / ENTRIES_PER_LEAF) {
             let leaf = of_leaf[0].0 / ENTRIES_PER_LEAF;
-            let first = leaf * ENTRIES_PER_LEAF;
-            let last = (first + ENTRIES_PER_LEAF).min(directory.entries.len());
-            let mut all = directory.entries[first..last].to_vec();
-            of_leaf.iter().for_each(|(logical, entry)| all[logical - first] = *entry);
+            let mut all = directory.read_leaf(leaf);
+            of_leaf.iter().for_each(|(logical, entry)| all[logical % ENTRIES_PER_LEAF] = *entry);
             bases.iter_mut().for_each(|bases| bases.leaf(leaf));
             let entry = put_leaf(&all, next_page(&data)?, generation, |bytes| {
                 data.extend_from_slice(bytes);
@@ -93,8 +92,11 @@ impl CommitJob {
             })?;
             leaves.push((leaf, entry));
         }
-        let added = entries.iter().filter(|(logical, _)| !directory.entries[*logical].is_present()).count();
-        let mut root = directory.root.clone();
+        let added = entries
+            .iter()
+            .filter(|(logical, _)| !directory.known(*logical as u64).is_some_and(|old| old.is_present()))
+            .count();
+        let mut root = directory.root().to_vec();
         leaves.iter().for_each(|(leaf, entry)| root[*leaf] = *entry);
         let root = root_bytes(&root);
         let state = State {

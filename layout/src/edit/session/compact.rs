@@ -2,17 +2,17 @@
 
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
-use crate::file::bytes::PAGE_BYTES;
+use crate::file::bytes::{PAGE_BYTES, to_usize};
 use crate::file::directory::{page_at, put_all_leaves, root_bytes};
 use crate::file::disk::Disk;
-use crate::file::entries::{Entry, absent};
+use crate::file::entries::{ENTRIES_PER_LEAF, Entry, absent};
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
 use crate::file::structure::inert_page;
 use crate::file::tail::Tail;
 use crate::imagery::{Append, Imagery, MadeTile};
-use crate::packing::{check_kind, publish_packed};
+use crate::packing::publish_packed;
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -80,9 +80,6 @@ fn write_anew(
         None => Terrain::open_unmapped(file)?,
     };
     let packs = packs || terrain.source().packed_bytes().is_some();
-    if packs {
-        check_kind(file, terrain.header().record_kind)?;
-    }
     let source = terrain.source();
     let bytes_before = source.packed_bytes().unwrap_or_else(|| source.byte_count());
     // A file whose journal is damaged is written anew all the same.
@@ -169,15 +166,15 @@ fn write_terrain(
     writer.put(&[0; 2 * PAGE_BYTES])?;
     debug_assert_eq!(writer.page()?, INERT_PAGE);
     writer.put(&inert_page(old.record_kind)[..])?;
-    let mut entries = absent(terrain.entries().len());
-    let pages = (0u64..).zip(terrain.entries()).zip(&mut entries);
-    for ((logical, entry), place) in pages.filter(|((_, entry), _)| entry.is_present()) {
+    let mut entries = absent(to_usize(terrain.page_count())?);
+    for (logical, entry) in terrain.present_pages()? {
         let page = terrain.checked_page(logical)?;
-        *place = Entry { page: writer.page()?, generation: 1, ..*entry };
+        entries[logical as usize] = Entry { page: writer.page()?, generation: 1, ..entry };
         writer.put(&page[..])?;
         progress.advance(old.records_per_page());
     }
-    let (root, root_page) = put_all_leaves(&entries, writer.page()?, |_, bytes| writer.put(bytes))?;
+    let (root, root_page) =
+        put_all_leaves(entries.chunks(ENTRIES_PER_LEAF), writer.page()?, |_, bytes| writer.put(bytes))?;
     let root = root_bytes(&root);
     writer.put(&root.bytes)?;
     writer.flush()?;

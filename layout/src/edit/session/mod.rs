@@ -16,16 +16,16 @@ pub use past::{HistoryEntry, history};
 use super::{Changes, Edit, Editor, HeightWindow};
 use crate::error::LayoutError;
 use crate::file::bytes::PAGE_BYTES;
-use crate::file::directory::Directory;
 use crate::file::disk::{Disk, SystemDisk};
-use crate::file::entries::{Entry, copy_of};
+use crate::file::entries::Entry;
 use crate::file::header::{Header, ImageryPlace};
 use crate::file::journal::{Lineage, State};
 use crate::file::lock::WriteLock;
 use crate::file::overlay::{Overlaid, create_overlay};
+use crate::file::page_table::PageTable;
 use crate::file::slots::Slots;
 use crate::file::source::{PreadSource, Source};
-use crate::file::structure::{read_directory, read_growing, read_root, read_structure};
+use crate::file::structure::{read_growing, read_structure};
 use crate::file::tail::{Attempt, Attempted, Tail};
 use crate::read::opened::Opened;
 use crate::read::terrain::Terrain;
@@ -85,7 +85,7 @@ pub struct EditSession {
     /// Offset of the file's first byte.
     start: u64,
     slots: Slots,
-    directory: Directory,
+    directory: PageTable,
     original: State,
     attempted: Attempted,
     phase: Phase,
@@ -93,7 +93,7 @@ pub struct EditSession {
 }
 
 impl EditSession {
-    /// Opens the terrain file at `path` for editing.
+    /// Opens the terrain file at `path` for editing, and checks its whole directory: nothing is edited that could not be committed.
     ///
     /// # Errors
     /// As [`Terrain::open`]; [`LayoutError::Usage`] while another program writes to it; [`LayoutError::Io`] if it cannot be written to.
@@ -108,9 +108,9 @@ impl EditSession {
     pub fn open_on(disk: Arc<dyn Disk + Send>, path: &Path) -> Result<Self, LayoutError> {
         let lock = take_lock(path)?;
         let source = Opened::of(over(path, &lock)?)?.into_source();
-        let (header, entries) = read_structure(&*source)?;
+        let (header, table) = read_structure(&*source)?;
         let slots = Slots::read(&*source, 0)?;
-        let terrain = Terrain::of(source, header, entries);
+        let terrain = Terrain::of(source, header, table);
         Self::new(disk, terrain, path, 0, slots, lock)
     }
 
@@ -141,8 +141,8 @@ impl EditSession {
         let overlaid = Overlaid::read(base_file.source_mut(), &mut overlay_file)?;
         let source = overlaid.source(base_file.into_source(), Box::new(overlay_file))?;
         let Overlaid { slots, split: start, .. } = overlaid;
-        let entries = read_directory(&*source, &slots.header)?;
-        let terrain = Terrain::of(source, slots.header.clone(), entries);
+        let table = PageTable::open(&*source, &slots.header)?;
+        let terrain = Terrain::of(source, slots.header.clone(), table);
         Self::new(disk, terrain, overlay, start, slots, lock)
     }
 
@@ -155,8 +155,9 @@ impl EditSession {
         lock: WriteLock,
     ) -> Result<Self, LayoutError> {
         let header = terrain.header().clone();
-        let directory =
-            Directory { entries: copy_of(terrain.entries()), root: read_root(terrain.source(), &header)? };
+        // Before anything is edited that could not be committed.
+        terrain.check_directory()?;
+        let directory = terrain.table().clone();
         let original = Lineage::read(terrain.source(), &header)?.original;
         Ok(Self {
             editor: Editor::new(Arc::new(terrain)),
@@ -190,8 +191,8 @@ impl EditSession {
 
     /// Where a logical page lies in the file as it is now, edits that are not committed apart; absent for pages that the terrain has not.
     pub fn place_of(&self, logical_page: u64) -> Entry {
-        let at = usize::try_from(logical_page).ok();
-        at.and_then(|at| self.directory.entries.get(at)).copied().unwrap_or_default()
+        // The whole directory was read when the session began.
+        self.directory.known(logical_page).unwrap_or_default()
     }
 
     /// What does the session's writing, for jobs of [`EditSession::prepare_commit`] that run elsewhere.
@@ -228,9 +229,8 @@ impl EditSession {
         let needs_original = !self.editor.has_original() && edits.iter().any(Edit::needs_original);
         if needs_original && self.slots.header.history.is_some() {
             let header = Header { history: None, ..self.original.put_into(&self.slots.header) };
-            let entries = read_directory(self.source(), &header)?;
-            let original =
-                Terrain::of(Box::new(Borrowed(Arc::clone(self.editor.terrain()))), header, entries);
+            let table = PageTable::open_beside(self.source(), &header, &self.directory)?;
+            let original = Terrain::of(Box::new(Borrowed(Arc::clone(self.editor.terrain()))), header, table);
             self.editor.set_original(Arc::new(original));
         }
         let changes = self.editor.apply(edits)?;
@@ -348,8 +348,7 @@ impl EditSession {
         let places: Vec<(u64, Entry)> =
             job.entries.iter().map(|(logical, entry)| (*logical as u64, *entry)).collect();
         let committed = Committed { pages: job.pages(), bytes: job.bytes(), places };
-        job.entries.iter().for_each(|(logical, entry)| self.directory.entries[*logical] = *entry);
-        job.leaves.iter().for_each(|(leaf, entry)| self.directory.root[*leaf] = *entry);
+        self.directory.update(&job.next.header, &job.entries, &job.leaves);
         self.slots.flip(job.next.page, job.next.header, job.tail.packed_end().cloned());
         if let Some(section) = job.section {
             self.picture.committed(section);

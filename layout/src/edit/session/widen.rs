@@ -35,8 +35,8 @@ pub fn widen(
     let file = AtomicFile::create(path)?;
     let header = rebuild_into(disk, &terrain, &file, Some(room), memory_mib, progress)?;
     let slots = Slots { current: header.to_page(), current_slot: 0, header, packed_end: None };
-    let rewritten = copy_imagery(disk, &file, slots, &terrain)?;
-    let packs = terrain.source().packed_bytes().is_some() && rewritten.record_kind == RecordKind::Compact;
+    copy_imagery(disk, &file, slots, &terrain)?;
+    let packs = terrain.source().packed_bytes().is_some();
     // Windows replaces no file that is mapped.
     drop(terrain);
     if packs {

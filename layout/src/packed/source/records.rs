@@ -9,7 +9,7 @@ use crate::packed::blocks::{MOST_TILES, Piece, pieces, tiles_of};
 use crate::packed::coder::Decoder;
 use crate::packed::places::{PLACE_BYTES, TilePlace};
 use crate::packed::shape::{TILE_LOG, TileId, TileShape};
-use crate::packed::tile::{INERT, TileRecords};
+use crate::packed::tile::TileRecords;
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
@@ -35,7 +35,7 @@ impl PackedSource {
             if end.is_none_or(|end| end > self.container.packed_bytes) {
                 return Err(damaged("it lies outside the file"));
             }
-            self.inner.read_at(offset, &mut bytes)?;
+            self.read_packed(offset, &mut bytes)?;
             if checksum(&bytes) != sum {
                 return Err(damaged("the checksum does not match"));
             }
@@ -79,7 +79,7 @@ impl PackedSource {
         if place.offset.saturating_add(bytes.len() as u64) > self.container.packed_bytes {
             return Err(damaged("it lies outside the file"));
         }
-        self.inner.read_at(place.offset, &mut bytes)?;
+        self.read_packed(place.offset, &mut bytes)?;
         let begun = Instant::now();
         let mut decoders = Vec::with_capacity(segments);
         let mut rest = &bytes[..];
@@ -93,8 +93,8 @@ impl PackedSource {
             rest = after;
         }
         let scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut scratch = scratch.unwrap_or_default();
-        let records = self.width.read(shape, &self.rules, &mut scratch, &mut decoders);
+        let mut scratch = scratch.unwrap_or_else(|| self.way.scratch());
+        let records = self.way.read(self.width, shape, &mut scratch, &mut decoders);
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
         if decoders.iter().all(Decoder::finish) {
             self.meter.count(bytes.len(), begun.elapsed());
@@ -106,11 +106,10 @@ impl PackedSource {
 
     /// Where a page of the terrain file lies on the ground, as a number that is near for pages near each other; those that are no record pages come first.
     pub(in crate::packed) fn place_of(&self, number: u64) -> u64 {
-        let present =
-            number.checked_sub(FIRST_PAGE).and_then(|at| self.present.get(usize::try_from(at).ok()?));
-        let Some(logical) = present else { return 0 };
+        let nth = number.checked_sub(FIRST_PAGE).filter(|nth| *nth < self.container.pages);
+        let Some(logical) = nth.and_then(|nth| self.logical(nth).ok()) else { return 0 };
         let per_page = self.header.records_per_page();
-        let first = u64::from(*logical) * per_page;
+        let first = logical * per_page;
         // Its middle, or whatever is no ghost.
         let mut slots = (first + per_page / 2..first + per_page).chain(first..first + per_page / 2);
         let point = slots.find_map(|slot| point_of(self.header.grid.k(), slot));
@@ -119,23 +118,24 @@ impl PackedSource {
     }
 
     /// Fills a record page.
-    pub(super) fn record_page(&self, logical: u32, page: &mut Page) -> Result<(), LayoutError> {
+    pub(super) fn record_page(&self, logical: u64, page: &mut Page) -> Result<(), LayoutError> {
         let k = self.header.grid.k();
-        let first = u64::from(logical) * self.header.records_per_page();
+        let first = logical * self.header.records_per_page();
+        page.copy_from_slice(&self.inert[..]);
         let page = page.as_chunks_mut::<4>().0;
-        page.fill(INERT.to_le_bytes());
-        let slots = first..first + page.len() as u64;
+        let words = self.way.words();
+        let slots = first..first + (page.len() / words) as u64;
         let mut near = Near::default();
         for piece in pieces(&self.groups, k, slots) {
             match piece {
                 Piece::Single(slots) => {
-                    let places = &mut page[(slots.start - first) as usize..];
-                    for (slot, place) in slots.zip(places) {
-                        *place = self.record(slot, &mut near)?.to_le_bytes();
+                    let places = &mut page[words * (slots.start - first) as usize..];
+                    for (slot, place) in slots.zip(places.chunks_exact_mut(words)) {
+                        self.record(slot, &mut near, place)?;
                     }
                 }
                 Piece::Block { first: from, slots, block, group, tile } => {
-                    let records = &mut page[(from - first) as usize..][..slots.len()];
+                    let records = &mut page[words * (from - first) as usize..][..words * slots.len()];
                     let mut tiles: [Option<Arc<TileRecords>>; MOST_TILES] = [const { None }; MOST_TILES];
                     for (number, id) in tiles_of(&self.groups, block, &slots, group, tile) {
                         match id {
@@ -144,26 +144,27 @@ impl PackedSource {
                             None => {
                                 for i in block.slots_in(number, &slots) {
                                     let within = i - slots.start;
-                                    records[within] =
-                                        self.record(from + within as u64, &mut near)?.to_le_bytes();
+                                    let record = &mut records[words * within..][..words];
+                                    self.record(from + within as u64, &mut near, record)?;
                                 }
                             }
                         }
                     }
-                    block.gather(
-                        &slots,
-                        &tiles.each_ref().map(|tile| tile.as_ref().map(|t| t.all())),
-                        records,
-                    );
+                    let tiles = tiles.each_ref().map(|tile| tile.as_ref().map(|t| t.all()));
+                    if words == 1 {
+                        block.gather(&slots, &tiles, records);
+                    } else {
+                        block.gather_words(&slots, &tiles, records, words);
+                    }
                 }
             }
         }
         Ok(())
     }
 
-    /// One record.
-    fn record(&self, slot: u64, near: &mut Near) -> Result<u32, LayoutError> {
-        let Some(p) = point_of(self.header.grid.k(), slot) else { return Ok(INERT) };
+    /// Puts one record where an inert one is.
+    fn record(&self, slot: u64, near: &mut Near, to: &mut [[u8; 4]]) -> Result<(), LayoutError> {
+        let Some(p) = point_of(self.header.grid.k(), slot) else { return Ok(()) };
         let octave = self.groups.octave(p);
         let (id, at) = self.groups.tile_of(p, octave);
         let finest = octave.saturating_sub(self.groups.groups[usize::from(id.group)].stride_log);
@@ -177,9 +178,11 @@ impl PackedSource {
                 near.len() - 1
             }
         };
-        let record = near[found].1.as_ref().map_or(INERT, |tile| tile.at(at));
+        if let Some(tile) = &near[found].1 {
+            to.iter_mut().zip(tile.words_at(at)).for_each(|(to, from)| *to = from.to_le_bytes());
+        }
         // The next vertex is likely to be in the same tile.
         near.swap(0, found);
-        Ok(record)
+        Ok(())
     }
 }

@@ -7,6 +7,7 @@ use crate::packed::model::DecodeTables;
 use crate::packed::places::TilePlace;
 use crate::packed::rules::Rules;
 use crate::packed::shape::{TileId, TileShape};
+use crate::packed::way::Way;
 use crate::packed::wide::Width;
 
 impl PackedSource {
@@ -18,8 +19,12 @@ impl PackedSource {
         &*self.inner
     }
 
-    pub(in crate::packed) fn rules(&self) -> &Rules {
-        &self.rules
+    /// `None` where records are exact.
+    pub(in crate::packed) fn rules(&self) -> Option<&Rules> {
+        match &self.way {
+            Way::Compact(rules) => Some(rules),
+            Way::Exact(_) => None,
+        }
     }
 
     pub(in crate::packed) fn tables(&self) -> &DecodeTables {

@@ -34,7 +34,7 @@ pub(super) fn kinds<C: Coder>(
         return false;
     }
     for i in 0..octave.count() {
-        let [west, south] = before(octave, i).map(|at| at.map_or(ORDINARY, |at| scratch.kinds[at]));
+        let [west, south] = octave.before(i).map(|at| at.map_or(ORDINARY, |at| scratch.kinds[at]));
         let mut kind = u16::from(scratch.kinds[i]);
         coder.value(KINDS + KIND_COUNT * u16::from(west) + u16::from(south), i, &mut kind);
         // What no writer makes is taken for ordinary.
@@ -48,19 +48,6 @@ pub(super) fn kinds<C: Coder>(
         (scratch.flat_errors[i], scratch.flat_radii[i]) = (0, 255);
     }
     true
-}
-
-/// The vertices of the same lattice west and south of one.
-fn before(octave: &Octave, i: usize) -> [Option<usize>; 2] {
-    let (first, wide) = if i < octave.whites() {
-        (0, octave.m)
-    } else if i < octave.whites() + octave.easts() {
-        (octave.whites(), octave.m)
-    } else {
-        (octave.whites() + octave.easts(), octave.m + 1)
-    };
-    let within = i - first;
-    [(!within.is_multiple_of(wide)).then(|| i - 1), (within >= wide).then(|| i - wide)]
 }
 
 /// Codes of the fringe vertices, each after the one before it.
@@ -107,7 +94,7 @@ pub(super) fn others<C: Coder>(
         if !is_asked(scratch, i) {
             continue;
         }
-        let [west, south] = before(octave, i).map(|at| u16::from(at.is_some_and(|at| is_other[at])));
+        let [west, south] = octave.before(i).map(|at| u16::from(at.is_some_and(|at| is_other[at])));
         let mut value = u16::from(differs(scratch, i));
         coder.value(OTHERS + 2 * west + south, turn, &mut value);
         is_other[i] = value == 1;

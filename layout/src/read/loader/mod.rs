@@ -4,6 +4,8 @@
 //! again. Waiting pages that lie within the same aligned 64 KiB of the file are read together, because a long read costs little more than a short one. Every page is
 //! checked against its checksum before it is handed over.
 //!
+//! Where a page lies is known from its directory leaf, which is read before the first of its pages. A leaf that cannot be read fails each page of it that was asked for.
+//!
 //! Edits move pages: a commit writes them elsewhere in the file, and an undo leads back to where they were. After a commit [`Loader::relocate`] must be called; from then on pages are read from their
 //! new places. A read that was under way at that moment may bring the page's old content. Such a read is made again before its page is given out.
 //!
@@ -20,6 +22,7 @@ use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page};
 use crate::file::entries::Entry;
 use crate::file::source::ReadJob;
+use crate::file::structure::inert_page;
 use places::Places;
 use queue::Waiting;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -175,7 +178,7 @@ impl Loader {
     /// What was read, unless its page lies elsewhere by now: then it is read again.
     fn if_valid(&self, (arrival, read_from): Sent) -> Option<Arrival> {
         let Some(read_from) = read_from else { return Some(arrival) };
-        if self.shared.lock().places.of(&self.shared.terrain, arrival.page) == read_from {
+        if self.shared.lock().places.of(&self.shared.terrain, arrival.page) == Some(read_from) {
             return Some(arrival);
         }
         self.read_again(arrival.page);
@@ -228,8 +231,34 @@ fn serve(shared: &Shared, arrivals: &Sender<Sent>) {
                 }
                 continue;
             }
-            gather(terrain, first.page, &mut state, &mut runs[begun].pages);
-            begun += 1;
+            match state.places.of(terrain, first.page) {
+                Some(entry) if entry.is_present() => {
+                    gather(terrain, first.page, &mut state, &mut runs[begun].pages);
+                    begun += 1;
+                }
+                Some(absent) => {
+                    let outcome = Outcome::Read(inert_page(terrain.header().record_kind));
+                    state.stats.pages += 1;
+                    if arrivals.send((Arrival { page: first.page, outcome }, Some(absent))).is_err() {
+                        return;
+                    }
+                }
+                None => {
+                    drop(state);
+                    let read = terrain.entry(first.page);
+                    state = shared.lock();
+                    match read {
+                        Ok(_) => state.waiting.ask(first),
+                        Err(error) => {
+                            state.stats.failures += 1;
+                            let failed = Arrival { page: first.page, outcome: Outcome::Failed(error) };
+                            if arrivals.send((failed, None)).is_err() {
+                                return;
+                            }
+                        }
+                    }
+                }
+            }
         }
         if begun == 0 {
             state = shared.work.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -255,10 +284,10 @@ fn gather(terrain: &Terrain, page: u64, state: &mut State, wanted: &mut Vec<(u64
     wanted.clear();
     let State { waiting, places, .. } = state;
     let run_of = |entry: Entry| entry.is_present().then(|| u64::from(entry.page) / RUN_PAGES);
-    let run = run_of(places.of(terrain, page));
+    let run = places.of(terrain, page).and_then(run_of);
     // Files that were edited or have holes keep neighbours elsewhere; then there is less to gather.
     for near in page.saturating_sub(RUN_PAGES - 1)..page + RUN_PAGES {
-        let entry = places.of(terrain, near);
+        let Some(entry) = places.of(terrain, near) else { continue };
         if near == page || (run.is_some() && run_of(entry) == run && waiting.take(near)) {
             wanted.push((near, entry));
         }

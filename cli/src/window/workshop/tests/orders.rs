@@ -68,7 +68,7 @@ fn what_is_told_as_saved_is_on_the_disk_where_it_says() {
             last = terrain.header().generation;
             assert!(!places.is_empty());
             for (page, entry) in places {
-                assert_eq!(terrain.entries()[page as usize], entry);
+                assert_eq!(terrain.entry(page).unwrap(), entry);
                 // Whoever opened the file before can read it there.
                 assert_eq!(opened.checked_page_at(page, entry).unwrap(), terrain.checked_page(page).unwrap());
             }
@@ -134,7 +134,7 @@ fn undo_and_redo_come_after_everything_before_and_bring_pages_and_places() {
                     .ground
                     .pages
                     .iter()
-                    .map(|(page, _)| (*page, terrain.entries()[*page as usize]))
+                    .map(|(page, _)| (*page, terrain.entry(*page).unwrap()))
                     .collect();
                 assert_eq!(seen.ground.places, opened);
                 assert!(!opened.is_empty() && seen.trouble.is_none());

@@ -1,0 +1,221 @@
+"""Tiles of exact records after FORMAT.md, section 9.9: the part of read_packed.py for kinds 2 and 3."""
+import math
+import struct
+
+INERT = {2: b"\0" * 6 + b"\xff\xff", 3: b"\0" * 12 + b"\xff" * 4}
+
+
+def unfold(number):
+    return number >> 1 if number % 2 == 0 else -(number + 1 >> 1)
+
+
+def half(value):
+    return struct.unpack("<Q", struct.pack("<d", abs(value)))[0] >> 51
+
+
+class Rules:
+    def __init__(self, kind, step, base, spacing, k):
+        self.height_bits, self.code_bits, self.mantissa = (32, 16, 23) if kind == 2 else (64, 32, 52)
+        self.step_m, self.base, self.spacing, self.flat = step, base, spacing, []
+        for level in range(2 * k):
+            s = 1 << level // 2
+            leg = s * max(spacing) if level % 2 else s / 2 * math.hypot(*spacing)
+            self.flat.append((self.flat[-1] if level else 0.0) + (leg if level else 0.0))
+
+    def number(self, bits):
+        value = struct.unpack("<f", struct.pack("<I", bits))[0] if self.height_bits == 32 else struct.unpack("<d", struct.pack("<Q", bits))[0]
+        return value if math.isfinite(value) else 0.0
+
+    def nearest(self, value):
+        if not math.isfinite(value):
+            return 0
+        if self.height_bits == 64:
+            return struct.unpack("<Q", struct.pack("<d", value))[0]
+        try:
+            return struct.unpack("<I", struct.pack("<f", value))[0]
+        except OverflowError:
+            return 0
+
+    def order(self, bits):
+        sign = 1 << self.height_bits - 1
+        return ~bits & 2 * sign - 1 if bits & sign else bits | sign
+
+    def back(self, place):
+        sign = 1 << self.height_bits - 1
+        return place ^ sign if place & sign else ~place & 2 * sign - 1
+
+    def code(self, metres):
+        bits = struct.unpack("<I", struct.pack("<f", metres))[0]
+        bits += struct.unpack("<f", struct.pack("<I", bits))[0] < metres
+        return -(-bits // 65536) if self.code_bits == 16 else bits
+
+    def metres(self, code):
+        code &= (1 << self.code_bits - 1) - 1
+        return struct.unpack("<f", struct.pack("<I", code << 32 - self.code_bits))[0]
+
+    def step(self, v, ends):
+        return self.code(abs(v - 0.5 * (ends[0] + ends[1])) * self.step_m * (1.0 + 1e-9))
+
+    def record(self, bits, error, radius):
+        return struct.pack("<IHH" if self.code_bits == 16 else "<QII", bits, error, radius)
+
+
+def row(coder, bits, largest, places, context):
+    """Numbers of vertices, whose context `context` gives by the row's shift."""
+    shift = min(coder.bits.take(6), bits - 1)
+    heads = coder.row([context(p, shift) for p in places])
+    return {p: coder.bits.take(bits) if head == largest else coder.bits.take(shift) | head << shift for p, head in zip(places, heads)}
+
+
+def single(coder, bits, context, turn):
+    head = coder.value(context, turn)
+    return coder.bits.take(bits) if head == 255 else head
+
+
+def tile(segments, rules, octaves, stride_log, is_top, is_last):
+    """Records of a tile by place, as far as it gives them."""
+    size, out, z, known = 1 << octaves, {}, {}, {}
+    hb, cb = rules.height_bits, rules.code_bits
+    mask, sign = (1 << cb) - 1, 1 << cb - 1
+    for p in ((0, 0), (size, 0), (0, size), (size, size)):
+        bits = segments[0].bits.take(hb)
+        z[p] = rules.number(bits)
+        if is_top:
+            error = segments[0].bits.take(cb)
+            out[p] = rules.record(bits, error, segments[0].bits.take(cb))
+    delivered = octaves if is_top else 3
+    for octave in range(octaves - 1, -1, -1):
+        coder, s = segments[2 - min(octave, 2)], 1 << octave
+        gives = octave < delivered
+        if octave == delivered - 1:
+            known = {}
+        inside = lambda p: (p[0] < size or is_last[0]) and (p[1] < size or is_last[1])
+        whites = [(x, y) for y in range(s, size, 2 * s) for x in range(s, size, 2 * s)]
+        easts = [(x, y) for y in range(0, size + 1, 2 * s) for x in range(s, size, 2 * s)]
+        norths = [(x, y) for y in range(s, size, 2 * s) for x in range(0, size + 1, 2 * s)]
+        vertices, kinds, codes, raw, around = whites + easts + norths, {}, {}, {}, {}
+        white = set(whites)
+        before = lambda marks, p: [marks.get((p[0] - 2 * s, p[1]), 0), marks.get((p[0], p[1] - 2 * s), 0)]
+        if gives and coder.bits.take(1):
+            for turn, p in enumerate(vertices):
+                west, south = before(kinds, p)
+                kinds[p] = coder.value(384 + 3 * west + south, turn)
+            error, radius, turn = sign, 0, 0
+            for p in (p for p in vertices if kinds[p] == 2):
+                error = error + unfold(single(coder, cb, 400, turn)) & mask
+                radius = radius + unfold(single(coder, cb, 401, turn + 1)) & mask
+                codes[p], turn = (error, radius), turn + 2
+        ordinary = [p for p in vertices if not kinds.get(p)]
+        # Heights.
+        e = {(x, y): z[x, y] for y in range(0, size + 1, 2 * s) for x in range(0, size + 1, 2 * s)}
+        for y in range(0, size + 1, 2 * s):
+            e[-2 * s, y] = 2 * e[0, y] - e[2 * s, y]
+            e[size + 2 * s, y] = 2 * e[size, y] - e[size - 2 * s, y]
+        for x in range(-2 * s, size + 2 * s + 1, 2 * s):
+            e[x, -2 * s] = 2 * e[x, 0] - e[x, 2 * s]
+            e[x, size + 2 * s] = 2 * e[x, size] - e[x, size - 2 * s]
+
+        def heights(places, first, near, far):
+            uneven = {}
+            for p in places:
+                a, b, c, d = around[p] = [e[p[0] + dx * s, p[1] + dy * s] for dx, dy in near(p)]
+                eight = 0.0
+                for i, (dx, dy) in enumerate(far(p)):
+                    eight = eight + e[p[0] + dx * s, p[1] + dy * s] if i else e[p[0] + dx * s, p[1] + dy * s]
+                four = a + b + c + d
+                raw[p] = rules.nearest((10.0 * four - eight) / 32.0)
+                uneven[p] = 8.0 * abs(a + b - c - d) + abs(2.0 * four - eight) + 2.0 * (max(a, b, c, d) - min(a, b, c, d))
+
+            def context(p, shift):
+                last = half(rules.number(raw[p])) // 2 * 2 - 2 * rules.mantissa
+                return first + min(max(half(uneven[p]) - last - 2 * shift - 4, 0), 31)
+
+            found = row(coder, hb, 65535, [p for p in places if kinds.get(p) != 1], context)
+            for p in places:
+                if p in found:
+                    raw[p] = rules.back(rules.order(raw[p]) + unfold(found[p]) & (1 << hb) - 1)
+                z[p] = rules.number(raw[p])
+
+        q = min(octave, 3) if gives else 3
+        near = [(-1, -1), (1, 1), (1, -1), (-1, 1)]
+        far = [(-3, -1), (-3, 1), (3, -1), (3, 1), (-1, -3), (1, -3), (-1, 3), (1, 3)]
+        heights(whites, 64 * q, lambda p: near, lambda p: far)
+        e.update((p, z[p]) for p in whites)
+        for y in range(s, size, 2 * s):
+            e[-s, y] = e[0, y - s] + e[0, y + s] - e[s, y]
+            e[size + s, y] = e[size, y - s] + e[size, y + s] - e[size - s, y]
+        for x in range(-s, size + s + 1, 2 * s):
+            e[x, -s] = e[x - s, 0] + e[x + s, 0] - e[x, s]
+            e[x, size + s] = e[x - s, size] + e[x + s, size] - e[x, size - s]
+        is_east = lambda p: p[0] // s % 2 == 1
+        diamond = lambda p: [(-1, 0), (1, 0), (0, -1), (0, 1)] if is_east(p) else [(0, -1), (0, 1), (-1, 0), (1, 0)]
+        wide, tall = [(-2, -1), (-2, 1), (2, -1), (2, 1)], [(-1, -2), (1, -2), (-1, 2), (1, 2)]
+        knights = lambda p: wide + tall if is_east(p) else tall + wide  # the order of a sum decides its last bit
+        heights(easts + norths, 64 * q + 32, diamond, knights)
+        if not gives:
+            continue
+        # Codes.
+        climbs = lambda p: (p[0] // (2 * s) + p[1] // (2 * s)) % 2 == 0
+        step = lambda p: rules.step(z[p], around[p][:2] if p not in white or climbs(p) else around[p][2:])
+        if stride_log + octave == 0:
+            rule = {p: (step(p), 0) for p in easts + norths}
+            for x, y in whites:
+                beside, along = [(x - 1, y), (x + 1, y)], [(x, y - 1), (x, y + 1)]
+                error = max([step((x, y))] + [rule[p][0] for p in beside + along if not kinds.get(p)])
+                radius = 0.0
+                for g, children in zip(rules.spacing, (beside, along)):
+                    for w in children:
+                        r = z[x, y] * rules.step_m - ((rules.base + z[w] * rules.step_m) - rules.base)
+                        radius = max(radius, math.sqrt(g * g + r * r) * (1.0 + 1.0 / (1 << 19)))
+                rule[x, y] = error, rules.code(radius)
+            codes.update((p, rule[p]) for p in ordinary)
+            if coder.bits.take(1):
+                other, turn = {}, 0
+                for p in (p for p in ordinary if inside(p)):
+                    west, south = before(other, p)
+                    other[p], turn = coder.value(393 + 2 * west + south, turn), turn + 1
+                    if other[p]:
+                        error = codes[p][0] + unfold(single(coder, cb, 402, turn)) & mask
+                        radius = codes[p][1] + unfold(single(coder, cb, 403, turn + 1)) & mask
+                        codes[p], turn = (error, radius), turn + 2
+        else:
+            for colour, places in enumerate((whites, easts + norths)):
+                asked, errors, radii, level = [], {}, {}, 2 * (stride_log + octave) + 1 - colour
+                for p in (p for p in places if not kinds.get(p) and inside(p)):
+                    if p in white:
+                        offsets = [(1, -1), (-1, 1)] if climbs(p) else [(-1, -1), (1, 1)]
+                    else:
+                        offsets = [(0, -1), (0, 1)] if is_east(p) else [(-1, 0), (1, 0)]
+                    parents = [known[q] for q in ((p[0] + dx * s, p[1] + dy * s) for dx, dy in offsets) if q in known]
+                    reach = max(around[p]) - min(around[p])
+                    slope = reach * rules.step_m / ((1 << stride_log + octave) * rules.spacing[0])
+                    if parents:
+                        most = min(error for error, _ in parents)
+                        y = (max(most - step(p), 0) >> cb - 16) + 1
+                        n = y.bit_length()
+                        errors[p] = most, min(2 * (n - 1) + (y >> n - 2 & 1 if n > 1 else 0), 30)
+                    else:
+                        errors[p] = rules.code(reach * rules.step_m), 31
+                    if parents and level + 1 < len(rules.flat):
+                        radius = rules.metres(max(radius for _, radius in parents)) * (rules.flat[level] / rules.flat[level + 1])
+                    else:
+                        radius = rules.flat[level] * math.sqrt(1.0 + slope * slope)
+                    kind = min(max(half(slope) - half(1.0) + 12, 0), 15) + (16 if parents else 0)
+                    radii[p] = rules.code(radius) if math.isfinite(radius) else 0, kind
+                    asked.append(p)
+                first = 32 * colour
+                found = row(coder, cb, 255, asked, lambda p, _: 256 + first + errors[p][1])
+                lies = row(coder, cb, 255, asked, lambda p, _: 320 + first + radii[p][1])
+                for p in asked:
+                    most, kind = errors[p]
+                    error = most + unfold(found[p]) if kind == 31 else most - found[p]
+                    codes[p] = error & mask, radii[p][0] + unfold(lies[p]) & mask
+                known.update((p, codes[p]) for p in asked)
+        for p in vertices:
+            if kinds.get(p) == 1:
+                out[p] = INERT[2 if cb == 16 else 3]
+            elif inside(p):
+                out[p] = rules.record(raw[p], *codes[p])
+    for segment in segments:
+        segment.check()
+    return {p: record for p, record in out.items() if inside(p) or is_top}

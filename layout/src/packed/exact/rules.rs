@@ -1,0 +1,99 @@
+//! What follows from heights: errors and radii of the two finest levels, as a build makes them, and what others are expected to be.
+
+use super::form::Form;
+use crate::grid::Grid;
+use crate::grid::record::{RecordScale, f32_at_least};
+
+/// Factors on errors and on radii that a build applies before it rounds up.
+const ERROR_MARGIN: f64 = 1.0 + 1e-9;
+const RADIUS_MARGIN: f64 = 1.0 + 1.0 / (1 << 19) as f64;
+
+/// Numbers of one file.
+#[derive(Debug)]
+pub(crate) struct Rules {
+    form: Form,
+    step_m: f64,
+    base_m: f64,
+    spacing_m: [f64; 2],
+    flat_m: Vec<f64>,
+}
+
+impl Rules {
+    pub(crate) fn new(form: Form, grid: &Grid, scale: &RecordScale) -> Self {
+        Self {
+            form,
+            step_m: scale.height_step_m,
+            base_m: scale.height_base_m,
+            spacing_m: grid.spacing_m(),
+            flat_m: (0..grid.levels()).map(|level| grid.flat_radius_m(level)).collect(),
+        }
+    }
+
+    pub(crate) fn form(&self) -> Form {
+        self.form
+    }
+
+    /// The code of the smallest error or radius that is at least `metres`.
+    #[inline(always)]
+    pub(super) fn at_least(&self, metres: f64) -> u32 {
+        // What heights beyond all numbers lead to counts as 0.
+        let bits = if metres.is_nan() { 0 } else { f32_at_least(metres).to_bits() & !(1 << 31) };
+        match self.form {
+            Form::Single => bits.div_ceil(0x1_0000),
+            Form::Double => bits,
+        }
+    }
+
+    /// Metres of a code without its sign.
+    #[inline(always)]
+    pub(super) fn metres(&self, code: u32) -> f64 {
+        let code = code & !self.form.sign();
+        f64::from(match self.form {
+            Form::Single => f32::from_bits(code << 16),
+            Form::Double => f32::from_bits(code),
+        })
+    }
+
+    /// The error code of a vertex alone: how far it is from the middle of its edge.
+    #[inline(always)]
+    pub(super) fn step(&self, v: f64, b: f64, d: f64) -> u32 {
+        self.at_least((v - 0.5 * (b + d)).abs() * self.step_m * ERROR_MARGIN)
+    }
+
+    /// The radius code of a vertex of level 1, from its height and those of its children beside, and north and south.
+    #[inline(always)]
+    pub(super) fn radius(&self, v: f64, beside: [f64; 2], along: [f64; 2]) -> u32 {
+        let mut radius_m = 0.0f64;
+        for (spacing_m, children) in self.spacing_m.into_iter().zip([beside, along]) {
+            for child in children {
+                let child_m = self.base_m + child * self.step_m - self.base_m;
+                let rise_m = v * self.step_m - child_m;
+                radius_m = radius_m.max((spacing_m * spacing_m + rise_m * rise_m).sqrt() * RADIUS_MARGIN);
+            }
+        }
+        self.at_least(radius_m)
+    }
+
+    /// The error code that a range of heights would have.
+    #[inline(always)]
+    pub(super) fn of_range(&self, range: f64) -> u32 {
+        self.at_least(range * self.step_m)
+    }
+
+    /// How steep a range of heights is over the steps of an octave.
+    #[inline(always)]
+    pub(super) fn slope(&self, range: f64, octave: u32) -> f64 {
+        range * self.step_m / (f64::from(1u32 << octave) * self.spacing_m[0])
+    }
+
+    /// The radius code expected at a level: that of the parents' larger radius over flat ground's; without parents, of the slope.
+    #[inline(always)]
+    pub(super) fn expected_radius(&self, level: usize, parents: Option<u32>, slope: f64) -> u32 {
+        let flat_m = self.flat_m.get(level).copied().unwrap_or(0.0);
+        let radius_m = match (parents, self.flat_m.get(level + 1)) {
+            (Some(code), Some(above_m)) => self.metres(code) * (flat_m / above_m),
+            _ => flat_m * (1.0 + slope * slope).sqrt(),
+        };
+        if radius_m.is_finite() { self.at_least(radius_m) } else { 0 }
+    }
+}

@@ -1,0 +1,144 @@
+//! Tiles of exact records through the coder and back.
+
+use super::{Form, Rules, Scratch, walk};
+use crate::grid::Grid;
+use crate::grid::record::RecordScale;
+use crate::mix::Random;
+use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
+use crate::packed::model::{CONTEXTS, DecodeTables, Model};
+use crate::packed::shape::{SEGMENTS, TileShape};
+use crate::packed::tile::TileRecords;
+use crate::packed::token::TOKENS;
+use proptest::prelude::*;
+
+fn rules(form: Form) -> Rules {
+    let grid = Grid::new([1025, 1025], [10.0, 12.0]).unwrap();
+    let scale = RecordScale {
+        height_base_m: 0.0,
+        height_step_m: 1.0,
+        error_top_m: 3000.0,
+        radius_steps_per_octave: 64,
+    };
+    Rules::new(form, &grid, &scale)
+}
+
+/// Smooth heights, voids, fringe, and records of which anything may be true, by `wildness`.
+fn records(form: Form, shape: &TileShape, seed: u64, wildness: u64) -> TileRecords {
+    let mut random = Random::new(seed);
+    let [a, b] = [random.below(50) as f64, random.below(40) as f64];
+    TileRecords::gathered(shape, form.inert_words(), |[x, y], words| {
+        let is_void = wildness > 0 && (x / 9 + y / 7) % 4 == 0;
+        let (x, y) = (f64::from(x), f64::from(y));
+        let height =
+            20.0 + 0.3 * a * x - 0.17 * b * y + x * y / 41.0 + random.below(1 + wildness) as f64 / 977.0;
+        let any = random.below(12);
+        if is_void {
+            return;
+        }
+        if any == 0 && wildness > 100 {
+            words.iter_mut().for_each(|word| *word = random.below(1 << 32) as u32);
+            return;
+        }
+        let mut codes = [40.0f32 + random.below(9) as f32, random.below(5) as f32];
+        if any == 1 && wildness > 0 {
+            codes = [-codes[0], if random.below(2) == 0 { codes[1] } else { -codes[1] }];
+        }
+        let [error, radius] = codes.map(f32::to_bits);
+        match words {
+            [value, both] => {
+                (*value, *both) = ((height as f32).to_bits(), error >> 16 | radius & 0xffff_0000)
+            }
+            [low, high, of_error, of_radius] => {
+                (*low, *high) = (height.to_bits() as u32, (height.to_bits() >> 32) as u32);
+                (*of_error, *of_radius) = (error, radius);
+            }
+            _ => unreachable!(),
+        }
+    })
+}
+
+/// What a tile of this shape gives, down to an octave.
+fn given(shape: &TileShape, records: &TileRecords, finest: u32) -> Vec<([u32; 2], Vec<u32>)> {
+    let last = 1u32 << shape.tile_log;
+    let all = (0..=last).flat_map(|y| (0..=last).map(move |x| [x, y]));
+    all.filter(|[x, y]| {
+        if x % last == 0 && y % last == 0 {
+            return shape.is_top;
+        }
+        (finest..shape.delivered()).contains(&(x | y).trailing_zeros())
+            && (*x < last || shape.is_last[0])
+            && (*y < last || shape.is_last[1])
+    })
+    .map(|at| (at, records.words_at(at).to_vec()))
+    .collect()
+}
+
+fn shapes() -> impl Strategy<Value = TileShape> {
+    (prop_oneof![Just(0u32), Just(3)], 1u32..=6, any::<bool>(), any::<[bool; 2]>()).prop_map(
+        |(stride_log, tile_log, is_top, is_last)| TileShape {
+            stride_log,
+            tile_log: if is_top { tile_log } else { 6 },
+            is_top,
+            is_last: if is_top { [true; 2] } else { is_last },
+        },
+    )
+}
+
+fn model_of(encoders: &[Encoder]) -> Model {
+    let mut counts = vec![[0; TOKENS]; CONTEXTS];
+    encoders.iter().for_each(|encoder| encoder.count(&mut counts));
+    Model::from_counts(&counts)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn tiles_come_back(shape in shapes(), seed: u64, double: bool, wildness in prop_oneof![Just(0u64), Just(9), Just(60_000)]) {
+        let form = if double { Form::Double } else { Form::Single };
+        let (rules, truth, mut scratch) = (rules(form), records(form, &shape, seed, wildness), Scratch::default());
+        let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
+        walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
+        let model = model_of(&encoders);
+        let segments = encoders.map(|encoder| encoder.finish(&model).unwrap());
+        let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
+        walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
+        let plain = encoders.map(PlainEncoder::finish);
+        let tables = DecodeTables::of(&model);
+        for (segments, count) in [(&segments, 3), (&segments, 2), (&segments, 1), (&plain, 3)] {
+            prop_assert!(segments.iter().all(|segment| segment.len() < 1 << 16));
+            let mut decoders: Vec<Decoder<'_>> =
+                segments[..count].iter().map(|bytes| Decoder::new(&tables, bytes).unwrap()).collect();
+            let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
+            prop_assert!(decoders.iter().all(|decoder| decoder.finish()));
+            let finest = ((SEGMENTS - count) as u32).min(shape.tile_log);
+            prop_assert_eq!(found.finest, finest);
+            prop_assert_eq!(given(&shape, &found, finest), given(&shape, &truth, finest));
+        }
+    }
+
+    /// Any bytes: a tile or none.
+    #[test]
+    fn any_bytes_are_a_tile_or_none(shape in shapes(), seed: u64, double: bool, bytes in prop::collection::vec(any::<u8>(), 0..900)) {
+        let form = if double { Form::Double } else { Form::Single };
+        let (rules, mut scratch) = (rules(form), Scratch::default());
+        let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
+        walk(&shape, &rules, &mut scratch, &mut encoders, Some(&records(form, &shape, seed, 9)));
+        let model = model_of(&encoders);
+        let tables = DecodeTables::of(&model);
+        let mut segments = encoders.map(|encoder| encoder.finish(&model).unwrap());
+        let mut random = Random::new(seed);
+        for segment in &mut segments {
+            let at = random.below(segment.len() as u64) as usize;
+            match random.below(4) {
+                0 => segment.truncate(at),
+                1 => segment[at] ^= 1 << random.below(8),
+                2 => *segment = bytes.clone(),
+                _ => segment.extend(&bytes),
+            }
+        }
+        let mut decoders: Vec<_> = segments.iter().map_while(|bytes| Decoder::new(&tables, bytes)).collect();
+        let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
+        prop_assert!(found.finest <= shape.tile_log);
+    }
+}

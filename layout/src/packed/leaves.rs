@@ -1,0 +1,285 @@
+//! Directory leaves of the terrain file as a packed one has them (FORMAT.md, section 9.7): which there are, how many pages each has, and its checksum stand at the file's front; which pages those are, and
+//! their checksums, in a block for each leaf, which is read when a page of it is asked for.
+//!
+//! Invariant: the blocks of all leaves lie in the section that holds them, so a file claims no more pages than it has four bytes each for. Cost: 72 bytes a leaf that is present.
+
+use super::container::Section;
+use crate::error::LayoutError;
+use crate::file::bytes::{checksum, get_u32, put_u32};
+use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// Bytes of a leaf in the list of leaves.
+pub(crate) const INDEX_BYTES: usize = 5;
+/// Bytes of the bits that say which pages of a leaf are present.
+const BITS_BYTES: usize = ENTRIES_PER_LEAF / 8;
+/// Which pages of a leaf are present, the first one lowest.
+type Bits = [u64; ENTRIES_PER_LEAF / 64];
+
+/// A leaf that is present.
+#[derive(Debug, Clone, Copy)]
+struct PackedLeaf {
+    /// Its place in the root.
+    number: u32,
+    /// CRC-32 of the page that it is in the terrain file.
+    checksum: u32,
+    /// Record pages of the leaves before it.
+    first: u64,
+    pages: usize,
+    /// First byte of its block in the file.
+    block: u64,
+}
+
+impl PackedLeaf {
+    fn block_bytes(&self) -> usize {
+        block_bytes(self.pages)
+    }
+}
+
+/// Bytes of the block of a leaf with so many pages.
+fn block_bytes(pages: usize) -> usize {
+    4 * pages + if pages < ENTRIES_PER_LEAF { BITS_BYTES } else { 0 }
+}
+
+/// All leaves that are present.
+pub(crate) struct PackedLeaves {
+    leaves: Vec<PackedLeaf>,
+    /// Which pages of each are present, once its block was read.
+    bits: Vec<OnceLock<Bits>>,
+    /// Logical pages of the terrain.
+    record_pages: u64,
+    /// Number of the terrain file's first record page.
+    first_page: u64,
+}
+
+impl PackedLeaves {
+    /// From the sections of a file that packs `packed_pages` of `record_pages` pages, which begin with page `first_page` of the terrain file. `None` if they contradict that.
+    pub(crate) fn parse(
+        runs: &[u8],
+        index: &[u8],
+        blocks: &Section,
+        [record_pages, packed_pages]: [u64; 2],
+        first_page: u64,
+    ) -> Option<Self> {
+        let (index, rest) = index.as_chunks::<INDEX_BYTES>();
+        let numbers =
+            present_numbers(runs, record_pages.div_ceil(ENTRIES_PER_LEAF as u64), index.len() as u64)?;
+        let (mut first, mut block) = (0, blocks.offset);
+        let mut leaves = Vec::with_capacity(numbers.len());
+        for (number, entry) in numbers.into_iter().zip(index) {
+            let pages = usize::from(entry[0]) + 1;
+            leaves.push(PackedLeaf { number, checksum: get_u32(entry, 1), first, pages, block });
+            first += pages as u64;
+            block = block.checked_add(block_bytes(pages) as u64)?;
+        }
+        let is_whole = rest.is_empty()
+            && first == packed_pages
+            && Some(block) == blocks.offset.checked_add(blocks.bytes);
+        let bits = (0..leaves.len()).map(|_| OnceLock::new()).collect();
+        is_whole.then_some(Self { leaves, bits, record_pages, first_page })
+    }
+
+    /// How many there are.
+    pub(crate) fn count(&self) -> u64 {
+        self.leaves.len() as u64
+    }
+
+    /// The terrain file's page that leaf `at`, of those that are present, is. `read` fills a buffer with the bytes at an offset of the packed file.
+    ///
+    /// # Errors
+    /// [`LayoutError::Damaged`] naming the leaf if its block does not give the page with its checksum; I/O.
+    pub(crate) fn page(
+        &self,
+        path: &Path,
+        at: usize,
+        read: impl FnOnce(u64, &mut [u8]) -> Result<(), LayoutError>,
+    ) -> Result<Vec<u8>, LayoutError> {
+        let leaf = &self.leaves[at];
+        let page = self.unchecked_page(at, read)?.filter(|page| checksum(page) == leaf.checksum);
+        let Some(page) = page else {
+            let place = format!("directory leaf {}", leaf.number);
+            return Err(LayoutError::damaged_terrain(path, place, "the checksum does not match"));
+        };
+        let mut present = Bits::default();
+        for i in (0..ENTRIES_PER_LEAF).filter(|i| Entry::read(&page, *i).is_present()) {
+            present[i / 64] |= 1 << (i % 64);
+        }
+        let _ = self.bits[at].set(present);
+        Ok(page)
+    }
+
+    /// As [`PackedLeaves::page`], whatever its checksum; `None` if the block has another number of pages than is said of it.
+    pub(crate) fn unchecked_page(
+        &self,
+        at: usize,
+        read: impl FnOnce(u64, &mut [u8]) -> Result<(), LayoutError>,
+    ) -> Result<Option<Vec<u8>>, LayoutError> {
+        let leaf = &self.leaves[at];
+        let mut block = vec![0; leaf.block_bytes()];
+        read(leaf.block, &mut block)?;
+        let (bits, sums) = block.split_at(block.len() - 4 * leaf.pages);
+        let is_present = |i: usize| bits.get(i / 8).is_none_or(|byte| byte >> (i % 8) & 1 == 1);
+        let places: Vec<usize> = (0..ENTRIES_PER_LEAF).filter(|i| is_present(*i)).collect();
+        let first = u64::from(leaf.number) * ENTRIES_PER_LEAF as u64;
+        let most = self.record_pages.saturating_sub(first);
+        if places.len() != leaf.pages || places.last().is_some_and(|last| *last as u64 >= most) {
+            return Ok(None);
+        }
+        let mut entries = [Entry::default(); ENTRIES_PER_LEAF];
+        for ((page, i), sum) in (self.first_page + leaf.first..).zip(places).zip(sums.as_chunks::<4>().0) {
+            entries[i] = Entry { page: page as u32, checksum: u32::from_le_bytes(*sum), generation: 1 };
+        }
+        Ok(Some(leaf_page(&entries)))
+    }
+
+    /// The logical page that is the `nth` of those that are packed.
+    ///
+    /// # Errors
+    /// As [`PackedLeaves::page`].
+    pub(crate) fn logical(
+        &self,
+        path: &Path,
+        nth: u64,
+        read: impl FnOnce(u64, &mut [u8]) -> Result<(), LayoutError>,
+    ) -> Result<u64, LayoutError> {
+        let at = self.leaves.partition_point(|leaf| leaf.first <= nth).saturating_sub(1);
+        let leaf = &self.leaves[at];
+        if leaf.pages < ENTRIES_PER_LEAF && self.bits[at].get().is_none() {
+            self.page(path, at, read)?;
+        }
+        let mut within = (nth - leaf.first) as u32;
+        let bits = self.bits[at].get().copied().unwrap_or([u64::MAX; ENTRIES_PER_LEAF / 64]);
+        let mut place = 0;
+        for word in bits {
+            if within < word.count_ones() {
+                place += nth_bit(word, within);
+                break;
+            }
+            within -= word.count_ones();
+            place += 64;
+        }
+        Ok(u64::from(leaf.number) * ENTRIES_PER_LEAF as u64 + u64::from(place))
+    }
+
+    /// The root of the terrain file's directory, `entries` entries long.
+    pub(crate) fn root(&self, entries: u64, packed_pages: u64) -> Vec<u8> {
+        let mut bytes = vec![0; entries as usize * ENTRY_BYTES];
+        let first = self.first_page + packed_pages;
+        for (page, leaf) in (first..).zip(&self.leaves) {
+            let entry = Entry { page: page as u32, checksum: leaf.checksum, generation: 1 };
+            entry.write(&mut bytes, leaf.number as usize);
+        }
+        bytes
+    }
+}
+
+/// Place of the `nth` bit that is set.
+fn nth_bit(mut word: u64, nth: u32) -> u32 {
+    for _ in 0..nth {
+        word &= word.wrapping_sub(1);
+    }
+    word.trailing_zeros()
+}
+
+/// The sections of the directory with these leaves, of at most 256 entries each: runs of absent and present leaves, the list, the blocks.
+#[cfg(feature = "files")]
+pub(crate) fn packed_leaves<'e>(leaves: impl Iterator<Item = &'e [Entry]> + Clone) -> [Vec<u8>; 3] {
+    let present = |leaf: &[Entry]| leaf.iter().filter(|entry| entry.is_present()).count();
+    let runs = runs_of(leaves.clone().map(|leaf| present(leaf) > 0));
+    let (mut index, mut blocks) = (Vec::new(), Vec::new());
+    for leaf in leaves {
+        let count = present(leaf);
+        if count == 0 {
+            continue;
+        }
+        index.push((count - 1) as u8);
+        let at = index.len();
+        index.resize(at + 4, 0);
+        put_u32(&mut index, at, checksum(&leaf_page(leaf)));
+        if count < ENTRIES_PER_LEAF {
+            let mut bits = [0; BITS_BYTES];
+            for (i, _) in leaf.iter().enumerate().filter(|(_, entry)| entry.is_present()) {
+                bits[i / 8] |= 1 << (i % 8);
+            }
+            blocks.extend(bits);
+        }
+        blocks.extend(
+            leaf.iter().filter(|entry| entry.is_present()).flat_map(|entry| entry.checksum.to_le_bytes()),
+        );
+    }
+    [runs, index, blocks]
+}
+
+/// Runs of absent and present things in turn, absent ones first, seven bits a byte, the low ones first.
+#[cfg(any(test, feature = "files"))]
+fn runs_of(is_present: impl Iterator<Item = bool>) -> Vec<u8> {
+    let (mut bytes, mut now, mut run) = (Vec::new(), false, 0u64);
+    let mut put = |mut run: u64| {
+        while run >= 128 {
+            bytes.push(run as u8 | 128);
+            run >>= 7;
+        }
+        bytes.push(run as u8);
+    };
+    for present in is_present {
+        if present != now {
+            put(run);
+            (now, run) = (present, 0);
+        }
+        run += 1;
+    }
+    put(run);
+    bytes
+}
+
+/// Numbers of those that are present, of which there are `count` among `all`. `None` if the bytes say anything else.
+fn present_numbers(bytes: &[u8], all: u64, count: u64) -> Option<Vec<u32>> {
+    let mut present = Vec::new();
+    let (mut at, mut is_present, mut bytes) = (0u64, false, bytes.iter());
+    while at < all {
+        let mut run = 0u64;
+        for shift in (0..).step_by(7) {
+            let byte = bytes.next().filter(|_| shift < 63)?;
+            run |= u64::from(byte & 127) << shift;
+            if byte & 128 == 0 {
+                break;
+            }
+        }
+        let end = at.checked_add(run).filter(|end| *end <= all)?;
+        if is_present {
+            if present.len() as u64 + run > count {
+                return None;
+            }
+            present.extend((at..end).map(|number| number as u32));
+        }
+        (at, is_present) = (end, !is_present);
+    }
+    (bytes.next().is_none() && present.len() as u64 == count).then_some(present)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn runs_come_back(pages in prop::collection::vec((any::<bool>(), 1usize..400), 0..30)) {
+            let all: Vec<bool> = pages.iter().flat_map(|(present, count)| vec![*present; *count]).collect();
+            let bytes = runs_of(all.iter().copied());
+            let expected: Vec<u32> = (0u32..).zip(&all).filter(|(_, p)| **p).map(|(i, _)| i).collect();
+            let count = expected.len() as u64;
+            if !all.is_empty() {
+                prop_assert_eq!(present_numbers(&bytes, all.len() as u64, count), Some(expected));
+                prop_assert_eq!(present_numbers(&bytes, all.len() as u64, count + 1), None);
+                prop_assert_eq!(present_numbers(&bytes[..bytes.len() - 1], all.len() as u64, count), None);
+            }
+        }
+
+        #[test]
+        fn any_bytes_are_runs_or_none(bytes in prop::collection::vec(any::<u8>(), 0..40), pages in 0u64..3000, count in 0u64..3000) {
+            present_numbers(&bytes, pages, count);
+        }
+    }
+}
