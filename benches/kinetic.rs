@@ -4,7 +4,7 @@
 //! incoherences, while turning, on the spot, and with a million triangles? What do the other ways to find expired words cost, and how
 //! much memory does it hold? Data: terrain files named on the command line. Command:
 //!
-//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE] [--walking]
+//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE [--clusters]] [--walking]
 //!
 //! All engines fly the same frames in the same process, one after the other, three times over; a frame's time is the least of its three, and figures are
 //! medians over the last two thirds of the frames. One thread. Prints Markdown. Keep runs under benches/runs/.
@@ -35,12 +35,14 @@ fn main() -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
     let (mut path, mut frames, mut profile, mut only_walks) = (None, 1500, None, false);
+    let mut culling = Culling::Vertices;
     while let Some(word) = words.next() {
         match word.as_str() {
             "--frames" => frames = words.next().ok_or("--frames wants a number")?.parse()?,
             "--profile" => {
                 profile = Some(words.next().ok_or("--profile wants a percentage")?.parse::<f64>()?)
             }
+            "--clusters" => culling = Culling::Clusters,
             "--walking" => only_walks = true,
             _ => path = Some(PathBuf::from(word)),
         }
@@ -54,7 +56,7 @@ fn main() -> Result<(), Failure> {
     let terrain = Terrain::open(&path)?;
     with_records!(terrain.records()?, records => {
         match profile {
-            Some(percent) => fly_only(&terrain, &records, frames, percent),
+            Some(percent) => fly_only(&terrain, &records, frames, percent, culling),
             None if only_walks => walking(&terrain, &records),
             None => report(&terrain, &records, frames),
         }
@@ -67,9 +69,10 @@ fn fly_only<C: RecordCodec>(
     records: &Records<'_, C>,
     frames: u64,
     percent: f64,
+    culling: Culling,
 ) -> Result<(), Failure> {
     let views = views(&straight(terrain, frames, percent, 1.0)?.0, 1.0);
-    let mut engine = Kinetic::new(records.clone(), Culling::Vertices);
+    let mut engine = Kinetic::new(records.clone(), culling);
     let start = Instant::now();
     let (mut updates, mut tests, mut changes) = (0u64, 0u64, 0u64);
     while start.elapsed().as_secs() < 10 {

@@ -398,7 +398,8 @@ fn ground_of_a_terrain_opened_before_an_edit_is_the_ground_of_then_and_takes_no_
 #[test]
 fn edits_that_are_refused_change_nothing() {
     let (_folder, path) = land();
-    let mut ground = streamed(&path);
+    let options = StreamOptions::default().cache_mib(4).room_mib(0);
+    let mut ground = Terrain::open(&path).unwrap().stream(options).unwrap();
     settle(&mut ground, &view(0));
     let before = heights_of(&mut ground);
     let deep =

@@ -1,39 +1,14 @@
-//! Overlays of edits that lie beside the terrain file they were made over.
-//!
-//! Only the file's own folder is looked into; of overlays elsewhere nothing is known. Cost: that of opening the terrain once for each overlay in the folder.
+//! Overlays of edits that lie beside the terrain file they were made over, in words.
 
-use std::path::{Path, PathBuf};
-use terrasoar_layout::read::terrain::Terrain;
+use std::path::Path;
+use terrasoar_layout::edit::overlays_beside;
 
 /// Overlays named in a message; of more the number is said.
 const NAMED: usize = 3;
 
-/// Overlays beside `file` that can be seen over it as it is, by name.
-fn beside(file: &Path) -> Vec<PathBuf> {
-    // Where a link leads, there its overlays may lie too.
-    let real = std::fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
-    let mut folders: Vec<&Path> = [file, &real].into_iter().filter_map(Path::parent).collect();
-    folders.dedup();
-    let mut found: Vec<PathBuf> = Vec::new();
-    for folder in folders {
-        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-            let path = folder.join(entry.file_name());
-            let is_overlay = path.extension().is_some_and(|ext| ext.eq_ignore_ascii_case("iqo"));
-            let is_known =
-                || found.iter().any(|other| same_file::is_same_file(other, &path).unwrap_or(false));
-            if is_overlay && !is_known() && Terrain::open_with_overlay_unmapped(file, &path).is_ok() {
-                found.push(path.strip_prefix(".").map_or_else(|_| path.clone(), Path::to_owned));
-            }
-        }
-    }
-    found.sort();
-    found
-}
-
 /// Names of overlays beside `file`, in words; `None` if there are none.
 pub(crate) fn named_beside(file: &Path) -> Option<String> {
-    let found = beside(file);
+    let found = overlays_beside(file);
     let names: Vec<String> = found.iter().take(NAMED).map(|path| path.display().to_string()).collect();
     match found.len() {
         0 => None,

@@ -182,7 +182,7 @@ impl Shown {
             radius_m: 25.0,
             depth_m: 6.0,
         };
-        // The next update shows it. An error says why the ground cannot be changed there.
+        // The next update shows it, or a later one if the file has to be rewritten for it. An error says why the ground cannot be changed there.
         if let Err(error) = self.ground.edit(&[Edit::Crater(crater)]) {
             eprintln!("{error}");
         }

@@ -187,7 +187,8 @@ pub trait SampleSink: Sync {
     /// Whatever keeps the sink from storing them, such as a full disk; the source stops and passes it on.
     fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError>;
 
-    /// As [`put`](SampleSink::put) of voids alone, of a window of any size.
+    /// As [`put`](SampleSink::put) of voids alone, of a window of any size. A build takes neither time nor memory for them, so a source that knows of
+    /// regions without heights says so here.
     ///
     /// # Errors
     /// As [`put`](SampleSink::put).

@@ -141,6 +141,18 @@ impl Drape {
         self.at_hand.extend(repaint.read);
     }
 
+    /// Reads from `terrain` from now on, whose file is the one before, rewritten with the same image.
+    ///
+    /// # Errors
+    /// The imagery is damaged or cannot be read.
+    pub fn follow(&mut self, terrain: &Arc<Terrain>) -> Result<(), LayoutError> {
+        if let Some(imagery) = Imagery::open(terrain)? {
+            let decodes = self.reader.decodes;
+            self.turn_to(Reader { terrain: Arc::clone(terrain), imagery, decodes });
+        }
+        Ok(())
+    }
+
     /// Reads by another reader from now on.
     fn turn_to(&mut self, reader: Reader) {
         self.reader = Arc::new(reader);

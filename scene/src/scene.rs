@@ -47,8 +47,9 @@ pub struct Scene {
     device: wgpu::Device,
     queue: wgpu::Queue,
     options: SceneOptions,
-    /// The opened terrain that it was made for.
-    terrain: u64,
+    /// The ground that it was made for, and the opened file that it has now.
+    land: u64,
+    file: u64,
     /// The step of the mesh that the device has; none before the first.
     seen: Option<MeshStep>,
     /// One past the highest triangle slot ever sent. Slots past it are empty, and the device has not heard of them.
@@ -88,7 +89,8 @@ impl Scene {
             device: gpu.device.clone(),
             queue: gpu.queue.clone(),
             options,
-            terrain: ground.terrain().instance(),
+            land: ground.land(),
+            file: ground.terrain().instance(),
             seen: None,
             end: 0,
             draws: Vec::new(),
@@ -275,15 +277,19 @@ impl Scene {
     }
 
     fn check(&self, ground: &Ground<'_>) -> Result<(), SceneError> {
-        if ground.terrain().instance() == self.terrain {
+        if ground.land() == self.land {
             return Ok(());
         }
         Err(SceneError::AnotherTerrain(ground.terrain().path().display().to_string()))
     }
 
-    /// Light follows edits of the ground within some frames.
+    /// Light follows edits of the ground within some frames, the image a file that was rewritten for them.
     fn note_edits(&mut self, ground: &Ground<'_>) -> Result<(), SceneError> {
         self.check(ground)?;
+        if let Some(terrain) = ground.shared_terrain().filter(|terrain| terrain.instance() != self.file) {
+            self.file = terrain.instance();
+            self.drape.as_mut().map_or(Ok(()), |drape| drape.follow(terrain))?;
+        }
         let (rects, now) = ground.edited_since(self.edits_seen);
         self.edits_seen = now;
         match rects {

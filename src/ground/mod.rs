@@ -10,14 +10,20 @@
 mod editing;
 mod engine;
 mod full;
+#[cfg(feature = "files")]
+mod hand;
 mod mapped;
 mod options;
 mod ray;
+#[cfg(feature = "files")]
+mod room;
 mod samples;
 mod streamed;
 #[cfg(feature = "files")]
 mod ticket;
 
+#[cfg(feature = "files")]
+pub use editing::Edited;
 pub use engine::Refined;
 pub use mapped::PictureEngine;
 pub use options::StreamOptions;
@@ -41,6 +47,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::SampleRect;
 use terrasoar_layout::file::entries::Entry;
+use terrasoar_layout::file::header::FileState;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Ground that is flown over.
@@ -52,9 +59,12 @@ pub struct Ground<'t> {
     views: [Option<View>; 2],
     /// The right to edit, from the first edit on.
     #[cfg(feature = "files")]
-    editing: Option<Box<Editing>>,
-    /// Generation of the file that is shown while there is no editing session.
-    seen_generation: u32,
+    editing: Option<Editing>,
+    /// The state of the file that is shown while there is no editing session.
+    seen: FileState,
+    /// The first opened terrain's number.
+    land: u64,
+    options: StreamOptions,
     /// Rectangles of samples whose heights changed, the newest last, and how many there were before these.
     edited: VecDeque<SampleRect>,
     edited_before: u64,
@@ -97,7 +107,7 @@ impl<'t> Ground<'t> {
     /// The first page cannot be read, or the system gives no thread.
     pub fn streamed(terrain: Arc<Terrain>, options: &StreamOptions) -> Result<Ground<'static>, LayoutError> {
         let engine = streamed::streamed(&terrain, options)?;
-        Ok(Ground::new(engine, Opened::Streamed(terrain)))
+        Ok(Ground::new(engine, Opened::Streamed(terrain), *options))
     }
 
     /// Ground whose records are all in memory or mapped.
@@ -109,19 +119,22 @@ impl<'t> Ground<'t> {
         engine: PictureEngine,
         culling: Culling,
     ) -> Result<Self, LayoutError> {
-        Ok(Self::new(mapped::mapped(terrain, engine, culling)?, Opened::Mapped(terrain)))
+        let options = StreamOptions::default();
+        Ok(Self::new(mapped::mapped(terrain, engine, culling)?, Opened::Mapped(terrain), options))
     }
 
-    fn new(engine: Box<dyn MeshEngine + 't>, terrain: Opened<'t>) -> Self {
+    fn new(engine: Box<dyn MeshEngine + 't>, terrain: Opened<'t>, options: StreamOptions) -> Self {
         let opened: &Terrain = match &terrain {
             Opened::Mapped(terrain) => terrain,
             Opened::Streamed(terrain) => terrain,
         };
-        let seen_generation = opened.header().generation;
+        let (seen, land) = (opened.header().state(), opened.instance());
         Self {
             engine,
             terrain,
-            seen_generation,
+            seen,
+            land,
+            options,
             step: MeshStep::first(),
             views: [None; 2],
             #[cfg(feature = "files")]
@@ -132,12 +145,17 @@ impl<'t> Ground<'t> {
         }
     }
 
-    /// The terrain as it was opened; edits since then are not in it.
+    /// The terrain as it was opened, or as it was rewritten for an edit that it had no room for; edits since then are not in it.
     pub fn terrain(&self) -> &Terrain {
         match &self.terrain {
             Opened::Mapped(terrain) => terrain,
             Opened::Streamed(terrain) => terrain,
         }
+    }
+
+    /// A number that the ground keeps where its file is rewritten for an edit: the [`instance`](Terrain::instance) of the terrain that it began with.
+    pub fn land(&self) -> u64 {
+        self.land
     }
 
     /// The terrain to read from with others, if it is not mapped.
@@ -241,6 +259,7 @@ impl<'t> Ground<'t> {
 
     /// Bounds what one update may do from now on. Whether the engine can be bounded.
     pub fn set_budget(&mut self, budget: Budget) -> bool {
+        self.options.budget = budget;
         self.engine.set_budget(budget)
     }
 
@@ -248,6 +267,7 @@ impl<'t> Ground<'t> {
     pub fn set_culling(&mut self, culling: Culling) -> bool {
         let can = self.engine.set_culling(culling);
         if can {
+            self.options.culling = culling;
             self.step = MeshStep::first();
         }
         can
@@ -261,13 +281,17 @@ impl<'t> Ground<'t> {
         let samples = patch.samples.clone();
         let can = self.engine.take_edits(patch)?;
         if can {
-            self.edited.extend(samples);
-            while self.edited.len() > EDITED_KEPT {
-                self.edited.pop_front();
-                self.edited_before += 1;
-            }
+            self.note_edited(&samples);
         }
         Ok(can)
+    }
+
+    fn note_edited(&mut self, samples: &[SampleRect]) {
+        self.edited.extend(samples);
+        while self.edited.len() > EDITED_KEPT {
+            self.edited.pop_front();
+            self.edited_before += 1;
+        }
     }
 
     /// Rectangles of samples whose heights changed since so many of them had been told, and how many there are now. `None` instead of them where too many
@@ -302,7 +326,11 @@ impl<'t> Ground<'t> {
 
     /// The oldest error of reading or writing that has not been reported yet. Where a page cannot be read the ground stays coarse. Edits that could not be written are part of the next commit.
     pub fn take_error(&mut self) -> Option<LayoutError> {
-        self.errors.pop_front().or_else(|| self.engine.take_error())
+        #[cfg(feature = "files")]
+        let own = self.editing_error();
+        #[cfg(not(feature = "files"))]
+        let own = self.errors.pop_front();
+        own.or_else(|| self.engine.take_error())
     }
 }
 

@@ -21,6 +21,8 @@ pub struct StreamOptions {
     pub prefetch: Prefetch,
     /// What one update may do; without bounds by default.
     pub budget: Budget,
+    /// Memory in MiB for rewriting the file in the background where an edit needs heights that its records cannot hold; 512 by default. With 0 such edits are refused instead.
+    pub room_mib: u64,
 }
 
 impl Default for StreamOptions {
@@ -32,6 +34,7 @@ impl Default for StreamOptions {
             culling: Culling::default(),
             prefetch: Prefetch::default(),
             budget: Budget::default(),
+            room_mib: 512,
         }
     }
 }
@@ -65,6 +68,11 @@ impl StreamOptions {
     /// These options with another way of asking ahead.
     pub fn prefetch(self, prefetch: Prefetch) -> Self {
         Self { prefetch, ..self }
+    }
+
+    /// These options with so much memory for rewriting the file where an edit needs heights that its records cannot hold; with 0 such edits are refused.
+    pub fn room_mib(self, room_mib: u64) -> Self {
+        Self { room_mib, ..self }
     }
 
     /// These options with bounds on what one update may do.

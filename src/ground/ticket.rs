@@ -19,12 +19,18 @@ pub struct Saved {
     pub bytes: u64,
 }
 
-/// Why edits are not on the disk. They are in memory still, and part of the next commit.
+/// Why edits are not on the disk. They are in memory still, and part of the next commit. Where the cause is that an edit was refused which had been taken on for later
+/// ([`Edited::Later`](super::Edited::Later)), that edit is not made, and all others are on the disk.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error(transparent)]
 pub struct CommitFailed(Arc<LayoutError>);
 
 impl CommitFailed {
+    /// For this cause.
+    pub(super) fn of(cause: LayoutError) -> Self {
+        Self(Arc::new(cause))
+    }
+
     /// What went wrong.
     pub fn cause(&self) -> &LayoutError {
         &self.0
@@ -44,11 +50,18 @@ struct Shared {
 }
 
 impl CommitTicket {
-    /// The ticket of a commit that had nothing to write.
-    pub(super) fn of_nothing() -> Self {
+    /// The ticket of a commit that had nothing to write, and of which that became.
+    pub(super) fn of_nothing(outcome: Result<Saved, CommitFailed>) -> Self {
         let shared = Shared::default();
-        *shared.lock() = Some(Ok(Saved::default()));
+        *shared.lock() = Some(outcome);
         Self { shared: Arc::new(shared) }
+    }
+
+    /// The ticket of a commit of the file at `path` that others will begin, and what they tell by it.
+    pub(super) fn promised(path: &Path) -> (Self, Promise) {
+        let ticket = Self { shared: Arc::default() };
+        let shared = Arc::clone(&ticket.shared);
+        (ticket, Promise { shared, path: path.to_owned() })
     }
 
     /// What became of it, if that is known; does not wait.
@@ -91,7 +104,7 @@ impl Shared {
 /// The thread that writes a commit, and its ticket.
 #[derive(Debug)]
 pub(super) struct Writing {
-    thread: JoinHandle<Written>,
+    thread: Option<JoinHandle<Written>>,
     ticket: CommitTicket,
 }
 
@@ -99,7 +112,7 @@ pub(super) struct Writing {
 type Written = Result<CommitJob, CommitFailed>;
 
 impl Writing {
-    /// Begins to write `job` to the file at `path` on a thread of its own.
+    /// Begins to write `job` to the file at `path` on a thread of its own. If edits before it were `refused`, the ticket tells that where all else goes well.
     ///
     /// # Errors
     /// The system gives no thread.
@@ -107,21 +120,20 @@ impl Writing {
         job: CommitJob,
         disk: Arc<dyn Disk + Send>,
         path: &Path,
+        refused: Option<CommitFailed>,
     ) -> Result<Self, LayoutError> {
-        let ticket = CommitTicket { shared: Arc::default() };
-        let shared = Arc::clone(&ticket.shared);
-        let teller = Teller { shared, path: path.to_owned() };
+        let (ticket, promise) = CommitTicket::promised(path);
         let write = move || {
-            let written = job.run_on(&*disk).map_err(|error| CommitFailed(Arc::new(error)));
+            let written = job.run_on(&*disk).map_err(CommitFailed::of);
             let saved = Saved { pages: job.pages(), bytes: job.bytes() };
-            teller.shared.tell(written.clone().map(|()| saved));
+            promise.tell(written.clone().and(refused.map_or(Ok(saved), Err)));
             written.map(|()| job)
         };
         let thread = std::thread::Builder::new()
             .name("commit writer".into())
             .spawn(write)
             .map_err(|e| LayoutError::io(path, "cannot start a thread that writes edits", e))?;
-        Ok(Self { thread, ticket })
+        Ok(Self { thread: Some(thread), ticket })
     }
 
     /// Its ticket.
@@ -129,28 +141,46 @@ impl Writing {
         self.ticket.clone()
     }
 
-    /// Whether the thread has come to its end.
+    /// Whether it is known what became of the commit: the thread is at its end then.
     pub(super) fn is_over(&self) -> bool {
-        self.thread.is_finished()
+        self.ticket.is_done()
     }
 
     /// Waits for the thread, and gives what it leaves.
-    pub(super) fn end(self) -> Written {
-        match self.thread.join() {
-            Ok(written) => written,
-            // It has told by its ticket.
-            Err(_) => Err(self.ticket.wait().err().unwrap_or_else(|| unexpected(Path::new("edits")))),
-        }
+    pub(super) fn end(mut self) -> Written {
+        self.join().unwrap_or_else(|| {
+            Err(self.ticket.wait().err().unwrap_or_else(|| unexpected(Path::new("edits"))))
+        })
+    }
+
+    /// What the thread leaves, unless it ended unexpectedly, which it has told by its ticket.
+    fn join(&mut self) -> Option<Written> {
+        self.thread.take()?.join().ok()
     }
 }
 
-/// Reports an unexpected end.
-struct Teller {
+impl Drop for Writing {
+    /// What is being written is brought to the disk; what became of it the ticket tells.
+    fn drop(&mut self) {
+        self.join();
+    }
+}
+
+/// What became of a commit will be told by it, its unexpected end included.
+#[derive(Debug)]
+pub(super) struct Promise {
     shared: Arc<Shared>,
     path: PathBuf,
 }
 
-impl Drop for Teller {
+impl Promise {
+    /// Tells what became of the commit.
+    pub(super) fn tell(&self, outcome: Result<Saved, CommitFailed>) {
+        self.shared.tell(outcome);
+    }
+}
+
+impl Drop for Promise {
     fn drop(&mut self) {
         // Does nothing if what became of it was told.
         self.shared.tell(Err(unexpected(&self.path)));

@@ -215,7 +215,7 @@ fn put_constant(sink: &dyn SampleSink, window: Window, value: f64) -> Result<(),
     if value.is_nan() {
         return sink.put_void(window);
     }
-    // At most a window's worth, or one row, of which a build has no longer ones than 65,537.
+    // At most a window's worth, or one row, of which a build has no longer ones than a terrain.
     let samples = vec![value; window.width as usize * rows as usize];
     for part in parts(window, rows) {
         sink.put(part, &samples[..part.width as usize * part.height as usize])?;

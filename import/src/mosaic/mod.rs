@@ -30,7 +30,7 @@ use blend::{Blend, Edges, over};
 use lattice::Tied;
 pub(crate) use names::Inputs;
 use plan::Placed;
-use sheet::{BLENDED, Laying, Sheet, replace};
+use sheet::{BLENDED, Cells, Laying, Sheet, replace};
 pub(crate) use source::open_one;
 use source::{Source, options_of_each};
 use std::collections::HashSet;
@@ -110,6 +110,8 @@ struct Mosaic {
     /// How each file is opened.
     each: OpenOptions,
     sheets: Vec<Sheet>,
+    /// Of each sheet, the cells that files lie in.
+    cells: Vec<Cells>,
     laid: Vec<Laid>,
     in_metres: bool,
     sample_bytes: u64,
@@ -171,6 +173,7 @@ impl Mosaic {
         let allowed = options.memory_mib.unwrap_or(512) << 20;
         let mosaic = Self {
             declared,
+            cells: sheets.iter().map(|sheet| Cells::of(sheet, &placed.sources)).collect(),
             sources: placed.sources,
             each,
             sheets,
@@ -200,16 +203,17 @@ impl Mosaic {
 
     /// The samples of a window of the mosaic, of all sheets.
     fn block(&self, window: Window, stores: &[Store], sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let met: Vec<bool> =
+            self.laid.iter().zip(&self.cells).map(|(laid, cells)| laid.meets(window, cells)).collect();
+        if !met.contains(&true) {
+            return sink.put_void(window);
+        }
         let count = window.width as usize * window.height as usize;
         let mut values = vec![f64::NAN; count];
         let mut weights = if self.blend.is_some() { vec![0.0; count] } else { Vec::new() };
         let highest = self.each.priority == Priority::Highest;
         for (number, (laid, store)) in self.laid.iter().zip(stores).enumerate() {
-            let meets = window.col < laid.to[0]
-                && window.row < laid.to[1]
-                && window.col + window.width > laid.from[0]
-                && window.row + window.height > laid.from[1];
-            if !meets {
+            if !met[number] {
                 continue;
             }
             let edges = self.blend.as_ref().map(|[_, sheets]| sheets.edges(number));

@@ -10,6 +10,7 @@ use crate::crs::HorizontalSize;
 use crate::options::Priority;
 use std::path::PathBuf;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::grid::MOST_SAMPLES_WORDS;
 use terrasoar_layout::portable::ln;
 
 /// Samples on a side of a sheet, at most: files that lie farther apart are a mistake, or several data sets.
@@ -159,7 +160,7 @@ impl Placed {
             let [first, last] = [members.first(), members.last()]
                 .map(|source| source.map(|at| self.sources[*at].path.display().to_string()));
             return Err(LayoutError::Usage(format!(
-                "the files span {} x {} samples, of which a terrain has at most 65,537 on a side; name files that lie together, not {} with {}",
+                "the files span {} x {} samples, of which a terrain has at most {MOST_SAMPLES_WORDS} on a side; name files that lie together, not {} with {}",
                 sides[0],
                 sides[1],
                 first.unwrap_or_default(),

@@ -7,17 +7,17 @@ use super::across::{Over, outside};
 use super::aim::Aim;
 use super::lattice::{Lattice, Tied};
 use super::plan::Placed;
-use super::sheet::Sheet;
+use super::sheet::{Cells, Sheet};
 use crate::crs::HorizontalSize;
 use crate::options::OpenOptions;
 use crate::warp::{Mapping, Projections, Resampler, three_digits};
 use std::path::Path;
+use terrasoar_layout::dem::Window;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::grid::{MOST_SAMPLES, MOST_SAMPLES_WORDS};
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::number;
 
-/// Samples on a side of a terrain, at most.
-const MOST_SAMPLES: f64 = 65_537.0;
 /// How much shorter steps of another system must be to count.
 const SHORTER: f64 = 0.95;
 /// What lies within a thousandth of a step of the edge of a sample lies on it.
@@ -37,6 +37,24 @@ pub(super) struct Laid {
     /// Columns and rows of the grid that it may cover: from, to (not included).
     pub(super) from: [u32; 2],
     pub(super) to: [u32; 2],
+}
+
+impl Laid {
+    /// Whether a window of the grid may have samples of the sheet, whose files lie in `cells`.
+    pub(super) fn meets(&self, window: Window, cells: &Cells) -> bool {
+        let is_within = window.col < self.to[0]
+            && window.row < self.to[1]
+            && window.col + window.width > self.from[0]
+            && window.row + window.height > self.from[1];
+        is_within
+            && match self.way {
+                Way::Copied(at) => cells.touch(
+                    [i64::from(window.col) - at[0], i64::from(window.row) - at[1]],
+                    [window.width, window.height],
+                ),
+                Way::Resampled(_) => true,
+            }
+    }
 }
 
 /// The grid of a mosaic.
@@ -98,9 +116,9 @@ impl Target {
         }
         let first = low.map(|low| (low + 0.5 + NEAR).floor());
         let counts: [f64; 2] = std::array::from_fn(|i| (high[i] - 0.5 - NEAR).ceil() - first[i] + 1.0);
-        if counts.iter().any(|count| !(2.0..=MOST_SAMPLES).contains(count)) {
+        if counts.iter().any(|count| !(2.0..=f64::from(MOST_SAMPLES)).contains(count)) {
             return Err(LayoutError::Usage(format!(
-                "{}: it would have {} x {} samples, and a terrain has from 2 to 65,537 on a side; name fewer files, or state a coarser resolution",
+                "{}: it would have {} x {} samples, and a terrain has from 2 to {MOST_SAMPLES_WORDS} on a side; name fewer files, or state a coarser resolution",
                 name.display(),
                 number(counts[0]),
                 number(counts[1])

@@ -15,10 +15,8 @@ use crate::value::Decode;
 use std::path::Path;
 use terrasoar_layout::dem::{SampleSink, Warning, Window};
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::grid::{MOST_SAMPLES, MOST_SAMPLES_WORDS};
 use terrasoar_layout::remedy::Remedy;
-
-/// Samples on a side of a terrain.
-const MAX_SIDE: u32 = 65_537;
 
 /// Elevation data in tiles.
 pub(crate) struct TileDem {
@@ -131,13 +129,13 @@ impl Packed<'_> {
 
 /// Refuses what no terrain can hold, with the zoom that one can.
 fn refuse_large(path: &Path, zoom: u8, size: [u32; 2]) -> Result<(), LayoutError> {
-    let over = size[0].max(size[1]).div_ceil(MAX_SIDE);
+    let over = size[0].max(size[1]).div_ceil(MOST_SAMPLES);
     if over <= 1 {
         return Ok(());
     }
     let levels = over.next_power_of_two().trailing_zeros() as u8;
     Err(LayoutError::Usage(format!(
-        "{}: zoom {zoom} has {} x {} samples here, and a terrain has {MAX_SIDE} at most a side; state bounds, or zoom {}",
+        "{}: zoom {zoom} has {} x {} samples here, and a terrain has {MOST_SAMPLES_WORDS} at most a side; state bounds, or zoom {}",
         path.display(),
         size[0],
         size[1],

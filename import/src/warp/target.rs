@@ -8,6 +8,7 @@ use crate::crs::{Ground, HorizontalSize, Kind, System, by_text, is_earth};
 use crate::options::OpenOptions;
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::grid::{MOST_SAMPLES, MOST_SAMPLES_WORDS};
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::{harmless, number};
 
@@ -15,8 +16,6 @@ use terrasoar_layout::words::{harmless, number};
 const MESH: u32 = 32;
 /// Widest data in degrees of longitude that UTM is chosen for.
 const UTM_WIDTH_DEG: f64 = 12.0;
-/// Samples on a side of a terrain, at most.
-const MOST_SAMPLES: f64 = 65_537.0;
 
 /// The grid that new samples lie on.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,9 +151,9 @@ pub(super) fn grid(
     let first: [f64; 2] = std::array::from_fn(|i| (low[i] / steps[i] + 0.5 - 1e-6).floor());
     let last: [f64; 2] = std::array::from_fn(|i| (high[i] / steps[i] - 0.5 + 1e-6).ceil());
     let counts: [f64; 2] = std::array::from_fn(|i| last[i] - first[i] + 1.0);
-    if counts.iter().any(|count| !(2.0..=MOST_SAMPLES).contains(count)) {
+    if counts.iter().any(|count| !(2.0..=f64::from(MOST_SAMPLES)).contains(count)) {
         return Err(LayoutError::Usage(format!(
-            "{}: brought over it would have {} x {} samples, and a terrain has from 2 to {MOST_SAMPLES} on a side; state another resolution",
+            "{}: brought over it would have {} x {} samples, and a terrain has from 2 to {MOST_SAMPLES_WORDS} on a side; state another resolution",
             path.display(),
             number(counts[0]),
             number(counts[1])

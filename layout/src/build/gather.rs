@@ -2,7 +2,7 @@
 //!
 //! The rows are looked up once for each part. A part with nothing but inert records, as in an ocean, costs a look at the rectangle around it and makes no page.
 
-use super::levels::{LevelShape, Levels};
+use super::levels::{LevelShape, Levels, Piece};
 use super::plan::{PagePart, block_bounds};
 use crate::grid::order::{BLOCK_SLOTS, BlockCells, level_slots};
 use crate::grid::record::RecordCodec;
@@ -26,14 +26,17 @@ pub(super) fn gather<C: RecordCodec>(
     let index = |i: usize| shape.index(GridPoint::new(clip(x[i], 0), clip(y[i], 1)));
     let ((south, west), (north, east)) = (index(0), index(1));
     // Rows of the block that are not kept belong to other parts of it.
-    let mut rows: [&[C::Raw]; ROWS] = [&[]; ROWS];
+    let mut rows: [Piece<'_, C::Raw>; ROWS] = std::array::from_fn(|_| Piece::none());
     for (place, row) in rows.iter_mut().zip(south..=north) {
-        *place = records.row(shape.level(), row).unwrap_or_default();
+        *place =
+            records.row(shape.level(), row).map_or(Piece::none(), |row| row.piece(west, east + 1, C::INERT));
     }
-    let is_inert = |row: &&[C::Raw]| {
-        let columns = west.min(row.len())..(east + 1).min(row.len());
+    let is_inert = |row: &Piece<'_, C::Raw>| {
+        let count = row.values.len();
+        let columns =
+            west.saturating_sub(row.from).min(count)..(east + 1).saturating_sub(row.from).min(count);
         // Without an early end the comparison takes many records at once.
-        row[columns].iter().fold(true, |all, raw| all & (*raw == C::INERT))
+        row.values[columns].iter().fold(true, |all, raw| all & (*raw == C::INERT))
     };
     if rows.iter().all(is_inert) {
         return None;
@@ -44,7 +47,7 @@ pub(super) fn gather<C: RecordCodec>(
         // Rows hold no more than what is not beyond the data, so ghosts and others are in none.
         let (row, column) = block.cell(within + i);
         let raw = rows.get(row.wrapping_sub(south)).and_then(|row| row.get(column));
-        C::write(raw.copied().unwrap_or(C::INERT), place);
+        C::write(raw.unwrap_or(C::INERT), place);
     }
     Some(bytes)
 }

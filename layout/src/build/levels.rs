@@ -1,9 +1,10 @@
 //! Rows of values for the vertices of each level: what the build keeps while it works its way north and up the levels.
 //!
 //! Row and column of a level count only its own vertices, so a level of spacing 2^t costs 4^t times less than the finest. Rows are made, used
-//! and dropped from south to north; memory is a few rows a level.
+//! and dropped from south to north; memory is a few rows a level. A row has values near heights alone, in runs of columns.
 
 use crate::grid::{Grid, GridPoint};
+use std::borrow::Cow;
 use std::collections::VecDeque;
 
 /// Where the vertices of one level lie: rows and columns of those not beyond the data.
@@ -15,13 +16,15 @@ pub(super) struct LevelShape {
     white: bool,
     /// Largest x and y of a vertex that is not beyond the data.
     limit: [u32; 2],
+    /// How far the diamonds of a vertex and of its descendants reach, in steps along either axis.
+    reach: u32,
 }
 
 impl LevelShape {
     pub(super) fn new(grid: &Grid, level: u32) -> Self {
         let reach = grid.reach_steps(level);
         let limit = grid.samples().map(|s| (s - 1 + reach - 1).min(grid.side_steps()));
-        Self { level, t: level / 2, white: level & 1 == 1, limit }
+        Self { level, t: level / 2, white: level & 1 == 1, limit, reach }
     }
 
     pub(super) fn level(&self) -> u32 {
@@ -36,6 +39,18 @@ impl LevelShape {
     /// Largest x and y of a vertex that is not beyond the data.
     pub(super) fn limit(&self) -> [u32; 2] {
         self.limit
+    }
+
+    /// How far the diamonds of a vertex and of its descendants reach, in steps along either axis.
+    pub(super) fn reach(&self) -> u32 {
+        self.reach
+    }
+
+    /// First column of a row at or east of x = `west`, and the one behind the last that is not east of `east`; that may be past the row's end.
+    pub(super) fn columns_between(&self, row: usize, west: u32, east: u32) -> (usize, usize) {
+        let (first, pitch) = (self.first_x(row), 2 << self.t);
+        let from = west.saturating_sub(first).div_ceil(pitch) as usize;
+        (from, east.checked_sub(first).map_or(0, |width| (width / pitch) as usize + 1))
     }
 
     pub(super) fn is_white(&self) -> bool {
@@ -92,10 +107,83 @@ pub(super) fn index_in(level: u32, p: GridPoint) -> (usize, usize) {
     ((p.y() >> (t + is_white)) as usize, (p.x() >> (t + 1)) as usize)
 }
 
+/// Values of a row's vertices where the DEM is not void far around. All others are what the level is made of elsewhere.
+#[derive(Debug)]
+pub(super) struct LevelRow<T> {
+    /// Vertices of the row.
+    columns: usize,
+    /// First columns and values, from the west.
+    runs: Vec<(usize, Box<[T]>)>,
+}
+
+impl<T> LevelRow<T> {
+    /// A row of so many vertices, and the values of those that have any.
+    pub(super) fn new(columns: usize, runs: Vec<(usize, Box<[T]>)>) -> Self {
+        Self { columns, runs }
+    }
+
+    /// Vertices of the row.
+    pub(super) fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Values of the `i`-th run.
+    pub(super) fn run(&self, i: usize) -> Option<&[T]> {
+        self.runs.get(i).map(|(_, values)| &**values)
+    }
+
+    /// The value of a vertex, if it has one.
+    #[inline(always)]
+    pub(super) fn get(&self, column: usize) -> Option<&T> {
+        let (first, values) = self.runs[..self.runs.partition_point(|run| run.0 <= column)].last()?;
+        values.get(column - first)
+    }
+}
+
+impl<T: Copy> LevelRow<T> {
+    /// At least the values from column `from` to `to`, as far as the row goes; `missing` for those that have none.
+    pub(super) fn piece(&self, from: usize, to: usize, missing: T) -> Piece<'_, T> {
+        let to = to.min(self.columns).max(from);
+        let covers = |run: &&(usize, Box<[T]>)| run.0 <= from && to <= run.0 + run.1.len();
+        if let Some((first, values)) = self.runs.iter().find(covers) {
+            return Piece { from: *first, values: Cow::Borrowed(values) };
+        }
+        let mut values = vec![missing; to - from];
+        for (first, run) in &self.runs {
+            let (west, east) = (from.max(*first), to.min(first + run.len()));
+            if west < east {
+                values[west - from..east - from].copy_from_slice(&run[west - first..east - first]);
+            }
+        }
+        Piece { from, values: Cow::Owned(values) }
+    }
+}
+
+/// Values side by side.
+#[derive(Debug)]
+pub(super) struct Piece<'r, T: Copy> {
+    /// Column of the first.
+    pub(super) from: usize,
+    pub(super) values: Cow<'r, [T]>,
+}
+
+impl<T: Copy> Piece<'_, T> {
+    /// No values.
+    pub(super) fn none() -> Self {
+        Self { from: 0, values: Cow::Borrowed(&[]) }
+    }
+
+    /// The value of a column, if it is here.
+    #[inline(always)]
+    pub(super) fn get(&self, column: usize) -> Option<T> {
+        self.values.get(column.wrapping_sub(self.from)).copied()
+    }
+}
+
 #[derive(Debug)]
 struct Rows<T> {
     first: usize,
-    rows: VecDeque<Box<[T]>>,
+    rows: VecDeque<LevelRow<T>>,
 }
 
 /// A value for every vertex of every level, row by row.
@@ -117,9 +205,9 @@ impl<T> Levels<T> {
 
     /// A row that has been pushed and not dropped.
     #[inline(always)]
-    pub(super) fn row(&self, level: u32, row: usize) -> Option<&[T]> {
+    pub(super) fn row(&self, level: u32, row: usize) -> Option<&LevelRow<T>> {
         let rows = &self.levels[level as usize];
-        rows.rows.get(row.checked_sub(rows.first)?).map(|r| &**r)
+        rows.rows.get(row.checked_sub(rows.first)?)
     }
 
     /// Number of the next row to be pushed.
@@ -128,7 +216,7 @@ impl<T> Levels<T> {
         rows.first + rows.rows.len()
     }
 
-    pub(super) fn push(&mut self, level: u32, row: Box<[T]>) {
+    pub(super) fn push(&mut self, level: u32, row: LevelRow<T>) {
         self.levels[level as usize].rows.push_back(row);
     }
 

@@ -2,10 +2,12 @@
 //!
 //! It estimates all that grows with the terrain, rather too high than too low. `benches/runs` has what was measured.
 
+use super::land::{BLOCK, Land};
 use super::options::{BuildOptions, LARGEST_TILE};
 use crate::dem::SampleType;
 use crate::error::LayoutError;
 use crate::grid::Grid;
+use crate::grid::order::slot_count;
 use crate::grid::record::RecordKind;
 use crate::remedy::Remedy;
 
@@ -26,6 +28,7 @@ pub(super) struct MemoryPlan {
 impl MemoryPlan {
     pub(super) fn new(
         grid: &Grid,
+        land: &Land,
         sample_type: SampleType,
         options: &BuildOptions,
         threads: u64,
@@ -52,17 +55,25 @@ impl MemoryPlan {
             (_, true) => 8,
             (_, false) => 16,
         };
-        // Pages of the directory and their plan, some 34 bytes each.
-        let directory = crate::grid::order::slot_count(grid.k()) * record_bytes / 4096 * 34;
+        let ([widest, runs], blocks, block) = (land.widest(), land.blocks(), u64::from(BLOCK));
+        // Pages of the directory and their plan, some 34 bytes each. Around blocks with heights there are some that hold little.
+        let slots = slot_count(grid.k());
+        let near = (blocks + 64) * block * block * 5;
+        let directory = slots.min(near) * record_bytes / 4096 * 34 + slots * record_bytes / (4096 * 256) * 44;
         let fixed = RESERVED_BYTES + directory;
         let work = |tile: u32| {
             let tile = u64::from(tile);
+            // What lies between blocks with heights takes nothing, but records on all sides of them do something.
+            let wide_near = wide.min(widest * block + 8 * runs * tile);
+            // A code, a void and an own error for every corner of a tile.
+            let corners = (wide / tile + 2) * (high / tile + 2);
+            let corners_near = (blocks + 64) * (block / tile + 1) * (block / tile + 1);
             // Codes and voids of some 3.5 tile rows, records and own errors beside them, rows of records that wait for their pages.
-            wide * (7 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
-                + wide * 128 * record_bytes
+            wide_near * (7 * tile / 2 + 8) * (10 + 3 * record_bytes / 2)
+                + wide_near * 128 * record_bytes
                 + threads * (tile + 1) * (tile + 1) * 8
-                // A code, a void and an own error for every corner of a tile.
-                + (wide / tile + 2) * (high / tile + 2) * 13
+                + corners.min(corners_near) * 13
+                + (high / tile + 2) * 256
         };
         let largest = n.min(options.largest_tile.clamp(2, LARGEST_TILE));
         let smallest = largest.min(16);
@@ -94,7 +105,8 @@ mod tests {
 
     fn plan(side: u32, sample_type: SampleType, memory_mib: u64) -> Result<MemoryPlan, LayoutError> {
         let grid = Grid::new([side, side - 1], [1.0, 1.0]).unwrap();
-        MemoryPlan::new(&grid, sample_type, &BuildOptions { memory_mib, ..Default::default() }, 2, 0)
+        let land = Land::in_windows(grid.samples(), None);
+        MemoryPlan::new(&grid, &land, sample_type, &BuildOptions { memory_mib, ..Default::default() }, 2, 0)
     }
 
     #[test]
@@ -124,7 +136,8 @@ mod tests {
         let grid = Grid::new([2049; 2], [1.0; 2]).unwrap();
         let with = |memory_mib, reading_mib| {
             let options = BuildOptions { memory_mib, ..Default::default() };
-            MemoryPlan::new(&grid, SampleType::U16, &options, 2, reading_mib * MIB)
+            let land = Land::in_windows(grid.samples(), None);
+            MemoryPlan::new(&grid, &land, SampleType::U16, &options, 2, reading_mib * MIB)
         };
         assert!(with(512, 10).unwrap().spool_bytes > 0);
         assert_eq!(with(512, 480).unwrap().spool_bytes, 0);

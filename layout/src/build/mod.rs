@@ -8,8 +8,10 @@
 //! Invariant: neither threads nor the memory budget change a byte of the file.
 
 mod band;
+mod codes;
 mod fill;
 mod gather;
+mod land;
 mod levels;
 mod memory;
 mod options;
@@ -38,15 +40,17 @@ use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::remedy::Remedy;
 use crate::words::{harmless, number};
-use band::{Band, Fills, RowReader};
+use band::{Band, Fills};
+use codes::{Row, RowReader};
 pub use fill::MAX_FILL;
-use levels::{LevelShape, Levels};
+use land::Land;
+use levels::{LevelRow, LevelShape, Levels};
 use memory::MemoryPlan;
 pub use options::BuildOptions;
 use rayon::prelude::*;
 pub(crate) use rebuild::rebuild_into;
 pub use rebuild::{HeightRoom, rebuild};
-use saturate::Saturator;
+use saturate::{Around, Saturator};
 use scan::{OwnErrors, scan_tile_row};
 use spool::Spool;
 use std::path::Path;
@@ -58,6 +62,9 @@ use writer::{PageWriter, PlacedPages, page_queue, write_pages};
 
 /// Longest text in a header; it has room for 254 bytes.
 const MAX_TEXT_CHARS: usize = 254;
+
+/// Largest `k` of which the memory for heights everywhere is asked for before samples are read: 65,537 a side.
+const LARGEST_FULL_K: u32 = 16;
 
 /// Longest warning that is kept.
 const MAX_WARNING_CHARS: usize = 500;
@@ -109,7 +116,12 @@ pub fn build_on(
     // What is wrong already need not be waited for.
     header.check_numbers()?;
     let threads = rayon::current_num_threads() as u64;
-    let memory = MemoryPlan::new(&grid, info.sample_type, options, threads, dem.memory_bytes())?;
+    let plan =
+        |land: &Land| MemoryPlan::new(&grid, land, info.sample_type, options, threads, dem.memory_bytes());
+    // Squares that large have heights everywhere in no file, so what they take is not known before they were read.
+    let is_known = grid.k() <= LARGEST_FULL_K;
+    let land = if is_known { Land::in_windows(grid.samples(), None) } else { Land::none(grid.samples()) };
+    let memory = plan(&land)?;
     // What will have the name comes first: it knows what has the name now.
     let packed = options.packed.then(|| AtomicFile::create(out)).transpose()?;
     let file = AtomicFile::create(out)?;
@@ -156,8 +168,9 @@ pub fn build_on(
     header.nodata_samples = stats.voids;
 
     progress.stage("building", samples);
-    let work =
-        Work { spool: &spool, code, fills: None, tile: memory.tile, file: &file, disk, advance: &advance };
+    // Now that it is known where heights are, larger tiles may fit, or smaller ones alone. They change no byte.
+    let tile = plan(spool.land())?.tile;
+    let work = Work { spool: &spool, code, fills: None, tile, file: &file, disk, advance: &advance };
     work.run_kind(&mut header)?;
     drop(spool);
     if let Some(packed) = packed {
@@ -254,28 +267,31 @@ impl Work<'_> {
     ) -> Result<PageWriter<'_, C>, LayoutError> {
         let grid = header.grid;
         let [wide, high] = grid.samples();
-        let plan = plan::Plan::new(&grid, header.records_per_page())?;
+        let land = self.spool.land();
+        let plan = plan::Plan::new(&grid, land, header.records_per_page());
         let ends = self.spool.stats().range.map(|raw| self.code.code(raw));
         let lowest = ends[0].min(ends[1]);
         let mut state = State {
             grid,
+            land,
             tile: self.tile,
             saturator: Saturator {
                 rules: Rules { grid, codec, scale: header.scale, error_kind: header.error_kind },
                 has_voids: header.has_voids,
             },
             shapes: (0..grid.levels()).map(|l| LevelShape::new(&grid, l)).collect(),
-            band: Band::new(grid, self.tile, lowest),
+            band: Band::new(grid, self.tile, self.fills),
             own: Levels::new(grid),
             records: Levels::new(grid),
-            writer: PageWriter::new(self.file, self.disk, grid, plan, header.record_kind, outgoing),
+            writer: PageWriter::new(self.file, self.disk, grid, plan, header.record_kind, outgoing)?,
             scanned: 0,
         };
-        state.band.preload_coarse(self.spool, &self.code)?;
+        let reader = || RowReader::new(self.spool, self.code, wide, lowest);
+        state.band.preload_coarse(reader(), self.spool)?;
         state.make_own_rows(0);
         let tile_rows = (high - 1).div_ceil(self.tile).max(1);
         let last_row = |tile_y: u32| ((tile_y + 1) * self.tile).min(high - 1);
-        let mut reader = RowReader::new(self.spool, self.code, self.fills, wide, lowest);
+        let mut reader = reader();
         let mut rows = reader.read(last_row(0))?;
         for tile_y in 0..tile_rows {
             let count = rows.len() as u64;
@@ -285,11 +301,11 @@ impl Work<'_> {
             state.scanned = if is_last { u32::MAX } else { (tile_y + 1) * self.tile };
             // The next rows are read while these are worked on.
             let (ahead, worked) = rayon::join(
-                || if is_last { Ok(Vec::new()) } else { reader.read(last_row(tile_y + 1)) },
+                || if is_last { Ok(Vec::<Row>::new()) } else { reader.read(last_row(tile_y + 1)) },
                 || {
                     if header.error_kind == ErrorKind::Bounded {
                         let step_m = header.scale.height_step_m;
-                        scan_tile_row(&grid, &state.band, &state.own, tile_y, self.tile, step_m);
+                        scan_tile_row(&grid, land, &state.band, &state.own, tile_y, self.tile, step_m);
                     }
                     state.advance()
                 },
@@ -305,10 +321,11 @@ impl Work<'_> {
 /// The work on one file as far as it has come.
 struct State<'a, C: RecordCodec> {
     grid: Grid,
+    land: &'a Land,
     tile: u32,
     saturator: Saturator<C>,
     shapes: Vec<LevelShape>,
-    band: Band,
+    band: Band<'a>,
     own: OwnErrors,
     records: Levels<C::Raw>,
     writer: PageWriter<'a, C>,
@@ -328,8 +345,9 @@ impl<'a, C: RecordCodec> State<'a, C> {
             let last = if shape.level() >= self.tile_levels() { u32::MAX } else { last_y };
             let mut row = self.own.next_row(shape.level());
             while row < shape.rows() && shape.row_y(row) <= last {
-                let cells = (0..shape.columns(row)).map(|_| AtomicU32::new(0)).collect();
-                self.own.push(shape.level(), cells);
+                let runs = self.land.columns(shape, row).into_iter();
+                let runs = runs.map(|run| (run.start, run.map(|_| AtomicU32::new(0)).collect()));
+                self.own.push(shape.level(), LevelRow::new(shape.columns(row), runs.collect()));
                 row += 1;
             }
         }
@@ -362,9 +380,12 @@ impl<'a, C: RecordCodec> State<'a, C> {
             while end < shape.rows() && self.is_ready(&shape, shape.row_y(end)) {
                 end += 1;
             }
-            let made: Vec<Box<[C::Raw]>> = (first..end)
+            let made: Vec<LevelRow<C::Raw>> = (first..end)
                 .into_par_iter()
-                .map(|row| self.saturator.row(&shape, row, &self.band, &self.own, &self.records))
+                .map(|row| {
+                    let around = Around { band: &self.band, own: &self.own, records: &self.records };
+                    self.saturator.row(&shape, row, &self.land.columns(&shape, row), around)
+                })
                 .collect::<Result<_, LayoutError>>()?;
             for row in made {
                 self.records.push(level, row);

@@ -1,15 +1,16 @@
 //! Which record pages the file will have, where each will lie, and when its last record is known.
 //!
 //! A level's slots are cut into blocks of the quadtree, whose rows lie close together, and blocks at page borders: a page is made of parts.
-//! Presence follows from the grid alone: a page is planned if one of its slots holds a vertex that is not beyond the data. Pages that turn out
-//! to be all void are taken out at the end. Cost: a few blocks a part, single slots only along the data's outline.
+//! Presence follows from the grid and from where there are heights: a page is planned if one of its slots holds a vertex that is not beyond the data, in a block near heights.
+//! Pages that turn out to be all void are taken out at the end. Cost: a few blocks a part, single slots only along the data's outline; nothing for oceans.
 
+use super::land::Land;
 use super::levels::LevelShape;
-use crate::error::LayoutError;
-use crate::file::bytes::to_usize;
+use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
 use crate::grid::Grid;
-use crate::grid::order::{BLOCK_SLOTS, level_slots, point_of, slot_count};
+use crate::grid::order::{BLOCK_SLOTS, level_slots, point_of};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// The slots of one page that lie in one block of one level: gathered together once the last of their rows is known. There are some two a
 /// page and all are there from the start, so they are small.
@@ -48,27 +49,50 @@ pub(super) struct LevelPlan {
     pub(super) span: u32,
 }
 
+/// Pages that one leaf of the directory leads to.
+#[derive(Debug, Clone)]
+pub(super) struct PlannedLeaf {
+    /// Parts of each page; one without any is absent.
+    pub(super) parts: [u8; ENTRIES_PER_LEAF],
+    /// Place of each page.
+    pub(super) entries: [Entry; ENTRIES_PER_LEAF],
+}
+
 /// The whole file's plan.
 #[derive(Debug)]
 pub(super) struct Plan {
     pub(super) levels: Vec<LevelPlan>,
-    /// Parts of each logical page; a page without any is absent.
-    pub(super) parts: Vec<u8>,
+    /// Leaves of the directory with planned pages, by number.
+    pub(super) leaves: BTreeMap<u64, Box<PlannedLeaf>>,
+}
+
+/// Leaf of a logical page, and its place there.
+pub(super) fn place_of(page: u64) -> (u64, usize) {
+    let per_leaf = ENTRIES_PER_LEAF as u64;
+    (page / per_leaf, (page % per_leaf) as usize)
 }
 
 impl Plan {
-    pub(super) fn new(grid: &Grid, records_per_page: u64) -> Result<Self, LayoutError> {
+    pub(super) fn new(grid: &Grid, land: &Land, records_per_page: u64) -> Self {
         let k = grid.k();
-        let pages = slot_count(k).div_ceil(records_per_page);
-        let mut parts = vec![0u8; to_usize(pages)?];
+        let mut leaves = BTreeMap::new();
+        let mut add = |page: u64| {
+            let (leaf, within) = place_of(page);
+            let leaf: &mut Box<PlannedLeaf> = leaves.entry(leaf).or_insert_with(|| {
+                Box::new(PlannedLeaf {
+                    parts: [0; ENTRIES_PER_LEAF],
+                    entries: [Entry::default(); ENTRIES_PER_LEAF],
+                })
+            });
+            leaf.parts[within] += 1;
+        };
         // The corners.
-        parts[0] = 1;
+        add(0);
         let mut levels = Vec::new();
         for level in 0..grid.levels() {
             let shape = LevelShape::new(grid, level);
             let slots = level_slots(k, level);
-            let blocks = (slots.end - slots.start).div_ceil(BLOCK_SLOTS);
-            let mut level_parts: Vec<PagePart> = (0..blocks)
+            let mut level_parts: Vec<PagePart> = blocks_near(k, &shape, land)
                 .into_par_iter()
                 .flat_map_iter(|block| {
                     let start = slots.start + block * BLOCK_SLOTS;
@@ -83,14 +107,49 @@ impl Plan {
                 })
                 .collect();
             level_parts.sort_unstable_by_key(|p| (p.y[1], p.slots));
-            for part in &level_parts {
-                parts[(part.first() / records_per_page) as usize] += 1;
-            }
+            level_parts.iter().for_each(|part| add(part.first() / records_per_page));
             let span = level_parts.iter().map(|p| p.y[1] - p.y[0]).max().unwrap_or(0);
             levels.push(LevelPlan { parts: level_parts, span });
         }
-        Ok(Self { levels, parts })
+        Self { levels, leaves }
     }
+}
+
+/// Blocks of [`BLOCK_SLOTS`] slots of a level, by number, that may hold records that are not inert: those near heights. The quadtree of blocks is followed from the top, so what is
+/// far from all heights costs nothing.
+fn blocks_near(k: u32, shape: &LevelShape, land: &Land) -> Vec<u64> {
+    const BLOCK_ORDER: u32 = BLOCK_SLOTS.ilog2() / 2;
+    let slots = level_slots(k, shape.level());
+    let top = (slots.end - slots.start).ilog2() / 2;
+    let mut blocks = Vec::new();
+    let mut waiting = vec![(0, top.max(BLOCK_ORDER))];
+    while let Some((offset, order)) = waiting.pop() {
+        // Levels smaller than a block have one, which may hold anything.
+        if top >= BLOCK_ORDER && !is_near(k, shape, land, offset, order) {
+            continue;
+        }
+        if order == BLOCK_ORDER {
+            blocks.push(offset / BLOCK_SLOTS);
+        } else {
+            waiting.extend((0..4).map(|quarter| (offset + (quarter << (2 * (order - 1))), order - 1)));
+        }
+    }
+    blocks
+}
+
+/// Whether vertices of the quadtree block of 4^order slots may have heights below them.
+fn is_near(k: u32, shape: &LevelShape, land: &Land, offset: u64, order: u32) -> bool {
+    let reach = i64::from(shape.reach());
+    let mut clipped = [[0; 2]; 2];
+    for ((place, [from, to]), limit) in
+        clipped.iter_mut().zip(block_bounds(k, shape, offset, order)).zip(shape.limit())
+    {
+        if to < 0 || from > i64::from(limit) {
+            return false;
+        }
+        *place = [from - reach, to + reach].map(|v| v.clamp(0, i64::from(limit)) as u32);
+    }
+    land.touches(clipped[0], clipped[1])
 }
 
 /// Least and largest y of the vertices that the slots of one level hold, those beyond the data left out.
@@ -164,6 +223,7 @@ pub(super) fn block_bounds(k: u32, shape: &LevelShape, offset: u64, order: u32) 
 mod tests {
     use super::*;
     use crate::grid::GridPoint;
+    use crate::grid::order::{slot_count, slot_of};
 
     /// Against every slot looked at one by one.
     #[test]
@@ -173,12 +233,11 @@ mod tests {
         {
             let grid = Grid::new(samples, [1.0, 1.0]).unwrap();
             let k = grid.k();
-            let plan = Plan::new(&grid, per_page).unwrap();
+            let plan = Plan::new(&grid, &Land::in_windows(samples, None), per_page);
             let mut planned = 4;
-            let mut seen = vec![0u8; plan.parts.len()];
-            seen[0] = 1;
+            let mut seen = BTreeMap::from([(0, 1)]);
             for part in plan.levels.iter().flat_map(|l| &l.parts) {
-                seen[(part.first() / per_page) as usize] += 1;
+                *seen.entry(part.first() / per_page).or_insert(0) += 1;
                 assert_eq!(part.first() / per_page, (part.first() + part.count() - 1) / per_page);
                 let rows: Vec<u32> = (part.first()..part.first() + part.count())
                     .filter_map(|s| point_of(k, s))
@@ -188,12 +247,55 @@ mod tests {
                 assert!(rows.iter().all(|y| (part.y[0]..=part.y[1]).contains(y)) && !rows.is_empty());
                 planned += rows.len();
             }
-            assert_eq!(seen, plan.parts);
+            assert_eq!(seen, counts(&plan));
             let all = (0..slot_count(k))
                 .filter_map(|s| point_of(k, s))
                 .filter(|p| grid.is_corner(*p) || !grid.is_beyond(*p, grid.level(*p)))
                 .count();
             assert_eq!(planned, all);
         }
+    }
+
+    fn counts(plan: &Plan) -> BTreeMap<u64, u8> {
+        let pages = plan.leaves.iter().flat_map(|(leaf, of_leaf)| (256 * leaf..).zip(of_leaf.parts));
+        pages.filter(|(_, parts)| *parts > 0).collect()
+    }
+
+    /// Every vertex that has a sample of an island among its descendants, or is one, found from the islands' samples up, is planned; of the ocean next to nothing is.
+    #[test]
+    fn what_lies_over_heights_is_planned() {
+        let samples = [1025, 900];
+        let grid = Grid::new(samples, [1.0, 1.0]).unwrap();
+        let k = grid.k();
+        let land = Land::none(samples);
+        let islands = [[30, 40], [600, 41], [601, 700], [1024, 899], [0, 899], [512, 512]];
+        islands.iter().for_each(|[x, y]| land.mark(*x..*x + 1, *y));
+        let plan = Plan::new(&grid, &land, 16);
+        let planned: Vec<std::ops::Range<u64>> = plan
+            .levels
+            .iter()
+            .flat_map(|level| &level.parts)
+            .map(|part| part.first()..part.first() + part.count())
+            .collect();
+        let mut alive: Vec<GridPoint> = Vec::new();
+        let n = grid.side_steps();
+        let images = |v: u32, count: u32| v..if v + 1 == count { n + 1 } else { v + 1 };
+        for [x, y] in islands {
+            let at =
+                images(y, samples[1]).flat_map(|y| images(x, samples[0]).map(move |x| GridPoint::new(x, y)));
+            alive.extend(at.filter(|p| !grid.is_corner(*p) && !grid.is_beyond(*p, grid.level(*p))));
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        while let Some(p) = alive.pop() {
+            if seen.insert(p.packed()) {
+                let slot = slot_of(k, p);
+                assert!(planned.iter().any(|slots| slots.contains(&slot)), "{p:?}");
+                // Parents are the apexes of the triangles that a vertex splits.
+                alive.extend(grid.apexes(p).filter(|p| !grid.is_corner(*p)));
+            }
+        }
+        assert!(seen.len() > 100);
+        let slots: u64 = planned.iter().map(|slots| slots.end - slots.start).sum();
+        assert!(slots < slot_count(k) * 3 / 4, "{slots}");
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! The samples are read back from the records, so nothing that the file held is lost. Voids keep the heights they are filled with. Cost and memory are those of a build.
 
+use super::land::{BLOCK, Land};
 use super::room::{self, LARGEST_CODE};
 use super::spool::Spool;
 use super::survey::HeightCode;
@@ -12,6 +13,7 @@ use crate::file::atomic::AtomicFile;
 use crate::file::disk::Disk;
 use crate::file::header::Header;
 use crate::grid::GridPoint;
+use crate::grid::order::slot_of;
 use crate::grid::record::{RecordCodec, RecordKind, RecordScale};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
@@ -30,13 +32,54 @@ pub struct HeightRoom {
     pub highest_m: f64,
 }
 
-/// Rows read at a time.
-const ROWS: u32 = 16;
-
 /// Heights of a terrain as a DEM whose raw samples are the records' height values.
 struct OwnHeights<'t, C: RecordCodec> {
     info: DemInfo,
     records: Records<'t, C>,
+    /// Windows that may have heights, and windows of voids: each sample lies in one.
+    land: Vec<Window>,
+    sea: Vec<Window>,
+}
+
+impl<'t, C: RecordCodec> OwnHeights<'t, C> {
+    fn new(info: DemInfo, records: Records<'t, C>) -> Self {
+        let [land, sea] = cells(&records);
+        Self { info, records, land, sea }
+    }
+}
+
+/// Windows that may have heights, and windows of voids alone. The centre of a cell is inert where nothing that is refined inside the cell is there, so oceans cost as little as in the file.
+fn cells<C: RecordCodec>(records: &Records<'_, C>) -> [Vec<Window>; 2] {
+    let grid = records.grid();
+    let (k, n, [wide, high]) = (grid.k(), grid.side_steps(), grid.samples());
+    let is_void =
+        |x: u32, y: u32| records.vertex_at(GridPoint::new(x.min(wide - 1), y.min(high - 1))).class.is_void();
+    let (mut land, mut sea) = (Vec::new(), Vec::new());
+    let mut waiting = vec![(0, 0, n)];
+    while let Some((west, south, side)) = waiting.pop() {
+        if west >= wide || south >= high {
+            continue;
+        }
+        let (east, north) = (west + side, south + side);
+        let centre = GridPoint::new(west + side / 2, south + side / 2);
+        // All of a cell but its corners is below its centre.
+        let is_sea = records.raw(slot_of(k, centre)) == C::INERT
+            && [(west, south), (east, south), (west, north), (east, north)]
+                .into_iter()
+                .all(|(x, y)| is_void(x, y));
+        if !is_sea && side > BLOCK {
+            let half = side / 2;
+            waiting
+                .extend([0, half].into_iter().flat_map(|y| [0, half].map(|x| (west + x, south + y, half))));
+            continue;
+        }
+        // The last cells have the far border, too.
+        let end = |to: u32, count: u32| if to == n { count } else { to.min(count) };
+        let (width, height) = (end(east, wide) - west, end(north, high) - south);
+        let window = Window { col: west, row: high - south - height, width, height };
+        if is_sea { &mut sea } else { &mut land }.push(window);
+    }
+    [land, sea]
 }
 
 impl<C: RecordCodec> DemSource for OwnHeights<'_, C> {
@@ -45,21 +88,19 @@ impl<C: RecordCodec> DemSource for OwnHeights<'_, C> {
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
-        let (wide, high) = (self.info.samples_wide, self.info.samples_high);
-        let k = self.records.grid().k();
-        (0..high.div_ceil(ROWS)).into_par_iter().try_for_each_init(Vec::new, |samples, block| {
-            let first = block * ROWS;
-            let rows = ROWS.min(high - first);
+        let (high, k) = (self.info.samples_high, self.records.grid().k());
+        self.sea.iter().try_for_each(|window| sink.put_void(*window))?;
+        self.land.par_iter().try_for_each_init(Vec::new, |samples, window| {
             samples.clear();
-            for row in first..first + rows {
+            for row in window.row..window.row + window.height {
                 let y = high - 1 - row;
-                samples.extend((0..wide).map(|x| {
-                    let raw = self.records.raw(crate::grid::order::slot_of(k, GridPoint::new(x, y)));
+                samples.extend((window.col..window.col + window.width).map(|x| {
+                    let raw = self.records.raw(slot_of(k, GridPoint::new(x, y)));
                     let is_void = self.records.decode(raw, 0).class.is_void();
                     if is_void { f64::NAN } else { C::height_value(raw) }
                 }));
             }
-            sink.put(Window { col: 0, row: first, width: wide, height: rows }, samples)
+            sink.put(*window, samples)
         })
     }
 }
@@ -129,18 +170,20 @@ fn rebuild_kind<C: RecordCodec>(
     };
     let samples = u64::from(wide) * u64::from(high);
     let options = BuildOptions { memory_mib, ..BuildOptions::default() };
-    let memory = MemoryPlan::new(&grid, info.sample_type, &options, rayon::current_num_threads() as u64, 0)?;
+    let source = OwnHeights::new(info, records);
+    let land = Land::in_windows(grid.samples(), Some(&source.land));
+    let threads = rayon::current_num_threads() as u64;
+    let memory = MemoryPlan::new(&grid, &land, source.info.sample_type, &options, threads, 0)?;
     let advance = |n| progress.advance(n);
     progress.stage("reading", samples);
-    let spool = Spool::new(disk, &info, None, file.target(), memory.spool_bytes, &advance)?;
-    let source = OwnHeights { info, records };
+    let spool = Spool::new(disk, &source.info, None, file.target(), memory.spool_bytes, &advance)?;
     source.stream(&spool)?;
 
     let (code, scale) = match room {
         None => (same_code(old), old.scale),
         Some(room) => {
             progress.stage("surveying", samples);
-            let code = roomy_code(old, room)?;
+            let code = roomy_code(terrain.path(), old, room)?;
             let steepest_m = super::survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
             (code, roomy_scale(old, &code, room, steepest_m))
         }
@@ -179,7 +222,7 @@ fn kept_fill<C: RecordCodec>(records: &Records<'_, C>, void: GridPoint) -> Optio
         (padding_to(void.x(), wide, void.y()), padding_to(void.y(), high, void.x()))
     };
     let images = (void.y()..=y_to).flat_map(|y| (void.x()..=x_to).map(move |x| GridPoint::new(x, y)));
-    let mut raws = images.map(|p| records.raw(crate::grid::order::slot_of(grid.k(), p)));
+    let mut raws = images.map(|p| records.raw(slot_of(grid.k(), p)));
     raws.find(|raw| *raw != C::INERT).map(C::height_value)
 }
 
@@ -204,11 +247,12 @@ fn range_with(old: &Header, room: HeightRoom) -> [f64; 2] {
 }
 
 /// The smallest kind of records that keeps the terrain's heights exactly and has room for others.
-fn roomy_code(old: &Header, room: HeightRoom) -> Result<HeightCode, LayoutError> {
+fn roomy_code(path: &Path, old: &Header, room: HeightRoom) -> Result<HeightCode, LayoutError> {
     let [low, high] = range_with(old, room);
     if !(low.abs() <= 1e9 && high.abs() <= 1e9) {
         return Err(LayoutError::Usage(format!(
-            "heights from {low} to {high} m are beyond a million kilometres; a terrain does not go there"
+            "{}: heights from {low} to {high} m are beyond a million kilometres; a terrain does not go there",
+            path.display()
         )));
     }
     let same = same_code(old);

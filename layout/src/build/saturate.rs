@@ -3,14 +3,15 @@
 //! Nearly all vertices lie away from borders and voids. A row of these is looked up once and worked through as a whole. The others are made one by one.
 
 use super::band::Band;
-use super::levels::{LevelShape, Levels};
+use super::levels::{LevelRow, LevelShape, Levels, Piece};
 use super::scan::OwnErrors;
 use crate::bound::{Below, FIRST_SCANNED, Rules};
 use crate::error::LayoutError;
 use crate::file::header::ErrorKind;
 use crate::grid::record::{RecordCodec, VertexClass};
 use crate::grid::{Grid, GridPoint};
-use std::sync::atomic::Ordering;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Makes records; one for a whole build.
 pub(super) struct Saturator<C> {
@@ -19,32 +20,52 @@ pub(super) struct Saturator<C> {
 }
 
 impl<C: RecordCodec> Saturator<C> {
-    /// The records of one row of a level. Children rows are done, rows of codes around it are in the band.
+    /// The records of one row of a level, `columns` of it. Children rows are done, rows of codes around it are in the band.
     pub(super) fn row(
         &self,
         shape: &LevelShape,
         row: usize,
-        band: &Band,
-        own: &OwnErrors,
-        records: &Levels<C::Raw>,
-    ) -> Result<Box<[C::Raw]>, LayoutError> {
+        columns: &[Range<usize>],
+        around: Around<'_, C>,
+    ) -> Result<LevelRow<C::Raw>, LayoutError> {
         let (y, step, level) = (shape.row_y(row), shape.step(), shape.level());
-        let [wide, high] = self.rules.grid.samples();
+        let [_, high] = self.rules.grid.samples();
         let voids_near = self.has_voids
-            && band.may_have_voids(y.saturating_sub(step).min(high - 1)..=(y + step).min(high - 1));
+            && around.band.may_have_voids(y.saturating_sub(step).min(high - 1)..=(y + step).min(high - 1));
         let scanned = if self.rules.error_kind == ErrorKind::Bounded && level >= FIRST_SCANNED {
-            own.row(level, row)
+            around.own.row(level, row)
         } else {
             None
         };
-        let around = Surroundings { shape, band, records };
-        let columns = shape.columns(row);
-        let mut made = Vec::with_capacity(columns);
+        let surroundings = Surroundings { shape, band: around.band, records: around.records };
+        let mut runs = Vec::with_capacity(columns.len());
+        for (i, columns) in columns.iter().enumerate() {
+            let cells = scanned.map(|row| row.run(i).unwrap_or_default());
+            runs.push((columns.start, self.run(row, columns.clone(), &surroundings, cells, voids_near)?));
+        }
+        Ok(LevelRow::new(shape.columns(row), runs))
+    }
+
+    /// The records of vertices side by side.
+    fn run(
+        &self,
+        row: usize,
+        columns: Range<usize>,
+        around: &Surroundings<'_, C>,
+        scanned: Option<&[AtomicU32]>,
+        voids_near: bool,
+    ) -> Result<Box<[C::Raw]>, LayoutError> {
+        let Surroundings { shape, band, .. } = *around;
+        let (y, step) = (shape.row_y(row), shape.step());
+        let [wide, high] = self.rules.grid.samples();
+        let mut made = Vec::with_capacity(columns.len());
         let is_inside = y >= step && y + step < high;
-        let open_row = (is_inside && !voids_near).then(|| OpenRow::new(&self.rules, &around, y)).flatten();
+        let ends = [columns.start, columns.end - 1].map(|column| shape.point(row, column).x());
+        let open_row =
+            (is_inside && !voids_near).then(|| OpenRow::new(&self.rules, around, y, ends)).flatten();
         let void_row =
-            (is_inside && voids_near).then(|| VoidRow::new(&self.rules.grid, &around, y)).flatten();
-        for column in 0..columns {
+            (is_inside && voids_near).then(|| VoidRow::new(&self.rules.grid, around, y, ends)).flatten();
+        for column in columns.clone() {
             let v = shape.point(row, column);
             let folded = v.x() + step >= wide || y + step >= high;
             let is_inside = !folded && v.x() >= step;
@@ -56,7 +77,9 @@ impl<C: RecordCodec> Saturator<C> {
                 continue;
             }
             let own_m = match scanned {
-                Some(cells) if !folded => f64::from(f32::from_bits(cells[column].load(Ordering::Relaxed))),
+                Some(cells) if !folded => cells
+                    .get(column - columns.start)
+                    .map_or(0.0, |cell| f64::from(f32::from_bits(cell.load(Ordering::Relaxed)))),
                 _ => f64::NAN,
             };
             // Nearly every vertex: all around it is there, nothing folds, nothing is void.
@@ -71,7 +94,7 @@ impl<C: RecordCodec> Saturator<C> {
             } else {
                 own_m
             };
-            made.push(self.record(v, &around, own_m, folded, voids_near)?);
+            made.push(self.record(v, around, own_m, folded, voids_near)?);
         }
         Ok(made.into())
     }
@@ -121,12 +144,13 @@ impl<C: RecordCodec> Saturator<C> {
                     continue;
                 }
                 let (row, column) = child_shape.index(child);
-                let Some(raw) = records.row(level - 1, row).and_then(|r| r.get(column)) else {
+                let Some(row) = records.row(level - 1, row).filter(|row| column < row.columns()) else {
                     return Err(internal(child));
                 };
+                let raw = row.get(column).copied().unwrap_or(C::INERT);
                 let ground2 = self.rules.ground2(v, child);
                 below.add(
-                    &self.rules.codec.decode(*raw, level - 1),
+                    &self.rules.codec.decode(raw, level - 1),
                     ground2,
                     height_m,
                     self.rules.scale.height_base_m,
@@ -137,10 +161,17 @@ impl<C: RecordCodec> Saturator<C> {
     }
 }
 
-/// Where a row's vertices find what they depend on.
+/// Where rows find what they depend on.
+pub(super) struct Around<'r, C: RecordCodec> {
+    pub(super) band: &'r Band<'r>,
+    pub(super) own: &'r OwnErrors,
+    pub(super) records: &'r Levels<C::Raw>,
+}
+
+/// Where the vertices of one level find what they depend on.
 struct Surroundings<'r, C: RecordCodec> {
     shape: &'r LevelShape,
-    band: &'r Band,
+    band: &'r Band<'r>,
     records: &'r Levels<C::Raw>,
 }
 
@@ -151,22 +182,30 @@ struct ChildRows<'r, C: RecordCodec> {
     /// Whether the vertices are white.
     is_white: bool,
     /// Rows south of, level with and north of the vertices.
-    rows: [&'r [C::Raw]; 3],
+    rows: [Piece<'r, C::Raw>; 3],
 }
 
 impl<'r, C: RecordCodec> ChildRows<'r, C> {
-    /// The children of the vertices at `y`, a row away from the data's borders above level 0.
-    fn new(grid: &Grid, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
+    /// The children of the vertices at `y`, a row away from the data's borders, from one x to another.
+    fn new(grid: &Grid, around: &Surroundings<'r, C>, y: u32, [west, east]: [u32; 2]) -> Option<Self> {
         let Surroundings { shape, records, .. } = *around;
         let (s, level) = (shape.step(), shape.level());
-        let child = |y: u32| {
+        let child = |y: u32, west: u32, east: u32| {
             let shape = LevelShape::new(grid, level - 1);
-            records.row(level - 1, shape.index(GridPoint::new(0, y)).0)
+            let (row, from) = shape.index(GridPoint::new(west, y));
+            let (_, to) = shape.index(GridPoint::new(east, y));
+            Some(records.row(level - 1, row)?.piece(from, to + 1, C::INERT))
         };
+        let half = s / 2;
         let rows = match (level, shape.is_white()) {
-            (0, _) => [&[][..]; 3],
-            (_, true) => [child(y - s)?, child(y)?, child(y + s)?],
-            (_, false) => [child(y - s / 2)?, &[], child(y + s / 2)?],
+            (0, _) => [Piece::none(), Piece::none(), Piece::none()],
+            (_, true) => {
+                [child(y - s, west, east)?, child(y, west - s, east + s)?, child(y + s, west, east)?]
+            }
+            (_, false) => {
+                let west = west.saturating_sub(half);
+                [child(y - half, west, east + half)?, Piece::none(), child(y + half, west, east + half)?]
+            }
         };
         Some(Self { step: s as usize, is_white: shape.is_white(), rows })
     }
@@ -174,34 +213,33 @@ impl<'r, C: RecordCodec> ChildRows<'r, C> {
     /// The four children of the vertex at `x`: those beside it before those north and south, where that makes a difference.
     #[inline(always)]
     fn of(&self, x: usize, column: usize) -> Option<[C::Raw; 4]> {
-        let [south, beside, north] = self.rows;
+        let [south, beside, north] = &self.rows;
         if self.is_white {
             return Some([
-                *beside.get(column)?,
-                *beside.get(column + 1)?,
-                *south.get(column)?,
-                *north.get(column)?,
+                beside.get(column)?,
+                beside.get(column + 1)?,
+                south.get(column)?,
+                north.get(column)?,
             ]);
         }
         let west = (x - self.step / 2) >> self.step.trailing_zeros();
-        let (south, north) = (south.get(west..west + 2)?, north.get(west..west + 2)?);
-        Some([south[0], south[1], north[0], north[1]])
+        Some([south.get(west)?, south.get(west + 1)?, north.get(west)?, north.get(west + 1)?])
     }
 }
 
 /// A row away from the data's borders, with voids.
 struct VoidRow<'r, C: RecordCodec> {
-    voids: &'r [bool],
+    voids: Piece<'static, bool>,
     /// `None` at level 0.
     children: Option<ChildRows<'r, C>>,
 }
 
 impl<'r, C: RecordCodec> VoidRow<'r, C> {
     /// `None` if the row itself has no voids or is no longer in the band.
-    fn new(grid: &Grid, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
-        let voids = around.band.find_row_voids(y).filter(|voids| !voids.is_empty())?;
+    fn new(grid: &Grid, around: &Surroundings<'r, C>, y: u32, ends: [u32; 2]) -> Option<Self> {
+        let voids = around.band.find_voids(y, ends[0] as usize, ends[1] as usize + 1)?;
         let has_children = around.shape.level() > 0;
-        let children = if has_children { Some(ChildRows::new(grid, around, y)?) } else { None };
+        let children = if has_children { Some(ChildRows::new(grid, around, y, ends)?) } else { None };
         Some(Self { voids, children })
     }
 
@@ -209,7 +247,7 @@ impl<'r, C: RecordCodec> VoidRow<'r, C> {
     #[inline(always)]
     fn is_inert(&self, x: u32, column: usize) -> bool {
         let x = x as usize;
-        self.voids[x]
+        self.voids.get(x).is_some_and(|is_void| is_void)
             && self.children.as_ref().is_none_or(|children| {
                 children.of(x, column).is_some_and(|raws| raws.iter().all(|raw| *raw == C::INERT))
             })
@@ -236,8 +274,8 @@ struct OpenRow<'r, C: RecordCodec> {
 }
 
 impl<'r, C: RecordCodec> OpenRow<'r, C> {
-    /// `None` if the rows are no longer in the band, as for levels larger than a tile.
-    fn new(rules: &'r Rules<C>, around: &Surroundings<'r, C>, y: u32) -> Option<Self> {
+    /// Of vertices from one x to another. `None` if the rows are no longer in the band, as for levels larger than a tile.
+    fn new(rules: &'r Rules<C>, around: &Surroundings<'r, C>, y: u32, ends_x: [u32; 2]) -> Option<Self> {
         let Surroundings { shape, band, .. } = *around;
         let (s, level) = (shape.step(), shape.level());
         let codes = band.find_row(y)?;
@@ -246,7 +284,7 @@ impl<'r, C: RecordCodec> OpenRow<'r, C> {
         } else {
             ([codes; 2], [-(s as isize), s as isize])
         };
-        let children = ChildRows::new(&rules.grid, around, y)?;
+        let children = ChildRows::new(&rules.grid, around, y, ends_x)?;
         let [dx, dy] = rules.grid.spacing_m().map(|d| d * f64::from(s));
         let ground2 = match (level, shape.is_white()) {
             (0, _) => [0.0; 2],

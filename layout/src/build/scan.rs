@@ -6,6 +6,7 @@
 //! about two nanoseconds of one core each. Triangles that padding deforms are left to [`crate::bound`].
 
 use super::band::Band;
+use super::land::Land;
 use super::levels::{Levels, index_in};
 use crate::bound::{
     Plane, Samples, farthest_diagonal, farthest_level, farthest_upright, larger, scanned_error_m,
@@ -19,12 +20,27 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub(super) type OwnErrors = Levels<AtomicU32>;
 
 /// Scans the tiles of one row of tiles, whose south border is row `tile_y * side`.
-pub(super) fn scan_tile_row(grid: &Grid, band: &Band, own: &OwnErrors, tile_y: u32, side: u32, step_m: f64) {
+pub(super) fn scan_tile_row(
+    grid: &Grid,
+    land: &Land,
+    band: &Band<'_>,
+    own: &OwnErrors,
+    tile_y: u32,
+    side: u32,
+    step_m: f64,
+) {
     let [wide, high] = grid.samples();
     let y0 = tile_y * side;
     debug_assert!(y0 < high);
-    let tiles = (wide - 1).div_ceil(side).max(1);
-    (0..tiles).into_par_iter().for_each_init(Vec::new, |buffer, tile_x| {
+    let last = (wide - 1).div_ceil(side).max(1) - 1;
+    let mut tiles: Vec<u32> = land
+        .runs(y0..=(y0 + side).min(high - 1))
+        .into_iter()
+        // A tile's border is its neighbour's as well.
+        .flat_map(|run| run.start.saturating_sub(1) / side..=((run.end - 1) / side).min(last))
+        .collect();
+    tiles.dedup();
+    tiles.into_par_iter().for_each_init(Vec::new, |buffer, tile_x| {
         let Some(tile) = Tile::load(grid, band, tile_x * side, y0, side, buffer) else { return };
         tile.scan_inside(own, step_m);
         tile.scan_around(own, step_m);
@@ -33,7 +49,7 @@ pub(super) fn scan_tile_row(grid: &Grid, band: &Band, own: &OwnErrors, tile_y: u
 
 struct Tile<'a> {
     grid: &'a Grid,
-    band: &'a Band,
+    band: &'a Band<'a>,
     x0: u32,
     y0: u32,
     side: u32,
@@ -62,34 +78,22 @@ impl<'a> Tile<'a> {
     /// The tile with its south-west corner at (`x0`, `y0`); `None` if it is wholly void and has nothing to say.
     fn load(
         grid: &'a Grid,
-        band: &'a Band,
+        band: &'a Band<'a>,
         x0: u32,
         y0: u32,
         side: u32,
         buffer: &'a mut Vec<f64>,
     ) -> Option<Self> {
         let samples = [0, 1].map(|i| (grid.samples()[i] - [x0, y0][i]).min(side + 1));
-        let is_void = |y| {
-            let voids = band.row_voids(y);
-            // Without an early end the comparison takes many samples at once.
-            !voids.is_empty()
-                && voids[x0 as usize..(x0 + samples[0]) as usize].iter().fold(true, |all, v| all & v)
-        };
-        if (y0..y0 + samples[1]).all(is_void) {
-            return None;
-        }
         buffer.clear();
         buffer.resize((side as usize + 1) * (side as usize + 1), f64::NAN);
         let rows = buffer.chunks_exact_mut(side as usize + 1).zip(y0..y0 + samples[1]);
+        let mut any = false;
         for (to, y) in rows {
-            let columns = x0 as usize..(x0 + samples[0]) as usize;
-            to[..columns.len()].copy_from_slice(&band.row(y)[columns.clone()]);
-            let voids = band.row_voids(y);
-            if !voids.is_empty() {
-                for (value, _) in to.iter_mut().zip(&voids[columns]).filter(|(_, is_void)| **is_void) {
-                    *value = f64::NAN;
-                }
-            }
+            any |= band.copy_heights(y, x0, &mut to[..samples[0] as usize]);
+        }
+        if !any {
+            return None;
         }
         Some(Self { grid, band, x0, y0, side, samples, codes: buffer })
     }

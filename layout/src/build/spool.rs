@@ -5,6 +5,7 @@
 //! NaN. Samples that single precision holds exactly take 4 bytes, others 8. A void's bytes are zero, so rows of voids are never written: the
 //! file has a hole there, and no room is taken.
 
+use super::land::{BLOCK, Land};
 use crate::bound::range;
 use crate::dem::{DemInfo, SampleSink, SampleType, Window};
 use crate::error::LayoutError;
@@ -13,6 +14,7 @@ use crate::file::atomic::folder_of;
 use crate::file::disk::Disk;
 use crate::remedy::Remedy;
 use std::fs::File;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError, RwLock};
@@ -90,6 +92,8 @@ pub(super) struct Spool<'a> {
     stats: Mutex<SampleStats>,
     /// Which rows, from the south, have a sample that is not void.
     has_heights: Vec<AtomicBool>,
+    /// Which blocks have.
+    land: Land,
     advance: &'a (dyn Fn(u64) + Sync),
 }
 
@@ -123,6 +127,7 @@ impl<'a> Spool<'a> {
             nodata,
             storage,
             stats: Mutex::new(SampleStats::new()),
+            land: Land::none([info.samples_wide, info.samples_high]),
             has_heights: (0..info.samples_high).map(|_| AtomicBool::new(false)).collect(),
             advance,
         })
@@ -142,9 +147,9 @@ impl<'a> Spool<'a> {
         !self.has_heights[y as usize].load(Ordering::Relaxed)
     }
 
-    /// Row `y`, counted from the south, of raw samples.
-    pub(super) fn read_row(&self, y: u32, row: &mut [f64]) -> Result<(), LayoutError> {
-        self.read_part(y, 0, row)
+    /// Where samples are that are not void.
+    pub(super) fn land(&self) -> &Land {
+        &self.land
     }
 
     /// Raw samples of row `y`, counted from the south, from a column on.
@@ -201,6 +206,8 @@ impl<'a> Spool<'a> {
     /// Stores encoded samples of row `y`, counted from the south, from a column on.
     fn write(&self, y: u32, col: u32, bytes: &[u8]) -> Result<(), LayoutError> {
         self.has_heights[y as usize].store(true, Ordering::Relaxed);
+        let count = bytes.len() as u64 / self.sample_bytes();
+        self.land.mark(col..col + count as u32, y);
         let offset = (u64::from(y) * u64::from(self.wide) + u64::from(col)) * self.sample_bytes();
         match &self.storage {
             Storage::Memory(all) => {
@@ -241,6 +248,25 @@ impl<'a> Spool<'a> {
             }
         }
     }
+}
+
+/// Parts of a row of samples that starts at column `col`, cut where blocks begin, that have blocks with heights only.
+fn stretches(row: &[f64], col: u32) -> Vec<Range<usize>> {
+    let mut stretches: Vec<Range<usize>> = Vec::new();
+    let mut from = 0;
+    while from < row.len() {
+        let column = col as usize + from;
+        let to = (from + BLOCK as usize - column % BLOCK as usize).min(row.len());
+        // Without an early end the comparison takes many samples at once.
+        if !row[from..to].iter().fold(true, |all, v| all & v.is_nan()) {
+            match stretches.last_mut().filter(|last| last.end == from) {
+                Some(last) => last.end = to,
+                None => stretches.push(from..to),
+            }
+        }
+        from = to;
+    }
+    stretches
 }
 
 fn failed(target: &Path, action: &'static str, e: std::io::Error) -> LayoutError {
@@ -299,12 +325,11 @@ impl SampleSink for Spool<'_> {
         let stats = SampleStats::of(samples, self.sample_type);
         let mut bytes = Vec::new();
         for (i, row) in samples.chunks_exact(window.width.max(1) as usize).enumerate() {
-            if row.iter().all(|v| v.is_nan()) {
-                continue;
-            }
-            self.encode(row, &mut bytes);
             let y = self.high - 1 - (window.row + i as u32);
-            self.write(y, window.col, &bytes)?;
+            for stretch in stretches(row, window.col) {
+                self.encode(&row[stretch.clone()], &mut bytes);
+                self.write(y, window.col + stretch.start as u32, &bytes)?;
+            }
         }
         self.stats.lock().unwrap_or_else(PoisonError::into_inner).merge(&stats);
         (self.advance)(samples.len() as u64);

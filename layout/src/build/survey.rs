@@ -142,24 +142,27 @@ pub(super) fn steepest_steps_m(
     let steepest = blocks
         .into_par_iter()
         .map(|first| {
-            let mut last_row = vec![f64::NAN; wide as usize];
-            let mut row = last_row.clone();
             let mut steepest = [0.0f64; 2];
-            let mut follows_row = false;
             // The row below the block belongs to it, so that no pair of rows is left out.
-            for y in first.saturating_sub(1)..(first + ROWS).min(high) {
-                if spool.is_void_row(y) {
-                    follows_row = false;
-                    continue;
+            let rows = first.saturating_sub(1)..(first + ROWS).min(high);
+            for run in spool.land().runs(rows.start..=rows.end - 1) {
+                let mut last_row = vec![f64::NAN; run.len()];
+                let mut row = last_row.clone();
+                let mut follows_row = false;
+                for y in rows.clone() {
+                    if spool.is_void_row(y) {
+                        follows_row = false;
+                        continue;
+                    }
+                    spool.read_part(y, run.start, &mut row)?;
+                    row.iter_mut().for_each(|v| *v = code.code(*v));
+                    steepest[0] = larger(steepest[0], largest_difference(&row, &row[1..]));
+                    if follows_row {
+                        steepest[1] = larger(steepest[1], largest_difference(&row, &last_row));
+                    }
+                    std::mem::swap(&mut row, &mut last_row);
+                    follows_row = true;
                 }
-                spool.read_row(y, &mut row)?;
-                row.iter_mut().for_each(|v| *v = code.code(*v));
-                steepest[0] = larger(steepest[0], largest_difference(&row, &row[1..]));
-                if follows_row {
-                    steepest[1] = larger(steepest[1], largest_difference(&row, &last_row));
-                }
-                std::mem::swap(&mut row, &mut last_row);
-                follows_row = true;
             }
             advance(u64::from(ROWS.min(high - first)) * u64::from(wide));
             Ok(steepest)

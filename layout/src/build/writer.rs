@@ -6,19 +6,19 @@
 
 use super::gather::gather;
 use super::levels::{LevelShape, Levels};
-use super::plan::{LevelPlan, Plan};
+use super::plan::{LevelPlan, Plan, PlannedLeaf, place_of};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
-use crate::file::bytes::{PAGE_BYTES, Page, checksum};
-use crate::file::directory::{put_all_leaves, root_bytes};
+use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
+use crate::file::directory::{page_at, put_leaf, root_bytes};
 use crate::file::disk::Disk;
-use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
+use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::structure::inert_page;
 use crate::grid::Grid;
 use crate::grid::record::{RecordCodec, RecordKind};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 const PAGE: u64 = PAGE_BYTES as u64;
@@ -33,10 +33,8 @@ pub(super) struct PageWriter<'a, C: RecordCodec> {
     levels: Vec<LevelPlan>,
     /// Next part of each level.
     next: Vec<usize>,
-    /// Place of each logical page as planned, then as written.
-    entries: Vec<Entry>,
-    /// Parts that each logical page still lacks.
-    lacking: Vec<u8>,
+    /// Place of each planned page as planned, then as written, and the parts that it still lacks; by leaf of the directory.
+    leaves: Leaves,
     /// Pages of which some parts are known.
     open: HashMap<u64, Box<Page>>,
     inert: Box<Page>,
@@ -44,6 +42,9 @@ pub(super) struct PageWriter<'a, C: RecordCodec> {
     outgoing: Option<SyncSender<PlacedPages>>,
     codec: std::marker::PhantomData<C>,
 }
+
+/// Leaves of the directory by number.
+type Leaves = BTreeMap<u64, Box<PlannedLeaf>>;
 
 /// Pages and their places in the file.
 pub(super) type PlacedPages = Vec<(u32, Box<Page>)>;
@@ -70,6 +71,13 @@ fn failed(file: &AtomicFile, e: std::io::Error) -> LayoutError {
     LayoutError::write(file.target(), "cannot write the terrain file", when_full, e)
 }
 
+/// What is said where page numbers end.
+fn too_long(file: &AtomicFile) -> LayoutError {
+    page_at(file.target(), u64::MAX)
+        .err()
+        .unwrap_or_else(|| LayoutError::Usage("the file would be too long".into()))
+}
+
 impl<'a, C: RecordCodec> PageWriter<'a, C> {
     pub(super) fn new(
         file: &'a AtomicFile,
@@ -78,29 +86,27 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         plan: Plan,
         kind: RecordKind,
         outgoing: SyncSender<PlacedPages>,
-    ) -> Self {
+    ) -> Result<Self, LayoutError> {
         let mut page = INERT_PAGE;
-        let entries = plan
-            .parts
-            .iter()
-            .map(|parts| {
-                page += u32::from(*parts > 0);
-                Entry { page: if *parts > 0 { page } else { 0 }, ..Entry::default() }
-            })
-            .collect();
-        Self {
+        let Plan { levels, mut leaves } = plan;
+        for leaf in leaves.values_mut() {
+            for (entry, _) in leaf.entries.iter_mut().zip(leaf.parts).filter(|(_, parts)| *parts > 0) {
+                page = page.checked_add(1).ok_or_else(|| too_long(file))?;
+                entry.page = page;
+            }
+        }
+        Ok(Self {
             file,
             disk,
             grid,
-            next: vec![0; plan.levels.len()],
-            levels: plan.levels,
-            entries,
-            lacking: plan.parts,
+            next: vec![0; levels.len()],
+            levels,
+            leaves,
             open: HashMap::new(),
             inert: inert_page(kind),
             outgoing: Some(outgoing),
             codec: std::marker::PhantomData,
-        }
+        })
     }
 
     /// Gathers the parts of `level` that are complete now that all its rows up to `done_y` are, and writes the pages that are; returns the
@@ -126,14 +132,14 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
             for (part, bytes) in batch.iter().zip(gathered) {
                 complete.extend(put(
                     &mut self.open,
-                    &mut self.lacking,
+                    &mut self.leaves,
                     &self.inert,
                     C::BYTES,
                     part.first(),
                     bytes.as_deref(),
                 ));
             }
-            send_pages(self.outgoing.as_ref(), &mut self.entries, &self.inert, complete)?;
+            send_pages(self.outgoing.as_ref(), &mut self.leaves, &self.inert, complete)?;
         }
         self.next[level as usize] += ready;
         let later = waiting.get(ready).map(|p| i64::from(p.y[1]) - i64::from(plan.span));
@@ -146,8 +152,8 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         for (raw, place) in corners.into_iter().zip(bytes.chunks_exact_mut(C::BYTES)) {
             C::write(raw, place);
         }
-        let complete = put(&mut self.open, &mut self.lacking, &self.inert, C::BYTES, 0, Some(&bytes));
-        send_pages(self.outgoing.as_ref(), &mut self.entries, &self.inert, complete.into_iter().collect())
+        let complete = put(&mut self.open, &mut self.leaves, &self.inert, C::BYTES, 0, Some(&bytes));
+        send_pages(self.outgoing.as_ref(), &mut self.leaves, &self.inert, complete.into_iter().collect())
     }
 
     /// No more pages will come.
@@ -157,16 +163,26 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
 
     /// Writes what remains, closes gaps, and gives `header` its places.
     pub(super) fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
-        let end = self.close_gaps()?;
-        let (root, page) = put_all_leaves(self.entries.chunks(ENTRIES_PER_LEAF), end, |page, leaf| {
-            self.disk
-                .write_at(self.file.file(), leaf, u64::from(page) * PAGE)
-                .map_err(|e| failed(self.file, e))
-        })?;
+        let mut page = self.close_gaps()?;
+        let mut root = vec![Entry::default(); to_usize(header.root_entries())?];
+        let mut stored = 0;
+        for (number, leaf) in &self.leaves {
+            let present = leaf.entries.iter().filter(|e| e.is_present()).count() as u64;
+            // Leaves without pages are left out.
+            if present > 0 {
+                root[*number as usize] = put_leaf(&leaf.entries, page, 1, |bytes| {
+                    self.disk
+                        .write_at(self.file.file(), bytes, u64::from(page) * PAGE)
+                        .map_err(|e| failed(self.file, e))
+                })?;
+                page = page.checked_add(1).ok_or_else(|| too_long(self.file))?;
+                stored += present;
+            }
+        }
         let root = root_bytes(&root);
         header.root_page = page;
         header.root_checksum = root.checksum;
-        header.stored_pages = self.entries.iter().filter(|e| e.is_present()).count() as u64;
+        header.stored_pages = stored;
         header.file_bytes = u64::from(page) * PAGE + root.bytes.len() as u64;
         header.generation = 1;
         let (file, disk) = (self.file.file(), self.disk);
@@ -182,18 +198,17 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     fn close_gaps(&mut self) -> Result<u32, LayoutError> {
         let mut free = INERT_PAGE + 1;
         let mut page = Box::new([0; PAGE_BYTES]);
-        for i in 0..self.entries.len() {
-            let entry = self.entries[i];
+        let (file, disk) = (self.file.file(), self.disk);
+        for entry in self.leaves.values_mut().flat_map(|leaf| &mut leaf.entries) {
             if entry.generation == 0 {
-                self.entries[i] = Entry::default();
+                *entry = Entry::default();
                 continue;
             }
             if entry.page != free {
-                let (file, disk) = (self.file.file(), self.disk);
                 disk.read_at(file, &mut page[..], u64::from(entry.page) * PAGE)
                     .and_then(|()| disk.write_at(file, &page[..], u64::from(free) * PAGE))
                     .map_err(|e| failed(self.file, e))?;
-                self.entries[i].page = free;
+                entry.page = free;
             }
             free += 1;
         }
@@ -205,7 +220,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
 /// it and anything was ever put there.
 fn put(
     open: &mut HashMap<u64, Box<Page>>,
-    lacking: &mut [u8],
+    leaves: &mut Leaves,
     inert: &Page,
     record: usize,
     first: u64,
@@ -218,8 +233,10 @@ fn put(
         let page = open.entry(number).or_insert_with(|| Box::new(*inert));
         page[at..at + bytes.len()].copy_from_slice(bytes);
     }
-    lacking[number as usize] -= 1;
-    if lacking[number as usize] > 0 {
+    let (leaf, within) = place_of(number);
+    let lacking = &mut leaves.get_mut(&leaf)?.parts[within];
+    *lacking -= 1;
+    if *lacking > 0 {
         return None;
     }
     open.remove(&number).map(|page| (number, page))
@@ -228,7 +245,7 @@ fn put(
 /// Sends complete pages to be written and notes their checksums; pages that are inert after all are left out.
 fn send_pages(
     outgoing: Option<&SyncSender<PlacedPages>>,
-    entries: &mut [Entry],
+    leaves: &mut Leaves,
     inert: &Page,
     pages: Vec<(u64, Box<Page>)>,
 ) -> Result<(), LayoutError> {
@@ -236,8 +253,11 @@ fn send_pages(
         pages.par_iter().map(|(_, page)| (**page != *inert).then(|| checksum(&page[..]))).collect();
     let mut placed = Vec::with_capacity(pages.len());
     for ((number, page), sum) in pages.into_iter().zip(sums) {
-        if let Some(sum) = sum {
-            let entry = &mut entries[number as usize];
+        let (leaf, within) = place_of(number);
+        if let Some(sum) = sum
+            && let Some(leaf) = leaves.get_mut(&leaf)
+        {
+            let entry = &mut leaf.entries[within];
             (entry.checksum, entry.generation) = (sum, 1);
             placed.push((entry.page, page));
         }

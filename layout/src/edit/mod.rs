@@ -24,6 +24,8 @@ pub use operations::line::{Crest, Line, MAX_LINE_PLACES};
 pub use operations::stamp::{Stamp, StampMode};
 pub use operations::window::{HeightWindow, SampleRect};
 #[cfg(feature = "files")]
+pub use session::beside::overlays_beside;
+#[cfg(feature = "files")]
 pub use session::commit::CommitJob;
 #[cfg(feature = "files")]
 pub use session::compact::{Compacted, compact, compact_packed};

@@ -132,7 +132,29 @@ pub struct Header {
     pub about: About,
 }
 
+/// The state that a file is in. A file that is written anew begins its generations anew, so a generation alone does not tell one state from another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FileState {
+    generation: u32,
+    root: [u32; 2],
+    record_kind: RecordKind,
+    scale: RecordScale,
+}
+
+impl FileState {
+    /// Its generation.
+    pub fn generation(&self) -> u32 {
+        self.generation
+    }
+}
+
 impl Header {
+    /// The state of the file, which says which records it has and what they mean.
+    pub fn state(&self) -> FileState {
+        let root = [self.root_page, self.root_checksum];
+        FileState { generation: self.generation, root, record_kind: self.record_kind, scale: self.scale }
+    }
+
     /// Records a page.
     pub fn records_per_page(&self) -> u64 {
         (PAGE_BYTES / self.record_kind.bytes()) as u64

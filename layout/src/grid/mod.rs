@@ -6,7 +6,7 @@
 //! (x, y and height) of the nearest data sample. Triangles wholly beyond the data thereby lose their
 //! area, and what remains covers the data exactly.
 //!
-//! Invariant: only [`Grid::new`] makes a grid, so `k` is 1..=16 and both sample counts fit the square.
+//! Invariant: only [`Grid::new`] makes a grid, so `k` is 1..=17 and both sample counts fit the square.
 
 pub(crate) mod octave;
 pub mod order;
@@ -17,10 +17,16 @@ use crate::portable::hypot;
 use crate::remedy::Remedy;
 use crate::words::number;
 
-/// Largest supported `k`: a square of 65,537 samples a side.
-pub(crate) const MAX_K: u32 = 16;
+/// Largest supported `k`: a square of 131,073 samples a side.
+pub(crate) const MAX_K: u32 = 17;
 
-/// A grid coordinate: column x (east) and row y (north), each at most 65,536.
+/// Most samples a side of a terrain: 2^17 + 1.
+pub const MOST_SAMPLES: u32 = (1 << MAX_K) + 1;
+
+/// [`MOST_SAMPLES`] as messages say it.
+pub const MOST_SAMPLES_WORDS: &str = "131,073";
+
+/// A grid coordinate: column x (east) and row y (north), each at most 2^17.
 ///
 /// Packed into one word, x in the low half, so that a midpoint is one addition and one shift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -49,7 +55,7 @@ impl GridPoint {
     /// the two ends of every longest edge above the finest level.
     #[inline(always)]
     pub const fn midpoint(self, other: Self) -> Self {
-        // Both sums are even and below 2^18, so no bit crosses from one half into the other.
+        // Both sums are even and below 2^22, so no bit crosses from one half into the other.
         Self((self.0 + other.0) >> 1)
     }
 
@@ -72,13 +78,13 @@ impl Grid {
     /// The smallest grid that holds `samples` (wide, high) at `spacing_m` (east, north).
     ///
     /// # Errors
-    /// [`LayoutError::Usage`] if a side has fewer than 2 or more than 65,537 samples, or a spacing is
+    /// [`LayoutError::Usage`] if a side has fewer than 2 or more than [`MOST_SAMPLES`], or a spacing is
     /// not a positive finite number between 1e-3 and 1e6 metres.
     pub fn new(samples: [u32; 2], spacing_m: [f64; 2]) -> Result<Self, LayoutError> {
         let longest = samples[0].max(samples[1]);
-        if samples[0].min(samples[1]) < 2 || longest > (1 << MAX_K) + 1 {
+        if samples[0].min(samples[1]) < 2 || longest > MOST_SAMPLES {
             return Err(LayoutError::Usage(format!(
-                "a terrain has 2 to 65,537 samples a side, not {} x {}; cut the DEM into smaller ones",
+                "a terrain has 2 to {MOST_SAMPLES_WORDS} samples a side, not {} x {}; cut the DEM into smaller ones",
                 samples[0], samples[1]
             )));
         }
@@ -94,7 +100,7 @@ impl Grid {
         Ok(Self { k, samples, spacing_m })
     }
 
-    /// Binary logarithm of the square's side in steps; 1..=16.
+    /// Binary logarithm of the square's side in steps; 1..=17.
     pub fn k(&self) -> u32 {
         self.k
     }
@@ -260,5 +266,21 @@ impl Grid {
             let (x, y) = (i64::from(p.x()) + dx, i64::from(p.y()) + dy);
             ((0..=n).contains(&x) && (0..=n).contains(&y)).then(|| GridPoint::new(x as u32, y as u32))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_square_is_as_said() {
+        assert_eq!(MOST_SAMPLES_WORDS.replace(',', ""), MOST_SAMPLES.to_string());
+        let grid = Grid::new([MOST_SAMPLES, 2], [1.0; 2]).unwrap();
+        assert_eq!((grid.k(), grid.side_steps()), (MAX_K, 1 << MAX_K));
+        for larger in [MOST_SAMPLES + 1, u32::MAX] {
+            let refused = Grid::new([2, larger], [1.0; 2]).unwrap_err().to_string();
+            assert!(refused.contains(MOST_SAMPLES_WORDS), "{refused}");
+        }
     }
 }

@@ -10,6 +10,8 @@
 //! sides. See FORMAT.md, "Order of records". Cost: a few shifts a vertex.
 
 mod blocks;
+#[cfg(test)]
+mod large;
 
 pub(crate) use blocks::{block_start, level_around, step_in_block};
 
@@ -104,11 +106,11 @@ pub fn slot_of(k: u32, p: GridPoint) -> u64 {
     let d = k - 1 - t;
     if tx == ty {
         let (cx, cy) = (x >> (t + 1), y >> (t + 1));
-        white_base(d) + 2 * spread16(cy) + spread16(cx ^ cy)
+        white_base(d) + 2 * spread24(cy) + spread24(cx ^ cy)
     } else {
         let (u, w) = (x >> t, y >> t);
         let (a, b) = black_block(d, u, w);
-        black_base(d) + 2 * spread16(a ^ ((1 << d) - 1)) + spread16(a ^ b ^ (1 << d))
+        black_base(d) + 2 * spread24(a ^ ((1 << d) - 1)) + spread24(a ^ b ^ (1 << d))
     }
 }
 
@@ -140,17 +142,19 @@ impl RowSlots {
     #[inline(always)]
     pub(crate) const fn slot(&self, x: u32) -> u64 {
         if self.is_white {
-            return self.base + spread16((x >> (self.t + 1)) as u64 ^ self.row);
+            return self.base + spread24((x >> (self.t + 1)) as u64 ^ self.row);
         }
         let (a, b) = black_block(self.d, (x >> self.t) as u64, self.row);
-        self.base + 2 * spread16(a ^ ((1 << self.d) - 1)) + spread16(a ^ b ^ (1 << self.d))
+        self.base + 2 * spread24(a ^ ((1 << self.d) - 1)) + spread24(a ^ b ^ (1 << self.d))
     }
 }
 
-/// [`spread`] of the low 16 bits, by table.
+/// [`spread`] of the low 24 bits, by table: enough for the coordinates of every block of a square of up to 2^24 steps.
 #[inline(always)]
-const fn spread16(v: u64) -> u64 {
-    SPREAD[v as usize & 255] as u64 | (SPREAD[(v >> 8) as usize & 255] as u64) << 16
+const fn spread24(v: u64) -> u64 {
+    SPREAD[v as usize & 255] as u64
+        | (SPREAD[(v >> 8) as usize & 255] as u64) << 16
+        | (SPREAD[(v >> 16) as usize & 255] as u64) << 32
 }
 
 /// Spread bytes.

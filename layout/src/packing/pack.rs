@@ -189,6 +189,12 @@ impl<C: RecordCodec> Packer<'_, C> {
         let first = id.at.map(|v| v << (group.stride_log + group.tile_log));
         let k = self.records.grid().k();
         let inert = self.way.inert();
+        // All that it gives lies below its centre, unless it gives the corners of the square, too.
+        let half = 1 << (group.stride_log + group.tile_log) >> 1;
+        let centre = slot_of(k, GridPoint::new(first[0] + half, first[1] + half));
+        if !shape.is_top && self.records.raw(centre) == C::INERT {
+            return None;
+        }
         let records = TileRecords::gathered(&shape, inert, |at, words| {
             let [x, y] = [0, 1].map(|axis| first[axis] + (at[axis] << group.stride_log));
             let mut bytes = [0; 16];

@@ -1,7 +1,6 @@
 //! Elevation data held in memory, and terrain files made of it.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
-use rayon::prelude::*;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::progress::Silent;
@@ -72,23 +71,44 @@ impl DemSource for Islands {
         &self.info
     }
 
+    /// Windows of voids between the islands, of any size, and islands some rows at a time.
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
         let side = self.info.samples_wide;
-        (0..side).into_par_iter().try_for_each_init(
-            || vec![f64::NAN; side as usize],
-            |samples, row| {
-                let y = side - 1 - row;
-                for island in self.islands.iter().filter(|i| i.contains(i.west, y)) {
-                    for x in island.west..island.west + island.wide {
-                        samples[x as usize] = self.height(x, y).unwrap_or(f64::NAN);
-                    }
+        let mut cuts: Vec<u32> = self.islands.iter().flat_map(|i| [i.south, i.south + i.high]).collect();
+        cuts.extend([0, side]);
+        cuts.sort_unstable();
+        cuts.dedup();
+        for south in cuts.windows(2).flat_map(|cut| (cut[0]..cut[1]).step_by(64).map(move |y| (y, cut))) {
+            let (south, cut) = south;
+            let mut here: Vec<&Island> = self.islands.iter().filter(|i| i.contains(i.west, south)).collect();
+            here.sort_unstable_by_key(|i| i.west);
+            if here.is_empty() {
+                if south == cut[0] {
+                    let height = cut[1] - cut[0];
+                    sink.put_void(Window { col: 0, row: side - cut[1], width: side, height })?;
                 }
-                sink.put(Window { col: 0, row, width: side, height: 1 }, samples)?;
-                for island in &self.islands {
-                    samples[island.west as usize..(island.west + island.wide) as usize].fill(f64::NAN);
+                continue;
+            }
+            let height = (cut[1] - south).min(64);
+            let row = side - south - height;
+            let mut west = 0;
+            for island in here {
+                if west < island.west {
+                    sink.put_void(Window { col: west, row, width: island.west - west, height })?;
                 }
-                Ok(())
-            },
-        )
+                let window = Window { col: island.west, row, width: island.wide, height };
+                let rows = (south..south + height).rev();
+                let samples: Vec<f64> = rows
+                    .flat_map(|y| (island.west..island.west + island.wide).map(move |x| (x, y)))
+                    .map(|(x, y)| self.height(x, y).unwrap_or(f64::NAN))
+                    .collect();
+                sink.put(window, &samples)?;
+                west = island.west + island.wide;
+            }
+            if west < side {
+                sink.put_void(Window { col: west, row, width: side - west, height })?;
+            }
+        }
+        Ok(())
     }
 }

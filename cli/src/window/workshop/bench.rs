@@ -15,6 +15,7 @@ use std::sync::mpsc::{Receiver, Sender};
 use terrasoar::stream::GroundPatch;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{Changes, CommitJob, Edit, EditSession};
+use terrasoar_layout::file::header::FileState;
 use terrasoar_layout::imagery::Paint;
 use terrasoar_scene::repaint::{PictureWatch, Repaint};
 
@@ -59,18 +60,18 @@ pub(super) struct Desk {
     reports: Sender<Report>,
     wake: Wake,
     done: Tally,
-    generation: u32,
+    state: FileState,
 }
 
 impl Desk {
-    /// A desk for a file on show in this generation.
-    pub(super) fn new(reports: Sender<Report>, wake: Wake, generation: u32) -> Self {
-        Self { reports, wake, done: Tally::default(), generation }
+    /// A desk for a file on show in this state.
+    pub(super) fn new(reports: Sender<Report>, wake: Wake, state: FileState) -> Self {
+        Self { reports, wake, done: Tally::default(), state }
     }
 
     fn report(&self, news: News) {
         // A window that has gone hears nothing.
-        let _ = self.reports.send(Report { news, done: self.done, generation: self.generation });
+        let _ = self.reports.send(Report { news, done: self.done, state: self.state });
         (self.wake)();
     }
 }
@@ -91,7 +92,7 @@ impl Bench {
         to_bench: Sender<Order>,
         spawn: Spawn,
     ) {
-        match open_session(open, desk.generation).and_then(|session| parts(session, to_bench, spawn)) {
+        match open_session(open, desk.state).and_then(|session| parts(session, to_bench, spawn)) {
             Err(error) => desk.report(News::NotOpened(error)),
             Ok((session, writer, helpers)) => {
                 let bench = Self {
@@ -223,7 +224,7 @@ impl Bench {
             self.batches.drain(..batches);
             self.desk.done.saved = edits;
         }
-        self.desk.generation = self.session.header().generation;
+        self.desk.state = self.session.header().state();
         // What was edited meanwhile is not what the file has.
         let edited: BTreeSet<u64> = self.session.editor().uncommitted().into_iter().collect();
         let mut places = committed.places;
@@ -261,7 +262,7 @@ impl Bench {
         let settled = self.settle();
         self.desk.done.orders += 1;
         let turned = settled.and_then(|()| if back { self.session.undo() } else { self.session.redo() });
-        self.desk.generation = self.session.header().generation;
+        self.desk.state = self.session.header().state();
         let news = match turned {
             Ok(None) => News::NothingToTurn { back },
             Err(error) => News::NotTurned(error),
@@ -306,10 +307,10 @@ impl Bench {
     }
 }
 
-/// Opens the session of a file that is on show in this generation.
-fn open_session(open: &Open, generation: u32) -> Result<EditSession, LayoutError> {
+/// Opens the session of a file that is on show in this state.
+fn open_session(open: &Open, state: FileState) -> Result<EditSession, LayoutError> {
     let session = open()?;
-    if session.header().generation == generation {
+    if session.header().state() == state {
         return Ok(session);
     }
     Err(LayoutError::Usage(format!(

@@ -25,6 +25,7 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{Edit, EditSession};
+use terrasoar_layout::file::header::FileState;
 use terrasoar_layout::imagery::Paint;
 use terrasoar_layout::read::terrain::Terrain;
 
@@ -39,8 +40,8 @@ type Spawn = fn(&str, Box<dyn FnOnce() + Send>) -> io::Result<JoinHandle<()>>;
 pub(crate) struct Workshop {
     state: State,
     path: PathBuf,
-    /// Generation of the file that is on show, edits included.
-    generation: u32,
+    /// State of the file that is on show, edits included.
+    on_show: FileState,
     open: Open,
     wake: Wake,
     spawn: Spawn,
@@ -89,8 +90,8 @@ impl Workshop {
     }
 
     fn with(terrain: &Terrain, open: Open, wake: Wake, spawn: Spawn) -> Self {
-        let (path, generation) = (terrain.path().to_path_buf(), terrain.header().generation);
-        Self { state: State::Closed, path, generation, open, wake, spawn }
+        let (path, on_show) = (terrain.path().to_path_buf(), terrain.header().state());
+        Self { state: State::Closed, path, on_show, open, wake, spawn }
     }
 
     /// Has edits applied, and paint on the picture. Of a stroke of which something was refused nothing more is applied.
@@ -192,7 +193,7 @@ impl Workshop {
     fn start(&self) -> Result<Worker, String> {
         let (orders, received) = channel();
         let (sender, reports) = channel();
-        let desk = Desk::new(sender, Arc::clone(&self.wake), self.generation);
+        let desk = Desk::new(sender, Arc::clone(&self.wake), self.on_show);
         let (open, spawn, to_bench) = (Arc::clone(&self.open), self.spawn, orders.clone());
         let life = move || Bench::live(&open, desk, received, to_bench, spawn);
         let thread = spawn("workshop", Box::new(life))
@@ -203,8 +204,8 @@ impl Workshop {
 
     /// Takes notice of a report.
     fn note(&mut self, report: Report) -> News {
-        let Report { news, done, generation } = report;
-        self.generation = generation;
+        let Report { news, done, state } = report;
+        self.on_show = state;
         if let State::Open(worker) = &mut self.state {
             worker.done = done;
         }

@@ -6,6 +6,7 @@ use terrasoar::stream::GroundPatch;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::edit::{CommitJob, Edit};
 use terrasoar_layout::file::entries::Entry;
+use terrasoar_layout::file::header::FileState;
 use terrasoar_layout::imagery::Paint;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_scene::repaint::Repaint;
@@ -45,8 +46,8 @@ pub(super) struct Report {
     pub news: News,
     /// What it has done so far.
     pub done: Tally,
-    /// The file's generation.
-    pub generation: u32,
+    /// The file's state.
+    pub state: FileState,
 }
 
 /// What has become of an order.

@@ -138,15 +138,21 @@ pub(super) fn fill_holes(
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Filled, LayoutError> {
     let (mut open, mut ended, mut filled) = (Open::default(), Vec::new(), Filled::default());
-    let mut row = vec![0.0; wide as usize];
-    let mut pieces = Vec::new();
+    let (mut row, mut pieces) = (Vec::new(), Vec::new());
     for y in 0..high {
         pieces.clear();
         if spool.is_void_row(y) {
             pieces.push(Piece { y, west: 0, east: wide - 1 });
         } else {
-            spool.read_row(y, &mut row)?;
-            voids_of(&row, y, &mut pieces);
+            let mut at = 0;
+            for run in spool.land().runs(y..=y) {
+                add_piece(&mut pieces, y, at..run.start);
+                row.resize(run.len(), 0.0);
+                spool.read_part(y, run.start, &mut row)?;
+                voids_of(&row, run.start, y, &mut pieces);
+                at = run.end;
+            }
+            add_piece(&mut pieces, y, at..wide);
         }
         open.next_row(&pieces, most, &mut ended);
         if ended.iter().map(|region| region.pieces.len()).sum::<usize>() >= BATCH {
@@ -166,14 +172,25 @@ impl Filled {
     }
 }
 
-/// Adds the row's pieces that are void.
-fn voids_of(row: &[f64], y: u32, pieces: &mut Vec<Piece>) {
+/// Adds the pieces that are void of a part of a row that begins at column `first`.
+fn voids_of(part: &[f64], first: u32, y: u32, pieces: &mut Vec<Piece>) {
     let mut x = 0;
-    while let Some(first) = row[x..].iter().position(|v| v.is_nan()) {
-        let west = x + first;
-        let count = row[west..].iter().position(|v| !v.is_nan()).unwrap_or(row.len() - west);
+    while let Some(skipped) = part[x..].iter().position(|v| v.is_nan()) {
+        let west = x + skipped;
+        let count = part[west..].iter().position(|v| !v.is_nan()).unwrap_or(part.len() - west);
         x = west + count;
-        pieces.push(Piece { y, west: west as u32, east: (x - 1) as u32 });
+        add_piece(pieces, y, first + west as u32..first + x as u32);
+    }
+}
+
+/// Adds columns that are void, to the last piece if they go on where it ends.
+fn add_piece(pieces: &mut Vec<Piece>, y: u32, columns: std::ops::Range<u32>) {
+    if columns.is_empty() {
+        return;
+    }
+    match pieces.last_mut().filter(|last| last.east + 1 == columns.start) {
+        Some(last) => last.east = columns.end - 1,
+        None => pieces.push(Piece { y, west: columns.start, east: columns.end - 1 }),
     }
 }
 
@@ -248,7 +265,7 @@ mod tests {
             for y in 0..high {
                 let row: Vec<f64> = (0..wide).map(|x| if is_void(x, y) { f64::NAN } else { 1.0 }).collect();
                 let mut pieces = Vec::new();
-                voids_of(&row, y, &mut pieces);
+                voids_of(&row, 0, y, &mut pieces);
                 open.next_row(&pieces, most, &mut ended);
             }
             open.next_row(&[], most, &mut ended);

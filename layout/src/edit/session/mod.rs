@@ -4,6 +4,7 @@
 //! their own: a header that leads to a state that is in the file already. One session at a time may have a file; readers need not stop.
 
 mod bases;
+pub(crate) mod beside;
 mod checked_state;
 pub(crate) mod commit;
 pub(crate) mod compact;

@@ -1,5 +1,6 @@
 //! A terrain file rewritten so that its records have room for other heights.
 
+use super::EditSession;
 use super::compact::copy_imagery;
 use crate::build::{HeightRoom, rebuild_into};
 use crate::error::LayoutError;
@@ -29,7 +30,18 @@ pub fn widen(
     memory_mib: u64,
     progress: &dyn Progress,
 ) -> Result<Header, LayoutError> {
-    let lock = WriteLock::take(path)?;
+    widen_locked(disk, path, &WriteLock::take(path)?, room, memory_mib, progress)
+}
+
+/// As [`widen`], by whoever has the right to write.
+pub(super) fn widen_locked(
+    disk: &dyn Disk,
+    path: &Path,
+    lock: &WriteLock,
+    room: HeightRoom,
+    memory_mib: u64,
+    progress: &dyn Progress,
+) -> Result<Header, LayoutError> {
     lock.check_only_name(path)?;
     let terrain = Terrain::open(path)?;
     let file = AtomicFile::create(path)?;
@@ -40,10 +52,47 @@ pub fn widen(
     // Windows replaces no file that is mapped.
     drop(terrain);
     if packs {
-        return Ok(publish_packed(disk, file, AtomicFile::create(path)?, Some(&lock), progress)?.0);
+        return Ok(publish_packed(disk, file, AtomicFile::create(path)?, Some(lock), progress)?.0);
     }
     progress.stage("syncing", 0);
-    publish_terrain(disk, file, Some(&lock))
+    publish_terrain(disk, file, Some(lock))
+}
+
+impl EditSession {
+    /// As [`widen`], of the file of this session, which keeps the right to edit until the new file has the name. The session ends with it: what was not committed is in neither file, and is to be
+    /// applied again in a session of the new one. After an error the session goes on with everything that it has.
+    ///
+    /// # Errors
+    /// As [`widen`]; [`LayoutError::Usage`] for an overlay, whose records are of its terrain's scale, and while a commit is under way. The session comes back, unless the file has the new contents
+    /// all the same.
+    pub fn widen(
+        mut self,
+        room: HeightRoom,
+        memory_mib: u64,
+        progress: &dyn Progress,
+    ) -> Result<Header, (Option<Box<Self>>, LayoutError)> {
+        let path = self.path.clone();
+        let checked = self.check_idle().and_then(|_| match self.start {
+            0 => Ok(()),
+            _ => Err(LayoutError::Usage(format!("{}: an overlay cannot be rewritten with room for other heights; make one file of it and its terrain, and edit that", path.display()))),
+        });
+        let widened =
+            checked.and_then(|()| widen_locked(&*self.disk, &path, &self.lock, room, memory_mib, progress));
+        widened.or_else(|error| {
+            if self.lock.is_of(&path) {
+                return Err((Some(Box::new(self)), error));
+            }
+            // The new file has the name, which only has to last.
+            header_of_renamed(&*self.disk, &path).ok_or((None, error))
+        })
+    }
+}
+
+/// Brings the name of the file at `path` to the disk, and reads what has it.
+fn header_of_renamed(disk: &dyn Disk, path: &Path) -> Option<Header> {
+    let real = std::fs::canonicalize(path).ok()?;
+    disk.sync_folder(real.parent()?).ok()?;
+    Some(Terrain::open_unmapped(path).ok()?.header().clone())
 }
 
 /// Room for heights that a file cannot hold, `heights_m` from the lowest to the highest as [`LayoutError::OutOfRange`] tells them: as much again beyond its range as they ask for,

@@ -57,7 +57,7 @@ impl Bench {
         drop(pool);
         let made = match widened {
             Ok(header) => {
-                desk.generation = header.generation;
+                desk.state = header.state();
                 match Terrain::open_unmapped(&path) {
                     Ok(terrain) => desk.report(News::Widened(Box::new(terrain))),
                     Err(error) => {
@@ -69,7 +69,7 @@ impl Bench {
             }
             Err(error) => Err(error),
         };
-        let session = match open_session(open, desk.generation) {
+        let session = match open_session(open, desk.state) {
             Ok(session) => session,
             Err(error) => {
                 desk.report(News::NotOpened(error));

@@ -64,7 +64,7 @@ fn what_is_told_as_saved_is_on_the_disk_where_it_says() {
         for news in wait_for(&mut workshop, is_saved) {
             let News::Saved { places, .. } = news else { continue };
             let terrain = land.open();
-            assert!(terrain.header().generation > last && terrain.header().generation == workshop.generation);
+            assert!(terrain.header().generation > last && terrain.header().state() == workshop.on_show);
             last = terrain.header().generation;
             assert!(!places.is_empty());
             for (page, entry) in places {

@@ -2,6 +2,8 @@
 
 use super::*;
 use std::sync::atomic::AtomicBool;
+use terrasoar_layout::build::HeightRoom;
+use terrasoar_layout::edit::widen;
 use terrasoar_layout::file::disk::{FailingDisk, Failure};
 
 #[test]
@@ -192,6 +194,20 @@ fn who_else_has_the_file_is_told() {
     other.commit("elsewhere").unwrap();
     drop(other);
     stroke(&mut workshop, 4);
+    let News::NotOpened(error) = wait(&mut workshop) else { panic!() };
+    assert!(error.to_string().contains("another program has edited it"), "{error}");
+}
+
+/// A file that was rewritten begins its generations anew, in another scale.
+#[test]
+fn a_file_that_another_rewrote_is_not_edited() {
+    let land = Land::new();
+    let mut workshop = land.workshop_on(Arc::new(SystemDisk));
+    let on_show = land.open().header().generation;
+    let room = HeightRoom { lowest_m: -9000.0, highest_m: 9000.0 };
+    let header = widen(&SystemDisk, &land.path, room, 512, &Silent).unwrap();
+    assert_eq!(header.generation, on_show);
+    stroke(&mut workshop, 1);
     let News::NotOpened(error) = wait(&mut workshop) else { panic!() };
     assert!(error.to_string().contains("another program has edited it"), "{error}");
 }
