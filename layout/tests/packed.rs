@@ -2,13 +2,15 @@
 
 mod common;
 
-use common::build_bytes;
 use common::drape::{draped, land, same_picture};
 use common::packed::{Bench, dem, options};
+use common::{MemoryDem, build_bytes};
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
+use terrasoar_layout::build::build;
+use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::source::{MemorySource, PackedNeed};
@@ -47,6 +49,26 @@ proptest! {
         prop_assert!(bench.bytes(&back) == bytes);
         assert_same(&Terrain::open(&bench.plain).unwrap(), &open(bench.bytes(&bench.packed)).unwrap());
     }
+}
+
+/// So many tiles that tables are made of a sample of them, and ground in few that is as no other: all of it comes back, packed while it is built and afterwards.
+#[test]
+fn what_a_sample_lacks_comes_back() {
+    let dem = MemoryDem::from_fn([2200, 2100], SampleType::I16, |x, y| {
+        let tile = x / 64 + 34 * (y / 64);
+        match tile {
+            77 | 500 | 911 => f64::from((x * 7919 + y * 104_729) % 60_001) - 30_000.0,
+            _ if tile % 9 == 0 => f64::from(x / 3 + y / 2),
+            _ => f64::NAN,
+        }
+    });
+    let bytes = build_bytes(&dem, &options()).unwrap();
+    let bench = Bench::of(&bytes).unwrap();
+    let [built, back] = ["built.iqt", "back.iqt"].map(|name| bench.plain.with_file_name(name));
+    build(&dem, &built, &options().packed(true), &Silent).unwrap();
+    assert!(bench.bytes(&built) == bench.bytes(&bench.packed));
+    unpack(&SystemDisk, &built, &back, &Silent).unwrap();
+    assert!(bench.bytes(&back) == bytes);
 }
 
 /// One step of a life of a terrain.

@@ -35,7 +35,7 @@ use crate::file::header::{ErrorKind, Header, SpacingOrigin};
 use crate::grid::Grid;
 use crate::grid::order::corners;
 use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
-use crate::packing::publish_packed;
+use crate::packing::{Check, publish_packed};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::remedy::Remedy;
@@ -174,7 +174,7 @@ pub fn build_on(
     work.run_kind(&mut header)?;
     drop(spool);
     if let Some(packed) = packed {
-        return Ok(publish_packed(disk, file, packed, None, progress)?.0);
+        return Ok(publish_packed(disk, file, packed, None, Check::Tiles, progress)?.0);
     }
     progress.stage("syncing", 0);
     publish_terrain(disk, file, None)

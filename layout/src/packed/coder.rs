@@ -38,16 +38,19 @@ pub(crate) struct Encoder {
 
 impl Coder for Encoder {
     fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
-        for (turn, (context, value)) in contexts.iter().zip(values).enumerate() {
-            self.value(first + u16::from(*context), turn, value);
+        // Whole rows at a time: what each step does is the same for all of a row.
+        let turns = (0u32..).zip(contexts.iter().zip(&*values));
+        self.symbols.extend(
+            turns.map(|(turn, (context, value))| (first + u16::from(*context), token_of(*value), turn)),
+        );
+        for value in values.iter().filter(|value| **value >= 16) {
+            self.beside(*value);
         }
     }
 
     fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
-        let token = token_of(*value);
-        self.symbols.push((context, token, turn as u32));
-        let (base, bits) = BASES[usize::from(token)];
-        self.bits.put(u32::from(*value - base), bits.into());
+        self.symbols.push((context, token_of(*value), turn as u32));
+        self.beside(*value);
     }
 
     fn raw(&mut self, bits: u32, value: &mut u16) {
@@ -56,6 +59,12 @@ impl Coder for Encoder {
 }
 
 impl Encoder {
+    /// The bits beside a value's token.
+    fn beside(&mut self, value: u16) {
+        let (base, bits) = BASES[usize::from(token_of(value))];
+        self.bits.put(u32::from(value - base), bits.into());
+    }
+
     /// Counts its symbols.
     pub(crate) fn count(&self, counts: &mut Counts) {
         self.symbols.iter().for_each(|(context, token, _)| {

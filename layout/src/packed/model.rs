@@ -1,4 +1,4 @@
-//! Tables of how often each token occurs in each context: made once a file, from all of it, and stored in it (FORMAT.md, section 9.5).
+//! Tables of how often each token occurs in each context: made once a file, from all of it or a sample, and stored in it (FORMAT.md, section 9.5).
 //!
 //! Contexts that are alike, or rare, share a table, because a table costs some ten bytes. Invariant: the numbers of a table add up to 2,048, and every token that was counted has at least 1.
 
@@ -11,6 +11,9 @@ pub(crate) const SCALE_LOG: u32 = 11;
 pub(crate) const SCALE: usize = 1 << SCALE_LOG;
 /// Bits of a frequency that are kept, of all but the largest.
 const KEPT_BITS: u32 = 4;
+
+/// Tokens beyond the largest of a sample that have a place in its table: an octave and a half.
+const UNSEEN: usize = 6;
 
 /// First context of heights: by octave, colour and class.
 pub(crate) const HEIGHTS: u16 = 0;
@@ -64,6 +67,17 @@ impl Model {
             table_of.push(pooled.len() as u16 - 1);
         }
         Self { table_of, tables: pooled.iter().map(frequencies).collect() }
+    }
+
+    /// The tables for what was counted in a sample: what did not occur there, and may elsewhere, has a place in them.
+    pub(crate) fn from_sample(counts: &Counts) -> Self {
+        let mut counts = counts.clone();
+        for of_context in &mut counts {
+            let last = of_context.iter().rposition(|count| *count > 0);
+            let likely = last.map_or(TOKENS, |last| TOKENS.min(last + 1 + UNSEEN));
+            of_context[..likely].iter_mut().for_each(|count| *count = (*count).max(1));
+        }
+        Self::from_counts(&counts)
     }
 
     /// As it is stored.
@@ -250,6 +264,21 @@ mod tests {
             let stored = model.to_bytes();
             prop_assert_eq!(Model::parse(&stored), Some(model));
             prop_assert_eq!(Model::parse(&stored[..stored.len() - 1]), None);
+        }
+
+        /// A sample's tables have what it has, and what lies near.
+        #[test]
+        fn samples_leave_room(seed in prop::collection::vec((0usize..CONTEXTS, 0usize..TOKENS, 1u64..1 << 40), 0..600)) {
+            let mut counts = vec![[0; TOKENS]; CONTEXTS];
+            seed.iter().for_each(|(context, token, count)| counts[*context][*token] += count);
+            let model = Model::from_sample(&counts);
+            for (of_context, table) in counts.iter().zip(&model.table_of) {
+                let table = &model.tables[usize::from(*table)];
+                let last = of_context.iter().rposition(|count| *count > 0).map_or(TOKENS, |last| last + 7);
+                prop_assert!(table[..last.min(TOKENS)].iter().all(|frequency| *frequency > 0));
+                prop_assert_eq!(table.iter().map(|f| usize::from(*f)).sum::<usize>(), SCALE);
+            }
+            prop_assert_eq!(Model::parse(&model.to_bytes()), Some(model));
         }
 
         #[test]

@@ -55,15 +55,31 @@ impl TileRecords {
         Self { finest, tile_log: shape.tile_log, words: record.len(), records: record.repeat(count) }
     }
 
-    /// What `record` says of every vertex in steps of the tile; it is handed the words of an inert one.
-    pub(crate) fn gathered(
+    /// What `row` says of rows of vertices. It is handed the place of the first, how far one lies west of the next, both in steps of the tile, and the words of as many inert records.
+    pub(crate) fn by_rows(
         shape: &TileShape,
         inert: &[u32],
-        mut record: impl FnMut([u32; 2], &mut [u32]),
+        mut row: impl FnMut([u32; 2], u32, &mut [u32]),
     ) -> Self {
         let mut all = Self::filled(shape, 0, inert);
-        let side = 0..=1 << shape.tile_log;
-        side.clone().for_each(|y| side.clone().for_each(|x| record([x, y], all.words_mut([x, y]))));
+        let (words, last) = (inert.len(), 1 << shape.tile_log);
+        for at in [[0, 0], [last, 0], [0, last], [last, last]] {
+            row(at, last, all.words_mut(at));
+        }
+        for octave in 0..shape.tile_log {
+            let (m, s) = (1usize << (shape.tile_log - octave - 1), 1u32 << octave);
+            let (whites, blacks) = all.refining_mut(m).split_at_mut(words * m * m);
+            let (easts, norths) = blacks.split_at_mut(words * m * (m + 1));
+            for (y, records) in (s..).step_by(2 * s as usize).zip(whites.chunks_exact_mut(words * m)) {
+                row([s, y], 2 * s, records);
+            }
+            for (y, records) in (0..).step_by(2 * s as usize).zip(easts.chunks_exact_mut(words * m)) {
+                row([s, y], 2 * s, records);
+            }
+            for (y, records) in (s..).step_by(2 * s as usize).zip(norths.chunks_exact_mut(words * (m + 1))) {
+                row([0, y], 2 * s, records);
+            }
+        }
         all
     }
 
@@ -111,6 +127,30 @@ impl TileRecords {
         4 * self.records.len() + size_of::<Self>()
     }
 
+    /// Whether all records that a tile gives are those of another.
+    pub(crate) fn gives_same(&self, other: &Self, shape: &TileShape) -> bool {
+        let (words, last) = (self.words, 1 << shape.tile_log);
+        let corners = [[0, 0], [last, 0], [0, last], [last, last]];
+        if shape.is_top && corners.iter().any(|at| self.words_at(*at) != other.words_at(*at)) {
+            return false;
+        }
+        (0..shape.delivered()).all(|octave| {
+            let m = 1usize << (shape.tile_log - octave - 1);
+            let (ours, theirs) = (self.refining(m), other.refining(m));
+            if ours.len() != theirs.len() || ours.is_empty() {
+                return false;
+            }
+            // Of those that run east the last row, of the others the last of each, may be another tile's.
+            let easts = words * (m * m + m * (m + usize::from(shape.is_last[1])));
+            let norths = words * (m * m + m * (m + 1));
+            let wide = words * (m + usize::from(shape.is_last[0]));
+            let mut rows = ours[norths..]
+                .chunks_exact(words * (m + 1))
+                .zip(theirs[norths..].chunks_exact(words * (m + 1)));
+            ours[..easts] == theirs[..easts] && rows.all(|(ours, theirs)| ours[..wide] == theirs[..wide])
+        })
+    }
+
     /// Whether all records that a tile gives are inert ones.
     pub(crate) fn gives_nothing(&self, shape: &TileShape, inert: &[u32]) -> bool {
         let last = 1 << shape.tile_log;
@@ -131,6 +171,18 @@ impl TileRecords {
 
 #[cfg(test)]
 impl TileRecords {
+    /// What `record` says of every vertex in steps of the tile; it is handed the words of an inert one.
+    pub(crate) fn gathered(
+        shape: &TileShape,
+        inert: &[u32],
+        mut record: impl FnMut([u32; 2], &mut [u32]),
+    ) -> Self {
+        let mut all = Self::filled(shape, 0, inert);
+        let side = 0..=1 << shape.tile_log;
+        side.clone().for_each(|y| side.clone().for_each(|x| record([x, y], all.words_mut([x, y]))));
+        all
+    }
+
     /// Compact records, by what `record` says of every vertex in steps of the tile.
     pub(crate) fn from_fn(shape: &TileShape, mut record: impl FnMut([u32; 2]) -> u32) -> Self {
         Self::gathered(shape, &[INERT], |at, words| words[0] = record(at))
@@ -151,6 +203,11 @@ mod tests {
                 assert_eq!(tile.at([x, y]), y << 8 | x);
             }
             assert_eq!(tile.all().len(), ((1 << tile_log) + 1) * ((1 << tile_log) + 1));
+            let by_rows = TileRecords::by_rows(&shape, &[INERT], |[x, y], step, words| {
+                let xs = (x..).step_by(step as usize);
+                words.iter_mut().zip(xs).for_each(|(word, x)| *word = y << 8 | x);
+            });
+            assert_eq!(by_rows, tile);
         }
     }
 }

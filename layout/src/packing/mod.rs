@@ -2,10 +2,13 @@
 //!
 //! Packed terrain is opened as any other: [`Terrain::open`](crate::read::terrain::Terrain::open). How it is read, and how a tile is coded, is module `packed`.
 
+mod compare;
 mod front;
+mod gather;
 mod pack;
 mod unpack;
 
+pub(crate) use compare::Check;
 pub(crate) use pack::publish_packed;
 pub use pack::{Packed, pack};
 pub use unpack::unpack;

@@ -1,9 +1,11 @@
-//! A terrain file packed into another, in two passes: one that counts, for the tables, and one that writes.
+//! A terrain file packed into another, in two passes: one over a sample of the tiles that counts, for the tables, and one that writes.
 //!
-//! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name. So whatever the file holds, what is packed is the same, or packing fails and says
-//! so. Cost: each vertex is looked up twice and unpacked once; memory is a few megabytes, and 16 bytes a record page.
+//! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name ([`Check`] says how). So whatever the file holds, what is packed is the same, or packing
+//! fails and says so. Cost: each vertex is looked up and unpacked once; memory is a few megabytes, and 24 bytes a record page.
 
+use super::compare::{CHUNK_BYTES, Check, compare, read_back, refused};
 use super::front::Front;
+use super::gather::tile_of;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
@@ -12,21 +14,20 @@ use crate::file::disk::Disk;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
 use crate::file::packed_end::{FRONT, Run};
-use crate::file::slots::Slots;
-use crate::file::source::{PreadSource, Source};
+use crate::file::source::Source;
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::RecordCodec;
-use crate::packed::coder::{Encoder, PlainEncoder};
+use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
 use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
 use crate::packed::leaves::packed_leaves;
-use crate::packed::model::{CONTEXTS, Counts, Model};
+use crate::packed::model::{CONTEXTS, Counts, DecodeTables, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
 use crate::packed::shape::{Groups, SEGMENTS, TileId};
-use crate::packed::source::PackedSource;
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
 use crate::packed::way::{Scratch, Way};
+use crate::packed::wide::Width;
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::records::Records;
@@ -38,8 +39,10 @@ use std::path::Path;
 const PAGE: u64 = PAGE_BYTES as u64;
 /// Tiles packed before they are written.
 const TILES_AT_ONCE: usize = 4096;
-/// Bytes compared, or copied, at a time.
-pub(super) const CHUNK_BYTES: usize = 256 << 10;
+
+/// Tiles of which all are counted, and of more one in so many.
+const TILES_COUNTED: usize = 1024;
+const TILES_A_SAMPLE: u32 = 8;
 
 /// What became of a terrain that was packed.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +70,8 @@ pub fn pack(disk: &dyn Disk, from: &Path, to: &Path, progress: &dyn Progress) ->
     // What edits have not touched.
     let built = terrain.header().history.map(|_| Terrain::open_original(from)).transpose()?;
     let file = AtomicFile::create(to)?;
-    let packed = pack_into(disk, &terrain, built.as_ref().unwrap_or(&terrain), &file, progress)?;
+    let built = built.as_ref().unwrap_or(&terrain);
+    let packed = pack_into(disk, &terrain, built, &file, Check::Pages, progress)?;
     progress.stage("syncing", 0);
     file.publish_on(disk)?;
     Ok(packed)
@@ -82,20 +86,23 @@ pub(crate) fn pack_into(
     terrain: &Terrain,
     built: &Terrain,
     file: &AtomicFile,
+    check: Check,
     progress: &dyn Progress,
 ) -> Result<Packed, LayoutError> {
-    check_pages(terrain, progress)?;
-    if built.instance() != terrain.instance() {
-        check_pages(built, progress)?;
+    if check == Check::Pages {
+        check_pages(terrain, progress)?;
+        if built.instance() != terrain.instance() {
+            check_pages(built, progress)?;
+        }
     }
     let directory_end = check_packable(built)?;
     let records = built.records()?;
     let (groups, way) = (Groups::of(built.grid()), Way::of(built.header()));
     let bytes = with_records!(records, records => {
-        let packer = Packer { records, groups, way, progress };
+        let packer = Packer { path: terrain.path(), records, groups, way, width: Width::best(), check, progress };
         packer.write(disk, terrain, built, directory_end, file)?
     });
-    compare(terrain, file, progress)?;
+    compare(terrain, built, file, check, progress)?;
     let [wide, high] = terrain.grid().samples().map(f64::from);
     let imagery = terrain.header().imagery.map_or(0, |place| place.bytes);
     Ok(Packed {
@@ -114,29 +121,16 @@ pub(crate) fn publish_packed(
     plain: AtomicFile,
     file: AtomicFile,
     over: Option<&WriteLock>,
+    check: Check,
     progress: &dyn Progress,
 ) -> Result<(Header, u64), LayoutError> {
     let packed = {
         let terrain = Terrain::mapped(read_back(&plain)?)?;
-        pack_into(disk, &terrain, &terrain, &file, progress)?
+        pack_into(disk, &terrain, &terrain, &file, check, progress)?
     };
     drop(plain);
     progress.stage("syncing", 0);
     Ok((publish_terrain(disk, file, over)?, packed.bytes))
-}
-
-/// The bytes of a file that has no name yet.
-fn read_back(file: &AtomicFile) -> Result<PreadSource, LayoutError> {
-    let path = file.target();
-    let again = file
-        .file()
-        .try_clone()
-        .map_err(|e| LayoutError::io(path, "cannot open the file a second time", e))?;
-    PreadSource::over(path, again)
-}
-
-fn refused(path: &Path, problem: &str) -> LayoutError {
-    LayoutError::unsupported(path, format!("the terrain cannot be packed: {problem}"))
 }
 
 /// Whether a file is laid out as a build leaves it: then its directory follows from which pages there are. Where that ends.
@@ -175,9 +169,12 @@ struct Made {
 }
 
 struct Packer<'p, C: RecordCodec> {
+    path: &'p Path,
     records: Records<'p, C>,
     groups: Groups,
     way: Way,
+    width: Width,
+    check: Check,
     progress: &'p dyn Progress,
 }
 
@@ -185,22 +182,15 @@ impl<C: RecordCodec> Packer<'_, C> {
     /// The records of a tile; `None` if all that it gives are inert.
     fn records_of(&self, id: TileId) -> Option<TileRecords> {
         let group = &self.groups.groups[usize::from(id.group)];
-        let shape = self.groups.shape(id);
+        let (shape, inert) = (self.groups.shape(id), self.way.inert());
         let first = id.at.map(|v| v << (group.stride_log + group.tile_log));
-        let k = self.records.grid().k();
-        let inert = self.way.inert();
         // All that it gives lies below its centre, unless it gives the corners of the square, too.
         let half = 1 << (group.stride_log + group.tile_log) >> 1;
-        let centre = slot_of(k, GridPoint::new(first[0] + half, first[1] + half));
+        let centre = slot_of(self.records.grid().k(), GridPoint::new(first[0] + half, first[1] + half));
         if !shape.is_top && self.records.raw(centre) == C::INERT {
             return None;
         }
-        let records = TileRecords::gathered(&shape, inert, |at, words| {
-            let [x, y] = [0, 1].map(|axis| first[axis] + (at[axis] << group.stride_log));
-            let mut bytes = [0; 16];
-            C::write(self.records.raw(slot_of(k, GridPoint::new(x, y))), &mut bytes);
-            words.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
-        });
+        let records = tile_of(&self.records, &self.groups, id, inert);
         (!records.gives_nothing(&shape, inert)).then_some(records)
     }
 
@@ -208,43 +198,77 @@ impl<C: RecordCodec> Packer<'_, C> {
         3 << (2 * self.groups.groups[usize::from(id.group)].tile_log) >> 2
     }
 
-    fn encoded(&self, id: TileId, scratch: &mut Scratch) -> Option<[Encoder; SEGMENTS]> {
-        let records = self.records_of(id)?;
+    fn encoded(&self, id: TileId, records: &TileRecords, scratch: &mut Scratch) -> [Encoder; SEGMENTS] {
         let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        self.way.write(&self.groups.shape(id), scratch, &mut encoders, &records);
-        Some(encoders)
+        self.way.write(&self.groups.shape(id), scratch, &mut encoders, records);
+        encoders
+    }
+
+    /// Whether a tile's values are counted, of the finest group of many tiles one in a few: those that chance takes, so that no pattern of the ground's is in step with them.
+    fn is_counted(&self, number: usize, tiles: usize, id: TileId) -> bool {
+        let chance = (number as u32).wrapping_mul(0x9e37_79b1) >> 16;
+        tiles <= TILES_COUNTED || id.group > 0 || chance.is_multiple_of(TILES_A_SAMPLE)
     }
 
     /// Counts what occurs.
     fn model(&self, tiles: &[(usize, TileId)]) -> Model {
         let none = || (vec![[0; TOKENS]; CONTEXTS], self.way.scratch());
         let counts = tiles
-            .par_chunks(64)
-            .fold(none, |(mut counts, mut scratch), tiles| {
-                for (_, id) in tiles {
-                    for encoder in self.encoded(*id, &mut scratch).into_iter().flatten() {
+            .par_iter()
+            .enumerate()
+            .with_min_len(64)
+            .filter(|(number, (_, id))| self.is_counted(*number, tiles.len(), *id))
+            .fold(none, |(mut counts, mut scratch), (_, (_, id))| {
+                if let Some(records) = self.records_of(*id) {
+                    for encoder in self.encoded(*id, &records, &mut scratch) {
                         encoder.count(&mut counts);
                     }
-                    self.progress.advance(self.samples_of(*id));
                 }
+                self.progress.advance(self.samples_of(*id));
                 (counts, scratch)
             })
             .map(|(counts, _)| counts)
             .reduce(|| none().0, sum);
-        Model::from_counts(&counts)
+        if tiles.len() > TILES_COUNTED { Model::from_sample(&counts) } else { Model::from_counts(&counts) }
     }
 
-    fn make(&self, id: TileId, model: &Model, scratch: &mut Scratch) -> Option<Made> {
-        let encoders = self.encoded(id, scratch)?;
-        let segments = encoders.map(|encoder| encoder.finish(model));
+    /// Packs a tile; `None` if all that it gives are inert.
+    fn make(
+        &self,
+        id: TileId,
+        model: &Model,
+        tables: &DecodeTables,
+        scratch: &mut Scratch,
+    ) -> Result<Option<Made>, LayoutError> {
+        let shape = self.groups.shape(id);
         self.progress.advance(self.samples_of(id));
-        if let [Some(a), Some(b), Some(c)] = segments {
-            return Some(Made { segments: [a, b, c] });
+        let Some(records) = self.records_of(id) else { return Ok(None) };
+        let segments = self.encoded(id, &records, scratch).map(|encoder| encoder.finish(model));
+        let segments = match segments {
+            [Some(a), Some(b), Some(c)] => [a, b, c],
+            // A sample lacked a token: values are stored as they are.
+            _ => {
+                let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
+                self.way.write(&shape, scratch, &mut encoders, &records);
+                encoders.map(PlainEncoder::finish)
+            }
+        };
+        if self.check == Check::Tiles {
+            let decoders = segments.iter().map(|bytes| Decoder::new(tables, bytes));
+            let same = decoders.collect::<Option<Vec<_>>>().is_some_and(|mut decoders| {
+                let found = self.way.read(self.width, &shape, scratch, &mut decoders);
+                decoders.iter().all(Decoder::finish) && found.gives_same(&records, &shape)
+            });
+            if !same {
+                let [x, y] = id.at;
+                let stride = 1u64 << shape.stride_log;
+                let problem = format!(
+                    "tile {x}, {y} of stride {stride} does not come out as it went in; please report it"
+                );
+                return Err(refused(self.path, &problem));
+            }
         }
-        // Nothing that was counted is lacking; should it ever be, values are stored as they are.
-        let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
-        self.way.write(&self.groups.shape(id), scratch, &mut encoders, &self.records_of(id)?);
-        Some(Made { segments: encoders.map(PlainEncoder::finish) })
+        Ok(Some(Made { segments }))
     }
 
     /// Writes the whole file: what was `built`, whose directory ends at `directory_end`, and what `terrain` has behind it. Its length.
@@ -258,8 +282,10 @@ impl<C: RecordCodec> Packer<'_, C> {
     ) -> Result<u64, LayoutError> {
         let tiles: Vec<(usize, TileId)> = self.groups.tiles().collect();
         let samples = tiles.iter().map(|(_, id)| self.samples_of(*id)).sum();
-        self.progress.stage("counting", samples);
+        let counted = tiles.iter().enumerate().filter(|(i, (_, id))| self.is_counted(*i, tiles.len(), *id));
+        self.progress.stage("counting", counted.map(|(_, (_, id))| self.samples_of(*id)).sum());
         let model = self.model(&tiles);
+        let tables = DecodeTables::of(&model);
         self.progress.stage("packing", samples);
 
         let (source, header) = (terrain.source(), terrain.header());
@@ -294,8 +320,8 @@ impl<C: RecordCodec> Packer<'_, C> {
             let made: Vec<Option<Made>> = tiles
                 .par_iter()
                 .with_min_len(16)
-                .map_init(|| self.way.scratch(), |scratch, (_, id)| self.make(*id, &model, scratch))
-                .collect();
+                .map_init(|| self.way.scratch(), |scratch, (_, id)| self.make(*id, &model, &tables, scratch))
+                .collect::<Result<_, LayoutError>>()?;
             let mut bytes = Vec::new();
             for ((leaf, _), made) in tiles.iter().zip(made) {
                 let mut place = TilePlace::default();
@@ -385,30 +411,4 @@ fn header_slots(source: &dyn Source, header: &Header) -> Result<[Box<Page>; 2], 
         }
     }
     Ok(slots)
-}
-
-/// Whether what was written reads as the terrain file, byte for byte.
-fn compare(terrain: &Terrain, file: &AtomicFile, progress: &dyn Progress) -> Result<(), LayoutError> {
-    let packed = PackedSource::open(Box::new(read_back(file)?))?;
-    let bytes = terrain.header().file_bytes;
-    progress.stage("comparing", bytes / 4);
-    if Slots::read(terrain.source(), 0)?.current != Slots::read(&packed, 0)?.current {
-        return Err(refused(terrain.path(), "its header holds what no build writes"));
-    }
-    // The header page that does not count may hold anything.
-    let first = 2 * PAGE;
-    (0..(bytes - first).div_ceil(CHUNK_BYTES as u64)).into_par_iter().try_for_each(|chunk| {
-        let from = first + chunk * CHUNK_BYTES as u64;
-        let count = to_usize((bytes - from).min(CHUNK_BYTES as u64))?;
-        let (mut ours, mut theirs) = (vec![0; count], vec![0; count]);
-        terrain.source().read_at(from, &mut ours)?;
-        packed.read_at(from, &mut theirs)?;
-        progress.advance(count as u64 / 4);
-        let Some(at) = ours.iter().zip(&theirs).position(|(a, b)| a != b) else { return Ok(()) };
-        let page = (from + at as u64) / PAGE;
-        Err(refused(
-            terrain.path(),
-            &format!("file page {page} holds what no build writes; check it with `terrasoar verify`"),
-        ))
-    })
 }

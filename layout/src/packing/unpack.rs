@@ -1,6 +1,6 @@
 //! The terrain file that a packed one was made of, again.
 
-use super::pack::CHUNK_BYTES;
+use super::compare::CHUNK_BYTES;
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::to_usize;

@@ -12,7 +12,7 @@ use crate::file::slots::Slots;
 use crate::file::structure::inert_page;
 use crate::file::tail::Tail;
 use crate::imagery::{Append, Imagery, MadeTile};
-use crate::packing::publish_packed;
+use crate::packing::{Check, publish_packed};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -88,7 +88,7 @@ fn write_anew(
     let (header, bytes) = if packs {
         let plain = AtomicFile::create(out)?;
         rewrite(disk, &terrain, &plain, progress)?;
-        publish_packed(disk, plain, new, lock.as_ref(), progress)?
+        publish_packed(disk, plain, new, lock.as_ref(), Check::Pages, progress)?
     } else {
         rewrite(disk, &terrain, &new, progress)?;
         progress.stage("syncing", 0);

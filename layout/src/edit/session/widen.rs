@@ -10,7 +10,7 @@ use crate::file::header::Header;
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
 use crate::grid::record::RecordKind;
-use crate::packing::publish_packed;
+use crate::packing::{Check, publish_packed};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -18,7 +18,7 @@ use std::path::Path;
 
 /// Rewrites the terrain file at `path` with room for the heights of `room` beside its own, and for slopes as steep as all of them over one sample. No height and nothing of the
 /// imagery changes; errors and radii are rounded up in another scale; where 16 bits do not hold the steps, records take 8 bytes instead of 4. The journal ends: what was edited before can no longer be undone. Readers go on reading
-/// the old file. Packed terrain stays packed, unless its records take 8 bytes then, which are not packed. Returns the new header.
+/// the old file. Packed terrain stays packed. Returns the new header.
 ///
 /// # Errors
 /// Damage and I/O; [`LayoutError::Usage`] while another program writes to it, for a file with other names (hard links), which would keep the old contents, and as
@@ -52,7 +52,15 @@ pub(super) fn widen_locked(
     // Windows replaces no file that is mapped.
     drop(terrain);
     if packs {
-        return Ok(publish_packed(disk, file, AtomicFile::create(path)?, Some(lock), progress)?.0);
+        return Ok(publish_packed(
+            disk,
+            file,
+            AtomicFile::create(path)?,
+            Some(lock),
+            Check::Pages,
+            progress,
+        )?
+        .0);
     }
     progress.stage("syncing", 0);
     publish_terrain(disk, file, Some(lock))

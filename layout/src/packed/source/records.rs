@@ -105,7 +105,7 @@ impl PackedSource {
     }
 
     /// Where a page of the terrain file lies on the ground, as a number that is near for pages near each other; those that are no record pages come first.
-    pub(in crate::packed) fn place_of(&self, number: u64) -> u64 {
+    pub(crate) fn place_of(&self, number: u64) -> u64 {
         let nth = number.checked_sub(FIRST_PAGE).filter(|nth| *nth < self.container.pages);
         let Some(logical) = nth.and_then(|nth| self.logical(nth).ok()) else { return 0 };
         let per_page = self.header.records_per_page();
