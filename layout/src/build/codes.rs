@@ -155,10 +155,10 @@ fn has_void(codes: &[f64]) -> bool {
 
 /// Fills a stretch of voids that begins at a place in a run and ends before another.
 fn close(codes: &mut [CodeRun], gaps: &mut [Gap], from: (usize, usize), to: (usize, usize), gap: Gap) {
-    for run in from.0..=to.0 {
+    for (run, before) in gaps.iter_mut().enumerate().take(to.0 + 1).skip(from.0) {
         // The voids before a run, unless the stretch begins in it.
         if run > from.0 || from == (0, 0) {
-            gaps[run] = gap;
+            *before = gap;
         }
         let Some(CodeRun { first, codes, .. }) = codes.get_mut(run) else { continue };
         let start = if run == from.0 { from.1 } else { 0 };
