@@ -1,6 +1,6 @@
 //! The page directory: logical record page -> where it lies and its checksum (FORMAT.md, section 5).
 //!
-//! On disk it has two levels, so that an edit rewrites one leaf and the root and a mostly void terrain has a small one. So it has in memory ([`page_table`](super::page_table)), but where all of it is
+//! On disk it has two levels, so that an edit rewrites one leaf and the root and a mostly void terrain has a small one. So it has in memory (`page_table`), but where all of it is
 //! written.
 //!
 //! Cost: 12 bytes an entry.
