@@ -77,7 +77,12 @@ impl<C: RecordCodec> Rules<C> {
 
     /// An own error in metres as a record of this level and class says it: rounded up, and no larger than errors get.
     pub(crate) fn stored_error_m(&self, level: u32, class: VertexClass, own_m: f64) -> f64 {
-        let raw = self.codec.encode(level, 0.0, class, smaller(self.largest_error_m(), own_m), 0.0);
+        self.recorded_error_m(level, class, smaller(self.largest_error_m(), own_m))
+    }
+
+    /// An error in metres as a record of this level and class says it: rounded up. Fringe children may have larger errors than own ones get, and those are not cut.
+    pub(crate) fn recorded_error_m(&self, level: u32, class: VertexClass, error_m: f64) -> f64 {
+        let raw = self.codec.encode(level, 0.0, class, error_m, 0.0);
         raw.map_or(f64::INFINITY, |raw| self.codec.decode(raw, level).error_m)
     }
 

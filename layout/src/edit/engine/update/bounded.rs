@@ -40,7 +40,7 @@ impl<C: RecordCodec> Update<'_, C> {
     /// The error in metres, children included, of a vertex whose triangles lie in the data: a number that its record says as it is.
     pub(super) fn bounded_error_m(&mut self, asked: &Asked<'_, C::Raw>) -> f64 {
         let before_m = asked.was.error_m;
-        let mut limit_m = self.stored_m(asked, asked.children_m);
+        let mut limit_m = self.recorded_m(asked, asked.children_m);
         let Some([low, high]) = self.changed_within(asked) else {
             if limit_m >= before_m {
                 return limit_m;
@@ -87,6 +87,11 @@ impl<C: RecordCodec> Update<'_, C> {
         self.rules.stored_error_m(asked.level, asked.was.class, own_m)
     }
 
+    /// A child's error as the record of a vertex says it.
+    fn recorded_m(&self, asked: &Asked<'_, C::Raw>, child_m: f64) -> f64 {
+        self.rules.recorded_error_m(asked.level, asked.was.class, child_m)
+    }
+
     /// First and last corner of where the changed rectangle and the bounds of a vertex's diamond meet.
     fn changed_within(&self, asked: &Asked<'_, C::Raw>) -> Option<[[u32; 2]; 2]> {
         let (rect, v, s) = (self.ground.new.rect, asked.v, 1 << (asked.level / 2));
@@ -111,7 +116,7 @@ impl<C: RecordCodec> Update<'_, C> {
             let changed = self.scratch.below.iter().find(|(p, _)| *p == child);
             let was_m = changed.map_or(0.0, |(_, old)| rules.codec.decode(*old, asked.level - 1).error_m);
             // Fringe vertices round errors in steps of their own.
-            self.stored_m(asked, was_m) < before_m
+            self.recorded_m(asked, was_m) < before_m
         })
     }
 
