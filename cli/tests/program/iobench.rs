@@ -159,7 +159,7 @@ fn packed_files_are_counted_by_tiles_too() {
         assert!(runs(&plain).iter().all(|run| run["stream"][field].is_null()), "{plain}");
     }
     let (_, csv) = bench.table("f.csv");
-    assert!(csv.lines().next().unwrap().ends_with(",tiles,tile_bytes"), "{csv}");
+    assert!(csv.lines().next().unwrap().contains(",preloaded_pages,tiles,tile_bytes,"), "{csv}");
     let table = bench.good(&packed);
     assert!(table.contains("the file is packed\n  kinetic needs "), "{table}");
 }

@@ -18,7 +18,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use terrasoar::sink::{FileSink, FolderSink};
 
-pub(super) const HEADER: &str = "engine,layout,source,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes,tiles,tile_bytes";
+pub(super) const HEADER: &str = "engine,layout,source,prefetch,frame,reads,record_bytes,pages,lines,units,realtime_pages,preloaded_pages,tiles,tile_bytes,update_ms,update_ms_cold,major_faults,minor_faults,disk_read_bytes";
 
 /// All that goes into a report.
 #[derive(Debug, Clone, Copy)]
@@ -110,23 +110,22 @@ fn write_run(to: &mut dyn Write, run: &Run, timed: Option<&Timed>) -> std::io::R
             tile_bytes,
         } = f;
         let [lines, units] = [lines, units].map(|count| cell(run.counts_lines().then_some(*count)));
+        let [tiles, tile_bytes] = [tiles, tile_bytes].map(|count| cell(run.counts_tiles.then_some(*count)));
         write!(
             to,
-            "{words},{frame},{reads},{record_bytes},{pages},{lines},{units},{realtime_pages},{preloaded_pages},"
+            "{words},{frame},{reads},{record_bytes},{pages},{lines},{units},{realtime_pages},{preloaded_pages},{tiles},{tile_bytes},"
         )?;
         let warm = timed.and_then(|t| t.warm.get(i));
         let cold = timed.filter(|t| t.was_forgotten).and_then(|t| t.cold.get(i));
         let faults = cold.and_then(|c| c.faults);
         writeln!(
             to,
-            "{},{},{},{},{},{},{}",
+            "{},{},{},{},{}",
             cell(warm.map(|c: &UpdateCost| neat_ms(c.ms))),
             cell(cold.map(|c| neat_ms(c.ms))),
             cell(faults.map(|f| f.major)),
             cell(faults.map(|f| f.minor)),
             cell(cold.and_then(|c| c.read_bytes)),
-            cell(run.counts_tiles.then_some(*tiles)),
-            cell(run.counts_tiles.then_some(*tile_bytes)),
         )?;
     }
     Ok(())
@@ -160,7 +159,8 @@ pub(super) mod tests {
                         units: scale,
                         realtime_pages: if frame == 0 { 10 * scale } else { frame },
                         preloaded_pages: 1,
-                        ..FrameIo::default()
+                        tiles: 3,
+                        tile_bytes: 700,
                     });
                     let run = Run {
                         reader,
@@ -168,7 +168,7 @@ pub(super) mod tests {
                         preload,
                         record_bytes: 4,
                         file_bytes: 1 << 30,
-                        counts_tiles: false,
+                        counts_tiles: layout == LayoutKind::Ours,
                         frames: frames.collect(),
                         trace: None,
                     };
@@ -244,8 +244,8 @@ pub(super) mod tests {
         let lines: Vec<&str> = text.lines().skip_while(|line| line.starts_with('#')).collect();
         assert_eq!(lines.len(), 1 + 5 * runs.len());
         assert!(lines.iter().all(|l| l.split(',').count() == HEADER.split(',').count()));
-        assert_eq!(lines[1], "soar,row,map,none,0,1000,4000,400,4000,40,400,1,,,,,");
-        assert_eq!(lines[11], "soar,ours,map,none,0,1000,4000,20,200,2,20,1,0.25,1.5,2,3,8192");
+        assert_eq!(lines[1], "soar,row,map,none,0,1000,4000,400,4000,40,400,1,,,,,,,");
+        assert_eq!(lines[11], "soar,ours,map,none,0,1000,4000,20,200,2,20,1,3,700,0.25,1.5,2,3,8192");
         let named = serde_json::to_string(&FrameIo::default()).unwrap();
         let fields: Vec<&str> = named.split('"').skip(1).step_by(2).collect();
         assert!(HEADER.contains(&fields.join(",")));
