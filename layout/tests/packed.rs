@@ -414,3 +414,25 @@ fn what_records_take_is_what_is_unpacked() {
     assert!(all.bytes < bytes.len() as u64 && all.bytes > bytes.len() as u64 / 2, "{all:?}");
     assert!(Terrain::open(&bench.plain).unwrap().source().unpacking().is_none());
 }
+
+/// Whoever needs all records hears which tile is damaged, and of a file that is whole nothing is read before it is asked for.
+#[test]
+fn a_damaged_tile_is_named_to_whoever_needs_all_records() {
+    let bench = Bench::of(&build_bytes(&dem([700, 421], 5, 2), &options()).unwrap()).unwrap();
+    let terrain = Terrain::open(&bench.packed).unwrap();
+    assert!(terrain.lends_records());
+    assert_eq!(terrain.source().unpacking().unwrap().unpacked().tiles, 0);
+    assert!(terrain.records().is_ok());
+    let mut bytes = bench.bytes(&bench.packed);
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x40;
+    std::fs::write(&bench.packed, bytes).unwrap();
+    let terrain = Terrain::open(&bench.packed).unwrap();
+    // Again and again: it is not taken for a terrain without records.
+    for _ in 0..2 {
+        let error = terrain.records().map(drop).unwrap_err();
+        assert!(matches!(error, LayoutError::Damaged { .. }), "{error}");
+        assert!(error.to_string().contains(": tile "), "{error}");
+    }
+    assert!(!Terrain::open_unmapped(&bench.packed).unwrap().lends_records());
+}

@@ -110,9 +110,7 @@ impl PageTable {
 
     /// Entries of the pages that are present, of all leaves that were read, in logical order: of the whole directory once [`PageTable::check`] has found it sound.
     pub(crate) fn present(&self) -> impl Iterator<Item = (u64, Entry)> + '_ {
-        let leaves = (0u64..).zip(&self.leaves).filter_map(|(i, leaf)| Some((i, leaf.get()?)));
-        let entries = leaves.flat_map(|(i, leaf)| (i * ENTRIES_PER_LEAF as u64..).zip(leaf.iter().copied()));
-        entries.filter(|(_, entry)| entry.is_present())
+        self.listed().filter(|(_, entry)| entry.is_present())
     }
 
     /// The entries of every leaf as far as they were read, none for absent ones.

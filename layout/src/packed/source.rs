@@ -31,7 +31,7 @@ use crate::file::source::{Source, Unpacking};
 use crate::file::structure::inert_page;
 use meter::Meter;
 use std::path::Path;
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 const PAGE: u64 = PAGE_BYTES as u64;
 /// Bytes of tiles kept unpacked, at most, and where no pool of pages has said how many.
@@ -74,9 +74,10 @@ pub(crate) struct PackedSource {
     scratch: Mutex<Vec<Scratch>>,
     width: Width,
     meter: Meter,
-    /// Whether the whole may be unpacked for those who need it, and what came of that.
+    /// Whether the whole may be unpacked for those who need it; that, and who does it just now.
     lends_whole: bool,
-    whole: OnceLock<Option<Vec<u8>>>,
+    whole: OnceLock<Vec<u8>>,
+    unpacking_whole: Mutex<()>,
 }
 
 impl PackedSource {
@@ -142,6 +143,7 @@ impl PackedSource {
             meter: Meter::default(),
             lends_whole: false,
             whole: OnceLock::new(),
+            unpacking_whole: Mutex::default(),
             root: OnceLock::new(),
             root_page,
             end,
@@ -170,24 +172,29 @@ impl PackedSource {
         self
     }
 
-    /// All bytes of the terrain file; `None` if there is no memory for them, or some of them cannot be read.
-    fn unpack_whole(&self) -> Option<Vec<u8>> {
+    /// All bytes of the terrain file.
+    fn unpack_whole(&self) -> Result<Vec<u8>, LayoutError> {
+        let count = self.header.file_bytes;
         let mut bytes = Vec::new();
-        bytes.try_reserve_exact(usize::try_from(self.header.file_bytes).ok()?).ok()?;
-        bytes.resize(bytes.capacity(), 0);
-        bytes.truncate(self.header.file_bytes as usize);
+        if usize::try_from(count).map_or(true, |count| bytes.try_reserve_exact(count).is_err()) {
+            let problem = format!(
+                "unpacked it takes {count} bytes of memory, and there are not so many; write it unpacked, and take that file"
+            );
+            return Err(LayoutError::unsupported(self.path(), problem));
+        }
+        bytes.resize(to_usize(count)?, 0);
         let mut pages: Vec<(u64, &mut [u8])> = (0..).zip(bytes.chunks_mut(PAGE_BYTES)).collect();
         // Pages that lie side by side one after the other, so that a tile is unpacked once for all of them.
         pages.sort_by_cached_key(|(number, _)| self.place_of(*number));
-        let fill = |(number, page): &mut (u64, &mut [u8])| self.read_at(*number * PAGE, page).ok();
+        let fill = |(number, page): &mut (u64, &mut [u8])| self.read_at(*number * PAGE, page);
         #[cfg(feature = "files")]
         {
             use rayon::prelude::*;
-            pages.par_iter_mut().with_min_len(WHOLE_PAGES).map(fill).collect::<Option<()>>()?;
+            pages.par_iter_mut().with_min_len(WHOLE_PAGES).try_for_each(fill)?;
         }
         #[cfg(not(feature = "files"))]
-        pages.iter_mut().map(fill).collect::<Option<()>>()?;
-        Some(bytes)
+        pages.iter_mut().try_for_each(fill)?;
+        Ok(bytes)
     }
 
     /// One page of the terrain file, of those that are packed.
@@ -263,10 +270,21 @@ impl Source for PackedSource {
     }
 
     fn bytes(&self) -> Option<&[u8]> {
-        if !self.lends_whole {
-            return None;
+        self.lend().ok().flatten()
+    }
+
+    fn lends(&self) -> bool {
+        self.lends_whole
+    }
+
+    fn lend(&self) -> Result<Option<&[u8]>, LayoutError> {
+        if self.lends_whole && self.whole.get().is_none() {
+            let _guard = self.unpacking_whole.lock().unwrap_or_else(PoisonError::into_inner);
+            if self.whole.get().is_none() {
+                let _ = self.whole.set(self.unpack_whole()?);
+            }
         }
-        self.whole.get_or_init(|| self.unpack_whole()).as_deref()
+        Ok(self.whole.get().map(Vec::as_slice))
     }
 
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {

@@ -39,10 +39,11 @@ impl Terrain {
     /// The records as refinement reads them. Reads and checks the whole directory.
     ///
     /// # Errors
-    /// As [`Terrain::check_directory`]; [`LayoutError::Unsupported`] if the source cannot lend its bytes, as [`Terrain::lends_records`] says.
+    /// As [`Terrain::check_directory`]; of a packed terrain, which is unpacked into memory for it, damage and I/O of any page, and too little memory; [`LayoutError::Unsupported`] if the source
+    /// cannot lend its bytes, as [`Terrain::lends_records`] says.
     pub fn records(&self) -> Result<AnyRecords<'_>, LayoutError> {
         self.check_directory()?;
-        let Some(first) = self.source().bytes() else {
+        let Some(first) = self.source().lend()? else {
             let problem = "its records are not in this process's memory, neither mapped nor unpacked there";
             return Err(LayoutError::unsupported(self.path(), problem));
         };
@@ -54,9 +55,9 @@ impl Terrain {
         })
     }
 
-    /// Whether the source lends its bytes, which [`Terrain::records`] needs.
+    /// Whether the source lends its bytes, which [`Terrain::records`] needs. Reads nothing.
     pub fn lends_records(&self) -> bool {
-        self.source().bytes().is_some()
+        self.source().lends()
     }
 
     /// A pool of at most `cache_bytes` for the pages of this terrain, whatever its source.

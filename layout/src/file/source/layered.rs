@@ -78,10 +78,17 @@ impl Source for LayeredSource<'_> {
     }
 
     fn bytes(&self) -> Option<&[u8]> {
-        let base = self.base.bytes()?;
+        self.lend().ok().flatten()
+    }
+
+    fn lends(&self) -> bool {
+        self.base.lends() && self.overlay.lends()
+    }
+
+    fn lend(&self) -> Result<Option<&[u8]>, LayoutError> {
+        let (Some(base), Some(_)) = (self.base.lend()?, self.overlay.bytes()) else { return Ok(None) };
         // Whatever lies behind the part that counts is none of this terrain's.
-        self.overlay.bytes()?;
-        base.get(..base.len().min(self.split as usize))
+        Ok(base.get(..base.len().min(self.split as usize)))
     }
 
     fn bytes_behind(&self) -> Option<(u64, &[u8])> {

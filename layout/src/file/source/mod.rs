@@ -171,6 +171,19 @@ pub trait Source: Send + Sync {
         None
     }
 
+    /// Whether the source has its bytes in its address space, or will bring them there when it is asked for them. Costs nothing.
+    fn lends(&self) -> bool {
+        self.bytes().is_some()
+    }
+
+    /// As [`Source::bytes`], of a source that brings its bytes there first; `None` for one that never does.
+    ///
+    /// # Errors
+    /// What kept it from that: damage, I/O, too little memory.
+    fn lend(&self) -> Result<Option<&[u8]>, LayoutError> {
+        Ok(self.bytes())
+    }
+
     /// Bytes that follow in another slice, and the offset of the first of them; `None` for all sources but those of two files.
     fn bytes_behind(&self) -> Option<(u64, &[u8])> {
         None
