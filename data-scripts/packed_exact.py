@@ -2,6 +2,8 @@
 import math
 import struct
 
+import packed_lattice
+
 INERT = {2: b"\0" * 6 + b"\xff\xff", 3: b"\0" * 12 + b"\xff" * 4}
 
 
@@ -90,9 +92,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
         if octave == delivered - 1:
             known = {}
         inside = lambda p: (p[0] < size or is_last[0]) and (p[1] < size or is_last[1])
-        whites = [(x, y) for y in range(s, size, 2 * s) for x in range(s, size, 2 * s)]
-        easts = [(x, y) for y in range(0, size + 1, 2 * s) for x in range(s, size, 2 * s)]
-        norths = [(x, y) for y in range(s, size, 2 * s) for x in range(0, size + 1, 2 * s)]
+        whites, easts, norths = packed_lattice.vertices(size, s)
         vertices, kinds, codes, raw, around = whites + easts + norths, {}, {}, {}, {}
         white = set(whites)
         before = lambda marks, p: [marks.get((p[0] - 2 * s, p[1]), 0), marks.get((p[0], p[1] - 2 * s), 0)]
@@ -107,13 +107,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                 codes[p], turn = (error, radius), turn + 2
         ordinary = [p for p in vertices if not kinds.get(p)]
         # Heights.
-        e = {(x, y): z[x, y] for y in range(0, size + 1, 2 * s) for x in range(0, size + 1, 2 * s)}
-        for y in range(0, size + 1, 2 * s):
-            e[-2 * s, y] = 2 * e[0, y] - e[2 * s, y]
-            e[size + 2 * s, y] = 2 * e[size, y] - e[size - 2 * s, y]
-        for x in range(-2 * s, size + 2 * s + 1, 2 * s):
-            e[x, -2 * s] = 2 * e[x, 0] - e[x, 2 * s]
-            e[x, size + 2 * s] = 2 * e[x, size] - e[x, size - 2 * s]
+        e = packed_lattice.coarse(z, size, s)
 
         def heights(places, first, near, far):
             uneven = {}
@@ -137,21 +131,9 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                 z[p] = rules.number(raw[p])
 
         q = min(octave, 3) if gives else 3
-        near = [(-1, -1), (1, 1), (1, -1), (-1, 1)]
-        far = [(-3, -1), (-3, 1), (3, -1), (3, 1), (-1, -3), (1, -3), (-1, 3), (1, 3)]
-        heights(whites, 64 * q, lambda p: near, lambda p: far)
-        e.update((p, z[p]) for p in whites)
-        for y in range(s, size, 2 * s):
-            e[-s, y] = e[0, y - s] + e[0, y + s] - e[s, y]
-            e[size + s, y] = e[size, y - s] + e[size, y + s] - e[size - s, y]
-        for x in range(-s, size + s + 1, 2 * s):
-            e[x, -s] = e[x - s, 0] + e[x + s, 0] - e[x, s]
-            e[x, size + s] = e[x - s, size] + e[x + s, size] - e[x, size - s]
-        is_east = lambda p: p[0] // s % 2 == 1
-        diamond = lambda p: [(-1, 0), (1, 0), (0, -1), (0, 1)] if is_east(p) else [(0, -1), (0, 1), (-1, 0), (1, 0)]
-        wide, tall = [(-2, -1), (-2, 1), (2, -1), (2, 1)], [(-1, -2), (1, -2), (-1, 2), (1, 2)]
-        knights = lambda p: wide + tall if is_east(p) else tall + wide  # the order of a sum decides its last bit
-        heights(easts + norths, 64 * q + 32, diamond, knights)
+        heights(whites, 64 * q, lambda p: packed_lattice.WHITE_NEAR, lambda p: packed_lattice.WHITE_FAR)
+        packed_lattice.add_whites(e, z, whites, size, s)
+        heights(easts + norths, 64 * q + 32, lambda p: packed_lattice.black_near(p, s), lambda p: packed_lattice.black_far(p, s))
         if not gives:
             continue
         # Codes.
@@ -185,7 +167,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                     if p in white:
                         offsets = [(1, -1), (-1, 1)] if climbs(p) else [(-1, -1), (1, 1)]
                     else:
-                        offsets = [(0, -1), (0, 1)] if is_east(p) else [(-1, 0), (1, 0)]
+                        offsets = packed_lattice.black_near(p, s)[2:]
                     parents = [known[q] for q in ((p[0] + dx * s, p[1] + dy * s) for dx, dy in offsets) if q in known]
                     reach = max(around[p]) - min(around[p])
                     slope = reach * rules.step_m / ((1 << stride_log + octave) * rules.spacing[0])

@@ -13,6 +13,7 @@ import zlib
 
 sys.dont_write_bytecode = True
 import packed_exact  # noqa: E402
+import packed_lattice  # noqa: E402
 
 INERT = 0xFF000000
 
@@ -147,9 +148,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
         if octave == delivered - 1:
             codes = {}
         inside = lambda p: (p[0] < last or is_last[0]) and (p[1] < last or is_last[1])
-        whites = [(x, y) for y in range(s, size, 2 * s) for x in range(s, size, 2 * s)]
-        easts = [(x, y) for y in range(0, size + 1, 2 * s) for x in range(s, size, 2 * s)]
-        norths = [(x, y) for y in range(s, size, 2 * s) for x in range(0, size + 1, 2 * s)]
+        whites, easts, norths = packed_lattice.vertices(size, s)
         vertices, kinds = whites + easts + norths, {}
         before = lambda marks, p: [marks.get((p[0] - 2 * s, p[1]), 0), marks.get((p[0], p[1] - 2 * s), 0)]
         if gives and coder.bits.take(1):
@@ -164,13 +163,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                 radius = radius + unzigzag(coder.value(401, turn + 1)) & 255
                 codes[p], turn = (error, radius), turn + 2
         # Heights.
-        e = {(x, y): z[x, y] for y in range(0, size + 1, 2 * s) for x in range(0, size + 1, 2 * s)}
-        for y in range(0, size + 1, 2 * s):
-            e[-2 * s, y] = 2 * e[0, y] - e[2 * s, y]
-            e[size + 2 * s, y] = 2 * e[size, y] - e[size - 2 * s, y]
-        for x in range(-2 * s, size + 2 * s + 1, 2 * s):
-            e[x, -2 * s] = 2 * e[x, 0] - e[x, 2 * s]
-            e[x, size + 2 * s] = 2 * e[x, size] - e[x, size - 2 * s]
+        e = packed_lattice.coarse(z, size, s)
         around = {}
 
         def heights(places, first, near, far):
@@ -191,20 +184,9 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                 z[p] = min(max(predicted[i], 0), 65535) if inert else predicted[i] + unzigzag(next(values)) & 65535
 
         q = min(octave, 3) if gives else 3
-        near = [(-1, -1), (1, 1), (1, -1), (-1, 1)]
-        far = [(-3, -1), (-3, 1), (3, -1), (3, 1), (-1, -3), (1, -3), (-1, 3), (1, 3)]
-        heights(whites, 64 * q, lambda p: near, lambda p: far)
-        e.update((p, z[p]) for p in whites)
-        for y in range(s, size, 2 * s):
-            e[-s, y] = e[0, y - s] + e[0, y + s] - e[s, y]
-            e[size + s, y] = e[size, y - s] + e[size, y + s] - e[size - s, y]
-        for x in range(-s, size + s + 1, 2 * s):
-            e[x, -s] = e[x - s, 0] + e[x + s, 0] - e[x, s]
-            e[x, size + s] = e[x - s, size] + e[x + s, size] - e[x, size - s]
-        is_east = lambda p: p[0] // s % 2 == 1
-        diamond = lambda p: [(-1, 0), (1, 0), (0, -1), (0, 1)] if is_east(p) else [(0, -1), (0, 1), (-1, 0), (1, 0)]
-        knights = lambda p: [(-2, -1), (-2, 1), (2, -1), (2, 1), (-1, -2), (1, -2), (-1, 2), (1, 2)]
-        heights(easts + norths, 64 * q + 32, diamond, knights)
+        heights(whites, 64 * q, lambda p: packed_lattice.WHITE_NEAR, lambda p: packed_lattice.WHITE_FAR)
+        packed_lattice.add_whites(e, z, whites, size, s)
+        heights(easts + norths, 64 * q + 32, lambda p: packed_lattice.black_near(p, s), lambda p: packed_lattice.black_far(p, s))
         if not gives:
             continue
         # Codes.
@@ -241,7 +223,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                     if p in white:
                         offsets = [(1, -1), (-1, 1)] if climbs(p) else [(-1, -1), (1, 1)]
                     else:
-                        offsets = [(0, -1), (0, 1)] if is_east(p) else [(-1, 0), (1, 0)]
+                        offsets = packed_lattice.black_near(p, s)[2:]
                     parents = [codes.get((p[0] + dx * s, p[1] + dy * s), (247, 0)) for dx, dy in offsets]
                     error, radius = min(min(c[0] for c in parents), 247), max(c[1] for c in parents)
                     y = max(error - step(p), 0)

@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::hollow::absent_square;
 use common::{MemoryDem, build_bytes, open_bytes};
 use std::path::Path;
 use std::sync::Arc;
@@ -15,7 +16,7 @@ use terrasoar_layout::packing::pack;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::opening::{Opening, Step};
 use terrasoar_layout::read::terrain::Terrain;
-use terrasoar_layout::testing::{Counts, packed_seeds, reseal, seeds};
+use terrasoar_layout::testing::packed_seeds;
 
 const PAGE: usize = 4096;
 /// What opening reads first.
@@ -69,18 +70,7 @@ fn opening_takes_few_reads() {
 
 /// 65,537 x 65,537 samples, 17 GB: all directory leaves are there, none of them has a page. Leaves are zeros, which the file has as a hole.
 fn huge(path: &Path) -> u64 {
-    let mut bytes = seeds().into_iter().find(|seed| seed.name == "compact").unwrap().files.terrain;
-    bytes.truncate(3 * PAGE);
-    let records = 4 + 5 * ((1u64 << 32) - 1) / 3;
-    let leaves = records.div_ceil(1024).div_ceil(256) as usize;
-    bytes.resize(3 * PAGE + (16 * leaves).next_multiple_of(PAGE), 0);
-    let length = bytes.len() as u64;
-    for at in [0x014, 0x018] {
-        bytes[at..at + 4].copy_from_slice(&65_537u32.to_le_bytes());
-    }
-    bytes[0x078..0x07c].copy_from_slice(&3u32.to_le_bytes());
-    bytes[0x088..0x090].copy_from_slice(&length.to_le_bytes());
-    reseal(&mut bytes, Counts::Settle);
+    let (mut bytes, leaves) = absent_square("compact");
     let first = (bytes.len() / PAGE) as u32;
     let sum = crc32fast::hash(&[0; PAGE]);
     for (i, entry) in bytes[3 * PAGE..].chunks_exact_mut(16).take(leaves).enumerate() {

@@ -3,7 +3,7 @@
 mod common;
 
 use common::drape::{draped, land, same_picture};
-use common::packed::{Bench, dem, options};
+use common::packed::{Bench, assert_same, dem, options};
 use common::{MemoryDem, build_bytes};
 use proptest::prelude::*;
 use std::path::Path;
@@ -23,16 +23,6 @@ use terrasoar_layout::verify::verify;
 
 fn open(bytes: Vec<u8>) -> Result<Terrain, LayoutError> {
     Terrain::from_source(Box::new(MemorySource::new("packed", bytes)))
-}
-
-/// Whether every page of two terrains is the same.
-fn assert_same(a: &Terrain, b: &Terrain) {
-    assert_eq!(a.header(), b.header());
-    assert!(a.present_pages().unwrap().eq(b.present_pages().unwrap()));
-    // From the last to the first, so that tiles are asked for in another order than they were written in.
-    for page in (0..a.page_count()).rev() {
-        assert!(a.checked_page(page).unwrap() == b.checked_page(page).unwrap(), "page {page}");
-    }
 }
 
 proptest! {

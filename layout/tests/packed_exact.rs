@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::packed::Bench;
+use common::packed::{Bench, assert_same};
 use common::{MemoryDem, build_bytes, open_bytes};
 use proptest::prelude::*;
 use terrasoar_layout::build::{BuildOptions, build};
@@ -31,15 +31,6 @@ fn dem(size: [u32; 2], sample_type: SampleType, rough_m: f64, voids: u32) -> Mem
 
 fn options() -> BuildOptions {
     BuildOptions::default().record(Some(RecordKind::Exact8)).spacing_m([20.0, 25.0])
-}
-
-/// Whether every page of two terrains is the same.
-fn assert_same(a: &Terrain, b: &Terrain) {
-    assert_eq!(a.header(), b.header());
-    assert!(a.present_pages().unwrap().eq(b.present_pages().unwrap()));
-    for page in (0..a.page_count()).rev() {
-        assert!(a.checked_page(page).unwrap() == b.checked_page(page).unwrap(), "page {page}");
-    }
 }
 
 proptest! {

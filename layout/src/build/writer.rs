@@ -9,8 +9,8 @@ use super::levels::{LevelShape, Levels};
 use super::plan::{LevelPlan, Plan, PlannedLeaf, place_of};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
-use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
-use crate::file::directory::{page_at, put_leaf, root_bytes};
+use crate::file::bytes::{PAGE_BYTES, Page, checksum};
+use crate::file::directory::{page_at, put_all_leaves, root_bytes};
 use crate::file::disk::Disk;
 use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
@@ -71,13 +71,6 @@ fn failed(file: &AtomicFile, e: std::io::Error) -> LayoutError {
     LayoutError::write(file.target(), "cannot write the terrain file", when_full, e)
 }
 
-/// What is said where page numbers end.
-fn too_long(file: &AtomicFile) -> LayoutError {
-    page_at(file.target(), u64::MAX)
-        .err()
-        .unwrap_or_else(|| LayoutError::Usage("the file would be too long".into()))
-}
-
 impl<'a, C: RecordCodec> PageWriter<'a, C> {
     pub(super) fn new(
         file: &'a AtomicFile,
@@ -91,7 +84,7 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
         let Plan { levels, mut leaves } = plan;
         for leaf in leaves.values_mut() {
             for (entry, _) in leaf.entries.iter_mut().zip(leaf.parts).filter(|(_, parts)| *parts > 0) {
-                page = page.checked_add(1).ok_or_else(|| too_long(file))?;
+                page = page_at(file.target(), (u64::from(page) + 1) * PAGE)?;
                 entry.page = page;
             }
         }
@@ -163,22 +156,16 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
 
     /// Writes what remains, closes gaps, and gives `header` its places.
     pub(super) fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
-        let mut page = self.close_gaps()?;
-        let mut root = vec![Entry::default(); to_usize(header.root_entries())?];
-        let mut stored = 0;
-        for (number, leaf) in &self.leaves {
-            let present = leaf.entries.iter().filter(|e| e.is_present()).count() as u64;
-            // Leaves without pages are left out.
-            if present > 0 {
-                root[*number as usize] = put_leaf(&leaf.entries, page, 1, |bytes| {
-                    self.disk
-                        .write_at(self.file.file(), bytes, u64::from(page) * PAGE)
-                        .map_err(|e| failed(self.file, e))
-                })?;
-                page = page.checked_add(1).ok_or_else(|| too_long(self.file))?;
-                stored += present;
-            }
-        }
+        let first = self.close_gaps()?;
+        let planned = &self.leaves;
+        let leaves =
+            (0..header.root_entries()).map(|i| planned.get(&i).map_or(&[][..], |leaf| &leaf.entries[..]));
+        let stored = leaves.clone().flatten().filter(|entry| entry.is_present()).count() as u64;
+        let (root, page) = put_all_leaves(self.file.target(), leaves, first, |page, bytes| {
+            self.disk
+                .write_at(self.file.file(), bytes, u64::from(page) * PAGE)
+                .map_err(|e| failed(self.file, e))
+        })?;
         let root = root_bytes(&root);
         header.root_page = page;
         header.root_checksum = root.checksum;

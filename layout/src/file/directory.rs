@@ -53,7 +53,11 @@ pub(crate) fn put_leaf(
 
 /// Writes all `leaves` of a new file, each from at most 256 entries, by `put`, which is told the page that each goes to, from `first_page` on. Leaves without pages are left out. Returns the root and
 /// the first page behind them.
+///
+/// # Errors
+/// Those of `put`; as [`page_at`], which says them of `path`.
 pub(crate) fn put_all_leaves<'e>(
+    path: &Path,
     leaves: impl Iterator<Item = &'e [Entry]>,
     first_page: u32,
     mut put: impl FnMut(u32, &[u8]) -> Result<(), LayoutError>,
@@ -63,7 +67,7 @@ pub(crate) fn put_all_leaves<'e>(
     for of_leaf in leaves {
         root.push(if of_leaf.iter().any(|entry| entry.is_present()) {
             let entry = put_leaf(of_leaf, page, 1, |bytes| put(page, bytes))?;
-            page += 1;
+            page = page_at(path, (u64::from(page) + 1) * PAGE)?;
             entry
         } else {
             Entry::default()
@@ -89,7 +93,8 @@ mod tests {
         let mut entries = vec![Entry::default(); 2 * ENTRIES_PER_LEAF + 3];
         entries[ENTRIES_PER_LEAF + 1] = Entry { page: 3, checksum: 7, generation: 1 };
         let mut put = Vec::new();
-        let (root, end) = put_all_leaves(entries.chunks(ENTRIES_PER_LEAF), 9, |page, bytes| {
+        let leaves = entries.chunks(ENTRIES_PER_LEAF);
+        let (root, end) = put_all_leaves(Path::new("a.iqt"), leaves, 9, |page, bytes| {
             put.push((page, bytes.len()));
             Ok(())
         })

@@ -4,6 +4,7 @@
 //! the class, in whose context the difference is coded.
 
 use super::model::HEIGHT_CLASSES;
+use std::ops::{Add, Sub};
 
 /// A plane of numbers with a ring of one around it.
 #[derive(Debug, Default)]
@@ -98,18 +99,18 @@ fn interleave<T: Copy>(row: &mut [T], even: &[T], odd: &[T]) {
     last.copy_from_slice(&even[odd.len()..]);
 }
 
-impl Lattices<i32> {
+impl<T: Copy + Default + Add<Output = T> + Sub<Output = T>> Lattices<T> {
     /// Continues the coarse lattice in straight lines over the border.
     #[inline(always)]
     pub(crate) fn ring_coarse(&mut self, m: usize) {
         let (e, m) = (&mut self.coarse, m as isize);
         for y in 0..=m {
-            e.set(-1, y, 2 * e.at(0, y) - e.at(1, y));
-            e.set(m + 1, y, 2 * e.at(m, y) - e.at(m - 1, y));
+            e.set(-1, y, e.at(0, y) + e.at(0, y) - e.at(1, y));
+            e.set(m + 1, y, e.at(m, y) + e.at(m, y) - e.at(m - 1, y));
         }
         for x in -1..=m + 1 {
-            e.set(x, -1, 2 * e.at(x, 0) - e.at(x, 1));
-            e.set(x, m + 1, 2 * e.at(x, m) - e.at(x, m - 1));
+            e.set(x, -1, e.at(x, 0) + e.at(x, 0) - e.at(x, 1));
+            e.set(x, m + 1, e.at(x, m) + e.at(x, m) - e.at(x, m - 1));
         }
     }
 
@@ -127,37 +128,50 @@ impl Lattices<i32> {
         }
     }
 
-    /// Predictions and classes of all whites, row by row.
+    /// Predicts all whites, row by row: `predict` is given the corners of their diamonds, two opposite pairs, and the eight vertices around, and writes what it predicts and what it has to say of
+    /// the ground around.
     #[inline(always)]
-    pub(crate) fn predict_whites(&self, m: usize, predicted: &mut [i32], classes: &mut [u8]) {
-        for (j, (predicted, classes)) in
-            predicted.chunks_exact_mut(m).zip(classes.chunks_exact_mut(m)).enumerate()
+    pub(crate) fn predict_whites<A>(
+        &self,
+        m: usize,
+        predicted: &mut [T],
+        around: &mut [A],
+        predict: impl Fn([&[T]; 4], [&[T]; 8], &mut [T], &mut [A]),
+    ) {
+        for (j, (predicted, around)) in
+            predicted.chunks_exact_mut(m).zip(around.chunks_exact_mut(m)).enumerate()
         {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m);
             let far = [e(-1, 0), e(-1, 1), e(2, 0), e(2, 1), e(0, -1), e(1, -1), e(0, 2), e(1, 2)];
-            predict([e(0, 0), e(1, 1), e(1, 0), e(0, 1)], far, predicted, classes);
+            predict([e(0, 0), e(1, 1), e(1, 0), e(0, 1)], far, predicted, around);
         }
     }
 
-    /// Predictions and classes of all blacks: those on edges that run east, row by row, then the others.
+    /// The same of all blacks: those on edges that run east, row by row, then the others.
     #[inline(always)]
-    pub(crate) fn predict_blacks(&self, m: usize, predicted: &mut [i32], classes: &mut [u8]) {
+    pub(crate) fn predict_blacks<A>(
+        &self,
+        m: usize,
+        predicted: &mut [T],
+        around: &mut [A],
+        predict: impl Fn([&[T]; 4], [&[T]; 8], &mut [T], &mut [A]),
+    ) {
         let of_east = m * (m + 1);
         let (east, north) = predicted.split_at_mut(of_east);
-        let (east_classes, north_classes) = classes.split_at_mut(of_east);
-        let rows = east.chunks_exact_mut(m).zip(east_classes.chunks_exact_mut(m));
-        for (j, (predicted, classes)) in rows.enumerate() {
+        let (east_around, north_around) = around.split_at_mut(of_east);
+        let rows = east.chunks_exact_mut(m).zip(east_around.chunks_exact_mut(m));
+        for (j, (predicted, around)) in rows.enumerate() {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m);
             let w = |dx: isize, dy: isize| self.whites.row(dx, j as isize + dy, m);
             let far = [w(-1, -1), w(-1, 0), w(1, -1), w(1, 0), e(0, -1), e(1, -1), e(0, 1), e(1, 1)];
-            predict([e(0, 0), e(1, 0), w(0, -1), w(0, 0)], far, predicted, classes);
+            predict([e(0, 0), e(1, 0), w(0, -1), w(0, 0)], far, predicted, around);
         }
-        let rows = north.chunks_exact_mut(m + 1).zip(north_classes.chunks_exact_mut(m + 1));
-        for (j, (predicted, classes)) in rows.enumerate() {
+        let rows = north.chunks_exact_mut(m + 1).zip(north_around.chunks_exact_mut(m + 1));
+        for (j, (predicted, around)) in rows.enumerate() {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m + 1);
             let w = |dx: isize, dy: isize| self.whites.row(dx, j as isize + dy, m + 1);
             let far = [w(-1, -1), w(0, -1), w(-1, 1), w(0, 1), e(-1, 0), e(-1, 1), e(1, 0), e(1, 1)];
-            predict([e(0, 0), e(0, 1), w(-1, 0), w(0, 0)], far, predicted, classes);
+            predict([e(0, 0), e(0, 1), w(-1, 0), w(0, 0)], far, predicted, around);
         }
     }
 }
@@ -167,7 +181,7 @@ const TOGETHER: usize = 8;
 
 /// Predictions and classes of a row, from two opposite pairs of corners and the eight vertices around.
 #[inline(always)]
-fn predict(near: [&[i32]; 4], far: [&[i32]; 8], predicted: &mut [i32], classes: &mut [u8]) {
+pub(crate) fn predict(near: [&[i32]; 4], far: [&[i32]; 8], predicted: &mut [i32], classes: &mut [u8]) {
     let count = predicted.len();
     let mut done = 0;
     // The last ones together with some that were predicted before.
@@ -241,7 +255,7 @@ mod tests {
         }
         lattices.ring_coarse(m);
         let (mut predicted, mut classes) = (vec![0; m * m], vec![0; m * m]);
-        lattices.predict_whites(m, &mut predicted, &mut classes);
+        lattices.predict_whites(m, &mut predicted, &mut classes, predict);
         for (x, y) in (1..m - 1).flat_map(|y| (1..m - 1).map(move |x| (x, y))) {
             let exact = f(x as f64 + 0.5, y as f64 + 0.5);
             assert!((f64::from(predicted[y * m + x]) - exact).abs() < 1.3, "{x} {y}");

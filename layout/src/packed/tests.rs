@@ -97,6 +97,20 @@ fn shapes() -> impl Strategy<Value = TileShape> {
     )
 }
 
+/// Does to each segment what damage may: cuts it, flips a bit, puts other bytes in its place or behind it.
+pub(super) fn spoil(segments: &mut [Vec<u8>], seed: u64, bytes: &[u8]) {
+    let mut random = Random::new(seed);
+    for segment in segments {
+        let at = random.below(segment.len() as u64) as usize;
+        match random.below(4) {
+            0 => segment.truncate(at),
+            1 => segment[at] ^= 1 << random.below(8),
+            2 => *segment = bytes.to_vec(),
+            _ => segment.extend(bytes),
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
@@ -145,16 +159,7 @@ proptest! {
         let model = Model::from_counts(&counts);
         let tables = DecodeTables::of(&model);
         let mut segments = encoders.map(|encoder| encoder.finish(&model).unwrap());
-        let mut random = Random::new(seed);
-        for segment in &mut segments {
-            let at = random.below(segment.len() as u64) as usize;
-            match random.below(4) {
-                0 => segment.truncate(at),
-                1 => segment[at] ^= 1 << random.below(8),
-                2 => *segment = bytes.clone(),
-                _ => segment.extend(&bytes),
-            }
-        }
+        spoil(&mut segments, seed, &bytes);
         let segments: Vec<_> = segments.into_iter().take_while(|bytes| Decoder::new(&tables, bytes).is_some()).collect();
         if !segments.is_empty() {
             let found = Width::all().into_iter().map(|width| read(width, &shape, &rules, &tables, &segments));

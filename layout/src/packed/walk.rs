@@ -5,11 +5,11 @@
 //! more values are asked for than the tile's shape gives. Cost: about a megabyte a thread.
 
 mod codes;
-mod special;
+pub(super) mod special;
 
 use super::coder::Coder;
 use super::model::{HEIGHT_CLASSES, HEIGHTS};
-use super::plane::Lattices;
+use super::plane::{Lattices, predict};
 use super::rules::{Rules, TOP_ERROR};
 use super::shape::{TILE_LOG, TileShape};
 use super::tile::{INERT, TileRecords};
@@ -248,12 +248,12 @@ fn heights<C: Coder>(
     let (m, whites) = (octave.m, octave.whites());
     let first = HEIGHTS + 2 * coded as u16 * HEIGHT_CLASSES;
     let Scratch { heights, flat_heights, contexts, .. } = scratch;
-    heights.predict_whites(m, &mut flat_heights[..whites], &mut contexts[..whites]);
+    heights.predict_whites(m, &mut flat_heights[..whites], &mut contexts[..whites], predict);
     residuals(scratch, coder, truth, 0..whites, first, is_special);
     let Scratch { heights, flat_heights, contexts, .. } = scratch;
     heights.take_whites(m, &flat_heights[..whites]);
     heights.ring_whites(m);
-    heights.predict_blacks(m, &mut flat_heights[octave.blacks()], &mut contexts[octave.blacks()]);
+    heights.predict_blacks(m, &mut flat_heights[octave.blacks()], &mut contexts[octave.blacks()], predict);
     residuals(scratch, coder, truth, octave.blacks(), first + HEIGHT_CLASSES, is_special);
 }
 

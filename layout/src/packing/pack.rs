@@ -145,7 +145,7 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
             return Err(refused(path, in_order));
         }
     }
-    let (root, page) = put_all_leaves(built.table().leaves(), next + 1, |_, _| Ok(()))?;
+    let (root, page) = put_all_leaves(path, built.table().leaves(), next + 1, |_, _| Ok(()))?;
     let root = root_bytes(&root);
     let end = u64::from(page) * PAGE + root.bytes.len() as u64;
     let is_in_order =

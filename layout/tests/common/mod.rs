@@ -6,6 +6,7 @@ use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::progress::Silent;
 pub mod drape;
 pub mod edits;
+pub mod hollow;
 pub mod packed;
 pub mod paint;
 pub mod paint_reference;

@@ -9,6 +9,7 @@ use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::packing::pack;
 use terrasoar_layout::progress::Silent;
+use terrasoar_layout::read::terrain::Terrain;
 
 /// Hills with voids, as rough as asked.
 pub fn dem(size: [u32; 2], roughness: u32, voids: u32) -> MemoryDem {
@@ -24,6 +25,16 @@ pub fn dem(size: [u32; 2], roughness: u32, voids: u32) -> MemoryDem {
 
 pub fn options() -> BuildOptions {
     BuildOptions::default().record(Some(RecordKind::Compact)).spacing_m([20.0, 25.0])
+}
+
+/// Whether every page of two terrains is the same.
+pub fn assert_same(a: &Terrain, b: &Terrain) {
+    assert_eq!(a.header(), b.header());
+    assert!(a.present_pages().unwrap().eq(b.present_pages().unwrap()));
+    // From the last to the first, so that tiles are asked for in another order than they were written in.
+    for page in (0..a.page_count()).rev() {
+        assert!(a.checked_page(page).unwrap() == b.checked_page(page).unwrap(), "page {page}");
+    }
 }
 
 pub struct Bench {

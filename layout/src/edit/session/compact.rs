@@ -173,8 +173,9 @@ fn write_terrain(
         writer.put(&page[..])?;
         progress.advance(old.records_per_page());
     }
+    let (path, first) = (writer.file.target(), writer.page()?);
     let (root, root_page) =
-        put_all_leaves(entries.chunks(ENTRIES_PER_LEAF), writer.page()?, |_, bytes| writer.put(bytes))?;
+        put_all_leaves(path, entries.chunks(ENTRIES_PER_LEAF), first, |_, bytes| writer.put(bytes))?;
     let root = root_bytes(&root);
     writer.put(&root.bytes)?;
     writer.flush()?;

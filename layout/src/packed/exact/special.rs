@@ -4,13 +4,9 @@ use super::form::{Form, Parts, folded, unfolded};
 use super::numbers::single;
 use super::scratch::Scratch;
 use crate::packed::coder::Coder;
-use crate::packed::model::{FRINGE_ERRORS, FRINGE_RADII, KINDS, OTHER_ERRORS, OTHER_RADII};
+use crate::packed::model::{FRINGE_ERRORS, FRINGE_RADII, OTHER_ERRORS, OTHER_RADII};
+use crate::packed::walk::special::{OTHERS, coded_kinds};
 use crate::packed::walk::{IS_FRINGE, IS_INERT, ORDINARY, Octave};
-
-/// Kinds of an inert, fringe or ordinary vertex.
-const KIND_COUNT: u16 = 3;
-/// First context of whether a vertex has other codes than follow from heights.
-const OTHERS: u16 = KINDS + KIND_COUNT * KIND_COUNT;
 
 /// Kinds of all vertices of an octave, where any is not ordinary; whether that is so. Of vertices whose records other tiles give, what is fringe counts as ordinary.
 pub(super) fn kinds<C: Coder>(
@@ -29,25 +25,11 @@ pub(super) fn kinds<C: Coder>(
             };
         }
     }
-    let is_any = truth.is_some() && scratch.kinds[..octave.count()].iter().any(|kind| *kind != ORDINARY);
-    let mut is_special = u16::from(is_any);
-    coder.raw(1, &mut is_special);
-    if is_special == 0 {
+    let is_special = coded_kinds(&mut scratch.kinds, coder, octave, truth.is_some());
+    if !is_special {
         scratch.kinds[..octave.count()].fill(ORDINARY);
-        return false;
     }
-    for i in 0..octave.count() {
-        let [west, south] = octave.before(i).map(|at| at.map_or(ORDINARY, |at| scratch.kinds[at]));
-        let mut kind = u16::from(scratch.kinds[i]);
-        coder.value(KINDS + KIND_COUNT * u16::from(west) + u16::from(south), i, &mut kind);
-        // What no writer makes is taken for ordinary.
-        scratch.kinds[i] = match kind as u8 {
-            IS_FRINGE if !octave.is_given(i) => ORDINARY,
-            kind @ (IS_INERT | IS_FRINGE) => kind,
-            _ => ORDINARY,
-        };
-    }
-    true
+    is_special
 }
 
 /// Errors and radii of the fringe vertices, each after the one before it.

@@ -7,6 +7,7 @@ use crate::mix::Random;
 use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
 use crate::packed::model::{CONTEXTS, DecodeTables, Model};
 use crate::packed::shape::{SEGMENTS, TileShape};
+use crate::packed::tests::spoil;
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
 use proptest::prelude::*;
@@ -127,16 +128,7 @@ proptest! {
         let model = model_of(&encoders);
         let tables = DecodeTables::of(&model);
         let mut segments = encoders.map(|encoder| encoder.finish(&model).unwrap());
-        let mut random = Random::new(seed);
-        for segment in &mut segments {
-            let at = random.below(segment.len() as u64) as usize;
-            match random.below(4) {
-                0 => segment.truncate(at),
-                1 => segment[at] ^= 1 << random.below(8),
-                2 => *segment = bytes.clone(),
-                _ => segment.extend(&bytes),
-            }
-        }
+        spoil(&mut segments, seed, &bytes);
         let mut decoders: Vec<_> = segments.iter().map_while(|bytes| Decoder::new(&tables, bytes)).collect();
         let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
         prop_assert!(found.finest <= shape.tile_log);

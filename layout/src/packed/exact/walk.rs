@@ -3,7 +3,7 @@
 //! It is that of compact records with other parts.
 
 use super::form::{Form, Parts};
-use super::heights::class_of;
+use super::heights::{class_of, predict};
 use super::numbers::{Row, raw, row, shift};
 use super::rules::Rules;
 use super::scratch::{Scratch, UNKNOWN};
@@ -37,7 +37,7 @@ pub(crate) fn walk<C: Coder>(
         });
         let truth = truth.as_deref();
         let at = Octave { octave, m, is_last: shape.is_last };
-        scratch.heights.ring_coarse_values(m);
+        scratch.heights.ring_coarse(m);
         if octave < shape.delivered() {
             if octave + 1 == shape.delivered() {
                 scratch.errors.coarse.fill(m + 1, m + 1, UNKNOWN);
@@ -134,12 +134,12 @@ fn heights<C: Coder>(
     let (m, whites) = (octave.m, octave.whites());
     let first = HEIGHTS + 2 * coded as u16 * HEIGHT_CLASSES;
     let Scratch { heights, predicted, uneven, .. } = scratch;
-    heights.predict_white_values(m, &mut predicted[..whites], &mut uneven[..whites]);
+    heights.predict_whites(m, &mut predicted[..whites], &mut uneven[..whites], predict);
     residuals(form, scratch, coder, truth, 0..whites, first);
     let Scratch { heights, predicted, uneven, values, .. } = scratch;
     heights.take_whites(m, &values[..whites]);
-    heights.ring_white_values(m);
-    heights.predict_black_values(m, &mut predicted[octave.blacks()], &mut uneven[octave.blacks()]);
+    heights.ring_whites(m);
+    heights.predict_blacks(m, &mut predicted[octave.blacks()], &mut uneven[octave.blacks()], predict);
     residuals(form, scratch, coder, truth, octave.blacks(), first + HEIGHT_CLASSES);
 }
 

@@ -9,7 +9,7 @@ use crate::packed::token::{folded8, unfolded8};
 /// Kinds of an inert, fringe or ordinary vertex.
 const KIND_COUNT: u16 = 3;
 /// First context of whether a vertex has other codes than follow from heights.
-const OTHERS: u16 = KINDS + KIND_COUNT * KIND_COUNT;
+pub(in crate::packed) const OTHERS: u16 = KINDS + KIND_COUNT * KIND_COUNT;
 
 /// Kinds of all vertices of an octave, where any is not ordinary; whether that is so. Of vertices whose records other tiles give, what is fringe counts as ordinary.
 pub(super) fn kinds<C: Coder>(
@@ -27,25 +27,39 @@ pub(super) fn kinds<C: Coder>(
             };
         }
     }
-    let is_any = truth.is_some() && scratch.kinds[..octave.count()].iter().any(|kind| *kind != ORDINARY);
+    if !coded_kinds(&mut scratch.kinds, coder, octave, truth.is_some()) {
+        return false;
+    }
+    for i in (0..octave.count()).filter(|i| scratch.kinds[*i] == IS_INERT) {
+        (scratch.flat_errors[i], scratch.flat_radii[i]) = (0, 255);
+    }
+    true
+}
+
+/// Brings the kinds of an octave's vertices through a coder, which begin as the writer has them; whether any is not ordinary. Otherwise what they are is not said.
+#[inline(always)]
+pub(in crate::packed) fn coded_kinds<C: Coder>(
+    kinds: &mut [u8],
+    coder: &mut C,
+    octave: &Octave,
+    is_writing: bool,
+) -> bool {
+    let is_any = is_writing && kinds[..octave.count()].iter().any(|kind| *kind != ORDINARY);
     let mut is_special = u16::from(is_any);
     coder.raw(1, &mut is_special);
     if is_special == 0 {
         return false;
     }
     for i in 0..octave.count() {
-        let [west, south] = octave.before(i).map(|at| at.map_or(ORDINARY, |at| scratch.kinds[at]));
-        let mut kind = u16::from(scratch.kinds[i]);
+        let [west, south] = octave.before(i).map(|at| at.map_or(ORDINARY, |at| kinds[at]));
+        let mut kind = u16::from(kinds[i]);
         coder.value(KINDS + KIND_COUNT * u16::from(west) + u16::from(south), i, &mut kind);
         // What no writer makes is taken for ordinary.
-        scratch.kinds[i] = match kind as u8 {
+        kinds[i] = match kind as u8 {
             IS_FRINGE if !octave.is_given(i) => ORDINARY,
             kind @ (IS_INERT | IS_FRINGE) => kind,
             _ => ORDINARY,
         };
-    }
-    for i in (0..octave.count()).filter(|i| scratch.kinds[*i] == IS_INERT) {
-        (scratch.flat_errors[i], scratch.flat_radii[i]) = (0, 255);
     }
     true
 }
