@@ -96,7 +96,8 @@ pub(super) fn others<C: Coder>(
         codes.is_some_and(|codes| codes != [scratch.flat_errors[i], scratch.flat_radii[i]])
     };
     let count = octave.count();
-    let are_any = truth.is_some() && (0..count).any(|i| is_asked(scratch, i) && differs(scratch, i));
+    // Nearly none differs, and to look whether it does is quick.
+    let are_any = truth.is_some() && (0..count).any(|i| differs(scratch, i) && is_asked(scratch, i));
     let mut are_any = u16::from(are_any);
     coder.raw(1, &mut are_any);
     if are_any == 0 {
