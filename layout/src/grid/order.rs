@@ -9,10 +9,12 @@
 //! Slots 0..=3 are the corners SW, SE, NE, NW; 4 is the centre; 5..=8 are the midpoints of the W, S, E, N
 //! sides. See FORMAT.md, "Order of records". Cost: a few shifts a vertex.
 
+mod along;
 mod blocks;
 #[cfg(test)]
 mod large;
 
+pub(crate) use along::{BlackAlong, WhiteAlong};
 pub(crate) use blocks::{block_start, level_around, step_in_block};
 
 use crate::grid::GridPoint;

@@ -1,4 +1,4 @@
-//! The records of the six finest levels around a changed rectangle, side by side as on the ground.
+//! The records of the eight finest levels around a changed rectangle, side by side as on the ground.
 //!
 //! Nearly all that an edit changes are vertices of these levels, each of which looks at a dozen others close by. Read once into rows, they are neighbours in memory,
 //! and samples can be compared with a plane row by row, as a build does.
@@ -6,21 +6,21 @@
 //! Invariant: what is written to the pages inside the rectangle is written here as well.
 
 use super::pages::Pages;
-use crate::bound::{Plane, Samples};
+use crate::bound::Plane;
 use crate::edit::operations::window::SampleRect;
-use crate::grid::order::{RowSlots, slot_of};
+use crate::grid::order::{BlackAlong, WhiteAlong, level_slots, slot_of};
 use crate::grid::record::RecordCodec;
 use crate::grid::{Grid, GridPoint};
 
 /// Levels that are done here.
-pub(crate) const NEAR_LEVELS: u32 = 6;
+pub(crate) const NEAR_LEVELS: u32 = 8;
 /// Steps around the changed rectangle: a diamond of the coarsest of these levels that touches it reaches twice its step, and so do its children.
-pub(crate) const MARGIN: u32 = 8;
+pub(crate) const MARGIN: u32 = 16;
 /// Steps between the points that belong to coarser levels.
 const COARSER: u32 = 1 << (NEAR_LEVELS / 2);
 
 /// Bytes of a line of the processor's caches.
-const LINE_BYTES: u64 = 64;
+const LINE_BYTES: usize = 64;
 
 /// Records of a rectangle of samples, padding left out.
 #[derive(Debug)]
@@ -33,24 +33,13 @@ pub(crate) struct Near<C: RecordCodec> {
     raws: Vec<C::Raw>,
     /// Slots of these records.
     slots: Vec<u64>,
-    /// Height codes; those of voids are what their records say.
-    values: Vec<f64>,
     /// Height codes; NaN for voids.
     samples: Vec<f64>,
 }
 
 impl<C: RecordCodec> Default for Near<C> {
     fn default() -> Self {
-        Self {
-            west: 0,
-            south: 0,
-            wide: 0,
-            high: 0,
-            raws: Vec::new(),
-            slots: Vec::new(),
-            values: Vec::new(),
-            samples: Vec::new(),
-        }
+        Self { west: 0, south: 0, wide: 0, high: 0, raws: Vec::new(), slots: Vec::new(), samples: Vec::new() }
     }
 }
 
@@ -60,45 +49,88 @@ impl<C: RecordCodec> Near<C> {
         let around = rect.grown(MARGIN, grid);
         (self.west, self.south) = (around.west, around.south);
         (self.wide, self.high) = (around.wide(), around.high());
-        self.list_slots(grid);
-        // Asked of memory all at once, then waited for.
-        let mut line = u64::MAX;
-        for slot in &self.slots {
-            let here = slot * C::BYTES as u64 / LINE_BYTES;
-            if here != line {
-                pages.prefetch(*slot);
-                line = here;
-            }
-        }
-        self.raws.clear();
-        self.raws.extend(self.slots.iter().map(|slot| pages.raw(*slot)));
-        self.values.clear();
-        self.values.extend(self.raws.iter().map(|raw| C::height_value(*raw)));
-        self.samples.clear();
-        let known = self.raws.iter().zip(&self.values);
-        self.samples.extend(known.map(|(raw, value)| if C::is_void(*raw) { f64::NAN } else { *value }));
-    }
-
-    /// Fills in the slots of the rectangle, a level at a time.
-    fn list_slots(&mut self, grid: &Grid) {
-        self.slots.clear();
-        self.slots.resize(self.wide as usize * self.high as usize, 0);
-        let n = grid.side_steps();
+        let count = self.row_length() * self.high as usize;
+        // Every point gets its slot and record below.
+        self.slots.resize(count, 0);
+        self.raws.resize(count, C::INERT);
+        self.ask(grid, pages);
         for level in 0..NEAR_LEVELS.min(grid.levels()) {
-            for y in self.south..self.south + self.high {
-                let Some(first) = first_of_row(level, self.west, y) else { continue };
-                let row = RowSlots::new(grid.k(), level, y);
-                for x in (first..self.west + self.wide).step_by(2 << (level / 2)) {
-                    let at = self.index(x, y);
-                    self.slots[at] = row.slot(x);
+            let step = 1 << (level / 2);
+            for y in (self.south.next_multiple_of(step)..self.south + self.high).step_by(step as usize) {
+                let Some(x) = first_of_row(level, self.west, y) else { continue };
+                if level & 1 == 1 {
+                    self.read_row(step, x, y, WhiteAlong::new(grid.k(), level, x, y), pages);
+                } else {
+                    self.read_row(step, x, y, BlackAlong::new(grid.k(), level, x, y), pages);
                 }
             }
         }
-        let step = COARSER.min(n);
+        let step = COARSER.min(grid.side_steps());
         for y in (self.south.next_multiple_of(step)..self.south + self.high).step_by(step as usize) {
             for x in (self.west.next_multiple_of(step)..self.west + self.wide).step_by(step as usize) {
-                let at = self.index(x, y);
-                self.slots[at] = slot_of(grid.k(), GridPoint::new(x, y));
+                let (at, slot) = (self.index(x, y), slot_of(grid.k(), GridPoint::new(x, y)));
+                self.slots[at] = slot;
+                self.raws[at] = pages.raw(slot);
+            }
+        }
+        self.samples.clear();
+        self.samples.extend(self.raws.iter().map(|raw| C::height_value(*raw)));
+        if self.raws.iter().fold(false, |any, raw| any | C::is_void(*raw)) {
+            let voids = self.raws.iter().zip(&mut self.samples).filter(|(raw, _)| C::is_void(**raw));
+            voids.for_each(|(_, sample)| *sample = f64::NAN);
+        }
+    }
+
+    /// Reads the records of a row of a level from (`x`, `y`) on, whose slots are `along`.
+    #[inline(always)]
+    fn read_row(
+        &mut self,
+        step: u32,
+        x: u32,
+        y: u32,
+        along: impl Iterator<Item = u64>,
+        pages: &mut Pages<C>,
+    ) {
+        if x >= self.west + self.wide {
+            return;
+        }
+        let (mut at, end) = (self.index(x, y), self.index(self.west, y) + self.row_length());
+        let (slots, raws) = (&mut self.slots[..end], &mut self.raws[..end]);
+        for slot in along {
+            if at >= end {
+                break;
+            }
+            slots[at] = slot;
+            raws[at] = pages.raw(slot);
+            at += 2 * step as usize;
+        }
+    }
+
+    /// Asks memory for all records at once, as far as their pages are here. Of slots side by side 16 are of one vertex four levels up.
+    fn ask(&self, grid: &Grid, pages: &Pages<C>) {
+        let n = grid.side_steps();
+        for level in 0..NEAR_LEVELS.min(grid.levels().saturating_sub(4)) {
+            let above = level + 4;
+            let (start, above_start) =
+                (level_slots(grid.k(), level).start, level_slots(grid.k(), above).start);
+            let step = 1 << (above / 2);
+            let (west, south) = (self.west.saturating_sub(step), self.south.saturating_sub(step));
+            let (east, north) =
+                ((self.west + self.wide + step).min(n), (self.south + self.high + step).min(n));
+            for y in (south.next_multiple_of(step)..=north).step_by(step as usize) {
+                let Some(x) = first_of_row(above, west, y).filter(|x| *x <= east) else { continue };
+                let count = ((east - x) / (2 * step) + 1) as usize;
+                let ask = |slot: u64| {
+                    let first = start + 16 * (slot - above_start);
+                    for at in (0..16).step_by(LINE_BYTES / C::BYTES).chain([15]) {
+                        pages.prefetch(first + at);
+                    }
+                };
+                if above & 1 == 1 {
+                    WhiteAlong::new(grid.k(), above, x, y).take(count).for_each(ask);
+                } else {
+                    BlackAlong::new(grid.k(), above, x, y).take(count).for_each(ask);
+                }
             }
         }
     }
@@ -115,7 +147,6 @@ impl<C: RecordCodec> Near<C> {
             let at = self.index(rect.west, y);
             for (i, code) in row.iter().enumerate().filter(|(_, code)| !code.is_nan()) {
                 self.samples[at + i] = *code;
-                self.values[at + i] = *code;
             }
         }
     }
@@ -142,10 +173,11 @@ impl<C: RecordCodec> Near<C> {
         self.slots[at]
     }
 
-    /// Height code at an index.
+    /// Height code at an index; that of a void is what its record says.
     #[inline(always)]
     pub(crate) fn value(&self, at: usize) -> f64 {
-        self.values[at]
+        let code = self.samples[at];
+        if code.is_nan() { C::height_value(self.raws[at]) } else { code }
     }
 
     /// Notes a record that was written, if it lies here.
@@ -161,23 +193,25 @@ impl<C: RecordCodec> Near<C> {
     pub(crate) fn within(&self, p: GridPoint) -> [u32; 2] {
         [p.x() - self.west, p.y() - self.south]
     }
-}
 
-impl<C: RecordCodec> Samples for Near<C> {
+    /// Largest distance from `plane` over columns `from..=to` of row `y`, counted within the rectangle and all in it.
     #[inline(always)]
-    fn corner(&self, x: u32, y: u32) -> (GridPoint, f64) {
-        let p = GridPoint::new(self.west.wrapping_add(x), self.south.wrapping_add(y));
-        let is_here = x < self.wide && y < self.high;
-        let code =
-            if is_here { self.samples[y as usize * self.wide as usize + x as usize] } else { f64::NAN };
-        (p, code)
-    }
-
-    #[inline(always)]
-    fn row(&self, plane: &Plane, from: u32, to: u32, y: u32) -> f64 {
+    pub(crate) fn row(&self, plane: &Plane, from: u32, to: u32, y: u32) -> f64 {
         let at = y as usize * self.wide as usize;
         let row = &self.samples[at + from as usize..=at + to as usize];
         plane.farthest_in_row(self.west + from, self.south + y, row)
+    }
+
+    /// Height codes, row by row from the south; NaN for voids.
+    #[inline(always)]
+    pub(crate) fn samples(&self) -> &[f64] {
+        &self.samples
+    }
+
+    /// Whether it holds a grid point and `around` steps on all sides of it.
+    pub(crate) fn holds(&self, p: GridPoint, around: u32) -> bool {
+        let is_within = |v: u32, low: u32, count: u32| v >= low + around && v + around < low + count;
+        is_within(p.x(), self.west, self.wide) && is_within(p.y(), self.south, self.high)
     }
 }
 

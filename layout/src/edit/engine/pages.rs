@@ -174,35 +174,37 @@ impl<C: RecordCodec> Pages<C> {
     }
 
     /// Overwrites a record.
+    #[inline(always)]
     pub(crate) fn write(&mut self, point: GridPoint, slot: u64, raw: C::Raw) {
         let (logical, within) = (page_of::<C>(slot) as usize, byte_in_page::<C>(slot));
-        let page = self.page_at(slot);
-        let place = &mut page[within..within + C::BYTES];
-        let old = C::read(place);
-        if self.flags[logical] & UNCOMMITTED == 0 {
-            let committed = Box::new(*self.page_at(slot));
-            self.uncommitted.push((logical as u64, committed));
-            self.clean -= usize::from(self.flags[logical] & TAKEN == 0);
-            self.flags[logical] |= EDITED | UNCOMMITTED;
+        if self.marked[logical] == 0 {
+            self.begin_writing(slot);
         }
-        C::write(raw, &mut self.page_at(slot)[within..within + C::BYTES]);
-        if self.mark(logical, within / C::BYTES) {
+        let place = &mut self.page_at(slot)[within..within + C::BYTES];
+        let old = C::read(place);
+        C::write(raw, place);
+        let record = within / C::BYTES;
+        let word = &mut self.marks[self.marked[logical] as usize - 1].1[record / 64];
+        let bit = 1 << (record % 64);
+        if *word & bit == 0 {
+            *word |= bit;
             self.log.push(Overwritten { point, slot, old });
         }
     }
 
-    /// Marks a record of a page; whether it was not marked before.
-    #[inline(always)]
-    fn mark(&mut self, logical: usize, record: usize) -> bool {
-        if self.marked[logical] == 0 {
-            self.marks.push((logical as u64, [0; _]));
-            self.marked[logical] = self.marks.len() as u32;
+    /// Before the batch's first record in the page of a slot.
+    #[inline(never)]
+    fn begin_writing(&mut self, slot: u64) {
+        let logical = page_of::<C>(slot);
+        let at = logical as usize;
+        self.marks.push((logical, [0; _]));
+        self.marked[at] = self.marks.len() as u32;
+        if self.flags[at] & UNCOMMITTED == 0 {
+            let committed = Box::new(*self.page_at(slot));
+            self.uncommitted.push((logical, committed));
+            self.clean -= usize::from(self.flags[at] & TAKEN == 0);
+            self.flags[at] |= EDITED | UNCOMMITTED;
         }
-        let word = &mut self.marks[self.marked[logical] as usize - 1].1[record / 64];
-        let bit = 1 << (record % 64);
-        let is_new = *word & bit == 0;
-        *word |= bit;
-        is_new
     }
 
     /// Ends the batch's marks.
