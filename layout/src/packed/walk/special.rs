@@ -18,7 +18,10 @@ pub(super) fn kinds<C: Coder>(
     truth: Option<&[u32]>,
     octave: &Octave,
 ) -> bool {
-    if let Some(truth) = truth {
+    let may_be_other = |record: &u32| *record == INERT || record.to_le_bytes()[2] >= FRINGE_CODE;
+    if truth.is_some_and(|truth| !truth.iter().fold(false, |any, record| any | may_be_other(record))) {
+        scratch.kinds[..octave.count()].fill(ORDINARY);
+    } else if let Some(truth) = truth {
         for ((i, kind), &record) in scratch.kinds.iter_mut().enumerate().zip(truth) {
             *kind = match record.to_le_bytes()[2] {
                 _ if record == INERT => IS_INERT,
