@@ -4,7 +4,7 @@
 //! incoherences, while turning, on the spot, and with a million triangles? What do the other ways to find expired words cost, and how
 //! much memory does it hold? Data: terrain files named on the command line. Command:
 //!
-//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE [--clusters]] [--walking]
+//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE | --pace METRES] [--clusters] [--walking]
 //!
 //! All engines fly the same frames in the same process, one after the other, three times over; a frame's time is the least of its three, and figures are
 //! medians over the last two thirds of the frames. One thread. Prints Markdown. Keep runs under benches/runs/.
@@ -34,7 +34,7 @@ const PASSES: usize = 3;
 fn main() -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
-    let (mut path, mut frames, mut profile, mut only_walks) = (None, 1500, None, false);
+    let (mut path, mut frames, mut profile, mut pace, mut only_walks) = (None, 1500, None, None, false);
     let mut culling = Culling::Vertices;
     while let Some(word) = words.next() {
         match word.as_str() {
@@ -42,6 +42,7 @@ fn main() -> Result<(), Failure> {
             "--profile" => {
                 profile = Some(words.next().ok_or("--profile wants a percentage")?.parse::<f64>()?)
             }
+            "--pace" => pace = Some(words.next().ok_or("--pace wants metres a frame")?.parse::<f64>()?),
             "--clusters" => culling = Culling::Clusters,
             "--walking" => only_walks = true,
             _ => path = Some(PathBuf::from(word)),
@@ -55,23 +56,22 @@ fn main() -> Result<(), Failure> {
     };
     let terrain = Terrain::open(&path)?;
     with_records!(terrain.records()?, records => {
-        match profile {
-            Some(percent) => fly_only(&terrain, &records, frames, percent, culling),
-            None if only_walks => walking(&terrain, &records),
-            None => report(&terrain, &records, frames),
+        match (profile, pace) {
+            (Some(percent), _) => fly_only(&records, &straight(&terrain, frames, percent, 1.0)?.0, culling),
+            (None, Some(speed_m)) => fly_only(&records, &plain(&terrain, frames, speed_m, 0.0)?, culling),
+            _ if only_walks => walking(&terrain, &records),
+            _ => report(&terrain, &records, frames),
         }
     })
 }
 
 /// Flies with `kinetic` alone for a while, there and back again, for a profiler, and to compare two binaries: other programs lengthen a leg and never shorten it.
 fn fly_only<C: RecordCodec>(
-    terrain: &Terrain,
     records: &Records<'_, C>,
-    frames: u64,
-    percent: f64,
+    flight: &[FlightFrame],
     culling: Culling,
 ) -> Result<(), Failure> {
-    let mut views = views(&straight(terrain, frames, percent, 1.0)?.0, 1.0);
+    let mut views = views(flight, 1.0);
     let mut engine = Kinetic::new(records.clone(), culling);
     let start = Instant::now();
     let (mut tests, mut changes, mut legs) = (0u64, 0u64, Vec::new());

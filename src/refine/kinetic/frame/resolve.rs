@@ -8,6 +8,7 @@ use super::budget::Allowance;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::mesh::labels::level_of;
 use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
+use crate::refine::kinetic::mesh::tree::Fetch;
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::{Phase, Probe};
@@ -18,8 +19,8 @@ use terrasoar_layout::read::store::RecordStore;
 
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
-/// How many splits or merges ahead memory is asked for what: see [`Kinetic::fetch`].
-const FETCH_AHEAD: [(u32, usize); 3] = [(2, 6), (1, 4), (0, 2)];
+/// How many splits or merges ahead memory is asked for what.
+const FETCH_AHEAD: [(Fetch, usize); 3] = [(Fetch::Node, 6), (Fetch::Near, 4), (Fetch::Far, 2)];
 
 impl<S: RecordStore> Kinetic<S> {
     /// Tests what is due, as far as the budget allows.
@@ -104,7 +105,7 @@ impl<S: RecordStore> Kinetic<S> {
         let mut list = std::mem::take(&mut self.list);
         // From fine to coarse, so that children have merged before their parents.
         list.extend(self.to_merge.iter_mut().flat_map(|nodes| nodes.drain(..)));
-        self.in_order(&list, |engine, node| {
+        self.in_order(&list, Self::fetch_for_merge, |engine, node| {
             if engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == SPLIT {
                 engine.merge(node);
             }
@@ -119,7 +120,7 @@ impl<S: RecordStore> Kinetic<S> {
                 }
                 list.clear();
                 list.append(&mut self.to_split[level]);
-                let done = self.in_order(&list, |engine, node| {
+                let done = self.in_order(&list, Self::fetch_for_split, |engine, node| {
                     let wanted = engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == ACTIVE;
                     if !wanted {
                         return true;
@@ -153,11 +154,16 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Does something to each node until that says no, and asks memory for what comes after it meanwhile. Tells how many nodes it was done to.
     #[inline(always)]
-    fn in_order(&mut self, nodes: &[u32], mut each: impl FnMut(&mut Self, u32) -> bool) -> usize {
+    fn in_order(
+        &mut self,
+        nodes: &[u32],
+        fetch: impl Fn(&Self, u32, Fetch),
+        mut each: impl FnMut(&mut Self, u32) -> bool,
+    ) -> usize {
         for (i, node) in nodes.iter().enumerate() {
-            for (ahead, distance) in FETCH_AHEAD {
+            for (what, distance) in FETCH_AHEAD {
                 if let Some(later) = nodes.get(i + distance) {
-                    self.fetch(*later, ahead);
+                    fetch(self, *later, what);
                 }
             }
             if !each(self, *node) {
