@@ -9,13 +9,15 @@ use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::mesh::labels::level_of;
 use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
 use crate::refine::kinetic::mesh::tree::Fetch;
+use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch, Words};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::{Phase, Probe};
 #[cfg(feature = "files")]
 use rayon::prelude::*;
 use terrasoar_layout::grid::order::slot_of;
-use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::store::{RawOf, RecordStore};
 
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
@@ -44,52 +46,90 @@ impl<S: RecordStore> Kinetic<S> {
     /// Tests nodes and sorts out those that are to be split or merged. Fresh ones have their records read first; where a record is away
     /// the node waits for it.
     fn test<P: Probe>(&mut self, nodes: &[u32], fresh: bool, judge: &Judge, probe: &mut P) {
-        let k = self.records.grid().k();
         let mut verdicts = std::mem::take(&mut self.verdicts);
-        let verdict = |node: &u32| {
-            let node = self.nodes.get(*node);
-            let point = node.point;
-            let raw = if fresh { self.records.get(slot_of(k, point)) } else { Some(node.raw) };
-            let Some(raw) = raw else { return (node.raw, UNREAD) };
-            let vertex = self.records.decode(raw, level_of(point));
-            (raw, judge.word(&judge.metric().sight(self.records.grid().position_m(point), &vertex)))
-        };
+        self.work.tests += nodes.len() as u64;
         #[cfg(feature = "files")]
         let parallel = nodes.len() >= PARALLEL && rayon::current_num_threads() > 1;
         #[cfg(not(feature = "files"))]
         let parallel = false;
-        if parallel {
-            #[cfg(feature = "files")]
-            nodes.par_iter().with_min_len(PARALLEL / 8).map(verdict).collect_into_vec(&mut verdicts);
-        } else {
+        // By one thread, what has been tested is still at hand when it is entered.
+        for part in nodes.chunks(if parallel { nodes.len() } else { BATCH }) {
             verdicts.clear();
-            verdicts.extend(nodes.iter().map(verdict));
-        }
-        self.work.tests += nodes.len() as u64;
-        for (node, (raw, word)) in nodes.iter().zip(&verdicts) {
-            let record = self.nodes.get_mut(*node);
-            let (old, point) = (record.word, record.point);
-            if !S::IS_COMPLETE && *word == UNREAD {
-                record.word = UNREAD;
-                self.unread.push(*node);
-                continue;
+            verdicts.resize(part.len(), (S::Codec::INERT, UNREAD));
+            let batches = |part: &[u32], verdicts: &mut [(RawOf<S>, u32)]| {
+                for (nodes, verdicts) in part.chunks(BATCH).zip(verdicts.chunks_mut(BATCH)) {
+                    self.judge_batch(nodes, fresh, judge, verdicts);
+                }
+            };
+            if parallel {
+                #[cfg(feature = "files")]
+                part.par_chunks(PARALLEL / 8)
+                    .zip(verdicts.par_chunks_mut(PARALLEL / 8))
+                    .for_each(|(part, verdicts)| batches(part, verdicts));
+            } else {
+                batches(part, &mut verdicts);
             }
-            if fresh {
-                probe.read(slot_of(k, point));
-                record.raw = *raw;
-            } else if expiry_of(old) != 0 {
-                // Twice in the list: it had been late, then gone, then come back.
-                continue;
-            }
-            record.word = *word | (old & SPLIT);
-            self.enter(clock_of(*word), Entry { node: *node, word: *word });
-            match (*word & ACTIVE != 0, old & SPLIT != 0) {
-                (true, false) => self.to_split[level_of(point) as usize].push(*node),
-                (false, true) => self.to_merge[level_of(point) as usize].push(*node),
-                _ => {}
+            for (node, (raw, word)) in part.iter().zip(&verdicts) {
+                self.take_verdict(*node, fresh, *raw, *word, probe);
             }
         }
         self.verdicts = verdicts;
+    }
+
+    /// Makes the words of up to [`BATCH`] nodes, and gives them with the nodes' records. [`UNREAD`] where those are away.
+    #[inline(always)]
+    fn judge_batch(&self, nodes: &[u32], fresh: bool, judge: &Judge, verdicts: &mut [(RawOf<S>, u32)]) {
+        let k = self.records.grid().k();
+        let mut batch = Batch::default();
+        let together = judge.makes_batches();
+        for (i, (node, verdict)) in nodes.iter().zip(verdicts.iter_mut()).enumerate() {
+            let node = self.nodes.get(*node);
+            let raw = if fresh { self.records.get(slot_of(k, node.point)) } else { Some(node.raw) };
+            let Some(raw) = raw else { continue };
+            let vertex = self.records.decode(raw, level_of(node.point));
+            let at_m = self.records.grid().position_m(node.point);
+            *verdict = (raw, 0);
+            if together {
+                batch.set(i, at_m, &vertex);
+            } else {
+                verdict.1 = judge.word(&judge.metric().sight(at_m, &vertex));
+            }
+        }
+        if together {
+            let mut words = Words::default();
+            judge.words(&batch, nodes.len(), &mut words);
+            for ((_, verdict), word) in verdicts.iter_mut().zip(words.as_flattened()) {
+                if S::IS_COMPLETE || *verdict != UNREAD {
+                    *verdict = *word;
+                }
+            }
+        }
+    }
+
+    /// Enters a node's new word, and lists the node if it is to be split or merged.
+    #[inline(always)]
+    fn take_verdict<P: Probe>(&mut self, node: u32, fresh: bool, raw: RawOf<S>, word: u32, probe: &mut P) {
+        let record = self.nodes.get_mut(node);
+        let (old, point) = (record.word, record.point);
+        if !S::IS_COMPLETE && word == UNREAD {
+            record.word = UNREAD;
+            self.unread.push(node);
+            return;
+        }
+        if fresh {
+            probe.read(slot_of(self.records.grid().k(), point));
+            record.raw = raw;
+        } else if expiry_of(old) != 0 {
+            // Twice in the list: it had been late, then gone, then come back.
+            return;
+        }
+        record.word = word | (old & SPLIT);
+        self.enter(clock_of(word), Entry { node, word });
+        match (word & ACTIVE != 0, old & SPLIT != 0) {
+            (true, false) => self.to_split[level_of(point) as usize].push(node),
+            (false, true) => self.to_merge[level_of(point) as usize].push(node),
+            _ => {}
+        }
     }
 
     /// Tests the children that splits have made.

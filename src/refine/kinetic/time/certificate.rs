@@ -26,10 +26,12 @@
 //!
 //! Where a course has no direction, L = m(0). Everything is rounded towards a shorter life. Cost: two square roots a vertex, and one a plane while turning.
 
-use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, band_of, clock_id};
+use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, band_of, clock_id, power_of_two};
 use super::course::Course;
 use super::ring;
 use crate::metric::{Metric, PLANES, Sighting};
+use crate::view::ErrorMetric;
+use batch::Way;
 use glam::DVec3;
 
 /// Status bit: the vertex is selected and not culled.
@@ -78,6 +80,7 @@ pub(crate) struct Judge {
     now: [u32; CLOCKS],
     ticks_per_m: f64,
     bands_per_m: f64,
+    way: Way,
 }
 
 /// What a margin rests on.
@@ -99,6 +102,8 @@ impl Judge {
         let slopes = normals.map(|n| n.dot(direction));
         let moves = direction != DVec3::ZERO;
         let share = |falls: f64| if moves { rate / rate.max(falls) } else { 1.0 };
+        // What turns about planes, or is seen along the line of sight, is tested one by one.
+        let is_plain = metric.kind() == ErrorMetric::Ball && !(axis != DVec3::ZERO && culls);
         Self {
             culls,
             course,
@@ -117,6 +122,7 @@ impl Judge {
             now: clocks.all_now(),
             ticks_per_m: clocks.ticks_per_m(),
             bands_per_m: clocks.bands_per_m(),
+            way: if is_plain { Way::best() } else { Way::Single },
             metric,
         }
     }
@@ -136,10 +142,17 @@ impl Judge {
     #[inline(always)]
     pub(crate) fn word(&self, sighting: &Sighting) -> u32 {
         let life = self.life(sighting);
+        let word = self.word_of_life(sighting, life, self.turns && !self.moves);
+        word + self.now[clock_of(word)]
+    }
+
+    /// The word of a life, its expiry counted from now. `on_spot` is whether the view turns about an eye that stays.
+    #[inline(always)]
+    fn word_of_life(&self, sighting: &Sighting, life: Life, on_spot: bool) -> u32 {
         let margin_m = life.margin_m - sighting.guard_m();
         let band = band_of(life.scale_m * self.bands_per_m);
-        let band_m = f64::from(1u32 << band) / self.bands_per_m;
-        let margin_m = if self.turns && !self.moves && life.kind == Kind::Planes {
+        let band_m = power_of_two(band) / self.bands_per_m;
+        let margin_m = if on_spot && life.kind == Kind::Planes {
             margin_m.min(self.turning_margin_m(sighting, &life, band_m))
         } else {
             margin_m
@@ -147,30 +160,36 @@ impl Judge {
         // Beyond half a band zooming would no longer be bounded by its first order.
         let margin_m = if band < BANDS - 1 { margin_m.min(0.5 * band_m) } else { margin_m };
         let clock = clock_id(self.course, life.kind, band);
-        // Negative and NaN margins saturate to 0.
-        let ticks = ((margin_m * self.ticks_per_m) as u32).min(HORIZON);
-        u32::from(life.active) << 31 | (clock as u32) << CLOCK_SHIFT | (self.now[clock] + ticks)
+        u32::from(life.active) << 31 | (clock as u32) << CLOCK_SHIFT | ticks(margin_m * self.ticks_per_m)
     }
 
     #[inline(always)]
     fn life(&self, sighting: &Sighting) -> Life {
-        let distance_m = sighting.distance_m();
-        let reach_m = sighting.reach_m();
-        let selected = sighting.is_selected();
-        if self.turn_per_m > 0.0 && selected && self.culls {
-            return self.turning_life(sighting, distance_m, reach_m);
+        if self.turn_per_m > 0.0 && sighting.is_selected() && self.culls {
+            return self.turning_life(sighting);
         }
-        let (margin_m, scale_m) = if sighting.ring_m() == 0.0 {
-            let margin_m = self.error_margin_m(sighting, selected, distance_m, reach_m);
-            (margin_m, if selected { reach_m } else { distance_m })
-        } else {
-            // Near the axis of the ring an error may grow beyond the distance before it shows.
-            (
-                ring::margin_m(sighting, self.moves.then_some(self.direction), self.rate),
-                distance_m.max(reach_m),
-            )
-        };
-        if !self.culls {
+        if sighting.ring_m() == 0.0 {
+            return self.ball_life(sighting, self.moves, self.culls);
+        }
+        // Near the axis of the ring an error may grow beyond the distance before it shows.
+        let margin_m = ring::margin_m(sighting, self.moves.then_some(self.direction), self.rate);
+        let scale_m = sighting.distance_m().max(sighting.reach_m());
+        self.weigh(sighting, margin_m, scale_m, self.moves, self.culls)
+    }
+
+    /// The life of a vertex whose errors show alike from everywhere, on a course that does not turn.
+    #[inline(always)]
+    fn ball_life(&self, sighting: &Sighting, moves: bool, culls: bool) -> Life {
+        let margin_m = self.error_margin_m(sighting, moves);
+        let scale_m = if sighting.is_selected() { sighting.reach_m() } else { sighting.distance_m() };
+        self.weigh(sighting, margin_m, scale_m, moves, culls)
+    }
+
+    /// The life of a vertex with that margin of the error test, planes included if it `culls`.
+    #[inline(always)]
+    fn weigh(&self, sighting: &Sighting, margin_m: f64, scale_m: f64, moves: bool, culls: bool) -> Life {
+        let selected = sighting.is_selected();
+        if !culls {
             return Life { active: selected, kind: Kind::Error, margin_m, scale_m };
         }
         let radius_m = sighting.radius_m();
@@ -185,8 +204,8 @@ impl Judge {
         let culled = outside_m > 0.0;
         let planes_m = if culled { outside_m } else { margin_m.min(inside_m) };
         // While the eye moves on by what the margin allows, turning acts on a longer arm.
-        let arm_m = if self.moves { planes_m / self.rate } else { 0.0 };
-        let arm_m = if culled { distance_m } else { reach_m } + arm_m;
+        let arm_m = if moves { planes_m / self.rate } else { 0.0 };
+        let arm_m = if culled { sighting.distance_m() } else { sighting.reach_m() } + arm_m;
         Life {
             active: selected & !culled,
             kind: if selected { Kind::Planes } else { Kind::Error },
@@ -216,7 +235,8 @@ impl Judge {
 
     /// The life of a selected vertex on a course that goes along and turns.
     #[inline(never)]
-    fn turning_life(&self, sighting: &Sighting, distance_m: f64, reach_m: f64) -> Life {
+    fn turning_life(&self, sighting: &Sighting) -> Life {
+        let (distance_m, reach_m) = (sighting.distance_m(), sighting.reach_m());
         let arm_m = self.arm_m(sighting);
         let bend = self.turn_per_m * (arm_m * self.turn_per_m + 2.0);
         let mut margins_m = [0.0; PLANES];
@@ -244,7 +264,7 @@ impl Judge {
             (ways_m.iter().copied().fold(chord_m.min(longest_m), f64::min), inside_m)
         };
         let scale_m = nearest + way_m;
-        let band_m = f64::from(1u32 << band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
+        let band_m = power_of_two(band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
         let counted_per_m = self.rate * (1.0 + band_m * self.turn_per_m);
         let margin_m = if culled {
             // Each plane may vouch by itself.
@@ -275,11 +295,12 @@ impl Judge {
 
     /// The margin of the error test. Written without branches, because no processor can predict the answer.
     #[inline(always)]
-    fn error_margin_m(&self, sighting: &Sighting, selected: bool, distance_m: f64, reach_m: f64) -> f64 {
-        let rate = self.rate;
+    fn error_margin_m(&self, sighting: &Sighting, moves: bool) -> f64 {
+        let (distance_m, reach_m) = (sighting.distance_m(), sighting.reach_m());
+        let (rate, selected) = (self.rate, sighting.is_selected());
         let across2 = 1.0 - rate * rate;
         let now_m = (reach_m - distance_m).abs();
-        if !self.moves {
+        if !moves {
             return now_m;
         }
         // Way along the course to the foot of the vertex, and squares of the distances.
@@ -301,6 +322,14 @@ impl Judge {
     }
 }
 
+/// Whole ticks of a life, no more than [`HORIZON`]: rounded down, and of some whole numbers one less. Negative lives become 0, and so does what is no number.
+#[inline(always)]
+fn ticks(life: f64) -> u32 {
+    // From here on numbers are as far apart as whole ones. No other conversion becomes a vector instruction.
+    const WHOLE: f64 = (1u64 << 52) as f64;
+    (life.max(0.5).min(f64::from(HORIZON)) - 0.5 + WHOLE).to_bits() as u32
+}
+
 #[inline(always)]
 fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
     a * x + b * y + c * z
@@ -313,5 +342,6 @@ fn used_up_at(margin: f64, slope: f64, bend: f64) -> f64 {
     if slope > 0.0 { 2.0 * margin / (slope + root) } else { (root - slope) / bend }
 }
 
+pub(crate) mod batch;
 #[cfg(test)]
 mod tests;

@@ -126,14 +126,17 @@ impl Queue {
                 return;
             }
         }
-        let mut entries = [Entry::default(); CHUNK_ENTRIES];
-        entries[0] = entry;
-        let fresh = Chunk { next: *head, used: 1, entries };
         if self.free == NONE {
-            *head = self.chunks.push(fresh) as u32;
+            let mut entries = [Entry::default(); CHUNK_ENTRIES];
+            entries[0] = entry;
+            *head = self.chunks.push(Chunk { next: *head, used: 1, entries }) as u32;
         } else {
-            *head = self.free;
-            self.free = std::mem::replace(&mut self.chunks[*head as usize], fresh).next;
+            // Its other entries stay as they are.
+            let chunk = &mut self.chunks[self.free as usize];
+            let next = std::mem::replace(&mut chunk.next, *head);
+            chunk.used = 1;
+            chunk.entries[0] = entry;
+            *head = std::mem::replace(&mut self.free, next);
         }
     }
 
@@ -184,7 +187,7 @@ impl Queue {
         for level in 0..LEVELS {
             let (over, same_turn) = over(wheel.now, now, level);
             let occupied = wheel.occupied[level];
-            if occupied != 0 {
+            if occupied & over != 0 {
                 let share = u64::from((occupied & over).count_ones()) * u64::from(wheel.counts[level]);
                 count += (share / u64::from(occupied.count_ones())) as usize;
             }
