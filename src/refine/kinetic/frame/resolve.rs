@@ -21,6 +21,8 @@ use terrasoar_layout::read::store::{RawOf, RecordStore};
 
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
+/// How many words ahead memory is asked for their places in the queue.
+const ENTER_AHEAD: usize = 6;
 /// How many splits or merges ahead memory is asked for what.
 const FETCH_AHEAD: [(Fetch, usize); 3] = [(Fetch::Node, 6), (Fetch::Near, 4), (Fetch::Far, 2)];
 
@@ -69,7 +71,10 @@ impl<S: RecordStore> Kinetic<S> {
             } else {
                 batches(part, &mut verdicts);
             }
-            for (node, (raw, word)) in part.iter().zip(&verdicts) {
+            for (i, (node, (raw, word))) in part.iter().zip(&verdicts).enumerate() {
+                if let Some((_, later)) = verdicts.get(i + ENTER_AHEAD) {
+                    self.queue.prefetch(clock_of(*later), *later);
+                }
                 self.take_verdict(*node, fresh, *raw, *word, probe);
             }
         }

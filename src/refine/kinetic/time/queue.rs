@@ -11,6 +11,7 @@
 use super::clocks::{CLOCKS, EXPIRY_BITS};
 use crate::refine::kinetic::capacity::give_up;
 use crate::refine::kinetic::chunked::Chunked;
+use terrasoar_layout::read::prefetch::prefetch;
 
 /// Bits of a digit.
 const DIGIT: u32 = 6;
@@ -44,15 +45,27 @@ struct Chunk {
     entries: [Entry; CHUNK_ENTRIES],
 }
 
-/// The wheel of one clock.
+/// The wheel of one clock. All but its heads is one cache line.
 #[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
 struct Wheel {
-    now: u32,
     /// Bit s of level l: slot s holds something.
     occupied: [u64; LEVELS],
     /// Entries of a level.
     counts: [u32; LEVELS],
+    now: u32,
     heads: [[u32; SLOTS]; LEVELS],
+}
+
+impl Wheel {
+    /// Level and slot of what is over at `expiry`.
+    #[inline(always)]
+    fn place(&self, expiry: u32) -> (usize, usize) {
+        let expiry = expiry.max(self.now);
+        let differing = expiry ^ self.now;
+        let level = (31 - (differing | 1).leading_zeros()) / DIGIT;
+        ((level as usize).min(LEVELS - 1), (expiry >> (level * DIGIT)) as usize % SLOTS)
+    }
 }
 
 const EMPTY: Wheel =
@@ -105,16 +118,20 @@ impl Queue {
             + self.moving.capacity() * size_of::<Entry>()
     }
 
+    /// Asks memory for what entering a word on clock `clock` will write to.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, clock: usize, word: u32) {
+        let wheel = &self.wheels[clock];
+        let (level, slot) = wheel.place(word & ((1 << EXPIRY_BITS) - 1));
+        self.chunks.prefetch(wheel.heads[level][slot] as usize);
+    }
+
     /// Enters a node under its word's expiry on clock `clock`.
     #[inline]
     pub(crate) fn enter(&mut self, clock: usize, entry: Entry) {
         self.entries += 1;
         let wheel = &mut self.wheels[clock];
-        let expiry = entry.expiry().max(wheel.now);
-        let differing = expiry ^ wheel.now;
-        let level = (31 - (differing | 1).leading_zeros()) / DIGIT;
-        let slot = (expiry >> (level * DIGIT)) as usize % SLOTS;
-        let level = (level as usize).min(LEVELS - 1);
+        let (level, slot) = wheel.place(entry.expiry());
         wheel.occupied[level] |= 1 << slot;
         wheel.counts[level] += 1;
         let head = &mut wheel.heads[level][slot];
@@ -157,12 +174,6 @@ impl Queue {
             let (over, same_turn) = over(then, now, level);
             let digit = (now >> (level as u32 * DIGIT)) % SLOTS as u32;
             let mut slots = self.wheels[clock].occupied[level] & over;
-            let mut heads = slots;
-            while heads != 0 {
-                self.chunks
-                    .prefetch(self.wheels[clock].heads[level][heads.trailing_zeros() as usize] as usize);
-                heads &= heads - 1;
-            }
             while slots != 0 {
                 self.take_slot(clock, level, slots.trailing_zeros() as usize, &mut due);
                 slots &= slots - 1;
@@ -171,6 +182,29 @@ impl Queue {
                 if level > 0 && self.wheels[clock].occupied[level] >> digit & 1 == 1 {
                     self.spread(clock, level, digit as usize, &mut due);
                 }
+                return;
+            }
+        }
+    }
+
+    /// Asks memory for what [`Queue::advance`] will look at: for the heads of slots, then, those having come, for what the heads name.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, clock: usize, now: u64, heads: bool) {
+        let wheel = &self.wheels[clock];
+        let now = now as u32;
+        for level in 0..LEVELS {
+            let (over, same_turn) = over(wheel.now, now, level);
+            // The slot that the tick is in, too: what it holds moves to lower levels.
+            let digit = 1 << ((now >> (level as u32 * DIGIT)) % SLOTS as u32);
+            let mut slots = wheel.occupied[level] & (over | digit);
+            if heads && slots != 0 {
+                prefetch(&wheel.heads[level], slots.trailing_zeros() as usize);
+            }
+            while !heads && slots != 0 {
+                self.chunks.prefetch(wheel.heads[level][slots.trailing_zeros() as usize] as usize);
+                slots &= slots - 1;
+            }
+            if same_turn {
                 return;
             }
         }
