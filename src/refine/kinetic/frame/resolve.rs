@@ -49,6 +49,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// the node waits for it.
     fn test<P: Probe>(&mut self, nodes: &[u32], fresh: bool, judge: &Judge, probe: &mut P) {
         let mut verdicts = std::mem::take(&mut self.verdicts);
+        let mut batch = self.batch.take().unwrap_or_default();
         self.work.tests += nodes.len() as u64;
         #[cfg(feature = "files")]
         let parallel = nodes.len() >= PARALLEL && rayon::current_num_threads() > 1;
@@ -58,18 +59,18 @@ impl<S: RecordStore> Kinetic<S> {
         for part in nodes.chunks(if parallel { nodes.len() } else { BATCH }) {
             verdicts.clear();
             verdicts.resize(part.len(), (S::Codec::INERT, UNREAD));
-            let batches = |part: &[u32], verdicts: &mut [(RawOf<S>, u32)]| {
+            let batches = |batch: &mut Batch, part: &[u32], verdicts: &mut [(RawOf<S>, u32)]| {
                 for (nodes, verdicts) in part.chunks(BATCH).zip(verdicts.chunks_mut(BATCH)) {
-                    self.judge_batch(nodes, fresh, judge, verdicts);
+                    self.judge_batch(batch, nodes, fresh, judge, verdicts);
                 }
             };
             if parallel {
                 #[cfg(feature = "files")]
                 part.par_chunks(PARALLEL / 8)
                     .zip(verdicts.par_chunks_mut(PARALLEL / 8))
-                    .for_each(|(part, verdicts)| batches(part, verdicts));
+                    .for_each(|(part, verdicts)| batches(&mut Batch::default(), part, verdicts));
             } else {
-                batches(part, &mut verdicts);
+                batches(&mut batch, part, &mut verdicts);
             }
             for (i, (node, (raw, word))) in part.iter().zip(&verdicts).enumerate() {
                 if let Some((_, later)) = verdicts.get(i + ENTER_AHEAD) {
@@ -78,14 +79,20 @@ impl<S: RecordStore> Kinetic<S> {
                 self.take_verdict(*node, fresh, *raw, *word, probe);
             }
         }
-        self.verdicts = verdicts;
+        (self.verdicts, self.batch) = (verdicts, Some(batch));
     }
 
     /// Makes the words of up to [`BATCH`] nodes, and gives them with the nodes' records. [`UNREAD`] where those are away.
     #[inline(always)]
-    fn judge_batch(&self, nodes: &[u32], fresh: bool, judge: &Judge, verdicts: &mut [(RawOf<S>, u32)]) {
+    fn judge_batch(
+        &self,
+        batch: &mut Batch,
+        nodes: &[u32],
+        fresh: bool,
+        judge: &Judge,
+        verdicts: &mut [(RawOf<S>, u32)],
+    ) {
         let k = self.records.grid().k();
-        let mut batch = Batch::default();
         let together = judge.makes_batches();
         for (i, (node, verdict)) in nodes.iter().zip(verdicts.iter_mut()).enumerate() {
             let node = self.nodes.get(*node);
@@ -102,7 +109,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         if together {
             let mut words = Words::default();
-            judge.words(&batch, nodes.len(), &mut words);
+            judge.words(batch, nodes.len(), &mut words);
             for ((_, verdict), word) in verdicts.iter_mut().zip(words.as_flattened()) {
                 if S::IS_COMPLETE || *verdict != UNREAD {
                     *verdict = *word;

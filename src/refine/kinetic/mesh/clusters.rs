@@ -8,6 +8,7 @@
 
 use super::bounds::{Bounds, BoundsColumns};
 use crate::metric::{BoxPlane, PLANES};
+use crate::refine::kinetic::capacity::settle;
 use std::ops::Range;
 
 /// Nodes of a cluster.
@@ -15,7 +16,7 @@ pub(crate) const CLUSTER: usize = 128;
 /// No cluster.
 const NONE: u32 = u32::MAX;
 
-/// A cache line. Whether it is full, empty or written stands beside the bits, because a processor waits where many bytes are read at once that were written one by one.
+/// A cache line. How many places are taken stands beside the bits, because a processor waits where many bytes are read at once that were written one by one.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 struct Cluster {
@@ -29,8 +30,6 @@ struct Cluster {
     use_count: u32,
     /// Places taken.
     used: u16,
-    /// Whether a slot has changed.
-    is_written: bool,
 }
 
 impl Cluster {
@@ -40,6 +39,11 @@ impl Cluster {
 
     fn is_empty(&self) -> bool {
         self.used == 0
+    }
+
+    /// Whether a slot has changed.
+    fn is_written(&self) -> bool {
+        self.written != [0; 4]
     }
 }
 
@@ -63,7 +67,7 @@ pub(crate) struct Clusters {
     first_open: usize,
     /// Near: empty clusters. May hold others as well.
     empty: Vec<u32>,
-    /// Clusters with slots that have changed.
+    /// Slots that have changed, each once.
     written: Vec<u32>,
     /// Clusters that are not there, of whose slots receivers of patches still have what a mesh before this one showed.
     stale: Range<usize>,
@@ -176,16 +180,10 @@ impl Clusters {
         let written = if is_stale { [u64::MAX; 4] } else { [0; 4] };
         if is_stale {
             self.stale.start = cluster + 1;
-            self.written.push(cluster as u32);
+            let slots = 2 * CLUSTER;
+            self.written.extend((cluster * slots) as u32..((cluster + 1) * slots) as u32);
         }
-        self.clusters.push(Cluster {
-            taken: [0; 2],
-            written,
-            spill: (NONE, 0),
-            use_count: 0,
-            used: 0,
-            is_written: is_stale,
-        });
+        self.clusters.push(Cluster { taken: [0; 2], written, spill: (NONE, 0), use_count: 0, used: 0 });
         self.bounds.push_empty();
         self.open.resize(cluster / 64 + 1, 0);
         self.open[cluster / 64] |= 1 << (cluster % 64);
@@ -223,7 +221,7 @@ impl Clusters {
                 u64::MAX.checked_shr(64 - taken.saturating_sub(from).min(64) as u32).unwrap_or(0)
             });
             filled.used = taken as u16;
-            (filled.written, filled.is_written) = ([0; 4], false);
+            filled.written = [0; 4];
             if filled.is_full() {
                 self.open[cluster / 64] &= !(1 << (cluster % 64));
             }
@@ -257,7 +255,7 @@ impl Clusters {
     /// Gives up empty clusters at the end whose slots have been told; whether there were any.
     pub(crate) fn give_up_empty_end(&mut self) -> bool {
         let before = self.clusters.len();
-        while self.clusters.last().is_some_and(|cluster| cluster.is_empty() && !cluster.is_written) {
+        while self.clusters.last().is_some_and(|cluster| cluster.is_empty() && !cluster.is_written()) {
             self.clusters.pop();
             self.bounds.pop();
             let cluster = self.clusters.len();
@@ -270,29 +268,26 @@ impl Clusters {
     /// Notes that the slot of a place's side shows something else now.
     #[inline(always)]
     pub(crate) fn touch(&mut self, place: u32, side: usize) {
-        let index = place as usize / CLUSTER;
-        let cluster = &mut self.clusters[index];
-        if !cluster.is_written {
-            cluster.is_written = true;
-            self.written.push(index as u32);
+        let slot = 2 * place + side as u32;
+        let word = &mut self.clusters[place as usize / CLUSTER].written[slot as usize / 64 % 4];
+        if *word >> (slot % 64) & 1 == 0 {
+            *word |= 1 << (slot % 64);
+            self.written.push(slot);
         }
-        let slot = 2 * (place as usize % CLUSTER) + side;
-        cluster.written[slot / 64] |= 1 << (slot % 64);
     }
 
-    /// Hands out the slots that have changed, as places and sides, cluster by cluster in order.
+    /// Hands out the slots that have changed, as places and sides, in the order in which they changed first.
     pub(crate) fn take_written(&mut self, mut each: impl FnMut(u32, usize)) {
-        for index in self.written.drain(..) {
-            let cluster = &mut self.clusters[index as usize];
-            cluster.is_written = false;
-            for (word, written) in cluster.written.iter_mut().enumerate() {
-                while *written != 0 {
-                    let slot = (2 * CLUSTER * index as usize + 64 * word) as u32 + written.trailing_zeros();
-                    *written &= *written - 1;
-                    each(slot / 2, slot as usize % 2);
-                }
-            }
+        for slot in self.written.drain(..) {
+            // All others of the word are in the list as well.
+            self.clusters[slot as usize / (2 * CLUSTER)].written[slot as usize / 64 % 4] = 0;
+            each(slot / 2, slot as usize % 2);
         }
+    }
+
+    /// Gives memory back that a frame which changed `used` slots has no need of.
+    pub(crate) fn settle(&mut self, used: usize) {
+        settle(&mut self.written, used);
     }
 
     /// How places are dealt out.

@@ -179,8 +179,10 @@ impl<R: Copy> Nodes<R> {
     pub(crate) fn sides(&self, node: u32, level: u32) -> [Option<Side>; 2] {
         let parents = self.get(node).parents;
         let side = |side: usize| {
-            let first = first_child(self.label(node, side), level);
-            (parents[side] != NONE).then_some(Side { parent: parents[side], first, last: (first + 3) & 3 })
+            let label = self.label(node, side);
+            let first = first_child(label, level);
+            let last = (first + 3) & 3;
+            (parents[side] != NONE).then_some(Side { parent: parents[side], label, first, last })
         };
         [side(0), side(1)]
     }
@@ -226,6 +228,8 @@ pub(crate) fn half<R>(node: &Node<R>, side: usize) -> [u32; 4] {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Side {
     pub parent: u32,
+    /// The node's label at that parent.
+    pub label: usize,
     /// Between parent and edge end p, counter-clockwise: child triangle (v; parent, p).
     pub first: usize,
     /// Between edge end q and parent: child triangle (v; q, parent).

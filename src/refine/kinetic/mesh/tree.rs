@@ -169,9 +169,8 @@ impl<S: RecordStore> Kinetic<S> {
         corners: [u32; 3],
     ) {
         // The neighbour around the parent that shares the child.
-        let own = self.nodes.label(node, usize::from(self.nodes.get(node).parents[1] == side.parent));
         let turn = if label == side.first { 3 } else { 1 };
-        let neighbour = self.nodes.get(side.parent).body[(own + turn) & 3];
+        let neighbour = self.nodes.get(side.parent).body[(side.label + turn) & 3];
         let shared = if neighbour != NONE && self.nodes.is_split(neighbour) {
             self.nodes.get(neighbour).body[(label + 2) & 3]
         } else {
