@@ -7,7 +7,7 @@
 
 use super::Judge;
 #[cfg(target_arch = "x86_64")]
-use super::clock_of;
+use super::{Motion, clock_of};
 use terrasoar_layout::grid::record::Vertex;
 
 /// Vertices that are tested together.
@@ -134,34 +134,113 @@ fn words_avx512(judge: &Judge, blocks: &[Block], words: &mut [[u32; LANES]]) {
     words_together(judge, blocks, words);
 }
 
+/// A loop for each motion, in which all else is without branches.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn words_together(judge: &Judge, blocks: &[Block], words: &mut [[u32; LANES]]) {
-    match (judge.moves, judge.culls) {
-        (false, false) => words_of::<false, false>(judge, blocks, words),
-        (false, true) => words_of::<false, true>(judge, blocks, words),
-        (true, false) => words_of::<true, false>(judge, blocks, words),
-        (true, true) => words_of::<true, true>(judge, blocks, words),
+    match (judge.motion(), judge.culls) {
+        (Motion::None, false) => words_of(judge, blocks, words, Motion::None, false),
+        (Motion::None, true) => words_of(judge, blocks, words, Motion::None, true),
+        (Motion::Way, false) => words_of(judge, blocks, words, Motion::Way, false),
+        (Motion::Way, true) => words_of(judge, blocks, words, Motion::Way, true),
+        (Motion::Turn, _) => words_of(judge, blocks, words, Motion::Turn, true),
+        (Motion::Bend, _) => words_of(judge, blocks, words, Motion::Bend, true),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn words_of<const MOVES: bool, const CULLS: bool>(
-    judge: &Judge,
-    blocks: &[Block],
-    words: &mut [[u32; LANES]],
-) {
+fn words_of(judge: &Judge, blocks: &[Block], words: &mut [[u32; LANES]], motion: Motion, culls: bool) {
     for (block, words) in blocks.iter().zip(words) {
         for i in 0..LANES {
             let at_m = [block.east_m[i], block.north_m[i]];
             let sighting =
                 judge.metric.sight_ball(at_m, block.height_m[i], block.error_m[i], block.radius_m[i]);
-            let life = judge.ball_life(&sighting, MOVES, CULLS);
-            words[i] = judge.word_of_life(&sighting, life, false);
+            let life = judge.ball_life(&sighting, motion, culls);
+            words[i] = judge.word_of_life(&sighting, life, motion);
         }
         for word in words {
             *word += judge.now[clock_of(*word)];
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::clocks::Clocks;
+    use super::super::super::course::{Course, Pose, RATE, STEADY_RATE};
+    use super::super::ACTIVE;
+    use super::*;
+    use crate::metric::Metric;
+    use crate::view::View;
+    use glam::DVec3;
+    use terrasoar_layout::grid::record::VertexClass;
+
+    /// Every way that this processor has, against one word after another: every bit, on all motions, near the borders of both tests too.
+    #[test]
+    fn words_are_the_same_whichever_way_they_are_made() {
+        let mut random = 1u64;
+        let mut next = |below: f64| {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (random >> 11) as f64 / (1u64 << 53) as f64 * below
+        };
+        let mut made = std::collections::BTreeMap::new();
+        for round in 0..2000 {
+            let view = View::new([next(7000.0), next(7000.0), next(2000.0)], next(360.0), 20.0 - next(90.0))
+                .exaggeration([1.0, 0.3, 2.5][round % 3]);
+            let metric = Metric::new(&view);
+            let mut clocks = Clocks::new([10.0, 0.3, 90.0][round % 5 % 3], 3000.0);
+            clocks.move_to(Pose {
+                eye_m: view.eye_m,
+                axes: view.axes(),
+                normals: metric.normals().map(DVec3::from_array),
+                nu: metric.nu(),
+                exaggeration: metric.exaggeration(),
+                metric: metric.kind(),
+            });
+            let mut unit = || DVec3::new(next(2.0) - 1.0, next(2.0) - 1.0, next(2.0) - 1.0).normalize();
+            let (along, about) = (unit(), unit());
+            let (moves, turns) = (round % 4 > 1, round % 2 > 0);
+            let course = Course {
+                direction: if moves { along } else { DVec3::ZERO },
+                axis: if turns { about } else { DVec3::ZERO },
+                turn_per_m: if moves && turns { next(0.01) + 1e-9 } else { 0.0 },
+                rate: if turns { RATE } else { STEADY_RATE },
+            };
+            clocks.take_course(1 + round % 3, course);
+            let judge = Judge::new(metric, &clocks, round % 7 > 0);
+            let count = 1 + round % BATCH;
+            let (mut batch, mut single) = (Batch::default(), Vec::new());
+            for i in 0..count {
+                let at_m = [view.eye_m.x + next(8000.0) - 4000.0, view.eye_m.y + next(8000.0) - 4000.0];
+                let mut vertex = Vertex {
+                    height_m: next(1000.0),
+                    error_m: [next(20.0), 0.0, f64::INFINITY][next(2.05) as usize],
+                    radius_m: [next(500.0), 0.0][next(1.2) as usize],
+                    class: VertexClass::Plain,
+                };
+                if i % 4 == 0 {
+                    // It reaches about as far as it lies.
+                    vertex.error_m = 0.0;
+                    vertex.radius_m =
+                        judge.metric.sight(at_m, &vertex).distance_m() / view.vertical_exaggeration.max(1.0);
+                }
+                batch.set(i, at_m, &vertex);
+                single.push(judge.word(&judge.metric.sight(at_m, &vertex)));
+            }
+            for way in Way::all().filter(|way| *way != Way::Single) {
+                let judge = Judge { way, ..judge.clone() };
+                assert!(judge.makes_batches());
+                let mut words = [[u32::MAX; LANES]; BATCH / LANES];
+                judge.words(&batch, count, &mut words);
+                assert_eq!(words.as_flattened()[..count], single, "{way:?}, round {round}");
+            }
+            for word in single {
+                // Motion, kind of the clock, and status.
+                *made.entry((round % 4, clock_of(word) / 16 % 2, word & ACTIVE)).or_insert(0) += 1;
+            }
+        }
+        // Unselected; selected and in view; selected and culled.
+        assert!(made.len() >= 4 * 3 && made.values().all(|n| *n > 100), "all kinds are met: {made:?}");
     }
 }
