@@ -4,7 +4,7 @@
 //! incoherences, while turning, on the spot, and with a million triangles? What do the other ways to find expired words cost, and how
 //! much memory does it hold? Data: terrain files named on the command line. Command:
 //!
-//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE | --pace METRES] [--clusters] [--walking]
+//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE | --pace METRES [--turn DEGREES]] [--clusters] [--walking]
 //!
 //! All engines fly the same frames in the same process, one after the other, three times over; a frame's time is the least of its three, and figures are
 //! medians over the last two thirds of the frames. One thread. Prints Markdown. Keep runs under benches/runs/.
@@ -35,6 +35,7 @@ fn main() -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
     let (mut path, mut frames, mut profile, mut pace, mut only_walks) = (None, 1500, None, None, false);
+    let mut turn_deg = 0.0;
     let mut culling = Culling::Vertices;
     while let Some(word) = words.next() {
         match word.as_str() {
@@ -43,6 +44,7 @@ fn main() -> Result<(), Failure> {
                 profile = Some(words.next().ok_or("--profile wants a percentage")?.parse::<f64>()?)
             }
             "--pace" => pace = Some(words.next().ok_or("--pace wants metres a frame")?.parse::<f64>()?),
+            "--turn" => turn_deg = words.next().ok_or("--turn wants degrees a frame")?.parse::<f64>()?,
             "--clusters" => culling = Culling::Clusters,
             "--walking" => only_walks = true,
             _ => path = Some(PathBuf::from(word)),
@@ -58,7 +60,7 @@ fn main() -> Result<(), Failure> {
     with_records!(terrain.records()?, records => {
         match (profile, pace) {
             (Some(percent), _) => fly_only(&records, &straight(&terrain, frames, percent, 1.0)?.0, culling),
-            (None, Some(speed_m)) => fly_only(&records, &plain(&terrain, frames, speed_m, 0.0)?, culling),
+            (None, Some(speed_m)) => fly_only(&records, &plain(&terrain, frames, speed_m, turn_deg)?, culling),
             _ if only_walks => walking(&terrain, &records),
             _ => report(&terrain, &records, frames),
         }

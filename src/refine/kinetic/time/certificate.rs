@@ -203,7 +203,13 @@ impl Judge {
         }
         let now_m = reach_m - sighting.distance_m();
         let bending = self.bending_life(sighting, now_m, self.chord_m(sighting, reach_m));
-        if selected { bending } else { Life { active: false, kind: Kind::Error, margin_m, scale_m } }
+        // Field by field, so that no branch comes of it.
+        Life {
+            active: selected & bending.active,
+            kind: if selected { Kind::Planes } else { Kind::Error },
+            margin_m: if selected { bending.margin_m } else { margin_m },
+            scale_m: if selected { bending.scale_m } else { scale_m },
+        }
     }
 
     /// The life of a vertex whose errors are measured along the line of sight.
@@ -271,18 +277,19 @@ impl Judge {
     fn bending_life(&self, sighting: &Sighting, margin_m: f64, chord_m: f64) -> Life {
         let arm_m = self.arm_m(sighting);
         let bend = self.turn_per_m * (arm_m * self.turn_per_m + 2.0);
-        let (mut margins_m, mut ways_m) = ([0.0; PLANES], [0.0; PLANES]);
-        let (mut inside_m, mut least_m, mut most_m) = (margin_m, chord_m, 0.0f64);
-        for i in 0..PLANES {
+        // Of each plane: how far the sphere is beyond it, and the way until that changes sign.
+        let plane = |i: usize| {
             let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
             let grows = self.slopes[i] + self.turn_per_m * dot(self.sweeps[i], sighting.offset_m());
             let way_m = used_up_at(beyond.abs(), if beyond > 0.0 { -grows } else { grows }, bend);
-            inside_m = inside_m.min(-beyond);
-            least_m = least_m.min(way_m);
-            most_m = most_m.max(if beyond > 0.0 { way_m } else { 0.0 });
-            (margins_m[i], ways_m[i]) = (beyond, way_m);
-        }
-        let culled = margins_m.iter().fold(0.0f64, |most, beyond| most.max(*beyond)) > 0.0;
+            (beyond, way_m)
+        };
+        let planes = [plane(0), plane(1), plane(2), plane(3)];
+        let inside_m = fold(&planes, margin_m, |least, (beyond, _)| least.min(-beyond));
+        let least_m = fold(&planes, chord_m, |least, (_, way_m)| least.min(way_m));
+        let outside = |beyond: f64, m: f64| if beyond > 0.0 { m } else { 0.0 };
+        let most_m = fold(&planes, 0.0, |most, (beyond, way_m)| most.max(outside(beyond, way_m)));
+        let culled = fold(&planes, 0.0, |most, (beyond, _)| most.max(beyond)) > 0.0;
         let nearest = if culled { sighting.distance_m() } else { sighting.reach_m() };
         // A way of many times the distance would weigh on every turn.
         let longest_m = 4.0 * nearest;
@@ -290,12 +297,10 @@ impl Judge {
         let scale_m = nearest + way_m;
         let band_m = power_of_two(band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
         let counted_per_m = self.rate * (1.0 + band_m * self.turn_per_m);
-        let mut outside_m = 0.0f64;
-        for i in 0..PLANES {
-            // Each plane may vouch by itself.
-            let vouched_m = margins_m[i].min(counted_per_m * ways_m[i].min(longest_m));
-            outside_m = outside_m.max(if margins_m[i] > 0.0 { vouched_m } else { 0.0 });
-        }
+        // Each plane may vouch by itself.
+        let outside_m = fold(&planes, 0.0, |most, (beyond, way_m)| {
+            most.max(outside(beyond, beyond.min(counted_per_m * way_m.min(longest_m))))
+        });
         let margin_m = if culled { outside_m } else { inside_m.min(counted_per_m * way_m) };
         Life { active: !culled, kind: Kind::Planes, margin_m, scale_m }
     }
@@ -352,6 +357,12 @@ fn ticks(life: f64) -> u32 {
     // From here on numbers are as far apart as whole ones. No other conversion becomes a vector instruction.
     const WHOLE: f64 = (1u64 << 52) as f64;
     (life.max(0.5).min(f64::from(HORIZON)) - 0.5 + WHOLE).to_bits() as u32
+}
+
+/// A fold without a loop: of loops within loops the compiler makes no vector instructions.
+#[inline(always)]
+fn fold<T: Copy>([a, b, c, d]: &[T; PLANES], start: f64, each: impl Fn(f64, T) -> f64) -> f64 {
+    each(each(each(each(start, *a), *b), *c), *d)
 }
 
 #[inline(always)]
