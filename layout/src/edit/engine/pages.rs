@@ -112,6 +112,19 @@ impl<C: RecordCodec> Pages<C> {
         })
     }
 
+    /// The bytes of so many records side by side from a slot on, if they lie in one page and that is here.
+    #[inline(always)]
+    pub(crate) fn side_by_side(&self, slot: u64, count: u64) -> Option<&[u8]> {
+        let logical = page_of::<C>(slot);
+        let page = self
+            .held
+            .get(logical as usize)?
+            .as_ref()
+            .filter(|_| page_of::<C>(slot + count - 1) == logical)?;
+        let within = byte_in_page::<C>(slot);
+        page.get(within..within + count as usize * C::BYTES)
+    }
+
     /// The record of a slot whose page is here.
     #[inline(always)]
     pub(crate) fn raw_if_held(&self, slot: u64) -> Option<C::Raw> {
