@@ -11,15 +11,11 @@ use crate::bound::Plane;
 use crate::edit::operations::window::SampleRect;
 use crate::grid::GridPoint;
 use crate::grid::record::RecordCodec;
-use reading::Family;
 
 /// Levels that are done here.
 pub(crate) const NEAR_LEVELS: u32 = 8;
 /// Steps around the changed rectangle: a diamond of the coarsest of these levels that touches it reaches twice its step, and so do its children.
 pub(crate) const MARGIN: u32 = 16;
-/// Points around the rectangle that have a place, whatever it holds: records that come 16 at a time may lie that far outside.
-const RIM: usize = 3;
-
 /// Records of a rectangle of samples, padding left out.
 #[derive(Debug)]
 pub(crate) struct Near<C: RecordCodec> {
@@ -27,24 +23,17 @@ pub(crate) struct Near<C: RecordCodec> {
     south: u32,
     wide: u32,
     high: u32,
-    /// Records, row by row from the south, [`RIM`] places around them.
+    /// Records, row by row from the south.
     raws: Vec<C::Raw>,
+    /// Slots of these records.
+    slots: Vec<u64>,
     /// Height codes; NaN for voids.
     samples: Vec<f64>,
-    families: Vec<Family>,
 }
 
 impl<C: RecordCodec> Default for Near<C> {
     fn default() -> Self {
-        Self {
-            west: 0,
-            south: 0,
-            wide: 0,
-            high: 0,
-            raws: Vec::new(),
-            samples: Vec::new(),
-            families: Vec::new(),
-        }
+        Self { west: 0, south: 0, wide: 0, high: 0, raws: Vec::new(), samples: Vec::new(), slots: Vec::new() }
     }
 }
 
@@ -68,7 +57,7 @@ impl<C: RecordCodec> Near<C> {
     /// Index of a column and row within the rectangle.
     #[inline(always)]
     fn place(&self, x: usize, y: usize) -> usize {
-        (y + RIM) * self.row_length() + x + RIM
+        y * self.row_length() + x
     }
 
     /// Index of a grid point of the rectangle.
@@ -80,7 +69,12 @@ impl<C: RecordCodec> Near<C> {
     /// Places a row.
     #[inline(always)]
     pub(crate) fn row_length(&self) -> usize {
-        self.wide as usize + 2 * RIM
+        self.wide as usize
+    }
+
+    #[inline(always)]
+    pub(crate) fn slot(&self, at: usize) -> u64 {
+        self.slots[at]
     }
 
     #[inline(always)]

@@ -91,6 +91,11 @@ impl<C: RecordCodec> Pages<C> {
         &self.terrain
     }
 
+    /// Whether any sample is void.
+    pub(crate) fn has_voids(&self) -> bool {
+        self.terrain.header().has_voids
+    }
+
     /// The record of a slot; inert if its page cannot be read, which [`Pages::check`] tells.
     #[inline(always)]
     pub(crate) fn raw(&mut self, slot: u64) -> C::Raw {
@@ -110,19 +115,6 @@ impl<C: RecordCodec> Pages<C> {
             let within = byte_in_page::<C>(slot);
             C::read(&page[within..within + C::BYTES])
         })
-    }
-
-    /// The bytes of so many records side by side from a slot on, if they lie in one page and that is here.
-    #[inline(always)]
-    pub(crate) fn side_by_side(&self, slot: u64, count: u64) -> Option<&[u8]> {
-        let logical = page_of::<C>(slot);
-        let page = self
-            .held
-            .get(logical as usize)?
-            .as_ref()
-            .filter(|_| page_of::<C>(slot + count - 1) == logical)?;
-        let within = byte_in_page::<C>(slot);
-        page.get(within..within + count as usize * C::BYTES)
     }
 
     /// The record of a slot whose page is here.

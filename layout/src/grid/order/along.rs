@@ -3,7 +3,7 @@
 //! Slots are made of spread coordinates. One more of a spread number is an addition in which the bits between its own let the carry pass, one less a subtraction that clears them.
 //! Invariant: the slots are those of [`slot_of`](super::slot_of).
 
-use super::{black_base, black_block, gather, level_slots, spread24, white_base};
+use super::{black_base, black_block, level_slots, spread24, white_base};
 
 /// The bits of spread numbers.
 const EVEN: u64 = 0x5555_5555_5555_5555;
@@ -78,33 +78,17 @@ impl Iterator for BlackAlong {
 /// Slots of a [`family`].
 pub(crate) const FAMILY: u64 = 16;
 
-/// First slot of the family of the vertex at `slot` of `level` + 4: of the 16 vertices of `level` that lie side by side in the file and around it on the ground, by [`STEPS`] of 2^(`level` / 2). They are its
-/// quadtree's, so every vertex of `level` is in one family.
+/// First slot of the family of the vertex at `slot` of `level` + 4: of the 16 vertices of `level` that lie side by side in the file and around it on the
+/// ground, three times 2^(`level` / 2) steps away at most along either axis. They are its quadtree's, so every vertex of `level` is in one family.
 #[inline(always)]
 pub(crate) const fn family(k: u32, level: u32, slot: u64) -> u64 {
     level_slots(k, level).start + FAMILY * (slot - level_slots(k, level + 4).start)
 }
 
-/// Where the vertices of a family lie from the vertex that it is of, east and north: of black levels, of white ones.
-pub(crate) const STEPS: [[[i32; 2]; FAMILY as usize]; 2] = {
-    let mut steps = [[[0; 2]; FAMILY as usize]; 2];
-    let mut i = 0;
-    while i < FAMILY as usize {
-        let (odd, even) = (gather(i as u64 >> 1) as i32, gather(i as u64) as i32);
-        // The trailing bits of A and B: see `black_point`.
-        let a = odd ^ 3;
-        let b = a ^ even;
-        steps[0][i] = [a - b, a + b - 3];
-        steps[1][i] = [2 * (odd ^ even) - 3, 2 * odd - 3];
-        i += 1;
-    }
-    steps
-};
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::order::slot_of;
+    use crate::grid::order::{point_of, slot_of};
     use crate::grid::{Grid, GridPoint};
 
     fn along(k: u32, level: u32, x: u32, y: u32, count: usize) -> Vec<u64> {
@@ -182,11 +166,13 @@ mod tests {
             for of in points().filter(|p| !grid.is_corner(*p) && grid.level(*p) >= 4) {
                 let level = grid.level(of) - 4;
                 let first = family(k, level, slot_of(k, of));
-                for (slot, [east, north]) in (first..).zip(STEPS[(level & 1) as usize]) {
-                    let step = 1 << (level / 2);
-                    let at = |v: u32, steps: i32| v.checked_add_signed(steps * step).filter(|v| *v <= 1 << k);
-                    let (Some(x), Some(y)) = (at(of.x(), east), at(of.y(), north)) else { continue };
-                    assert_eq!(slot, slot_of(k, GridPoint::new(x, y)), "{of:?}");
+                let reach = 3 << (level / 2);
+                for p in (first..first + FAMILY).filter_map(|slot| point_of(k, slot)) {
+                    assert_eq!(grid.level(p), level);
+                    assert!(
+                        p.x().abs_diff(of.x()) <= reach && p.y().abs_diff(of.y()) <= reach,
+                        "{of:?} {p:?}"
+                    );
                     seen += 1;
                 }
             }

@@ -178,7 +178,7 @@ impl RecordCodec for Compact {
         Vertex { height_m, error_m, radius_m, class }
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn encode_plain(&self, level: u32, value: f64, error_m: f64, radius_m: f64) -> Option<u32> {
         if !(0.0..=65535.0).contains(&value) {
             return None;

@@ -9,7 +9,6 @@ use super::Update;
 use crate::bound::{Below, FIRST_SCANNED, larger};
 use crate::file::header::ErrorKind;
 use crate::grid::GridPoint;
-use crate::grid::order::{BlackAlong, WhiteAlong};
 use crate::grid::record::{RecordCodec, VertexClass};
 
 /// What the vertices of one of the finest levels have in common.
@@ -38,13 +37,8 @@ impl<C: RecordCodec> Update<'_, C> {
         let of = &self.finest::<LEVEL>();
         let [wide, high] = self.rules.grid.samples();
         let is_inside = y >= s && y + s < high;
-        let k = self.rules.grid.k();
-        let mut white = WhiteAlong::new(k, LEVEL | 1, first, y);
-        let mut black = BlackAlong::new(k, LEVEL & !1, first, y);
         for x in (first..=last).step_by(2 * s as usize) {
-            let slot = if LEVEL & 1 == 1 { white.next() } else { black.next() };
-            let is_done =
-                is_inside && x >= s && x + s < wide && self.renew_near::<LEVEL>(x, y, slot.unwrap_or(0), of);
+            let is_done = is_inside && x >= s && x + s < wide && self.renew_near::<LEVEL>(x, y, of);
             if !is_done {
                 self.renew(GridPoint::new(x, y), LEVEL);
             }
@@ -53,7 +47,7 @@ impl<C: RecordCodec> Update<'_, C> {
 
     /// Makes the record of a vertex in the data's interior anew, if it is plain; else returns false.
     #[inline(always)]
-    fn renew_near<const LEVEL: u32>(&mut self, x: u32, y: u32, slot: u64, of: &Finest) -> bool {
+    fn renew_near<const LEVEL: u32>(&mut self, x: u32, y: u32, of: &Finest) -> bool {
         let (rules, near) = (self.rules, &self.scratch.near);
         let s = 1usize << (LEVEL / 2);
         let (at, row) = (near.index(x, y), near.row_length());
@@ -79,6 +73,7 @@ impl<C: RecordCodec> Update<'_, C> {
             };
             rules.step_error_m(code, [near.value(at - apart), near.value(at + apart)])
         };
+        let slot = near.slot(at);
         let new = rules.encode_plain(LEVEL, code, own_m, &below);
         if new == Some(old) {
             return true;
