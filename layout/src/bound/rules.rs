@@ -123,6 +123,13 @@ impl<C: RecordCodec> Rules<C> {
         self.encode(level, code, class, own_m, below)
     }
 
+    /// The record of a plain vertex whose triangles padding does not deform.
+    #[inline(always)]
+    pub(crate) fn encode_plain(&self, level: u32, code: f64, own_m: f64, below: &Below) -> Option<C::Raw> {
+        let error_m = larger(below.error_m, smaller(self.largest_error_m(), own_m));
+        self.codec.encode_plain(level, code, error_m, below.radius_m)
+    }
+
     /// The record of a vertex whose class is known and whose triangles padding does not deform.
     #[inline(always)]
     pub(crate) fn encode(

@@ -14,7 +14,7 @@ mod blocks;
 #[cfg(test)]
 mod large;
 
-pub(crate) use along::{BlackAlong, WhiteAlong};
+pub(crate) use along::{BlackAlong, FAMILY, WhiteAlong, family};
 pub(crate) use blocks::{block_start, level_around, step_in_block};
 
 use crate::grid::GridPoint;

@@ -91,6 +91,11 @@ impl<C: RecordCodec> Pages<C> {
         &self.terrain
     }
 
+    /// Whether any sample is void.
+    pub(crate) fn has_voids(&self) -> bool {
+        self.terrain.header().has_voids
+    }
+
     /// The record of a slot; inert if its page cannot be read, which [`Pages::check`] tells.
     #[inline(always)]
     pub(crate) fn raw(&mut self, slot: u64) -> C::Raw {

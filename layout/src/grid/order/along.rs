@@ -1,9 +1,9 @@
 //! Slots of the vertices of a row one after the other: each from the one before it, by a few additions.
 //!
 //! Slots are made of spread coordinates. One more of a spread number is an addition in which the bits between its own let the carry pass, one less a subtraction that clears them.
-//! Invariant: the slots are those of [`RowSlots`](super::RowSlots).
+//! Invariant: the slots are those of [`slot_of`](super::slot_of).
 
-use super::{black_base, black_block, spread24, white_base};
+use super::{black_base, black_block, level_slots, spread24, white_base};
 
 /// The bits of spread numbers.
 const EVEN: u64 = 0x5555_5555_5555_5555;
@@ -75,10 +75,20 @@ impl Iterator for BlackAlong {
     }
 }
 
+/// Slots of a [`family`].
+pub(crate) const FAMILY: u64 = 16;
+
+/// First slot of the family of the vertex at `slot` of `level` + 4: of the 16 vertices of `level` that lie side by side in the file and around it on the
+/// ground, three times 2^(`level` / 2) steps away at most along either axis. They are its quadtree's, so every vertex of `level` is in one family.
+#[inline(always)]
+pub(crate) const fn family(k: u32, level: u32, slot: u64) -> u64 {
+    level_slots(k, level).start + FAMILY * (slot - level_slots(k, level + 4).start)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::order::slot_of;
+    use crate::grid::order::{point_of, slot_of};
     use crate::grid::{Grid, GridPoint};
 
     fn along(k: u32, level: u32, x: u32, y: u32, count: usize) -> Vec<u64> {
@@ -145,5 +155,29 @@ mod tests {
     fn level_of(p: GridPoint, k: u32) -> Option<u32> {
         let grid = Grid::new([(1 << k) + 1; 2], [1.0; 2]).unwrap();
         (!grid.is_corner(p)).then(|| grid.level(p))
+    }
+
+    #[test]
+    fn every_vertex_is_in_the_family_that_lies_around_it() {
+        for k in 3..=6 {
+            let grid = Grid::new([(1 << k) + 1; 2], [1.0; 2]).unwrap();
+            let points = || (0..=1 << k).flat_map(|y| (0..=1 << k).map(move |x| GridPoint::new(x, y)));
+            let mut seen = 0;
+            for of in points().filter(|p| !grid.is_corner(*p) && grid.level(*p) >= 4) {
+                let level = grid.level(of) - 4;
+                let first = family(k, level, slot_of(k, of));
+                let reach = 3 << (level / 2);
+                for p in (first..first + FAMILY).filter_map(|slot| point_of(k, slot)) {
+                    assert_eq!(grid.level(p), level);
+                    assert!(
+                        p.x().abs_diff(of.x()) <= reach && p.y().abs_diff(of.y()) <= reach,
+                        "{of:?} {p:?}"
+                    );
+                    seen += 1;
+                }
+            }
+            let has_family = |p: &GridPoint| !grid.is_corner(*p) && grid.level(*p) + 4 < grid.levels();
+            assert_eq!(seen, points().filter(has_family).count());
+        }
     }
 }

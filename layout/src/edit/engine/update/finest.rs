@@ -74,7 +74,10 @@ impl<C: RecordCodec> Update<'_, C> {
             rules.step_error_m(code, [near.value(at - apart), near.value(at + apart)])
         };
         let slot = near.slot(at);
-        let new = rules.encode(LEVEL, code, VertexClass::Plain, own_m, &below);
+        let new = rules.encode_plain(LEVEL, code, own_m, &below);
+        if new == Some(old) {
+            return true;
+        }
         let v = GridPoint::new(x, y);
         if self.put(v, slot, old, new).is_some() {
             self.scratch.here.push((v, old));
