@@ -1,7 +1,6 @@
 //! The page directory: logical record page -> where it lies and its checksum (FORMAT.md, section 5).
 //!
-//! On disk it has two levels, so that an edit rewrites one leaf and the root and a mostly void terrain has a small one. So it has in memory (`page_table`), but where all of it is
-//! written.
+//! On disk it has two levels, or three for the largest squares, so that an edit rewrites one page of each and a mostly void terrain has a small one. So it has in memory (`page_table`).
 //!
 //! Cost: 12 bytes an entry.
 
@@ -15,7 +14,7 @@ use super::bytes::{PAGE_BYTES, get_u32, put_u32};
 pub(crate) const ENTRY_BYTES: usize = 16;
 
 /// Where a page lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, bytemuck::Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Entry {
     /// Page number in the file; 0 if absent.
     pub page: u32,
@@ -51,9 +50,41 @@ impl Entry {
     }
 }
 
-/// The table of a terrain of so many logical pages, all of them absent. Memory is taken as entries are written.
-pub(crate) fn absent(logical_pages: usize) -> Vec<Entry> {
-    bytemuck::zeroed_vec(logical_pages)
+/// Least `k` of squares whose directory has nodes between root and leaves.
+const LEAST_K_WITH_NODES: u32 = 18;
+
+/// How a directory is made up: a root that leads to leaves, or to nodes that lead to them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct DirectoryShape {
+    record_pages: u64,
+    has_nodes: bool,
+}
+
+impl DirectoryShape {
+    /// Of a square of 2^k steps a side with so many logical pages.
+    pub(crate) const fn new(k: u32, record_pages: u64) -> Self {
+        Self { record_pages, has_nodes: k >= LEAST_K_WITH_NODES }
+    }
+
+    /// Whether there are nodes.
+    pub(crate) const fn has_nodes(&self) -> bool {
+        self.has_nodes
+    }
+
+    /// Leaves, absent ones included.
+    pub(crate) const fn leaves(&self) -> u64 {
+        self.record_pages.div_ceil(ENTRIES_PER_LEAF as u64)
+    }
+
+    /// Groups of as many leaves as a node has, whether they are nodes or not.
+    pub(crate) const fn nodes(&self) -> u64 {
+        self.leaves().div_ceil(ENTRIES_PER_LEAF as u64)
+    }
+
+    /// Entries of the root.
+    pub(crate) const fn root_entries(&self) -> u64 {
+        if self.has_nodes { self.nodes() } else { self.leaves() }
+    }
 }
 
 /// Entries a leaf page.
