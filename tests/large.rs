@@ -232,3 +232,8 @@ fn check(side: u32) {
 fn islands_in_a_square_of_17_bits() {
     check(131_073);
 }
+
+#[test]
+fn islands_in_a_square_of_20_bits() {
+    check(1_048_577);
+}

@@ -183,3 +183,15 @@ fn squares_of_17_bits_a_side() {
     assert_eq!(terrain.grid().k(), 17);
     descend(&islands(side), &terrain);
 }
+
+/// Slots past 2^40, and a directory with nodes.
+#[test]
+fn squares_of_20_bits_a_side() {
+    let folder = tempfile::tempdir().unwrap();
+    for (side, k) in [(262_145, 18), (1_048_577, 20)] {
+        let terrain = check(side, &folder.path().join("islands.iqt"));
+        assert_eq!(terrain.grid().k(), k);
+        let largest = descend(&islands(side), &terrain);
+        assert!(k < 20 || largest > 1 << 40, "{largest}");
+    }
+}
