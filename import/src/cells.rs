@@ -1,6 +1,6 @@
 //! Large squares of a grid, and which of them anything lies in: what lies between is passed over as a whole.
 //!
-//! Memory: some 12 bytes a cell with something in it. Cost: a look at each cell, and at each block of those with something in them.
+//! Memory: some 12 bytes a cell with something in it. Cost: a look at each block of cells with something in them, and at the larger squares around these.
 
 use crate::parallel::each_task;
 use std::collections::HashSet;
@@ -28,13 +28,17 @@ impl Cells {
     /// Whether a window of the grid, which may lie beyond it in part, touches any.
     pub(crate) fn touch(&self, from: [i64; 2], size: [u32; 2]) -> bool {
         let cell = |v: i64| (v.clamp(0, i64::from(u32::MAX)) >> CELL_LOG2) as u32;
-        let span = |i: usize| cell(from[i])..=cell(from[i] + i64::from(size[i]) - 1);
-        span(1).any(|y| span(0).any(|x| self.0.contains(&[x, y])))
+        let span = [0, 1].map(|i| cell(from[i])..=cell(from[i] + i64::from(size[i]) - 1));
+        let count: u64 = span.iter().map(|span| u64::from(span.end() - span.start()) + 1).product();
+        if count > self.0.len() as u64 {
+            return self.0.iter().any(|cell| (0..2).all(|i| span[i].contains(&cell[i])));
+        }
+        span[1].clone().any(|y| span[0].clone().any(|x| self.0.contains(&[x, y])))
     }
 }
 
-/// Calls `make` with every block, of at most `size` columns and rows, of those cells of a grid that `is_met` says something lies in, on all threads; and `pass` with windows that are made of the others. The
-/// sides of blocks divide that of a cell.
+/// Calls `make` with every block, of at most `size` columns and rows, of those cells of a grid that `is_met` says something may lie in, on all threads; and `pass` with windows that are made of the others.
+/// `is_met` is asked of the whole grid first, then of halves. The sides of blocks divide that of a cell.
 pub(crate) fn each_block_met(
     [wide, high]: [u32; 2],
     size: [u32; 2],
@@ -44,31 +48,36 @@ pub(crate) fn each_block_met(
 ) -> Result<(), LayoutError> {
     debug_assert!(size.iter().all(|side| CELL.is_multiple_of(*side)));
     let mut met: Vec<Window> = Vec::new();
-    for row in (0..high).step_by(CELL as usize) {
-        let height = CELL.min(high - row);
-        // What is passed over since the last cell that is met.
-        let mut from = 0;
-        for col in (0..wide).step_by(CELL as usize) {
-            let cell = Window { col, row, width: CELL.min(wide - col), height };
-            if is_met(cell) {
-                if from < col {
-                    pass(Window { col: from, row, width: col - from, height })?;
-                }
-                from = col + cell.width;
-                // Cells side by side are one, so that the order of blocks is that of rows.
-                match met.last_mut().filter(|last| last.row == row && last.col + last.width == col) {
-                    Some(last) => last.width += cell.width,
-                    None => met.push(cell),
-                }
+    let mut waiting = vec![Window { col: 0, row: 0, width: wide, height: high }];
+    while let Some(window) = waiting.pop() {
+        let Window { col, row, width, height } = window;
+        if !is_met(window) {
+            pass(window)?;
+        } else if width.max(height) <= CELL {
+            met.push(window);
+        } else {
+            // In halves of whole cells.
+            let half = |side: u32| (side.div_ceil(CELL) / 2).max(1) * CELL;
+            if width >= height {
+                let left = half(width);
+                waiting.push(Window { width: left, ..window });
+                waiting.push(Window { col: col + left, width: width - left, ..window });
+            } else {
+                let upper = half(height);
+                waiting.push(Window { height: upper, ..window });
+                waiting.push(Window { row: row + upper, height: height - upper, ..window });
             }
         }
-        if from < wide {
-            pass(Window { col: from, row, width: wide - from, height })?;
-        }
     }
-    let blocks = |cells: &Window| {
-        u64::from(cells.width.div_ceil(size[0])) * u64::from(cells.height.div_ceil(size[1]))
-    };
+    // Cells side by side are one, so that the order of blocks is that of rows.
+    met.sort_unstable_by_key(|cell| (cell.row, cell.col));
+    met.dedup_by(|cell, last| {
+        let is_beside = cell.row == last.row && cell.col == last.col + last.width;
+        last.width += if is_beside { cell.width } else { 0 };
+        is_beside
+    });
+    let blocks =
+        |cells: &Window| u64::from(cells.width.div_ceil(size[0])) * u64::from(cells.height.div_ceil(size[1]));
     let mut all = 0;
     let firsts: Vec<u64> = met
         .iter()
@@ -118,8 +127,7 @@ mod tests {
                 let mut cells = Cells::default();
                 met.iter().for_each(|[x, y]| cells.add([x * CELL, y * CELL], [x * CELL + 1, y * CELL + 9]));
                 for size in [[2048, 32], [256, 256]] {
-                    let is_met =
-                        |w: Window| cells.touch([w.col.into(), w.row.into()], [w.width, w.height]);
+                    let is_met = |w: Window| cells.touch([w.col.into(), w.row.into()], [w.width, w.height]);
                     let seen = Mutex::new(vec![0u8; (grid[0] * grid[1]) as usize]);
                     let note = |window: Window, as_block: bool| {
                         let mut seen = seen.lock().unwrap();

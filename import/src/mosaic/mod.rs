@@ -369,7 +369,8 @@ impl Reader for Mosaic {
             return Err(nothing);
         }
         let size = if self.is_copied() && self.blend.is_none() { COPIED } else { BLENDED };
-        let is_met = |cell: Window| self.laid.iter().zip(&self.cells).any(|(laid, cells)| laid.meets(cell, cells));
+        let is_met =
+            |cell: Window| self.laid.iter().zip(&self.cells).any(|(laid, cells)| laid.meets(cell, cells));
         let pass = |window| sink.put_void(window);
         let make = |window| self.block(window, &stores, sink);
         each_block_met(self.declared.samples, size, is_met, pass, make)

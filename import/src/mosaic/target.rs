@@ -48,12 +48,12 @@ impl Laid {
             && window.col + window.width > self.from[0]
             && window.row + window.height > self.from[1];
         is_within
-            && match self.way {
+            && match &self.way {
                 Way::Copied(at) => cells.touch(
                     [i64::from(window.col) - at[0], i64::from(window.row) - at[1]],
                     [window.width, window.height],
                 ),
-                Way::Resampled(_) => true,
+                Way::Resampled(resampler) => resampler.may_touch(window, cells),
             }
     }
 }

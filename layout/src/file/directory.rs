@@ -132,7 +132,10 @@ mod tests {
             Ok(())
         })
         .unwrap();
-        assert_eq!((put.iter().map(|(page, _)| *page).collect::<Vec<_>>(), end), (vec![9, 10, 11, 12, 13], 14));
+        assert_eq!(
+            (put.iter().map(|(page, _)| *page).collect::<Vec<_>>(), end),
+            (vec![9, 10, 11, 12, 13], 14)
+        );
         let present = |bytes: &[u8]| {
             let entries = (0..bytes.len() / ENTRY_BYTES).map(|i| (i, Entry::read(bytes, i).page));
             entries.filter(|(_, page)| *page > 0).collect::<Vec<_>>()

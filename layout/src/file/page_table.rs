@@ -229,9 +229,8 @@ impl PageTable {
         (0u64..self.nodes.len() as u64).flat_map(move |i| {
             let node = self.known_node(i);
             let count = if matches!(node, Some(None)) { 0 } else { ENTRIES_PER_LEAF };
-            let is_present = move |within: &usize| {
-                node.flatten().is_none_or(|node| node.entries[*within].is_present())
-            };
+            let is_present =
+                move |within: &usize| node.flatten().is_none_or(|node| node.entries[*within].is_present());
             (0..count).filter(is_present).map(move |within| i * PER_LEAF + within as u64)
         })
     }

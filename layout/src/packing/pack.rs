@@ -359,7 +359,8 @@ impl<C: RecordCodec> Packer<'_, C> {
         let write = |bytes: &[u8], offset| disk.write_at(file.file(), bytes, offset).map_err(failed);
         let mut done = 0;
         while done < leaves.len() {
-            let few = leaves[done..].partition_point(|listed| listed.end - leaves[done].first <= TILES_AT_ONCE);
+            let few =
+                leaves[done..].partition_point(|listed| listed.end - leaves[done].first <= TILES_AT_ONCE);
             let batch = &leaves[done..done + few.max(1)];
             let tiles: Vec<TileId> = self.tiles_of(batch).map(|(_, id)| id).collect();
             let made: Vec<Option<Made>> = tiles

@@ -45,7 +45,8 @@ impl PageMap {
     fn with_row(count: u64, most: u64) -> Self {
         let row = count.min(most);
         let blocks = place((count - row).div_ceil(BLOCK as u64));
-        let numbers = if blocks == 0 { Vec::new() } else { [0, u32::MAX].map(|v| Box::new([v; BLOCK])).into() };
+        let numbers =
+            if blocks == 0 { Vec::new() } else { [0, u32::MAX].map(|v| Box::new([v; BLOCK])).into() };
         // Zeros that are never written take no memory.
         Self { row: vec![0; place(row)], blocks: vec![ZEROS; blocks], numbers, count }
     }

@@ -168,10 +168,13 @@ fn leaf_sizes(file: &[u8], slot: usize) -> Vec<usize> {
     if samples.iter().any(|side| *side > 1 << 14) {
         return Vec::new();
     }
-    Grid::new(samples, [1.0; 2]).map_or_else(|_| Vec::new(), |grid| {
-        let groups = Groups::of(&grid);
-        (0..groups.leaves).map(|leaf| groups.leaf_size(leaf)).collect()
-    })
+    Grid::new(samples, [1.0; 2]).map_or_else(
+        |_| Vec::new(),
+        |grid| {
+            let groups = Groups::of(&grid);
+            (0..groups.leaves).map(|leaf| groups.leaf_size(leaf)).collect()
+        },
+    )
 }
 
 fn seal_leaf(file: &mut [u8], named_at: usize, tiles: usize) {

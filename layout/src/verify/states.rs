@@ -143,7 +143,9 @@ impl<'t> States<'t> {
         let mut nodes = 0;
         let differing = self.table.leaves_to(source, header, &root, |i| {
             nodes += PAGE;
-            left = left.checked_sub(PAGE).ok_or_else(|| over_one_another(self.terrain, format!("directory node {i}")))?;
+            left = left
+                .checked_sub(PAGE)
+                .ok_or_else(|| over_one_another(self.terrain, format!("directory node {i}")))?;
             Ok(())
         })?;
         self.spend(nodes, "directory")?;

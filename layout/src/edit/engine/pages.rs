@@ -389,7 +389,9 @@ impl<C: RecordCodec> Pages<C> {
 
     /// Pages in memory, copies from before commits counted.
     pub(crate) fn held_pages(&self) -> usize {
-        self.touched.iter().filter(|page| page.held.is_some()).count() + self.uncommitted.len() + self.taken.len()
+        self.touched.iter().filter(|page| page.held.is_some()).count()
+            + self.uncommitted.len()
+            + self.taken.len()
     }
 
     /// A page that was edited, if it is here.

@@ -72,7 +72,8 @@ impl PageTable {
         root: &[Entry],
         mut spend: impl FnMut(u64) -> Result<(), LayoutError>,
     ) -> Result<Vec<(u64, Entry)>, LayoutError> {
-        let differing = (0u64..).zip(root.iter().zip(&self.root)).filter(|(_, (theirs, ours))| theirs != ours);
+        let differing =
+            (0u64..).zip(root.iter().zip(&self.root)).filter(|(_, (theirs, ours))| theirs != ours);
         if !self.shape.has_nodes() {
             return Ok(differing.map(|(leaf, (theirs, _))| (leaf, *theirs)).collect());
         }
