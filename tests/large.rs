@@ -1,4 +1,4 @@
-//! Squares of more than 65,537 samples a side, nearly all void: slots need more than 32 bits, and places in metres more than 24. Engines fly over islands in them and draw one mesh, that of
+//! Squares of more than 65,537 samples a side, nearly all void: slots need more than 32 bits, and of the largest more than 40, and places in metres more than 24. Engines fly over islands in them and draw one mesh, that of
 //! SOAR, which is made anew in every frame (the definition looks at every vertex there is); edits, packed files and files written anew hold what the source said.
 
 mod common;
