@@ -69,15 +69,14 @@ fn walk(terrain: &Terrain, east: f64, north: f64) -> Vec<u64> {
 
 /// Builds, opens, verifies and samples a square of `side` samples with islands in it.
 fn check(side: u32, path: &Path) -> Terrain {
-    check_kind(side, path, None)
+    check_built(&islands(side), path)
 }
 
-/// The same in records of a kind.
-fn check_kind(side: u32, path: &Path, kind: Option<RecordKind>) -> Terrain {
-    let dem = islands(side);
+fn check_built(dem: &Islands, path: &Path) -> Terrain {
+    let side = dem.info.samples_wide;
     let start = Instant::now();
-    let options = BuildOptions::default().spacing_m([30.0, 20.0]).record(kind);
-    let header = build(&dem, path, &options, &Silent).unwrap();
+    let options = BuildOptions::default().spacing_m([30.0, 20.0]);
+    let header = build(dem, path, &options, &Silent).unwrap();
     let built = start.elapsed();
     let data = dem.samples();
     assert_eq!(header.nodata_samples, u64::from(side) * u64::from(side) - data);
@@ -100,7 +99,7 @@ fn check_kind(side: u32, path: &Path, kind: Option<RecordKind>) -> Terrain {
         header.record_pages(),
         header.file_bytes
     );
-    compare(&dem, &terrain);
+    compare(dem, &terrain);
     terrain
 }
 
@@ -197,9 +196,8 @@ fn squares_of_17_bits_a_side() {
 fn pages_past_32_bits_hold_what_the_source_says() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("islands.iqt");
-    let side = 1_048_577;
-    let terrain = check_kind(side, &path, Some(RecordKind::Exact16));
-    let dem = islands(side);
+    let dem = islands(1_048_577).precise();
+    let terrain = check_built(&dem, &path);
     let far: Vec<u64> =
         terrain.present_pages().unwrap().map(|(page, _)| page).filter(|page| page >> 32 > 0).collect();
     assert!(far.len() > 100 && terrain.header().record_kind == RecordKind::Exact16, "{}", far.len());

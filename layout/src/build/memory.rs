@@ -6,7 +6,7 @@ use super::land::{BLOCK, Land};
 use super::options::{BuildOptions, LARGEST_TILE};
 use crate::dem::SampleType;
 use crate::error::LayoutError;
-use crate::file::entries::DirectoryShape;
+use crate::file::directory_shape::DirectoryShape;
 use crate::grid::Grid;
 use crate::grid::order::slot_count;
 use crate::grid::record::RecordKind;

@@ -3,7 +3,8 @@
 //! Builds, rewritten files and commits all write it here. Invariant: no page number is handed out that 32 bits do not hold.
 
 use super::bytes::{PAGE_BYTES, checksum};
-use super::entries::{DirectoryShape, ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use super::directory_shape::DirectoryShape;
+use super::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use crate::error::LayoutError;
 use std::path::Path;
 

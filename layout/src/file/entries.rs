@@ -50,43 +50,6 @@ impl Entry {
     }
 }
 
-/// Least `k` of squares whose directory has nodes between root and leaves.
-const LEAST_K_WITH_NODES: u32 = 18;
-
-/// How a directory is made up: a root that leads to leaves, or to nodes that lead to them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct DirectoryShape {
-    record_pages: u64,
-    has_nodes: bool,
-}
-
-impl DirectoryShape {
-    /// Of a square of 2^k steps a side with so many logical pages.
-    pub(crate) const fn new(k: u32, record_pages: u64) -> Self {
-        Self { record_pages, has_nodes: k >= LEAST_K_WITH_NODES }
-    }
-
-    /// Whether there are nodes.
-    pub(crate) const fn has_nodes(&self) -> bool {
-        self.has_nodes
-    }
-
-    /// Leaves, absent ones included.
-    pub(crate) const fn leaves(&self) -> u64 {
-        self.record_pages.div_ceil(ENTRIES_PER_LEAF as u64)
-    }
-
-    /// Groups of as many leaves as a node has, whether they are nodes or not.
-    pub(crate) const fn nodes(&self) -> u64 {
-        self.leaves().div_ceil(ENTRIES_PER_LEAF as u64)
-    }
-
-    /// Entries of the root.
-    pub(crate) const fn root_entries(&self) -> u64 {
-        if self.has_nodes { self.nodes() } else { self.leaves() }
-    }
-}
-
 /// Entries a leaf page.
 pub(crate) const ENTRIES_PER_LEAF: usize = PAGE_BYTES / ENTRY_BYTES;
 

@@ -7,7 +7,7 @@ mod fields;
 mod numbers;
 
 use super::bytes::{PAGE_BYTES, Page, checksum, get_u16, put_f64, put_text, put_u16, put_u32, put_u64};
-use super::entries::DirectoryShape;
+use super::directory_shape::DirectoryShape;
 use crate::dem::{About, HorizontalUnit};
 use crate::error::LayoutError;
 use crate::grid::Grid;

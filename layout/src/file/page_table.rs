@@ -12,7 +12,8 @@ mod read;
 pub(crate) use read::{read_leaf, read_node, read_root};
 
 use super::bytes::{PAGE_BYTES, to_usize};
-use super::entries::{DirectoryShape, ENTRIES_PER_LEAF, Entry, PageUses};
+use super::directory_shape::DirectoryShape;
+use super::entries::{ENTRIES_PER_LEAF, Entry, PageUses};
 use super::header::Header;
 use super::source::Source;
 use crate::error::LayoutError;

@@ -6,7 +6,8 @@
 use super::container::Section;
 use crate::error::LayoutError;
 use crate::file::bytes::{checksum, get_u32, put_u32};
-use crate::file::entries::{DirectoryShape, ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
+use crate::file::directory_shape::DirectoryShape;
+use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use std::path::Path;
 use std::sync::OnceLock;
 

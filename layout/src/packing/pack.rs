@@ -6,6 +6,7 @@
 use super::compare::{CHUNK_BYTES, Check, compare, read_back, refused};
 use super::front::Front;
 use super::gather::tile_of;
+use super::listed::{ListedLeaf, listed, tiles_of};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
@@ -168,14 +169,6 @@ struct Made {
     segments: [Vec<u8>; SEGMENTS],
 }
 
-/// A leaf of the tile directory that is written.
-struct ListedLeaf {
-    leaf: usize,
-    /// Numbers of its first tile, and of the one behind its last, among the tiles of all that are written.
-    first: usize,
-    end: usize,
-}
-
 struct Packer<'p, C: RecordCodec> {
     path: &'p Path,
     records: Records<'p, C>,
@@ -195,35 +188,6 @@ impl<C: RecordCodec> Packer<'_, C> {
         let [x, y] = id.at.map(|v| (v << shift) + half);
         let centre = slot_of(self.records.grid().k(), GridPoint::new(x, y));
         group.is_top || self.records.raw(centre) != C::INERT
-    }
-
-    /// The leaves of the tile directory with tiles that may hold anything, in order. What lies in a tile that holds nothing is not looked at.
-    fn listed(&self) -> Vec<ListedLeaf> {
-        let mut leaves = Vec::new();
-        let mut candidates: Vec<usize> = (0..self.groups.groups.last().map_or(0, |_| 1)).collect();
-        while !candidates.is_empty() {
-            let holding: Vec<(usize, Vec<TileId>)> = candidates
-                .into_par_iter()
-                .map(|leaf| (leaf, self.groups.tiles_in(leaf).filter(|id| self.may_hold(*id)).collect()))
-                .filter(|(_, tiles): &(usize, Vec<TileId>)| !tiles.is_empty())
-                .collect();
-            leaves.extend(holding.iter().map(|(leaf, _)| *leaf));
-            let tiles = holding.iter().flat_map(|(_, tiles)| tiles);
-            candidates = tiles.flat_map(|id| self.groups.leaves_inside(*id)).collect();
-            candidates.sort_unstable();
-            candidates.dedup();
-        }
-        let mut tiles = 0;
-        let number = |leaf| {
-            tiles += self.groups.leaf_size(leaf);
-            ListedLeaf { leaf, first: tiles - self.groups.leaf_size(leaf), end: tiles }
-        };
-        leaves.into_iter().map(number).collect()
-    }
-
-    /// All tiles of leaves, with their numbers among those of all leaves that are listed.
-    fn tiles_of<'t>(&'t self, leaves: &'t [ListedLeaf]) -> impl Iterator<Item = (usize, TileId)> + 't {
-        leaves.iter().flat_map(|listed| (listed.first..).zip(self.groups.tiles_in(listed.leaf)))
     }
 
     /// The records of a tile; `None` if all that it gives are inert.
@@ -258,7 +222,7 @@ impl<C: RecordCodec> Packer<'_, C> {
         let count = leaves.last().map_or(0, |last| last.end);
         let counts = leaves
             .par_iter()
-            .flat_map_iter(|leaf| self.tiles_of(std::slice::from_ref(leaf)))
+            .flat_map_iter(|leaf| tiles_of(&self.groups, std::slice::from_ref(leaf)))
             .filter(|(number, id)| self.is_counted(*number, count, *id))
             .fold(none, |(mut counts, mut scratch), (_, id)| {
                 if let Some(records) = self.records_of(id) {
@@ -322,10 +286,11 @@ impl<C: RecordCodec> Packer<'_, C> {
         directory_end: u64,
         file: &AtomicFile,
     ) -> Result<u64, LayoutError> {
-        let leaves = self.listed();
+        let leaves = listed(&self.groups, |id| self.may_hold(id));
         let count = leaves.last().map_or(0, |last| last.end);
-        let samples = self.tiles_of(&leaves).map(|(_, id)| self.samples_of(id)).sum();
-        let counted = self.tiles_of(&leaves).filter(|(number, id)| self.is_counted(*number, count, *id));
+        let samples = tiles_of(&self.groups, &leaves).map(|(_, id)| self.samples_of(id)).sum();
+        let counted =
+            tiles_of(&self.groups, &leaves).filter(|(number, id)| self.is_counted(*number, count, *id));
         self.progress.stage("counting", counted.map(|(_, id)| self.samples_of(id)).sum());
         let model = self.model(&leaves);
         let tables = DecodeTables::of(&model);
@@ -362,7 +327,7 @@ impl<C: RecordCodec> Packer<'_, C> {
             let few =
                 leaves[done..].partition_point(|listed| listed.end - leaves[done].first <= TILES_AT_ONCE);
             let batch = &leaves[done..done + few.max(1)];
-            let tiles: Vec<TileId> = self.tiles_of(batch).map(|(_, id)| id).collect();
+            let tiles: Vec<TileId> = tiles_of(&self.groups, batch).map(|(_, id)| id).collect();
             let made: Vec<Option<Made>> = tiles
                 .par_iter()
                 .with_min_len(16)

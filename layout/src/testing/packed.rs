@@ -5,7 +5,7 @@
 //! Invariant and cost are those of this module.
 
 use crate::file::bytes::{PAGE_BYTES, checksum, get_u16, get_u32, get_u64};
-use crate::file::entries::DirectoryShape;
+use crate::file::directory_shape::DirectoryShape;
 use crate::grid::Grid;
 use crate::packed::container::{BLOCKS, INDEX, ROOT, RUNS, Section};
 use crate::packed::leaves::{INDEX_BYTES, PackedLeaves};

@@ -2,7 +2,8 @@
 
 use super::image::{Image, JOURNAL_MAGIC, SECTION_MAGIC};
 use crate::file::bytes::{PAGE_BYTES, get_u32};
-use crate::file::entries::{DirectoryShape, ENTRY_BYTES};
+use crate::file::directory_shape::DirectoryShape;
+use crate::file::entries::ENTRY_BYTES;
 use std::collections::BTreeSet;
 
 /// Journal pages that are followed.

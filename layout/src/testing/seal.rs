@@ -6,7 +6,8 @@
 use super::image::Image;
 use super::parts::{Parts, page_of, tile_directory};
 use crate::file::bytes::{PAGE_BYTES, checksum, get_u32};
-use crate::file::entries::{DirectoryShape, ENTRIES_PER_LEAF, ENTRY_BYTES};
+use crate::file::directory_shape::DirectoryShape;
+use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES};
 use crate::grid::Grid;
 use crate::grid::order::slot_count;
 use std::collections::{BTreeMap, BTreeSet};
