@@ -254,14 +254,10 @@ impl Resampler {
         let reach = self.kernel.reach();
         let span: [(i64, u32); 2] = std::array::from_fn(|i| {
             let apart = |a: [f64; 2], b: [f64; 2]| (a[i] - b[i]).abs();
-            let mut widest = 0.0f64;
-            for y in 0..NODES {
-                for x in 1..NODES {
-                    widest = widest
-                        .max(apart(places[y][x], places[y][x - 1]))
-                        .max(apart(places[x][y], places[x - 1][y]));
-                }
-            }
+            let along = places.iter().flat_map(|row| row.windows(2)).map(|two| apart(two[0], two[1]));
+            let across =
+                places.windows(2).flat_map(|two| two[0].iter().zip(&two[1])).map(|(a, b)| apart(*a, *b));
+            let widest = along.chain(across).fold(0.0, f64::max);
             let margin = widest + reach[i] + 1.0;
             let [from, to] = [low[i] - margin, high[i] + margin].map(|value| value.clamp(-1.0, 4.0e9) as i64);
             (from, (to - from + 1) as u32)

@@ -22,7 +22,7 @@ pub(crate) struct PageMap {
     row: Vec<u32>,
     /// Which of `numbers` each block behind the row is.
     blocks: Vec<u32>,
-    numbers: Vec<Box<[u32; BLOCK]>>,
+    numbers: Vec<[u32; BLOCK]>,
     count: u64,
 }
 
@@ -45,8 +45,7 @@ impl PageMap {
     fn with_row(count: u64, most: u64) -> Self {
         let row = count.min(most);
         let blocks = place((count - row).div_ceil(BLOCK as u64));
-        let numbers =
-            if blocks == 0 { Vec::new() } else { [0, u32::MAX].map(|v| Box::new([v; BLOCK])).into() };
+        let numbers = if blocks == 0 { Vec::new() } else { [0, u32::MAX].map(|v| [v; BLOCK]).into() };
         // Zeros that are never written take no memory.
         Self { row: vec![0; place(row)], blocks: vec![ZEROS; blocks], numbers, count }
     }
@@ -116,7 +115,7 @@ impl PageMap {
             return;
         }
         if at <= ONES {
-            let own = self.numbers[at as usize].clone();
+            let own = self.numbers[at as usize];
             at = self.numbers.len() as u32;
             self.numbers.push(own);
             self.blocks[block] = at;
