@@ -85,6 +85,16 @@ pub(crate) const fn family(k: u32, level: u32, slot: u64) -> u64 {
     level_slots(k, level).start + FAMILY * (slot - level_slots(k, level + 4).start)
 }
 
+/// The first slot of the row that begins with a vertex of `level`.
+#[cfg(test)]
+pub(super) fn first_along(k: u32, level: u32, p: crate::grid::GridPoint) -> Option<u64> {
+    if level & 1 == 1 {
+        WhiteAlong::new(k, level, p.x(), p.y()).next()
+    } else {
+        BlackAlong::new(k, level, p.x(), p.y()).next()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
