@@ -152,12 +152,12 @@ fn words_together(judge: &Judge, blocks: &[Block], words: &mut [[u32; LANES]]) {
 #[inline(always)]
 fn words_of(judge: &Judge, blocks: &[Block], words: &mut [[u32; LANES]], motion: Motion, culls: bool) {
     for (block, words) in blocks.iter().zip(words) {
-        for i in 0..LANES {
+        for (i, word) in words.iter_mut().enumerate() {
             let at_m = [block.east_m[i], block.north_m[i]];
             let sighting =
                 judge.metric.sight_ball(at_m, block.height_m[i], block.error_m[i], block.radius_m[i]);
             let life = judge.ball_life(&sighting, motion, culls);
-            words[i] = judge.word_of_life(&sighting, life, motion);
+            *word = judge.word_of_life(&sighting, life, motion);
         }
         for word in words {
             *word += judge.now[clock_of(*word)];
