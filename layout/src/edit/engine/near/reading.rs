@@ -29,7 +29,9 @@ impl<C: RecordCodec> Near<C> {
         for level in 0..NEAR_LEVELS.min(grid.levels()) {
             let step = 1 << (level / 2);
             for y in (self.south.next_multiple_of(step)..self.south + self.high).step_by(step as usize) {
-                let Some(x) = first_of_row(level, self.west, y) else { continue };
+                let Some(x) = first_of_row(level, self.west, y).filter(|x| *x < self.west + self.wide) else {
+                    continue;
+                };
                 if level & 1 == 1 {
                     self.read_row(2 * step, x, y, WhiteAlong::new(k, level, x, y), pages);
                 } else {
@@ -40,6 +42,9 @@ impl<C: RecordCodec> Near<C> {
         let step = COARSER.min(grid.side_steps());
         for y in (self.south.next_multiple_of(step)..self.south + self.high).step_by(step as usize) {
             let first = self.west.next_multiple_of(step);
+            if first >= self.west + self.wide {
+                break;
+            }
             let slots = (first..).step_by(step as usize).map(|x| slot_of(k, GridPoint::new(x, y)));
             self.read_row(step, first, y, slots, pages);
         }
@@ -58,18 +63,15 @@ impl<C: RecordCodec> Near<C> {
         apart: u32,
         x: u32,
         y: u32,
-        along: impl Iterator<Item = u64>,
+        mut along: impl Iterator<Item = u64>,
         pages: &mut Pages<C>,
     ) {
-        if x >= self.west + self.wide {
-            return;
-        }
         let (mut at, end) = (self.index(x, y), self.index(self.west, y) + self.row_length());
         let (slots, raws) = (&mut self.slots[..end], &mut self.raws[..end]);
-        for slot in along {
-            if at >= end {
-                break;
-            }
+        // What lies beyond the row is not asked for: it may lie beyond the square.
+        while at < end
+            && let Some(slot) = along.next()
+        {
             slots[at] = slot;
             raws[at] = pages.raw(slot);
             at += apart as usize;

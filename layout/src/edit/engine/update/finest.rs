@@ -181,9 +181,9 @@ fn farthest_level(samples: &[f64], at: usize, row: usize, s: usize) -> f64 {
         let base = out.map(|out| middle + out * j as f64);
         let reach = s - 1 - j;
         let lines = [at - j * row, at + j * row].map(|centre| &samples[centre - (s - 1)..centre + s]);
-        for i in s - 1 - reach..s + reach {
-            let rise = along * (i as f64 - (s - 1) as f64);
-            both(&mut best, [lines[0][i], lines[1][i]], base, [rise; 2]);
+        for i in 0..=2 * reach {
+            let rise = along * (i as f64 - reach as f64);
+            both(&mut best, [lines[0][j + i], lines[1][j + i]], base, [rise; 2]);
         }
     }
     larger(best[0], best[1])
