@@ -98,7 +98,7 @@ mod tests {
                     "{state} {frequency}"
                 );
             }
-            assert_eq!(u32::try_from(end).map_or(true, |state| step.is_full(state)), true);
+            assert!(u32::try_from(end).map_or(true, |state| step.is_full(state)));
         }
     }
 
