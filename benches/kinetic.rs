@@ -4,7 +4,7 @@
 //! incoherences, while turning, on the spot, and with a million triangles? What do the other ways to find expired words cost, and how
 //! much memory does it hold? Data: terrain files named on the command line. Command:
 //!
-//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE [--clusters]] [--walking]
+//!     cargo bench --bench kinetic -- TERRAIN.iqt [--frames 1500] [--profile INCOHERENCE | --pace METRES [--turn DEGREES]] [--clusters] [--walking]
 //!
 //! All engines fly the same frames in the same process, one after the other, three times over; a frame's time is the least of its three, and figures are
 //! medians over the last two thirds of the frames. One thread. Prints Markdown. Keep runs under benches/runs/.
@@ -34,7 +34,8 @@ const PASSES: usize = 3;
 fn main() -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let mut words = std::env::args().skip(1).filter(|w| w != "--bench");
-    let (mut path, mut frames, mut profile, mut only_walks) = (None, 1500, None, false);
+    let (mut path, mut frames, mut profile, mut pace, mut only_walks) = (None, 1500, None, None, false);
+    let mut turn_deg = 0.0;
     let mut culling = Culling::Vertices;
     while let Some(word) = words.next() {
         match word.as_str() {
@@ -42,6 +43,8 @@ fn main() -> Result<(), Failure> {
             "--profile" => {
                 profile = Some(words.next().ok_or("--profile wants a percentage")?.parse::<f64>()?)
             }
+            "--pace" => pace = Some(words.next().ok_or("--pace wants metres a frame")?.parse::<f64>()?),
+            "--turn" => turn_deg = words.next().ok_or("--turn wants degrees a frame")?.parse::<f64>()?,
             "--clusters" => culling = Culling::Clusters,
             "--walking" => only_walks = true,
             _ => path = Some(PathBuf::from(word)),
@@ -55,44 +58,54 @@ fn main() -> Result<(), Failure> {
     };
     let terrain = Terrain::open(&path)?;
     with_records!(terrain.records()?, records => {
-        match profile {
-            Some(percent) => fly_only(&terrain, &records, frames, percent, culling),
-            None if only_walks => walking(&terrain, &records),
-            None => report(&terrain, &records, frames),
+        match (profile, pace) {
+            (Some(percent), _) => fly_only(&records, &straight(&terrain, frames, percent, 1.0)?.0, culling),
+            (None, Some(speed_m)) => fly_only(&records, &plain(&terrain, frames, speed_m, turn_deg)?, culling),
+            _ if only_walks => walking(&terrain, &records),
+            _ => report(&terrain, &records, frames),
         }
     })
 }
 
-/// Flies with `kinetic` alone for a while, there and back again, for a profiler.
+/// Flies with `kinetic` alone for a while, there and back again, for a profiler, and to compare two binaries: other programs lengthen a leg and never shorten it.
 fn fly_only<C: RecordCodec>(
-    terrain: &Terrain,
     records: &Records<'_, C>,
-    frames: u64,
-    percent: f64,
+    flight: &[FlightFrame],
     culling: Culling,
 ) -> Result<(), Failure> {
-    let views = views(&straight(terrain, frames, percent, 1.0)?.0, 1.0);
+    let mut views = views(flight, 1.0);
     let mut engine = Kinetic::new(records.clone(), culling);
     let start = Instant::now();
-    let (mut updates, mut tests, mut changes) = (0u64, 0u64, 0u64);
+    let (mut tests, mut changes, mut legs) = (0u64, 0u64, Vec::new());
     while start.elapsed().as_secs() < 10 {
-        for view in views.iter().chain(views.iter().rev()) {
+        let (before, mut in_leg) = (cpu_ns(start), 0);
+        for view in &views {
             engine.update(view, &mut Unobserved);
             let work = engine.work();
-            updates += 1;
             tests += work.tests;
-            changes += work.splits + work.merges;
+            in_leg += work.splits + work.merges;
         }
+        changes += in_leg;
+        legs.push((cpu_ns(start) - before) / in_leg.max(1) as f64);
+        views.reverse();
     }
-    let seconds = start.elapsed().as_secs_f64();
+    // The first leg has the first frame.
+    let (updates, later) = ((legs.len() * views.len()) as f64, legs.get(1..).unwrap_or(&[]));
     println!(
-        "{updates} updates in {seconds:.1} s, {:.1} us each: {:.0} changes of {:.0} ns and {:.2} tests each",
-        seconds * 1e6 / updates as f64,
-        changes as f64 / updates as f64,
-        seconds * 1e9 / changes as f64,
-        tests as f64 / changes as f64
+        "{updates} updates: {:.0} changes and {:.2} tests a change; ns a change, of a leg: {:.0} at the least, {:.0} in the median",
+        changes as f64 / updates,
+        tests as f64 / changes as f64,
+        later.iter().copied().fold(f64::INFINITY, f64::min),
+        median(later.to_vec()),
     );
     Ok(())
+}
+
+/// Time in nanoseconds that this thread has run for, where the system tells, else time since `start`.
+fn cpu_ns(start: Instant) -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let run = told.and_then(|told| told.split_whitespace().next()?.parse().ok());
+    run.unwrap_or(start.elapsed().as_nanos() as f64)
 }
 
 /// A straight flight and its speed in metres a frame.

@@ -111,27 +111,15 @@ impl Metric {
     /// The vertex at horizontal position `at_m` as seen from the eye.
     #[inline(always)]
     pub fn sight(&self, at_m: [f64; 2], vertex: &Vertex) -> Sighting {
-        let height_m = vertex.height_m * self.exaggeration;
-        let offset_m = [at_m[0] - self.eye_m[0], at_m[1] - self.eye_m[1], height_m - self.eye_m[2]];
-        let [x, y, z] = offset_m;
-        let radius_m = vertex.radius_m * self.radius_factor;
+        let ball = self.sight_ball(at_m, vertex.height_m, vertex.error_m, vertex.radius_m);
+        if self.kind == ErrorMetric::Ball {
+            return ball;
+        }
+        let Sighting { offset_m, distance2, radius_m, .. } = ball;
+        let [x, y, _] = offset_m;
+        let across2 = x * x + y * y;
         let error_m = vertex.error_m * self.exaggeration;
         let seen_m = self.nu * error_m;
-        let across2 = x * x + y * y;
-        let distance2 = across2 + z * z;
-        if self.kind == ErrorMetric::Ball {
-            let reach_m = seen_m + radius_m;
-            let is_selected = distance2 < reach_m * reach_m;
-            return Sighting {
-                offset_m,
-                distance2,
-                reach_m,
-                radius_m,
-                span_m: radius_m,
-                ring_m: 0.0,
-                is_selected,
-            };
-        }
         let span_m = radius_m + error_m;
         let reach_m = seen_m + span_m;
         // On the fringe of a void the same tests make a ball.
@@ -142,6 +130,19 @@ impl Metric {
         // An endless error has no ring.
         let ring_m = if ring2_m < f64::INFINITY { 0.5 * ring2_m } else { 0.0 };
         Sighting { offset_m, distance2, reach_m, radius_m, span_m, ring_m, is_selected }
+    }
+
+    /// As [`Metric::sight`], by [`ErrorMetric::Ball`], of a vertex of that height, error and radius.
+    #[inline(always)]
+    pub(crate) fn sight_ball(&self, at_m: [f64; 2], height_m: f64, error_m: f64, radius_m: f64) -> Sighting {
+        let height_m = height_m * self.exaggeration;
+        let offset_m = [at_m[0] - self.eye_m[0], at_m[1] - self.eye_m[1], height_m - self.eye_m[2]];
+        let [x, y, z] = offset_m;
+        let radius_m = radius_m * self.radius_factor;
+        let distance2 = x * x + y * y + z * z;
+        let reach_m = self.nu * (error_m * self.exaggeration) + radius_m;
+        let is_selected = distance2 < reach_m * reach_m;
+        Sighting { offset_m, distance2, reach_m, radius_m, span_m: radius_m, ring_m: 0.0, is_selected }
     }
 
     /// Signed distance of the vertex from plane `i`, positive outside.

@@ -46,6 +46,7 @@ use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners};
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};
 use terrasoar_layout::read::store::{RawOf, RecordStore};
 use time::certificate::Judge;
+use time::certificate::batch::Batch;
 use time::clocks::Clocks;
 use time::course::Pose;
 use time::queue::{Entry, Queue};
@@ -93,6 +94,8 @@ pub struct Kinetic<S: RecordStore> {
     to_merge: [Vec<u32>; LEVELS],
     /// Records and words of the nodes being tested.
     verdicts: Vec<(RawOf<S>, u32)>,
+    /// Room for what is tested together.
+    batch: Option<Box<Batch>>,
     /// Entries that are over, of words that may have changed since.
     over: Vec<Entry>,
     /// Entries on their way from one clock to another.
@@ -133,6 +136,7 @@ impl<S: RecordStore> Kinetic<S> {
             to_split: Default::default(),
             to_merge: Default::default(),
             verdicts: Vec::new(),
+            batch: None,
             over: Vec::new(),
             waiting: Vec::new(),
             patch: Patch::default(),
@@ -195,6 +199,7 @@ impl<S: RecordStore> Kinetic<S> {
             + self.vertices.bytes()
             + self.queue.bytes()
             + lists.into_iter().chain(by_level).map(|l| l.capacity() * size_of::<u32>()).sum::<usize>()
+            + size_of::<Batch>()
             + self.verdicts.capacity() * size_of::<(RawOf<S>, u32)>()
             + (self.over.capacity() + self.waiting.capacity()) * size_of::<Entry>()
             + self.ahead.as_ref().map_or(0, |ahead| ahead.bytes())
@@ -273,6 +278,7 @@ impl<S: RecordStore> Kinetic<S> {
             settle(&mut self.waiting, 0);
         }
         settle(&mut self.verdicts, used);
+        self.nodes.clusters.settle(used);
         settle(&mut self.patch.vertices, used);
         settle(&mut self.patch.triangles, used);
         self.edits.settle(self.nodes.clusters.taken());

@@ -24,6 +24,9 @@ impl<S: RecordStore> Kinetic<S> {
         if self.has_jumped(moved.clocks) {
             self.uproot();
         }
+        for heads in [true, false] {
+            each_clock(moved.clocks, |clock| self.queue.fetch(clock, self.clocks.now(clock), heads));
+        }
         let mut clocks = moved.clocks;
         while clocks != 0 {
             let clock = clocks.trailing_zeros() as usize;
@@ -119,6 +122,15 @@ impl<S: RecordStore> Kinetic<S> {
             }
         }
         self.waiting = waiting;
+    }
+}
+
+/// Calls `each` with the clocks of a set.
+#[inline(always)]
+fn each_clock(mut clocks: u128, mut each: impl FnMut(usize)) {
+    while clocks != 0 {
+        each(clocks.trailing_zeros() as usize);
+        clocks &= clocks - 1;
     }
 }
 

@@ -8,18 +8,23 @@ use super::budget::Allowance;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::mesh::labels::level_of;
 use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
+use crate::refine::kinetic::mesh::tree::Fetch;
+use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch, Words};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::{Phase, Probe};
 #[cfg(feature = "files")]
 use rayon::prelude::*;
 use terrasoar_layout::grid::order::slot_of;
-use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::store::{RawOf, RecordStore};
 
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
-/// How many splits or merges ahead memory is asked for what: see [`Kinetic::fetch`].
-const FETCH_AHEAD: [(u32, usize); 3] = [(2, 6), (1, 4), (0, 2)];
+/// How many words ahead memory is asked for their places in the queue.
+const ENTER_AHEAD: usize = 6;
+/// How many splits or merges ahead memory is asked for what.
+const FETCH_AHEAD: [(Fetch, usize); 3] = [(Fetch::Node, 6), (Fetch::Near, 4), (Fetch::Far, 2)];
 
 impl<S: RecordStore> Kinetic<S> {
     /// Tests what is due, as far as the budget allows.
@@ -43,52 +48,100 @@ impl<S: RecordStore> Kinetic<S> {
     /// Tests nodes and sorts out those that are to be split or merged. Fresh ones have their records read first; where a record is away
     /// the node waits for it.
     fn test<P: Probe>(&mut self, nodes: &[u32], fresh: bool, judge: &Judge, probe: &mut P) {
-        let k = self.records.grid().k();
         let mut verdicts = std::mem::take(&mut self.verdicts);
-        let verdict = |node: &u32| {
-            let node = self.nodes.get(*node);
-            let point = node.point;
-            let raw = if fresh { self.records.get(slot_of(k, point)) } else { Some(node.raw) };
-            let Some(raw) = raw else { return (node.raw, UNREAD) };
-            let vertex = self.records.decode(raw, level_of(point));
-            (raw, judge.word(&judge.metric().sight(self.records.grid().position_m(point), &vertex)))
-        };
+        let mut batch = self.batch.take().unwrap_or_default();
+        self.work.tests += nodes.len() as u64;
         #[cfg(feature = "files")]
         let parallel = nodes.len() >= PARALLEL && rayon::current_num_threads() > 1;
         #[cfg(not(feature = "files"))]
         let parallel = false;
-        if parallel {
-            #[cfg(feature = "files")]
-            nodes.par_iter().with_min_len(PARALLEL / 8).map(verdict).collect_into_vec(&mut verdicts);
-        } else {
+        // By one thread, what has been tested is still at hand when it is entered.
+        for part in nodes.chunks(if parallel { nodes.len() } else { BATCH }) {
             verdicts.clear();
-            verdicts.extend(nodes.iter().map(verdict));
-        }
-        self.work.tests += nodes.len() as u64;
-        for (node, (raw, word)) in nodes.iter().zip(&verdicts) {
-            let record = self.nodes.get_mut(*node);
-            let (old, point) = (record.word, record.point);
-            if !S::IS_COMPLETE && *word == UNREAD {
-                record.word = UNREAD;
-                self.unread.push(*node);
-                continue;
+            verdicts.resize(part.len(), (S::Codec::INERT, UNREAD));
+            let batches = |batch: &mut Batch, part: &[u32], verdicts: &mut [(RawOf<S>, u32)]| {
+                for (nodes, verdicts) in part.chunks(BATCH).zip(verdicts.chunks_mut(BATCH)) {
+                    self.judge_batch(batch, nodes, fresh, judge, verdicts);
+                }
+            };
+            if parallel {
+                #[cfg(feature = "files")]
+                part.par_chunks(PARALLEL / 8)
+                    .zip(verdicts.par_chunks_mut(PARALLEL / 8))
+                    .for_each(|(part, verdicts)| batches(&mut Batch::default(), part, verdicts));
+            } else {
+                batches(&mut batch, part, &mut verdicts);
             }
-            if fresh {
-                probe.read(slot_of(k, point));
-                record.raw = *raw;
-            } else if expiry_of(old) != 0 {
-                // Twice in the list: it had been late, then gone, then come back.
-                continue;
-            }
-            record.word = *word | (old & SPLIT);
-            self.enter(clock_of(*word), Entry { node: *node, word: *word });
-            match (*word & ACTIVE != 0, old & SPLIT != 0) {
-                (true, false) => self.to_split[level_of(point) as usize].push(*node),
-                (false, true) => self.to_merge[level_of(point) as usize].push(*node),
-                _ => {}
+            for (i, (node, (raw, word))) in part.iter().zip(&verdicts).enumerate() {
+                if let Some((_, later)) = verdicts.get(i + ENTER_AHEAD) {
+                    self.queue.prefetch(clock_of(*later), *later);
+                }
+                self.take_verdict(*node, fresh, *raw, *word, probe);
             }
         }
-        self.verdicts = verdicts;
+        (self.verdicts, self.batch) = (verdicts, Some(batch));
+    }
+
+    /// Makes the words of up to [`BATCH`] nodes, and gives them with the nodes' records. [`UNREAD`] where those are away.
+    #[inline(always)]
+    fn judge_batch(
+        &self,
+        batch: &mut Batch,
+        nodes: &[u32],
+        fresh: bool,
+        judge: &Judge,
+        verdicts: &mut [(RawOf<S>, u32)],
+    ) {
+        let k = self.records.grid().k();
+        let together = judge.makes_batches();
+        for (i, (node, verdict)) in nodes.iter().zip(verdicts.iter_mut()).enumerate() {
+            let node = self.nodes.get(*node);
+            let raw = if fresh { self.records.get(slot_of(k, node.point)) } else { Some(node.raw) };
+            let Some(raw) = raw else { continue };
+            let vertex = self.records.decode(raw, level_of(node.point));
+            let at_m = self.records.grid().position_m(node.point);
+            *verdict = (raw, 0);
+            if together {
+                batch.set(i, at_m, &vertex);
+            } else {
+                verdict.1 = judge.word(&judge.metric().sight(at_m, &vertex));
+            }
+        }
+        if together {
+            let mut words = Words::default();
+            judge.words(batch, nodes.len(), &mut words);
+            for ((_, verdict), word) in verdicts.iter_mut().zip(words.as_flattened()) {
+                if S::IS_COMPLETE || *verdict != UNREAD {
+                    *verdict = *word;
+                }
+            }
+        }
+    }
+
+    /// Enters a node's new word, and lists the node if it is to be split or merged.
+    #[inline(always)]
+    fn take_verdict<P: Probe>(&mut self, node: u32, fresh: bool, raw: RawOf<S>, word: u32, probe: &mut P) {
+        let record = self.nodes.get_mut(node);
+        let (old, point) = (record.word, record.point);
+        if !S::IS_COMPLETE && word == UNREAD {
+            record.word = UNREAD;
+            self.unread.push(node);
+            return;
+        }
+        if fresh {
+            probe.read(slot_of(self.records.grid().k(), point));
+            record.raw = raw;
+        } else if expiry_of(old) != 0 {
+            // Twice in the list: it had been late, then gone, then come back.
+            return;
+        }
+        record.word = word | (old & SPLIT);
+        self.enter(clock_of(word), Entry { node, word });
+        match (word & ACTIVE != 0, old & SPLIT != 0) {
+            (true, false) => self.to_split[level_of(point) as usize].push(node),
+            (false, true) => self.to_merge[level_of(point) as usize].push(node),
+            _ => {}
+        }
     }
 
     /// Tests the children that splits have made.
@@ -104,7 +157,7 @@ impl<S: RecordStore> Kinetic<S> {
         let mut list = std::mem::take(&mut self.list);
         // From fine to coarse, so that children have merged before their parents.
         list.extend(self.to_merge.iter_mut().flat_map(|nodes| nodes.drain(..)));
-        self.in_order(&list, |engine, node| {
+        self.in_order(&list, Self::fetch_for_merge, |engine, node| {
             if engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == SPLIT {
                 engine.merge(node);
             }
@@ -119,7 +172,7 @@ impl<S: RecordStore> Kinetic<S> {
                 }
                 list.clear();
                 list.append(&mut self.to_split[level]);
-                let done = self.in_order(&list, |engine, node| {
+                let done = self.in_order(&list, Self::fetch_for_split, |engine, node| {
                     let wanted = engine.nodes.is_live(node) && engine.nodes.get(node).word & STATUS == ACTIVE;
                     if !wanted {
                         return true;
@@ -153,11 +206,16 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Does something to each node until that says no, and asks memory for what comes after it meanwhile. Tells how many nodes it was done to.
     #[inline(always)]
-    fn in_order(&mut self, nodes: &[u32], mut each: impl FnMut(&mut Self, u32) -> bool) -> usize {
+    fn in_order(
+        &mut self,
+        nodes: &[u32],
+        fetch: impl Fn(&Self, u32, Fetch),
+        mut each: impl FnMut(&mut Self, u32) -> bool,
+    ) -> usize {
         for (i, node) in nodes.iter().enumerate() {
-            for (ahead, distance) in FETCH_AHEAD {
+            for (what, distance) in FETCH_AHEAD {
                 if let Some(later) = nodes.get(i + distance) {
-                    self.fetch(*later, ahead);
+                    fetch(self, *later, what);
                 }
             }
             if !each(self, *node) {

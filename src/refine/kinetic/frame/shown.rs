@@ -87,7 +87,7 @@ impl<S: RecordStore> Kinetic<S> {
         let mut written = std::mem::take(&mut self.patch.triangles);
         let mut clusters = std::mem::replace(&mut self.nodes.clusters, Clusters::new(Dealing::Packed));
         clusters.take_written(|node, side| {
-            written.push((2 * node + side as u32, self.shown(node, self.nodes.triangles(node)[side])));
+            written.push((2 * node + side as u32, self.shown(node, self.nodes.triangle(node, side))));
         });
         self.nodes.clusters = clusters;
         self.patch.triangles = written;

@@ -8,6 +8,7 @@
 
 use super::bounds::{Bounds, BoundsColumns};
 use crate::metric::{BoxPlane, PLANES};
+use crate::refine::kinetic::capacity::settle;
 use std::ops::Range;
 
 /// Nodes of a cluster.
@@ -15,30 +16,34 @@ pub(crate) const CLUSTER: usize = 128;
 /// No cluster.
 const NONE: u32 = u32::MAX;
 
+/// A cache line. How many places are taken stands beside the bits, because a processor waits where many bytes are read at once that were written one by one.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 struct Cluster {
-    /// Bit i % 64 of word i / 64: place i is taken. Two words, because a processor waits where 16 bytes are read that were written as twice 8.
+    /// Bit i % 64 of word i / 64: place i is taken.
     taken: [u64; 2],
-    /// The same of side s: slot 2 i + s has changed.
-    written: [[u64; 2]; 2],
+    /// The same of slots: slot i has changed.
+    written: [u64; 4],
     /// Where children go when this cluster is full, and which use of that cluster is meant.
     spill: (u32, u32),
     /// How often the cluster has been emptied.
     use_count: u32,
+    /// Places taken.
+    used: u16,
 }
 
 impl Cluster {
     fn is_full(&self) -> bool {
-        self.taken == [u64::MAX; 2]
+        usize::from(self.used) == CLUSTER
     }
 
     fn is_empty(&self) -> bool {
-        self.taken == [0; 2]
+        self.used == 0
     }
 
     /// Whether a slot has changed.
     fn is_written(&self) -> bool {
-        self.written != [[0; 2]; 2]
+        self.written != [0; 4]
     }
 }
 
@@ -62,7 +67,7 @@ pub(crate) struct Clusters {
     first_open: usize,
     /// Near: empty clusters. May hold others as well.
     empty: Vec<u32>,
-    /// Clusters with slots that have changed.
+    /// Slots that have changed, each once.
     written: Vec<u32>,
     /// Clusters that are not there, of whose slots receivers of patches still have what a mesh before this one showed.
     stale: Range<usize>,
@@ -118,11 +123,12 @@ impl Clusters {
     }
 
     fn take_in(&mut self, cluster: usize) -> u32 {
-        let taken = &mut self.clusters[cluster].taken;
-        let word = usize::from(taken[0] == u64::MAX);
-        let place = (!taken[word]).trailing_zeros();
-        taken[word] |= 1 << place;
-        if self.clusters[cluster].is_full() {
+        let present = &mut self.clusters[cluster];
+        let word = usize::from(present.taken[0] == u64::MAX);
+        let place = (!present.taken[word]).trailing_zeros();
+        present.taken[word] |= 1 << place;
+        present.used += 1;
+        if present.is_full() {
             self.open[cluster / 64] &= !(1 << (cluster % 64));
         }
         self.taken += 1;
@@ -171,12 +177,13 @@ impl Clusters {
     fn new_cluster(&mut self) -> usize {
         let cluster = self.clusters.len();
         let is_stale = self.stale.contains(&cluster);
-        let written = if is_stale { [[u64::MAX; 2]; 2] } else { [[0; 2]; 2] };
+        let written = if is_stale { [u64::MAX; 4] } else { [0; 4] };
         if is_stale {
             self.stale.start = cluster + 1;
-            self.written.push(cluster as u32);
+            let slots = 2 * CLUSTER;
+            self.written.extend((cluster * slots) as u32..((cluster + 1) * slots) as u32);
         }
-        self.clusters.push(Cluster { taken: [0; 2], written, spill: (NONE, 0), use_count: 0 });
+        self.clusters.push(Cluster { taken: [0; 2], written, spill: (NONE, 0), use_count: 0, used: 0 });
         self.bounds.push_empty();
         self.open.resize(cluster / 64 + 1, 0);
         self.open[cluster / 64] |= 1 << (cluster % 64);
@@ -209,11 +216,13 @@ impl Clusters {
         for cluster in 0..nodes.div_ceil(fill) {
             self.new_cluster();
             let taken = (nodes - cluster * fill).min(fill);
-            self.clusters[cluster].taken = [0, 64].map(|from| {
+            let filled = &mut self.clusters[cluster];
+            filled.taken = [0, 64].map(|from| {
                 u64::MAX.checked_shr(64 - taken.saturating_sub(from).min(64) as u32).unwrap_or(0)
             });
-            self.clusters[cluster].written = [[0; 2]; 2];
-            if self.clusters[cluster].is_full() {
+            filled.used = taken as u16;
+            filled.written = [0; 4];
+            if filled.is_full() {
                 self.open[cluster / 64] &= !(1 << (cluster % 64));
             }
         }
@@ -226,12 +235,14 @@ impl Clusters {
         let index = place as usize / CLUSTER;
         let cluster = &mut self.clusters[index];
         cluster.taken[place as usize / 64 % 2] &= !(1 << (place % 64));
+        cluster.used -= 1;
         let is_empty = cluster.is_empty();
+        if is_empty {
+            cluster.use_count = cluster.use_count.wrapping_add(1);
+        }
         self.open[index / 64] |= 1 << (index % 64);
         self.taken -= 1;
         if is_empty {
-            let cluster = &mut self.clusters[index];
-            cluster.use_count = cluster.use_count.wrapping_add(1);
             self.bounds.set(index, Bounds::EMPTY);
         }
         if self.dealing == Dealing::Packed {
@@ -257,31 +268,26 @@ impl Clusters {
     /// Notes that the slot of a place's side shows something else now.
     #[inline(always)]
     pub(crate) fn touch(&mut self, place: u32, side: usize) {
-        let index = place as usize / CLUSTER;
-        let cluster = &mut self.clusters[index];
-        if !cluster.is_written() {
-            self.written.push(index as u32);
+        let slot = 2 * place + side as u32;
+        let word = &mut self.clusters[place as usize / CLUSTER].written[slot as usize / 64 % 4];
+        if *word >> (slot % 64) & 1 == 0 {
+            *word |= 1 << (slot % 64);
+            self.written.push(slot);
         }
-        cluster.written[side][place as usize / 64 % 2] |= 1 << (place % 64);
     }
 
-    /// Hands out the slots that have changed, as places and sides, cluster by cluster in order.
+    /// Hands out the slots that have changed, as places and sides, in the order in which they changed first.
     pub(crate) fn take_written(&mut self, mut each: impl FnMut(u32, usize)) {
-        for index in self.written.drain(..) {
-            let written = std::mem::take(&mut self.clusters[index as usize].written);
-            for word in 0..2 {
-                let mut either = written[0][word] | written[1][word];
-                while either != 0 {
-                    let place = either.trailing_zeros();
-                    either &= either - 1;
-                    for (side, written) in written.iter().enumerate() {
-                        if written[word] >> place & 1 == 1 {
-                            each(index * CLUSTER as u32 + 64 * word as u32 + place, side);
-                        }
-                    }
-                }
-            }
+        for slot in self.written.drain(..) {
+            // All others of the word are in the list as well.
+            self.clusters[slot as usize / (2 * CLUSTER)].written[slot as usize / 64 % 4] = 0;
+            each(slot / 2, slot as usize % 2);
         }
+    }
+
+    /// Gives memory back that a frame which changed `used` slots has no need of.
+    pub(crate) fn settle(&mut self, used: usize) {
+        settle(&mut self.written, used);
     }
 
     /// How places are dealt out.

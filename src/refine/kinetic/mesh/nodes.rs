@@ -179,8 +179,10 @@ impl<R: Copy> Nodes<R> {
     pub(crate) fn sides(&self, node: u32, level: u32) -> [Option<Side>; 2] {
         let parents = self.get(node).parents;
         let side = |side: usize| {
-            let first = first_child(self.label(node, side), level);
-            (parents[side] != NONE).then_some(Side { parent: parents[side], first, last: (first + 3) & 3 })
+            let label = self.label(node, side);
+            let first = first_child(label, level);
+            let last = (first + 3) & 3;
+            (parents[side] != NONE).then_some(Side { parent: parents[side], label, first, last })
         };
         [side(0), side(1)]
     }
@@ -188,24 +190,26 @@ impl<R: Copy> Nodes<R> {
     /// What the two slots of a place show: triangles of vertex slots, counter-clockwise, apex first.
     #[inline]
     pub(crate) fn triangles(&self, node: u32) -> [Option<[u32; 3]>; 2] {
-        let Node { word, parents, body, point, .. } = self.get(node);
+        [0, 1].map(|side| self.triangle(node, side))
+    }
+
+    /// What one slot of a place shows. With few branches, because no processor can predict what has changed.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, node: u32, side: usize) -> Option<[u32; 3]> {
+        let record = self.get(node);
+        let Node { word, parents, body, point, .. } = record;
         if *word & !STATUS == NO_VERTEX {
             // Whatever is free has no owner; an annex shows the last half of each side.
-            let Some(owner) = (parents[0] != NONE).then(|| self.get(parents[0])) else { return [None; 2] };
-            return [0, 1].map(|side| {
-                let [here, apex, _, q] = half(owner, side);
-                (owner.parents[side] != NONE).then_some([here, q, apex])
-            });
+            let owner = (parents[0] != NONE).then(|| self.get(parents[0]))?;
+            let [here, apex, _, q] = half(owner, side);
+            return (owner.parents[side] != NONE).then_some([here, q, apex]);
         }
+        let [here, apex, p, q] = half(record, side);
         let split = *word & SPLIT != 0;
-        if split && level_of(*point) > 0 {
-            return [None; 2];
-        }
-        [0, 1].map(|side| {
-            let [here, apex, p, q] = half(self.get(node), side);
-            let shown = if split { [here, apex, p] } else { [apex, p, q] };
-            (parents[side] != NONE && body[body::P] != NONE).then_some(shown)
-        })
+        let shown =
+            [if split { here } else { apex }, if split { apex } else { p }, if split { p } else { q }];
+        let has_some = (parents[side] != NONE) & (body[body::P] != NONE) & !(split & (level_of(*point) > 0));
+        has_some.then_some(shown)
     }
 }
 
@@ -224,6 +228,8 @@ pub(crate) fn half<R>(node: &Node<R>, side: usize) -> [u32; 4] {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Side {
     pub parent: u32,
+    /// The node's label at that parent.
+    pub label: usize,
     /// Between parent and edge end p, counter-clockwise: child triangle (v; parent, p).
     pub first: usize,
     /// Between edge end q and parent: child triangle (v; q, parent).

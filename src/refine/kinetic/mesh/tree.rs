@@ -2,7 +2,7 @@
 //!
 //! Invariant: after each call all of `super::nodes` holds, and the slots that show something else have been noted. A split makes two triangles of
 //! each of a node's one or two, a merge the reverse. Cost: six slots, at most four nodes made or freed. Most of the time is the wait for memory, which
-//! [`Kinetic::fetch`] shortens by prefetching a node's relatives some splits ahead.
+//! [`Fetch`] shortens by prefetching a node's relatives some splits ahead.
 
 use super::labels::{child_point, level_of};
 use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
@@ -11,6 +11,14 @@ use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::read::prefetch::prefetch;
 use terrasoar_layout::read::store::RecordStore;
+
+/// What is asked of memory ahead of a split or merge. Each needs what the one before has brought.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Fetch {
+    Node,
+    Near,
+    Far,
+}
 
 impl<S: RecordStore> Kinetic<S> {
     /// The child of a split node that lies at `at`; `None` at the finest level, where there are none.
@@ -62,26 +70,44 @@ impl<S: RecordStore> Kinetic<S> {
         self.nodes.clusters.set_bounds(cluster, bounds);
     }
 
-    /// Asks memory for what splitting or merging a node will look at. `ahead` 2: itself; 1: its vertices and parents; 0: its neighbours.
+    /// Asks memory for what splitting a node will look at, in order: itself; its parents; its neighbours.
     #[inline(always)]
-    pub(crate) fn fetch(&self, node: u32, ahead: u32) {
-        // A record may begin in one cache line and end in the next.
-        let both_lines = |node: u32| [0, 1].iter().for_each(|i| prefetch(&self.nodes.all, node as usize + i));
-        if ahead == 2 {
-            return both_lines(node);
-        }
-        // The place may have been given up since.
-        let Some(node) = self.nodes.all.get(node as usize) else { return };
-        let parents = node.parents.into_iter().filter(|parent| *parent != NONE);
-        if ahead == 1 {
-            parents.for_each(both_lines);
-        } else {
+    pub(crate) fn fetch_for_split(&self, node: u32, what: Fetch) {
+        match what {
+            Fetch::Node => self.fetch(node),
+            Fetch::Near => self.parents(node).for_each(|parent| self.fetch(parent)),
             // The neighbours around each parent, which its body names.
-            parents.for_each(|parent| {
-                let parent = self.nodes.all.get(parent as usize);
-                parent.into_iter().flat_map(|parent| &parent.body[..4]).for_each(|child| both_lines(*child))
-            });
+            Fetch::Far => self.parents(node).for_each(|parent| self.fetch_children(parent)),
         }
+    }
+
+    /// Asks memory for what merging a node will look at: itself; then its children.
+    #[inline(always)]
+    pub(crate) fn fetch_for_merge(&self, node: u32, what: Fetch) {
+        match what {
+            Fetch::Node => self.fetch(node),
+            Fetch::Near => self.fetch_children(node),
+            Fetch::Far => {}
+        }
+    }
+
+    /// A record may begin in one cache line and end in the next.
+    #[inline(always)]
+    fn fetch(&self, node: u32) {
+        [0, 1].iter().for_each(|i| prefetch(&self.nodes.all, node as usize + i));
+    }
+
+    #[inline(always)]
+    fn fetch_children(&self, node: u32) {
+        let node = self.nodes.all.get(node as usize);
+        node.into_iter().flat_map(|node| &node.body[..4]).for_each(|child| self.fetch(*child));
+    }
+
+    /// The parents of a node, whose place may have been given up since.
+    #[inline(always)]
+    fn parents(&self, node: u32) -> impl Iterator<Item = u32> + use<S> {
+        let parents = self.nodes.all.get(node as usize).map_or([NONE; 2], |node| node.parents);
+        parents.into_iter().filter(|parent| *parent != NONE)
     }
 
     /// Splits a node. `false`, and nothing done, if a triangle on one of its sides is yet to come.
@@ -143,9 +169,8 @@ impl<S: RecordStore> Kinetic<S> {
         corners: [u32; 3],
     ) {
         // The neighbour around the parent that shares the child.
-        let own = self.nodes.label(node, usize::from(self.nodes.get(node).parents[1] == side.parent));
         let turn = if label == side.first { 3 } else { 1 };
-        let neighbour = self.nodes.get(side.parent).body[(own + turn) & 3];
+        let neighbour = self.nodes.get(side.parent).body[(side.label + turn) & 3];
         let shared = if neighbour != NONE && self.nodes.is_split(neighbour) {
             self.nodes.get(neighbour).body[(label + 2) & 3]
         } else {

@@ -26,10 +26,12 @@
 //!
 //! Where a course has no direction, L = m(0). Everything is rounded towards a shorter life. Cost: two square roots a vertex, and one a plane while turning.
 
-use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, band_of, clock_id};
+use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, band_of, clock_id, power_of_two};
 use super::course::Course;
 use super::ring;
 use crate::metric::{Metric, PLANES, Sighting};
+use crate::view::ErrorMetric;
+use batch::Way;
 use glam::DVec3;
 
 /// Status bit: the vertex is selected and not culled.
@@ -78,6 +80,19 @@ pub(crate) struct Judge {
     now: [u32; CLOCKS],
     ticks_per_m: f64,
     bands_per_m: f64,
+    way: Way,
+}
+
+/// What happens to the view on a course, as far as tests ask. Each motion is a loop of its own where vertices are tested together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Motion {
+    None,
+    /// The eye stays and the view turns.
+    Turn,
+    /// The eye moves.
+    Way,
+    /// The eye moves and the view turns by the way.
+    Bend,
 }
 
 /// What a margin rests on.
@@ -117,6 +132,8 @@ impl Judge {
             now: clocks.all_now(),
             ticks_per_m: clocks.ticks_per_m(),
             bands_per_m: clocks.bands_per_m(),
+            // Rings take many more steps, by ways that differ.
+            way: if metric.kind() == ErrorMetric::Ball { Way::best() } else { Way::Single },
             metric,
         }
     }
@@ -132,45 +149,87 @@ impl Judge {
         &self.metric
     }
 
+    /// What happens to the view on the course.
+    #[inline(always)]
+    fn motion(&self) -> Motion {
+        match (self.moves, self.turns && self.culls) {
+            (false, false) => Motion::None,
+            (false, true) => Motion::Turn,
+            (true, false) => Motion::Way,
+            // A course that has both turns by the way.
+            (true, true) => Motion::Bend,
+        }
+    }
+
     /// The word of a vertex: its status by the same operations as every engine's, and its certificate.
     #[inline(always)]
     pub(crate) fn word(&self, sighting: &Sighting) -> u32 {
-        let life = self.life(sighting);
+        let motion = self.motion();
+        let life = if sighting.ring_m() == 0.0 {
+            self.ball_life(sighting, motion, self.culls)
+        } else {
+            self.ring_life(sighting, motion)
+        };
+        let word = self.word_of_life(sighting, life, motion);
+        word + self.now[clock_of(word)]
+    }
+
+    /// The word of a life, its expiry counted from now.
+    #[inline(always)]
+    fn word_of_life(&self, sighting: &Sighting, life: Life, motion: Motion) -> u32 {
         let margin_m = life.margin_m - sighting.guard_m();
         let band = band_of(life.scale_m * self.bands_per_m);
-        let band_m = f64::from(1u32 << band) / self.bands_per_m;
-        let margin_m = if self.turns && !self.moves && life.kind == Kind::Planes {
-            margin_m.min(self.turning_margin_m(sighting, &life, band_m))
+        let band_m = power_of_two(band) / self.bands_per_m;
+        let margin_m = if motion == Motion::Turn {
+            let turning_m = margin_m.min(self.turning_margin_m(sighting, &life, band_m));
+            if life.kind == Kind::Planes { turning_m } else { margin_m }
         } else {
             margin_m
         };
         // Beyond half a band zooming would no longer be bounded by its first order.
         let margin_m = if band < BANDS - 1 { margin_m.min(0.5 * band_m) } else { margin_m };
         let clock = clock_id(self.course, life.kind, band);
-        // Negative and NaN margins saturate to 0.
-        let ticks = ((margin_m * self.ticks_per_m) as u32).min(HORIZON);
-        u32::from(life.active) << 31 | (clock as u32) << CLOCK_SHIFT | (self.now[clock] + ticks)
+        u32::from(life.active) << 31 | (clock as u32) << CLOCK_SHIFT | ticks(margin_m * self.ticks_per_m)
     }
 
+    /// The life of a vertex whose errors show alike from everywhere.
     #[inline(always)]
-    fn life(&self, sighting: &Sighting) -> Life {
-        let distance_m = sighting.distance_m();
-        let reach_m = sighting.reach_m();
-        let selected = sighting.is_selected();
-        if self.turn_per_m > 0.0 && selected && self.culls {
-            return self.turning_life(sighting, distance_m, reach_m);
+    fn ball_life(&self, sighting: &Sighting, motion: Motion, culls: bool) -> Life {
+        let (selected, reach_m) = (sighting.is_selected(), sighting.reach_m());
+        let margin_m = self.error_margin_m(sighting, motion);
+        let scale_m = if selected { reach_m } else { sighting.distance_m() };
+        if motion != Motion::Bend {
+            return self.weigh(sighting, margin_m, scale_m, motion, culls);
         }
-        let (margin_m, scale_m) = if sighting.ring_m() == 0.0 {
-            let margin_m = self.error_margin_m(sighting, selected, distance_m, reach_m);
-            (margin_m, if selected { reach_m } else { distance_m })
-        } else {
-            // Near the axis of the ring an error may grow beyond the distance before it shows.
-            (
-                ring::margin_m(sighting, self.moves.then_some(self.direction), self.rate),
-                distance_m.max(reach_m),
-            )
-        };
-        if !self.culls {
+        let now_m = reach_m - sighting.distance_m();
+        let bending = self.bending_life(sighting, now_m, self.chord_m(sighting, reach_m));
+        // Field by field, so that no branch comes of it.
+        Life {
+            active: selected & bending.active,
+            kind: if selected { Kind::Planes } else { Kind::Error },
+            margin_m: if selected { bending.margin_m } else { margin_m },
+            scale_m: if selected { bending.scale_m } else { scale_m },
+        }
+    }
+
+    /// The life of a vertex whose errors are measured along the line of sight.
+    #[inline(never)]
+    fn ring_life(&self, sighting: &Sighting, motion: Motion) -> Life {
+        if motion == Motion::Bend && sighting.is_selected() {
+            return self.bending_life(sighting, sighting.margin_m(), ring::chord_m(sighting, self.direction));
+        }
+        // Near the axis of the ring an error may grow beyond the distance before it shows.
+        let margin_m = ring::margin_m(sighting, self.moves.then_some(self.direction), self.rate);
+        let scale_m = sighting.distance_m().max(sighting.reach_m());
+        let culls = self.culls && motion != Motion::Bend;
+        self.weigh(sighting, margin_m, scale_m, motion, culls)
+    }
+
+    /// The life of a vertex with that margin of the error test, planes included if it `culls`.
+    #[inline(always)]
+    fn weigh(&self, sighting: &Sighting, margin_m: f64, scale_m: f64, motion: Motion, culls: bool) -> Life {
+        let selected = sighting.is_selected();
+        if !culls {
             return Life { active: selected, kind: Kind::Error, margin_m, scale_m };
         }
         let radius_m = sighting.radius_m();
@@ -185,8 +244,8 @@ impl Judge {
         let culled = outside_m > 0.0;
         let planes_m = if culled { outside_m } else { margin_m.min(inside_m) };
         // While the eye moves on by what the margin allows, turning acts on a longer arm.
-        let arm_m = if self.moves { planes_m / self.rate } else { 0.0 };
-        let arm_m = if culled { distance_m } else { reach_m } + arm_m;
+        let arm_m = if motion == Motion::Way { planes_m / self.rate } else { 0.0 };
+        let arm_m = if culled { sighting.distance_m() } else { sighting.reach_m() } + arm_m;
         Life {
             active: selected & !culled,
             kind: if selected { Kind::Planes } else { Kind::Error },
@@ -196,63 +255,53 @@ impl Judge {
     }
 
     /// What a margin that rests on the planes may be if the view turns on the spot.
-    #[inline(never)]
+    #[inline(always)]
     fn turning_margin_m(&self, sighting: &Sighting, life: &Life, band_m: f64) -> f64 {
         let arm_m = self.arm_m(sighting);
         let (mut inside, mut outside_m) = (f64::INFINITY, 0.0f64);
         for i in 0..PLANES {
             let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
             let sweep_m = dot(self.sweeps[i], sighting.offset_m());
-            if life.active {
-                inside = inside.min(used_up_at((-beyond).max(0.0), sweep_m, arm_m));
-            } else if beyond > 0.0 {
-                // Each plane may vouch by itself.
-                let turn = used_up_at(beyond, -sweep_m, arm_m);
-                outside_m = outside_m.max(beyond.min(self.rate * band_m * turn));
-            }
+            let (margin, slope) = if life.active { (-beyond, sweep_m) } else { (beyond, -sweep_m) };
+            let turn = used_up_at(margin.max(0.0), slope, arm_m);
+            inside = inside.min(turn);
+            // Each plane may vouch by itself.
+            let vouched_m = beyond.min(self.rate * band_m * turn);
+            outside_m = outside_m.max(if beyond > 0.0 { vouched_m } else { 0.0 });
         }
         if life.active { self.rate * band_m * inside } else { outside_m }
     }
 
-    /// The life of a selected vertex on a course that goes along and turns.
-    #[inline(never)]
-    fn turning_life(&self, sighting: &Sighting, distance_m: f64, reach_m: f64) -> Life {
+    /// The life of a selected vertex on a course that goes along and turns; the error test's margin, and the way along the course until it ends.
+    #[inline(always)]
+    fn bending_life(&self, sighting: &Sighting, margin_m: f64, chord_m: f64) -> Life {
         let arm_m = self.arm_m(sighting);
         let bend = self.turn_per_m * (arm_m * self.turn_per_m + 2.0);
-        let mut margins_m = [0.0; PLANES];
-        let mut ways_m = [0.0; PLANES];
-        for i in 0..PLANES {
+        // Of each plane: how far the sphere is beyond it, and the way until that changes sign.
+        let plane = |i: usize| {
             let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
             let grows = self.slopes[i] + self.turn_per_m * dot(self.sweeps[i], sighting.offset_m());
-            margins_m[i] = beyond;
-            ways_m[i] = used_up_at(beyond.abs(), if beyond > 0.0 { -grows } else { grows }, bend);
-        }
-        let culled = margins_m.iter().any(|beyond| *beyond > 0.0);
-        let nearest = if culled { distance_m } else { reach_m };
+            let way_m = used_up_at(beyond.abs(), if beyond > 0.0 { -grows } else { grows }, bend);
+            (beyond, way_m)
+        };
+        let planes = [plane(0), plane(1), plane(2), plane(3)];
+        let inside_m = fold(&planes, margin_m, |least, (beyond, _)| least.min(-beyond));
+        let least_m = fold(&planes, chord_m, |least, (_, way_m)| least.min(way_m));
+        let outside = |beyond: f64, m: f64| if beyond > 0.0 { m } else { 0.0 };
+        let most_m = fold(&planes, 0.0, |most, (beyond, way_m)| most.max(outside(beyond, way_m)));
+        let culled = fold(&planes, 0.0, |most, (beyond, _)| most.max(beyond)) > 0.0;
+        let nearest = if culled { sighting.distance_m() } else { sighting.reach_m() };
         // A way of many times the distance would weigh on every turn.
         let longest_m = 4.0 * nearest;
-        let (way_m, margin_m) = if culled {
-            let outside = (0..PLANES).filter(|i| margins_m[*i] > 0.0);
-            (outside.map(|i| ways_m[i]).fold(0.0, f64::max).min(longest_m), f64::INFINITY)
-        } else {
-            let (margin_m, chord_m) = if sighting.ring_m() == 0.0 {
-                (reach_m - distance_m, self.chord_m(sighting, reach_m))
-            } else {
-                (sighting.margin_m(), ring::chord_m(sighting, self.direction))
-            };
-            let inside_m = margins_m.iter().fold(margin_m, |least, beyond| least.min(-beyond));
-            (ways_m.iter().copied().fold(chord_m.min(longest_m), f64::min), inside_m)
-        };
+        let way_m = if culled { most_m } else { least_m }.min(longest_m);
         let scale_m = nearest + way_m;
-        let band_m = f64::from(1u32 << band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
+        let band_m = power_of_two(band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
         let counted_per_m = self.rate * (1.0 + band_m * self.turn_per_m);
-        let margin_m = if culled {
-            // Each plane may vouch by itself.
-            let vouched = |i: usize| margins_m[i].min(counted_per_m * ways_m[i].min(longest_m));
-            (0..PLANES).filter(|i| margins_m[*i] > 0.0).map(vouched).fold(0.0, f64::max)
-        } else {
-            margin_m.min(counted_per_m * way_m)
-        };
+        // Each plane may vouch by itself.
+        let outside_m = fold(&planes, 0.0, |most, (beyond, way_m)| {
+            most.max(outside(beyond, beyond.min(counted_per_m * way_m.min(longest_m))))
+        });
+        let margin_m = if culled { outside_m } else { inside_m.min(counted_per_m * way_m) };
         Life { active: !culled, kind: Kind::Planes, margin_m, scale_m }
     }
 
@@ -275,11 +324,12 @@ impl Judge {
 
     /// The margin of the error test. Written without branches, because no processor can predict the answer.
     #[inline(always)]
-    fn error_margin_m(&self, sighting: &Sighting, selected: bool, distance_m: f64, reach_m: f64) -> f64 {
-        let rate = self.rate;
+    fn error_margin_m(&self, sighting: &Sighting, motion: Motion) -> f64 {
+        let (distance_m, reach_m) = (sighting.distance_m(), sighting.reach_m());
+        let (rate, selected) = (self.rate, sighting.is_selected());
         let across2 = 1.0 - rate * rate;
         let now_m = (reach_m - distance_m).abs();
-        if !self.moves {
+        if matches!(motion, Motion::None | Motion::Turn) {
             return now_m;
         }
         // Way along the course to the foot of the vertex, and squares of the distances.
@@ -301,6 +351,20 @@ impl Judge {
     }
 }
 
+/// Whole ticks of a life, no more than [`HORIZON`]: rounded down, and of some whole numbers one less. Negative lives become 0, and so does what is no number.
+#[inline(always)]
+fn ticks(life: f64) -> u32 {
+    // From here on numbers are as far apart as whole ones. No other conversion becomes a vector instruction.
+    const WHOLE: f64 = (1u64 << 52) as f64;
+    (life.max(0.5).min(f64::from(HORIZON)) - 0.5 + WHOLE).to_bits() as u32
+}
+
+/// A fold without a loop: of loops within loops the compiler makes no vector instructions.
+#[inline(always)]
+fn fold<T: Copy>([a, b, c, d]: &[T; PLANES], start: f64, each: impl Fn(f64, T) -> f64) -> f64 {
+    each(each(each(each(start, *a), *b), *c), *d)
+}
+
 #[inline(always)]
 fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
     a * x + b * y + c * z
@@ -310,8 +374,10 @@ fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
 #[inline(always)]
 fn used_up_at(margin: f64, slope: f64, bend: f64) -> f64 {
     let root = (slope * slope + 2.0 * bend * margin).sqrt();
-    if slope > 0.0 { 2.0 * margin / (slope + root) } else { (root - slope) / bend }
+    let (part, whole) = if slope > 0.0 { (2.0 * margin, slope + root) } else { (root - slope, bend) };
+    part / whole
 }
 
+pub(crate) mod batch;
 #[cfg(test)]
 mod tests;

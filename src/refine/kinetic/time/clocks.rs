@@ -232,6 +232,12 @@ pub(crate) fn band_of(scale: f64) -> usize {
     ((bits >> 52) as i64 - 1023).clamp(0, BANDS as i64 - 1) as usize
 }
 
+/// 2^exponent, for small exponents, by its bits.
+#[inline(always)]
+pub(crate) fn power_of_two(exponent: usize) -> f64 {
+    f64::from_bits((exponent as u64 + 1023) << 52)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -257,6 +263,7 @@ mod tests {
         ] {
             let band = band_of(scale);
             assert!(band == BANDS - 1 || scale <= f64::from(1u32 << band), "{scale} {band}");
+            assert_eq!(power_of_two(band), f64::from(1u32 << band));
             assert!(band == 0 || band == BANDS - 1 || scale > f64::from(1u32 << (band - 1)));
         }
     }

@@ -11,6 +11,7 @@
 use super::clocks::{CLOCKS, EXPIRY_BITS};
 use crate::refine::kinetic::capacity::give_up;
 use crate::refine::kinetic::chunked::Chunked;
+use terrasoar_layout::read::prefetch::prefetch;
 
 /// Bits of a digit.
 const DIGIT: u32 = 6;
@@ -22,6 +23,9 @@ const LEVELS: usize = EXPIRY_BITS.div_ceil(DIGIT) as usize;
 const NONE: u32 = u32::MAX;
 /// Entries a chunk, which is two cache lines that a processor brings together.
 const CHUNK_ENTRIES: usize = 15;
+
+/// How many entries ahead memory is asked for where they move to.
+const MOVE_AHEAD: usize = 6;
 
 /// A node and the word it had when it was entered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -44,19 +48,36 @@ struct Chunk {
     entries: [Entry; CHUNK_ENTRIES],
 }
 
-/// The wheel of one clock.
+/// The wheel of one clock. All but its heads is one cache line.
 #[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
 struct Wheel {
-    now: u32,
     /// Bit s of level l: slot s holds something.
     occupied: [u64; LEVELS],
     /// Entries of a level.
     counts: [u32; LEVELS],
+    now: u32,
     heads: [[u32; SLOTS]; LEVELS],
+}
+
+impl Wheel {
+    /// Level and slot of what is over at `expiry`.
+    #[inline(always)]
+    fn place(&self, expiry: u32) -> (usize, usize) {
+        let expiry = expiry.max(self.now);
+        let differing = expiry ^ self.now;
+        let level = (31 - (differing | 1).leading_zeros()) / DIGIT;
+        ((level as usize).min(LEVELS - 1), (expiry >> (level * DIGIT)) as usize % SLOTS)
+    }
 }
 
 const EMPTY: Wheel =
     Wheel { now: 0, occupied: [0; LEVELS], counts: [0; LEVELS], heads: [[NONE; SLOTS]; LEVELS] };
+
+fn all_empty() -> Box<[Wheel; CLOCKS]> {
+    let all: Box<[Wheel]> = vec![EMPTY; CLOCKS].into();
+    all.try_into().unwrap_or_else(|_| unreachable!("there are as many wheels as clocks"))
+}
 
 /// The slots of a level that are over as a whole when a wheel moves on to `now`: up to the one that holds the new tick, or all of a turn that is over. Whether the turn is
 /// the same, so that levels above have none.
@@ -76,7 +97,7 @@ fn over(then: u32, now: u32, level: usize) -> (u64, bool) {
 /// The queue of one engine.
 #[derive(Debug)]
 pub(crate) struct Queue {
-    wheels: Box<[Wheel]>,
+    wheels: Box<[Wheel; CLOCKS]>,
     chunks: Chunked<Chunk, 8>,
     free: u32,
     /// Entries on their way to another level.
@@ -89,7 +110,7 @@ pub(crate) struct Queue {
 impl Queue {
     pub(crate) fn new() -> Self {
         Self {
-            wheels: vec![EMPTY; CLOCKS].into(),
+            wheels: all_empty(),
             chunks: Chunked::default(),
             free: NONE,
             moving: Vec::new(),
@@ -105,16 +126,20 @@ impl Queue {
             + self.moving.capacity() * size_of::<Entry>()
     }
 
+    /// Asks memory for what entering a word on clock `clock` will write to.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, clock: usize, word: u32) {
+        let wheel = &self.wheels[clock % CLOCKS];
+        let (level, slot) = wheel.place(word & ((1 << EXPIRY_BITS) - 1));
+        self.chunks.prefetch(wheel.heads[level][slot] as usize);
+    }
+
     /// Enters a node under its word's expiry on clock `clock`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn enter(&mut self, clock: usize, entry: Entry) {
         self.entries += 1;
-        let wheel = &mut self.wheels[clock];
-        let expiry = entry.expiry().max(wheel.now);
-        let differing = expiry ^ wheel.now;
-        let level = (31 - (differing | 1).leading_zeros()) / DIGIT;
-        let slot = (expiry >> (level * DIGIT)) as usize % SLOTS;
-        let level = (level as usize).min(LEVELS - 1);
+        let wheel = &mut self.wheels[clock % CLOCKS];
+        let (level, slot) = wheel.place(entry.expiry());
         wheel.occupied[level] |= 1 << slot;
         wheel.counts[level] += 1;
         let head = &mut wheel.heads[level][slot];
@@ -126,20 +151,23 @@ impl Queue {
                 return;
             }
         }
-        let mut entries = [Entry::default(); CHUNK_ENTRIES];
-        entries[0] = entry;
-        let fresh = Chunk { next: *head, used: 1, entries };
         if self.free == NONE {
-            *head = self.chunks.push(fresh) as u32;
+            let mut entries = [Entry::default(); CHUNK_ENTRIES];
+            entries[0] = entry;
+            *head = self.chunks.push(Chunk { next: *head, used: 1, entries }) as u32;
         } else {
-            *head = self.free;
-            self.free = std::mem::replace(&mut self.chunks[*head as usize], fresh).next;
+            // Its other entries stay as they are.
+            let chunk = &mut self.chunks[self.free as usize];
+            let next = std::mem::replace(&mut chunk.next, *head);
+            chunk.used = 1;
+            chunk.entries[0] = entry;
+            *head = std::mem::replace(&mut self.free, next);
         }
     }
 
     /// Moves a wheel on to tick `now` and hands out all entries whose expiry is not above it.
     pub(crate) fn advance(&mut self, clock: usize, now: u64, mut due: impl FnMut(Entry)) {
-        let wheel = &mut self.wheels[clock];
+        let wheel = &mut self.wheels[clock % CLOCKS];
         if wheel.occupied == [0; LEVELS] {
             wheel.now = now.min(u64::from(u32::MAX)) as u32;
             return;
@@ -153,19 +181,13 @@ impl Queue {
         for level in 0..LEVELS {
             let (over, same_turn) = over(then, now, level);
             let digit = (now >> (level as u32 * DIGIT)) % SLOTS as u32;
-            let mut slots = self.wheels[clock].occupied[level] & over;
-            let mut heads = slots;
-            while heads != 0 {
-                self.chunks
-                    .prefetch(self.wheels[clock].heads[level][heads.trailing_zeros() as usize] as usize);
-                heads &= heads - 1;
-            }
+            let mut slots = self.wheels[clock % CLOCKS].occupied[level] & over;
             while slots != 0 {
                 self.take_slot(clock, level, slots.trailing_zeros() as usize, &mut due);
                 slots &= slots - 1;
             }
             if same_turn {
-                if level > 0 && self.wheels[clock].occupied[level] >> digit & 1 == 1 {
+                if level > 0 && self.wheels[clock % CLOCKS].occupied[level] >> digit & 1 == 1 {
                     self.spread(clock, level, digit as usize, &mut due);
                 }
                 return;
@@ -173,9 +195,32 @@ impl Queue {
         }
     }
 
+    /// Asks memory for what [`Queue::advance`] will look at: for the heads of slots, then, those having come, for what the heads name.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, clock: usize, now: u64, heads: bool) {
+        let wheel = &self.wheels[clock % CLOCKS];
+        let now = now as u32;
+        for level in 0..LEVELS {
+            let (over, same_turn) = over(wheel.now, now, level);
+            // The slot that the tick is in, too: what it holds moves to lower levels.
+            let digit = 1 << ((now >> (level as u32 * DIGIT)) % SLOTS as u32);
+            let mut slots = wheel.occupied[level] & (over | digit);
+            if heads && slots != 0 {
+                prefetch(&wheel.heads[level], slots.trailing_zeros() as usize);
+            }
+            while !heads && slots != 0 {
+                self.chunks.prefetch(wheel.heads[level][slots.trailing_zeros() as usize] as usize);
+                slots &= slots - 1;
+            }
+            if same_turn {
+                return;
+            }
+        }
+    }
+
     /// About how many entries would be over if a wheel moved on to tick `now`: those of levels that would be over as a whole, and of others the share of their slots.
     pub(crate) fn count_over(&self, clock: usize, now: u64) -> usize {
-        let wheel = &self.wheels[clock];
+        let wheel = &self.wheels[clock % CLOCKS];
         if now >= 1 << EXPIRY_BITS {
             return wheel.counts.iter().map(|count| *count as usize).sum();
         }
@@ -184,7 +229,7 @@ impl Queue {
         for level in 0..LEVELS {
             let (over, same_turn) = over(wheel.now, now, level);
             let occupied = wheel.occupied[level];
-            if occupied != 0 {
+            if occupied & over != 0 {
                 let share = u64::from((occupied & over).count_ones()) * u64::from(wheel.counts[level]);
                 count += (share / u64::from(occupied.count_ones())) as usize;
             }
@@ -197,7 +242,7 @@ impl Queue {
 
     /// Takes all entries out; memory stays, and so do the wheels' ticks.
     pub(crate) fn clear(&mut self) {
-        for wheel in &mut self.wheels {
+        for wheel in self.wheels.iter_mut() {
             if wheel.occupied != [0; LEVELS] {
                 *wheel = Wheel { now: wheel.now, ..EMPTY };
             }
@@ -214,7 +259,7 @@ impl Queue {
     /// Takes all entries of a clock out.
     pub(crate) fn drain(&mut self, clock: usize, mut each: impl FnMut(Entry)) {
         for level in 0..LEVELS {
-            let mut slots = self.wheels[clock].occupied[level];
+            let mut slots = self.wheels[clock % CLOCKS].occupied[level];
             while slots != 0 {
                 self.take_slot(clock, level, slots.trailing_zeros() as usize, &mut each);
                 slots &= slots - 1;
@@ -236,7 +281,7 @@ impl Queue {
             self.swept = (self.swept + 1) % (CLOCKS * LEVELS * SLOTS);
             let (clock, level, slot) =
                 (self.swept / (LEVELS * SLOTS), self.swept / SLOTS % LEVELS, self.swept % SLOTS);
-            if self.wheels[clock].occupied[level] >> slot & 1 == 1 {
+            if self.wheels[clock % CLOCKS].occupied[level] >> slot & 1 == 1 {
                 self.take_slot(clock, level, slot, &mut |entry| kept.extend(keep(entry).then_some(entry)));
                 kept.sort_unstable_by_key(|entry| (entry.node, entry.word));
                 kept.dedup();
@@ -250,25 +295,29 @@ impl Queue {
 
     /// Sets the tick of an empty wheel.
     pub(crate) fn restart(&mut self, clock: usize, now: u32) {
-        debug_assert_eq!(self.wheels[clock].occupied, [0; LEVELS]);
-        self.wheels[clock].now = now;
+        debug_assert_eq!(self.wheels[clock % CLOCKS].occupied, [0; LEVELS]);
+        self.wheels[clock % CLOCKS].now = now;
     }
 
     /// Moves the entries of a slot, which the wheel's tick has reached, to lower levels.
     fn spread(&mut self, clock: usize, level: usize, slot: usize, due: &mut impl FnMut(Entry)) {
-        let now = self.wheels[clock].now;
+        let now = self.wheels[clock % CLOCKS].now;
         let mut moving = std::mem::take(&mut self.moving);
         self.take_slot(clock, level, slot, &mut |entry| {
             if entry.expiry() <= now { due(entry) } else { moving.push(entry) }
         });
-        for entry in moving.drain(..) {
-            self.enter(clock, entry);
+        for (i, entry) in moving.iter().enumerate() {
+            if let Some(later) = moving.get(i + MOVE_AHEAD) {
+                self.prefetch(clock, later.word);
+            }
+            self.enter(clock, *entry);
         }
+        moving.clear();
         self.moving = moving;
     }
 
     fn take_slot(&mut self, clock: usize, level: usize, slot: usize, each: &mut impl FnMut(Entry)) {
-        let wheel = &mut self.wheels[clock];
+        let wheel = &mut self.wheels[clock % CLOCKS];
         wheel.occupied[level] &= !(1 << slot);
         let mut at = std::mem::replace(&mut wheel.heads[level][slot], NONE);
         while at != NONE {
@@ -276,7 +325,7 @@ impl Queue {
             let chunk = &mut self.chunks[at as usize];
             chunk.entries[..chunk.used as usize].iter().for_each(|entry| each(*entry));
             self.entries -= chunk.used as usize;
-            self.wheels[clock].counts[level] -= chunk.used;
+            self.wheels[clock % CLOCKS].counts[level] -= chunk.used;
             let next = std::mem::replace(&mut chunk.next, self.free);
             self.free = at;
             at = next;
