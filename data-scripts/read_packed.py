@@ -262,18 +262,25 @@ def slot_of(k, x, y):
     return (8 * 4**d + 7) // 3 + 2 * spread(a ^ 2**d - 1) + spread(a ^ b ^ 2**d)
 
 
+def in_runs(data):
+    """Numbers of what is present, out of runs of absent and present ones (9.1)."""
+    found, at, is_present, shift, run = [], 0, False, 0, 0
+    for byte in data:
+        run, shift = run | (byte & 127) << shift, shift + 7
+        if byte < 128:
+            found += range(at, at + run) if is_present else []
+            at, is_present, shift, run = at + run, not is_present, 0, 0
+    return found
+
+
 class Unpacked:
     """Pages of the unpacked file: those that are packed, made of records by slot, and those in runs (9.8)."""
 
     def __init__(self, data, header, sections, by_slot, inert):
         self.data, self.by_slot, self.inert = data, by_slot, inert
         self.in_page = 4096 // len(inert)
-        leaves, at, is_present, shift, run = [], 0, False, 0, 0
-        for byte in sections[2]:
-            run, shift = run | (byte & 127) << shift, shift + 7
-            if byte < 128:
-                leaves += range(at, at + run) if is_present else []
-                at, is_present, shift, run = at + run, not is_present, 0, 0
+        leaves = in_runs(sections[2])
+        self.has_nodes = header[0x10] > 17
         self.present = present = []
         tables, at = {leaf: bytearray(4096) for leaf in leaves}, 0
         for leaf, (less, sum_) in zip(leaves, struct.iter_unpack("<BI", sections[3]), strict=True):
@@ -289,9 +296,20 @@ class Unpacked:
             assert zlib.crc32(tables[leaf]) == sum_
         assert at == len(sections[5]) and len(present) == struct.unpack_from("<Q", header, 0x110)[0]
         root = bytearray(-(-16 * struct.unpack_from("<I", header, 0x7C)[0] // 4096) * 4096)
+        pages = dict.fromkeys(leaves)
         for i, leaf in enumerate(leaves):
-            struct.pack_into("<III", root, 16 * leaf, 3 + len(present) + i, zlib.crc32(tables[leaf]), 1)
-        behind = b"".join(tables[leaf] for leaf in leaves) + root
+            pages[leaf] = struct.pack("<III", 3 + len(present) + i, zlib.crc32(tables[leaf]), 1)
+        behind = b"".join(tables[leaf] for leaf in leaves)
+        if self.has_nodes:
+            nodes = {leaf // 256: bytearray(4096) for leaf in leaves}
+            for leaf, entry in pages.items():
+                struct.pack_into("12s", nodes[leaf // 256], 16 * (leaf % 256), entry)
+            first = 3 + len(present) + len(leaves)
+            pages = {node: struct.pack("<III", first + i, zlib.crc32(page), 1) for i, (node, page) in enumerate(nodes.items())}
+            behind += b"".join(nodes.values())
+        for i, entry in pages.items():
+            struct.pack_into("12s", root, 16 * i, entry)
+        behind += root
         self.behind = [behind[at:at + 4096] for at in range(0, len(behind), 4096)]
         self.first, self.runs = 3 + len(present) + len(self.behind), []
         offset, sum_, count = struct.unpack_from("<QII", header, 0x1E8)
@@ -324,8 +342,12 @@ class Unpacked:
         root_page, leaves, sum_ = struct.unpack_from("<III", header, 0x78)
         root = b"".join(self.page(root_page + i) for i in range(-(-16 * leaves // 4096)))[:16 * leaves]
         assert zlib.crc32(root) == sum_
-        found = {}
-        for i, (leaf, sum_, _, _) in enumerate(struct.iter_unpack("<4I", root)):
+        found, listed = {}, enumerate(struct.iter_unpack("<4I", root))
+        if self.has_nodes:
+            nodes = [(i, node, sum_) for i, (node, sum_, _, _) in listed if node >= self.first]
+            assert all(zlib.crc32(self.page(node)) == sum_ for _, node, sum_ in nodes)
+            listed = [(256 * i + j, leaf) for i, node, _ in nodes for j, leaf in enumerate(struct.iter_unpack("<4I", self.page(node)))]
+        for i, (leaf, sum_, _, _) in listed:
             if leaf < self.first:
                 continue
             entries = self.page(leaf)
@@ -361,13 +383,18 @@ def main(packed, target):
         (base,) = struct.unpack_from("<d", header, 0x30)
         rules, inert, read = packed_exact.Rules(kind, step, base, spacing, k), packed_exact.INERT[kind], packed_exact.tile
     groups = [(3 * g, min(6, k - 3 * g), k - 3 * g <= 6) for g in range(-(-max(k - 6, 0) // 3) + 1)]
-    by_slot, leaf = {}, 0
+    by_slot, leaf, tile_root = {}, 0, sections[4]
+    listed = range(len(tile_root) // 12)
+    if k > 17:
+        places = len(tile_root) - 12 * struct.unpack_from("<I", tile_root)[0]
+        listed, tile_root = in_runs(tile_root[4:places]), tile_root[places:]
+    tile_root = dict(zip(listed, struct.iter_unpack("<QI", tile_root), strict=True))
     for stride_log, octaves, is_top in reversed(groups):
         shift, side = stride_log + octaves, 1 << k - stride_log - octaves
         tiles = [min(side, (size - 1 >> shift) + 2) for size in (wide, high)]
         for block in ((x, y) for y in range(0, tiles[1], 16) for x in range(0, tiles[0], 16)):
             sizes = [min(16, tiles[axis] - block[axis]) for axis in (0, 1)]
-            offset, sum_ = struct.unpack_from("<QI", sections[4], 12 * leaf)
+            offset, sum_ = tile_root.get(leaf, (0, 0))
             leaf += 1
             if offset == 0:
                 continue

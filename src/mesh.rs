@@ -22,7 +22,9 @@ impl TriangleKey {
         let (x2, y2) = (u64::from(b.x() + d.x()), u64::from(b.y() + d.y()));
         let (ax2, ay2) = (2 * u64::from(apex.x()), 2 * u64::from(apex.y()));
         let side = ay2 > y2 || (ay2 == y2 && ax2 > x2);
-        Self((y2 << 18 | x2) << 1 | u64::from(side))
+        // A column of 18 bits is all that squares of less than 2^17 steps have; what larger ones have besides lies above the row's 22.
+        let (low, high) = (x2 & 0x3_ffff, x2 >> 18);
+        Self(high << 44 | (y2 << 18 | low) << 1 | u64::from(side))
     }
 
     /// The key of a triangle whose apex is not known: the corner opposite the longest edge.
@@ -173,6 +175,21 @@ mod tests {
                 }
             }
         });
+    }
+
+    /// Midpoints of edges of the largest square, whose doubled coordinates have 22 bits, each bit by itself and all together.
+    #[test]
+    fn keys_tell_triangles_of_the_largest_square_apart() {
+        let ends: Vec<u32> = (0..=20).map(|bit| 1 << bit).chain([0, (1 << 20) - 1]).collect();
+        let mut keys = std::collections::HashSet::new();
+        for (x, y) in ends.iter().flat_map(|x| ends.iter().map(move |y| (*x, *y))) {
+            let (b, d) = (GridPoint::new(x, y), GridPoint::new(x, y + 2));
+            let apexes = [GridPoint::new(x + 1, y + 1), GridPoint::new(x.wrapping_sub(1), y + 1)];
+            for apex in apexes.into_iter().filter(|apex| apex.x() <= 1 << 20) {
+                assert!(keys.insert(TriangleKey::new(apex, b, d)), "{x} {y}");
+            }
+        }
+        assert!(keys.len() > 2 * 22 * 22);
     }
 
     #[test]

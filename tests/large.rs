@@ -1,4 +1,4 @@
-//! Squares of more than 65,537 samples a side, nearly all void: slots need more than 32 bits, and places in metres more than 24. Engines fly over islands in them and draw one mesh, that of
+//! Squares of more than 65,537 samples a side, nearly all void: slots need more than 32 bits, and of the largest more than 40, and places in metres more than 24. Engines fly over islands in them and draw one mesh, that of
 //! SOAR, which is made anew in every frame (the definition looks at every vertex there is); edits, packed files and files written anew hold what the source said.
 
 mod common;
@@ -231,4 +231,9 @@ fn check(side: u32) {
 #[test]
 fn islands_in_a_square_of_17_bits() {
     check(131_073);
+}
+
+#[test]
+fn islands_in_a_square_of_20_bits() {
+    check(1_048_577);
 }

@@ -45,16 +45,37 @@ fn heights_note(terrain: &Terrain) -> Option<String> {
 
 /// FNV-1a over the grid and the checksums of the pages of records, in 16 hexadecimal digits. `None` if the directory cannot be read.
 fn digest(terrain: &Terrain) -> Option<String> {
-    terrain.check_directory().ok()?;
     let grid = terrain.grid();
     let shape = grid.samples().into_iter().map(u64::from).chain(grid.spacing_m().map(f64::to_bits));
-    // Where a page lies in the file says nothing of heights.
-    let pages = (0..terrain.page_count())
-        .map(|page| u64::from(terrain.known_entry(page).unwrap_or_default().checksum));
-    let hash = shape.chain(pages).flat_map(u64::to_le_bytes).fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    });
-    Some(format!("{hash:016x}"))
+    let mut hash = shape.fold(FNV_OFFSET, put);
+    // Where a page lies in the file says nothing of heights. An absent one counts as a checksum of 0, whose bytes change the hash by the factor alone.
+    let mut next = 0;
+    for (page, entry) in terrain.present_pages().ok()? {
+        hash = put(absent(hash, page - next), entry.checksum.into());
+        next = page + 1;
+    }
+    Some(format!("{:016x}", absent(hash, terrain.page_count() - next)))
+}
+
+const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
+
+/// A hash with the bytes of a number put in.
+fn put(hash: u64, number: u64) -> u64 {
+    number.to_le_bytes().into_iter().fold(hash, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(FNV_PRIME))
+}
+
+/// A hash with so many zeros of 8 bytes put in.
+fn absent(hash: u64, count: u64) -> u64 {
+    let (mut hash, mut factor, mut bytes) = (hash, FNV_PRIME, 8 * count);
+    while bytes > 0 {
+        if bytes & 1 == 1 {
+            hash = hash.wrapping_mul(factor);
+        }
+        factor = factor.wrapping_mul(factor);
+        bytes >>= 1;
+    }
+    hash
 }
 
 /// Whether an eye is over the terrain.
@@ -119,4 +140,17 @@ pub(crate) fn strange(
         ));
     }
     Ok(strange)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_zeros_are_put_in_at_once() {
+        for count in [0, 1, 2, 5, 1000] {
+            let hash = put(FNV_OFFSET, 77);
+            assert_eq!(absent(hash, count), (0..count).fold(hash, |hash, _| put(hash, 0)), "{count}");
+        }
+    }
 }

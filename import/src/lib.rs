@@ -24,6 +24,7 @@
 mod ascii_grid;
 mod beside;
 mod bt;
+mod cells;
 mod crs;
 pub mod difference;
 mod dted;

@@ -201,7 +201,7 @@ fn hgt_mistakes() {
     let cut = in_folder("N02E010.hgt");
     std::fs::write(&cut, [0; 19]).unwrap();
     assert!(refusal(&[cut]).contains("cut short"));
-    assert!(refusal(&[a, data("crater_lake_1025.bt")]).contains("131,073 on a side"));
+    assert!(refusal(&[a, data("crater_lake_1025.bt")]).contains("1,048,577 on a side"));
 }
 
 #[test]

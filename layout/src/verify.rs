@@ -90,8 +90,8 @@ impl Findings {
 }
 
 /// What is told apart when a page is named.
-fn record_page(terrain: &Terrain, page: usize) -> String {
-    match terrain.known_entry(page as u64) {
+fn record_page(terrain: &Terrain, page: u64) -> String {
+    match terrain.known_entry(page) {
         Some(entry) if entry.is_present() => format!("record page {page} (file page {})", entry.page),
         _ => format!("record page {page} (absent)"),
     }
@@ -108,8 +108,8 @@ pub fn verify_pages(terrain: &Terrain) -> u64 {
 /// Only if the file cannot be read; what is wrong in it is the report's business. Of a file with a damaged directory it says that alone.
 pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<VerifyReport, LayoutError> {
     // Without the directory nothing is known of what it leads to.
-    let present: Vec<u32> = match terrain.present_pages() {
-        Ok(pages) => pages.map(|(page, _)| page as u32).collect(),
+    let present: Vec<u64> = match terrain.present_pages() {
+        Ok(pages) => pages.map(|(page, _)| page).collect(),
         Err(LayoutError::Damaged { place, problem, .. }) => {
             let problems = vec![Problem { place, problem }];
             return Ok(VerifyReport { problems, problem_count: 1, ..VerifyReport::default() });
@@ -146,14 +146,14 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
 /// Reads every record page and holds it against its checksum; gives the pages that do not match, sorted.
 fn checksums(
     terrain: &Terrain,
-    present: &[u32],
+    present: &[u64],
     progress: &(dyn Fn(u64) + Sync),
-) -> Result<(Vec<u32>, Findings), LayoutError> {
-    let task = |pages: &[u32]| {
+) -> Result<(Vec<u64>, Findings), LayoutError> {
+    let task = |pages: &[u64]| {
         let mut bytes = Box::new([0; PAGE_BYTES]);
         let mut damaged = Vec::new();
         for &page in pages {
-            let entry = terrain.entry(page.into())?;
+            let entry = terrain.entry(page)?;
             terrain.source().read_at(u64::from(entry.page) * PAGE_BYTES as u64, &mut bytes[..])?;
             if checksum(&bytes[..]) != entry.checksum {
                 damaged.push(page);
@@ -162,11 +162,11 @@ fn checksums(
         progress(pages.len() as u64);
         Ok::<_, LayoutError>(damaged)
     };
-    let damaged: Vec<Vec<u32>> = present.par_chunks(TASK_PAGES).map(task).collect::<Result<_, _>>()?;
+    let damaged: Vec<Vec<u64>> = present.par_chunks(TASK_PAGES).map(task).collect::<Result<_, _>>()?;
     let damaged = damaged.concat();
     let mut findings = Findings::default();
     for &page in &damaged {
-        findings.add(record_page(terrain, page as usize), "the checksum does not match");
+        findings.add(record_page(terrain, page), "the checksum does not match");
     }
     Ok((damaged, findings))
 }

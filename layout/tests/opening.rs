@@ -70,7 +70,7 @@ fn opening_takes_few_reads() {
 
 /// 65,537 x 65,537 samples, 17 GB: all directory leaves are there, none of them has a page. Leaves are zeros, which the file has as a hole.
 fn huge(path: &Path) -> u64 {
-    let (mut bytes, leaves) = absent_square("compact");
+    let (mut bytes, leaves) = absent_square("compact", 65_537);
     let first = (bytes.len() / PAGE) as u32;
     let sum = crc32fast::hash(&[0; PAGE]);
     for (i, entry) in bytes[3 * PAGE..].chunks_exact_mut(16).take(leaves).enumerate() {
@@ -103,6 +103,22 @@ fn a_large_file_opens_as_a_small_one_does() {
     }
     terrain.check_directory().unwrap();
     assert!(source.counts().0 < 30, "leaves that lie one after the other are read together");
+}
+
+/// The largest square there is, in the largest records: a root with nodes is no larger than those of smaller squares.
+#[test]
+fn the_largest_square_opens_as_a_small_one_does() {
+    let (bytes, nodes) = absent_square("exact 16", 1_048_577);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hollow.iqt");
+    std::fs::write(&path, &bytes).unwrap();
+    let (terrain, source) = counted(PreadSource::open(&path).unwrap());
+    assert_eq!(source.counts(), (2, FRONT + 16 * nodes as u64));
+    assert!(nodes == 109_227 && terrain.page_count() > u64::from(u32::MAX));
+    for page in [0, 5_000_000_000, terrain.page_count() - 1, u64::MAX] {
+        assert!(!terrain.entry(page).unwrap().is_present());
+    }
+    assert_eq!(source.counts().0, 2, "what is absent is not read");
 }
 
 /// Packed terrain of 65,537 x 65,537 samples, all pages of which are said to be present: 28 GB unpacked. Only the front is there, the rest is a hole. Its bytes in front of the directory's blocks.

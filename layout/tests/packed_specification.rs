@@ -38,28 +38,47 @@ fn a_reader_written_from_the_specification_agrees() {
                 &options().record(Some(RecordKind::Exact8)),
             ),
         };
-        let bench = Bench::of(&bytes.unwrap()).unwrap();
-        let out = bench.plain.with_file_name("records");
-        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
-        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-        check_records(&bench.bytes(&out), &bench.plain, size);
-        // Edited, and back by one commit.
-        for path in [&bench.plain, &bench.packed] {
-            let mut session = EditSession::open(path).unwrap();
-            for (i, height_m) in [(0, 901.0), (1, 950.0), (2, 1000.0)] {
-                let rect =
-                    SampleRect { west: i, south: i, east: (i + 40).min(size[0] - 1), north: size[1] - 1 };
-                if i < size[1] {
-                    session.apply(&[Edit::Set { area: Area::Rect(rect), height_m }]).unwrap();
-                    session.commit("set").unwrap();
-                }
-            }
-            session.undo().unwrap();
-        }
-        let ran = python(&[script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()]).unwrap();
-        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-        check_records(&bench.bytes(&out), &bench.plain, size);
+        compare(&script, &bytes.unwrap(), size, 0);
     }
+    // A directory with nodes, in a square of 2^18 steps: void, but for both ends of a strip.
+    let size = [131_100, 4];
+    let ground = dem([60, 4], 4, 0);
+    let strip = MemoryDem::from_fn(size, SampleType::I16, |x, y| match x {
+        0..20 | 131_050.. => ground.sample(x % 131_050, y),
+        _ => f64::NAN,
+    });
+    compare(&script, &build_bytes(&strip, &options()).unwrap(), size, 131_060);
+}
+
+/// Packs a terrain file and holds what the script reads against its records; as it is, and after edits from column `west` on and an undo.
+fn compare(script: &Path, bytes: &[u8], size: [u32; 2], west: u32) {
+    let bench = Bench::of(bytes).unwrap();
+    let out = bench.plain.with_file_name("records");
+    let read = || {
+        let args = [script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()];
+        let ran = std::process::Command::new("python3").args(args).output().unwrap();
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        check_records(&bench.bytes(&out), &bench.plain, size);
+    };
+    read();
+    // Edited, and back by one commit.
+    for path in [&bench.plain, &bench.packed] {
+        let mut session = EditSession::open(path).unwrap();
+        for (i, height_m) in [(0, 901.0), (1, 950.0), (2, 1000.0)] {
+            let rect = SampleRect {
+                west: west + i,
+                south: i,
+                east: (west + i + 40).min(size[0] - 1),
+                north: size[1] - 1,
+            };
+            if i < size[1] {
+                session.apply(&[Edit::Set { area: Area::Rect(rect), height_m }]).unwrap();
+                session.commit("set").unwrap();
+            }
+        }
+        session.undo().unwrap();
+    }
+    read();
 }
 
 /// Heights that no step divides.

@@ -9,10 +9,13 @@ use common::{Island, Islands};
 use std::path::Path;
 use std::time::Instant;
 use terrasoar_layout::build::{BuildOptions, build};
+use terrasoar_layout::edit::{Edit, EditSession, SampleRect};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{ROOTS, child_slots, point_of, slot_count, slot_of};
-use terrasoar_layout::grid::record::VertexClass;
+use terrasoar_layout::grid::record::{RecordKind, VertexClass};
 use terrasoar_layout::progress::Silent;
+use terrasoar_layout::read::kinds::ByKind;
+use terrasoar_layout::read::store::RecordStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::verify;
 use terrasoar_layout::with_records;
@@ -66,10 +69,14 @@ fn walk(terrain: &Terrain, east: f64, north: f64) -> Vec<u64> {
 
 /// Builds, opens, verifies and samples a square of `side` samples with islands in it.
 fn check(side: u32, path: &Path) -> Terrain {
-    let dem = islands(side);
+    check_built(&islands(side), path)
+}
+
+fn check_built(dem: &Islands, path: &Path) -> Terrain {
+    let side = dem.info.samples_wide;
     let start = Instant::now();
     let options = BuildOptions::default().spacing_m([30.0, 20.0]);
-    let header = build(&dem, path, &options, &Silent).unwrap();
+    let header = build(dem, path, &options, &Silent).unwrap();
     let built = start.elapsed();
     let data = dem.samples();
     assert_eq!(header.nodata_samples, u64::from(side) * u64::from(side) - data);
@@ -92,7 +99,7 @@ fn check(side: u32, path: &Path) -> Terrain {
         header.record_pages(),
         header.file_bytes
     );
-    compare(&dem, &terrain);
+    compare(dem, &terrain);
     terrain
 }
 
@@ -182,4 +189,61 @@ fn squares_of_17_bits_a_side() {
     let terrain = check(side, &folder.path().join("islands.iqt"));
     assert_eq!(terrain.grid().k(), 17);
     descend(&islands(side), &terrain);
+}
+
+/// In the largest records there are more than 2^32 pages: a pool holds them, an editor changes them, and both find what the source said.
+#[test]
+fn pages_past_32_bits_hold_what_the_source_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("islands.iqt");
+    let dem = islands(1_048_577).precise();
+    let terrain = check_built(&dem, &path);
+    let far: Vec<u64> =
+        terrain.present_pages().unwrap().map(|(page, _)| page).filter(|page| page >> 32 > 0).collect();
+    assert!(far.len() > 100 && terrain.header().record_kind == RecordKind::Exact16, "{}", far.len());
+    let unmapped = Terrain::open_unmapped(&path).unwrap();
+    let ByKind::Exact16(mut pool) = unmapped.pool(64 << 20).unwrap() else { panic!("records of 16 bytes") };
+    assert!(!pool.is_resident(far[0]), "its leaf was not read");
+    for (page, _) in terrain.present_pages().unwrap() {
+        pool.install(page, &unmapped.checked_page(page).unwrap()).unwrap();
+    }
+    assert!(far.iter().all(|page| pool.is_resident(*page)));
+    let places = |island: &Island| {
+        let (x, y) = (island.west, island.south);
+        [[x, y], [x + 1, y + 2], [x + island.wide - 1, y + island.high - 1]]
+    };
+    for [x, y] in dem.islands.iter().flat_map(places) {
+        let v = pool.vertex_at(GridPoint::new(x, y));
+        assert_eq!(Some(v.height_m), dem.height(x, y), "({x}, {y})");
+    }
+    drop(terrain);
+    let mut session = EditSession::open(&path).unwrap();
+    for island in &dem.islands {
+        let [west, south] = [island.west + 5, island.south + 5];
+        let rect = SampleRect { west, south, east: west + 20, north: south + 20 };
+        assert!(!session.apply(&[Edit::set(rect, 777.25)]).unwrap().vertices.is_empty());
+    }
+    session.commit("set").unwrap();
+    let edited = Terrain::open(&path).unwrap();
+    let report = verify(&edited, &|_| {}).unwrap();
+    assert!(report.is_sound(), "{:?}", report.problems);
+    for island in &dem.islands {
+        let place_m = [f64::from(island.west + 9) * 30.0, f64::from(island.south + 9) * 20.0];
+        assert_eq!(edited.height_m(place_m[0], place_m[1]).unwrap(), Some(777.25));
+    }
+    drop(edited);
+    session.undo().unwrap().unwrap();
+    compare(&dem, &Terrain::open(&path).unwrap());
+}
+
+/// Slots past 2^40, and a directory with nodes.
+#[test]
+fn squares_of_20_bits_a_side() {
+    let folder = tempfile::tempdir().unwrap();
+    for (side, k) in [(262_145, 18), (1_048_577, 20)] {
+        let terrain = check(side, &folder.path().join("islands.iqt"));
+        assert_eq!(terrain.grid().k(), k);
+        let largest = descend(&islands(side), &terrain);
+        assert!(k < 20 || largest > 1 << 40, "{largest}");
+    }
 }

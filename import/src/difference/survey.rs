@@ -99,6 +99,10 @@ impl Difference<'_> {
                 progress.advance(u64::from(window.width) * u64::from(window.height));
                 part
             })
+            // Of oceans nothing is kept.
+            .filter(|part| {
+                part.as_ref().map_or(true, |part| part.compared + part.alone[0] + part.alone[1] > 0)
+            })
             .collect::<Result<_, LayoutError>>()?;
         let reduced_size = size.map(|side| side.div_ceil(samples));
         let mut reduced = vec![f32::NAN; reduced_size[0] as usize * reduced_size[1] as usize];

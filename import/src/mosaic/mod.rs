@@ -18,19 +18,20 @@ mod target;
 mod told;
 mod values;
 
+use crate::cells::{Cells, each_block_met};
 use crate::crs::System;
 use crate::guard::is_ours;
 use crate::opened::{Known, OpenedDem, shift_lost};
 use crate::options::{OpenOptions, Priority, Resampling};
 use crate::reader::{Declared, Reader, Said};
 use crate::value::Voids;
-use crate::warp::{Store, blocks_bytes, each_block};
+use crate::warp::{Store, blocks_bytes};
 use aim::{Aim, aimed};
 use blend::{Blend, Edges, over};
 use lattice::Tied;
 pub(crate) use names::Inputs;
 use plan::Placed;
-use sheet::{BLENDED, Cells, Laying, Sheet, replace};
+use sheet::{BLENDED, Laying, Sheet, cells_of, replace};
 pub(crate) use source::open_one;
 use source::{Source, options_of_each};
 use std::collections::HashSet;
@@ -173,7 +174,7 @@ impl Mosaic {
         let allowed = options.memory_mib.unwrap_or(512) << 20;
         let mosaic = Self {
             declared,
-            cells: sheets.iter().map(|sheet| Cells::of(sheet, &placed.sources)).collect(),
+            cells: sheets.iter().map(|sheet| cells_of(sheet, &placed.sources)).collect(),
             sources: placed.sources,
             each,
             sheets,
@@ -368,6 +369,10 @@ impl Reader for Mosaic {
             return Err(nothing);
         }
         let size = if self.is_copied() && self.blend.is_none() { COPIED } else { BLENDED };
-        each_block(self.declared.samples, size, |window| self.block(window, &stores, sink))
+        let is_met =
+            |cell: Window| self.laid.iter().zip(&self.cells).any(|(laid, cells)| laid.meets(cell, cells));
+        let pass = |window| sink.put_void(window);
+        let make = |window| self.block(window, &stores, sink);
+        each_block_met(self.declared.samples, size, is_met, pass, make)
     }
 }

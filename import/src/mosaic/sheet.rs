@@ -5,9 +5,9 @@
 
 use super::blend::{Blend, Edges, over};
 use super::source::{Failure, Read, Source};
+use crate::cells::Cells;
 use crate::options::{OpenOptions, Priority};
 use crate::warp::{Store, each_block};
-use std::collections::HashSet;
 use std::path::Path;
 use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
@@ -37,32 +37,14 @@ pub(super) struct Sheet {
     pub(super) system: usize,
 }
 
-/// Binary logarithm of the side of a cell in samples.
-const CELL_LOG2: u32 = 11;
-
-/// The cells of a sheet that its files lie in: between files that lie far apart nothing is looked at.
-#[derive(Debug)]
-pub(super) struct Cells(HashSet<[u32; 2]>);
-
-impl Cells {
-    pub(super) fn of(sheet: &Sheet, sources: &[Source]) -> Self {
-        let mut cells = HashSet::new();
-        for member in &sheet.members {
-            let span = |i: usize| {
-                let end = member.at[i] + sources[member.source].samples[i];
-                member.at[i] >> CELL_LOG2..=(end - 1) >> CELL_LOG2
-            };
-            cells.extend(span(1).flat_map(|y| span(0).map(move |x| [x, y])));
-        }
-        Self(cells)
+/// The cells of a sheet that its files lie in.
+pub(super) fn cells_of(sheet: &Sheet, sources: &[Source]) -> Cells {
+    let mut cells = Cells::default();
+    for member in &sheet.members {
+        let size = sources[member.source].samples;
+        cells.add(member.at, [0, 1].map(|i| member.at[i] + size[i]));
     }
-
-    /// Whether a window of the sheet, which may lie beyond it in part, touches any.
-    pub(super) fn touch(&self, from: [i64; 2], size: [u32; 2]) -> bool {
-        let cell = |v: i64| (v.clamp(0, i64::from(u32::MAX)) >> CELL_LOG2) as u32;
-        let span = |i: usize| cell(from[i])..=cell(from[i] + i64::from(size[i]) - 1);
-        span(1).any(|y| span(0).any(|x| self.0.contains(&[x, y])))
-    }
+    cells
 }
 
 /// How samples become those of the mosaic, and where they are kept meanwhile.
@@ -172,18 +154,5 @@ pub(super) fn replace(value: &mut f64, new: f64, highest: bool) {
     let stays = new.is_nan() || highest && *value >= new;
     if !stays {
         *value = new;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn windows_touch_the_cells_of_files_and_no_others() {
-        let cells = Cells([[0, 0], [3, 5]].into());
-        assert!(cells.touch([2047, 2047], [1, 1]) && !cells.touch([2048, 0], [4096, 5000]));
-        assert!(cells.touch([6143, 10_239], [2, 2]) && !cells.touch([6143, 10_239], [1, 2]));
-        assert!(cells.touch([-500, -500], [501, 501]) && cells.touch([-500, 0], [100_000, 1]));
     }
 }

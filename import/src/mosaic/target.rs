@@ -7,7 +7,8 @@ use super::across::{Over, outside};
 use super::aim::Aim;
 use super::lattice::{Lattice, Tied};
 use super::plan::Placed;
-use super::sheet::{Cells, Sheet};
+use super::sheet::Sheet;
+use crate::cells::Cells;
 use crate::crs::HorizontalSize;
 use crate::options::OpenOptions;
 use crate::warp::{Mapping, Projections, Resampler, three_digits};
@@ -47,12 +48,12 @@ impl Laid {
             && window.col + window.width > self.from[0]
             && window.row + window.height > self.from[1];
         is_within
-            && match self.way {
+            && match &self.way {
                 Way::Copied(at) => cells.touch(
                     [i64::from(window.col) - at[0], i64::from(window.row) - at[1]],
                     [window.width, window.height],
                 ),
-                Way::Resampled(_) => true,
+                Way::Resampled(resampler) => resampler.may_touch(window, cells),
             }
     }
 }

@@ -5,6 +5,7 @@
 
 use super::change::held;
 use super::said::{Band, Source};
+use crate::cells::Cells;
 use crate::options::Resampling;
 use crate::warp::{Mapping, Resampler, Store, each_block};
 use terrasoar_layout::dem::{SampleSink, SampleType, Window};
@@ -62,9 +63,10 @@ pub(super) struct Painting<'a> {
 }
 
 impl Painting<'_> {
-    /// Lays a piece of the file over what is in `store`.
-    pub(super) fn paint(&self, source: &Source, store: &Store) -> Result<(), LayoutError> {
+    /// Lays a piece of the file over what is in `store`, and notes in `cells` where.
+    pub(super) fn paint(&self, source: &Source, store: &Store, cells: &mut Cells) -> Result<(), LayoutError> {
         let Some(placing) = placing(source, self.file, self.grid) else { return Ok(()) };
+        cells.add(placing.from, placing.to);
         let size = [0, 1].map(|i| placing.to[i] - placing.from[i]);
         let [columns, rows] =
             [0, 1].map(|i| placing.start[i] + placing.step[i] * (f64::from(placing.from[i]) + 0.5) - 0.5);

@@ -4,11 +4,12 @@ use super::paint::Painting;
 use super::said::{Band, Part, Source};
 use super::text::is_virtual;
 use crate::beside::Beside;
+use crate::cells::{Cells, each_block_met};
 use crate::guard;
 use crate::options::OpenOptions;
 use crate::reader::{Declared, Reader, Said};
 use crate::value::Voids;
-use crate::warp::{Store, each_block};
+use crate::warp::Store;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -160,8 +161,9 @@ impl Painted {
         )
     }
 
-    /// Lays all files into a store.
-    fn paint(&self, store: &Store) -> Result<(), LayoutError> {
+    /// Lays all files into a store; where they lie.
+    fn paint(&self, store: &Store) -> Result<Cells, LayoutError> {
+        let mut cells = Cells::default();
         let sources = &self.band.sources;
         let mut lost = BTreeMap::new();
         let (mut at, mut painted) = (0, 0);
@@ -188,7 +190,9 @@ impl Painted {
                         sample_bytes: if file_type.fits_f32() { 4 } else { 8 },
                         samples: &samples,
                     };
-                    sources[at..at + count].iter().try_for_each(|source| painting.paint(source, store))?;
+                    for source in &sources[at..at + count] {
+                        painting.paint(source, store, &mut cells)?;
+                    }
                 }
                 Err(error)
                     if self.within.options.strict
@@ -211,7 +215,7 @@ impl Painted {
                 "its files",
                 format!("none of them can be read; the first: {why}"),
             )),
-            _ => Ok(()),
+            _ => Ok(cells),
         }
     }
 }
@@ -250,8 +254,9 @@ impl Reader for Painted {
         let samples = self.declared.samples;
         let in_memory = self.in_memory(samples, self.sample_bytes());
         let store = Store::new(samples, self.sample_bytes(), in_memory, &self.folder())?;
-        self.paint(&store)?;
-        each_block(samples, BLOCK, |window| {
+        let cells = self.paint(&store)?;
+        let is_met = |w: Window| cells.touch([w.col.into(), w.row.into()], [w.width, w.height]);
+        let make = |window: Window| {
             let first = [i64::from(window.col), i64::from(window.row)];
             let values =
                 store.window(first, [window.width as usize, window.height as usize], false)?.into_values();
@@ -260,7 +265,8 @@ impl Reader for Painted {
             } else {
                 sink.put(window, &values)
             }
-        })
+        };
+        each_block_met(samples, BLOCK, is_met, |window| sink.put_void(window), make)
     }
 }
 

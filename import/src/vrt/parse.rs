@@ -17,7 +17,7 @@ use terrasoar_layout::words::harmless;
 /// Sources of one band, at most.
 const MOST_SOURCES: usize = 1 << 16;
 /// Samples of a grid, at most: 256 times those of the largest terrain, for what is thinned out.
-const MOST_SAMPLES: u64 = 1 << 40;
+const MOST_SAMPLES: u64 = 1 << 42;
 /// Numbers of a table.
 const MOST_ENTRIES: usize = 1 << 16;
 

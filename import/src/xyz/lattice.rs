@@ -5,8 +5,8 @@
 
 use std::collections::HashSet;
 
-/// Most samples along a side, twice those of the largest terrain: beyond that it is no grid.
-pub(super) const MOST_SAMPLES: usize = 1 << 17;
+/// Most samples along a side, those of the largest terrain: beyond that it is no grid.
+pub(super) const MOST_SAMPLES: usize = terrasoar_layout::grid::MOST_SAMPLES as usize;
 /// Coordinates closer than this share of the usual distance are one, printed differently.
 const SAME: f64 = 1e-3;
 /// How far a coordinate may be from its place, in steps.

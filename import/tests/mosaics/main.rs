@@ -8,4 +8,5 @@ mod ground;
 mod levels;
 mod priority;
 mod repeat;
+mod vast;
 mod virtuals;

@@ -157,7 +157,7 @@ fn directories_that_lead_round_or_overflow_are_damage() {
     is("many", &many, b"", "cut short or damaged");
     // A run over the whole world of a deep zoom is as many tiles as there are, and one tile's bytes.
     let world = directory(&[[(4u64.pow(20) - 1) / 3, 4u64.pow(20), 0, length]]);
-    is("world", &world, b"", "16777216 x 16722258 samples here, and a terrain has 131,073 at most");
+    is("world", &world, b"", "16777216 x 16722258 samples here, and a terrain has 1,048,577 at most");
 }
 
 #[test]

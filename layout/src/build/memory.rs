@@ -6,6 +6,7 @@ use super::land::{BLOCK, Land};
 use super::options::{BuildOptions, LARGEST_TILE};
 use crate::dem::SampleType;
 use crate::error::LayoutError;
+use crate::file::directory_shape::DirectoryShape;
 use crate::grid::Grid;
 use crate::grid::order::slot_count;
 use crate::grid::record::RecordKind;
@@ -59,7 +60,10 @@ impl MemoryPlan {
         // Pages of the directory and their plan, some 34 bytes each. Around blocks with heights there are some that hold little.
         let slots = slot_count(grid.k());
         let near = (blocks + 64) * block * block * 5;
-        let directory = slots.min(near) * record_bytes / 4096 * 34 + slots * record_bytes / (4096 * 256) * 44;
+        // The root, which leads to leaves, or in the largest squares to nodes.
+        let shape = DirectoryShape::new(grid.k(), slots * record_bytes / 4096);
+        let root = shape.root_entries() * 44;
+        let directory = slots.min(near) * record_bytes / 4096 * 34 + root;
         let fixed = RESERVED_BYTES + directory;
         let work = |tile: u32| {
             let tile = u64::from(tile);

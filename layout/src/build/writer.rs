@@ -10,7 +10,7 @@ use super::plan::{LevelPlan, Plan, PlannedLeaf, place_of};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum};
-use crate::file::directory::{page_at, put_all_leaves, root_bytes};
+use crate::file::directory::{page_at, put_directory};
 use crate::file::disk::Disk;
 use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
@@ -157,16 +157,15 @@ impl<'a, C: RecordCodec> PageWriter<'a, C> {
     /// Writes what remains, closes gaps, and gives `header` its places.
     pub(super) fn finish(mut self, header: &mut Header) -> Result<(), LayoutError> {
         let first = self.close_gaps()?;
-        let planned = &self.leaves;
-        let leaves =
-            (0..header.root_entries()).map(|i| planned.get(&i).map_or(&[][..], |leaf| &leaf.entries[..]));
-        let stored = leaves.clone().flatten().filter(|entry| entry.is_present()).count() as u64;
-        let (root, page) = put_all_leaves(self.file.target(), leaves, first, |page, bytes| {
+        let leaves = self.leaves.iter().map(|(number, leaf)| (*number, &leaf.entries[..]));
+        let stored =
+            leaves.clone().flat_map(|(_, leaf)| leaf).filter(|entry| entry.is_present()).count() as u64;
+        let shape = header.directory();
+        let (root, page) = put_directory(self.file.target(), shape, leaves, first, |page, bytes| {
             self.disk
                 .write_at(self.file.file(), bytes, u64::from(page) * PAGE)
                 .map_err(|e| failed(self.file, e))
         })?;
-        let root = root_bytes(&root);
         header.root_page = page;
         header.root_checksum = root.checksum;
         header.stored_pages = stored;

@@ -1,7 +1,6 @@
 //! The page directory: logical record page -> where it lies and its checksum (FORMAT.md, section 5).
 //!
-//! On disk it has two levels, so that an edit rewrites one leaf and the root and a mostly void terrain has a small one. So it has in memory (`page_table`), but where all of it is
-//! written.
+//! On disk it has two levels, or three for the largest squares, so that an edit rewrites one page of each and a mostly void terrain has a small one. So it has in memory (`page_table`).
 //!
 //! Cost: 12 bytes an entry.
 
@@ -15,7 +14,7 @@ use super::bytes::{PAGE_BYTES, get_u32, put_u32};
 pub(crate) const ENTRY_BYTES: usize = 16;
 
 /// Where a page lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, bytemuck::Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Entry {
     /// Page number in the file; 0 if absent.
     pub page: u32,
@@ -49,11 +48,6 @@ impl Entry {
     pub fn is_present(self) -> bool {
         self.page != 0
     }
-}
-
-/// The table of a terrain of so many logical pages, all of them absent. Memory is taken as entries are written.
-pub(crate) fn absent(logical_pages: usize) -> Vec<Entry> {
-    bytemuck::zeroed_vec(logical_pages)
 }
 
 /// Entries a leaf page.

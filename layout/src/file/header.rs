@@ -7,6 +7,7 @@ mod fields;
 mod numbers;
 
 use super::bytes::{PAGE_BYTES, Page, checksum, get_u16, put_f64, put_text, put_u16, put_u32, put_u64};
+use super::directory_shape::DirectoryShape;
 use crate::dem::{About, HorizontalUnit};
 use crate::error::LayoutError;
 use crate::grid::Grid;
@@ -18,8 +19,6 @@ use std::path::Path;
 pub use super::version::MAGIC;
 /// The page that absent record pages read as.
 pub const INERT_PAGE: u32 = 2;
-/// Entries a directory leaf page.
-pub(crate) const LEAF_ENTRIES: u64 = 256;
 
 /// Which error bound the records hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -165,9 +164,9 @@ impl Header {
         slot_count(self.grid.k()).div_ceil(self.records_per_page())
     }
 
-    /// Entries of the directory root.
-    pub(crate) fn root_entries(&self) -> u64 {
-        self.record_pages().div_ceil(LEAF_ENTRIES)
+    /// How the directory is made up.
+    pub(crate) fn directory(&self) -> DirectoryShape {
+        DirectoryShape::new(self.grid.k(), self.record_pages())
     }
 
     /// The header as a page.
@@ -210,7 +209,7 @@ impl Header {
         put_u64(p, 0x068, self.record_pages());
         put_u64(p, 0x070, self.stored_pages);
         put_u32(p, 0x078, self.root_page);
-        put_u32(p, 0x07c, self.root_entries() as u32);
+        put_u32(p, 0x07c, self.directory().root_entries() as u32);
         put_u32(p, 0x080, self.root_checksum);
         put_u64(p, 0x088, self.file_bytes);
         put_u64(p, 0x090, self.imagery.map_or(0, |place| place.offset));

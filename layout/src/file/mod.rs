@@ -3,7 +3,7 @@
 //! * [`atomic`]: a new file appears under its name only when it is complete, keeps what the name stood for (a link, a mode, an owner), and its name is on the disk too.
 //! * `lock`: one writer at a time, by a lock on the file itself, whatever name it is reached by.
 //! * `tail`: a file grows behind its end, and one write of a header makes that count. Edits, undo, pictures and overlays all go through it.
-//! * `directory`: where pages lie, written behind them; `page_table`: where they lie, read on need.
+//! * `directory_shape`: how many pages a directory has; `directory`: where pages lie, written behind them; `page_table`: where they lie, read on need.
 //! * `journal`: what commits led to and what was before them.
 //! * `slots`: which of a file's two headers counts.
 //! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
@@ -17,6 +17,7 @@ pub mod atomic;
 pub mod bytes;
 #[cfg(feature = "files")]
 pub(crate) mod directory;
+pub(crate) mod directory_shape;
 #[cfg(feature = "files")]
 pub mod disk;
 pub mod entries;

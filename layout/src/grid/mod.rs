@@ -6,7 +6,7 @@
 //! (x, y and height) of the nearest data sample. Triangles wholly beyond the data thereby lose their
 //! area, and what remains covers the data exactly.
 //!
-//! Invariant: only [`Grid::new`] makes a grid, so `k` is 1..=17 and both sample counts fit the square.
+//! Invariant: only [`Grid::new`] makes a grid, so `k` is 1..=20 and both sample counts fit the square.
 
 pub(crate) mod octave;
 pub mod order;
@@ -17,16 +17,19 @@ use crate::portable::hypot;
 use crate::remedy::Remedy;
 use crate::words::number;
 
-/// Largest supported `k`: a square of 131,073 samples a side.
-pub(crate) const MAX_K: u32 = 17;
+/// Largest supported `k`: a square of 1,048,577 samples a side.
+pub(crate) const MAX_K: u32 = 20;
 
-/// Most samples a side of a terrain: 2^17 + 1.
+/// Most samples a side of a terrain: 2^20 + 1.
 pub const MOST_SAMPLES: u32 = (1 << MAX_K) + 1;
 
-/// [`MOST_SAMPLES`] as messages say it.
-pub const MOST_SAMPLES_WORDS: &str = "131,073";
+/// Most vertex levels of a terrain, corners left out.
+pub const MOST_LEVELS: usize = 2 * MAX_K as usize;
 
-/// A grid coordinate: column x (east) and row y (north), each at most 2^17.
+/// [`MOST_SAMPLES`] as messages say it.
+pub const MOST_SAMPLES_WORDS: &str = "1,048,577";
+
+/// A grid coordinate: column x (east) and row y (north), each at most 2^20.
 ///
 /// Packed into one word, x in the low half, so that a midpoint is one addition and one shift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -100,7 +103,7 @@ impl Grid {
         Ok(Self { k, samples, spacing_m })
     }
 
-    /// Binary logarithm of the square's side in steps; 1..=17.
+    /// Binary logarithm of the square's side in steps; 1..=20.
     pub fn k(&self) -> u32 {
         self.k
     }

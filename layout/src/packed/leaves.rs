@@ -6,6 +6,7 @@
 use super::container::Section;
 use crate::error::LayoutError;
 use crate::file::bytes::{checksum, get_u32, put_u32};
+use crate::file::directory_shape::DirectoryShape;
 use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES, Entry, leaf_page};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -162,16 +163,65 @@ impl PackedLeaves {
         Ok(u64::from(leaf.number) * ENTRIES_PER_LEAF as u64 + u64::from(place))
     }
 
-    /// The root of the terrain file's directory, `entries` entries long.
-    pub(crate) fn root(&self, entries: u64, packed_pages: u64) -> Vec<u8> {
-        let mut bytes = vec![0; entries as usize * ENTRY_BYTES];
+    /// The nodes of the terrain file's directory, and its root, which leads to them, or to the leaves where there are none.
+    pub(crate) fn root(&self, shape: DirectoryShape, packed_pages: u64) -> (PackedNodes, Vec<u8>) {
+        let mut root = vec![0; shape.root_entries() as usize * ENTRY_BYTES];
         let first = self.first_page + packed_pages;
-        for (page, leaf) in (first..).zip(&self.leaves) {
-            let entry = Entry { page: page as u32, checksum: leaf.checksum, generation: 1 };
-            entry.write(&mut bytes, leaf.number as usize);
+        let entry = |page: u64, checksum| Entry { page: page as u32, checksum, generation: 1 };
+        let mut nodes = PackedNodes(Vec::new());
+        if !shape.has_nodes() {
+            for (page, leaf) in (first..).zip(&self.leaves) {
+                entry(page, leaf.checksum).write(&mut root, leaf.number as usize);
+            }
+            return (nodes, root);
         }
-        bytes
+        let first_node = first + self.count();
+        let mut at = 0;
+        for leaves in self.leaves.chunk_by(|a, b| node_of(a.number) == node_of(b.number)) {
+            nodes.0.push(at);
+            let page = nodes.page(self, nodes.count() - 1, first);
+            let here = entry(first_node + nodes.count() - 1, checksum(&page));
+            here.write(&mut root, node_of(leaves[0].number) as usize);
+            at += leaves.len();
+        }
+        (nodes, root)
     }
+
+    /// Nodes that are present, of a directory that has any.
+    pub(crate) fn nodes(&self, shape: DirectoryShape) -> u64 {
+        let nodes = self.leaves.chunk_by(|a, b| node_of(a.number) == node_of(b.number));
+        if shape.has_nodes() { nodes.count() as u64 } else { 0 }
+    }
+}
+
+/// Nodes that are present: place of the first leaf of each among those that are present.
+#[derive(Debug)]
+pub(crate) struct PackedNodes(Vec<usize>);
+
+impl PackedNodes {
+    fn count(&self) -> u64 {
+        self.0.len() as u64
+    }
+
+    /// The terrain file's page that node `at`, of those that are present, is; the first leaf is page `first_leaf`. Zeros for one that there is not.
+    pub(crate) fn page(&self, leaves: &PackedLeaves, at: u64, first_leaf: u64) -> Vec<u8> {
+        let mut entries = [Entry::default(); ENTRIES_PER_LEAF];
+        let Some(first) = usize::try_from(at).ok().and_then(|at| self.0.get(at).copied()) else {
+            return leaf_page(&entries);
+        };
+        let node = node_of(leaves.leaves[first].number);
+        let of_node = leaves.leaves[first..].iter().take_while(|leaf| node_of(leaf.number) == node);
+        for (page, leaf) in (first_leaf + first as u64..).zip(of_node) {
+            entries[leaf.number as usize % ENTRIES_PER_LEAF] =
+                Entry { page: page as u32, checksum: leaf.checksum, generation: 1 };
+        }
+        leaf_page(&entries)
+    }
+}
+
+/// Node of a leaf.
+fn node_of(leaf: u32) -> u32 {
+    leaf / ENTRIES_PER_LEAF as u32
 }
 
 /// Place of the `nth` bit that is set.
@@ -182,17 +232,17 @@ fn nth_bit(mut word: u64, nth: u32) -> u32 {
     word.trailing_zeros()
 }
 
-/// The sections of the directory with these leaves, of at most 256 entries each: runs of absent and present leaves, the list, the blocks.
+/// The sections of a directory of so many leaves, with these, by number and in order, of at most 256 entries each: runs of absent and present leaves, the list, the blocks.
 #[cfg(feature = "files")]
-pub(crate) fn packed_leaves<'e>(leaves: impl Iterator<Item = &'e [Entry]> + Clone) -> [Vec<u8>; 3] {
+pub(crate) fn packed_leaves<'e>(all: u64, leaves: impl Iterator<Item = (u64, &'e [Entry])>) -> [Vec<u8>; 3] {
     let present = |leaf: &[Entry]| leaf.iter().filter(|entry| entry.is_present()).count();
-    let runs = runs_of(leaves.clone().map(|leaf| present(leaf) > 0));
-    let (mut index, mut blocks) = (Vec::new(), Vec::new());
-    for leaf in leaves {
+    let (mut numbers, mut index, mut blocks) = (Vec::new(), Vec::new(), Vec::new());
+    for (number, leaf) in leaves {
         let count = present(leaf);
         if count == 0 {
             continue;
         }
+        numbers.push(number);
         index.push((count - 1) as u8);
         let at = index.len();
         index.resize(at + 4, 0);
@@ -208,13 +258,13 @@ pub(crate) fn packed_leaves<'e>(leaves: impl Iterator<Item = &'e [Entry]> + Clon
             leaf.iter().filter(|entry| entry.is_present()).flat_map(|entry| entry.checksum.to_le_bytes()),
         );
     }
-    [runs, index, blocks]
+    [runs_of(all, &numbers), index, blocks]
 }
 
-/// Runs of absent and present things in turn, absent ones first, seven bits a byte, the low ones first.
+/// Runs of absent and present ones of `all` things in turn, absent ones first, seven bits a byte, the low ones first; `present` are the numbers of those that are, ascending.
 #[cfg(any(test, feature = "files"))]
-fn runs_of(is_present: impl Iterator<Item = bool>) -> Vec<u8> {
-    let (mut bytes, mut now, mut run) = (Vec::new(), false, 0u64);
+pub(crate) fn runs_of(all: u64, present: &[u64]) -> Vec<u8> {
+    let mut bytes = Vec::new();
     let mut put = |mut run: u64| {
         while run >= 128 {
             bytes.push(run as u8 | 128);
@@ -222,19 +272,21 @@ fn runs_of(is_present: impl Iterator<Item = bool>) -> Vec<u8> {
         }
         bytes.push(run as u8);
     };
-    for present in is_present {
-        if present != now {
-            put(run);
-            (now, run) = (present, 0);
-        }
-        run += 1;
+    let mut at = 0;
+    for run in present.chunk_by(|a, b| a + 1 == *b) {
+        put(run[0] - at);
+        put(run.len() as u64);
+        at = run[0] + run.len() as u64;
     }
-    put(run);
+    // Nothing at all is a run of none.
+    if at < all || all == 0 {
+        put(all - at);
+    }
     bytes
 }
 
 /// Numbers of those that are present, of which there are `count` among `all`. `None` if the bytes say anything else.
-fn present_numbers(bytes: &[u8], all: u64, count: u64) -> Option<Vec<u32>> {
+pub(crate) fn present_numbers(bytes: &[u8], all: u64, count: u64) -> Option<Vec<u32>> {
     let mut present = Vec::new();
     let (mut at, mut is_present, mut bytes) = (0u64, false, bytes.iter());
     while at < all {
@@ -267,8 +319,9 @@ mod tests {
         #[test]
         fn runs_come_back(pages in prop::collection::vec((any::<bool>(), 1usize..400), 0..30)) {
             let all: Vec<bool> = pages.iter().flat_map(|(present, count)| vec![*present; *count]).collect();
-            let bytes = runs_of(all.iter().copied());
             let expected: Vec<u32> = (0u32..).zip(&all).filter(|(_, p)| **p).map(|(i, _)| i).collect();
+            let present: Vec<u64> = expected.iter().copied().map(u64::from).collect();
+            let bytes = runs_of(all.len() as u64, &present);
             let count = expected.len() as u64;
             if !all.is_empty() {
                 prop_assert_eq!(present_numbers(&bytes, all.len() as u64, count), Some(expected));

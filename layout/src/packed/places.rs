@@ -1,12 +1,65 @@
 //! Where tiles lie in a packed file, and their checksums (FORMAT.md, section 9.2).
 
+use super::leaves::present_numbers;
+#[cfg(feature = "files")]
+use super::leaves::runs_of;
 use super::shape::SEGMENTS;
-use crate::file::bytes::{get_u16, get_u32, put_u16, put_u32};
+use crate::file::bytes::{get_u16, get_u32, get_u64, put_u16, put_u32};
 
 /// Bytes of a tile's entry.
 pub(crate) const PLACE_BYTES: usize = 24;
 /// Bytes of a leaf's entry in the root.
 pub(crate) const LEAF_BYTES: usize = 12;
+
+/// Where leaves of the tile directory lie: the packed file's root, without what is absent.
+#[derive(Debug)]
+pub(crate) struct TileRoot {
+    /// Numbers of leaves that are listed, ascending.
+    numbers: Vec<u32>,
+    /// First byte and checksum of each.
+    places: Vec<(u64, u32)>,
+}
+
+impl TileRoot {
+    /// From the section of a file with so many leaves, which lists them all, or as runs of those that it lists. `None` if it is neither.
+    pub(crate) fn parse(bytes: &[u8], leaves: usize, has_runs: bool) -> Option<Self> {
+        let place = |entry: &[u8; LEAF_BYTES]| (get_u64(entry, 0), get_u32(entry, 8));
+        if !has_runs {
+            let (entries, rest) = bytes.as_chunks::<LEAF_BYTES>();
+            let listed = (0u32..).zip(entries.iter().map(place)).filter(|(_, (offset, _))| *offset > 0);
+            let (numbers, places) = listed.unzip();
+            return (rest.is_empty() && entries.len() == leaves).then_some(Self { numbers, places });
+        }
+        let count = get_u32(bytes.get(..4)?, 0) as usize;
+        let runs = bytes.len().checked_sub(count.checked_mul(LEAF_BYTES)?)?;
+        let numbers = present_numbers(bytes.get(4..runs)?, leaves as u64, count as u64)?;
+        Some(Self { numbers, places: bytes[runs..].as_chunks().0.iter().map(place).collect() })
+    }
+
+    /// The section without the places of its leaves, which follow: those with these numbers, ascending, of so many.
+    #[cfg(feature = "files")]
+    pub(crate) fn begin(leaves: usize, numbers: &[usize], has_runs: bool) -> Vec<u8> {
+        if !has_runs {
+            return Vec::new();
+        }
+        let numbers: Vec<u64> = numbers.iter().map(|number| *number as u64).collect();
+        let mut bytes = (numbers.len() as u32).to_le_bytes().to_vec();
+        bytes.extend(runs_of(leaves as u64, &numbers));
+        bytes
+    }
+
+    /// Leaves that are listed.
+    pub(crate) fn count(&self) -> usize {
+        self.numbers.len()
+    }
+
+    /// Which of those that are listed a leaf is, its first byte and its checksum.
+    pub(crate) fn find(&self, leaf: usize) -> Option<(usize, u64, u32)> {
+        let at = self.numbers.binary_search(&u32::try_from(leaf).ok()?).ok()?;
+        let (offset, checksum) = self.places[at];
+        (offset > 0).then_some((at, offset, checksum))
+    }
+}
 
 /// Where a tile lies; all zero if all that it gives is inert.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

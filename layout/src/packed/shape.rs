@@ -131,20 +131,6 @@ impl Groups {
         }
     }
 
-    /// All tiles, leaf by leaf from the first.
-    pub(crate) fn tiles(&self) -> impl Iterator<Item = (usize, TileId)> + '_ {
-        self.groups.iter().enumerate().rev().flat_map(|(g, group)| {
-            let [wide, high] = group.leaves();
-            (0..high).flat_map(move |y| (0..wide).map(move |x| [x, y])).flat_map(move |leaf| {
-                let size = group.leaf_size(leaf);
-                (0..size[0] * size[1]).map(move |i| {
-                    let at = [leaf[0] * LEAF_SIDE + i % size[0], leaf[1] * LEAF_SIDE + i / size[0]];
-                    (group.leaf_number(leaf), TileId { group: g as u8, at })
-                })
-            })
-        })
-    }
-
     /// Leaf of a tile and its place there; `None` for one that does not exist.
     #[inline]
     pub(crate) fn leaf_of(&self, id: TileId) -> Option<(usize, usize)> {
@@ -157,17 +143,53 @@ impl Groups {
         Some((group.leaf_number(leaf), (within[1] * group.leaf_size(leaf)[0] + within[0]) as usize))
     }
 
-    /// Tiles of each leaf.
-    pub(crate) fn leaf_sizes(&self) -> Vec<usize> {
-        let mut sizes = Vec::with_capacity(self.leaves);
-        for group in self.groups.iter().rev() {
-            let [wide, high] = group.leaves();
-            for leaf in (0..high).flat_map(|y| (0..wide).map(move |x| [x, y])) {
-                let size = group.leaf_size(leaf);
-                sizes.push(size[0] as usize * size[1] as usize);
-            }
-        }
-        sizes
+    /// The group of a leaf, and its column and row there.
+    fn leaf_at(&self, leaf: usize) -> Option<(&Group, [u32; 2])> {
+        let group = self.groups.iter().find(|group| group.first_leaf <= leaf)?;
+        let within = leaf - group.first_leaf;
+        let [wide, high] = group.leaves().map(|count| count as usize);
+        (within < wide * high).then_some((group, [(within % wide) as u32, (within / wide) as u32]))
+    }
+
+    /// Tiles of a leaf; none of one that there is not.
+    pub(crate) fn leaf_size(&self, leaf: usize) -> usize {
+        self.leaf_at(leaf).map_or(0, |(group, at)| {
+            let size = group.leaf_size(at);
+            size[0] as usize * size[1] as usize
+        })
+    }
+
+    /// Tiles of a leaf, in its order.
+    #[cfg(feature = "files")]
+    pub(crate) fn tiles_in(&self, leaf: usize) -> impl Iterator<Item = TileId> + Clone + '_ {
+        let found = self.leaf_at(leaf);
+        found.into_iter().flat_map(move |(group, at)| {
+            let size = group.leaf_size(at);
+            // Groups are few.
+            let number = self.groups.iter().position(|other| other == group).unwrap_or_default() as u8;
+            (0..size[0] * size[1]).map(move |i| TileId {
+                group: number,
+                at: [at[0] * LEAF_SIDE + i % size[0], at[1] * LEAF_SIDE + i / size[0]],
+            })
+        })
+    }
+
+    /// Leaves of the next finer group with tiles inside the tile `over`.
+    #[cfg(feature = "files")]
+    pub(crate) fn leaves_inside(&self, over: TileId) -> impl Iterator<Item = usize> + '_ {
+        // A tile of a group is as wide as 2^OCTAVES tiles of the finer one, and leaves are aligned to no less.
+        let group = usize::from(over.group).checked_sub(1).map(|finer| &self.groups[finer]);
+        group.into_iter().flat_map(move |group| {
+            // The coarsest group's tile may be narrower.
+            let coarser = &self.groups[usize::from(over.group)];
+            let log = coarser.stride_log + coarser.tile_log - group.stride_log - group.tile_log;
+            let [x, y] = [0, 1].map(|axis| {
+                let first = over.at[axis] << log;
+                let end = ((over.at[axis] + 1) << log).min(group.tiles[axis]);
+                first / LEAF_SIDE..end.div_ceil(LEAF_SIDE).max(first / LEAF_SIDE)
+            });
+            y.flat_map(move |y| x.clone().map(move |x| group.leaf_number([x, y])))
+        })
     }
 }
 
@@ -211,14 +233,27 @@ mod tests {
                     }
                 }
             }
-            let sizes = groups.leaf_sizes();
-            assert_eq!(sizes.len(), groups.leaves);
-            let mut counted = vec![0; groups.leaves];
-            for (leaf, id) in groups.tiles() {
-                assert_eq!(groups.leaf_of(id), Some((leaf, counted[leaf])));
-                counted[leaf] += 1;
+            let mut tiles = 0;
+            for leaf in 0..groups.leaves {
+                for (i, id) in groups.tiles_in(leaf).enumerate() {
+                    assert_eq!(groups.leaf_of(id), Some((leaf, i)));
+                }
+                assert_eq!(groups.tiles_in(leaf).count(), groups.leaf_size(leaf));
+                tiles += groups.leaf_size(leaf);
             }
-            assert_eq!(counted, sizes);
+            assert_eq!((groups.leaf_size(groups.leaves), groups.tiles_in(groups.leaves).count()), (0, 0));
+            let all: u32 = groups.groups.iter().map(|group| group.tiles[0] * group.tiles[1]).sum();
+            assert_eq!(tiles, all as usize);
+            // Every tile of a group but the coarsest has its leaf among those inside the coarser tile that it lies in.
+            for leaf in 0..groups.leaves {
+                for id in groups.tiles_in(leaf) {
+                    let Some(coarser) = groups.groups.get(usize::from(id.group) + 1) else { continue };
+                    let group = &groups.groups[usize::from(id.group)];
+                    let log = coarser.stride_log + coarser.tile_log - group.stride_log - group.tile_log;
+                    let over = TileId { group: id.group + 1, at: id.at.map(|v| v >> log) };
+                    assert!(groups.leaves_inside(over).any(|inside| inside == leaf), "{id:?}");
+                }
+            }
         }
     }
 }

@@ -16,14 +16,14 @@ mod stages;
 use super::appended::Appended;
 use super::cache::Cache;
 use super::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS, Section, current_of};
-use super::leaves::PackedLeaves;
+use super::leaves::{PackedLeaves, PackedNodes};
 use super::model::{DecodeTables, Model};
-use super::places::{LEAF_BYTES, TilePlace};
+use super::places::{TilePlace, TileRoot};
 use super::shape::Groups;
 use super::way::{Scratch, Way};
 use super::wide::Width;
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_u32, get_u64, to_usize};
+use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
 use crate::file::entries::ENTRY_BYTES;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::packed_end::{PackedEnd, from_file};
@@ -61,12 +61,13 @@ pub(crate) struct PackedSource {
     /// What is not packed, as it was when the file was opened, and as it is.
     end: PackedEnd,
     appended: Appended,
-    /// The root of the terrain file's directory, made when it is first asked for.
-    root: OnceLock<Vec<u8>>,
+    /// First page of nodes of that directory, or of the root if it has none.
+    node_page: u64,
+    /// Its nodes and root, made when they are first asked for.
+    root: OnceLock<(PackedNodes, Vec<u8>)>,
     groups: Groups,
-    leaf_sizes: Vec<usize>,
     /// Where leaves of tiles lie, and what they hold, once they were needed.
-    tile_leaves: Vec<(u64, u32)>,
+    tile_root: TileRoot,
     tiles: Vec<OnceLock<Box<[TilePlace]>>>,
     way: Way,
     tables: DecodeTables,
@@ -105,17 +106,17 @@ impl PackedSource {
         let pages = [header.record_pages(), container.pages];
         let leaves = PackedLeaves::parse(&runs, &index, &container.section(BLOCKS), pages, FIRST_PAGE)
             .ok_or_else(|| odd(path, "directory leaves"))?;
-        let root_page = FIRST_PAGE + container.pages + leaves.count();
-        let root_pages = (header.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE);
+        let node_page = FIRST_PAGE + container.pages + leaves.count();
+        let shape = header.directory();
+        let root_page = node_page + leaves.nodes(shape);
+        let root_pages = (shape.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE);
         let first_page = root_page + root_pages;
         let model = front.section(&*inner, &container.section(MODEL), "tables")?;
         let tables = DecodeTables::of(&Model::parse(&model).ok_or_else(|| odd(path, "tables"))?);
         let groups = Groups::of(&header.grid);
-        let leaf_sizes = groups.leaf_sizes();
         let root = front.section(&*inner, &container.section(ROOT), "tile directory")?;
-        if root.len() != groups.leaves * LEAF_BYTES {
-            return Err(odd(path, "tile directory"));
-        }
+        let tile_root = TileRoot::parse(&root, groups.leaves, shape.has_nodes())
+            .ok_or_else(|| odd(path, "tile directory"))?;
         // The header first and then the length: what a header counts was in the file before the header was.
         inner.measure_again()?;
         let end = PackedEnd::read(path, &page, first_page, &|at, buffer| inner.read_at(at, buffer))?;
@@ -131,10 +132,8 @@ impl PackedSource {
         let appended = Appended::default();
         appended.learn(&end.runs);
         Ok(Self {
-            tile_leaves: (0..groups.leaves)
-                .map(|i| (get_u64(&root, i * LEAF_BYTES), get_u32(&root, i * LEAF_BYTES + 8)))
-                .collect(),
-            tiles: (0..groups.leaves).map(|_| OnceLock::new()).collect(),
+            tiles: (0..tile_root.count()).map(|_| OnceLock::new()).collect(),
+            tile_root,
             way: Way::of(&header),
             inert: inert_page(header.record_kind),
             cache: Cache::new(MOST_CACHE_BYTES),
@@ -145,6 +144,7 @@ impl PackedSource {
             whole: OnceLock::new(),
             unpacking_whole: Mutex::default(),
             root: OnceLock::new(),
+            node_page,
             root_page,
             end,
             appended,
@@ -155,7 +155,6 @@ impl PackedSource {
             front: front.into_kept(),
             leaves,
             groups,
-            leaf_sizes,
             tables,
         })
     }
@@ -206,13 +205,19 @@ impl PackedSource {
             _ if number - FIRST_PAGE < stored => {
                 self.record_page(self.logical(number - FIRST_PAGE)?, page)?;
             }
-            _ if number < self.root_page => {
+            _ if number < self.node_page => {
                 let at = (number - FIRST_PAGE - stored) as usize;
                 let read = |offset, buffer: &mut [u8]| self.read_packed(offset, buffer);
                 page.copy_from_slice(&self.leaves.page(self.path(), at, read)?);
             }
             _ => {
-                let root = self.root.get_or_init(|| self.leaves.root(self.header.root_entries(), stored));
+                let (nodes, root) =
+                    self.root.get_or_init(|| self.leaves.root(self.header.directory(), stored));
+                if number < self.root_page {
+                    let first_leaf = FIRST_PAGE + stored;
+                    page.copy_from_slice(&nodes.page(&self.leaves, number - self.node_page, first_leaf));
+                    return Ok(());
+                }
                 let at = (number - self.root_page) as usize * PAGE_BYTES;
                 page.fill(0);
                 let bytes = root.get(at..).unwrap_or_default();

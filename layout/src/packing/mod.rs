@@ -5,6 +5,7 @@
 mod compare;
 mod front;
 mod gather;
+mod listed;
 mod pack;
 mod unpack;
 

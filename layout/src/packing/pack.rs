@@ -1,15 +1,16 @@
 //! A terrain file packed into another, in two passes: one over a sample of the tiles that counts, for the tables, and one that writes.
 //!
 //! What was written is unpacked again and compared with the terrain file, byte for byte, before it gets its name ([`Check`] says how). So whatever the file holds, what is packed is the same, or packing
-//! fails and says so. Cost: each vertex is looked up and unpacked once; memory is a few megabytes, and 24 bytes a record page.
+//! fails and says so. Cost: each vertex is looked up and unpacked once; memory is a few megabytes, 40 bytes a thousand of these, and 24 bytes a record page.
 
 use super::compare::{CHUNK_BYTES, Check, compare, read_back, refused};
 use super::front::Front;
 use super::gather::tile_of;
+use super::listed::{ListedLeaf, listed, tiles_of};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
-use crate::file::directory::{page_at, put_all_leaves, root_bytes};
+use crate::file::directory::{page_at, put_directory};
 use crate::file::disk::Disk;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
@@ -22,7 +23,7 @@ use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
 use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
 use crate::packed::leaves::packed_leaves;
 use crate::packed::model::{CONTEXTS, Counts, DecodeTables, Model};
-use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace};
+use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace, TileRoot};
 use crate::packed::shape::{Groups, SEGMENTS, TileId};
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
@@ -145,8 +146,8 @@ fn check_packable(built: &Terrain) -> Result<u64, LayoutError> {
             return Err(refused(path, in_order));
         }
     }
-    let (root, page) = put_all_leaves(path, built.table().leaves(), next + 1, |_, _| Ok(()))?;
-    let root = root_bytes(&root);
+    let leaves = built.table().leaves().map(|(number, leaf)| (number, &leaf[..]));
+    let (root, page) = put_directory(path, header.directory(), leaves, next + 1, |_, _| Ok(()))?;
     let end = u64::from(page) * PAGE + root.bytes.len() as u64;
     let is_in_order =
         [header.root_page, header.root_checksum] == [page, root.checksum] && end <= header.file_bytes;
@@ -189,16 +190,6 @@ impl<C: RecordCodec> Packer<'_, C> {
         group.is_top || self.records.raw(centre) != C::INERT
     }
 
-    /// Which leaves of the tile directory may hold anything, and the tiles of these: what is void takes no room.
-    fn listed(&self) -> (Vec<bool>, Vec<(usize, TileId)>) {
-        let mut holds = vec![false; self.groups.leaves];
-        for (leaf, id) in self.groups.tiles() {
-            holds[leaf] = holds[leaf] || self.may_hold(id);
-        }
-        let tiles = self.groups.tiles().filter(|(leaf, _)| holds[*leaf]).collect();
-        (holds, tiles)
-    }
-
     /// The records of a tile; `None` if all that it gives are inert.
     fn records_of(&self, id: TileId) -> Option<TileRecords> {
         if !self.may_hold(id) {
@@ -226,25 +217,25 @@ impl<C: RecordCodec> Packer<'_, C> {
     }
 
     /// Counts what occurs.
-    fn model(&self, tiles: &[(usize, TileId)]) -> Model {
+    fn model(&self, leaves: &[ListedLeaf]) -> Model {
         let none = || (vec![[0; TOKENS]; CONTEXTS], self.way.scratch());
-        let counts = tiles
+        let count = leaves.last().map_or(0, |last| last.end);
+        let counts = leaves
             .par_iter()
-            .enumerate()
-            .with_min_len(64)
-            .filter(|(number, (_, id))| self.is_counted(*number, tiles.len(), *id))
-            .fold(none, |(mut counts, mut scratch), (_, (_, id))| {
-                if let Some(records) = self.records_of(*id) {
-                    for encoder in self.encoded(*id, &records, &mut scratch) {
+            .flat_map_iter(|leaf| tiles_of(&self.groups, std::slice::from_ref(leaf)))
+            .filter(|(number, id)| self.is_counted(*number, count, *id))
+            .fold(none, |(mut counts, mut scratch), (_, id)| {
+                if let Some(records) = self.records_of(id) {
+                    for encoder in self.encoded(id, &records, &mut scratch) {
                         encoder.count(&mut counts);
                     }
                 }
-                self.progress.advance(self.samples_of(*id));
+                self.progress.advance(self.samples_of(id));
                 (counts, scratch)
             })
             .map(|(counts, _)| counts)
             .reduce(|| none().0, sum);
-        if tiles.len() > TILES_COUNTED { Model::from_sample(&counts) } else { Model::from_counts(&counts) }
+        if count > TILES_COUNTED { Model::from_sample(&counts) } else { Model::from_counts(&counts) }
     }
 
     /// Packs a tile; `None` if all that it gives are inert.
@@ -295,11 +286,13 @@ impl<C: RecordCodec> Packer<'_, C> {
         directory_end: u64,
         file: &AtomicFile,
     ) -> Result<u64, LayoutError> {
-        let (holds, tiles) = self.listed();
-        let samples = tiles.iter().map(|(_, id)| self.samples_of(*id)).sum();
-        let counted = tiles.iter().enumerate().filter(|(i, (_, id))| self.is_counted(*i, tiles.len(), *id));
-        self.progress.stage("counting", counted.map(|(_, (_, id))| self.samples_of(*id)).sum());
-        let model = self.model(&tiles);
+        let leaves = listed(&self.groups, |id| self.may_hold(id));
+        let count = leaves.last().map_or(0, |last| last.end);
+        let samples = tiles_of(&self.groups, &leaves).map(|(_, id)| self.samples_of(id)).sum();
+        let counted =
+            tiles_of(&self.groups, &leaves).filter(|(number, id)| self.is_counted(*number, count, *id));
+        self.progress.stage("counting", counted.map(|(_, id)| self.samples_of(id)).sum());
+        let model = self.model(&leaves);
         let tables = DecodeTables::of(&model);
         self.progress.stage("packing", samples);
 
@@ -308,61 +301,65 @@ impl<C: RecordCodec> Packer<'_, C> {
         let mut front = Front::default();
         front.put(MODEL, &model.to_bytes());
         built.check_directory()?;
-        let [runs, index, blocks] = packed_leaves(built.table().leaves());
+        let directory = header.directory();
+        let of_directory = built.table().leaves().map(|(number, leaf)| (number, &leaf[..]));
+        let [runs, index, blocks] = packed_leaves(directory.leaves(), of_directory);
         front.put(RUNS, &runs);
         front.put(INDEX, &index);
-        let root = front.put(ROOT, &vec![0; self.groups.leaves * LEAF_BYTES]);
         // Leaves have their place before it is known what they hold.
-        let mut leaf_sizes = self.groups.leaf_sizes();
-        leaf_sizes.iter_mut().zip(&holds).filter(|(_, holds)| !**holds).for_each(|(size, _)| *size = 0);
+        let numbers: Vec<usize> = leaves.iter().map(|listed| listed.leaf).collect();
+        let mut root = TileRoot::begin(self.groups.leaves, &numbers, directory.has_nodes());
+        let is_sparse = !root.is_empty();
+        let first_place = root.len();
+        let places = if is_sparse { leaves.len() } else { self.groups.leaves };
+        root.resize(first_place + places * LEAF_BYTES, 0);
+        let root = front.put(ROOT, &root) + first_place;
         let first_leaf = FRONT + front.bytes.len() as u64;
-        let mut at = first_leaf;
-        let leaf_offsets: Vec<u64> = leaf_sizes
-            .iter()
-            .map(|size| {
-                at += (size * PLACE_BYTES) as u64;
-                at - (size * PLACE_BYTES) as u64
-            })
-            .collect();
+        let mut at = first_leaf + (count * PLACE_BYTES) as u64;
 
-        let mut places: Vec<Vec<TilePlace>> =
-            leaf_sizes.iter().map(|size| Vec::with_capacity(*size)).collect();
         let failed = |e| {
             let when_full = "cannot write the packed file, for which there is no room; make some on its disk, or name an output on another";
             LayoutError::write(file.target(), "cannot write the packed file", when_full, e)
         };
         let write = |bytes: &[u8], offset| disk.write_at(file.file(), bytes, offset).map_err(failed);
-        for tiles in tiles.chunks(TILES_AT_ONCE) {
+        let mut done = 0;
+        while done < leaves.len() {
+            let few =
+                leaves[done..].partition_point(|listed| listed.end - leaves[done].first <= TILES_AT_ONCE);
+            let batch = &leaves[done..done + few.max(1)];
+            let tiles: Vec<TileId> = tiles_of(&self.groups, batch).map(|(_, id)| id).collect();
             let made: Vec<Option<Made>> = tiles
                 .par_iter()
                 .with_min_len(16)
-                .map_init(|| self.way.scratch(), |scratch, (_, id)| self.make(*id, &model, &tables, scratch))
+                .map_init(|| self.way.scratch(), |scratch, id| self.make(*id, &model, &tables, scratch))
                 .collect::<Result<_, LayoutError>>()?;
             let mut bytes = Vec::new();
-            for ((leaf, _), made) in tiles.iter().zip(made) {
-                let mut place = TilePlace::default();
-                if let Some(made) = made {
-                    place.offset = at + bytes.len() as u64;
-                    for (s, segment) in made.segments.iter().enumerate() {
+            let mut made = made.into_iter();
+            for (i, listed) in (done..).zip(batch) {
+                let mut entries = vec![0; (listed.end - listed.first) * PLACE_BYTES];
+                let mut is_present = false;
+                for (within, made) in made.by_ref().take(listed.end - listed.first).enumerate() {
+                    let Some(Made { segments }) = made else { continue };
+                    let mut place = TilePlace { offset: at + bytes.len() as u64, ..TilePlace::default() };
+                    for (s, segment) in segments.iter().enumerate() {
                         place.lengths[s] = segment.len() as u16;
                         place.checksums[s] = checksum(segment);
                         bytes.extend(segment);
                     }
+                    place.write(&mut entries, within);
+                    is_present = true;
                 }
-                places[*leaf].push(place);
+                let offset = first_leaf + (listed.first * PLACE_BYTES) as u64;
+                if is_present {
+                    let to = root + if is_sparse { i } else { listed.leaf } * LEAF_BYTES;
+                    put_u64(&mut front.bytes, to, offset);
+                    put_u32(&mut front.bytes, to + 8, checksum(&entries));
+                }
+                write(&entries, offset)?;
             }
             write(&bytes, at)?;
             at += bytes.len() as u64;
-        }
-        let root = &mut front.bytes[root..];
-        for (i, (leaf, offset)) in places.iter().zip(&leaf_offsets).enumerate() {
-            let mut bytes = vec![0; leaf.len() * PLACE_BYTES];
-            if leaf.iter().any(TilePlace::is_present) {
-                leaf.iter().enumerate().for_each(|(i, place)| place.write(&mut bytes, i));
-                put_u64(root, i * LEAF_BYTES, *offset);
-                put_u32(root, i * LEAF_BYTES + 8, checksum(&bytes));
-            }
-            write(&bytes, *offset)?;
+            done += batch.len();
         }
         front.seal(ROOT);
         front.list(BLOCKS, &blocks, at);

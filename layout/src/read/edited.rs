@@ -2,11 +2,12 @@
 //!
 //! Pages are the file's until they are installed, and then this store's own. Cost over [`Records`]: a branch a record, and 4 bytes a logical page.
 
+use super::page_map::PageMap;
 use super::prefetch::prefetch;
 use super::records::Records;
 use super::store::{CompleteStore, RawOf, RecordShape, RecordStore, byte_in_page, page_of};
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
+use crate::file::bytes::{PAGE_BYTES, Page};
 use crate::grid::record::RecordCodec;
 
 /// The page is the file's. Zero, so that pages that are never replaced take no memory.
@@ -18,7 +19,7 @@ pub struct EditedRecords<'a, C: RecordCodec> {
     records: Records<'a, C>,
     shape: RecordShape<C>,
     /// Which own page each logical page is, counted from 1, or [`FILES`].
-    own: Vec<u32>,
+    own: PageMap,
     /// Own pages, one after the other.
     bytes: Vec<u8>,
 }
@@ -26,7 +27,7 @@ pub struct EditedRecords<'a, C: RecordCodec> {
 impl<'a, C: RecordCodec> EditedRecords<'a, C> {
     /// The records as the file has them.
     pub fn new(records: Records<'a, C>) -> Self {
-        let own = vec![FILES; records.page_count()];
+        let own = PageMap::like(records.pages());
         Self { shape: records.shape().clone(), records, own, bytes: Vec::new() }
     }
 
@@ -35,17 +36,17 @@ impl<'a, C: RecordCodec> EditedRecords<'a, C> {
     /// # Errors
     /// [`LayoutError::Usage`] if the terrain has no such page.
     pub fn install(&mut self, logical_page: u64, page: &Page) -> Result<(), LayoutError> {
-        let count = self.own.len();
-        let Some(own) = self.own.get_mut(to_usize(logical_page)?) else {
+        let count = self.own.count();
+        let Some(own) = self.own.get(logical_page) else {
             return Err(LayoutError::Usage(format!(
                 "page {logical_page} does not exist; the terrain has {count}"
             )));
         };
-        if *own == FILES {
-            *own = (self.bytes.len() / PAGE_BYTES) as u32 + 1;
+        if own == FILES {
+            self.own.set(logical_page, (self.bytes.len() / PAGE_BYTES) as u32 + 1);
             self.bytes.extend_from_slice(page);
         } else {
-            self.bytes[(*own as usize - 1) * PAGE_BYTES..][..PAGE_BYTES].copy_from_slice(page);
+            self.bytes[(own as usize - 1) * PAGE_BYTES..][..PAGE_BYTES].copy_from_slice(page);
         }
         Ok(())
     }
@@ -58,7 +59,7 @@ impl<'a, C: RecordCodec> EditedRecords<'a, C> {
     /// Own page and byte in it of a slot; `None` if it is the file's.
     #[inline(always)]
     fn place(&self, slot: u64) -> Option<usize> {
-        let own = *self.own.get(page_of::<C>(slot) as usize)?;
+        let own = self.own.get(page_of::<C>(slot))?;
         let within = byte_in_page::<C>(slot);
         (own != FILES).then(|| (own as usize - 1) * PAGE_BYTES + within)
     }

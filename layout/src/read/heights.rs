@@ -9,7 +9,7 @@ use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page};
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
-use crate::grid::record::Vertex;
+use crate::grid::record::{Vertex, VertexClass};
 
 /// Pages kept by default: 4 MiB.
 const PAGES: usize = 1024;
@@ -66,6 +66,10 @@ impl<'t> Heights<'t> {
         window.check(self.terrain.grid())?;
         into.clear();
         into.reserve(window.size[0] as usize * window.size[1] as usize);
+        if self.is_void(window)? {
+            into.resize(window.size[0] as usize * window.size[1] as usize, f64::NAN);
+            return Ok(());
+        }
         for row in 0..window.size[1] {
             for column in 0..window.size[0] {
                 let vertex = self.vertex(window.point(column, row))?;
@@ -73,6 +77,36 @@ impl<'t> Heights<'t> {
             }
         }
         Ok(())
+    }
+
+    /// Whether none of the samples of a window, which lies in the data, nor between them has a height: found from the coarsest records down, so that oceans cost next to nothing.
+    fn is_void(&mut self, window: &SampleWindow) -> Result<bool, LayoutError> {
+        let (from, last) = (window.from, window.last());
+        let mut waiting = vec![([0u32; 2], self.terrain.grid().side_steps())];
+        while let Some((at, side)) = waiting.pop() {
+            if (0..2).any(|axis| at[axis] > last[axis] || at[axis] + side < from[axis]) {
+                continue;
+            }
+            let half = side / 2;
+            // What lies in a square or on its sides lies below its centre, but for the corners.
+            let is_open = half > 0 && {
+                let centre = self.vertex(GridPoint::new(at[0] + half, at[1] + half))?;
+                centre.class != VertexClass::Inert
+            };
+            if is_open {
+                waiting.extend(
+                    [[0, 0], [half, 0], [0, half], [half, half]].map(|[x, y]| ([at[0] + x, at[1] + y], half)),
+                );
+                continue;
+            }
+            for [x, y] in [[0, 0], [side, 0], [0, side], [side, side]].map(|[x, y]| [at[0] + x, at[1] + y]) {
+                let is_within = (from[0]..=last[0]).contains(&x) && (from[1]..=last[1]).contains(&y);
+                if is_within && !self.vertex(GridPoint::new(x, y))?.class.is_void() {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
     }
 
     /// The vertex at a grid point of the square.
@@ -216,5 +250,40 @@ mod tests {
             }
             assert!(many.iter().flatten().count() > 3000 && many.iter().any(Option::is_none));
         }
+    }
+
+    /// Windows over islands, single samples among them, and over what lies between: as sample by sample, and without an ocean's samples being looked at.
+    #[test]
+    fn windows_of_voids_are_void_and_others_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.iqt");
+        let [wide, high] = [700, 600];
+        let islands = [[0, 0], [699, 599], [256, 256], [255, 300], [511, 128], [300, 599]];
+        let dem = MemoryDem::from_fn([wide, high], SampleType::I16, |x, y| {
+            let is_land = islands.contains(&[x, y]) || (400..430).contains(&x) && (60..90).contains(&y);
+            if is_land { f64::from(x + 2 * y) } else { f64::NAN }
+        });
+        build(&dem, &path, &BuildOptions::default().spacing_m([1.0; 2]), &Silent).unwrap();
+        let terrain = Terrain::open_unmapped(&path).unwrap();
+        let mut heights = Heights::new(&terrain);
+        let mut random = Random::new(9);
+        let mut read = Vec::new();
+        let mut voids = 0;
+        for i in 0..400 {
+            let [x, y] = islands[i % islands.len()];
+            let near = |v: u32, random: &mut Random| (v + random.below(40) as u32).saturating_sub(20);
+            let from = [near(x, &mut random).min(wide - 1), near(y, &mut random).min(high - 1)];
+            let size = [from[0], from[1]]
+                .map(|v| 1 + random.below(30).min(u64::from(high - 1 - v.min(high - 1))) as u32);
+            let window = SampleWindow { from, size: [size[0].min(wide - from[0]), size[1]], step: 1 };
+            heights.samples(&window, &mut read).unwrap();
+            for (at, height) in (0u32..).zip(&read) {
+                let p = window.point(at % window.size[0], at / window.size[0]);
+                let expected = dem.sample(p.x(), p.y());
+                assert!(*height == expected || height.is_nan() && expected.is_nan(), "{p:?}: {height}");
+            }
+            voids += usize::from(read.iter().all(|height| height.is_nan()));
+        }
+        assert!((20..390).contains(&voids), "{voids}");
     }
 }

@@ -11,6 +11,7 @@ pub mod loader;
 #[cfg(feature = "files")]
 pub(crate) mod opened;
 pub mod opening;
+pub(crate) mod page_map;
 pub mod pool;
 pub mod prefetch;
 pub mod records;

@@ -5,13 +5,14 @@
 //!
 //! Invariants: pages take at most the stated number of bytes, whatever the system's own cache does. The inert page and page 0 stay. A full
 //! pool drops a page that was not read since the last round of the hand (second chance, after F. Corbato, "A Paging Experiment with the Multics
-//! System", 1968). Cost: 4 bytes a logical page of the file, a load more than a mapped file a record.
+//! System", 1968). Cost: as of a [`PageMap`], a load more than a mapped file a record.
 
+use super::page_map::PageMap;
 use super::prefetch::prefetch;
 use super::store::{RawOf, RecordShape, RecordStore, byte_in_page, page_of};
 use super::terrain::Terrain;
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
+use crate::file::bytes::{PAGE_BYTES, Page};
 use crate::file::entries::ENTRIES_PER_LEAF;
 use crate::file::structure::inert_page;
 use crate::grid::record::RecordCodec;
@@ -23,6 +24,8 @@ const LEAST_PAGES: usize = 16;
 const STAYING: usize = 2;
 /// The page is away.
 const AWAY: u32 = u32::MAX;
+/// The frame has no logical page.
+const NO_PAGE: u64 = u64::MAX;
 
 /// Pages of one terrain, resident in memory.
 #[derive(Debug)]
@@ -31,9 +34,9 @@ pub struct PagePool<C> {
     /// Page frames, one after the other.
     bytes: Vec<u8>,
     /// Frame of each logical page, or [`AWAY`].
-    frames: Vec<u32>,
-    /// Logical page of each frame.
-    held: Vec<u32>,
+    frames: PageMap,
+    /// Logical page of each frame, or [`NO_PAGE`].
+    held: Vec<u64>,
     /// Whether a frame was read since the hand passed it.
     recent: Vec<AtomicBool>,
     /// Most frames.
@@ -48,8 +51,7 @@ impl<C: RecordCodec> PagePool<C> {
     /// As [`Terrain::checked_page`].
     pub fn new(terrain: &Terrain, shape: RecordShape<C>, cache_bytes: u64) -> Result<Self, LayoutError> {
         let cache_bytes = cache_bytes - terrain.source().take_share(cache_bytes).min(cache_bytes);
-        let count = to_usize(terrain.page_count())?;
-        let most = count.saturating_add(STAYING);
+        let most = usize::try_from(terrain.page_count()).unwrap_or(usize::MAX).saturating_add(STAYING);
         let capacity = usize::try_from(cache_bytes / PAGE_BYTES as u64).unwrap_or(usize::MAX);
         let capacity = capacity.clamp(STAYING + LEAST_PAGES, most.max(STAYING + LEAST_PAGES));
         // Page 0 stays, so its leaf is read first.
@@ -58,14 +60,14 @@ impl<C: RecordCodec> PagePool<C> {
             shape,
             // Zeroed lazily by the system: memory is taken as pages come.
             bytes: vec![0; capacity * PAGE_BYTES],
-            frames: frames_of(terrain, count),
+            frames: frames_of(terrain),
             held: Vec::with_capacity(capacity),
             recent: (0..capacity).map(|_| AtomicBool::new(false)).collect(),
             capacity,
             hand: STAYING,
         };
         // The inert page is no logical page; nothing looks it up.
-        pool.held.push(AWAY);
+        pool.held.push(NO_PAGE);
         pool.bytes[..PAGE_BYTES].copy_from_slice(&inert_page(terrain.header().record_kind)[..]);
         pool.install(0, &first)?;
         Ok(pool)
@@ -74,7 +76,7 @@ impl<C: RecordCodec> PagePool<C> {
     /// Whether a logical page is here. Absent pages are, as soon as it is known that they are absent; pages past the last one never.
     #[inline(always)]
     pub fn is_resident(&self, logical_page: u64) -> bool {
-        self.frames.get(logical_page as usize).is_some_and(|frame| *frame != AWAY)
+        self.frames.get(logical_page).is_some_and(|frame| frame != AWAY)
     }
 
     /// Takes a page in; gives up another if the pool is full.
@@ -82,21 +84,20 @@ impl<C: RecordCodec> PagePool<C> {
     /// # Errors
     /// [`LayoutError::Usage`] if the terrain has no such page.
     pub fn install(&mut self, logical_page: u64, page: &Page) -> Result<(), LayoutError> {
-        let at = to_usize(logical_page)?;
-        let Some(known) = self.frames.get(at).copied() else {
+        let Some(known) = self.frames.get(logical_page) else {
             return Err(LayoutError::Usage(format!(
                 "page {logical_page} does not exist; the terrain has {}",
-                self.frames.len()
+                self.frames.count()
             )));
         };
         if known == AWAY && self.bytes[..PAGE_BYTES] == page[..] {
             // An absent page whose directory leaf had not been read.
-            self.frames[at] = 0;
+            self.frames.set(logical_page, 0);
             return Ok(());
         }
         let frame = match known {
             AWAY if self.held.len() < self.capacity => {
-                self.held.push(AWAY);
+                self.held.push(NO_PAGE);
                 self.held.len() - 1
             }
             AWAY => self.give_up_one(),
@@ -104,8 +105,8 @@ impl<C: RecordCodec> PagePool<C> {
             here => here as usize,
         };
         self.bytes[frame * PAGE_BYTES..][..PAGE_BYTES].copy_from_slice(page);
-        self.held[frame] = logical_page as u32;
-        self.frames[at] = frame as u32;
+        self.held[frame] = logical_page;
+        self.frames.set(logical_page, frame as u32);
         *self.recent[frame].get_mut() = true;
         Ok(())
     }
@@ -126,17 +127,15 @@ impl<C: RecordCodec> PagePool<C> {
     /// States whether a page is in the file now. One that has come to be there is away until it is installed; one that is no longer there is inert. Others, and pages that the terrain has
     /// not, are as they were.
     pub fn set_present(&mut self, logical_page: u64, is_present: bool) {
-        let Some(frame) = usize::try_from(logical_page).ok().and_then(|at| self.frames.get_mut(at)) else {
-            return;
-        };
-        match (*frame, is_present) {
-            (0, true) => *frame = AWAY,
+        let Some(frame) = self.frames.get(logical_page) else { return };
+        match (frame, is_present) {
+            (0, true) => self.frames.set(logical_page, AWAY),
             (0, false) | (_, true) => {}
-            (AWAY, false) => *frame = 0,
+            (AWAY, false) => self.frames.set(logical_page, 0),
             (here, false) => {
-                *frame = 0;
+                self.frames.set(logical_page, 0);
                 // Free for the next page that comes past the hand.
-                self.held[here as usize] = AWAY;
+                self.held[here as usize] = NO_PAGE;
                 *self.recent[here as usize].get_mut() = false;
             }
         }
@@ -153,8 +152,8 @@ impl<C: RecordCodec> PagePool<C> {
             self.hand = if self.hand + 1 < self.capacity { self.hand + 1 } else { STAYING };
             if !std::mem::replace(self.recent[self.hand].get_mut(), false) {
                 // A frame whose page is no longer in the file holds none.
-                if let Some(frame) = self.frames.get_mut(self.held[self.hand] as usize) {
-                    *frame = AWAY;
+                if self.held[self.hand] != NO_PAGE {
+                    self.frames.set(self.held[self.hand], AWAY);
                 }
                 return self.hand;
             }
@@ -168,17 +167,15 @@ impl<C: RecordCodec> PagePool<C> {
 }
 
 /// Frames of all logical pages while none is here: absent ones read as inert, of others, and where a directory leaf was not read yet, it is not known.
-fn frames_of(terrain: &Terrain, count: usize) -> Vec<u32> {
-    // Zeros that are never written take no memory: most of a void terrain.
-    let mut frames = vec![0; count];
+fn frames_of(terrain: &Terrain) -> PageMap {
+    let mut frames = PageMap::new(terrain.page_count());
     let table = terrain.table();
-    let leaves = frames.chunks_mut(ENTRIES_PER_LEAF).zip(table.root()).enumerate();
-    for (i, (leaf, _)) in leaves.filter(|(_, (_, here))| here.is_present()) {
-        for (page, frame) in ((i * ENTRIES_PER_LEAF) as u64..).zip(leaf) {
-            if table.known(page).is_none_or(|entry| entry.is_present()) {
-                *frame = AWAY;
-            }
-        }
+    for leaf in table.maybe_present() {
+        let known = table.known_leaf(leaf);
+        frames.set_leaf_to_ones(leaf);
+        let entries = (leaf * ENTRIES_PER_LEAF as u64..).zip(known.into_iter().flatten());
+        let absent = entries.filter(|(page, entry)| *page < frames.count() && !entry.is_present());
+        absent.collect::<Vec<_>>().into_iter().for_each(|(page, _)| frames.set(page, 0));
     }
     frames
 }
@@ -195,7 +192,7 @@ impl<C: RecordCodec> RecordStore for PagePool<C> {
 
     #[inline(always)]
     fn get(&self, slot: u64) -> Option<RawOf<Self>> {
-        let frame = self.frames[page_of::<C>(slot) as usize];
+        let frame = self.frames.at(page_of::<C>(slot));
         if frame == AWAY {
             return None;
         }
@@ -212,9 +209,9 @@ impl<C: RecordCodec> RecordStore for PagePool<C> {
 
     #[inline(always)]
     fn prefetch(&self, slot: u64) {
-        if let Some(frame) = self.frames.get(page_of::<C>(slot) as usize).filter(|f| **f != AWAY) {
+        if let Some(frame) = self.frames.get(page_of::<C>(slot)).filter(|f| *f != AWAY) {
             let within = byte_in_page::<C>(slot);
-            prefetch(&self.bytes, *frame as usize * PAGE_BYTES + within);
+            prefetch(&self.bytes, frame as usize * PAGE_BYTES + within);
         }
     }
 }

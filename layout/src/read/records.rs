@@ -2,6 +2,7 @@
 //!
 //! Invariant: every page number in the table lies inside the bytes.
 
+use super::page_map::PageMap;
 use super::prefetch::prefetch;
 use super::store::{CompleteStore, RecordShape, RecordStore, byte_in_page, page_of};
 use super::terrain::Terrain;
@@ -43,8 +44,9 @@ impl Slices<'_> {
 #[derive(Debug, Clone)]
 pub struct Records<'a, C: RecordCodec> {
     bytes: Slices<'a>,
-    /// Counted from the inert page.
-    pages: &'a [u32],
+    /// Counted from the inert page; the first of them in one row.
+    pages: &'a PageMap,
+    row: &'a [u32],
     shape: RecordShape<C>,
 }
 
@@ -52,7 +54,8 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     /// # Errors
     /// As [`Terrain::check_directory`].
     pub(crate) fn new(terrain: &'a Terrain, bytes: Slices<'a>, codec: C) -> Result<Self, LayoutError> {
-        Ok(Self { bytes, pages: terrain.pages()?, shape: terrain.shape(codec) })
+        let pages = terrain.pages()?;
+        Ok(Self { bytes, pages, row: pages.row(), shape: terrain.shape(codec) })
     }
 
     /// Grid shape and spacing.
@@ -72,8 +75,22 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     }
 
     /// Logical pages.
-    pub fn page_count(&self) -> usize {
-        self.pages.len()
+    pub fn page_count(&self) -> u64 {
+        self.pages.count()
+    }
+
+    pub(super) fn pages(&self) -> &PageMap {
+        self.pages
+    }
+
+    /// File page of a logical page.
+    #[inline(always)]
+    fn page(&self, logical: u64) -> usize {
+        let page = match self.row.get(usize::try_from(logical).unwrap_or(usize::MAX)) {
+            Some(page) => *page,
+            None => self.pages.behind(logical),
+        };
+        page as usize + INERT_PAGE as usize
     }
 
     /// Bytes a record.
@@ -87,7 +104,7 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     /// For a slot past the last page.
     #[inline(always)]
     pub fn raw(&self, slot: u64) -> C::Raw {
-        let page = self.pages[page_of::<C>(slot) as usize] as usize + INERT_PAGE as usize;
+        let page = self.page(page_of::<C>(slot));
         let within = byte_in_page::<C>(slot);
         self.bytes.record::<C>(page * PAGE_BYTES + within)
     }
@@ -95,9 +112,9 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     /// Asks memory for the record at `slot`. A hint: reads nothing, and does nothing for a slot past the last page.
     #[inline(always)]
     pub fn prefetch(&self, slot: u64) {
-        if let Some(page) = self.pages.get(page_of::<C>(slot) as usize) {
+        if let Some(page) = self.pages.get(page_of::<C>(slot)) {
             let within = byte_in_page::<C>(slot);
-            prefetch(self.bytes.first, (*page + INERT_PAGE) as usize * PAGE_BYTES + within);
+            prefetch(self.bytes.first, (page + INERT_PAGE) as usize * PAGE_BYTES + within);
         }
     }
 
@@ -144,7 +161,7 @@ impl<C: RecordCodec> RecordStore for Records<'_, C> {
     #[inline(always)]
     fn pair(&self, slots: [u64; 2]) -> [C::Raw; 2] {
         if page_of::<C>(slots[0]) == page_of::<C>(slots[1]) {
-            let page = self.pages[page_of::<C>(slots[0]) as usize] as usize + INERT_PAGE as usize;
+            let page = self.page(page_of::<C>(slots[0]));
             let first = self.bytes.first.get(page * PAGE_BYTES..);
             if let Some(bytes) = first.and_then(|bytes| bytes.first_chunk::<PAGE_BYTES>()) {
                 return slots.map(|slot| {

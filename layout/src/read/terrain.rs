@@ -7,9 +7,10 @@
 //! Invariant: every page number that is handed out lies inside the file as its header counts it.
 
 use super::opening::{Found, Opening};
+use super::page_map::PageMap;
 use super::store::RecordShape;
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, Page, checksum, to_usize};
+use crate::file::bytes::{PAGE_BYTES, Page, checksum};
 use crate::file::entries::Entry;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::journal::Commit;
@@ -32,7 +33,7 @@ pub struct Terrain {
     header: Header,
     table: PageTable,
     /// Page of each logical page, counted from the inert page, which absent ones read as. Made when records are first asked for.
-    pages: OnceLock<Vec<u32>>,
+    pages: OnceLock<PageMap>,
     codec: OnceLock<Box<AnyCodec>>,
     /// Which opened terrain of this process it is.
     instance: u64,
@@ -129,14 +130,12 @@ impl Terrain {
     ///
     /// # Errors
     /// As [`Terrain::check_directory`].
-    pub(crate) fn pages(&self) -> Result<&[u32], LayoutError> {
+    pub(crate) fn pages(&self) -> Result<&PageMap, LayoutError> {
         self.check_directory()?;
-        let count = to_usize(self.page_count())?;
         Ok(self.pages.get_or_init(|| {
-            // Zeros that are never written take no memory: most of a void terrain.
-            let mut pages = vec![0; count];
+            let mut pages = PageMap::new(self.page_count());
             for (logical, entry) in self.table.present() {
-                pages[logical as usize] = entry.page - INERT_PAGE;
+                pages.set(logical, entry.page - INERT_PAGE);
             }
             pages
         }))

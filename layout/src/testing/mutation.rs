@@ -286,7 +286,7 @@ impl Mutation {
 
     /// Byte of an entry of a directory.
     fn entry(self, parts: &[Part]) -> Option<(usize, usize)> {
-        let part = self.part(parts, &[What::Root, What::Leaf, What::TileDirectory])?;
+        let part = self.part(parts, &[What::Root, What::Node, What::Leaf, What::TileDirectory])?;
         let entries = (part.bytes / ENTRY_BYTES).max(1);
         Some((part.at + usize::from(self.place) % entries * ENTRY_BYTES, entries))
     }

@@ -5,6 +5,7 @@
 //! Invariant and cost are those of this module.
 
 use crate::file::bytes::{PAGE_BYTES, checksum, get_u16, get_u32, get_u64};
+use crate::file::directory_shape::DirectoryShape;
 use crate::grid::Grid;
 use crate::packed::container::{BLOCKS, INDEX, ROOT, RUNS, Section};
 use crate::packed::leaves::{INDEX_BYTES, PackedLeaves};
@@ -151,11 +152,12 @@ fn seal_directory(file: &mut [u8], slot: usize) {
             file[entry + 1..entry + 5].copy_from_slice(&sum.to_le_bytes());
         }
     }
-    let root_page = FIRST_PAGE + pages[1] + leaves.count();
+    let shape = DirectoryShape::new(file[slot + 0x010].into(), pages[0]);
+    let root_page = FIRST_PAGE + pages[1] + leaves.count() + leaves.nodes(shape);
     if u64::from(get_u32(file, slot + 0x078)) == root_page
         && let Some(leaves) = parse(file)
     {
-        let root = leaves.root(pages[0].div_ceil(256), pages[1]);
+        let (_, root) = leaves.root(shape, pages[1]);
         file[slot + 0x080..slot + 0x084].copy_from_slice(&checksum(&root).to_le_bytes());
     }
 }
@@ -166,7 +168,13 @@ fn leaf_sizes(file: &[u8], slot: usize) -> Vec<usize> {
     if samples.iter().any(|side| *side > 1 << 14) {
         return Vec::new();
     }
-    Grid::new(samples, [1.0; 2]).map_or_else(|_| Vec::new(), |grid| Groups::of(&grid).leaf_sizes())
+    Grid::new(samples, [1.0; 2]).map_or_else(
+        |_| Vec::new(),
+        |grid| {
+            let groups = Groups::of(&grid);
+            (0..groups.leaves).map(|leaf| groups.leaf_size(leaf)).collect()
+        },
+    )
 }
 
 fn seal_leaf(file: &mut [u8], named_at: usize, tiles: usize) {

@@ -2,6 +2,7 @@
 
 use super::image::{Image, JOURNAL_MAGIC, SECTION_MAGIC};
 use crate::file::bytes::{PAGE_BYTES, get_u32};
+use crate::file::directory_shape::DirectoryShape;
 use crate::file::entries::ENTRY_BYTES;
 use std::collections::BTreeSet;
 
@@ -15,6 +16,7 @@ const MOST_TILES: usize = 4096;
 pub(super) enum What {
     Header,
     Root,
+    Node,
     Leaf,
     Records,
     Journal,
@@ -40,10 +42,24 @@ pub(super) struct Root {
     pub(super) entries: usize,
     /// Entries of all leaves, as the header says.
     pub(super) record_pages: u64,
+    /// Whether it leads to nodes.
+    pub(super) has_nodes: bool,
     /// Where root page, checksum and pages stored are said.
     pub(super) page_at: usize,
     pub(super) checksum_at: usize,
     pub(super) stored_at: usize,
+}
+
+impl Root {
+    /// Distinct pages of leaves that lie in the file.
+    pub(super) fn leaves(&self, image: &Image<'_>) -> BTreeSet<u32> {
+        let below = entry_pages(image, self.page as usize * PAGE_BYTES, self.entries);
+        if !self.has_nodes {
+            return below;
+        }
+        let of_node = |node| entry_pages(image, node as usize * PAGE_BYTES, PAGE_BYTES / ENTRY_BYTES);
+        below.into_iter().flat_map(of_node).collect()
+    }
 }
 
 /// A directory of tiles.
@@ -67,15 +83,17 @@ impl Parts {
     /// Follows headers and journal.
     pub(super) fn of(image: &Image<'_>) -> Self {
         let mut parts = Self::default();
-        let (mut entries, mut record_pages) = (0, 0);
+        let (mut entries, mut record_pages, mut has_nodes) = (0, 0, false);
         for at in image.headers() {
             let most = image.end() / ENTRY_BYTES;
             entries = (image.u32_at(at + 0x07c) as usize).min(most);
             record_pages = image.u64_at(at + 0x068);
+            has_nodes = DirectoryShape::new(image.u32_at(at + 0x010) & 0xff, record_pages).has_nodes();
             parts.roots.insert(Root {
                 page: image.u32_at(at + 0x078),
                 entries,
                 record_pages,
+                has_nodes,
                 page_at: at + 0x078,
                 checksum_at: at + 0x080,
                 stored_at: at + 0x070,
@@ -91,6 +109,7 @@ impl Parts {
                     page: image.u32_at(state),
                     entries,
                     record_pages,
+                    has_nodes,
                     page_at: state,
                     checksum_at: state + 0x04,
                     stored_at: state + 0x08,
@@ -130,7 +149,12 @@ impl Parts {
         for root in &self.roots {
             let at = root.page as usize * PAGE_BYTES;
             note(What::Root, at, root.entries * ENTRY_BYTES);
-            for leaf in entry_pages(image, at, root.entries) {
+            if root.has_nodes {
+                for node in entry_pages(image, at, root.entries) {
+                    note(What::Node, node as usize * PAGE_BYTES, PAGE_BYTES);
+                }
+            }
+            for leaf in root.leaves(image) {
                 let at = leaf as usize * PAGE_BYTES;
                 note(What::Leaf, at, PAGE_BYTES);
                 for page in entry_pages(image, at, PAGE_BYTES / ENTRY_BYTES) {

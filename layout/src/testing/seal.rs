@@ -4,10 +4,10 @@
 //! at most [`MOST_TILE_BYTES`].
 
 use super::image::Image;
-use super::parts::{Parts, entry_pages, page_of, tile_directory};
+use super::parts::{Parts, page_of, tile_directory};
 use crate::file::bytes::{PAGE_BYTES, checksum, get_u32};
-use crate::file::entries::ENTRY_BYTES;
-use crate::file::header::LEAF_ENTRIES;
+use crate::file::directory_shape::DirectoryShape;
+use crate::file::entries::{ENTRIES_PER_LEAF, ENTRY_BYTES};
 use crate::grid::Grid;
 use crate::grid::order::slot_count;
 use std::collections::{BTreeMap, BTreeSet};
@@ -60,7 +60,8 @@ fn settle_grid(image: &mut Image<'_>) {
         let record_pages = slot_count(grid.k()).div_ceil(per_page);
         image.put(at + 0x010, &[grid.k() as u8]);
         image.put(at + 0x068, &record_pages.to_le_bytes());
-        image.put(at + 0x07c, &(record_pages.div_ceil(LEAF_ENTRIES) as u32).to_le_bytes());
+        let entries = DirectoryShape::new(grid.k(), record_pages).root_entries();
+        image.put(at + 0x07c, &(entries as u32).to_le_bytes());
         let length = image.u64_at(at + 0x088).min(image.end() as u64);
         image.put(at + 0x088, &length.to_le_bytes());
     }
@@ -77,20 +78,24 @@ fn round(image: &mut Image<'_>, counts: Counts) -> bool {
     let mut leaves = BTreeSet::new();
     for root in &parts.roots {
         let at = root.page as usize * PAGE_BYTES;
-        for leaf in entry_pages(image, at, root.entries) {
+        for leaf in root.leaves(image) {
             if leaves.insert(leaf) {
                 changed |= seal_leaf(image, leaf, &mut sums);
             }
         }
         let mut stored = 0;
-        for i in 0..root.entries {
-            let leaf = image.u32_at(at + i * ENTRY_BYTES);
-            let Some(page) = page_of(image, leaf).filter(|_| leaf != 0) else { continue };
-            let left = root.record_pages.saturating_sub(i as u64 * LEAF_ENTRIES);
-            let entries = page.chunks_exact(ENTRY_BYTES).take(left.min(LEAF_ENTRIES) as usize);
-            stored += entries.filter(|entry| get_u32(entry, 0) != 0).count() as u64;
-            let sum = checksum(page);
-            changed |= image.put(at + i * ENTRY_BYTES + 4, &sum.to_le_bytes());
+        if root.has_nodes {
+            for i in 0..root.entries {
+                let node = image.u32_at(at + i * ENTRY_BYTES);
+                if node != 0 && page_of(image, node).is_some() {
+                    let first = i as u64 * ENTRIES_PER_LEAF as u64;
+                    let entries = (node as usize * PAGE_BYTES, ENTRIES_PER_LEAF);
+                    changed |= seal_entries(image, entries, (first, root.record_pages), &mut stored);
+                }
+            }
+            changed |= seal_entries(image, (at, root.entries), (0, 0), &mut stored);
+        } else {
+            changed |= seal_entries(image, (at, root.entries), (0, root.record_pages), &mut stored);
         }
         if let Some(sum) = image.sum(at, root.entries * ENTRY_BYTES) {
             changed |= image.put(root.checksum_at, &sum.to_le_bytes());
@@ -104,6 +109,27 @@ fn round(image: &mut Image<'_>, counts: Counts) -> bool {
     }
     for at in image.headers() {
         changed |= seal_page(image, at);
+    }
+    changed
+}
+
+/// Checksums of the pages that `count` entries at `at` name, which are leaf `first` and those behind it; adds their record pages to those `stored`, as far as there are so many.
+fn seal_entries(
+    image: &mut Image<'_>,
+    (at, count): (usize, usize),
+    (first, record_pages): (u64, u64),
+    stored: &mut u64,
+) -> bool {
+    let per_leaf = ENTRIES_PER_LEAF as u64;
+    let mut changed = false;
+    for i in 0..count {
+        let leaf = image.u32_at(at + i * ENTRY_BYTES);
+        let Some(page) = page_of(image, leaf).filter(|_| leaf != 0) else { continue };
+        let left = record_pages.saturating_sub((first + i as u64) * per_leaf);
+        let entries = page.chunks_exact(ENTRY_BYTES).take(left.min(per_leaf) as usize);
+        *stored += entries.filter(|entry| get_u32(entry, 0) != 0).count() as u64;
+        let sum = checksum(page);
+        changed |= image.put(at + i * ENTRY_BYTES + 4, &sum.to_le_bytes());
     }
     changed
 }

@@ -1,4 +1,4 @@
-//! Small sound files to begin with: all kinds of records, padding and voids, several directory leaves, edits undone and not, pictures draped and painted, an overlay.
+//! Small sound files to begin with: all kinds of records, padding and voids, several directory leaves, a directory with nodes, edits undone and not, pictures draped and painted, an overlay.
 
 use super::sealed::Sealed;
 use crate::build::{BuildOptions, build};
@@ -51,12 +51,14 @@ fn make_packed() -> Result<Vec<Seed>, LayoutError> {
         "packed edits",
         "packed, exact 8",
         "packed, exact 16",
+        "packed nodes",
         "edited",
         "draped and painted",
     ];
     for name in names {
         match name {
             "packed islands" => islands(&plain)?,
+            "packed nodes" => shore(&plain)?,
             "packed, exact 8" => terrain(&plain, RecordKind::Exact8)?,
             "packed, exact 16" => terrain(&plain, RecordKind::Exact16)?,
             _ => terrain(&plain, RecordKind::Compact)?,
@@ -112,6 +114,9 @@ fn make() -> Result<Vec<Seed>, LayoutError> {
     keep("overlay", Some(&overlay))?;
     islands(&path)?;
     keep("islands", None)?;
+    shore(&path)?;
+    edit(EditSession::open(&path)?, false)?;
+    keep("nodes", None)?;
     Ok(seeds)
 }
 
@@ -137,6 +142,15 @@ fn islands(path: &Path) -> Result<(), LayoutError> {
         if is_land { f64::from(x * 7 % 13 + y * 5 % 11) } else { f64::NAN }
     });
     build(&dem, path, &BuildOptions::default(), &Silent).map(|_| ())
+}
+
+/// A shore in the west of a square of 2^18 steps, whose directory has nodes.
+fn shore(path: &Path) -> Result<(), LayoutError> {
+    let dem = MemoryDem::from_fn([(1 << 17) + 9, 12], SampleType::I16, |x, y| {
+        if x < 20 { f64::from(400 + x * 7 % 13 + y * 5 % 11) } else { f64::NAN }
+    });
+    let options = BuildOptions { spacing_m: Some([20.0, 25.0]), ..BuildOptions::default() };
+    build(&dem, path, &options, &Silent).map(|_| ())
 }
 
 fn picture(path: &Path, format: TileFormat) -> Result<(), LayoutError> {

@@ -25,7 +25,7 @@ pub(super) fn check(
     let section = place.offset / PAGE_BYTES as u64..place.end() / PAGE_BYTES as u64;
     for (page, entry) in terrain.present_pages()? {
         if section.contains(&u64::from(entry.page)) {
-            findings.add(super::record_page(terrain, page as usize), "its page lies in the imagery section");
+            findings.add(super::record_page(terrain, page), "its page lies in the imagery section");
         }
     }
     let imagery = match Imagery::open(terrain) {
@@ -47,7 +47,7 @@ pub(super) fn check(
             && !section.contains(&number)
         {
             let problem = format!("its page is also that of imagery {}", crate::imagery::tile_name(id));
-            findings.add(super::record_page(terrain, page as usize), problem);
+            findings.add(super::record_page(terrain, page), problem);
         }
     }
     let ids: Vec<TileId> = imagery.shape().ids().filter(|id| imagery.has_tile(*id)).collect();

@@ -46,14 +46,14 @@ impl Tally {
 pub(super) fn check<C: RecordCodec>(
     terrain: &Terrain,
     codec: &C,
-    present: &[u32],
-    damaged: &[u32],
+    present: &[u64],
+    damaged: &[u64],
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<(Findings, u64), LayoutError> {
     let grid = terrain.grid();
     let reach: Vec<u32> = (0..grid.levels()).map(|level| grid.reach_steps(level)).collect();
     let edges: Vec<f64> = (0..grid.levels()).map(|level| grid.edge_m(level)).collect();
-    let task = |pages: &[u32]| {
+    let task = |pages: &[u64]| {
         let mut walk = Walk {
             grid,
             header: terrain.header(),
@@ -89,13 +89,13 @@ pub(super) fn check<C: RecordCodec>(
 struct Cache<'a, C: RecordCodec> {
     terrain: &'a Terrain,
     codec: &'a C,
-    damaged: &'a [u32],
+    damaged: &'a [u64],
     /// By the low bits of the page's number: whose bytes these are.
-    held: Vec<Option<(u32, Box<Page>)>>,
+    held: Vec<Option<(u64, Box<Page>)>>,
 }
 
 impl<'a, C: RecordCodec> Cache<'a, C> {
-    fn new(terrain: &'a Terrain, codec: &'a C, damaged: &'a [u32]) -> Self {
+    fn new(terrain: &'a Terrain, codec: &'a C, damaged: &'a [u64]) -> Self {
         Self { terrain, codec, damaged, held: std::iter::repeat_with(|| None).take(CACHED_PAGES).collect() }
     }
 
@@ -104,12 +104,12 @@ impl<'a, C: RecordCodec> Cache<'a, C> {
         self.terrain.known_entry(page_of::<C>(slot)).is_none_or(|entry| !entry.is_present())
     }
 
-    fn page(&mut self, page: u32) -> Result<&Page, LayoutError> {
+    fn page(&mut self, page: u64) -> Result<&Page, LayoutError> {
         let place = &mut self.held[page as usize % CACHED_PAGES];
-        let (whose, bytes) = place.get_or_insert_with(|| (u32::MAX, Box::new([0; PAGE_BYTES])));
+        let (whose, bytes) = place.get_or_insert_with(|| (u64::MAX, Box::new([0; PAGE_BYTES])));
         if *whose != page {
-            *whose = u32::MAX;
-            let entry = self.terrain.entry(page.into())?;
+            *whose = u64::MAX;
+            let entry = self.terrain.entry(page)?;
             let number = if entry.is_present() { entry.page } else { INERT_PAGE };
             self.terrain.source().read_at(u64::from(number) * PAGE_BYTES as u64, &mut bytes[..])?;
             *whose = page;
@@ -119,7 +119,7 @@ impl<'a, C: RecordCodec> Cache<'a, C> {
 
     /// The vertex at a slot; `None` on a damaged page.
     fn vertex(&mut self, slot: u64, level: u32) -> Result<Option<Vertex>, LayoutError> {
-        let page = page_of::<C>(slot) as u32;
+        let page = page_of::<C>(slot);
         if !self.damaged.is_empty() && self.damaged.binary_search(&page).is_ok() {
             return Ok(None);
         }
@@ -153,11 +153,11 @@ struct Walk<'a, C: RecordCodec> {
 
 impl<C: RecordCodec> Walk<'_, C> {
     /// Checks every record of a page; adds at most one problem, the first, with the number of all.
-    fn page(&mut self, page: u32, tally: &mut Tally) -> Result<(), LayoutError> {
+    fn page(&mut self, page: u64, tally: &mut Tally) -> Result<(), LayoutError> {
         let per_page = records_per_page::<C>();
         let mut first: Option<String> = None;
         let mut count = 0u64;
-        let start = u64::from(page) * per_page;
+        let start = page * per_page;
         for slot in start..start + per_page {
             let problem = match point_of(self.grid.k(), slot) {
                 None => self.ghost(slot)?,
@@ -185,7 +185,7 @@ impl<C: RecordCodec> Walk<'_, C> {
         if let Some(first) = first {
             let more =
                 if count > 1 { format!(", and {} more on this page", count - 1) } else { String::new() };
-            tally.findings.add(record_page(self.records.terrain, page as usize), format!("{first}{more}"));
+            tally.findings.add(record_page(self.records.terrain, page), format!("{first}{more}"));
         }
         Ok(())
     }

@@ -29,7 +29,7 @@ struct Wanted {
     checksum: u32,
     is_tile: bool,
     /// Logical page, or place in the directory of tiles.
-    index: u32,
+    index: u64,
     /// Place in [`States::names`].
     state: u32,
 }
@@ -93,10 +93,7 @@ impl<'t> States<'t> {
     fn take_all(&mut self) -> Result<(), LayoutError> {
         let source = self.terrain.source();
         self.uses = PageUses::new(source, self.terrain.header().file_bytes)?;
-        self.uses.take_root(source, &self.header, self.table.root())?;
-        for (i, _) in self.table.root().iter().enumerate().filter(|(_, leaf)| leaf.is_present()) {
-            self.uses.take_entries(source, i * ENTRIES_PER_LEAF, &self.table.read_leaf(i))?;
-        }
+        self.table.take_all(source, &mut self.uses)?;
         // They were free before.
         self.journal.iter().for_each(|page| _ = self.uses.take((*page).into(), 1));
         Ok(())
@@ -134,25 +131,30 @@ impl<'t> States<'t> {
     fn spend(&mut self, bytes: u64, place: &str) -> Result<(), LayoutError> {
         let left = self.left.checked_sub(bytes);
         self.left = left.unwrap_or(0);
-        left.map(|_| ()).ok_or_else(|| {
-            let problem =
-                "with those of other states it is longer than the file, so they lie over one another";
-            LayoutError::damaged(self.terrain.path(), place, problem)
-        })
+        left.map(|_| ()).ok_or_else(|| over_one_another(self.terrain, place))
     }
 
     /// Goes from the directory held to that of `header`.
     fn directory(&mut self, header: &Header) -> Result<(), LayoutError> {
         let source = self.terrain.source();
-        self.spend(header.root_entries() * ENTRY_BYTES as u64, "directory root")?;
+        self.spend(header.directory().root_entries() * ENTRY_BYTES as u64, "directory root")?;
         let root = read_root(source, header)?;
-        let differing: Vec<usize> = (0..root.len()).filter(|i| root[*i] != self.table.root()[*i]).collect();
+        let mut left = self.left;
+        let mut nodes = 0;
+        let differing = self.table.leaves_to(source, header, &root, |i| {
+            nodes += PAGE;
+            left = left
+                .checked_sub(PAGE)
+                .ok_or_else(|| over_one_another(self.terrain, format!("directory node {i}")))?;
+            Ok(())
+        })?;
+        self.spend(nodes, "directory")?;
         let mut leaves = Vec::new();
-        for i in differing {
-            if root[i].is_present() {
+        for (i, here) in differing {
+            if here.is_present() {
                 self.spend(PAGE, &format!("directory leaf {i}"))?;
             }
-            leaves.push((i, read_leaf(source, header, i, root[i])?));
+            leaves.push((i, here, read_leaf(source, header, i, here)?));
         }
         let taken = self.exchange(header, &root, &leaves);
         if taken.is_err() {
@@ -160,39 +162,47 @@ impl<'t> States<'t> {
             return taken;
         }
         let state = (self.names.len() - 1) as u32;
-        for (i, leaf) in leaves {
-            let first = i * ENTRIES_PER_LEAF;
+        for (i, here, leaf) in leaves {
+            let first = i * ENTRIES_PER_LEAF as u64;
             let ours = self.table.read_leaf(i);
             let pairs = (first..).zip(ours.iter().zip(&leaf));
-            for (logical, (_, theirs)) in pairs.filter(|(_, (a, b))| a != b && b.is_present()) {
+            for (index, (_, theirs)) in pairs.filter(|(_, (a, b))| a != b && b.is_present()) {
                 let Entry { page, checksum, .. } = *theirs;
-                let (bytes, index) = (PAGE_BYTES as u32, logical as u32);
+                let bytes = PAGE_BYTES as u32;
                 self.wanted.push(Wanted { page, bytes, checksum, is_tile: false, index, state });
             }
-            self.table.set_leaf(i, root[i], leaf);
+            self.table.set_leaf(i, here, leaf);
         }
+        self.table.set_root(header, root);
         self.header = header.clone();
         Ok(())
     }
 
-    /// Gives back the pages of root and leaves that are not the new state's, and takes those that are.
+    /// Gives back the pages of root, nodes and leaves that are not the new state's, and takes those that are.
     fn exchange(
         &mut self,
         header: &Header,
         root: &[Entry],
-        leaves: &[(usize, Leaf)],
+        leaves: &[(u64, Entry, Leaf)],
     ) -> Result<(), LayoutError> {
         let source = self.terrain.source();
+        let has_nodes = header.directory().has_nodes();
         self.uses.give_back_root(&self.header, self.table.root());
         let mut stored = self.header.stored_pages;
-        for (i, _) in leaves {
+        for (i, ..) in leaves {
+            if has_nodes {
+                self.uses.give_back_entries(&[self.table.known_leaf_entry(*i)]);
+            }
             let ours = self.table.read_leaf(*i);
             self.uses.give_back_entries(&ours);
             stored -= present(&ours);
         }
         self.uses.take_root(source, header, root)?;
-        for (i, leaf) in leaves {
-            self.uses.take_entries(source, i * ENTRIES_PER_LEAF, leaf)?;
+        for (i, here, leaf) in leaves {
+            if has_nodes {
+                self.uses.take_leaves(source, *i, &[*here])?;
+            }
+            self.uses.take_entries(source, i * ENTRIES_PER_LEAF as u64, leaf)?;
             stored += present(leaf);
         }
         if stored != header.stored_pages {
@@ -211,7 +221,7 @@ impl<'t> States<'t> {
         let imagery = Imagery::open_at(self.terrain, place, header.file_bytes)?;
         self.spend(imagery.directory_bytes() + PAGE, "imagery directory")?;
         let state = (self.names.len() - 1) as u32;
-        for (index, id) in (0u32..).zip(imagery.shape().ids()) {
+        for (index, id) in (0u64..).zip(imagery.shape().ids()) {
             if let Some((page, bytes, checksum)) = imagery.stored_place(id) {
                 self.wanted.push(Wanted { page, bytes, checksum, is_tile: true, index, state });
             }
@@ -246,6 +256,11 @@ impl<'t> States<'t> {
         }
         Ok(())
     }
+}
+
+fn over_one_another(terrain: &Terrain, place: impl Into<String>) -> LayoutError {
+    let problem = "with those of other states it is longer than the file, so they lie over one another";
+    LayoutError::damaged(terrain.path(), place.into(), problem)
 }
 
 /// What tells one root from another.

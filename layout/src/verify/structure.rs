@@ -10,7 +10,6 @@ pub(super) fn check(terrain: &Terrain) -> Findings {
     let header = terrain.header();
     let mut findings = Findings::default();
     for (page, entry) in terrain.table().listed() {
-        let page = page as usize;
         if entry.is_present() {
             if !(1..=header.generation).contains(&entry.generation) {
                 let problem = format!(

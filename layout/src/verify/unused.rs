@@ -1,8 +1,8 @@
 //! How much of a file is not used: pages that edits and imagery replaced (FORMAT.md, sections 7 and 8).
 
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, to_usize};
-use crate::file::entries::{ENTRY_BYTES, Entry};
+use crate::file::bytes::PAGE_BYTES;
+use crate::file::entries::ENTRY_BYTES;
 use crate::imagery::Imagery;
 use crate::read::terrain::Terrain;
 
@@ -14,17 +14,14 @@ use crate::read::terrain::Terrain;
 pub fn unused_bytes(terrain: &Terrain) -> Result<u64, LayoutError> {
     let page = PAGE_BYTES as u64;
     let header = terrain.header();
-    let root_bytes = header.root_entries() * ENTRY_BYTES as u64;
-    let mut root = vec![0; to_usize(root_bytes)?];
-    terrain.source().read_at(u64::from(header.root_page) * page, &mut root)?;
-    let leaves = (0..header.root_entries() as usize).filter(|i| Entry::read(&root, *i).is_present()).count();
-    let root_used = root_bytes.next_multiple_of(page);
+    let root_used = (header.directory().root_entries() * ENTRY_BYTES as u64).next_multiple_of(page);
+    let directory = terrain.table().pages_below_root(terrain.source())?;
     // A painted picture has tiles all over the file; of one that is damaged its section counts.
     let imagery = match Imagery::open(terrain) {
         Ok(imagery) => imagery.map_or(0, |imagery| imagery.used_pages() * page),
         Err(error @ LayoutError::Io { .. }) => return Err(error),
         Err(_) => header.imagery.map_or(0, |place| place.bytes),
     };
-    let used = (3 + header.stored_pages + leaves as u64) * page + root_used + imagery;
+    let used = (3 + header.stored_pages + directory) * page + root_used + imagery;
     Ok(terrain.source().byte_count().saturating_sub(used))
 }

@@ -47,18 +47,27 @@ impl Island {
 pub struct Islands {
     pub info: DemInfo,
     pub islands: Vec<Island>,
+    /// What is added to every height.
+    more: f64,
 }
 
 impl Islands {
     pub fn new(side: u32, islands: Vec<Island>) -> Self {
         let info = MemoryDem::from_fn([2, 2], SampleType::I16, |_, _| 0.0).info().clone();
-        Self { info: DemInfo { samples_wide: side, samples_high: side, ..info }, islands }
+        Self { info: DemInfo { samples_wide: side, samples_high: side, ..info }, islands, more: 0.0 }
+    }
+
+    /// The same with heights that only double precision holds.
+    pub fn precise(self) -> Self {
+        Self { info: DemInfo { sample_type: SampleType::F64, ..self.info }, more: 1.0 / 3.0, ..self }
     }
 
     /// Metres of height of a sample; `None` in the sea.
     pub fn height(&self, x: u32, y: u32) -> Option<f64> {
         let is_land = self.islands.iter().any(|island| island.contains(x, y));
-        is_land.then(|| f64::from((x.wrapping_mul(31) ^ y.wrapping_mul(17)) % 97 + x % 613 + y % 389))
+        is_land.then(|| {
+            f64::from((x.wrapping_mul(31) ^ y.wrapping_mul(17)) % 97 + x % 613 + y % 389) + self.more
+        })
     }
 
     /// Samples that have a height.

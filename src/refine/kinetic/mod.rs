@@ -41,9 +41,9 @@ use mesh::clusters::{Clusters, Dealing};
 use mesh::labels::level_of;
 use mesh::nodes::{CENTRE, NONE, Nodes, SPLIT, STATUS, body};
 use mesh::vertices::Vertices;
-use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners};
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};
+use terrasoar_layout::grid::{GridPoint, MOST_LEVELS};
 use terrasoar_layout::read::store::{RawOf, RecordStore};
 use time::certificate::Judge;
 use time::certificate::batch::Batch;
@@ -51,8 +51,6 @@ use time::clocks::Clocks;
 use time::course::Pose;
 use time::queue::{Entry, Queue};
 
-/// Levels of the largest terrain.
-const LEVELS: usize = 32;
 /// Late vertices that are asked for their error in a frame whose time is bounded: evenly out of all that are late.
 const MOST_ASSESSED: usize = 8192;
 /// Sweeps of a queue in one frame.
@@ -90,8 +88,8 @@ pub struct Kinetic<S: RecordStore> {
     /// Nodes to be split or merged, in order.
     list: Vec<u32>,
     /// Leaves that are to be split, by level. What a budget leaves here waits for the next frame.
-    to_split: [Vec<u32>; LEVELS],
-    to_merge: [Vec<u32>; LEVELS],
+    to_split: [Vec<u32>; MOST_LEVELS],
+    to_merge: [Vec<u32>; MOST_LEVELS],
     /// Records and words of the nodes being tested.
     verdicts: Vec<(RawOf<S>, u32)>,
     /// Room for what is tested together.
@@ -133,8 +131,8 @@ impl<S: RecordStore> Kinetic<S> {
             late: Vec::new(),
             fresh: Vec::new(),
             list: Vec::new(),
-            to_split: Default::default(),
-            to_merge: Default::default(),
+            to_split: std::array::from_fn(|_| Vec::new()),
+            to_merge: std::array::from_fn(|_| Vec::new()),
             verdicts: Vec::new(),
             batch: None,
             over: Vec::new(),

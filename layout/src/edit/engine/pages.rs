@@ -7,13 +7,14 @@
 //! written to since the last commit has a copy from before, which takes everything back. While a commit is under way the copies from before it are kept until it has succeeded.
 
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, Page, to_usize};
+use crate::file::bytes::{PAGE_BYTES, Page};
 use crate::file::entries::Entry;
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
 use crate::grid::record::RecordCodec;
+use crate::read::page_map::PageMap;
 use crate::read::prefetch::prefetch;
-use crate::read::store::{byte_in_page, page_of, records_per_page};
+use crate::read::store::{byte_in_page, page_of};
 use crate::read::terrain::Terrain;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -39,24 +40,34 @@ pub(crate) struct Overwritten<R> {
 /// Bits for the records of a page that the batch wrote to.
 type Marks = [u64; PAGE_BYTES / 4 / 64];
 
+/// A page that something was asked of.
+#[derive(Debug)]
+struct Touched {
+    logical: u64,
+    /// What it holds, if that is here.
+    held: Option<Box<Page>>,
+    /// [`EDITED`], [`UNCOMMITTED`], [`TAKEN`].
+    flags: u8,
+    /// Where its marks are, counted from 1; 0 if the batch did not write to it.
+    marked: u32,
+}
+
 /// Pages with edits.
 #[derive(Debug)]
 pub(crate) struct Pages<C: RecordCodec> {
     terrain: Arc<Terrain>,
     k: u32,
-    /// What each logical page holds, as far as it is here.
-    held: Vec<Option<Box<Page>>>,
-    /// [`EDITED`], [`UNCOMMITTED`], [`TAKEN`] of each logical page.
-    flags: Vec<u8>,
+    /// Where in `touched` each logical page is, counted from 1; 0 for those that nothing was asked of.
+    places: PageMap,
+    touched: Vec<Touched>,
     /// Where pages lie that commits have moved.
     moved: HashMap<u64, Entry>,
     /// Pages here that can be read again, and how many of them are kept.
     clean: usize,
     most_clean: usize,
     log: Vec<Overwritten<C::Raw>>,
-    /// Where the marks of a page are, counted from 1; 0 for pages that the batch did not write to.
-    marked: Vec<u32>,
-    marks: Vec<(u64, Marks)>,
+    /// Marks of pages that the batch wrote to, by their place in `touched`.
+    marks: Vec<(usize, Marks)>,
     /// Pages written to since the last commit began, and what they held then.
     uncommitted: Vec<(u64, Box<Page>)>,
     /// How many of them were written to by batches that stay; those behind are the batch's that is under way.
@@ -68,17 +79,15 @@ pub(crate) struct Pages<C: RecordCodec> {
 
 impl<C: RecordCodec> Pages<C> {
     pub(crate) fn new(terrain: Arc<Terrain>) -> Self {
-        let count = usize::try_from(terrain.page_count()).unwrap_or(usize::MAX);
         Self {
             k: terrain.grid().k(),
+            places: PageMap::new(terrain.page_count()),
             terrain,
-            held: vec![None; count],
-            flags: vec![0; count],
+            touched: Vec::new(),
             moved: HashMap::new(),
             clean: 0,
             most_clean: CLEAN_PAGES,
             log: Vec::new(),
-            marked: vec![0; count],
             marks: Vec::new(),
             uncommitted: Vec::new(),
             kept: 0,
@@ -120,7 +129,7 @@ impl<C: RecordCodec> Pages<C> {
     /// The record of a slot whose page is here.
     #[inline(always)]
     pub(crate) fn raw_if_held(&self, slot: u64) -> Option<C::Raw> {
-        let page = self.held[page_of::<C>(slot) as usize].as_ref()?;
+        let page = self.held(page_of::<C>(slot))?;
         let within = byte_in_page::<C>(slot);
         Some(C::read(&page[within..within + C::BYTES]))
     }
@@ -134,16 +143,55 @@ impl<C: RecordCodec> Pages<C> {
     /// Asks memory for the record of a slot, if its page is here.
     #[inline(always)]
     pub(crate) fn prefetch(&self, slot: u64) {
-        if let Some(Some(page)) = self.held.get(page_of::<C>(slot) as usize) {
+        if let Some(page) = self.held(page_of::<C>(slot)) {
             prefetch(&page[..], byte_in_page::<C>(slot));
         }
     }
 
+    /// What was asked of a page, if anything was.
+    #[inline(always)]
+    fn known(&self, logical: u64) -> Option<&Touched> {
+        self.touched.get((self.places.get(logical)? as usize).wrapping_sub(1))
+    }
+
+    #[inline(always)]
+    fn held(&self, logical: u64) -> Option<&Page> {
+        self.known(logical)?.held.as_deref()
+    }
+
+    /// Place of a page in `touched`.
+    #[inline(always)]
+    fn place(&mut self, logical: u64) -> usize {
+        match self.places.at(logical) {
+            0 => self.touch(logical),
+            place => place as usize - 1,
+        }
+    }
+
+    #[cold]
+    fn touch(&mut self, logical: u64) -> usize {
+        self.touched.push(Touched { logical, held: None, flags: 0, marked: 0 });
+        self.places.set(logical, self.touched.len() as u32);
+        self.touched.len() - 1
+    }
+
+    fn touched(&mut self, logical: u64) -> &mut Touched {
+        let place = self.place(logical);
+        &mut self.touched[place]
+    }
+
     #[inline(always)]
     fn page_at(&mut self, slot: u64) -> &mut Page {
-        let Self { terrain, held, clean, failure, moved, .. } = self;
         let logical = page_of::<C>(slot);
-        held[logical as usize].get_or_insert_with(|| {
+        let place = self.place(logical);
+        self.page_in(place, logical)
+    }
+
+    /// The page that is at a place in `touched`.
+    #[inline(always)]
+    fn page_in(&mut self, place: usize, logical: u64) -> &mut Page {
+        let Self { terrain, touched, clean, failure, moved, .. } = self;
+        touched[place].held.get_or_insert_with(|| {
             *clean += 1;
             load(terrain, moved.get(&logical), logical, failure)
         })
@@ -152,16 +200,16 @@ impl<C: RecordCodec> Pages<C> {
     /// A page as it is now.
     pub(crate) fn page(&mut self, logical: u64) -> Result<&Page, LayoutError> {
         self.check_index(logical)?;
-        let at = to_usize(logical)?;
-        if self.held[at].is_none() {
+        let place = self.place(logical);
+        if self.touched[place].held.is_none() {
             let page = match self.moved.get(&logical) {
                 Some(entry) => self.terrain.checked_page_at(logical, *entry)?,
                 None => self.terrain.checked_page(logical)?,
             };
-            self.held[at] = Some(page);
+            self.touched[place].held = Some(page);
             self.clean += 1;
         }
-        Ok(&*self.page_at(logical * records_per_page::<C>()))
+        Ok(&*self.page_in(place, logical))
     }
 
     /// What a page holds at another place in the file.
@@ -171,8 +219,8 @@ impl<C: RecordCodec> Pages<C> {
     }
 
     fn check_index(&self, logical: u64) -> Result<(), LayoutError> {
-        let pages = self.held.len();
-        if logical < pages as u64 {
+        let pages = self.places.count();
+        if logical < pages {
             return Ok(());
         }
         Err(LayoutError::Usage(format!("page {logical} does not exist; the terrain has {pages}")))
@@ -181,15 +229,16 @@ impl<C: RecordCodec> Pages<C> {
     /// Overwrites a record.
     #[inline(always)]
     pub(crate) fn write(&mut self, point: GridPoint, slot: u64, raw: C::Raw) {
-        let (logical, within) = (page_of::<C>(slot) as usize, byte_in_page::<C>(slot));
-        if self.marked[logical] == 0 {
-            self.begin_writing(slot);
+        let (logical, within) = (page_of::<C>(slot), byte_in_page::<C>(slot));
+        let at = self.place(logical);
+        if self.touched[at].marked == 0 {
+            self.begin_writing(at, logical);
         }
-        let place = &mut self.page_at(slot)[within..within + C::BYTES];
+        let place = &mut self.page_in(at, logical)[within..within + C::BYTES];
         let old = C::read(place);
         C::write(raw, place);
         let record = within / C::BYTES;
-        let word = &mut self.marks[self.marked[logical] as usize - 1].1[record / 64];
+        let word = &mut self.marks[self.touched[at].marked as usize - 1].1[record / 64];
         let bit = 1 << (record % 64);
         if *word & bit == 0 {
             *word |= bit;
@@ -197,32 +246,31 @@ impl<C: RecordCodec> Pages<C> {
         }
     }
 
-    /// Before the batch's first record in the page of a slot.
+    /// Before the batch's first record in the page at a place in `touched`.
     #[inline(never)]
-    fn begin_writing(&mut self, slot: u64) {
-        let logical = page_of::<C>(slot);
-        let at = logical as usize;
-        self.marks.push((logical, [0; _]));
-        self.marked[at] = self.marks.len() as u32;
-        if self.flags[at] & UNCOMMITTED == 0 {
-            let committed = Box::new(*self.page_at(slot));
+    fn begin_writing(&mut self, at: usize, logical: u64) {
+        self.marks.push((at, [0; _]));
+        self.touched[at].marked = self.marks.len() as u32;
+        if self.touched[at].flags & UNCOMMITTED == 0 {
+            let committed = Box::new(*self.page_in(at, logical));
             self.uncommitted.push((logical, committed));
-            self.clean -= usize::from(self.flags[at] & TAKEN == 0);
-            self.flags[at] |= EDITED | UNCOMMITTED;
+            let flags = &mut self.touched[at].flags;
+            self.clean -= usize::from(*flags & TAKEN == 0);
+            *flags |= EDITED | UNCOMMITTED;
         }
     }
 
     /// Ends the batch's marks.
     fn unmark(&mut self) {
-        self.marks.drain(..).for_each(|(logical, _)| self.marked[logical as usize] = 0);
+        self.marks.drain(..).for_each(|(place, _)| self.touched[place].marked = 0);
     }
 
     /// Puts what the file has at another place into a page that is here and committed.
     pub(crate) fn replace(&mut self, logical: u64, entry: Entry, bytes: Box<Page>) {
-        let at = logical as usize;
-        self.clean += usize::from(self.held[at].is_none());
-        self.held[at] = Some(bytes);
-        self.flags[at] |= EDITED;
+        let page = self.touched(logical);
+        page.flags |= EDITED;
+        let is_new = page.held.replace(bytes).is_none();
+        self.clean += usize::from(is_new);
         self.moved.insert(logical, entry);
     }
 
@@ -269,10 +317,11 @@ impl<C: RecordCodec> Pages<C> {
         }
         self.unmark();
         // Pages that this batch alone wrote to are as they were: there is nothing to commit of them.
-        for (logical, _) in self.uncommitted.drain(self.kept..) {
-            let flags = &mut self.flags[logical as usize];
+        for (logical, _) in self.uncommitted.split_off(self.kept) {
+            let flags = &mut self.touched(logical).flags;
             *flags &= !UNCOMMITTED;
-            self.clean += usize::from(*flags & TAKEN == 0);
+            let is_clean = *flags & TAKEN == 0;
+            self.clean += usize::from(is_clean);
         }
     }
 
@@ -281,12 +330,13 @@ impl<C: RecordCodec> Pages<C> {
         let mut until_now = Vec::with_capacity(self.uncommitted.len());
         self.kept = 0;
         for (logical, committed) in std::mem::take(&mut self.uncommitted) {
-            let flags = &mut self.flags[logical as usize];
+            let Touched { flags, held, .. } = self.touched(logical);
             *flags &= !UNCOMMITTED;
-            self.clean += usize::from(*flags & TAKEN == 0);
-            if let Some(page) = &mut self.held[logical as usize] {
+            let is_clean = *flags & TAKEN == 0;
+            if let Some(page) = held {
                 until_now.push((logical, std::mem::replace(page, committed)));
             }
+            self.clean += usize::from(is_clean);
         }
         until_now
     }
@@ -303,18 +353,20 @@ impl<C: RecordCodec> Pages<C> {
         debug_assert!(self.taken.is_empty());
         self.taken = std::mem::take(&mut self.uncommitted);
         self.kept = 0;
-        for (logical, _) in &self.taken {
-            let flags = &mut self.flags[*logical as usize];
+        let taken: Vec<u64> = self.taken.iter().map(|(logical, _)| *logical).collect();
+        for logical in taken {
+            let flags = &mut self.touched(logical).flags;
             *flags = *flags & !UNCOMMITTED | TAKEN;
         }
     }
 
     /// It is in the file, each page at a place of its own.
     pub(crate) fn end_commit(&mut self, places: &[(u64, Entry)]) {
-        for (logical, _) in self.taken.drain(..) {
-            let flags = &mut self.flags[logical as usize];
+        for (logical, _) in std::mem::take(&mut self.taken) {
+            let flags = &mut self.touched(logical).flags;
             *flags &= !TAKEN;
-            self.clean += usize::from(*flags & UNCOMMITTED == 0);
+            let is_clean = *flags & UNCOMMITTED == 0;
+            self.clean += usize::from(is_clean);
         }
         self.moved.extend(places.iter().copied());
     }
@@ -324,7 +376,7 @@ impl<C: RecordCodec> Pages<C> {
         let since: HashMap<u64, usize> =
             self.uncommitted.iter().map(|(logical, _)| *logical).zip(0..).collect();
         for (logical, before) in std::mem::take(&mut self.taken) {
-            let flags = &mut self.flags[logical as usize];
+            let flags = &mut self.touched(logical).flags;
             *flags = *flags & !TAKEN | UNCOMMITTED;
             match since.get(&logical) {
                 Some(at) => self.uncommitted[*at].1 = before,
@@ -341,26 +393,29 @@ impl<C: RecordCodec> Pages<C> {
 
     /// Pages in memory, copies from before commits counted.
     pub(crate) fn held_pages(&self) -> usize {
-        self.held.iter().flatten().count() + self.uncommitted.len() + self.taken.len()
+        self.touched.iter().filter(|page| page.held.is_some()).count()
+            + self.uncommitted.len()
+            + self.taken.len()
     }
 
     /// A page that was edited, if it is here.
     pub(crate) fn edited(&self, logical: u64) -> Option<&Page> {
-        let at = usize::try_from(logical).ok()?;
-        let is_edited = self.flags.get(at)? & EDITED != 0;
-        self.held[at].as_deref().filter(|_| is_edited)
+        self.known(logical).filter(|page| page.flags & EDITED != 0)?.held.as_deref()
     }
 
     /// All pages that were edited, ascending.
     pub(crate) fn all_edited(&self) -> Vec<u64> {
-        (0u64..).zip(&self.flags).filter(|(_, flags)| **flags & EDITED != 0).map(|(page, _)| page).collect()
+        let edited = self.touched.iter().filter(|page| page.flags & EDITED != 0);
+        let mut pages: Vec<u64> = edited.map(|page| page.logical).collect();
+        pages.sort_unstable();
+        pages
     }
 
     /// Drops pages that can be read again.
     #[cold]
     fn drop_clean(&mut self) {
-        let pages = self.held.iter_mut().zip(&self.flags);
-        pages.filter(|(_, flags)| **flags & (UNCOMMITTED | TAKEN) == 0).for_each(|(page, _)| *page = None);
+        let clean = self.touched.iter_mut().filter(|page| page.flags & (UNCOMMITTED | TAKEN) == 0);
+        clean.for_each(|page| page.held = None);
         self.clean = 0;
     }
 }

@@ -4,10 +4,9 @@
 //! edited. Cost: the root as it was packed is read, and of each leaf that changes the one as it was.
 
 use crate::error::LayoutError;
-use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
 use crate::file::header::Header;
 use crate::file::journal::State;
-use crate::file::page_table::{Leaf, read_leaf, read_root};
+use crate::file::page_table::PageTable;
 use crate::file::source::Source;
 use crate::file::tail::Tail;
 use crate::read::terrain::Terrain;
@@ -19,11 +18,9 @@ pub(crate) struct Bases {
     terrain: Arc<Terrain>,
     /// First page that is not packed.
     first: u64,
-    /// As it was before all commits.
-    original: Header,
-    root: Vec<Entry>,
-    /// The leaf that was asked for last.
-    leaf: Option<(usize, Box<Leaf>)>,
+    /// The directory as it was before all commits.
+    original: PageTable,
+    root_page: u32,
     pages: Vec<u32>,
 }
 
@@ -37,9 +34,9 @@ impl Bases {
     ) -> Result<Option<Self>, LayoutError> {
         let Some(end) = tail.packed_end() else { return Ok(None) };
         let original = Header { history: None, ..original.put_into(header) };
-        let root = read_root(terrain.source(), &original)?;
-        let first = end.first;
-        Ok(Some(Self { terrain, first, original, root, leaf: None, pages: Vec::new() }))
+        let (first, root_page) = (end.first, original.root_page);
+        let original = PageTable::open(terrain.source(), &original)?;
+        Ok(Some(Self { terrain, first, original, root_page, pages: Vec::new() }))
     }
 
     /// The next page is like this one, if that is packed.
@@ -53,26 +50,27 @@ impl Bases {
     }
 
     /// The next page is that of a logical page.
-    pub(crate) fn record_page(&mut self, logical: usize) -> Result<(), LayoutError> {
-        let (at, within) = (logical / ENTRIES_PER_LEAF, logical % ENTRIES_PER_LEAF);
-        if self.leaf.as_ref().is_none_or(|(known, _)| *known != at) {
-            let here = self.root.get(at).copied().unwrap_or_default();
-            let entries = read_leaf(self.terrain.source(), &self.original, at, here)?;
-            self.leaf = Some((at, Box::new(entries)));
-        }
-        let entry = self.leaf.as_ref().map(|(_, entries)| entries[within]);
-        self.push(entry.unwrap_or_default().page);
+    pub(crate) fn record_page(&mut self, logical: u64) -> Result<(), LayoutError> {
+        let entry = self.original.entry(self.terrain.source(), logical)?;
+        self.push(entry.page);
         Ok(())
     }
 
     /// The next page is a leaf.
-    pub(crate) fn leaf(&mut self, at: usize) {
-        self.push(self.root.get(at).map_or(0, |entry| entry.page));
+    pub(crate) fn leaf(&mut self, leaf: u64) -> Result<(), LayoutError> {
+        let here = self.original.leaf_entry(self.terrain.source(), leaf)?;
+        self.push(here.page);
+        Ok(())
+    }
+
+    /// The next page is a node.
+    pub(crate) fn node(&mut self, node: usize) {
+        self.push(self.original.root().get(node).map_or(0, |here| here.page));
     }
 
     /// The next `count` pages are the root.
     pub(crate) fn root(&mut self, count: usize) {
-        let first = self.original.root_page;
+        let first = self.root_page;
         (0..count as u32).for_each(|page| self.push(first + page));
     }
 

@@ -1,7 +1,7 @@
 //! A batch of edits on its way to the disk: everything that changed goes behind the file's end in one write, and when it is there, a header that leads to it (FORMAT.md, section 7).
 //!
 //! Nothing that a header leads to is ever written over. Killed at any moment the file holds a whole number of batches; readers that have it open keep what they opened.
-//! Cost: the pages that changed, the directory leaves that lead to them, the root; two syncs.
+//! Cost: the pages that changed, the directory leaves and nodes that lead to them, the root; two syncs.
 
 use super::bases::Bases;
 use crate::error::LayoutError;
@@ -37,9 +37,10 @@ pub struct CommitJob {
     /// What its pages differ little from, in a packed file.
     bases: Option<Bases>,
     pub(crate) next: NextHeader,
-    /// Directory entries that change with it: (logical page or leaf, entry).
+    /// Directory entries that change with it: (logical page, leaf or node, entry).
     pub(crate) entries: Vec<(usize, Entry)>,
     pub(crate) leaves: Vec<(usize, Entry)>,
+    pub(crate) nodes: Vec<(usize, Entry)>,
     /// Painted tiles in it, without their bytes.
     pub(crate) section: Option<PaintedSection>,
 }
@@ -75,7 +76,7 @@ impl CommitJob {
         let mut entries = Vec::with_capacity(content.pages.len());
         bases.iter_mut().for_each(|bases| bases.none(data.len() / PAGE_BYTES));
         for (logical, page) in &content.pages {
-            bases.as_mut().map_or(Ok(()), |bases| bases.record_page(*logical as usize))?;
+            bases.as_mut().map_or(Ok(()), |bases| bases.record_page(*logical))?;
             let entry = Entry { page: next_page(&data)?, checksum: checksum(&page[..]), generation };
             entries.push((*logical as usize, entry));
             data.extend_from_slice(&page[..]);
@@ -83,9 +84,9 @@ impl CommitJob {
         let mut leaves = Vec::new();
         for of_leaf in entries.chunk_by(|a, b| a.0 / ENTRIES_PER_LEAF == b.0 / ENTRIES_PER_LEAF) {
             let leaf = of_leaf[0].0 / ENTRIES_PER_LEAF;
-            let mut all = directory.read_leaf(leaf);
+            let mut all = directory.read_leaf(leaf as u64);
             of_leaf.iter().for_each(|(logical, entry)| all[logical % ENTRIES_PER_LEAF] = *entry);
-            bases.iter_mut().for_each(|bases| bases.leaf(leaf));
+            bases.as_mut().map_or(Ok(()), |bases| bases.leaf(leaf as u64))?;
             let entry = put_leaf(&all, next_page(&data)?, generation, |bytes| {
                 data.extend_from_slice(bytes);
                 Ok(())
@@ -96,8 +97,25 @@ impl CommitJob {
             .iter()
             .filter(|(logical, _)| !directory.known(*logical as u64).is_some_and(|old| old.is_present()))
             .count();
+        let mut nodes = Vec::new();
+        let has_nodes = old.directory().has_nodes();
+        for of_node in leaves.chunk_by(|a, b| a.0 / ENTRIES_PER_LEAF == b.0 / ENTRIES_PER_LEAF) {
+            if !has_nodes {
+                break;
+            }
+            let node = of_node[0].0 / ENTRIES_PER_LEAF;
+            let mut all = directory.node_entries(node as u64);
+            of_node.iter().for_each(|(leaf, entry)| all[leaf % ENTRIES_PER_LEAF] = *entry);
+            bases.iter_mut().for_each(|bases| bases.node(node));
+            let entry = put_leaf(&all, next_page(&data)?, generation, |bytes| {
+                data.extend_from_slice(bytes);
+                Ok(())
+            })?;
+            nodes.push((node, entry));
+        }
         let mut root = directory.root().to_vec();
-        leaves.iter().for_each(|(leaf, entry)| root[*leaf] = *entry);
+        let listed = if has_nodes { &nodes } else { &leaves };
+        listed.iter().for_each(|(place, entry)| root[*place] = *entry);
         let root = root_bytes(&root);
         let state = State {
             root_page: next_page(&data)?,
@@ -117,7 +135,7 @@ impl CommitJob {
             history: Some(History { commit_page, tip_page: commit_page }),
             ..state.put_into(old)
         })?;
-        Ok(Self { tail, data, bases, next, entries, leaves, section: content.section })
+        Ok(Self { tail, data, bases, next, entries, leaves, nodes, section: content.section })
     }
 
     /// A header alone: another state that is in the file already.
@@ -130,6 +148,7 @@ impl CommitJob {
             next,
             entries: Vec::new(),
             leaves: Vec::new(),
+            nodes: Vec::new(),
             section: None,
         })
     }

@@ -2,12 +2,13 @@
 
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
-use crate::file::bytes::{PAGE_BYTES, to_usize};
-use crate::file::directory::{page_at, put_all_leaves, root_bytes};
+use crate::file::bytes::PAGE_BYTES;
+use crate::file::directory::{page_at, put_directory};
 use crate::file::disk::Disk;
-use crate::file::entries::{ENTRIES_PER_LEAF, Entry, absent};
+use crate::file::entries::{ENTRIES_PER_LEAF, Entry};
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
+use crate::file::page_table::Leaf;
 use crate::file::slots::Slots;
 use crate::file::structure::inert_page;
 use crate::file::tail::Tail;
@@ -166,17 +167,23 @@ fn write_terrain(
     writer.put(&[0; 2 * PAGE_BYTES])?;
     debug_assert_eq!(writer.page()?, INERT_PAGE);
     writer.put(&inert_page(old.record_kind)[..])?;
-    let mut entries = absent(to_usize(terrain.page_count())?);
+    let mut leaves: Vec<(u64, Box<Leaf>)> = Vec::new();
+    let per_leaf = ENTRIES_PER_LEAF as u64;
     for (logical, entry) in terrain.present_pages()? {
         let page = terrain.checked_page(logical)?;
-        entries[logical as usize] = Entry { page: writer.page()?, generation: 1, ..entry };
+        if leaves.last().is_none_or(|(leaf, _)| *leaf != logical / per_leaf) {
+            leaves.push((logical / per_leaf, Box::new([Entry::default(); ENTRIES_PER_LEAF])));
+        }
+        if let Some((_, leaf)) = leaves.last_mut() {
+            leaf[(logical % per_leaf) as usize] = Entry { page: writer.page()?, generation: 1, ..entry };
+        }
         writer.put(&page[..])?;
         progress.advance(old.records_per_page());
     }
     let (path, first) = (writer.file.target(), writer.page()?);
+    let entries = leaves.iter().map(|(number, leaf)| (*number, &leaf[..]));
     let (root, root_page) =
-        put_all_leaves(path, entries.chunks(ENTRIES_PER_LEAF), first, |_, bytes| writer.put(bytes))?;
-    let root = root_bytes(&root);
+        put_directory(path, old.directory(), entries, first, |_, bytes| writer.put(bytes))?;
     writer.put(&root.bytes)?;
     writer.flush()?;
     let header = Header {

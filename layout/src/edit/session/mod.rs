@@ -349,7 +349,7 @@ impl EditSession {
         let places: Vec<(u64, Entry)> =
             job.entries.iter().map(|(logical, entry)| (*logical as u64, *entry)).collect();
         let committed = Committed { pages: job.pages(), bytes: job.bytes(), places };
-        self.directory.update(&job.next.header, &job.entries, &job.leaves);
+        self.directory.update(&job.next.header, &job.entries, &job.leaves, &job.nodes);
         self.slots.flip(job.next.page, job.next.header, job.tail.packed_end().cloned());
         if let Some(section) = job.section {
             self.picture.committed(section);

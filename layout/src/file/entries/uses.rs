@@ -13,6 +13,7 @@ use crate::file::source::Source;
 const PAGE: u64 = PAGE_BYTES as u64;
 
 /// Pages of a file that are in use.
+#[derive(Debug, Clone)]
 pub(crate) struct PageUses {
     /// A bit a page.
     taken: Vec<u64>,
@@ -75,16 +76,16 @@ impl PageUses {
     /// Gives back what [`PageUses::take_root`] took.
     pub(crate) fn give_back_root(&mut self, header: &Header, root: &[Entry]) {
         self.give_back(header.root_page.into(), root_pages(header));
-        root.iter().filter(|leaf| leaf.is_present()).for_each(|leaf| self.give_back(leaf.page.into(), 1));
+        self.give_back_entries(root);
     }
 
-    /// Gives back what [`PageUses::take_entries`] took.
+    /// Gives back what [`PageUses::take_entries`] or [`PageUses::take_leaves`] took.
     pub(crate) fn give_back_entries(&mut self, entries: &[Entry]) {
         let present = entries.iter().filter(|entry| entry.is_present());
         present.for_each(|entry| self.give_back(entry.page.into(), 1));
     }
 
-    /// Takes the pages of the root that `header` names and of the leaves that it leads to.
+    /// Takes the pages of the root that `header` names and of the nodes or leaves that it leads to.
     pub(crate) fn take_root(
         &mut self,
         source: &dyn Source,
@@ -95,26 +96,43 @@ impl PageUses {
         taken.map_err(|problem| {
             LayoutError::damaged_terrain(source.path(), "directory root".into(), problem)
         })?;
-        for (i, leaf) in root.iter().enumerate().filter(|(_, leaf)| leaf.is_present()) {
-            let taken = self.take(leaf.page.into(), 1);
-            taken.map_err(|problem| {
-                LayoutError::damaged_terrain(source.path(), format!("directory leaf {i}"), problem)
-            })?;
-        }
-        Ok(())
+        let what = if header.directory().has_nodes() { "directory node" } else { "directory leaf" };
+        self.take_all(source, what, 0, root)
+    }
+
+    /// Takes the pages of the leaves that a node leads to, the first of which is leaf `first`: all of them, or on an error none.
+    pub(crate) fn take_leaves(
+        &mut self,
+        source: &dyn Source,
+        first: u64,
+        entries: &[Entry],
+    ) -> Result<(), LayoutError> {
+        self.take_all(source, "directory leaf", first, entries)
     }
 
     /// Takes the record pages of a leaf whose first entry is that of logical page `first`.
     pub(crate) fn take_entries(
         &mut self,
         source: &dyn Source,
-        first: usize,
+        first: u64,
+        entries: &[Entry],
+    ) -> Result<(), LayoutError> {
+        self.take_all(source, "directory entry of record page", first, entries)
+    }
+
+    fn take_all(
+        &mut self,
+        source: &dyn Source,
+        what: &str,
+        first: u64,
         entries: &[Entry],
     ) -> Result<(), LayoutError> {
         for (i, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.is_present()) {
-            let place = || format!("directory entry of record page {}", first + i);
-            self.take(entry.page.into(), 1)
-                .map_err(|problem| LayoutError::damaged_terrain(source.path(), place(), problem))?;
+            if let Err(problem) = self.take(entry.page.into(), 1) {
+                self.give_back_entries(&entries[..i]);
+                let place = format!("{what} {}", first + i as u64);
+                return Err(LayoutError::damaged_terrain(source.path(), place, problem));
+            }
         }
         Ok(())
     }
@@ -122,7 +140,7 @@ impl PageUses {
 
 /// Pages of the root, the last one begun perhaps.
 fn root_pages(header: &Header) -> u64 {
-    (header.root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE)
+    (header.directory().root_entries() * ENTRY_BYTES as u64).div_ceil(PAGE)
 }
 
 #[cfg(test)]

@@ -186,8 +186,8 @@ impl Fields<'_> {
         self.check(header.nodata_samples <= samples, "nodata_samples")?;
         self.check(get_u64(p, 0x068) == header.record_pages(), "record_pages")?;
         self.check(header.stored_pages <= header.record_pages(), "stored_pages")?;
-        self.check(u64::from(get_u32(p, 0x07c)) == header.root_entries(), "root_entries")?;
-        let root_end = u64::from(header.root_page) * page_bytes + 16 * header.root_entries();
+        self.check(u64::from(get_u32(p, 0x07c)) == header.directory().root_entries(), "root_entries")?;
+        let root_end = u64::from(header.root_page) * page_bytes + 16 * header.directory().root_entries();
         self.check(header.root_page > INERT_PAGE && root_end <= header.file_bytes, "root_page")?;
         self.check(header.file_bytes <= u64::from(u32::MAX) * page_bytes, "file_bytes")?;
         let fits = |place: ImageryPlace| {

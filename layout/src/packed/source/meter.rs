@@ -54,7 +54,7 @@ impl Unpacking for PackedSource {
         let mut need = PackedNeed::default();
         for (id, segments) in segments {
             let Some((leaf, within)) = self.groups.leaf_of(id) else { continue };
-            let place = self.leaf(leaf)?[within];
+            let place = self.tile_place(leaf, within)?;
             if place.is_present() {
                 need.tiles += 1;
                 need.bytes += place.bytes(segments) as u64;

@@ -1,6 +1,6 @@
 //! Record pages of a packed file: tiles are read, unpacked, kept, and their records put where pages have them.
 
-use super::{FIRST_PAGE, PackedSource, odd};
+use super::{FIRST_PAGE, PackedSource};
 use crate::error::LayoutError;
 use crate::file::bytes::{Page, checksum};
 use crate::file::source::Source;
@@ -17,20 +17,16 @@ use std::time::Instant;
 type Near = Vec<(TileId, Option<Arc<TileRecords>>)>;
 
 impl PackedSource {
-    /// Where the tile directory's leaf `leaf` says its tiles lie.
-    pub(super) fn leaf(&self, leaf: usize) -> Result<&[TilePlace], LayoutError> {
-        let known = &self.tiles[leaf];
-        if let Some(places) = known.get() {
-            return Ok(places);
-        }
-        let count = self.leaf_sizes[leaf];
-        let (offset, sum) = self.tile_leaves[leaf];
-        let mut places = vec![TilePlace::default(); count];
-        if offset > 0 {
+    /// Where a leaf of the tile directory says that its tile `within` lies; absent if the leaf is.
+    pub(super) fn tile_place(&self, leaf: usize, within: usize) -> Result<TilePlace, LayoutError> {
+        let Some((at, offset, sum)) = self.tile_root.find(leaf) else { return Ok(TilePlace::default()) };
+        let known = &self.tiles[at];
+        if known.get().is_none() {
             let damaged = |problem: &str| {
                 LayoutError::damaged_terrain(self.path(), format!("tile directory leaf {leaf}"), problem)
             };
-            let mut bytes = vec![0; count * PLACE_BYTES];
+            let mut places = vec![TilePlace::default(); self.groups.leaf_size(leaf)];
+            let mut bytes = vec![0; places.len() * PLACE_BYTES];
             let end = offset.checked_add(bytes.len() as u64);
             if end.is_none_or(|end| end > self.container.packed_bytes) {
                 return Err(damaged("it lies outside the file"));
@@ -40,9 +36,9 @@ impl PackedSource {
                 return Err(damaged("the checksum does not match"));
             }
             places.iter_mut().enumerate().for_each(|(i, place)| *place = TilePlace::read(&bytes, i));
+            let _ = known.set(places.into());
         }
-        let _ = known.set(places.into());
-        known.get().map(|places| &**places).ok_or_else(|| odd(self.path(), "tile directory"))
+        Ok(known.get().and_then(|places| places.get(within)).copied().unwrap_or_default())
     }
 
     /// The records of a tile down to octave `finest`, counted from its own finest; `None` if they are all inert.
@@ -51,7 +47,7 @@ impl PackedSource {
         if let Some(tile) = self.cache.get(id, finest) {
             return Ok(Some(tile));
         }
-        let place = self.leaf(leaf)?[within];
+        let place = self.tile_place(leaf, within)?;
         if !place.is_present() {
             return Ok(None);
         }

@@ -43,11 +43,12 @@ impl PackedSource {
     /// All tiles that are present.
     pub(in crate::packed) fn all_tiles(&self) -> Result<Vec<(TileId, TileShape, TilePlace)>, LayoutError> {
         let mut all = Vec::new();
-        for (_, id) in self.groups.tiles() {
-            let Some((leaf, within)) = self.groups.leaf_of(id) else { continue };
-            let place = self.leaf(leaf)?[within];
-            if place.is_present() {
-                all.push((id, self.groups.shape(id), place));
+        for leaf in 0..self.groups.leaves {
+            for (within, id) in self.groups.tiles_in(leaf).enumerate() {
+                let place = self.tile_place(leaf, within)?;
+                if place.is_present() {
+                    all.push((id, self.groups.shape(id), place));
+                }
             }
         }
         Ok(all)
