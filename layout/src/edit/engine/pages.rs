@@ -246,7 +246,7 @@ impl<C: RecordCodec> Pages<C> {
         }
     }
 
-    /// Before the batch's first record in the page that is at a place in `touched`.
+    /// Before the batch's first record in the page at a place in `touched`.
     #[inline(never)]
     fn begin_writing(&mut self, at: usize, logical: u64) {
         self.marks.push((at, [0; _]));
