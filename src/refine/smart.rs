@@ -20,7 +20,6 @@ use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
 use crate::metric::Metric;
 use crate::view::View;
-use std::ops::Range;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
 use terrasoar_layout::read::store::{CompleteStore, RecordStore};
@@ -276,15 +275,14 @@ impl<S: RecordStore, P: Probe> Walk<'_, S, P> {
 /// Ends the live ranges of all nodes that an edit can concern.
 struct Expiry<'e> {
     nodes: &'e mut NodeArray,
-    areas: &'e mut Areas,
+    areas: &'e Areas,
 }
 
 impl Expiry<'_> {
     /// Visits the triangle (apex; b, d) of `node`.
-    fn visit(&mut self, level: u32, node: u32, [apex, b, d]: Triangle, above: &Range<usize>) {
+    fn visit(&mut self, level: u32, node: u32, [apex, b, d]: Triangle) {
         let v = b.midpoint(d);
-        let here = self.areas.narrow(above, v, level);
-        if here.is_empty() {
+        if !self.areas.concern(v, level) {
             return;
         }
         let word = &mut self.nodes.words[node as usize];
@@ -292,8 +290,8 @@ impl Expiry<'_> {
         *word &= SPLIT;
         let children = self.nodes.children[node as usize];
         if is_split && children != NONE {
-            self.visit(level - 1, children, [v, b, apex], &here);
-            self.visit(level - 1, children + 1, [v, apex, d], &here);
+            self.visit(level - 1, children, [v, b, apex]);
+            self.visit(level - 1, children + 1, [v, apex, d]);
         }
     }
 }
@@ -314,10 +312,10 @@ impl<S: CompleteStore> Engine for Smart<S> {
             self.nodes.vertices[i].height_m = height_m;
             self.spare.vertices[i].height_m = height_m;
         }
-        let all = self.areas.start(&grid, change);
-        let mut expiry = Expiry { nodes: &mut self.nodes, areas: &mut self.areas };
+        self.areas.start(&grid, change);
+        let mut expiry = Expiry { nodes: &mut self.nodes, areas: &self.areas };
         for (root, (_, [b, d])) in ROOTS.into_iter().enumerate() {
-            expiry.visit(grid.levels() - 2, root as u32, [c[0].midpoint(c[2]), c[b], c[d]], &all);
+            expiry.visit(grid.levels() - 2, root as u32, [c[0].midpoint(c[2]), c[b], c[d]]);
         }
     }
 

@@ -123,6 +123,13 @@ impl<C: RecordCodec> Rules<C> {
         self.encode(level, code, class, own_m, below)
     }
 
+    /// The record of a plain vertex whose triangles padding does not deform.
+    #[inline(always)]
+    pub(crate) fn encode_plain(&self, level: u32, code: f64, own_m: f64, below: &Below) -> Option<C::Raw> {
+        let error_m = larger(below.error_m, smaller(self.largest_error_m(), own_m));
+        self.codec.encode_plain(level, code, error_m, below.radius_m)
+    }
+
     /// The record of a vertex whose class is known and whose triangles padding does not deform.
     #[inline(always)]
     pub(crate) fn encode(
@@ -156,6 +163,28 @@ pub(crate) struct Below {
 }
 
 impl Below {
+    /// Four children, `ground2` square metres away over the ground from a vertex at `height_m` above `base_m`.
+    #[inline(always)]
+    pub(crate) fn of(children: &[Vertex; 4], ground2: &[f64; 4], height_m: f64, base_m: f64) -> Self {
+        let mut below = Self::default();
+        if children.iter().any(|child| child.class != VertexClass::Plain) {
+            for (child, ground2) in children.iter().zip(ground2) {
+                below.add(child, *ground2, height_m, base_m);
+            }
+            return below;
+        }
+        // Roots side by side.
+        let mut radii_m = [0.0; 4];
+        for i in 0..4 {
+            let dz = height_m - (children[i].height_m - base_m);
+            radii_m[i] = ((ground2[i] + dz * dz).sqrt() + children[i].radius_m) * MARGIN;
+        }
+        below.any_alive = true;
+        below.radius_m = radii_m.into_iter().fold(0.0, larger);
+        below.error_m = children.iter().map(|child| child.error_m).fold(0.0, larger);
+        below
+    }
+
     /// Adds a child `ground2` square metres away over the ground from a vertex at `height_m` above `base_m`.
     #[inline(always)]
     pub(crate) fn add(&mut self, child: &Vertex, ground2: f64, height_m: f64, base_m: f64) {

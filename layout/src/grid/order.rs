@@ -9,10 +9,12 @@
 //! Slots 0..=3 are the corners SW, SE, NE, NW; 4 is the centre; 5..=8 are the midpoints of the W, S, E, N
 //! sides. See FORMAT.md, "Order of records". Cost: a few shifts a vertex.
 
+mod along;
 mod blocks;
 #[cfg(test)]
 mod large;
 
+pub(crate) use along::{BlackAlong, FAMILY, WhiteAlong, family};
 pub(crate) use blocks::{block_start, level_around, step_in_block};
 
 use crate::grid::GridPoint;
@@ -111,41 +113,6 @@ pub fn slot_of(k: u32, p: GridPoint) -> u64 {
         let (u, w) = (x >> t, y >> t);
         let (a, b) = black_block(d, u, w);
         black_base(d) + 2 * spread24(a ^ ((1 << d) - 1)) + spread24(a ^ b ^ (1 << d))
-    }
-}
-
-/// Slots of the vertices of one row of a level: [`slot_of`] with the work for the row done once.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RowSlots {
-    is_white: bool,
-    t: u32,
-    d: u32,
-    base: u64,
-    /// Cell row of white vertices; row in steps of black ones.
-    row: u64,
-}
-
-impl RowSlots {
-    /// The row at `y` of `level` in a square of 2^k steps a side.
-    pub(crate) const fn new(k: u32, level: u32, y: u32) -> Self {
-        let t = level / 2;
-        let d = k - 1 - t;
-        if level & 1 == 1 {
-            let row = (y >> (t + 1)) as u64;
-            Self { is_white: true, t, d, base: white_base(d) + 2 * spread(row), row }
-        } else {
-            Self { is_white: false, t, d, base: black_base(d), row: (y >> t) as u64 }
-        }
-    }
-
-    /// Slot of the vertex at column `x`, which is one of the row's.
-    #[inline(always)]
-    pub(crate) const fn slot(&self, x: u32) -> u64 {
-        if self.is_white {
-            return self.base + spread24((x >> (self.t + 1)) as u64 ^ self.row);
-        }
-        let (a, b) = black_block(self.d, (x >> self.t) as u64, self.row);
-        self.base + 2 * spread24(a ^ ((1 << self.d) - 1)) + spread24(a ^ b ^ (1 << self.d))
     }
 }
 
@@ -340,8 +307,8 @@ mod tests {
                     let p = GridPoint::new(x, y);
                     assert_eq!(point_of(k, slot_of(k, p)), Some(p));
                     if !grid(k).is_corner(p) {
-                        let row = RowSlots::new(k, grid(k).level(p), y);
-                        assert_eq!(row.slot(x), slot_of(k, p), "{p:?} of {k}");
+                        let slot = along::first_along(k, grid(k).level(p), p);
+                        assert_eq!(slot, Some(slot_of(k, p)), "{p:?} of {k}");
                     }
                 }
             }

@@ -10,21 +10,21 @@ pub(crate) struct BitWriter {
 
 impl BitWriter {
     /// Appends the low `count` bits of `value`, at most 32; the others are 0.
+    #[inline(always)]
     pub(crate) fn put(&mut self, value: u32, count: u32) {
         self.waiting |= u64::from(value) << self.count;
         self.count += count;
-        while self.count >= 8 {
-            self.bytes.push(self.waiting as u8);
-            self.waiting >>= 8;
-            self.count -= 8;
+        if self.count >= 32 {
+            self.bytes.extend((self.waiting as u32).to_le_bytes());
+            self.waiting >>= 32;
+            self.count -= 32;
         }
     }
 
     /// All bytes, the last one filled up with zeros.
     pub(crate) fn finish(mut self) -> Vec<u8> {
-        if self.count > 0 {
-            self.bytes.push(self.waiting as u8);
-        }
+        let last = self.waiting.to_le_bytes();
+        self.bytes.extend(&last[..self.count.div_ceil(8) as usize]);
         self.bytes
     }
 }

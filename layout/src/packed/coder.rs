@@ -4,7 +4,8 @@
 //! several independent steps at hand. Invariant: decoding never reads outside the bytes, and [`Decoder::finish`] says whether all of them, and nothing else, were used.
 
 use super::bits::{BitReader, BitWriter};
-use super::model::{Counts, DecodeTable, DecodeTables, ERRORS, Model, SCALE_LOG};
+use super::model::{Counts, DecodeTable, DecodeTables, ERRORS};
+use super::symbols::EncodeTables;
 use super::token::{BASES, TOKENS, token_of};
 
 /// What a state is before the first and after the last symbol.
@@ -31,25 +32,57 @@ pub(crate) trait Coder {
 /// Symbols of a segment on their way into bytes.
 #[derive(Debug, Default)]
 pub(crate) struct Encoder {
-    /// Context, token, turn.
-    symbols: Vec<(u16, u8, u32)>,
+    symbols: Vec<Symbol>,
     bits: BitWriter,
 }
 
+/// A token in its context, and whose turn it is.
+#[derive(Debug, Clone, Copy)]
+struct Symbol(u32);
+
+impl Symbol {
+    const TURN_BITS: u32 = MOST_LANES.ilog2();
+    const TOKEN_BITS: u32 = TOKENS.ilog2();
+
+    #[inline(always)]
+    fn new(context: u16, token: u8, turn: usize) -> Self {
+        let turn = turn as u32 % MOST_LANES as u32;
+        Self(((u32::from(context) << Self::TOKEN_BITS) | u32::from(token)) << Self::TURN_BITS | turn)
+    }
+
+    #[inline(always)]
+    fn context(self) -> usize {
+        (self.0 >> (Self::TURN_BITS + Self::TOKEN_BITS)) as usize
+    }
+
+    #[inline(always)]
+    fn token(self) -> usize {
+        (self.0 >> Self::TURN_BITS) as usize % TOKENS
+    }
+
+    /// Its turn among `lanes` states, a power of two that is no larger than [`MOST_LANES`].
+    #[inline(always)]
+    fn lane(self, lanes: usize) -> usize {
+        self.0 as usize & (lanes - 1) & (MOST_LANES - 1)
+    }
+}
+
 impl Coder for Encoder {
+    #[inline(always)]
     fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
-        // Whole rows at a time: what each step does is the same for all of a row.
-        let turns = (0u32..).zip(contexts.iter().zip(&*values));
-        self.symbols.extend(
-            turns.map(|(turn, (context, value))| (first + u16::from(*context), token_of(*value), turn)),
-        );
-        for value in values.iter().filter(|value| **value >= 16) {
-            self.beside(*value);
+        self.symbols.extend(contexts.iter().zip(&*values).enumerate().map(|(turn, (context, value))| {
+            Symbol::new(first + u16::from(*context), token_of(*value), turn)
+        }));
+        // Most rows of flat ground have no bits beside their tokens.
+        for values in values.chunks(16) {
+            if values.iter().fold(0, |all, value| all | value) >= 16 {
+                values.iter().for_each(|value| self.beside(*value));
+            }
         }
     }
 
     fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
-        self.symbols.push((context, token_of(*value), turn as u32));
+        self.symbols.push(Symbol::new(context, token_of(*value), turn));
         self.beside(*value);
     }
 
@@ -60,6 +93,7 @@ impl Coder for Encoder {
 
 impl Encoder {
     /// The bits beside a value's token.
+    #[inline(always)]
     fn beside(&mut self, value: u16) {
         let (base, bits) = BASES[usize::from(token_of(value))];
         self.bits.put(u32::from(value - base), bits.into());
@@ -67,51 +101,44 @@ impl Encoder {
 
     /// Counts its symbols.
     pub(crate) fn count(&self, counts: &mut Counts) {
-        self.symbols.iter().for_each(|(context, token, _)| {
-            counts[usize::from(*context)][usize::from(*token)] += 1;
-        });
+        self.symbols.iter().for_each(|symbol| counts[symbol.context()][symbol.token()] += 1);
     }
 
-    /// The segment. `None` if the model lacks one of its tokens.
-    pub(crate) fn finish(self, model: &Model) -> Option<Vec<u8>> {
+    /// The segment. `None` if the tables lack one of its tokens.
+    pub(crate) fn finish(self, tables: &EncodeTables) -> Option<Vec<u8>> {
         let lanes: usize = match self.symbols.len() {
             0..1_000 => 4,
             1_000..3_000 => 8,
             3_000..11_000 => 16,
             _ => MOST_LANES,
         };
-        let starts: Vec<[u16; 64]> = model
-            .tables
-            .iter()
-            .map(|table| {
-                let mut at = 0;
-                std::array::from_fn(|token| {
-                    at += table[token];
-                    at - table[token]
-                })
-            })
-            .collect();
         let mut states = [START; MOST_LANES];
-        let mut words = Vec::new();
-        for (context, token, turn) in self.symbols.iter().rev() {
-            let table = usize::from(*model.table_of.get(usize::from(*context))?);
-            let frequency = u32::from(model.tables[table][usize::from(*token)]);
-            if frequency == 0 {
-                return None;
+        // A symbol gives a word at most. They are filled from behind, for the last symbol comes first.
+        let mut words = vec![[0; 2]; self.symbols.len()];
+        let (mut at, mut has_all) = (words.len(), true);
+        for symbol in self.symbols.iter().rev() {
+            let step = tables.step(symbol.context(), symbol.token());
+            has_all &= step.is_known();
+            let state = &mut states[symbol.lane(lanes)];
+            let is_full = step.is_full(*state);
+            // Without a branch, which nothing foretells: a word that does not count is written over by the next.
+            if let Some(word) = words.get_mut(at.wrapping_sub(1)) {
+                *word = (*state as u16).to_le_bytes();
             }
-            let state = &mut states[*turn as usize % lanes];
-            if u64::from(*state) >= u64::from(frequency) << (32 - SCALE_LOG) {
-                words.push(*state as u16);
-                *state >>= 16;
-            }
-            let start = u32::from(starts[table][usize::from(*token)]);
-            *state = ((*state / frequency) << SCALE_LOG) + *state % frequency + start;
+            at -= usize::from(is_full);
+            *state = step.after(*state >> (16 * u32::from(is_full)));
         }
-        let mut bytes = vec![lanes as u8];
-        bytes.extend(u16::try_from(words.len()).ok()?.to_le_bytes());
+        if !has_all {
+            return None;
+        }
+        let words = words[at..].as_flattened();
+        let bits = self.bits.finish();
+        let mut bytes = Vec::with_capacity(3 + 4 * lanes + words.len() + bits.len());
+        bytes.push(lanes as u8);
+        bytes.extend(u16::try_from(words.len() / 2).ok()?.to_le_bytes());
         states[..lanes].iter().for_each(|state| bytes.extend(state.to_le_bytes()));
-        words.iter().rev().for_each(|word| bytes.extend(word.to_le_bytes()));
-        bytes.extend(self.bits.finish());
+        bytes.extend(words);
+        bytes.extend(bits);
         Some(bytes)
     }
 }

@@ -27,6 +27,7 @@ pub(crate) mod shape;
 pub(crate) mod source;
 #[cfg(feature = "testing")]
 pub(crate) mod stages;
+pub(crate) mod symbols;
 pub(crate) mod tile;
 pub(crate) mod token;
 pub(crate) mod walk;

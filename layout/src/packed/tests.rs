@@ -4,6 +4,7 @@ use super::coder::{Decoder, Encoder, PlainEncoder};
 use super::model::{CONTEXTS, DecodeTables, Model};
 use super::rules::Rules;
 use super::shape::{SEGMENTS, TileShape};
+use super::symbols::EncodeTables;
 use super::tile::{INERT, TileRecords};
 use super::token::TOKENS;
 use super::walk::{Scratch, walk};
@@ -49,9 +50,9 @@ fn records(shape: &TileShape, seed: u64, wildness: u64) -> TileRecords {
     })
 }
 
-fn encoded(shape: &TileShape, rules: &Rules, truth: &TileRecords) -> [Encoder; SEGMENTS] {
+fn encoded(width: Width, shape: &TileShape, rules: &Rules, truth: &TileRecords) -> [Encoder; SEGMENTS] {
     let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-    walk(shape, rules, &mut Scratch::default(), &mut encoders, Some(truth));
+    width.walk(shape, rules, &mut Scratch::default(), &mut encoders, Some(truth));
     encoders
 }
 
@@ -82,7 +83,7 @@ fn read(
     segments: &[Vec<u8>],
 ) -> (TileRecords, bool) {
     let mut decoders: Vec<_> = segments.iter().map(|bytes| Decoder::new(tables, bytes).unwrap()).collect();
-    let found = width.read(shape, rules, &mut Scratch::default(), &mut decoders);
+    let found = width.walk(shape, rules, &mut Scratch::default(), &mut decoders, None);
     (found, decoders.iter().all(Decoder::finish))
 }
 
@@ -117,12 +118,17 @@ proptest! {
     #[test]
     fn tiles_come_back(shape in shapes(), seed: u64, wildness in prop_oneof![Just(0u64), Just(9), Just(60_000)]) {
         let (rules, truth) = (rules(), records(&shape, seed, wildness));
-        let encoders = encoded(&shape, &rules, &truth);
+        let encoders = encoded(Width::Portable, &shape, &rules, &truth);
         let mut counts = vec![[0; TOKENS]; CONTEXTS];
         encoders.iter().for_each(|encoder| encoder.count(&mut counts));
         let model = Model::from_counts(&counts);
         let model = Model::parse(&model.to_bytes()).unwrap();
-        let segments = encoders.map(|encoder| encoder.finish(&model).unwrap());
+        let encode = EncodeTables::of(&model);
+        let segments = encoders.map(|encoder| encoder.finish(&encode).unwrap());
+        for width in Width::all() {
+            let same = encoded(width, &shape, &rules, &truth).map(|encoder| encoder.finish(&encode).unwrap());
+            prop_assert!(same == segments, "{width:?}");
+        }
         let tables = DecodeTables::of(&model);
         let mut scratch = Scratch::default();
         for count in (1..=SEGMENTS).rev() {
@@ -153,12 +159,12 @@ proptest! {
     #[test]
     fn any_bytes_are_a_tile_or_none(shape in shapes(), seed: u64, bytes in prop::collection::vec(any::<u8>(), 0..900)) {
         let rules = rules();
-        let encoders = encoded(&shape, &rules, &records(&shape, seed, 9));
+        let encoders = encoded(Width::best(), &shape, &rules, &records(&shape, seed, 9));
         let mut counts = vec![[0; TOKENS]; CONTEXTS];
         encoders.iter().for_each(|encoder| encoder.count(&mut counts));
         let model = Model::from_counts(&counts);
         let tables = DecodeTables::of(&model);
-        let mut segments = encoders.map(|encoder| encoder.finish(&model).unwrap());
+        let mut segments = encoders.map(|encoder| encoder.finish(&EncodeTables::of(&model)).unwrap());
         spoil(&mut segments, seed, &bytes);
         let segments: Vec<_> = segments.into_iter().take_while(|bytes| Decoder::new(&tables, bytes).is_some()).collect();
         if !segments.is_empty() {

@@ -57,6 +57,7 @@ impl Way {
     /// Takes the records of a tile through `segments`.
     pub(crate) fn write<C: Coder>(
         &self,
+        width: Width,
         shape: &TileShape,
         scratch: &mut Scratch,
         segments: &mut [C],
@@ -64,7 +65,7 @@ impl Way {
     ) {
         match (self, scratch) {
             (Self::Compact(rules), Scratch::Compact(scratch)) => {
-                walk::walk(shape, rules, scratch, segments, Some(records));
+                width.walk(shape, rules, scratch, segments, Some(records));
             }
             (Self::Exact(rules), Scratch::Exact(scratch)) => {
                 exact::walk(shape, rules, scratch, segments, Some(records));
@@ -72,7 +73,7 @@ impl Way {
             // One of another file.
             (_, scratch) => {
                 *scratch = self.scratch();
-                self.write(shape, scratch, segments, records);
+                self.write(width, shape, scratch, segments, records);
             }
         }
     }
@@ -86,7 +87,9 @@ impl Way {
         segments: &mut [Decoder<'_>],
     ) -> TileRecords {
         match (self, scratch) {
-            (Self::Compact(rules), Scratch::Compact(scratch)) => width.read(shape, rules, scratch, segments),
+            (Self::Compact(rules), Scratch::Compact(scratch)) => {
+                width.walk(shape, rules, scratch, segments, None)
+            }
             (Self::Exact(rules), Scratch::Exact(scratch)) => {
                 exact::walk(shape, rules, scratch, segments, None)
             }

@@ -1,15 +1,15 @@
-//! Reading tiles with what the processor has: the same walk, compiled three times, for the instructions of any processor, for AVX2 and for AVX-512.
+//! Reading and writing tiles with what the processor has: the same walk, compiled three times, for the instructions of any processor, for AVX2 and for AVX-512.
 //!
-//! Nothing in it differs but what the compiler makes of loops over rows. Invariant: all of them read the same from any bytes, which the tests hold against each other. Cost: asking what the processor has is a
+//! Nothing in it differs but what the compiler makes of loops over rows. Invariant: all of them read the same from any bytes and write the same, which the tests hold against each other. Cost: asking what the processor has is a
 //! load.
 
-use super::coder::Decoder;
+use super::coder::Coder;
 use super::rules::Rules;
 use super::shape::TileShape;
 use super::tile::TileRecords;
 use super::walk::{Scratch, walk};
 
-/// Instructions that tiles are read with.
+/// Instructions that tiles are read and written with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Width {
     /// Those that every processor of the target has.
@@ -52,60 +52,64 @@ impl Width {
         }
     }
 
-    /// Reads a tile out of its segments. Whether it used all of them is for the decoders to say.
-    pub(crate) fn read(
+    /// Takes a tile's values through its segments, as [`walk`] does.
+    pub(crate) fn walk<C: Coder>(
         self,
         shape: &TileShape,
         rules: &Rules,
         scratch: &mut Scratch,
-        segments: &mut [Decoder<'_>],
+        segments: &mut [C],
+        truth: Option<&TileRecords>,
     ) -> TileRecords {
         match self {
             #[cfg(target_arch = "x86_64")]
             #[expect(unsafe_code, reason = "instructions that not every processor has")]
             Self::Avx2 if self.is_here() => {
                 // SAFETY: the processor has all that the function is compiled for.
-                unsafe { read_avx2(shape, rules, scratch, segments) }
+                unsafe { walk_avx2(shape, rules, scratch, segments, truth) }
             }
             #[cfg(target_arch = "x86_64")]
             #[expect(unsafe_code, reason = "instructions that not every processor has")]
             Self::Avx512 if self.is_here() => {
                 // SAFETY: the processor has all that the function is compiled for.
-                unsafe { read_avx512(shape, rules, scratch, segments) }
+                unsafe { walk_avx512(shape, rules, scratch, segments, truth) }
             }
-            _ => read_portable(shape, rules, scratch, segments),
+            _ => walk_portable(shape, rules, scratch, segments, truth),
         }
     }
 }
 
 #[inline(never)]
-fn read_portable(
+fn walk_portable<C: Coder>(
     shape: &TileShape,
     rules: &Rules,
     scratch: &mut Scratch,
-    segments: &mut [Decoder<'_>],
+    segments: &mut [C],
+    truth: Option<&TileRecords>,
 ) -> TileRecords {
-    walk(shape, rules, scratch, segments, None)
+    walk(shape, rules, scratch, segments, truth)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn read_avx2(
+fn walk_avx2<C: Coder>(
     shape: &TileShape,
     rules: &Rules,
     scratch: &mut Scratch,
-    segments: &mut [Decoder<'_>],
+    segments: &mut [C],
+    truth: Option<&TileRecords>,
 ) -> TileRecords {
-    walk(shape, rules, scratch, segments, None)
+    walk(shape, rules, scratch, segments, truth)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn read_avx512(
+fn walk_avx512<C: Coder>(
     shape: &TileShape,
     rules: &Rules,
     scratch: &mut Scratch,
-    segments: &mut [Decoder<'_>],
+    segments: &mut [C],
+    truth: Option<&TileRecords>,
 ) -> TileRecords {
-    walk(shape, rules, scratch, segments, None)
+    walk(shape, rules, scratch, segments, truth)
 }

@@ -1,7 +1,7 @@
 //! The records of a tile out of a terrain file, row by row: the work for a row's slots is done once.
 
 use crate::grid::GridPoint;
-use crate::grid::order::{RowSlots, slot_of};
+use crate::grid::order::{BlackAlong, WhiteAlong, slot_of};
 use crate::grid::record::RecordCodec;
 use crate::packed::shape::{Groups, TileId};
 use crate::packed::tile::TileRecords;
@@ -20,19 +20,29 @@ pub(super) fn tile_of<C: RecordCodec>(
     let on_grid = |at: [u32; 2]| [0, 1].map(|axis| first[axis] + (at[axis] << group.stride_log));
     TileRecords::by_rows(&groups.shape(id), inert, |at, step, words| {
         let [x, y] = on_grid(at);
-        let step = step << group.stride_log;
-        // Steps between the vertices of a level are twice those between its lattice and the next.
-        let slots = ((x | y).trailing_zeros() < k).then(|| {
-            let octave = (x | y).trailing_zeros();
-            let is_white = x.trailing_zeros() == y.trailing_zeros();
-            RowSlots::new(k, 2 * octave + u32::from(is_white), y)
-        });
-        let xs = (0u32..).map(|i| x + i * step);
-        for (record, x) in words.chunks_exact_mut(inert.len()).zip(xs) {
-            let slot = slots.map_or_else(|| slot_of(k, GridPoint::new(x, y)), |slots| slots.slot(x));
-            let mut bytes = [0; 16];
-            C::write(records.raw(slot), &mut bytes);
-            record.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
+        let octave = (x | y).trailing_zeros();
+        if octave >= k {
+            let xs = (0u32..).map(|i| x + i * (step << group.stride_log));
+            fill(records, xs.map(|x| slot_of(k, GridPoint::new(x, y))), words, inert.len());
+        } else if x.trailing_zeros() == y.trailing_zeros() {
+            fill(records, WhiteAlong::new(k, 2 * octave + 1, x, y), words, inert.len());
+        } else {
+            fill(records, BlackAlong::new(k, 2 * octave, x, y), words, inert.len());
         }
     })
+}
+
+/// The records of these slots, in words.
+#[inline(always)]
+fn fill<C: RecordCodec>(
+    records: &Records<'_, C>,
+    slots: impl Iterator<Item = u64>,
+    words: &mut [u32],
+    words_each: usize,
+) {
+    for (record, slot) in words.chunks_exact_mut(words_each).zip(slots) {
+        let mut bytes = [0; 16];
+        C::write(records.raw(slot), &mut bytes);
+        record.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
+    }
 }

@@ -25,6 +25,7 @@ use crate::packed::leaves::packed_leaves;
 use crate::packed::model::{CONTEXTS, Counts, DecodeTables, Model};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace, TileRoot};
 use crate::packed::shape::{Groups, SEGMENTS, TileId};
+use crate::packed::symbols::EncodeTables;
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
 use crate::packed::way::{Scratch, Way};
@@ -164,6 +165,12 @@ fn check_pages(terrain: &Terrain, progress: &dyn Progress) -> Result<(), LayoutE
         .try_for_each(|page| terrain.checked_page(page).map(|_| progress.advance(per_page)))
 }
 
+/// The tables of a file, as writing and reading have them.
+struct Tables {
+    encode: EncodeTables,
+    decode: DecodeTables,
+}
+
 /// A packed tile.
 struct Made {
     segments: [Vec<u8>; SEGMENTS],
@@ -206,7 +213,7 @@ impl<C: RecordCodec> Packer<'_, C> {
 
     fn encoded(&self, id: TileId, records: &TileRecords, scratch: &mut Scratch) -> [Encoder; SEGMENTS] {
         let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        self.way.write(&self.groups.shape(id), scratch, &mut encoders, records);
+        self.way.write(self.width, &self.groups.shape(id), scratch, &mut encoders, records);
         encoders
     }
 
@@ -239,28 +246,22 @@ impl<C: RecordCodec> Packer<'_, C> {
     }
 
     /// Packs a tile; `None` if all that it gives are inert.
-    fn make(
-        &self,
-        id: TileId,
-        model: &Model,
-        tables: &DecodeTables,
-        scratch: &mut Scratch,
-    ) -> Result<Option<Made>, LayoutError> {
+    fn make(&self, id: TileId, tables: &Tables, scratch: &mut Scratch) -> Result<Option<Made>, LayoutError> {
         let shape = self.groups.shape(id);
         self.progress.advance(self.samples_of(id));
         let Some(records) = self.records_of(id) else { return Ok(None) };
-        let segments = self.encoded(id, &records, scratch).map(|encoder| encoder.finish(model));
+        let segments = self.encoded(id, &records, scratch).map(|encoder| encoder.finish(&tables.encode));
         let segments = match segments {
             [Some(a), Some(b), Some(c)] => [a, b, c],
             // A sample lacked a token: values are stored as they are.
             _ => {
                 let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
-                self.way.write(&shape, scratch, &mut encoders, &records);
+                self.way.write(self.width, &shape, scratch, &mut encoders, &records);
                 encoders.map(PlainEncoder::finish)
             }
         };
         if self.check == Check::Tiles {
-            let decoders = segments.iter().map(|bytes| Decoder::new(tables, bytes));
+            let decoders = segments.iter().map(|bytes| Decoder::new(&tables.decode, bytes));
             let same = decoders.collect::<Option<Vec<_>>>().is_some_and(|mut decoders| {
                 let found = self.way.read(self.width, &shape, scratch, &mut decoders);
                 decoders.iter().all(Decoder::finish) && found.gives_same(&records, &shape)
@@ -293,7 +294,7 @@ impl<C: RecordCodec> Packer<'_, C> {
             tiles_of(&self.groups, &leaves).filter(|(number, id)| self.is_counted(*number, count, *id));
         self.progress.stage("counting", counted.map(|(_, id)| self.samples_of(id)).sum());
         let model = self.model(&leaves);
-        let tables = DecodeTables::of(&model);
+        let tables = Tables { encode: EncodeTables::of(&model), decode: DecodeTables::of(&model) };
         self.progress.stage("packing", samples);
 
         let (source, header) = (terrain.source(), terrain.header());
@@ -331,7 +332,7 @@ impl<C: RecordCodec> Packer<'_, C> {
             let made: Vec<Option<Made>> = tiles
                 .par_iter()
                 .with_min_len(16)
-                .map_init(|| self.way.scratch(), |scratch, id| self.make(*id, &model, &tables, scratch))
+                .map_init(|| self.way.scratch(), |scratch, id| self.make(*id, &tables, scratch))
                 .collect::<Result<_, LayoutError>>()?;
             let mut bytes = Vec::new();
             let mut made = made.into_iter();

@@ -258,7 +258,7 @@ impl<C: RecordCodec> Core<C> {
         let (near, scale) = (&self.scratch.near, &self.rules.scale);
         let mut heights_m = Vec::with_capacity(rect.count());
         for y in rect.south..=rect.north {
-            let codes = (rect.west..=rect.east).map(|x| near.sample(x, y));
+            let codes = near.samples_of_row(y, rect.west, rect.east).iter();
             heights_m.extend(codes.map(|code| scale.height_base_m + code * scale.height_step_m));
         }
         HeightWindow::new(rect, heights_m)
@@ -280,29 +280,30 @@ impl<C: RecordCodec> Core<C> {
         let mut changed: Option<SampleRect> = None;
         let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
         for y in block.south..=block.north {
-            let first = window.index(block.west, y);
+            let (at, first) = (then.len(), window.index(block.west, y));
             let heights_m = &window.heights_m()[first..first + block.wide() as usize];
-            for (x, height_m) in (block.west..).zip(heights_m) {
-                let old = self.scratch.near.sample(x, y);
-                let new = if height_m.is_nan() || old.is_nan() {
-                    changes.voids_passed += u64::from(old.is_nan() && !height_m.is_nan());
-                    old
-                } else {
-                    C::round_height((height_m - scale.height_base_m) / scale.height_step_m)
-                };
+            then.extend_from_slice(self.scratch.near.samples_of_row(y, block.west, block.east));
+            now.extend(heights_m.iter().zip(&then[at..]).map(|(height_m, old)| {
+                let new = C::round_height((height_m - scale.height_base_m) / scale.height_step_m);
+                if height_m.is_nan() || old.is_nan() { *old } else { new }
+            }));
+            // Voids differ from everything, and stay.
+            let (mut east, mut west) = (None, None);
+            for (x, (old, new)) in (block.west..).zip(then[at..].iter().zip(&now[at..])) {
                 if new != old && !old.is_nan() {
-                    lowest = lowest.min(new);
-                    highest = highest.max(new);
-                    let here = SampleRect { west: x, south: y, east: x, north: y };
-                    changed = Some(changed.map_or(here, |r| SampleRect {
-                        west: r.west.min(x),
-                        south: r.south,
-                        east: r.east.max(x),
-                        north: y,
-                    }));
+                    lowest = lowest.min(*new);
+                    highest = highest.max(*new);
+                    west = west.or(Some(x));
+                    east = Some(x);
                 }
-                then.push(old);
-                now.push(new);
+            }
+            let voids = heights_m.iter().zip(&then[at..]).filter(|(m, old)| old.is_nan() && !m.is_nan());
+            changes.voids_passed += voids.count() as u64;
+            if let (Some(west), Some(east)) = (west, east) {
+                changed = Some(match changed {
+                    None => SampleRect { west, south: y, east, north: y },
+                    Some(r) => SampleRect { west: r.west.min(west), east: r.east.max(east), north: y, ..r },
+                });
             }
         }
         self.codes = [then, now];

@@ -1,27 +1,21 @@
-//! The records of the six finest levels around a changed rectangle, side by side as on the ground.
+//! The records of the eight finest levels around a changed rectangle, side by side as on the ground.
 //!
 //! Nearly all that an edit changes are vertices of these levels, each of which looks at a dozen others close by. Read once into rows, they are neighbours in memory,
 //! and samples can be compared with a plane row by row, as a build does.
 //!
 //! Invariant: what is written to the pages inside the rectangle is written here as well.
 
-use super::pages::Pages;
-use crate::bound::{Plane, Samples};
+mod reading;
+
+use crate::bound::Plane;
 use crate::edit::operations::window::SampleRect;
-use crate::grid::order::{RowSlots, slot_of};
+use crate::grid::GridPoint;
 use crate::grid::record::RecordCodec;
-use crate::grid::{Grid, GridPoint};
 
 /// Levels that are done here.
-pub(crate) const NEAR_LEVELS: u32 = 6;
+pub(crate) const NEAR_LEVELS: u32 = 8;
 /// Steps around the changed rectangle: a diamond of the coarsest of these levels that touches it reaches twice its step, and so do its children.
-pub(crate) const MARGIN: u32 = 8;
-/// Steps between the points that belong to coarser levels.
-const COARSER: u32 = 1 << (NEAR_LEVELS / 2);
-
-/// Bytes of a line of the processor's caches.
-const LINE_BYTES: u64 = 64;
-
+pub(crate) const MARGIN: u32 = 16;
 /// Records of a rectangle of samples, padding left out.
 #[derive(Debug)]
 pub(crate) struct Near<C: RecordCodec> {
@@ -33,108 +27,49 @@ pub(crate) struct Near<C: RecordCodec> {
     raws: Vec<C::Raw>,
     /// Slots of these records.
     slots: Vec<u64>,
-    /// Height codes; those of voids are what their records say.
-    values: Vec<f64>,
     /// Height codes; NaN for voids.
     samples: Vec<f64>,
 }
 
 impl<C: RecordCodec> Default for Near<C> {
     fn default() -> Self {
-        Self {
-            west: 0,
-            south: 0,
-            wide: 0,
-            high: 0,
-            raws: Vec::new(),
-            slots: Vec::new(),
-            values: Vec::new(),
-            samples: Vec::new(),
-        }
+        Self { west: 0, south: 0, wide: 0, high: 0, raws: Vec::new(), samples: Vec::new(), slots: Vec::new() }
     }
 }
 
 impl<C: RecordCodec> Near<C> {
-    /// Reads the records of `rect` and of the samples around it.
-    pub(crate) fn load(&mut self, grid: &Grid, rect: SampleRect, pages: &mut Pages<C>) {
-        let around = rect.grown(MARGIN, grid);
-        (self.west, self.south) = (around.west, around.south);
-        (self.wide, self.high) = (around.wide(), around.high());
-        self.list_slots(grid);
-        // Asked of memory all at once, then waited for.
-        let mut line = u64::MAX;
-        for slot in &self.slots {
-            let here = slot * C::BYTES as u64 / LINE_BYTES;
-            if here != line {
-                pages.prefetch(*slot);
-                line = here;
-            }
-        }
-        self.raws.clear();
-        self.raws.extend(self.slots.iter().map(|slot| pages.raw(*slot)));
-        self.values.clear();
-        self.values.extend(self.raws.iter().map(|raw| C::height_value(*raw)));
-        self.samples.clear();
-        let known = self.raws.iter().zip(&self.values);
-        self.samples.extend(known.map(|(raw, value)| if C::is_void(*raw) { f64::NAN } else { *value }));
-    }
-
-    /// Fills in the slots of the rectangle, a level at a time.
-    fn list_slots(&mut self, grid: &Grid) {
-        self.slots.clear();
-        self.slots.resize(self.wide as usize * self.high as usize, 0);
-        let n = grid.side_steps();
-        for level in 0..NEAR_LEVELS.min(grid.levels()) {
-            for y in self.south..self.south + self.high {
-                let Some(first) = first_of_row(level, self.west, y) else { continue };
-                let row = RowSlots::new(grid.k(), level, y);
-                for x in (first..self.west + self.wide).step_by(2 << (level / 2)) {
-                    let at = self.index(x, y);
-                    self.slots[at] = row.slot(x);
-                }
-            }
-        }
-        let step = COARSER.min(n);
-        for y in (self.south.next_multiple_of(step)..self.south + self.high).step_by(step as usize) {
-            for x in (self.west.next_multiple_of(step)..self.west + self.wide).step_by(step as usize) {
-                let at = self.index(x, y);
-                self.slots[at] = slot_of(grid.k(), GridPoint::new(x, y));
-            }
-        }
-    }
-
-    /// Height code of a sample of the rectangle; NaN for voids.
+    /// Height codes of row `y` from column `west` to `east`, all in the rectangle; NaN for voids.
     #[inline(always)]
-    pub(crate) fn sample(&self, x: u32, y: u32) -> f64 {
-        self.samples[self.index(x, y)]
+    pub(crate) fn samples_of_row(&self, y: u32, west: u32, east: u32) -> &[f64] {
+        &self.samples[self.index(west, y)..=self.index(east, y)]
     }
 
     /// Gives samples new height codes, those of `rect` row by row; NaN leaves one as it is.
     pub(crate) fn set(&mut self, rect: SampleRect, codes: &[f64]) {
         for (y, row) in (rect.south..=rect.north).zip(codes.chunks_exact(rect.wide() as usize)) {
             let at = self.index(rect.west, y);
-            for (i, code) in row.iter().enumerate().filter(|(_, code)| !code.is_nan()) {
-                self.samples[at + i] = *code;
-                self.values[at + i] = *code;
+            for (sample, code) in self.samples[at..at + row.len()].iter_mut().zip(row) {
+                *sample = if code.is_nan() { *sample } else { *code };
             }
         }
+    }
+
+    /// Index of a column and row within the rectangle.
+    #[inline(always)]
+    fn place(&self, x: usize, y: usize) -> usize {
+        y * self.row_length() + x
     }
 
     /// Index of a grid point of the rectangle.
     #[inline(always)]
     pub(crate) fn index(&self, x: u32, y: u32) -> usize {
-        (y - self.south) as usize * self.wide as usize + (x - self.west) as usize
+        self.place((x - self.west) as usize, (y - self.south) as usize)
     }
 
-    /// Points a row.
+    /// Places a row.
     #[inline(always)]
     pub(crate) fn row_length(&self) -> usize {
         self.wide as usize
-    }
-
-    #[inline(always)]
-    pub(crate) fn raw(&self, at: usize) -> C::Raw {
-        self.raws[at]
     }
 
     #[inline(always)]
@@ -142,17 +77,24 @@ impl<C: RecordCodec> Near<C> {
         self.slots[at]
     }
 
-    /// Height code at an index.
+    #[inline(always)]
+    pub(crate) fn raw(&self, at: usize) -> C::Raw {
+        self.raws[at]
+    }
+
+    /// Height code at an index; that of a void is what its record says.
     #[inline(always)]
     pub(crate) fn value(&self, at: usize) -> f64 {
-        self.values[at]
+        let code = self.samples[at];
+        if code.is_nan() { C::height_value(self.raws[at]) } else { code }
     }
 
     /// Notes a record that was written, if it lies here.
     pub(crate) fn note(&mut self, p: GridPoint, raw: C::Raw) {
         let (x, y) = (p.x().wrapping_sub(self.west), p.y().wrapping_sub(self.south));
         if x < self.wide && y < self.high {
-            self.raws[y as usize * self.wide as usize + x as usize] = raw;
+            let at = self.place(x as usize, y as usize);
+            self.raws[at] = raw;
         }
     }
 
@@ -161,23 +103,24 @@ impl<C: RecordCodec> Near<C> {
     pub(crate) fn within(&self, p: GridPoint) -> [u32; 2] {
         [p.x() - self.west, p.y() - self.south]
     }
-}
 
-impl<C: RecordCodec> Samples for Near<C> {
+    /// Largest distance from `plane` over columns `from..=to` of row `y`, counted within the rectangle and all in it.
     #[inline(always)]
-    fn corner(&self, x: u32, y: u32) -> (GridPoint, f64) {
-        let p = GridPoint::new(self.west.wrapping_add(x), self.south.wrapping_add(y));
-        let is_here = x < self.wide && y < self.high;
-        let code =
-            if is_here { self.samples[y as usize * self.wide as usize + x as usize] } else { f64::NAN };
-        (p, code)
+    pub(crate) fn row(&self, plane: &Plane, from: u32, to: u32, y: u32) -> f64 {
+        let row = &self.samples[self.place(from as usize, y as usize)..=self.place(to as usize, y as usize)];
+        plane.farthest_in_row(self.west + from, self.south + y, row)
     }
 
+    /// Height codes, row by row from the south; NaN for voids.
     #[inline(always)]
-    fn row(&self, plane: &Plane, from: u32, to: u32, y: u32) -> f64 {
-        let at = y as usize * self.wide as usize;
-        let row = &self.samples[at + from as usize..=at + to as usize];
-        plane.farthest_in_row(self.west + from, self.south + y, row)
+    pub(crate) fn samples(&self) -> &[f64] {
+        &self.samples
+    }
+
+    /// Whether it holds a grid point and `around` steps on all sides of it.
+    pub(crate) fn holds(&self, p: GridPoint, around: u32) -> bool {
+        let is_within = |v: u32, low: u32, count: u32| v >= low + around && v + around < low + count;
+        is_within(p.x(), self.west, self.wide) && is_within(p.y(), self.south, self.high)
     }
 }
 

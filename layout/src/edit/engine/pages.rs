@@ -100,6 +100,11 @@ impl<C: RecordCodec> Pages<C> {
         &self.terrain
     }
 
+    /// Whether any sample is void.
+    pub(crate) fn has_voids(&self) -> bool {
+        self.terrain.header().has_voids
+    }
+
     /// The record of a slot; inert if its page cannot be read, which [`Pages::check`] tells.
     #[inline(always)]
     pub(crate) fn raw(&mut self, slot: u64) -> C::Raw {
@@ -222,12 +227,30 @@ impl<C: RecordCodec> Pages<C> {
     }
 
     /// Overwrites a record.
+    #[inline(always)]
     pub(crate) fn write(&mut self, point: GridPoint, slot: u64, raw: C::Raw) {
         let (logical, within) = (page_of::<C>(slot), byte_in_page::<C>(slot));
         let at = self.place(logical);
-        let page = self.page_in(at, logical);
-        let place = &mut page[within..within + C::BYTES];
+        if self.touched[at].marked == 0 {
+            self.begin_writing(at, logical);
+        }
+        let place = &mut self.page_in(at, logical)[within..within + C::BYTES];
         let old = C::read(place);
+        C::write(raw, place);
+        let record = within / C::BYTES;
+        let word = &mut self.marks[self.touched[at].marked as usize - 1].1[record / 64];
+        let bit = 1 << (record % 64);
+        if *word & bit == 0 {
+            *word |= bit;
+            self.log.push(Overwritten { point, slot, old });
+        }
+    }
+
+    /// Before the batch's first record in the page at a place in `touched`.
+    #[inline(never)]
+    fn begin_writing(&mut self, at: usize, logical: u64) {
+        self.marks.push((at, [0; _]));
+        self.touched[at].marked = self.marks.len() as u32;
         if self.touched[at].flags & UNCOMMITTED == 0 {
             let committed = Box::new(*self.page_in(at, logical));
             self.uncommitted.push((logical, committed));
@@ -235,25 +258,6 @@ impl<C: RecordCodec> Pages<C> {
             self.clean -= usize::from(*flags & TAKEN == 0);
             *flags |= EDITED | UNCOMMITTED;
         }
-        C::write(raw, &mut self.page_in(at, logical)[within..within + C::BYTES]);
-        if self.mark(at, within / C::BYTES) {
-            self.log.push(Overwritten { point, slot, old });
-        }
-    }
-
-    /// Marks a record of the page at a place in `touched`; whether it was not marked before.
-    #[inline(always)]
-    fn mark(&mut self, place: usize, record: usize) -> bool {
-        let marked = &mut self.touched[place].marked;
-        if *marked == 0 {
-            self.marks.push((place, [0; _]));
-            *marked = self.marks.len() as u32;
-        }
-        let word = &mut self.marks[*marked as usize - 1].1[record / 64];
-        let bit = 1 << (record % 64);
-        let is_new = *word & bit == 0;
-        *word |= bit;
-        is_new
     }
 
     /// Ends the batch's marks.

@@ -6,11 +6,12 @@
 //! them have to be looked at than those that changed. Cost: the samples of the rectangle, some ten vertices a level above them, a few tens of records for each search.
 
 mod bounded;
+mod finest;
 
 use super::midway::{Ground, NewCodes};
 use super::near::{NEAR_LEVELS, Near, first_of_row};
 use super::pages::Pages;
-use crate::bound::{Below, FIRST_SCANNED, Rules, farthest_diagonal, farthest_level, farthest_upright};
+use crate::bound::{Below, FIRST_SCANNED, Rules};
 use crate::edit::operations::window::SampleRect;
 use crate::error::LayoutError;
 use crate::file::header::ErrorKind;
@@ -94,30 +95,37 @@ impl<'u, C: RecordCodec> Update<'u, C> {
         let s = 1u32 << (level / 2);
         let reach = grid.reach_steps(level);
         let limit = grid.samples().map(|count| (count - 1 + reach - 1).min(grid.side_steps()));
-        let span = |low: u32, high: u32, limit: u32| (low.saturating_sub(s), (high + s).min(limit));
-        let (west, east) = span(self.area.west, self.area.east, limit[0]);
-        let (south, north) = span(self.area.south, self.area.north, limit[1]);
-        let is_near = level < NEAR_LEVELS;
-        let near = NearLevel::new(self.rules, level);
+        let (south, north) = (self.area.south.saturating_sub(s), (self.area.north + s).min(limit[1]));
         for y in (south.next_multiple_of(s)..=north).step_by(s as usize) {
-            let Some(first) = first_of_row(level, west, y) else { continue };
-            for x in (first..=east).step_by(2 * s as usize) {
-                if level & 1 == 0 && self.steps_from_area(x, y) > s {
-                    continue;
-                }
-                let v = GridPoint::new(x, y);
-                if !(is_near && self.renew_near(v, &near)) {
-                    self.renew(v, level);
-                }
+            // Diamonds of white vertices are squares, those of black ones stand on a corner.
+            let off = self.area.south.saturating_sub(y) + y.saturating_sub(self.area.north);
+            let across = if level & 1 == 1 { s } else { s - off };
+            let (west, east) =
+                (self.area.west.saturating_sub(across), (self.area.east + across).min(limit[0]));
+            if let Some(first) = first_of_row(level, west, y) {
+                self.renew_along(level, y, first, east);
             }
         }
         self.renew_apart(level, limit);
     }
 
-    /// Steps along both axes from a point to the area.
-    fn steps_from_area(&self, x: u32, y: u32) -> u32 {
-        let off = |v: u32, low: u32, high: u32| low.saturating_sub(v) + v.saturating_sub(high);
-        off(x, self.area.west, self.area.east) + off(y, self.area.south, self.area.north)
+    /// Makes the records of a level's vertices in a row from column `first` to `last` anew.
+    fn renew_along(&mut self, level: u32, y: u32, first: u32, last: u32) {
+        match level {
+            0 => self.renew_row::<0>(y, first, last),
+            1 => self.renew_row::<1>(y, first, last),
+            2 => self.renew_row::<2>(y, first, last),
+            3 => self.renew_row::<3>(y, first, last),
+            4 => self.renew_row::<4>(y, first, last),
+            5 => self.renew_row::<5>(y, first, last),
+            6 => self.renew_row::<6>(y, first, last),
+            7 => self.renew_row::<7>(y, first, last),
+            _ => {
+                for x in (first..=last).step_by(2 << (level / 2)) {
+                    self.renew(GridPoint::new(x, y), level);
+                }
+            }
+        }
     }
 
     /// Whether the diamond of a vertex touches the area.
@@ -147,7 +155,11 @@ impl<'u, C: RecordCodec> Update<'u, C> {
         apart.sort_unstable();
         apart.dedup();
         for v in &apart {
-            self.renew(*v, level);
+            if level < NEAR_LEVELS && self.scratch.near.holds(*v, 1 << (level / 2)) {
+                self.renew_along(level, v.y(), v.x(), v.x());
+            } else {
+                self.renew(*v, level);
+            }
         }
         self.scratch.apart = apart;
     }
@@ -190,56 +202,6 @@ impl<'u, C: RecordCodec> Update<'u, C> {
         }
     }
 
-    /// Makes the record of a vertex of the finest levels anew, if nothing around it is void, padding or the square's border; else returns false.
-    #[inline(always)]
-    fn renew_near(&mut self, v: GridPoint, of: &NearLevel) -> bool {
-        let (rules, near) = (self.rules, &self.scratch.near);
-        let (s, [wide, high]) = (of.step, rules.grid.samples());
-        let (x, y) = (v.x(), v.y());
-        if x < s || y < s || x + s >= wide || y + s >= high {
-            return false;
-        }
-        let at = near.index(x, y);
-        let old = near.raw(at);
-        if rules.codec.decode(old, of.level).class != VertexClass::Plain {
-            return false;
-        }
-        let code = near.value(at);
-        let row = near.row_length();
-        let mut below = Below::default();
-        if of.level > 0 {
-            let height_m = code * rules.scale.height_step_m;
-            for (child, ground2) in of.children(at, row) {
-                let child = rules.codec.decode(near.raw(child), of.level - 1);
-                below.add(&child, ground2, height_m, rules.scale.height_base_m);
-            }
-        }
-        let own_m = if rules.error_kind == ErrorKind::Bounded && of.level >= FIRST_SCANNED {
-            let [x, y] = near.within(v);
-            let farthest = match of.edge(v) {
-                Edge::Upright => farthest_upright(near, x, y, s),
-                Edge::Level => farthest_level(near, x, y, s),
-                edge => farthest_diagonal(near, x, y, s, edge == Edge::Rising),
-            };
-            f64::from(rules.scanned_error_m(farthest))
-        } else {
-            let s = s as usize;
-            let (b, d) = match of.edge(v) {
-                Edge::Upright => (at - s * row, at + s * row),
-                Edge::Level => (at - s, at + s),
-                Edge::Rising => (at - s * row - s, at + s * row + s),
-                Edge::Falling => (at - s * row + s, at + s * row - s),
-            };
-            rules.step_error_m(code, [near.value(b), near.value(d)])
-        };
-        let slot = near.slot(at);
-        let new = rules.encode(of.level, code, VertexClass::Plain, own_m, &below);
-        if self.put(v, slot, old, new).is_some() {
-            self.scratch.here.push((v, old));
-        }
-        true
-    }
-
     /// Stores a record; returns it if it is another one than before.
     fn put(&mut self, v: GridPoint, slot: u64, old: C::Raw, new: Option<C::Raw>) -> Option<C::Raw> {
         match new {
@@ -272,59 +234,5 @@ fn with_padding(grid: &Grid, rect: SampleRect) -> SampleRect {
         east: if rect.east == wide - 1 { n } else { rect.east },
         north: if rect.north == high - 1 { n } else { rect.north },
         ..rect
-    }
-}
-
-/// How the edge runs that a vertex splits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Edge {
-    Upright,
-    Level,
-    Rising,
-    Falling,
-}
-
-/// What the vertices of one of the finest levels have in common.
-struct NearLevel {
-    level: u32,
-    /// Steps from a vertex to its nearest ancestors.
-    step: u32,
-    /// Square metres over the ground to the children beside a vertex, and to those north and south.
-    ground2: [f64; 2],
-}
-
-impl NearLevel {
-    fn new<C: RecordCodec>(rules: &Rules<C>, level: u32) -> Self {
-        let step = 1u32 << (level / 2);
-        let [dx, dy] = rules.grid.spacing_m();
-        let [e, n] = [dx, dy].map(|d| d * f64::from(if level & 1 == 1 { step } else { step / 2 }));
-        let ground2 = if level & 1 == 1 { [e * e, n * n] } else { [e * e + n * n; 2] };
-        Self { level, step, ground2 }
-    }
-
-    /// Indices of the children of the vertex at index `at`, in rows of `row`, and square metres to them.
-    #[inline(always)]
-    fn children(&self, at: usize, row: usize) -> [(usize, f64); 4] {
-        let [beside, across] = self.ground2;
-        if self.level & 1 == 1 {
-            let s = self.step as usize;
-            [(at + s, beside), (at - s, beside), (at + s * row, across), (at - s * row, across)]
-        } else {
-            let h = self.step as usize / 2;
-            let (south, north) = (at - h * row, at + h * row);
-            [(south - h, beside), (south + h, beside), (north - h, beside), (north + h, beside)]
-        }
-    }
-
-    /// See [`Grid::edge_ends`].
-    #[inline(always)]
-    fn edge(&self, v: GridPoint) -> Edge {
-        let (column, row) = (v.x() >> (self.level / 2), v.y() >> (self.level / 2));
-        match (self.level & 1 == 1, row & 1 == 1) {
-            (false, true) => Edge::Upright,
-            (false, false) => Edge::Level,
-            (true, _) if (column ^ row) & 2 == 0 => Edge::Rising,
-            (true, _) => Edge::Falling,
-        }
     }
 }

@@ -58,7 +58,7 @@ fn slots_of_large_squares_are_those_of_the_definition() {
             let level = grid(k).level(p);
             let slots = level_slots(k, level);
             assert!(slots.contains(&slot), "{p:?} of {k}");
-            assert_eq!(RowSlots::new(k, level, p.y()).slot(p.x()), slot, "{p:?} of {k}");
+            assert_eq!(along::first_along(k, level, p), Some(slot), "{p:?} of {k}");
             let offset = slot - slots.start;
             let (t, is_white) = (level / 2, level & 1);
             let cell = BlockCells::new(k, level, offset / BLOCK_SLOTS * BLOCK_SLOTS)

@@ -122,6 +122,12 @@ pub trait RecordCodec: Clone + Send + Sync + 'static {
         radius_m: f64,
     ) -> Option<Self::Raw>;
 
+    /// [`RecordCodec::encode`] of a plain vertex.
+    #[inline(always)]
+    fn encode_plain(&self, level: u32, value: f64, error_m: f64, radius_m: f64) -> Option<Self::Raw> {
+        self.encode(level, value, VertexClass::Plain, error_m, radius_m)
+    }
+
     /// Whether a record's sample is void, or the record inert: as [`Vertex::class`] says it, without decoding the rest.
     fn is_void(raw: Self::Raw) -> bool;
 

@@ -75,7 +75,7 @@ pub(super) fn others<C: Coder>(
         })
     };
     let count = octave.count();
-    let mut are_any = u16::from((0..count).any(|i| is_asked(scratch, i) && differs(scratch, i)));
+    let mut are_any = u16::from((0..count).any(|i| differs(scratch, i) && is_asked(scratch, i)));
     coder.raw(1, &mut are_any);
     if are_any == 0 {
         return;

@@ -7,6 +7,7 @@ use crate::mix::Random;
 use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
 use crate::packed::model::{CONTEXTS, DecodeTables, Model};
 use crate::packed::shape::{SEGMENTS, TileShape};
+use crate::packed::symbols::EncodeTables;
 use crate::packed::tests::spoil;
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
@@ -101,7 +102,7 @@ proptest! {
         let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
         walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
         let model = model_of(&encoders);
-        let segments = encoders.map(|encoder| encoder.finish(&model).unwrap());
+        let segments = encoders.map(|encoder| encoder.finish(&EncodeTables::of(&model)).unwrap());
         let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
         walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
         let plain = encoders.map(PlainEncoder::finish);
@@ -127,7 +128,7 @@ proptest! {
         walk(&shape, &rules, &mut scratch, &mut encoders, Some(&records(form, &shape, seed, 9)));
         let model = model_of(&encoders);
         let tables = DecodeTables::of(&model);
-        let mut segments = encoders.map(|encoder| encoder.finish(&model).unwrap());
+        let mut segments = encoders.map(|encoder| encoder.finish(&EncodeTables::of(&model)).unwrap());
         spoil(&mut segments, seed, &bytes);
         let mut decoders: Vec<_> = segments.iter().map_while(|bytes| Decoder::new(&tables, bytes)).collect();
         let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);

@@ -18,7 +18,10 @@ pub(super) fn kinds<C: Coder>(
     truth: Option<&[u32]>,
     octave: &Octave,
 ) -> bool {
-    if let Some(truth) = truth {
+    let may_be_other = |record: &u32| *record == INERT || record.to_le_bytes()[2] >= FRINGE_CODE;
+    if truth.is_some_and(|truth| !truth.iter().fold(false, |any, record| any | may_be_other(record))) {
+        scratch.kinds[..octave.count()].fill(ORDINARY);
+    } else if let Some(truth) = truth {
         for ((i, kind), &record) in scratch.kinds.iter_mut().enumerate().zip(truth) {
             *kind = match record.to_le_bytes()[2] {
                 _ if record == INERT => IS_INERT,
@@ -96,7 +99,8 @@ pub(super) fn others<C: Coder>(
         codes.is_some_and(|codes| codes != [scratch.flat_errors[i], scratch.flat_radii[i]])
     };
     let count = octave.count();
-    let are_any = truth.is_some() && (0..count).any(|i| is_asked(scratch, i) && differs(scratch, i));
+    // Nearly none differs, and to look whether it does is quick.
+    let are_any = truth.is_some() && (0..count).any(|i| differs(scratch, i) && is_asked(scratch, i));
     let mut are_any = u16::from(are_any);
     coder.raw(1, &mut are_any);
     if are_any == 0 {

@@ -1,7 +1,7 @@
 //! The ground was edited: nodes get the records that changed, and are tested again.
 //!
-//! One walk goes down the refinement graph, only to vertices that an edit can concern ([`Areas`]), and to each of them once. It compares each node's record with the present
-//! one. A node whose record has changed keeps its place. Its word is due in the next update, which tests it as any other. If its vertex is in the mesh it is sent anew, once
+//! One walk goes down the refinement graph, level by level, only to vertices that an edit can concern ([`Areas`]), and to each of them once. It compares each node's record with the present
+//! one, and asks memory for what comes some nodes later. A node whose record has changed keeps its place. Its word is due in the next update, which tests it as any other. If its vertex is in the mesh it is sent anew, once
 //! however many edits come between two frames. Errors and radii are saturated as before. So the mesh has no cracks, and without a budget it is SOAR's over the edited ground in the same frame.
 //! Earlier looks ahead below a leaf saw records that may have changed, so they are made again.
 //!
@@ -14,7 +14,6 @@ use crate::refine::kinetic::mesh::nodes::{CENTRE, NONE, STATUS, body};
 use crate::refine::kinetic::time::certificate::{clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::kinetic::{Kinetic, root_label};
-use std::ops::Range;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::prefetch::prefetch;
@@ -23,10 +22,27 @@ use terrasoar_layout::read::store::{RawOf, RecordStore, byte_in_page};
 /// Lists below this length are left as they are.
 const SHORT: usize = 4096;
 
+/// How many nodes ahead memory is asked for a node, and for its record.
+const AHEAD: [usize; 2] = [12, 6];
+
+/// A node on the way down.
+#[derive(Debug, Clone, Copy)]
+struct Visit {
+    /// Of its record.
+    slot: u64,
+    node: u32,
+    /// Vertex slots of the edge that it splits, as its triangle of side 0 has them.
+    ends: [u32; 2],
+    /// The side of the parent that led here.
+    side: u32,
+}
+
 /// What edits have done since the last update, and where.
 #[derive(Debug, Default)]
 pub(crate) struct Edits {
     areas: Areas,
+    /// Nodes that the walk has come to, empty after it.
+    visits: Vec<Visit>,
     /// Calls since the last update.
     calls: u32,
     /// Vertex slots, the nodes that split there ([`NONE`] for corners of the square), and the vertex slots of their edges' ends.
@@ -44,6 +60,7 @@ impl Edits {
     pub(crate) fn bytes(&self) -> usize {
         self.areas.bytes()
             + self.moved.capacity() * size_of::<(u32, u32, [u32; 2])>()
+            + self.visits.capacity() * size_of::<Visit>()
             + (self.leaves.capacity() + self.looks.capacity()) * size_of::<u32>()
     }
 
@@ -60,6 +77,9 @@ impl Edits {
     /// Gives back what exceeds a mesh of so many nodes.
     pub(crate) fn settle(&mut self, nodes: usize) {
         let most = nodes.max(SHORT);
+        if self.visits.capacity() > 2 * most {
+            self.visits.shrink_to(most);
+        }
         if self.moved.capacity() > 2 * most {
             self.moved.shrink_to(most);
         }
@@ -82,12 +102,8 @@ impl<S: RecordStore> Kinetic<S> {
         let mut edits = std::mem::take(&mut self.edits);
         edits.calls += 1;
         self.renew_top(&mut edits, change);
-        let all = edits.areas.start(self.records.grid(), change);
-        for (side, [b, d]) in ROOTS {
-            let label = root_label(side);
-            let root = self.nodes.get(CENTRE).body[label];
-            self.descend(root, turned([b as u32, d as u32], label), &all, &mut edits, change);
-        }
+        edits.areas.start(self.records.grid(), change);
+        self.walk(&mut edits, change);
         if self.nodes.clusters.has_bounds() {
             edits.loose = self.nodes.clusters.len();
         }
@@ -132,52 +148,65 @@ impl<S: RecordStore> Kinetic<S> {
         }
     }
 
-    /// Looks at a node and what is below it. `ends` are the vertex slots of the edge that it splits, as its triangle of side 0 has them. Of a node's parents
-    /// the first one that it has leads to it.
-    fn descend(
-        &mut self,
-        node: u32,
-        ends: [u32; 2],
-        above: &Range<usize>,
-        edits: &mut Edits,
-        change: &GroundChange<'_>,
-    ) {
+    /// Looks at all nodes that areas can concern, coarser ones before finer ones. Of a node's parents the first one that it has leads to it.
+    fn walk(&mut self, edits: &mut Edits, change: &GroundChange<'_>) {
+        let mut visits = std::mem::take(&mut edits.visits);
+        for (side, [b, d]) in ROOTS {
+            let label = root_label(side);
+            let node = self.nodes.get(CENTRE).body[label];
+            let ends = turned([b as u32, d as u32], label);
+            visits.push(Visit { slot: side, node, ends, side: (label >> 1) as u32 });
+        }
+        let mut next = 0;
+        while let Some(visit) = visits.get(next).copied() {
+            if let Some(later) = visits.get(next + AHEAD[0]) {
+                // A record may begin in one cache line and end in the next.
+                [0, 1].iter().for_each(|i| prefetch(&self.nodes.all, later.node as usize + i));
+            }
+            if let Some(later) = visits.get(next + AHEAD[1]) {
+                self.records.prefetch(later.slot);
+            }
+            next += 1;
+            self.visit(visit, &mut visits, edits, change);
+        }
+        visits.clear();
+        edits.visits = visits;
+    }
+
+    /// Looks at a node, and lists those below it.
+    #[inline(always)]
+    fn visit(&mut self, visit: Visit, visits: &mut Vec<Visit>, edits: &mut Edits, change: &GroundChange<'_>) {
+        let Visit { slot, node, ends, side } = visit;
         let record = *self.nodes.get(node);
-        let level = level_of(record.point);
-        let here = edits.areas.narrow(above, record.point, level);
-        if here.is_empty() {
+        if side == 1 && record.parents[0] != NONE {
             return;
         }
-        let is_inner = self.nodes.is_split(node) && level > 0;
-        if is_inner {
-            for (label, child) in record.body[..4].iter().enumerate().filter(|(_, child)| **child != NONE) {
-                prefetch(&self.nodes.all, *child as usize);
-                let at = child_point(record.point, level, label);
-                self.records.prefetch(slot_of(self.records.grid().k(), at));
-            }
-        }
+        let level = level_of(record.point);
         if !self.nodes.is_unread(node)
-            && let Some(raw) = self.record_now(change, slot_of(self.records.grid().k(), record.point))
+            && let Some(raw) = self.record_now(change, slot)
             && raw != record.raw
         {
             self.renew(node, raw, ends, edits);
         } else if !S::IS_COMPLETE && !self.nodes.is_split(node) && self.has_been_looked_from(node) {
             edits.looks.push(node);
         }
-        if !is_inner {
+        if !self.nodes.is_split(node) || level == 0 {
             if self.nodes.clusters.has_bounds() {
                 edits.leaves.push(node);
             }
             return;
         }
+        let k = self.records.grid().k();
         for (i, side) in self.nodes.sides(node, level).into_iter().enumerate() {
             let Some(side) = side else { continue };
             let apex = self.nodes.get(side.parent).body[body::HERE];
             let [p, q] = if i == 0 { ends } else { [ends[1], ends[0]] };
             for (label, edge) in [(side.first, [apex, p]), (side.last, [q, apex])] {
-                let child = record.body[label];
-                if label >> 1 == 0 || self.nodes.get(child).parents[0] == NONE {
-                    self.descend(child, turned(edge, label), &here, edits, change);
+                let at = child_point(record.point, level, label);
+                if edits.areas.concern(at, level - 1) {
+                    let child = record.body[label];
+                    let side = (label >> 1) as u32;
+                    visits.push(Visit { slot: slot_of(k, at), node: child, ends: turned(edge, label), side });
                 }
             }
         }

@@ -6,7 +6,7 @@
 //! changed rectangle, then some tens of records.
 
 use super::Update;
-use crate::bound::{Plane, Samples, larger};
+use crate::bound::{Plane, larger};
 use crate::edit::engine::farthest::Search;
 use crate::grid::order::slot_of;
 use crate::grid::record::{RecordCodec, Vertex};
