@@ -1,12 +1,12 @@
 //! A number for each logical page, where most have the same: which place in memory a page has.
 //!
-//! Those of a square of up to 2^17 steps lie in one row, so that a look is one load. Of larger squares the first pages do; those behind lie in blocks of as many as a directory leaf
+//! Those of a square of up to 2^16 steps in compact records lie in one row, so that a look is one load. Where there are more, the first pages do; those behind lie in blocks of as many as a directory leaf
 //! has, and blocks that are all the same are one. Cost: 4 bytes a logical page of the row, taken as they are written, and of the blocks behind it 4 bytes each and 1 KiB for each that is written to.
 
 use crate::file::entries::ENTRIES_PER_LEAF;
 
-/// Most pages that all lie in the row: those of a square of 2^17 steps in the largest records, rounded up.
-const MOST_IN_ROW: u64 = 1 << 27;
+/// Most pages that all lie in the row, which then has 32 MiB: those of a square of 2^16 steps in compact records, rounded up. What a header claims is no reason to ask the system for more.
+const MOST_IN_ROW: u64 = 1 << 23;
 /// Pages of the row where there are more.
 const SHORT_ROW: u64 = 1 << 20;
 /// Pages a block.
