@@ -5,7 +5,7 @@
 //!
 //! Invariants: pages take at most the stated number of bytes, whatever the system's own cache does. The inert page and page 0 stay. A full
 //! pool drops a page that was not read since the last round of the hand (second chance, after F. Corbato, "A Paging Experiment with the Multics
-//! System", 1968). Cost: as of a [`PageMap`], a load more than a mapped file a record.
+//! System", 1968). Cost: one look in a table of pages, a load more than a mapped file a record.
 
 use super::page_map::PageMap;
 use super::prefetch::prefetch;
