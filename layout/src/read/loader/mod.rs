@@ -105,7 +105,8 @@ impl Shared {
 }
 
 impl Loader {
-    /// Starts `threads` threads, at least one, that read from `terrain`'s source.
+    /// Starts `threads` threads, at least one, that read from `terrain`'s source. Where its pages are unpacked there are fewer of them than the machine has processors: unpacking keeps a processor busy, and the thread that
+    /// flies needs one.
     ///
     /// # Errors
     /// [`LayoutError::Io`] if the system gives no thread.
@@ -113,7 +114,11 @@ impl Loader {
         let shared = Arc::new(Shared { terrain, state: Mutex::default(), work: Condvar::new() });
         let (sender, arrivals) = channel();
         let loader = Self { shared, arrivals };
-        for i in 0..threads.max(1) {
+        let most = match loader.shared.terrain.source().unpacking() {
+            Some(_) => std::thread::available_parallelism().map_or(1, |processors| processors.get() - 1),
+            None => threads,
+        };
+        for i in 0..threads.min(most).max(1) {
             let (shared, sender) = (Arc::clone(&loader.shared), sender.clone());
             std::thread::Builder::new()
                 .name(format!("page loader {i}"))
