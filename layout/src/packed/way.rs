@@ -1,6 +1,6 @@
 //! The way through tiles, of whichever kind of records a terrain has.
 
-use super::coder::{Coder, Decoder};
+use super::coder::Coder;
 use super::exact::{self, Form};
 use super::rules::Rules;
 use super::shape::TileShape;
@@ -54,48 +54,26 @@ impl Way {
         }
     }
 
-    /// Takes the records of a tile through `segments`.
-    pub(crate) fn write<C: Coder>(
+    /// Takes a tile's values through `segments`: writing gives the records, reading makes them. Whether reading used all of the segments is for the decoders to say.
+    pub(crate) fn walk<C: Coder>(
         &self,
         width: Width,
         shape: &TileShape,
         scratch: &mut Scratch,
         segments: &mut [C],
-        records: &TileRecords,
-    ) {
+        truth: Option<&TileRecords>,
+    ) -> TileRecords {
         match (self, scratch) {
             (Self::Compact(rules), Scratch::Compact(scratch)) => {
-                width.walk(shape, rules, scratch, segments, Some(records));
+                width.walk(shape, rules, scratch, segments, truth)
             }
             (Self::Exact(rules), Scratch::Exact(scratch)) => {
-                exact::walk(shape, rules, scratch, segments, Some(records));
+                exact::walk(shape, rules, scratch, segments, truth)
             }
             // One of another file.
             (_, scratch) => {
                 *scratch = self.scratch();
-                self.write(width, shape, scratch, segments, records);
-            }
-        }
-    }
-
-    /// Reads a tile out of its segments. Whether it used all of them is for the decoders to say.
-    pub(crate) fn read(
-        &self,
-        width: Width,
-        shape: &TileShape,
-        scratch: &mut Scratch,
-        segments: &mut [Decoder<'_>],
-    ) -> TileRecords {
-        match (self, scratch) {
-            (Self::Compact(rules), Scratch::Compact(scratch)) => {
-                width.walk(shape, rules, scratch, segments, None)
-            }
-            (Self::Exact(rules), Scratch::Exact(scratch)) => {
-                exact::walk(shape, rules, scratch, segments, None)
-            }
-            (_, scratch) => {
-                *scratch = self.scratch();
-                self.read(width, shape, scratch, segments)
+                self.walk(width, shape, scratch, segments, truth)
             }
         }
     }

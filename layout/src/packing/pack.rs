@@ -213,7 +213,7 @@ impl<C: RecordCodec> Packer<'_, C> {
 
     fn encoded(&self, id: TileId, records: &TileRecords, scratch: &mut Scratch) -> [Encoder; SEGMENTS] {
         let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        self.way.write(self.width, &self.groups.shape(id), scratch, &mut encoders, records);
+        self.way.walk(self.width, &self.groups.shape(id), scratch, &mut encoders, Some(records));
         encoders
     }
 
@@ -256,14 +256,14 @@ impl<C: RecordCodec> Packer<'_, C> {
             // A sample lacked a token: values are stored as they are.
             _ => {
                 let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
-                self.way.write(self.width, &shape, scratch, &mut encoders, &records);
+                self.way.walk(self.width, &shape, scratch, &mut encoders, Some(&records));
                 encoders.map(PlainEncoder::finish)
             }
         };
         if self.check == Check::Tiles {
             let decoders = segments.iter().map(|bytes| Decoder::new(&tables.decode, bytes));
             let same = decoders.collect::<Option<Vec<_>>>().is_some_and(|mut decoders| {
-                let found = self.way.read(self.width, &shape, scratch, &mut decoders);
+                let found = self.way.walk(self.width, &shape, scratch, &mut decoders, None);
                 decoders.iter().all(Decoder::finish) && found.gives_same(&records, &shape)
             });
             if !same {

@@ -90,7 +90,7 @@ impl PackedSource {
         }
         let scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut scratch = scratch.unwrap_or_else(|| self.way.scratch());
-        let records = self.way.read(self.width, shape, &mut scratch, &mut decoders);
+        let records = self.way.walk(self.width, shape, &mut scratch, &mut decoders, None);
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
         if decoders.iter().all(Decoder::finish) {
             self.meter.count(bytes.len(), begun.elapsed());
