@@ -34,11 +34,7 @@ pub(crate) fn read_node(
     }
     let damaged =
         |problem: &str| LayoutError::damaged_terrain(source.path(), format!("directory node {i}"), problem);
-    if !is_in_file(header, here.page) {
-        return Err(damaged("it lies outside the file"));
-    }
-    let mut page = [0; PAGE_BYTES];
-    source.read_at(u64::from(here.page) * PAGE_BYTES as u64, &mut page)?;
+    let page = read_page(source, header, here, damaged)?;
     if checksum(&page) != here.checksum {
         return Err(damaged("the checksum does not match"));
     }
@@ -59,12 +55,23 @@ pub(crate) fn read_leaf(
     if !here.is_present() {
         return Ok([Entry::default(); ENTRIES_PER_LEAF]);
     }
-    if !is_in_file(header, here.page) {
-        return Err(damaged_leaf(source, i, "it lies outside the file"));
-    }
-    let mut leaf = [0; PAGE_BYTES];
-    source.read_at(u64::from(here.page) * PAGE_BYTES as u64, &mut leaf)?;
+    let leaf = read_page(source, header, here, |problem| damaged_leaf(source, i, problem))?;
     parse_leaf(source, header, i, here, &leaf)
+}
+
+/// The bytes of a node or leaf, unchecked.
+fn read_page(
+    source: &dyn Source,
+    header: &Header,
+    here: Entry,
+    damaged: impl Fn(&str) -> LayoutError,
+) -> Result<Page, LayoutError> {
+    if !is_in_file(header, here.page) {
+        return Err(damaged("it lies outside the file"));
+    }
+    let mut page = [0; PAGE_BYTES];
+    source.read_at(u64::from(here.page) * PAGE_BYTES as u64, &mut page)?;
+    Ok(page)
 }
 
 /// Whether a page may be a node, a leaf or a record page.
