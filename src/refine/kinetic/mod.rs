@@ -36,7 +36,6 @@ use capacity::settle;
 use frame::ahead::Ahead;
 use frame::budget::Allowance;
 use frame::edited::Edits;
-use glam::DVec3;
 use mesh::clusters::{Clusters, Dealing};
 use mesh::labels::level_of;
 use mesh::nodes::{CENTRE, NONE, Nodes, SPLIT, STATUS, body};
@@ -325,14 +324,7 @@ impl<S: RecordStore> Engine for Kinetic<S> {
 
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
         let metric = Metric::new(view);
-        let pose = Pose {
-            eye_m: view.eye_m,
-            axes: view.axes(),
-            normals: metric.normals().map(DVec3::from_array),
-            nu: metric.nu(),
-            exaggeration: metric.exaggeration(),
-            metric: metric.kind(),
-        };
+        let pose = Pose::of(view, &metric);
         self.work = Work::default();
         self.patch.clear();
         self.tell_edits();

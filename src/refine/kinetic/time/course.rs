@@ -3,7 +3,8 @@
 //! A course counts little of the way along it and all of the way off it (`super::clocks`). So it is worth taking while the eye keeps to it, and worth leaving soon.
 //! Invariant: nothing here decides a status. Courses only move the time at which a vertex is tested again. Cost: a few dozen operations a frame.
 
-use crate::view::ErrorMetric;
+use crate::metric::Metric;
+use crate::view::{ErrorMetric, View};
 use glam::{DQuat, DVec3};
 use terrasoar_layout::portable;
 
@@ -34,6 +35,20 @@ pub(crate) struct Pose {
     pub exaggeration: f64,
     /// A change of it leaves no certificate.
     pub metric: ErrorMetric,
+}
+
+impl Pose {
+    /// That of a view, whose metric is given.
+    pub(crate) fn of(view: &View, metric: &Metric) -> Self {
+        Self {
+            eye_m: view.eye_m,
+            axes: view.axes(),
+            normals: metric.normals().map(DVec3::from_array),
+            nu: metric.nu(),
+            exaggeration: metric.exaggeration(),
+            metric: metric.kind(),
+        }
+    }
 }
 
 /// What the eye is expected to keep doing.

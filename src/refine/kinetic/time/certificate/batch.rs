@@ -190,14 +190,7 @@ mod tests {
                 .exaggeration([1.0, 0.3, 2.5][round % 3]);
             let metric = Metric::new(&view);
             let mut clocks = Clocks::new([10.0, 0.3, 90.0][round % 5 % 3], 3000.0);
-            clocks.move_to(Pose {
-                eye_m: view.eye_m,
-                axes: view.axes(),
-                normals: metric.normals().map(DVec3::from_array),
-                nu: metric.nu(),
-                exaggeration: metric.exaggeration(),
-                metric: metric.kind(),
-            });
+            clocks.move_to(Pose::of(&view, &metric));
             let mut unit = || DVec3::new(next(2.0) - 1.0, next(2.0) - 1.0, next(2.0) - 1.0).normalize();
             let (along, about) = (unit(), unit());
             let (moves, turns) = (round % 4 > 1, round % 2 > 0);

@@ -21,17 +21,6 @@ fn view(eye_m: DVec3, yaw: f64, pitch: f64, fov: f64, exaggeration: f64) -> View
     }
 }
 
-fn pose(metric: &Metric, view: &View) -> Pose {
-    Pose {
-        eye_m: view.eye_m,
-        axes: view.axes(),
-        normals: metric.normals().map(DVec3::from_array),
-        nu: metric.nu(),
-        exaggeration: view.vertical_exaggeration,
-        metric: view.metric,
-    }
-}
-
 fn direction() -> impl Strategy<Value = DVec3> {
     (-1.0f64..1.0, -1.0f64..1.0, -1.0f64..1.0)
         .prop_map(|(x, y, z)| (DVec3::new(x, y, z) + DVec3::X * 1e-3).normalize())
@@ -57,7 +46,7 @@ proptest! {
             clocks.take_course(2, Course { direction, axis, turn_per_m, rate });
         }
         let mut metric = Metric::new(&now);
-        clocks.move_to(pose(&metric, &now));
+        clocks.move_to(Pose::of(&now, &metric));
         // Where vertices enter and leave the view, or anywhere.
         let away = edge.map_or(away, |(x, y)| {
             let [right, up, forward] = now.axes();
@@ -83,7 +72,7 @@ proptest! {
             if zooming { now.vertical_fov_rad = (now.vertical_fov_rad * zoom).clamp(0.05, 2.0); }
             if stretching { now.vertical_exaggeration = (now.vertical_exaggeration * stretch).clamp(0.2, 5.0); }
             metric = Metric::new(&now);
-            clocks.move_to(pose(&metric, &now));
+            clocks.move_to(Pose::of(&now, &metric));
             if clocks.now(clock_of(word)) >= u64::from(expiry_of(word)) {
                 break;
             }
@@ -101,7 +90,7 @@ fn on_course_words_last_until_the_change() {
     let start = view(DVec3::ZERO, 0.0, 0.0, 0.8, 1.0);
     clocks.take_course(1, Course { direction: DVec3::Y, ..Default::default() });
     let metric = Metric::new(&start);
-    clocks.move_to(pose(&metric, &start));
+    clocks.move_to(Pose::of(&start, &metric));
     // Not selected, 30 degrees off the course; SMART would look again after 400 m, then 330 m more, ...
     let vertex =
         Vertex { height_m: 0.0, error_m: 600.0 / metric.nu(), radius_m: 0.0, class: VertexClass::Plain };
@@ -111,7 +100,7 @@ fn on_course_words_last_until_the_change() {
     while clocks.now(clock_of(word)) < u64::from(expiry_of(word)) {
         way += 1.0;
         let moved = View { eye_m: DVec3::Y * way, ..start };
-        clocks.move_to(pose(&Metric::new(&moved), &moved));
+        clocks.move_to(Pose::of(&moved, &Metric::new(&moved)));
     }
     let crossing = 866.0 - (600.0f64.powi(2) - 500.0f64.powi(2)).sqrt();
     assert!(way > crossing - 3.0 && way <= crossing + 1.0, "{way} {crossing}");
@@ -131,7 +120,7 @@ fn few_words_are_made_along_the_line_of_sight() {
         for way in 0..8000 {
             let moved = View { eye_m: DVec3::Y * f64::from(way), ..start };
             let metric = Metric::new(&moved);
-            clocks.move_to(pose(&metric, &moved));
+            clocks.move_to(Pose::of(&moved, &metric));
             let is_over = |word: u32| clocks.now(clock_of(word)) >= u64::from(expiry_of(word));
             if word.is_none_or(is_over) {
                 let next = Judge::new(metric, &clocks, false).word(&metric.sight([side_m, 4000.0], &vertex));
