@@ -66,7 +66,7 @@ impl<'t> Heights<'t> {
         window.check(self.terrain.grid())?;
         into.clear();
         into.reserve(window.size[0] as usize * window.size[1] as usize);
-        if self.is_void(window)? {
+        if self.terrain.header().has_voids && self.is_void(window)? {
             into.resize(window.size[0] as usize * window.size[1] as usize, f64::NAN);
             return Ok(());
         }
