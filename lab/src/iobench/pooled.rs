@@ -24,7 +24,7 @@ const FIRST_WAIT: Duration = Duration::from_secs(60);
 /// What reads the pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ReadBy {
-    /// Four threads, a read each.
+    /// Four threads, a read each; of packed terrain no more than leave a processor to the thread that flies.
     #[default]
     Threads,
     /// One thread with an io_uring.

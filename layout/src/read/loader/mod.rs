@@ -114,11 +114,9 @@ impl Loader {
         let shared = Arc::new(Shared { terrain, state: Mutex::default(), work: Condvar::new() });
         let (sender, arrivals) = channel();
         let loader = Self { shared, arrivals };
-        let most = match loader.shared.terrain.source().unpacking() {
-            Some(_) => std::thread::available_parallelism().map_or(1, |processors| processors.get() - 1),
-            None => threads,
-        };
-        for i in 0..threads.min(most).max(1) {
+        let unpacks = loader.shared.terrain.source().unpacking().is_some();
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        for i in 0..thread_count(threads, unpacks, processors) {
             let (shared, sender) = (Arc::clone(&loader.shared), sender.clone());
             std::thread::Builder::new()
                 .name(format!("page loader {i}"))
@@ -202,6 +200,12 @@ impl Drop for Loader {
         // Threads end by themselves; one that storage keeps waiting must not keep the program from ending.
         self.shared.work.notify_all();
     }
+}
+
+/// How many threads read where so many were asked for.
+fn thread_count(asked: usize, unpacks: bool, processors: usize) -> usize {
+    let most = if unpacks { processors.saturating_sub(1) } else { asked };
+    asked.min(most).max(1)
 }
 
 /// Pages that are read together and where they lie, in the order of the file, and what they are read into.
@@ -347,4 +351,17 @@ fn cut_out(
     page.copy_from_slice(&buffer[at..at + PAGE_BYTES]);
     terrain.check_page(logical_page, entry, &page)?;
     Ok(page)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::thread_count;
+
+    #[test]
+    fn threads_that_unpack_leave_a_processor() {
+        let with =
+            |unpacks| [(0, 8), (4, 1), (4, 2), (4, 4), (4, 16)].map(|(n, p)| thread_count(n, unpacks, p));
+        assert_eq!(with(true), [1, 1, 1, 3, 4]);
+        assert_eq!(with(false), [1, 4, 4, 4, 4]);
+    }
 }
