@@ -5,7 +5,7 @@
 
 use crate::file::entries::ENTRIES_PER_LEAF;
 
-/// Most pages that all lie in the row, which then has 32 MiB: those of a square of 2^16 steps in compact records, rounded up. What a header claims is no reason to ask the system for more.
+/// Most pages that all lie in the row, which then has 32 MiB: those of a square of 2^16 steps in compact records, rounded up. What a header claims is no reason to ask the system for more. Over a square of 2^17 steps, which has more pages, SOAR takes 1.08 times as long as with one row, and kinetic no longer.
 const MOST_IN_ROW: u64 = 1 << 23;
 /// Pages of the row where there are more.
 const SHORT_ROW: u64 = 1 << 20;
