@@ -1,8 +1,9 @@
 //! Masks: samples that another image, inside the file or beside it, calls void.
 //!
 //! The mask is read first, a bit for each sample: in memory where the budget allows it, else in a nameless temporary file. Then samples are read, and those whose bit is 0
-//! become NaN. Cost: one pass over the mask, a copy of each window with such samples.
+//! become NaN. Squares without any bit are known, so that what lies in them is passed over. Cost: one pass over the mask, a copy of each window with such samples.
 
+use crate::cells::Cells;
 use crate::kept::Kept;
 use crate::options::OpenOptions;
 use crate::reader::Reader;
@@ -13,6 +14,13 @@ use terrasoar_layout::error::LayoutError;
 
 /// Share of the memory allowed that a mask may take.
 const SHARE: u64 = 8;
+
+/// Where a file that masks the one at `path` would stand.
+pub(crate) fn beside(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".msk");
+    PathBuf::from(name)
+}
 
 /// A mask that is to be applied.
 pub(crate) struct Masking {
@@ -28,6 +36,15 @@ pub(crate) struct Masking {
 pub(crate) struct Bits {
     kept: Kept,
     writing: Mutex<()>,
+    /// Where bits are set.
+    shown: Cells,
+}
+
+impl Bits {
+    /// Whether no bit of a window is set, as far as is known without reading them.
+    fn hides(&self, window: Window) -> bool {
+        !self.shown.touch([window.col.into(), window.row.into()], [window.width, window.height])
+    }
 }
 
 impl Masking {
@@ -62,8 +79,10 @@ impl Masking {
         let Some(mask) = self.file.as_deref().or(own) else { return Ok(None) };
         let action = "cannot keep the mask in a temporary file in";
         let kept = Kept::new(Self::bytes_of(self.samples), self.in_memory, &self.scratch, action)?;
-        let bits = Bits { kept, writing: Mutex::new(()) };
-        mask.stream(&Keeping { masking: self, bits: &bits })?;
+        let mut bits = Bits { kept, writing: Mutex::new(()), shown: Cells::default() };
+        let shown = Mutex::new(Cells::default());
+        mask.stream(&Keeping { masking: self, bits: &bits, shown: &shown })?;
+        bits.shown = shown.into_inner().unwrap_or_else(PoisonError::into_inner);
         Ok(Some(bits))
     }
 
@@ -130,14 +149,31 @@ impl Masking {
 struct Keeping<'a> {
     masking: &'a Masking,
     bits: &'a Bits,
+    shown: &'a Mutex<Cells>,
+}
+
+/// Whether a number of a mask shows what lies under it.
+fn shows(value: f64) -> bool {
+    value != 0.0 && !value.is_nan()
 }
 
 impl SampleSink for Keeping<'_> {
     fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
         let width = window.width as usize;
+        let rows = samples.chunks_exact(width.max(1));
+        let ends = rows.filter_map(|row| {
+            Some([row.iter().position(|v| shows(*v))?, row.iter().rposition(|v| shows(*v))?])
+        });
+        // What was never written hides.
+        let Some([first, last]) = ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else { return Ok(()) };
+        // Both are columns of the window.
+        let [from, to] = [first as u32, last as u32 + 1].map(|at| window.col + at);
+        let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
+        shown.add([from, window.row], [to, window.row + window.height]);
+        drop(shown);
         self.masking.rows(self.bits, window, true, |row, bytes, bit| {
             for (at, value) in samples[row * width..(row + 1) * width].iter().enumerate() {
-                if *value != 0.0 && !value.is_nan() {
+                if shows(*value) {
                     bytes[(bit + at) / 8] |= 1 << ((bit + at) % 8);
                 }
             }
@@ -158,6 +194,9 @@ struct Masked<'a> {
 
 impl SampleSink for Masked<'_> {
     fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
+        if self.bits.hides(window) {
+            return self.sink.put_void(window);
+        }
         let width = window.width as usize;
         let mut masked = samples.to_vec();
         self.masking.rows(self.bits, window, false, |row, bytes, bit| {
@@ -168,6 +207,10 @@ impl SampleSink for Masked<'_> {
             }
         })?;
         self.sink.put(window, &masked)
+    }
+
+    fn is_void(&self, window: Window) -> bool {
+        self.bits.hides(window)
     }
 
     fn put_void(&self, window: Window) -> Result<(), LayoutError> {

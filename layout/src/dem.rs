@@ -197,6 +197,12 @@ pub trait SampleSink: Sync {
         (window.row..window.row + window.height)
             .try_for_each(|row_number| self.put(Window { row: row_number, height: 1, ..window }, &row))
     }
+
+    /// Whether all of a window is void, whatever samples come for it. A source that would make them up, because its file left them out, asks before and says
+    /// [`put_void`](SampleSink::put_void) instead.
+    fn is_void(&self, _window: Window) -> bool {
+        false
+    }
 }
 
 /// An elevation data set that can be read window by window.

@@ -8,7 +8,7 @@ mod prj;
 mod world;
 
 use crate::geotiff::TiffMask;
-use crate::mask::Masking;
+use crate::mask::{self, Masking};
 use crate::options::OpenOptions;
 use crate::reader::{Declared, Reader, Said};
 use aux_xml::Aux;
@@ -64,7 +64,7 @@ impl Beside {
         {
             declared.crs.text = Some(Said::new(prj::plain(&found), name));
         }
-        let mask = appended(&self.path, ".msk");
+        let mask = mask::beside(&self.path);
         if own.is_some() || !mask.is_file() {
             return Ok(own);
         }

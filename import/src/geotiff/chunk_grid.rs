@@ -186,13 +186,21 @@ impl ChunkGrid {
     }
 
     /// Refuses an image that is large and hardly there, with what to do: a file of some hundred bytes would ask for hours and gigabytes.
-    pub(super) fn check_sparse(&self, file: &TiffFile, stored: u64, advice: &str) -> Result<(), LayoutError> {
-        let samples = u64::from(self.width) * u64::from(self.height);
+    /// Of an image with a mask only the samples of which its mask is `shown` count.
+    pub(super) fn check_sparse(
+        &self,
+        file: &TiffFile,
+        stored: u64,
+        shown: Option<u64>,
+        advice: &str,
+    ) -> Result<(), LayoutError> {
+        let samples = shown.unwrap_or(u64::from(self.width) * u64::from(self.height));
         if samples < LARGE_SAMPLES || stored >= samples / SPARSEST {
             return Ok(());
         }
         let there = if stored == 0 { "none is".into() } else { format!("only {stored} are") };
-        let problem = format!("of the {samples} samples that it declares {there} stored; {advice}");
+        let which = if shown.is_some() { "of which its mask is stored" } else { "that it declares" };
+        let problem = format!("of the {samples} samples {which} {there} stored; {advice}");
         Err(LayoutError::unsupported(file.path(), problem))
     }
 

@@ -315,7 +315,7 @@ impl Table {
             },
         )?;
         let advice = "cut out what is there: gdal_translate -projwin WEST NORTH EAST SOUTH INPUT output.tif";
-        self.grid.check_sparse(file, stored.samples, advice)?;
+        self.grid.check_sparse(file, stored.samples, None, advice)?;
         Ok(stored.longest)
     }
 

@@ -30,8 +30,10 @@ pub(super) struct Convert {
     pub(super) pick: Pick,
     /// Band of alpha, counted from 0.
     pub(super) alpha: Option<usize>,
-    /// What stands in for a chunk that the file left out.
+    /// What stands in a band for a chunk that the file left out.
     pub(super) absent: f64,
+    /// What stands in for pixels all of whose bands the file left out.
+    pub(super) left_out: f64,
 }
 
 impl Convert {
@@ -129,6 +131,7 @@ mod tests {
             pick: Pick::Band(0),
             alpha: None,
             absent: 0.0,
+            left_out: 0.0,
         };
         let mut samples = Vec::new();
         convert.append(bytes, &mut samples);
@@ -167,6 +170,7 @@ mod tests {
             pick: Pick::Band(1),
             alpha: Some(2),
             absent: 0.0,
+            left_out: 0.0,
         };
         let mut samples = Vec::new();
         convert.append(&[1, 2, 255, 3, 4, 0, 5, 6, 1], &mut samples);

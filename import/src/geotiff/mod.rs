@@ -9,8 +9,8 @@
 //! This is our own code, because no crate does all of it: tiff-reader 0.10 reads every fixture here and holds each chunk as a whole, so that a file of one strip takes
 //! the memory of the terrain, and refuses files that state no lengths of chunks; tiff 0.11.3 refuses sound LZW tiles that GDAL writes and inverts "white is zero".
 //!
-//! Two things are as in GDAL: a chunk without data is void if the file declares a void value, else zero; heights
-//! are not inverted for "white is zero" files.
+//! Two things are as in GDAL: a chunk without data is void if the file declares a void value, else zero, and zeros of a mask or of alpha hide; heights
+//! are not inverted for "white is zero" files. Chunks without data that are void, or that a mask hides, are passed over.
 
 mod bands;
 mod body;
@@ -62,6 +62,7 @@ use terrasoar_layout::dem::{SampleSink, Window};
 use terrasoar_layout::error::LayoutError;
 
 use super::WINDOW_SAMPLES;
+use crate::mask;
 use crate::options::OpenOptions;
 use crate::reader::{CrsSaid, Declared, Reader, Said};
 
@@ -109,6 +110,8 @@ impl TiffMask {
             pick: Pick::Band(0),
             alpha: None,
             absent: 0.0,
+            // Of a mask 0 hides.
+            left_out: f64::NAN,
         };
         let declared = Declared::new(samples, chunks.sample_type, "mask");
         Ok(Self { path: file.path().to_owned(), declared, chunks, convert })
@@ -166,11 +169,23 @@ impl TiffDem {
         let nodata = nodata.filter(|text| !text.trim().is_empty());
         declared.value.nodata.extend(nodata.map(|text| Said::new(text, "tag GDAL_NODATA")));
         let is_void = !declared.value.nodata.is_empty() || !options.nodata.is_empty();
-        if !is_void {
+        let mask = match file.mask_of(samples)? {
+            Some(directory) => Some(TiffMask::of(&mut file, &directory)?),
+            None => None,
+        };
+        if !is_void && bands.alpha.is_none() && !mask::beside(path).is_file() {
+            let shown = mask.as_ref().map(|mask| mask.chunks.stored_samples);
             let advice = "the others would all be heights of 0, for it declares no void value; if they are voids, say so: \
                           gdal_edit.py -a_nodata -9999 FILE";
-            chunks.grid.check_sparse(&file, chunks.stored_samples, advice)?;
+            chunks.grid.check_sparse(&file, chunks.stored_samples, shown, advice)?;
         }
+        let absent = if is_void { f64::NAN } else { 0.0 };
+        let left_out = match &bands.pick {
+            // Alpha is left out too, and so is 0.
+            _ if bands.alpha.is_some() => f64::NAN,
+            Pick::Band(_) => absent,
+            Pick::Decode(decode) => decode.height([absent; 3]),
+        };
         let planes = if chunks.is_planar { Planes::of(&bands) } else { Planes::one() };
         let (pick, alpha) = if chunks.is_planar { (Pick::Band(0), None) } else { (bands.pick, bands.alpha) };
         let convert = Convert {
@@ -180,11 +195,8 @@ impl TiffDem {
             bands: chunks.side_by_side() as usize,
             pick,
             alpha,
-            absent: if is_void { f64::NAN } else { 0.0 },
-        };
-        let mask = match file.mask_of(samples)? {
-            Some(directory) => Some(TiffMask::of(&mut file, &directory)?),
-            None => None,
+            absent,
+            left_out,
         };
         Ok(Self { path: path.to_owned(), declared, chunks, planes, convert, mask })
     }
@@ -209,10 +221,10 @@ impl Reader for TiffDem {
     }
 }
 
-/// Pushes `window` full of one value, a few rows at a time.
+/// Pushes `window` full of one value, a few rows at a time, unless a mask hides it.
 fn put_constant(sink: &dyn SampleSink, window: Window, value: f64) -> Result<(), LayoutError> {
     let rows = rows_at_once(window.width).min(window.height);
-    if value.is_nan() {
+    if value.is_nan() || sink.is_void(window) {
         return sink.put_void(window);
     }
     // At most a window's worth, or one row, of which a build has no longer ones than a terrain.

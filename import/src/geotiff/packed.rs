@@ -115,7 +115,7 @@ impl<'a> Worker<'a> {
             open.push((number, rows.transpose()?));
         }
         if open.iter().all(|(_, rows)| rows.is_none()) {
-            return put_constant(sink, window, self.convert.absent);
+            return put_constant(sink, window, self.convert.left_out);
         }
         let stride = chunks.stride();
         for part in parts(window, part_rows(window.width, stride)) {

@@ -73,7 +73,7 @@ pub(super) fn stream(
             is_there |= worker.read(at, [*plane, chunk], first, window, convert)?;
         }
         if !is_there {
-            return put_constant(sink, window, convert.absent);
+            return put_constant(sink, window, convert.left_out);
         }
         if let [only] = &worker.apart[..] {
             return sink.put(window, only);

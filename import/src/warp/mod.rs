@@ -1,20 +1,22 @@
 //! Samples on another grid: north-up where the file's is turned or sheared, or in another reference system.
 //!
 //! The old samples are kept while they stream ([`store`]); then the new grid is made block by block, on all threads: places among the old samples ([`mapping`]), a window of these,
-//! and a kernel ([`kernel`]). Memory: a share of what is allowed, whatever the size of either grid. Cost: two passes over the samples, and a microsecond a new one.
+//! and a kernel ([`kernel`]). Blocks that no old sample reaches are passed over. Memory: a share of what is allowed, whatever the size of either grid. Cost: two passes over the samples that are not void, and a
+//! microsecond a new one.
 
 mod kernel;
 mod mapping;
 mod store;
 mod target;
 
-use crate::cells::Cells;
+use crate::cells::{Cells, each_block_met};
 use crate::crs::{Ground, HorizontalSize, Kind, System, is_earth};
 use crate::options::{OpenOptions, Resampling};
 use crate::parallel::each_task;
 use kernel::Kernel;
 pub(crate) use mapping::{Mapping, Projections, apply};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 pub(crate) use store::Store;
 use target::Grid;
 pub(crate) use target::system as target_system;
@@ -168,13 +170,40 @@ impl Warp {
     ) -> Result<(), LayoutError> {
         let Resampler { kernel, sample_bytes, .. } = &self.resampler;
         let store = Store::new(kernel.samples, *sample_bytes, self.in_memory, &self.folder)?;
-        old(&store)?;
-        each_block(self.grid.samples, BLOCK, |window| {
+        let there = Mutex::default();
+        old(&Noting { store: &store, there: &there })?;
+        let there = there.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let is_met = |window| self.resampler.may_touch(window, &there);
+        let pass = |window| sink.put_void(window);
+        each_block_met(self.grid.samples, BLOCK, is_met, pass, |window| {
             self.resampler.block(&store, window, &mut |window, samples| match samples {
                 Some(samples) => sink.put(window, samples),
                 None => sink.put_void(window),
             })
         })
+    }
+}
+
+/// Keeps samples and notes where there are some that are not void.
+struct Noting<'a> {
+    store: &'a Store,
+    there: &'a Mutex<Cells>,
+}
+
+impl SampleSink for Noting<'_> {
+    fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
+        if samples.iter().all(|value| value.is_nan()) {
+            return Ok(());
+        }
+        // Checks that the window lies in the grid.
+        self.store.put(window, samples)?;
+        let mut there = self.there.lock().unwrap_or_else(PoisonError::into_inner);
+        there.add([window.col, window.row], [window.col + window.width, window.row + window.height]);
+        Ok(())
+    }
+
+    fn put_void(&self, _window: Window) -> Result<(), LayoutError> {
+        Ok(())
     }
 }
 
