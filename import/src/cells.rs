@@ -7,57 +7,79 @@ use std::collections::HashSet;
 use terrasoar_layout::dem::Window;
 use terrasoar_layout::error::LayoutError;
 
-/// Binary logarithm of the side of a cell in samples.
+/// Binary logarithm of the side of a cell of samples.
 const CELL_LOG2: u32 = 11;
-/// Side of a cell in samples.
-const CELL: u32 = 1 << CELL_LOG2;
+/// Side of a cell of samples.
+pub(crate) const CELL: u32 = 1 << CELL_LOG2;
 
 /// The cells of a grid that something lies in.
-#[derive(Debug, Default)]
-pub(crate) struct Cells(HashSet<[u32; 2]>);
+#[derive(Debug)]
+pub(crate) struct Cells {
+    side_log2: u32,
+    met: HashSet<[u32; 2]>,
+}
+
+impl Default for Cells {
+    /// Cells of samples.
+    fn default() -> Self {
+        Self::of(CELL_LOG2)
+    }
+}
 
 impl Cells {
+    /// Cells of a side whose binary logarithm is told, below 32.
+    pub(crate) fn of(side_log2: u32) -> Self {
+        Self { side_log2, met: HashSet::new() }
+    }
+
+    /// Side of a cell.
+    pub(crate) fn side(&self) -> u32 {
+        1 << self.side_log2
+    }
+
     /// Something lies from one column and row to others, which are not included.
     pub(crate) fn add(&mut self, from: [u32; 2], to: [u32; 2]) {
         if (0..2).all(|i| from[i] < to[i]) {
-            let span = |i: usize| from[i] >> CELL_LOG2..=(to[i] - 1) >> CELL_LOG2;
-            self.0.extend(span(1).flat_map(|y| span(0).map(move |x| [x, y])));
+            let span = |i: usize| from[i] >> self.side_log2..=(to[i] - 1) >> self.side_log2;
+            self.met.extend(span(1).flat_map(|y| span(0).map(move |x| [x, y])));
         }
     }
 
     /// Whether a window of the grid, which may lie beyond it in part, touches any.
     pub(crate) fn touch(&self, from: [i64; 2], size: [u32; 2]) -> bool {
-        let cell = |v: i64| (v.clamp(0, i64::from(u32::MAX)) >> CELL_LOG2) as u32;
+        let cell = |v: i64| (v.clamp(0, i64::from(u32::MAX)) >> self.side_log2) as u32;
         let span = [0, 1].map(|i| cell(from[i])..=cell(from[i] + i64::from(size[i]) - 1));
         let count: u64 = span.iter().map(|span| u64::from(span.end() - span.start()) + 1).product();
-        if count > self.0.len() as u64 {
-            return self.0.iter().any(|cell| (0..2).all(|i| span[i].contains(&cell[i])));
+        if count > self.met.len() as u64 {
+            return self.met.iter().any(|cell| (0..2).all(|i| span[i].contains(&cell[i])));
         }
-        span[1].clone().any(|y| span[0].clone().any(|x| self.0.contains(&[x, y])))
+        span[1].clone().any(|y| span[0].clone().any(|x| self.met.contains(&[x, y])))
     }
 }
 
-/// Calls `make` with every block, of at most `size` columns and rows, of those cells of a grid that `is_met` says something may lie in, on all threads; and `pass` with windows that are made of the others.
-/// `is_met` is asked of the whole grid first, then of halves. The sides of blocks divide that of a cell.
-pub(crate) fn each_block_met(
+/// Calls `make` with every block, of at most `size` columns and rows, of those cells of a grid that `is_met` says something may lie in, on all threads, each with a state of its own; and `pass` with windows
+/// that are made of the others. `is_met` is asked of the whole grid first, then of halves. The sides of blocks divide that of a cell.
+pub(crate) fn each_block_met<S>(
     [wide, high]: [u32; 2],
     size: [u32; 2],
+    cell: u32,
     is_met: impl Fn(Window) -> bool,
     pass: impl Fn(Window) -> Result<(), LayoutError>,
-    make: impl Fn(Window) -> Result<(), LayoutError> + Sync,
+    open: impl Fn() -> S + Sync,
+    make: impl Fn(&mut S, Window) -> Result<(), LayoutError> + Sync,
 ) -> Result<(), LayoutError> {
-    debug_assert!(size.iter().all(|side| CELL.is_multiple_of(*side)));
+    debug_assert!(size.iter().all(|side| cell.is_multiple_of(*side)));
     let mut met: Vec<Window> = Vec::new();
     let mut waiting = vec![Window { col: 0, row: 0, width: wide, height: high }];
     while let Some(window) = waiting.pop() {
         let Window { col, row, width, height } = window;
         if !is_met(window) {
             pass(window)?;
-        } else if width.max(height) <= CELL {
+        } else if width.max(height) <= cell {
             met.push(window);
         } else {
             // In halves of whole cells.
-            let half = |side: u32| (side.div_ceil(CELL) / 2).max(1) * CELL;
+            let half = |side: u32| (side.div_ceil(cell) / 2).max(1) * cell;
             if width >= height {
                 let left = half(width);
                 waiting.push(Window { width: left, ..window });
@@ -89,19 +111,20 @@ pub(crate) fn each_block_met(
     each_task(
         all,
         usize::MAX,
-        || Ok(()),
-        |(), block| {
+        || Ok(open()),
+        |state, block| {
             let at = firsts.partition_point(|first| *first <= block) - 1;
             let (cells, block) = (&met[at], block - firsts[at]);
             let across = u64::from(cells.width.div_ceil(size[0]));
             // Both products stay below the sides of the cells.
             let (col, row) = ((block % across) as u32 * size[0], (block / across) as u32 * size[1]);
-            make(Window {
+            let block = Window {
                 col: cells.col + col,
                 row: cells.row + row,
                 width: size[0].min(cells.width - col),
                 height: size[1].min(cells.height - row),
-            })
+            };
+            make(state, block)
         },
     )
 }
@@ -113,7 +136,7 @@ mod tests {
 
     #[test]
     fn windows_touch_the_cells_of_files_and_no_others() {
-        let cells = Cells([[0, 0], [3, 5]].into());
+        let cells = Cells { met: [[0, 0], [3, 5]].into(), ..Cells::default() };
         assert!(cells.touch([2047, 2047], [1, 1]) && !cells.touch([2048, 0], [4096, 5000]));
         assert!(cells.touch([6143, 10_239], [2, 2]) && !cells.touch([6143, 10_239], [1, 2]));
         assert!(cells.touch([-500, -500], [501, 501]) && cells.touch([-500, 0], [100_000, 1]));
@@ -138,11 +161,12 @@ mod tests {
                         }
                         Ok(())
                     };
-                    let make = |window: Window| {
+                    let make = |(): &mut (), window: Window| {
                         assert!(window.width <= size[0] && window.height <= size[1]);
                         note(window, true)
                     };
-                    each_block_met(grid, size, is_met, |window| note(window, false), make).unwrap();
+                    each_block_met(grid, size, CELL, is_met, |window| note(window, false), || (), make)
+                        .unwrap();
                     for (at, seen) in (0u32..).zip(seen.into_inner().unwrap()) {
                         let cell = [at % grid[0] / CELL, at / grid[0] / CELL];
                         assert_eq!(seen, 1 + u8::from(met.contains(&cell)), "{cell:?} {grid:?}");

@@ -18,7 +18,7 @@ mod target;
 mod told;
 mod values;
 
-use crate::cells::{Cells, each_block_met};
+use crate::cells::{CELL, Cells, each_block_met};
 use crate::crs::System;
 use crate::guard::is_ours;
 use crate::opened::{Known, OpenedDem, shift_lost};
@@ -372,7 +372,7 @@ impl Reader for Mosaic {
         let is_met =
             |cell: Window| self.laid.iter().zip(&self.cells).any(|(laid, cells)| laid.meets(cell, cells));
         let pass = |window| sink.put_void(window);
-        let make = |window| self.block(window, &stores, sink);
-        each_block_met(self.declared.samples, size, is_met, pass, make)
+        let make = |(): &mut (), window| self.block(window, &stores, sink);
+        each_block_met(self.declared.samples, size, CELL, is_met, pass, || (), make)
     }
 }

@@ -76,6 +76,12 @@ pub(super) trait Archive: Send + Sync {
     /// I/O; damage.
     fn survey(&self, within: &dyn Fn(u8) -> Option<Span>) -> Result<Levels, LayoutError>;
 
+    /// Calls `each` with rectangles of tiles of a zoom, full of tiles, that make up all there are in `within`.
+    ///
+    /// # Errors
+    /// I/O; damage.
+    fn each_span(&self, zoom: u8, within: Span, each: &mut dyn FnMut(Span)) -> Result<(), LayoutError>;
+
     /// Whether a tile is there.
     ///
     /// # Errors

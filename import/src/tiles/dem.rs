@@ -9,7 +9,6 @@ use super::packing::{Found, check, find};
 use super::seam::{Halves, Shifted};
 use super::{Part, Pyramid, place_above};
 use crate::OpenOptions;
-use crate::parallel::each_task;
 use crate::reader::{Declared, Reader, Said, VerticalUnit};
 use crate::value::Decode;
 use std::path::Path;
@@ -182,14 +181,10 @@ impl Reader for TileDem {
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
         self.halves.put_rest(sink)?;
         for (pyramid, by) in &self.halves.all {
-            let (plan, sink) = (&pyramid.plan, Shifted { sink, by: *by });
+            let sink = Shifted { sink, by: *by };
             let packed = Packed { pyramid, found: &self.found };
-            each_task(
-                plan.span.count(),
-                usize::MAX,
-                || Ok(Worker::default()),
-                |worker, i| packed.put(plan.span.tile(plan.zoom, i), worker, &sink),
-            )?;
+            let put = |worker: &mut Worker, tile: Tile| packed.put(tile, worker, &sink);
+            pyramid.each_tile_met(|window| sink.put_void(window), put)?;
         }
         Ok(())
     }

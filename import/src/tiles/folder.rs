@@ -114,6 +114,39 @@ impl Folder {
         if self.from_south { tile.row_from_south() } else { tile.y }
     }
 
+    /// Calls `each` with the tiles of a zoom in a span, and `ended` with the end of each name.
+    fn each_tile(
+        &self,
+        zoom: u8,
+        span: Span,
+        mut ended: impl FnMut(&str),
+        mut each: impl FnMut(Tile),
+    ) -> Result<(), LayoutError> {
+        let Some(folder) = self.zooms()?.get(&zoom) else { return Ok(()) };
+        for (x, column) in numbers(folder, last(zoom))? {
+            if !(span.x[0]..=span.x[1]).contains(&x) {
+                continue;
+            }
+            let mut rows = BTreeSet::new();
+            for entry in entries(&column)? {
+                let name = entry?.file_name();
+                let Some((row, ending)) = name.to_str().and_then(row_of) else { continue };
+                if row <= last(zoom) {
+                    ended(ending);
+                    rows.insert(row);
+                }
+            }
+            for row in rows {
+                let tile = Tile { zoom, x, y: row };
+                let tile = Tile { y: self.row(tile), ..tile };
+                if span.holds(tile) {
+                    each(tile);
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// The file of a tile, if there is one.
     fn file(&self, tile: Tile) -> Result<Option<PathBuf>, LayoutError> {
         let folder = self.path.join(tile.zoom.to_string()).join(tile.x.to_string());
@@ -168,32 +201,17 @@ impl Archive for Folder {
     fn survey(&self, within: &dyn Fn(u8) -> Option<Span>) -> Result<Levels, LayoutError> {
         let mut levels = Levels::new();
         let mut endings = BTreeSet::new();
-        for (zoom, folder) in self.zooms()? {
+        for zoom in self.zooms()?.keys() {
             let Some(span) = within(*zoom) else { continue };
-            for (x, column) in numbers(folder, last(*zoom))? {
-                if !(span.x[0]..=span.x[1]).contains(&x) {
-                    continue;
-                }
-                let mut rows = BTreeSet::new();
-                for entry in entries(&column)? {
-                    let name = entry?.file_name();
-                    let Some((row, ending)) = name.to_str().and_then(row_of) else { continue };
-                    if row <= last(*zoom) {
-                        endings.insert((!ending.starts_with("@2x"), ending.to_owned()));
-                        rows.insert(row);
-                    }
-                }
-                for row in rows {
-                    let tile = Tile { zoom: *zoom, x, y: row };
-                    let tile = Tile { y: self.row(tile), ..tile };
-                    if span.holds(tile) {
-                        count(&mut levels, tile);
-                    }
-                }
-            }
+            let ended = |ending: &str| _ = endings.insert((!ending.starts_with("@2x"), ending.to_owned()));
+            self.each_tile(*zoom, span, ended, |tile| count(&mut levels, tile))?;
         }
         *self.endings.write().unwrap_or_else(PoisonError::into_inner) = endings;
         Ok(levels)
+    }
+
+    fn each_span(&self, zoom: u8, within: Span, each: &mut dyn FnMut(Span)) -> Result<(), LayoutError> {
+        self.each_tile(zoom, within, |_| {}, |tile| each(Span::of(tile)))
     }
 
     fn has(&self, tile: Tile) -> Result<bool, LayoutError> {

@@ -33,6 +33,7 @@ impl TileImage {
     ) -> Result<Self, LayoutError> {
         let pyramid = Pyramid::open(path, options, around)?;
         let plan = &pyramid.plan;
+        plan.check_scattered(path)?;
         if plan.size.iter().any(|side| *side > MAX_TEXELS) {
             let [wide, high] = plan.size;
             return Err(LayoutError::Usage(format!(

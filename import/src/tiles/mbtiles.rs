@@ -31,6 +31,8 @@ const COUNT: &str = "SELECT count(*), min(tile_column), max(tile_column), min(ti
     WHERE zoom_level = ?1 AND tile_column BETWEEN ?2 AND ?3 AND tile_row BETWEEN ?4 AND ?5";
 const SAMPLES: &str = "SELECT tile_column, tile_row FROM tiles \
     WHERE zoom_level = ?1 AND tile_column BETWEEN ?2 AND ?3 AND tile_row BETWEEN ?4 AND ?5 LIMIT 64";
+const PLACES: &str = "SELECT tile_column, tile_row FROM tiles \
+    WHERE zoom_level = ?1 AND tile_column BETWEEN ?2 AND ?3 AND tile_row BETWEEN ?4 AND ?5";
 const HAS: &str = "SELECT 1 FROM tiles WHERE zoom_level = ?1 AND tile_column = ?2 AND tile_row = ?3 LIMIT 1";
 const TILE: &str =
     "SELECT tile_data FROM tiles WHERE zoom_level = ?1 AND tile_column = ?2 AND tile_row = ?3 LIMIT 1";
@@ -111,7 +113,7 @@ impl Mbtiles {
         });
         let database = Mutex::new(opened.map_err(|error| told(path, "header", error))?);
         let mut archive = Self { path: path.to_owned(), about: About::default(), database, left, allowance };
-        for statement in [COUNT, SAMPLES, HAS, TILE] {
+        for statement in [COUNT, SAMPLES, PLACES, HAS, TILE] {
             archive.refuse_copies(statement)?;
         }
         archive.about = archive.read_about()?;
@@ -191,7 +193,7 @@ impl Mbtiles {
     fn level(&self, zoom: u8, span: Span) -> Result<Option<Level>, LayoutError> {
         let place = format!("zoom {zoom}");
         let turn = |y: u32| last(zoom) - y;
-        let values = [u32::from(zoom), span.x[0], span.x[1], turn(span.y[1]), turn(span.y[0])];
+        let values = values_of(zoom, span);
         let mut found = None;
         self.rows(&place, COUNT, values, |row| {
             let count = u64::try_from(row.get::<_, i64>(0)?).unwrap_or(0);
@@ -218,6 +220,12 @@ impl Mbtiles {
         }
         Ok(Some(level))
     }
+}
+
+/// What a statement about a zoom's tiles within a span, whose rows are counted from the north, is asked with.
+fn values_of(zoom: u8, span: Span) -> [u32; 5] {
+    let turn = |y: u32| last(zoom) - y;
+    [u32::from(zoom), span.x[0], span.x[1], turn(span.y[1]), turn(span.y[0])]
 }
 
 /// Shuts out all that a database could do beside giving its tiles.
@@ -325,6 +333,14 @@ impl Archive for Mbtiles {
             }
         }
         Ok(levels)
+    }
+
+    fn each_span(&self, zoom: u8, within: Span, each: &mut dyn FnMut(Span)) -> Result<(), LayoutError> {
+        self.rows(&format!("zoom {zoom}"), PLACES, values_of(zoom, within), |row| {
+            let (x, y): (u32, u32) = (row.get(0)?, row.get(1)?);
+            each(Span::of(Tile { zoom, x, y: last(zoom) - y.min(last(zoom)) }));
+            Ok(true)
+        })
     }
 
     fn has(&self, tile: Tile) -> Result<bool, LayoutError> {

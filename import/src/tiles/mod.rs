@@ -1,7 +1,8 @@
 //! Pyramids of web-map tiles: folders of `zoom/column/row.png`, MBTiles and PMTiles, as elevation data ([`TileDem`]) and as pictures ([`TileImage`]).
 //!
 //! One zoom is read ([`plan`]), as a grid in EPSG:3857 whose texels are areas: the edges of tiles are edges of texels. A missing tile is made of the nearest coarser one up to [`plan::MOST_ABOVE`] zooms above, if there is one; else it is void or transparent.
-//! Tiles are looked up one by one and decoded on all threads; nothing is listed in memory. Cost: a look at each tile's entry to count them, then each tile decoded once.
+//! Tiles are looked up one by one and decoded on all threads; no tile is listed in memory. Of elevation data what lies between tiles is passed over ([`met`]). Cost: a look at each tile's entry to count them and
+//! another to see where they lie, then each tile decoded once.
 
 mod about;
 mod archive;
@@ -14,6 +15,7 @@ mod grid;
 mod image;
 #[cfg(feature = "mbtiles")]
 mod mbtiles;
+mod met;
 mod packing;
 mod plan;
 mod pmtiles;

@@ -9,11 +9,12 @@ use super::decode::{Texels, decode, most_of_all};
 use super::grid::{Area, MAX_ZOOM, Span, Tile};
 use crate::options::TileOptions;
 use std::ops::Range;
+use std::path::Path;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::remedy::Remedy;
 use terrasoar_layout::words::thousands;
 
-/// Places of tiles for each tile that there is; a set that is thinner is refused.
+/// Places of tiles for each tile that there is; a set that is thinner makes no picture.
 const PLACES_A_TILE: u64 = 256;
 /// Places up to which missing tiles are looked for one by one before anything is read.
 const COUNTED_PLACES: u64 = 1 << 18;
@@ -36,6 +37,8 @@ pub(super) struct Plan {
     pub(super) span: Span,
     /// Zooms above that have tiles, from the deepest; missing tiles are made of them.
     pub(super) above: Vec<u8>,
+    /// Tiles of the zoom that there are.
+    count: u64,
     /// Some tiles, for a first look.
     pub(super) samples: Vec<Tile>,
     /// What was chosen, in words.
@@ -100,14 +103,6 @@ impl Plan {
         let Some(level) = levels.get(&zoom) else {
             return Err(refused("its tiles changed while it was read; start again".into()));
         };
-        if level.span.count() > PLACES_A_TILE.saturating_mul(level.count) {
-            let [wide, high] = level.span.sides();
-            return Err(refused(format!(
-                "the {} tiles of zoom {zoom} lie scattered over {wide} x {high} places, nearly all of it void; state bounds around those that you need, or a lower zoom",
-                counted(level.count)
-            ))
-            .mended_by(Remedy::Bounds));
-        }
         let side = first_tile(archive, level)?.side;
         let texels = bounds.area.texels(zoom, side);
         let cut = |[first, end]: [u64; 2], tiles: [u32; 2]| -> Range<u64> {
@@ -140,6 +135,7 @@ impl Plan {
             size: sides.map(|side| side as u32),
             span,
             above,
+            count: level.count,
             samples: level.samples.clone(),
             words: String::new(),
             missing: None,
@@ -147,6 +143,24 @@ impl Plan {
         plan.words = plan.say(coarsest, deepest, level, options.zoom.is_some());
         plan.missing = plan.count_missing(archive, level)?;
         Ok(plan)
+    }
+
+    /// Refuses tiles that lie scattered, of which a picture would be nearly all holes, every texel of them made and kept.
+    ///
+    /// # Errors
+    /// [`LayoutError::Usage`], with what would help.
+    pub(super) fn check_scattered(&self, path: &Path) -> Result<(), LayoutError> {
+        if self.span.count() <= PLACES_A_TILE.saturating_mul(self.count) {
+            return Ok(());
+        }
+        let [wide, high] = self.span.sides();
+        Err(LayoutError::Usage(format!(
+            "{}: the {} tiles of zoom {} lie scattered over {wide} x {high} places, nearly all of it void; state bounds around those that you need, or a lower zoom",
+            path.display(),
+            counted(self.count),
+            self.zoom
+        ))
+        .mended_by(Remedy::Bounds))
     }
 
     fn bounds(

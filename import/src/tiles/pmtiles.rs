@@ -324,6 +324,17 @@ impl Archive for Pmtiles {
         Ok(levels)
     }
 
+    fn each_span(&self, zoom: u8, within: Span, each: &mut dyn FnMut(Span)) -> Result<(), LayoutError> {
+        let mut spans = vec![None; usize::from(MAX_ZOOM) + 1];
+        spans[usize::from(zoom)] = Some(within);
+        let mut block = |block: Block| {
+            if let Some(span) = within.shared(block.span).filter(|_| block.zoom == zoom) {
+                each(span);
+            }
+        };
+        self.walk(&self.root, FIRST[usize::from(MAX_ZOOM) + 1], DEEPEST, &spans, &mut 0, &mut block)
+    }
+
     fn has(&self, tile: Tile) -> Result<bool, LayoutError> {
         self.find(id_of(tile)).map(|entry| entry.is_some())
     }

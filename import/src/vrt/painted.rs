@@ -4,7 +4,7 @@ use super::paint::Painting;
 use super::said::{Band, Part, Source};
 use super::text::is_virtual;
 use crate::beside::Beside;
-use crate::cells::{Cells, each_block_met};
+use crate::cells::{CELL, Cells, each_block_met};
 use crate::guard;
 use crate::options::OpenOptions;
 use crate::reader::{Declared, Reader, Said};
@@ -266,7 +266,8 @@ impl Reader for Painted {
                 sink.put(window, &values)
             }
         };
-        each_block_met(samples, BLOCK, is_met, |window| sink.put_void(window), make)
+        let pass = |window| sink.put_void(window);
+        each_block_met(samples, BLOCK, CELL, is_met, pass, || (), |(), window| make(window))
     }
 }
 

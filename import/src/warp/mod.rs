@@ -9,7 +9,7 @@ mod mapping;
 mod store;
 mod target;
 
-use crate::cells::{Cells, each_block_met};
+use crate::cells::{CELL, Cells, each_block_met};
 use crate::crs::{Ground, HorizontalSize, Kind, System, is_earth};
 use crate::options::{OpenOptions, Resampling};
 use crate::parallel::each_task;
@@ -175,12 +175,20 @@ impl Warp {
         let there = there.into_inner().unwrap_or_else(PoisonError::into_inner);
         let is_met = |window| self.resampler.may_touch(window, &there);
         let pass = |window| sink.put_void(window);
-        each_block_met(self.grid.samples, BLOCK, is_met, pass, |window| {
-            self.resampler.block(&store, window, &mut |window, samples| match samples {
-                Some(samples) => sink.put(window, samples),
-                None => sink.put_void(window),
-            })
-        })
+        each_block_met(
+            self.grid.samples,
+            BLOCK,
+            CELL,
+            is_met,
+            pass,
+            || (),
+            |(), window| {
+                self.resampler.block(&store, window, &mut |window, samples| match samples {
+                    Some(samples) => sink.put(window, samples),
+                    None => sink.put_void(window),
+                })
+            },
+        )
     }
 }
 
