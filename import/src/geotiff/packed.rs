@@ -78,7 +78,7 @@ pub(super) fn stream(
             planes,
             convert,
             file: &file,
-            places: chunks.grid.places(path, &file),
+            places: planes.numbers.iter().map(|_| chunks.grid.places(path, &file)).collect(),
             bytes: Vec::new(),
             apart: vec![Vec::new(); planes.numbers.len()],
             samples: Vec::new(),
@@ -93,7 +93,8 @@ struct Worker<'a> {
     planes: &'a Planes,
     convert: &'a Convert,
     file: &'a File,
-    places: Places<'a>,
+    /// Of each plane, for all of them are read side by side.
+    places: Vec<Places<'a>>,
     bytes: Vec<u8>,
     /// Samples of each plane.
     apart: Vec<Vec<f64>>,
@@ -106,9 +107,9 @@ impl<'a> Worker<'a> {
         let (chunks, planes) = (self.chunks, self.planes);
         let window = chunks.grid.window(chunk);
         let mut open = Vec::with_capacity(planes.numbers.len());
-        for plane in &planes.numbers {
+        for (plane, places) in planes.numbers.iter().zip(&mut self.places) {
             let number = plane * chunks.grid.count() + chunk;
-            let place = chunks.grid.place_of(*plane, chunk, &mut self.places)?;
+            let place = chunks.grid.place_of(*plane, chunk, places)?;
             let file = self.file;
             let rows = place
                 .map(|place| guarded(self.path, chunks, number, || Rows::open(file, chunks, number, place)));

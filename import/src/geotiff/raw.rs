@@ -27,7 +27,8 @@ struct Worker<'a> {
     path: &'a Path,
     chunks: &'a Chunks,
     file: &'a File,
-    places: Places<'a>,
+    /// Of each plane, for all of them are read side by side.
+    places: Vec<Places<'a>>,
     bytes: Vec<u8>,
     /// Samples of each plane.
     apart: Vec<Vec<f64>>,
@@ -53,7 +54,7 @@ pub(super) fn stream(
             path,
             chunks,
             file: &file,
-            places: grid.places(path, &file),
+            places: planes.numbers.iter().map(|_| grid.places(path, &file)).collect(),
             bytes: Vec::new(),
             apart: vec![Vec::new(); planes.numbers.len()],
             samples: Vec::new(),
@@ -94,7 +95,7 @@ impl Worker<'_> {
         convert: &Convert,
     ) -> Result<bool, LayoutError> {
         let (chunks, pixels) = (self.chunks, window.width as usize);
-        let place = chunks.grid.place_of(plane, chunk, &mut self.places)?;
+        let place = chunks.grid.place_of(plane, chunk, &mut self.places[at])?;
         let samples = &mut self.apart[at];
         samples.clear();
         let Some((place, _)) = place else {

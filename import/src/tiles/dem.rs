@@ -175,7 +175,7 @@ impl Reader for TileDem {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.halves.all.iter().map(|(half, _)| half.memory_bytes()).max().unwrap_or(0)
+        self.halves.all.iter().map(|(half, _)| half.memory_bytes() + half.met_bytes()).max().unwrap_or(0)
     }
 
     fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {

@@ -1,6 +1,6 @@
 //! Where a pyramid has something to read: squares of tiles, of which those without any tile are passed over as a whole.
 //!
-//! A missing tile counts where a coarser one stands in for it. Squares are as large as it takes for their number to stay small, whatever the pyramid says of itself. Memory: some megabytes at most. Cost: a
+//! A missing tile counts where a coarser one stands in for it. Squares are as large as it takes for their number to stay small, whatever the pyramid says of itself. Memory: 20 bytes a square, 40 MB at most. Cost: a
 //! look at the entry of each tile of a few zooms.
 
 use super::Pyramid;
@@ -12,9 +12,27 @@ use terrasoar_layout::error::LayoutError;
 /// Binary logarithm of the side of a square in tiles, at least.
 const LEAST_LOG2: u32 = 3;
 /// Squares, at most.
-const MOST_SQUARES: u64 = 1 << 18;
+const MOST_SQUARES: u64 = 1 << 21;
+/// Memory that a square takes, with what a table of them leaves empty.
+const SQUARE_BYTES: u64 = 20;
+
+/// Squares that cover a grid of tiles.
+fn squares(sides: [u32; 2], log2: u32) -> u64 {
+    sides.map(|side| u64::from(side >> log2) + 1).iter().product()
+}
+
+/// Binary logarithm of the side of a square.
+fn side_log2(sides: [u32; 2]) -> u32 {
+    (LEAST_LOG2..32).find(|log2| squares(sides, *log2) <= MOST_SQUARES).unwrap_or(31)
+}
 
 impl Pyramid {
+    /// Memory that knowing the squares takes.
+    pub(super) fn met_bytes(&self) -> u64 {
+        let sides = self.plan.span.sides().map(|side| side as u32);
+        squares(sides, side_log2(sides)) * SQUARE_BYTES
+    }
+
     /// Calls `make` with every tile of the squares that have any, on all threads, each with a state of its own; and `pass` with the texels of the others.
     pub(super) fn each_tile_met<S: Default>(
         &self,
@@ -48,9 +66,7 @@ impl Pyramid {
     /// The squares of a grid of tiles that have any.
     fn met(&self, sides: [u32; 2]) -> Result<Cells, LayoutError> {
         let plan = &self.plan;
-        let squares = |log2: u32| sides.map(|side| u64::from(side >> log2) + 1).iter().product::<u64>();
-        let log2 = (LEAST_LOG2..32).find(|log2| squares(*log2) <= MOST_SQUARES).unwrap_or(31);
-        let mut met = Cells::of(log2);
+        let mut met = Cells::of(side_log2(sides));
         for zoom in plan.above.iter().copied().chain([plan.zoom]) {
             let levels = plan.zoom - zoom;
             let within = Span { x: plan.span.x.map(|x| x >> levels), y: plan.span.y.map(|y| y >> levels) };

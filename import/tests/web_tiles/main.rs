@@ -7,6 +7,7 @@ mod hostile;
 mod import_support;
 mod make;
 mod pictures;
+mod scattered;
 mod zooms;
 
 use import_support::{Grid, collect};

@@ -192,17 +192,6 @@ fn a_missing_tile_is_made_of_the_one_above() {
     }
 }
 
-#[test]
-fn sets_that_are_nearly_all_void_are_refused() {
-    let folder_of = tempdir().unwrap();
-    let mut made = plane(8, 0..1, 0..1);
-    made.extend(plane(8, 255..256, 255..256));
-    let path = folder_of.path().join("thin.pmtiles");
-    pmtiles(&path, &made, "{}", [-180.0, -85.06, 180.0, 85.06], Pm::PLAIN);
-    let words = refusal(&path, Some("mapbox"), TileOptions::default());
-    assert!(words.contains("lie scattered over 256 x 256 places"), "{words}");
-}
-
 /// What is asked of a pyramid is not dropped without a word where there is none.
 #[test]
 fn what_is_for_pyramids_is_refused_of_other_files() {
