@@ -1,14 +1,10 @@
-"""Tiles of exact records after FORMAT.md, section 9.9: the part of read_packed.py for kinds 2 and 3."""
+"""Tiles of exact records after FORMAT.md, section 9.9: the part of read_packed_all.py for kinds 2 and 3."""
 import math
 import struct
 
-import packed_lattice
+from read_packed import AROUND, Lattice, unzigzag as unfold
 
 INERT = {2: b"\0" * 6 + b"\xff\xff", 3: b"\0" * 12 + b"\xff" * 4}
-
-
-def unfold(number):
-    return number >> 1 if number % 2 == 0 else -(number + 1 >> 1)
 
 
 def half(value):
@@ -16,10 +12,12 @@ def half(value):
 
 
 class Rules:
-    def __init__(self, kind, step, base, spacing, k):
-        self.height_bits, self.code_bits, self.mantissa = (32, 16, 23) if kind == 2 else (64, 32, 52)
-        self.step_m, self.base, self.spacing, self.flat = step, base, spacing, []
-        for level in range(2 * k):
+    def __init__(self, header):
+        self.height_bits, self.code_bits, self.mantissa = (32, 16, 23) if header[0x11] == 2 else (64, 32, 52)
+        self.spacing, self.flat = struct.unpack_from("<dd", header, 0x20), []
+        self.base, self.step_m = struct.unpack_from("<dd", header, 0x30)
+        spacing = self.spacing
+        for level in range(2 * header[0x10]):
             s = 1 << level // 2
             leg = s * max(spacing) if level % 2 else s / 2 * math.hypot(*spacing)
             self.flat.append((self.flat[-1] if level else 0.0) + (leg if level else 0.0))
@@ -64,14 +62,14 @@ class Rules:
 
 def row(coder, bits, largest, places, context):
     """Numbers of vertices, whose context `context` gives by the row's shift."""
-    shift = min(coder.bits.take(6), bits - 1)
+    shift = min(coder.take(6), bits - 1)
     heads = coder.row([context(p, shift) for p in places])
-    return {p: coder.bits.take(bits) if head == largest else coder.bits.take(shift) | head << shift for p, head in zip(places, heads)}
+    return {p: coder.take(bits) if head == largest else coder.take(shift) | head << shift for p, head in zip(places, heads)}
 
 
 def single(coder, bits, context, turn):
-    head = coder.value(context, turn)
-    return coder.bits.take(bits) if head == 255 else head
+    (head,) = coder.row([context], turn)
+    return coder.take(bits) if head == 255 else head
 
 
 def tile(segments, rules, octaves, stride_log, is_top, is_last):
@@ -80,11 +78,11 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
     hb, cb = rules.height_bits, rules.code_bits
     mask, sign = (1 << cb) - 1, 1 << cb - 1
     for p in ((0, 0), (size, 0), (0, size), (size, size)):
-        bits = segments[0].bits.take(hb)
+        bits = segments[0].take(hb)
         z[p] = rules.number(bits)
         if is_top:
-            error = segments[0].bits.take(cb)
-            out[p] = rules.record(bits, error, segments[0].bits.take(cb))
+            error = segments[0].take(cb)
+            out[p] = rules.record(bits, error, segments[0].take(cb))
     delivered = octaves if is_top else 3
     for octave in range(octaves - 1, -1, -1):
         coder, s = segments[2 - min(octave, 2)], 1 << octave
@@ -92,30 +90,28 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
         if octave == delivered - 1:
             known = {}
         inside = lambda p: (p[0] < size or is_last[0]) and (p[1] < size or is_last[1])
-        whites, easts, norths = packed_lattice.vertices(size, s)
-        vertices, kinds, codes, raw, around = whites + easts + norths, {}, {}, {}, {}
-        white = set(whites)
+        lattice = Lattice(z, size, s)
+        whites, blacks = lattice.whites, lattice.blacks
+        vertices, kinds, codes, raw, around = whites + blacks, {}, {}, {}, {}
         before = lambda marks, p: [marks.get((p[0] - 2 * s, p[1]), 0), marks.get((p[0], p[1] - 2 * s), 0)]
-        if gives and coder.bits.take(1):
+        if gives and coder.take(1):
             for turn, p in enumerate(vertices):
                 west, south = before(kinds, p)
-                kinds[p] = coder.value(384 + 3 * west + south, turn)
+                (kinds[p],) = coder.row([384 + 3 * west + south], turn)
             error, radius, turn = sign, 0, 0
             for p in (p for p in vertices if kinds[p] == 2):
                 error = error + unfold(single(coder, cb, 400, turn)) & mask
                 radius = radius + unfold(single(coder, cb, 401, turn + 1)) & mask
                 codes[p], turn = (error, radius), turn + 2
         ordinary = [p for p in vertices if not kinds.get(p)]
-        # Heights.
-        e = packed_lattice.coarse(z, size, s)
-
-        def heights(places, first, near, far):
+        # Heights: rows of numbers.
+        def heights(places, first):
             uneven = {}
             for p in places:
-                a, b, c, d = around[p] = [e[p[0] + dx * s, p[1] + dy * s] for dx, dy in near(p)]
-                eight = 0.0
-                for i, (dx, dy) in enumerate(far(p)):
-                    eight = eight + e[p[0] + dx * s, p[1] + dy * s] if i else e[p[0] + dx * s, p[1] + dy * s]
+                a, b, c, d = around[p] = lattice.around(p, 0)
+                eight, *others = lattice.around(p, 1)
+                for value in others:
+                    eight = eight + value
                 four = a + b + c + d
                 raw[p] = rules.nearest((10.0 * four - eight) / 32.0)
                 uneven[p] = 8.0 * abs(a + b - c - d) + abs(2.0 * four - eight) + 2.0 * (max(a, b, c, d) - min(a, b, c, d))
@@ -131,16 +127,14 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                 z[p] = rules.number(raw[p])
 
         q = min(octave, 3) if gives else 3
-        heights(whites, 64 * q, lambda p: packed_lattice.WHITE_NEAR, lambda p: packed_lattice.WHITE_FAR)
-        packed_lattice.add_whites(e, z, whites, size, s)
-        heights(easts + norths, 64 * q + 32, lambda p: packed_lattice.black_near(p, s), lambda p: packed_lattice.black_far(p, s))
+        heights(whites, 64 * q)
+        heights(blacks, 64 * q + 32)
         if not gives:
             continue
         # Codes.
-        climbs = lambda p: (p[0] // (2 * s) + p[1] // (2 * s)) % 2 == 0
-        step = lambda p: rules.step(z[p], around[p][:2] if p not in white or climbs(p) else around[p][2:])
+        step = lambda p: rules.step(z[p], lattice.ends_first(p, around[p])[0])
         if stride_log + octave == 0:
-            rule = {p: (step(p), 0) for p in easts + norths}
+            rule = {p: (step(p), 0) for p in blacks}
             for x, y in whites:
                 beside, along = [(x - 1, y), (x + 1, y)], [(x, y - 1), (x, y + 1)]
                 error = max([step((x, y))] + [rule[p][0] for p in beside + along if not kinds.get(p)])
@@ -151,24 +145,21 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                         radius = max(radius, math.sqrt(g * g + r * r) * (1.0 + 1.0 / (1 << 19)))
                 rule[x, y] = error, rules.code(radius)
             codes.update((p, rule[p]) for p in ordinary)
-            if coder.bits.take(1):
+            if coder.take(1):
                 other, turn = {}, 0
                 for p in (p for p in ordinary if inside(p)):
                     west, south = before(other, p)
-                    other[p], turn = coder.value(393 + 2 * west + south, turn), turn + 1
+                    (other[p],), turn = coder.row([393 + 2 * west + south], turn), turn + 1
                     if other[p]:
                         error = codes[p][0] + unfold(single(coder, cb, 402, turn)) & mask
                         radius = codes[p][1] + unfold(single(coder, cb, 403, turn + 1)) & mask
                         codes[p], turn = (error, radius), turn + 2
         else:
-            for colour, places in enumerate((whites, easts + norths)):
+            for colour, places in enumerate((whites, blacks)):
                 asked, errors, radii, level = [], {}, {}, 2 * (stride_log + octave) + 1 - colour
                 for p in (p for p in places if not kinds.get(p) and inside(p)):
-                    if p in white:
-                        offsets = [(1, -1), (-1, 1)] if climbs(p) else [(-1, -1), (1, 1)]
-                    else:
-                        offsets = packed_lattice.black_near(p, s)[2:]
-                    parents = [known[q] for q in ((p[0] + dx * s, p[1] + dy * s) for dx, dy in offsets) if q in known]
+                    corners = [(p[0] + dx * s, p[1] + dy * s) for dx, dy in AROUND[p[0] // s % 2, p[1] // s % 2][0]]
+                    parents = [known[q] for q in lattice.ends_first(p, corners)[1] if q in known]
                     reach = max(around[p]) - min(around[p])
                     slope = reach * rules.step_m / ((1 << stride_log + octave) * rules.spacing[0])
                     if parents:

@@ -1,21 +1,23 @@
 #!/usr/bin/env python3
-"""Reads a packed terrain file (.iqt of version 2) after FORMAT.md, section 9, and writes its records.
+"""Reads packed terrain of compact records (.iqt, version 2) as it was built, after layout/FORMAT.md alone: heights, errors and radii.
 
-    read_packed.py PACKED.iqt OUT
+    read_packed.py PACKED.iqt > SAMPLES.csv
 
-OUT has the record of every sample, of 4, 8 or 16 bytes as section 3 has it; rows from the south, in a row from the west.
-It is a second reader, for comparison; it needs nothing but Python, and it is slow.
+A line a sample, rows from the south and in a row from the west; a void has no height. It needs nothing but Python, and it is slow.
+What edits changed, and exact records, take the larger reader, read_packed_all.py, which builds on this one.
 """
+import functools
 import math
 import struct
 import sys
 import zlib
 
-sys.dont_write_bytecode = True
-import packed_exact  # noqa: E402
-import packed_lattice  # noqa: E402
-
-INERT = 0xFF000000
+# Steps from a white (1, 1), an east (1, 0) and a north (0, 1) to the corners a, b, c, d of its diamond and to eight vertices around (9.3).
+WIDE, TALL = [(-2, -1), (-2, 1), (2, -1), (2, 1)], [(-1, -2), (1, -2), (-1, 2), (1, 2)]
+WHITE_FAR = [(-3, -1), (-3, 1), (3, -1), (3, 1), (-1, -3), (1, -3), (-1, 3), (1, 3)]
+AROUND = {(1, 1): ([(-1, -1), (1, 1), (1, -1), (-1, 1)], WHITE_FAR),
+          (1, 0): ([(-1, 0), (1, 0), (0, -1), (0, 1)], WIDE + TALL),
+          (0, 1): ([(0, -1), (0, 1), (-1, 0), (1, 0)], TALL + WIDE)}
 
 
 class Bits:
@@ -23,18 +25,16 @@ class Bits:
         self.number, self.at, self.length = int.from_bytes(data, "little"), 0, 8 * len(data)
 
     def take(self, count):
-        value = self.number >> self.at & (1 << count) - 1
         self.at += count
-        return value
+        return self.number >> self.at - count & (1 << count) - 1
 
 
 def tables(data):
-    """For each context its table, as 2,048 of (token, frequency, place)."""
-    bits, found, table = Bits(data), [], None
+    """For each context its table, as 2,048 of (token, frequency, place) (9.5)."""
+    bits, found = Bits(data), []
     for _ in range(404):
         if bits.take(1):
-            rest, count = bits.take(6), bits.take(7)
-            frequency, length = [0] * 64, 0
+            rest, count, frequency, length = bits.take(6), bits.take(7), [0] * 64, 0
             for token in (t for t in range(count) if t != rest):
                 steps = 0
                 while bits.take(1):
@@ -49,17 +49,20 @@ def tables(data):
     return found
 
 
-class Segment:
+class Segment(Bits):
+    """Values of a segment (9.4)."""
+
     def __init__(self, data, of_context):
-        self.tables, self.lanes = of_context, data[0]
+        self.tables, self.lanes, self.states, self.words, at = of_context, data[0], [], iter(()), 1
         if self.lanes:
-            (count,) = struct.unpack_from("<H", data, 1)
-            at = 3 + 4 * self.lanes
+            at = 3 + 4 * self.lanes + 2 * struct.unpack_from("<H", data, 1)[0]
             self.states = list(struct.unpack_from(f"<{self.lanes}I", data, 3))
-            self.words = iter(struct.unpack_from(f"<{count}H", data, at))
-            self.bits = Bits(data[at + 2 * count:])
-        else:
-            self.bits = Bits(data[1:])
+            self.words = (word for word, in struct.iter_unpack("<H", data[3 + 4 * self.lanes:at]))
+        super().__init__(data[at:])
+
+    def row(self, contexts, turn=0):
+        """Values of contexts, of which the first has a turn: all tokens, then all raw bits."""
+        return [self.finished(c, t) for c, t in zip(contexts, [self.token(c, turn + i) for i, c in enumerate(contexts)])]
 
     def token(self, context, turn):
         if not self.lanes:
@@ -72,22 +75,12 @@ class Segment:
 
     def finished(self, context, token):
         if token is None:
-            return self.bits.take(16 if context < 256 else 8)
-        if token < 16:
-            return token
-        raw = (token - 16) // 4 + 2
-        return ((token - 16) % 4 + 4 << raw) + self.bits.take(raw)
-
-    def value(self, context, turn):
-        return self.finished(context, self.token(context, turn))
-
-    def row(self, contexts):
-        tokens = [self.token(context, turn) for turn, context in enumerate(contexts)]
-        return [self.finished(context, token) for context, token in zip(contexts, tokens)]
+            return self.take(16 if context < 256 else 8)
+        raw = max((token - 16) // 4 + 2, 0)
+        return token if token < 16 else ((token - 16) % 4 + 4 << raw) + self.take(raw)
 
     def check(self):
-        assert not self.lanes or (all(s == 65536 for s in self.states) and next(self.words, None) is None)
-        assert 0 <= self.bits.length - self.bits.at < 8
+        assert all(state == 65536 for state in self.states) and next(self.words, None) is None and 0 <= self.length - self.at < 8
 
 
 def unzigzag(value):
@@ -95,14 +88,18 @@ def unzigzag(value):
 
 
 class Rules:
-    """What follows from heights (9.6)."""
+    """What codes mean in metres (3.1), and which follow from heights (9.6)."""
 
-    def __init__(self, step, top, steps, spacing):
-        self.step_m, self.spacing = step, spacing
-        powers = self.powers(16)
-        self.errors = [0.0] + [top / powers[246] * powers[c - 1] for c in range(1, 248)]
-        self.octaves = self.powers(steps)
-        self.known = {}
+    def __init__(self, header):
+        self.k, self.spacing = header[0x10], struct.unpack_from("<dd", header, 0x20)
+        self.base_m, self.step_m = struct.unpack_from("<dd", header, 0x30)
+        top, steps = struct.unpack_from("<dI", header, 0x50)
+        errors, self.radii, self.fringe_radii = (self.powers(steps) for steps in (16, steps, 8))
+        self.errors = [0.0] + [top / errors[246] * power for power in errors[:247]]
+        self.flat = [0.0]
+        for level in range(1, 2 * self.k):
+            s = 1 << level // 2
+            self.flat.append(self.flat[-1] + (s * max(self.spacing) if level % 2 else s / 2 * math.hypot(*self.spacing)))
 
     @staticmethod
     def powers(steps):
@@ -113,134 +110,141 @@ class Rules:
             powers.append(2.0 * powers[i - steps] if i % steps == 0 else powers[i - 1] * root)
         return powers
 
-    def ask(self, what, apart):
-        if (what, apart) not in self.known:
-            self.known[what, apart] = self.find(what, apart)
-        return self.known[what, apart]
+    @functools.cache
+    def step(self, apart):
+        error = apart * 0.5 * self.step_m * (1.0 + 1e-9)
+        return next((code for code in range(248) if self.errors[code] >= error), 247)
 
-    def find(self, what, apart):
-        if what == "step":
-            error = apart * 0.5 * self.step_m * (1.0 + 1e-9)
-            return next((c for c in range(248) if self.errors[c] >= error), 247)
-        if what in ("east", "north"):
-            ground, rise = self.spacing[what == "north"], apart * self.step_m
-            radius = math.sqrt(ground * ground + rise * rise) * (1.0 + 1.0 / (1 << 19))
-            flat = max(self.spacing)
-            return next((c for c in range(255) if flat * self.octaves[c] >= radius), 254)
+    @functools.cache
+    def side(self, ground, apart):
+        rise = apart * self.step_m
+        radius = math.sqrt(ground * ground + rise * rise) * (1.0 + 1.0 / (1 << 19))
+        return next((code for code in range(255) if self.flat[1] * self.radii[code] >= radius), 254)
+
+    @functools.cache
+    def slope(self, octave, apart):
         apart = min(max(apart, 1), 65535)
         cut = max(apart.bit_length() - 5, 0)
-        rise = (apart >> cut << cut) * self.step_m / (2.0 * (1 << what) * self.spacing[0])
-        slope = math.sqrt(1.0 + rise * rise)
-        return next((c for c in range(256) if self.octaves[c] >= slope), 255)
+        rise = (apart >> cut << cut) * self.step_m / (2.0 * (1 << octave) * self.spacing[0])
+        return next((code for code in range(256) if self.radii[code] >= math.sqrt(1.0 + rise * rise)), 255)
+
+    def metres(self, x, y, height, error, radius):
+        """Height, error and radius of the sample at a grid point; a void has no height."""
+        tz = [min((v & -v).bit_length() - 1, self.k) if v else self.k for v in (x, y)]
+        level = 2 * min(tz) + (tz[0] == tz[1]) if min(tz) < self.k else 0
+        s, is_void = 1 << level // 2, error >= 252 or (error, radius) == (0, 255)
+        height_m = None if is_void else self.base_m + height * self.step_m
+        if error >= 248:
+            edge = 2 * s * (math.hypot(*self.spacing) if level % 2 else max(self.spacing))
+            return height_m, edge * (1, 16, 256, math.inf)[error % 4], self.flat[level] * self.fringe_radii[radius]
+        return height_m, self.errors[error], 0.0 if (error, radius) == (0, 255) else self.flat[level] * self.radii[radius]
+
+
+class Lattice:
+    """Heights of a tile by place, continued over its border for the octave whose vertices lie s from coarser ones (9.3)."""
+
+    def __init__(self, z, size, s):
+        self.z, self.size, self.s = z, size, s
+        rows = range(s, size, 2 * s), range(0, size + 1, 2 * s)
+        self.whites = [(x, y) for y in rows[0] for x in rows[0]]
+        self.blacks = [(x, y) for y in rows[1] for x in rows[0]] + [(x, y) for y in rows[0] for x in rows[1]]
+
+    def at(self, x, y):
+        if (x, y) in self.z:
+            return self.z[x, y]
+        # Over the border in straight lines: a white's mirror image and the edge between them, which has the mean of its ends.
+        off = self.s if x // self.s % 2 else 0
+        if 0 <= y <= self.size:
+            edge, mirrored = 0 if x < 0 else self.size, -x if x < 0 else 2 * self.size - x
+            return self.at(edge, y - off) + self.at(edge, y + off) - self.at(mirrored, y)
+        edge, mirrored = 0 if y < 0 else self.size, -y if y < 0 else 2 * self.size - y
+        return self.at(x - off, edge) + self.at(x + off, edge) - self.at(x, mirrored)
+
+    def around(self, p, which):
+        """Heights of the corners of a vertex's diamond (0), or of the eight around (1)."""
+        return [self.at(p[0] + dx * self.s, p[1] + dy * self.s) for dx, dy in AROUND[p[0] // self.s % 2, p[1] // self.s % 2][which]]
+
+    def ends_first(self, p, four):
+        """Of what belongs to the corners of a diamond, that of the ends of the edge that its vertex splits, then that of its parents."""
+        is_white, climbs = p[0] // self.s % 2 == p[1] // self.s % 2, (p[0] // (2 * self.s) + p[1] // (2 * self.s)) % 2 == 0
+        return (four[2:], four[:2]) if is_white and not climbs else (four[:2], four[2:])
 
 
 def tile(segments, rules, octaves, stride_log, is_top, is_last):
     """Records of a tile by place, as far as it gives them."""
     size, out, z, codes = 1 << octaves, {}, {}, {}
-    for x, y in ((0, 0), (size, 0), (0, size), (size, size)):
-        z[x, y] = segments[0].bits.take(16)
+    for p in ((0, 0), (size, 0), (0, size), (size, size)):
+        z[p] = segments[0].take(16)
         if is_top:
-            out[x, y] = z[x, y] | segments[0].bits.take(8) << 16 | segments[0].bits.take(8) << 24
+            out[p] = z[p], segments[0].take(8), segments[0].take(8)
     delivered = octaves if is_top else 3
     for octave in range(octaves - 1, -1, -1):
-        coder, s = segments[2 - min(octave, 2)], 1 << octave
-        gives, last = octave < delivered, size
+        coder, s, gives = segments[2 - min(octave, 2)], 1 << octave, octave < delivered
+        lattice, kinds, four = Lattice(z, size, s), {}, {}
+        vertices = lattice.whites + lattice.blacks
+        before = lambda marks, p: [marks.get((p[0] - 2 * s, p[1]), 0), marks.get((p[0], p[1] - 2 * s), 0)]
+        is_given = lambda p: (p[0] < size or is_last[0]) and (p[1] < size or is_last[1])
         if octave == delivered - 1:
             codes = {}
-        inside = lambda p: (p[0] < last or is_last[0]) and (p[1] < last or is_last[1])
-        whites, easts, norths = packed_lattice.vertices(size, s)
-        vertices, kinds = whites + easts + norths, {}
-        before = lambda marks, p: [marks.get((p[0] - 2 * s, p[1]), 0), marks.get((p[0], p[1] - 2 * s), 0)]
-        if gives and coder.bits.take(1):
+        if gives and coder.take(1):
             for turn, p in enumerate(vertices):
                 west, south = before(kinds, p)
-                kinds[p] = coder.value(384 + 3 * west + south, turn)
-                if kinds[p] == 1:
-                    codes[p] = (0, 255)
-            radius, turn = 0, 0
-            for p in (p for p in vertices if kinds[p] == 2):
-                error = 248 + coder.value(400, turn)
-                radius = radius + unzigzag(coder.value(401, turn + 1)) & 255
-                codes[p], turn = (error, radius), turn + 2
-        # Heights.
-        e = packed_lattice.coarse(z, size, s)
-        around = {}
-
-        def heights(places, first, near, far):
-            predicted, contexts = [], []
+                (kinds[p],) = coder.row([384 + 3 * west + south], turn)
+            radius = 0
+            for turn, p in enumerate(p for p in vertices if kinds[p] == 2):
+                (error,), (more,) = coder.row([400], 2 * turn), coder.row([401], 2 * turn + 1)
+                radius = radius + unzigzag(more) & 255
+                codes[p] = 248 + error, radius
+        codes.update((p, (0, 255)) for p in vertices if kinds.get(p) == 1)
+        for is_black, places in enumerate((lattice.whites, lattice.blacks)):
+            predicted, contexts = {}, {}
             for p in places:
-                four = [e[p[0] + dx * s, p[1] + dy * s] for dx, dy in near(p)]
-                eight = sum(e[p[0] + dx * s, p[1] + dy * s] for dx, dy in far(p))
-                predicted.append(10 * sum(four) - eight + 16 >> 5)
-                u = 8 * abs(four[0] + four[1] - four[2] - four[3]) + abs(2 * sum(four) - eight)
-                u += 2 * (max(four) - min(four))
-                length = u.bit_length()
-                contexts.append(first + (0 if u < 4 else min(2 * (length - 3) + (u >> length - 2 & 1), 31)))
-                around[p] = four
-            asked = [i for i, p in enumerate(places) if kinds.get(p) != 1]
-            values = iter(coder.row([contexts[i] for i in asked]))
-            for i, p in enumerate(places):
-                inert = kinds.get(p) == 1
-                z[p] = min(max(predicted[i], 0), 65535) if inert else predicted[i] + unzigzag(next(values)) & 65535
-
-        q = min(octave, 3) if gives else 3
-        heights(whites, 64 * q, lambda p: packed_lattice.WHITE_NEAR, lambda p: packed_lattice.WHITE_FAR)
-        packed_lattice.add_whites(e, z, whites, size, s)
-        heights(easts + norths, 64 * q + 32, lambda p: packed_lattice.black_near(p, s), lambda p: packed_lattice.black_far(p, s))
-        if not gives:
-            continue
-        # Codes.
-        climbs = lambda p: (p[0] // (2 * s) + p[1] // (2 * s)) % 2 == 0
-        white = set(whites)
-
-        def step(p):
-            a, b, c, d = around[p]
-            ends = a + b if p not in white or climbs(p) else c + d
-            return rules.ask("step", abs(2 * z[p] - ends))
-
-        if stride_log == 0 and octave == 0:
-            rule = {p: (step(p), 0) for p in easts + norths}
-            for x, y in whites:
-                beside, along = [(x - 1, y), (x + 1, y)], [(x, y - 1), (x, y + 1)]
-                apart = [max(abs(z[x, y] - z[p]) for p in side) for side in (beside, along)]
-                error = max([step((x, y))] + [rule[p][0] for p in beside + along])
-                rule[x, y] = error, max(rules.ask("east", apart[0]), rules.ask("north", apart[1]))
-            for p in vertices:
-                codes.setdefault(p, rule[p])
-            if coder.bits.take(1):
+                four[p], eight = lattice.around(p, 0), sum(lattice.around(p, 1))
+                a, b, c, d = four[p]
+                predicted[p] = 10 * sum(four[p]) - eight + 16 >> 5
+                u = 8 * abs(a + b - c - d) + abs(2 * sum(four[p]) - eight) + 2 * (max(four[p]) - min(four[p]))
+                grade = 0 if u < 4 else min(2 * (u.bit_length() - 3) + (u >> u.bit_length() - 2 & 1), 31)
+                contexts[p] = 64 * (min(octave, 3) if gives else 3) + 32 * is_black + grade
+            asked = [p for p in places if kinds.get(p) != 1]
+            z.update((p, min(max(predicted[p], 0), 65535)) for p in places)
+            z.update((p, predicted[p] + unzigzag(v) & 65535) for p, v in zip(asked, coder.row([contexts[p] for p in asked])))
+        ordinary = [p for p in vertices if gives and not kinds.get(p) and is_given(p)]
+        step = lambda p: rules.step(abs(2 * z[p] - sum(lattice.ends_first(p, four[p])[0])))
+        if gives and stride_log + octave == 0:
+            rule = {p: (step(p), 0) for p in lattice.blacks}
+            for x, y in lattice.whites:
+                easts, norths = [(x, y - 1), (x, y + 1)], [(x - 1, y), (x + 1, y)]
+                apart = [max(abs(z[x, y] - z[p]) for p in beside) for beside in (norths, easts)]
+                radius = max(map(rules.side, rules.spacing, apart))
+                rule[x, y] = max([step((x, y))] + [rule[p][0] for p in easts + norths]), radius
+            codes.update((p, rule[p]) for p in vertices if not kinds.get(p))
+            if coder.take(1):
                 other, turn = {}, 0
-                for p in (p for p in vertices if not kinds.get(p) and inside(p)):
+                for p in ordinary:
                     west, south = before(other, p)
-                    other[p], turn = coder.value(393 + 2 * west + south, turn), turn + 1
+                    (other[p],) = coder.row([393 + 2 * west + south], turn)
                     if other[p]:
-                        error = codes[p][0] + unzigzag(coder.value(402, turn)) & 255
-                        radius = codes[p][1] + unzigzag(coder.value(403, turn + 1)) & 255
-                        codes[p], turn = (error, radius), turn + 2
-        else:
-            for places in (whites, easts + norths):
-                asked, contexts, radius_contexts, most = [], [], [], []
-                for p in (p for p in places if not kinds.get(p) and inside(p)):
-                    if p in white:
-                        offsets = [(1, -1), (-1, 1)] if climbs(p) else [(-1, -1), (1, 1)]
-                    else:
-                        offsets = packed_lattice.black_near(p, s)[2:]
-                    parents = [codes.get((p[0] + dx * s, p[1] + dy * s), (247, 0)) for dx, dy in offsets]
-                    error, radius = min(min(c[0] for c in parents), 247), max(c[1] for c in parents)
-                    y = max(error - step(p), 0)
-                    u = min(y, 12) + (min(max(y - 12, 0), 12) >> 1) + (min(max(y - 24, 0), 88) >> 3)
-                    contexts.append(256 + 32 * (p not in white) + min(u, 29))
-                    y = radius - rules.ask(stride_log + octave, max(around[p]) - min(around[p]))
-                    q = min(max(y, -6), 5) + (min(max(y - 5, 0), 23) >> 3) + (min(max(y + 6, -8), 0) >> 3)
-                    radius_contexts.append(320 + 16 * sum(radius >= v for v in (6, 20, 60)) + q + 7)
-                    asked.append(p)
-                    most.append((error, radius))
-                errors, radii = coder.row(contexts), coder.row(radius_contexts)
-                for p, (error, radius), less, more in zip(asked, most, errors, radii):
-                    codes[p] = error - less & 255, radius + unzigzag(more) & 255
-        for p in vertices:
-            if inside(p):
-                error, radius = codes[p]
-                out[p] = INERT if (error, radius) == (0, 255) else z[p] | error << 16 | radius << 24
+                        (error,), (radius,) = coder.row([402], turn + 1), coder.row([403], turn + 2)
+                        codes[p] = rule[p][0] + unzigzag(error) & 255, rule[p][1] + unzigzag(radius) & 255
+                    turn += 3 if other[p] else 1
+        for is_black, places in enumerate((lattice.whites, lattice.blacks)) if gives and stride_log + octave else ():
+            asked, contexts = [p for p in places if p in set(ordinary)], ([], [])
+            most = {}
+            for p in asked:
+                corners = [(p[0] + dx * s, p[1] + dy * s) for dx, dy in AROUND[p[0] // s % 2, p[1] // s % 2][0]]
+                parents = [codes.get(q, (247, 0)) for q in lattice.ends_first(p, corners)[1]]
+                most[p] = error, radius = min(min(c[0] for c in parents), 247), max(c[1] for c in parents)
+                y = max(error - step(p), 0)
+                u = min(y, 12) + (min(max(y - 12, 0), 12) >> 1) + (min(max(y - 24, 0), 88) >> 3)
+                contexts[0].append(256 + 32 * is_black + min(u, 29))
+                y = radius - rules.slope(stride_log + octave, max(four[p]) - min(four[p]))
+                q = min(max(y, -6), 5) + (min(max(y - 5, 0), 23) >> 3) + (min(max(y + 6, -8), 0) >> 3)
+                contexts[1].append(320 + 16 * sum(radius >= bound for bound in (6, 20, 60)) + q + 7)
+            for p, less, more in zip(asked, coder.row(contexts[0]), coder.row(contexts[1])):
+                codes[p] = most[p][0] - less & 255, most[p][1] + unzigzag(more) & 255
+        for p in vertices if gives else ():
+            if is_given(p):
+                out[p] = (0 if codes[p] == (0, 255) else z[p], *codes[p])
             else:
                 codes.pop(p, None)
     for segment in segments:
@@ -248,21 +252,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
     return out
 
 
-def slot_of(k, x, y):
-    """Where the unpacked file has the record of a grid point (section 2)."""
-    n = 1 << k
-    if x % n == 0 and y % n == 0:
-        return {(0, 0): 0, (n, 0): 1, (n, n): 2, (0, n): 3}[x, y]
-    spread = lambda v: sum((v >> i & 1) << 2 * i for i in range(v.bit_length()))
-    t = ((x | y) & -(x | y)).bit_length() - 1
-    d, u, w = k - 1 - t, x >> t, y >> t
-    if u % 2 and w % 2:
-        return (5 * 4**d + 7) // 3 + 2 * spread(w >> 1) + spread(u >> 1 ^ w >> 1)
-    a, b = (u + w - 1) // 2, (w - u + 2 ** (d + 1) - 1) // 2
-    return (8 * 4**d + 7) // 3 + 2 * spread(a ^ 2**d - 1) + spread(a ^ b ^ 2**d)
-
-
-def in_runs(data):
+def runs(data):
     """Numbers of what is present, out of runs of absent and present ones (9.1)."""
     found, at, is_present, shift, run = [], 0, False, 0, 0
     for byte in data:
@@ -273,152 +263,63 @@ def in_runs(data):
     return found
 
 
-class Unpacked:
-    """Pages of the unpacked file: those that are packed, made of records by slot, and those in runs (9.8)."""
-
-    def __init__(self, data, header, sections, by_slot, inert):
-        self.data, self.by_slot, self.inert = data, by_slot, inert
-        self.in_page = 4096 // len(inert)
-        leaves = in_runs(sections[2])
-        self.has_nodes = header[0x10] > 17
-        self.present = present = []
-        tables, at = {leaf: bytearray(4096) for leaf in leaves}, 0
-        for leaf, (less, sum_) in zip(leaves, struct.iter_unpack("<BI", sections[3]), strict=True):
-            bits = (1 << 256) - 1
-            if less < 255:
-                bits, at = int.from_bytes(sections[5][at:at + 32], "little"), at + 32
-            here = [i for i in range(256) if bits >> i & 1]
-            assert len(here) == less + 1
-            for i in here:
-                struct.pack_into("<I4sI", tables[leaf], 16 * i, 3 + len(present), sections[5][at:at + 4], 1)
-                present.append(256 * leaf + i)
-                at += 4
-            assert zlib.crc32(tables[leaf]) == sum_
-        assert at == len(sections[5]) and len(present) == struct.unpack_from("<Q", header, 0x110)[0]
-        root = bytearray(-(-16 * struct.unpack_from("<I", header, 0x7C)[0] // 4096) * 4096)
-        pages = dict.fromkeys(leaves)
-        for i, leaf in enumerate(leaves):
-            pages[leaf] = struct.pack("<III", 3 + len(present) + i, zlib.crc32(tables[leaf]), 1)
-        behind = b"".join(tables[leaf] for leaf in leaves)
-        if self.has_nodes:
-            nodes = {leaf // 256: bytearray(4096) for leaf in leaves}
-            for leaf, entry in pages.items():
-                struct.pack_into("12s", nodes[leaf // 256], 16 * (leaf % 256), entry)
-            first = 3 + len(present) + len(leaves)
-            pages = {node: struct.pack("<III", first + i, zlib.crc32(page), 1) for i, (node, page) in enumerate(nodes.items())}
-            behind += b"".join(nodes.values())
-        for i, entry in pages.items():
-            struct.pack_into("12s", root, 16 * i, entry)
-        behind += root
-        self.behind = [behind[at:at + 4096] for at in range(0, len(behind), 4096)]
-        self.first, self.runs = 3 + len(present) + len(self.behind), []
-        offset, sum_, count = struct.unpack_from("<QII", header, 0x1E8)
-        while count:
-            block = data[offset:offset + 16 + 24 * count]
-            assert zlib.crc32(block) == sum_
-            self.runs = [struct.unpack_from("<IIQII", block, 16 + 24 * i) for i in range(count)] + self.runs
-            offset, sum_, count = struct.unpack_from("<QII", block)
-
-    def page(self, number):
-        if number < 3 + len(self.present):
-            first = self.in_page * self.present[number - 3]
-            return b"".join(self.by_slot.get(first + i, self.inert) for i in range(self.in_page))
-        if number < self.first:
-            return self.behind[number - 3 - len(self.present)]
-        first, pages, at, kind, sum_ = next(run for run in self.runs if run[0] <= number < run[0] + run[1])
-        if kind == 0:
-            return self.data[at + 4096 * (number - first):][:4096]
-        table = self.data[at:at + 6 * pages]
-        assert kind == 1 and zlib.crc32(table) == sum_
-        entries = [struct.unpack_from("<IH", table, 6 * i) for i in range(pages)]
-        at += 6 * pages + sum(length for _, length in entries[:number - first])
-        base, length = entries[number - first]
-        page = self.data[at:at + length]
-        page = page if length == 4096 else zlib.decompress(page, -15)
-        return bytes(a ^ b for a, b in zip(page, self.page(base))) if base else page
-
-    def edited(self, header):
-        """Records of pages that were appended, by slot, as far as the directory leads to them (section 5)."""
-        root_page, leaves, sum_ = struct.unpack_from("<III", header, 0x78)
-        root = b"".join(self.page(root_page + i) for i in range(-(-16 * leaves // 4096)))[:16 * leaves]
-        assert zlib.crc32(root) == sum_
-        found, listed = {}, enumerate(struct.iter_unpack("<4I", root))
-        if self.has_nodes:
-            nodes = [(i, node, sum_) for i, (node, sum_, _, _) in listed if node >= self.first]
-            assert all(zlib.crc32(self.page(node)) == sum_ for _, node, sum_ in nodes)
-            listed = [(256 * i + j, leaf) for i, node, _ in nodes for j, leaf in enumerate(struct.iter_unpack("<4I", self.page(node)))]
-        for i, (leaf, sum_, _, _) in listed:
-            if leaf < self.first:
-                continue
-            entries = self.page(leaf)
-            assert zlib.crc32(entries) == sum_
-            for j, (number, sum_, _, _) in enumerate(struct.iter_unpack("<4I", entries)):
-                if number >= self.first:
-                    page = self.page(number)
-                    assert zlib.crc32(page) == sum_
-                    records = (page[at:at + len(self.inert)] for at in range(0, 4096, len(self.inert)))
-                    found.update(enumerate(records, self.in_page * (256 * i + j)))
-        return found
+def checked(data, offset, length, checksum):
+    part = data[offset:offset + length]
+    assert zlib.crc32(part) == checksum, "damaged"
+    return part
 
 
-def main(packed, target):
-    with open(packed, "rb") as file:
-        data = file.read()
+def opened(data):
+    """The header that counts, and the sections (9.1)."""
     slots = [data[at:at + 4096] for at in (0, 4096)]
     slots = [page for page in slots if zlib.crc32(page[:0xFFC]) == struct.unpack_from("<I", page, 0xFFC)[0]]
     header = max(slots, key=lambda page: struct.unpack_from("<I", page, 0x1C))
-    assert header[:10] == b"\x89IQT\r\n\x1a\n\2\0" and struct.unpack_from("<H", header, 0x100) == (1,)
-    sections = {}
-    for i in range(header[0x107]):
-        kind, sum_, offset, length = struct.unpack_from("<IIQQ", header, 0x120 + 24 * i)
-        sections[kind] = data[offset:offset + length]
-        assert zlib.crc32(sections[kind]) == sum_
-    k, (wide, high) = header[0x10], struct.unpack_from("<II", header, 0x14)
-    spacing, (step,) = struct.unpack_from("<dd", header, 0x20), struct.unpack_from("<d", header, 0x38)
-    (top,), (steps,) = struct.unpack_from("<d", header, 0x50), struct.unpack_from("<I", header, 0x58)
-    of_context, kind = tables(sections[1]), header[0x11]
-    if kind == 1:
-        rules, inert, read = Rules(step, top, steps, spacing), struct.pack("<I", INERT), tile
-    else:
-        (base,) = struct.unpack_from("<d", header, 0x30)
-        rules, inert, read = packed_exact.Rules(kind, step, base, spacing, k), packed_exact.INERT[kind], packed_exact.tile
-    groups = [(3 * g, min(6, k - 3 * g), k - 3 * g <= 6) for g in range(-(-max(k - 6, 0) // 3) + 1)]
-    by_slot, leaf, tile_root = {}, 0, sections[4]
-    listed = range(len(tile_root) // 12)
+    assert header[:10] == b"\x89IQT\r\n\x1a\n\2\0" and struct.unpack_from("<H", header, 0x100) == (1,), "no packed terrain"
+    sections = [struct.unpack_from("<IIQQ", header, 0x120 + 24 * i) for i in range(header[0x107])]
+    return header, {kind: checked(data, offset, length, checksum) for kind, checksum, offset, length in sections}
+
+
+def records(data, header, sections, rules, read):
+    """Pairs of a grid point and its record, which `read` finds in a tile's segments (9.2)."""
+    k, (wide, high), of_context, root = header[0x10], struct.unpack_from("<II", header, 0x14), tables(sections[1]), sections[4]
+    listed = range(len(root) // 12)
     if k > 17:
-        places = len(tile_root) - 12 * struct.unpack_from("<I", tile_root)[0]
-        listed, tile_root = in_runs(tile_root[4:places]), tile_root[places:]
-    tile_root = dict(zip(listed, struct.iter_unpack("<QI", tile_root), strict=True))
+        places = len(root) - 12 * struct.unpack_from("<I", root)[0]
+        listed, root = runs(root[4:places]), root[places:]
+    root, leaf = dict(zip(listed, struct.iter_unpack("<QI", root), strict=True)), -1
+    groups = [(3 * g, min(6, k - 3 * g), k - 3 * g <= 6) for g in range(-(-max(k - 6, 0) // 3) + 1)]
     for stride_log, octaves, is_top in reversed(groups):
         shift, side = stride_log + octaves, 1 << k - stride_log - octaves
         tiles = [min(side, (size - 1 >> shift) + 2) for size in (wide, high)]
-        for block in ((x, y) for y in range(0, tiles[1], 16) for x in range(0, tiles[0], 16)):
-            sizes = [min(16, tiles[axis] - block[axis]) for axis in (0, 1)]
-            offset, sum_ = tile_root.get(leaf, (0, 0))
+        for south, west in ((y, x) for y in range(0, tiles[1], 16) for x in range(0, tiles[0], 16)):
             leaf += 1
-            if offset == 0:
-                continue
-            entries = data[offset:offset + 24 * sizes[0] * sizes[1]]
-            assert zlib.crc32(entries) == sum_
-            for i in range(sizes[0] * sizes[1]):
-                at = block[0] + i % sizes[0], block[1] + i // sizes[0]
-                *place, a, b, c, sum_a, sum_b, sum_c = struct.unpack_from("<IHHHHIII", entries, 24 * i)
-                place, segments = place[0] | place[1] << 32, []
-                for length, sum_ in ((a, sum_a), (b, sum_b), (c, sum_c)):
-                    segment = data[place:place + length]
-                    assert zlib.crc32(segment) == sum_
-                    segments.append(segment)
+            across, down = min(16, tiles[0] - west), min(16, tiles[1] - south)
+            entries = checked(data, root[leaf][0], 24 * across * down, root[leaf][1]) if root.get(leaf, (0,))[0] else b""
+            for i, (low, high_bits, *lengths_and_sums) in enumerate(struct.iter_unpack("<IH3H3I", entries)):
+                place, segments = low | high_bits << 32, []
+                for length, checksum in zip(lengths_and_sums[:3], lengths_and_sums[3:]):
+                    segments.append(checked(data, place, length, checksum))
                     place += length
-                if not a:
-                    continue
-                coders = [Segment(segment, of_context) for segment in segments]
-                is_last = [at[axis] + 1 == side for axis in (0, 1)]
-                for (x, y), record in read(coders, rules, octaves, stride_log, is_top, is_last).items():
-                    x, y = (at[0] << shift) + (x << stride_log), (at[1] << shift) + (y << stride_log)
-                    by_slot[slot_of(k, x, y)] = record if kind > 1 else struct.pack("<I", record)
-    by_slot.update(Unpacked(data, header, sections, by_slot, inert).edited(header))
-    with open(target, "wb") as file:
-        file.write(b"".join(by_slot.get(slot_of(k, x, y), inert) for y in range(high) for x in range(wide)))
+                if segments[0]:
+                    at = west + i % across, south + i // across
+                    coders = [Segment(segment, of_context) for segment in segments]
+                    is_last = [at[axis] + 1 == side for axis in (0, 1)]
+                    for (x, y), record in read(coders, rules, octaves, stride_log, is_top, is_last).items():
+                        yield ((at[0] << shift) + (x << stride_log), (at[1] << shift) + (y << stride_log)), record
+
+
+def main(packed):
+    with open(packed, "rb") as file:
+        data = file.read()
+    header, sections = opened(data)
+    if header[0x11] != 1 or struct.unpack_from("<I", header, 0xE8) != (0,):
+        sys.exit(f"{packed}: it has exact records or edits, which read_packed_all.py reads")
+    rules, (wide, high) = Rules(header), struct.unpack_from("<II", header, 0x14)
+    found = dict(records(data, header, sections, rules, tile))
+    print("x,y,height_m,error_m,radius_m,height_code,error_code,radius_code")
+    for x, y in ((x, y) for y in range(high) for x in range(wide)):
+        codes = found.get((x, y), (0, 0, 255))
+        print(x, y, *("" if m is None else repr(m) for m in rules.metres(x, y, *codes)), *codes, sep=",")
 
 
 if __name__ == "__main__":

@@ -4,12 +4,15 @@ mod common;
 
 use common::packed::{Bench, dem, options};
 use common::{MemoryDem, build_bytes};
+use std::ffi::OsStr;
 use std::path::Path;
+use std::process::Command;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
-use terrasoar_layout::grid::record::{RecordCodec, RecordKind};
+use terrasoar_layout::grid::record::{RecordCodec, RecordKind, VertexClass};
+use terrasoar_layout::read::kinds::ByKind;
 use terrasoar_layout::read::records::Records;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
@@ -22,7 +25,7 @@ fn a_reader_written_from_the_specification_agrees() {
         eprintln!("no Python here: not compared");
         return;
     }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data-scripts/read_packed.py");
+    let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data-scripts");
     for (size, roughness, voids, exact) in [
         ([150, 131], 4, 2, None),
         ([70, 9], 900, 0, None),
@@ -38,7 +41,7 @@ fn a_reader_written_from_the_specification_agrees() {
                 &options().record(Some(RecordKind::Exact8)),
             ),
         };
-        compare(&script, &bytes.unwrap(), size, 0);
+        compare(&scripts, &bytes.unwrap(), size, 0);
     }
     // A directory with nodes, in a square of 2^18 steps: void, but for both ends of a strip.
     let size = [131_100, 4];
@@ -47,20 +50,32 @@ fn a_reader_written_from_the_specification_agrees() {
         0..20 | 131_050.. => ground.sample(x % 131_050, y),
         _ => f64::NAN,
     });
-    compare(&script, &build_bytes(&strip, &options()).unwrap(), size, 131_060);
+    compare(&scripts, &build_bytes(&strip, &options()).unwrap(), size, 131_060);
 }
 
-/// Packs a terrain file and holds what the script reads against its records; as it is, and after edits from column `west` on and an undo.
-fn compare(script: &Path, bytes: &[u8], size: [u32; 2], west: u32) {
+/// Packs a terrain file and holds what both readers read against its records, the small one where it can; as it is, and after edits from column `west` on and an undo.
+fn compare(scripts: &Path, bytes: &[u8], size: [u32; 2], west: u32) {
     let bench = Bench::of(bytes).unwrap();
     let out = bench.plain.with_file_name("records");
+    let run = |args: &[&OsStr]| Command::new("python3").arg("-B").args(args).output().unwrap();
+    let [small, whole] = ["read_packed.py", "read_packed_all.py"].map(|name| scripts.join(name));
     let read = || {
-        let args = [script.as_os_str(), bench.packed.as_os_str(), out.as_os_str()];
-        let ran = std::process::Command::new("python3").args(args).output().unwrap();
+        let args = [whole.as_os_str(), bench.packed.as_os_str(), out.as_os_str()];
+        let ran = run(&args);
         assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
         check_records(&bench.bytes(&out), &bench.plain, size);
     };
     read();
+    let read_small = || run(&[small.as_os_str(), bench.packed.as_os_str()]);
+    let words = "which read_packed_all.py reads";
+    let is_compact = Terrain::open(&bench.plain).unwrap().header().record_kind == RecordKind::Compact;
+    let ran = read_small();
+    if is_compact {
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        check_samples(&String::from_utf8(ran.stdout).unwrap(), &bench.plain, size);
+    } else {
+        assert!(!ran.status.success() && String::from_utf8_lossy(&ran.stderr).contains(words));
+    }
     // Edited, and back by one commit.
     for path in [&bench.plain, &bench.packed] {
         let mut session = EditSession::open(path).unwrap();
@@ -79,6 +94,37 @@ fn compare(script: &Path, bytes: &[u8], size: [u32; 2], west: u32) {
         session.undo().unwrap();
     }
     read();
+    let ran = read_small();
+    assert!(!ran.status.success() && String::from_utf8_lossy(&ran.stderr).contains(words));
+}
+
+/// Whether the lines that the small reader wrote are the samples of a terrain file of compact records: codes, and metres to the last bit.
+fn check_samples(lines: &str, plain: &Path, size: [u32; 2]) {
+    let plain = Terrain::open(plain).unwrap();
+    let records = plain.records().unwrap();
+    let ByKind::Compact(records) = records else { panic!("other records") };
+    let mut count = 0;
+    for (line, i) in lines.lines().skip(1).zip(0u32..) {
+        let [x, y, height, error, radius, codes @ ..] = &line.split(',').collect::<Vec<_>>()[..] else {
+            panic!("{line}")
+        };
+        let point = GridPoint::new(i % size[0], i / size[0]);
+        assert_eq!([x.parse(), y.parse()], [Ok(point.x()), Ok(point.y())]);
+        let vertex = records.vertex_at(point);
+        let [low, high, error_code, radius_code] =
+            records.raw(slot_of(plain.grid().k(), point)).to_le_bytes();
+        let wanted = [u16::from_le_bytes([low, high]), error_code.into(), radius_code.into()];
+        assert_eq!(codes, wanted.map(|code| code.to_string()), "{line}");
+        let is_void = !matches!(vertex.class, VertexClass::Plain | VertexClass::Fringe);
+        let height_m = (!is_void).then_some(vertex.height_m);
+        assert_eq!(
+            [height.parse().ok(), error.parse().ok(), radius.parse().ok()],
+            [height_m, Some(vertex.error_m), Some(vertex.radius_m)],
+            "{line}"
+        );
+        count += 1;
+    }
+    assert_eq!(count, size[0] * size[1]);
 }
 
 /// Heights that no step divides.

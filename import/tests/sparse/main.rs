@@ -66,15 +66,18 @@ fn is_there(x: u32, y: u32) -> bool {
 
 const THERE: [[u32; 2]; 2] = [[20, 20], [69, 69]];
 
+/// What the sample of a column and row is.
+type Wanted = Box<dyn Fn(u32, u32) -> Option<i16>>;
+
 /// All kinds of small files, with what their samples are.
-fn small(folder: &TempDir) -> Vec<(PathBuf, Box<dyn Fn(u32, u32) -> Option<i16>>)> {
+fn small(folder: &TempDir) -> Vec<(PathBuf, Wanted)> {
     let image = heights(70, 16, &THERE);
     let said = |x, y| is_there(x, y).then(|| height(x, y));
     let or_zero = move |x, y| Some(said(x, y).unwrap_or(0));
-    let mut files: Vec<(PathBuf, Box<dyn Fn(u32, u32) -> Option<i16>>)> = Vec::new();
+    let mut files: Vec<(PathBuf, Wanted)> = Vec::new();
     let nodata = Image { nodata: Some("-9999"), ..image.clone() };
-    files.push((file(folder, "nodata.tif", &[nodata.clone()]), Box::new(said)));
-    files.push((file(folder, "plain.tif", &[image.clone()]), Box::new(or_zero)));
+    files.push((file(folder, "nodata.tif", std::slice::from_ref(&nodata)), Box::new(said)));
+    files.push((file(folder, "plain.tif", std::slice::from_ref(&image)), Box::new(or_zero)));
     // Smaller images behind it change nothing.
     let smaller = Image { kind: 1, ..heights(35, 16, &[]) };
     files.push((file(folder, "overviews.tif", &[nodata, smaller.clone()]), Box::new(said)));
@@ -103,7 +106,7 @@ fn small(folder: &TempDir) -> Vec<(PathBuf, Box<dyn Fn(u32, u32) -> Option<i16>>
             Image { bands: 2, has_alpha: true, is_unsigned: true, is_planar, ..heights(70, 16, &[]) };
         image.fill(&THERE, |x, y, band| if band == 0 { height(x, y) } else { i16::from(x % 5 > 0) });
         files.push((
-            file(folder, name, &[image.clone()]),
+            file(folder, name, std::slice::from_ref(&image)),
             Box::new(move |x, y| said(x, y).filter(|_| x % 5 > 0)),
         ));
         if is_planar {
@@ -226,7 +229,7 @@ fn what_is_void_in_the_largest_square_is_passed_over() {
     assert_eq!([counts.made, counts.heights], [stored; 2]);
 
     // Without a void value all the rest would be heights.
-    let plain = file(&folder, "plain.tif", &[image.clone()]);
+    let plain = file(&folder, "plain.tif", std::slice::from_ref(&image));
     let refused = open_with(&[plain], &options()).err().unwrap().to_string();
     assert!(refused.contains("would all be heights of 0"), "{refused}");
 
@@ -303,7 +306,7 @@ fn five_islands_are_built_within_a_minute() {
     let path = file(&folder, "five.tif", &[image]);
     let target = folder.path().join("t.iqt");
     let begun = Instant::now();
-    let dem = open_with(&[path.clone()], &OpenOptions::default()).unwrap();
+    let dem = open_with(std::slice::from_ref(&path), &OpenOptions::default()).unwrap();
     build(&*dem, &target, &BuildOptions::default().memory_mib(512), &Silent).unwrap();
     assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", begun.elapsed());
     let terrain = Terrain::open(&target).unwrap();
