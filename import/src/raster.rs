@@ -5,6 +5,7 @@
 use std::sync::{Mutex, PoisonError};
 use terrasoar_layout::dem::Window;
 use terrasoar_layout::error::LayoutError;
+use terrasoar_layout::grid::Grid;
 use terrasoar_layout::read::heights::Heights;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::read::window::SampleWindow;
@@ -35,6 +36,17 @@ impl<'t> TerrainSamples<'t> {
         let [column, row] = [window.size[0].saturating_sub(1), window.size[1].saturating_sub(1)];
         samples.with_reader(|reader| reader.samples(&window.part([column, row], [1; 2]), &mut Vec::new()))?;
         Ok(samples)
+    }
+
+    /// The grid that they are of.
+    pub(crate) fn grid(&self) -> &Grid {
+        self.terrain.grid()
+    }
+
+    /// Whether none of the samples of a part of its window has a height.
+    pub(crate) fn is_void(&self, Window { col, row, width, height }: Window) -> Result<bool, LayoutError> {
+        let part = self.window.part([col, self.window.size[1] - row - height], [width, height]);
+        self.with_reader(|reader| reader.is_void(&part))
     }
 
     /// Runs `read` with a reader that nobody else uses meanwhile.

@@ -7,8 +7,9 @@ use std::path::Path;
 use tempfile::{TempDir, tempdir};
 use terrasoar_import::difference::{Difference, Summary};
 use terrasoar_import::places::{Crs, Frame};
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, build};
-use terrasoar_layout::dem::{MemoryDem, SampleType};
+use terrasoar_layout::dem::{DemInfo, DemSource, MemoryDem, SampleSink, SampleType, Window};
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::read::window::SampleWindow;
@@ -238,4 +239,88 @@ fn what_cannot_be_brought_together_is_refused() {
     }
     let outside = SampleWindow { from: [50, 0], size: [20, 20], step: 1 };
     assert!(Difference::new(&placed, &placed, &outside).is_err());
+}
+
+/// Squares of ground in a square of voids, said to be void as a whole.
+struct Isles {
+    info: DemInfo,
+    /// Columns and rows from the north-west where they begin.
+    at: Vec<[u32; 2]>,
+    raised: f64,
+}
+
+/// Samples a side of an isle.
+const ISLE: u32 = 90;
+
+impl DemSource for Isles {
+    fn info(&self) -> &DemInfo {
+        &self.info
+    }
+
+    fn stream(&self, sink: &dyn SampleSink) -> Result<(), LayoutError> {
+        let [wide, high] = [self.info.samples_wide, self.info.samples_high];
+        let void = |col: u32, row: u32, width: u32, height: u32| match width > 0 && height > 0 {
+            true => sink.put_void(Window { col, row, width, height }),
+            false => Ok(()),
+        };
+        let mut top = 0;
+        for [col, row] in self.at.iter().copied() {
+            void(0, top, wide, row - top)?;
+            void(0, row, col, ISLE)?;
+            void(col + ISLE, row, wide - col - ISLE, ISLE)?;
+            let height = |x: u32, y: u32| f64::from((x * 7 + y * 13) % 200) + self.raised;
+            let samples: Vec<f64> =
+                (0..ISLE * ISLE).map(|i| height(col + i % ISLE, row + i / ISLE)).collect();
+            sink.put(Window { col, row, width: ISLE, height: ISLE }, &samples)?;
+            top = row + ISLE;
+        }
+        void(0, top, wide, high - top)
+    }
+}
+
+/// Islands far apart in the largest square: what is void in both is passed over, and the numbers are those of the islands.
+#[test]
+fn oceans_are_passed_over() {
+    const SIDE: u32 = 1_048_577;
+    let folder = folder();
+    let isles = |name: &str, samples: [u32; 2], corner: [f64; 2], at: &[[u32; 2]], raised: f64| {
+        let mut info = MemoryDem::from_fn([2, 2], SampleType::I16, |_, _| 0.0).info().clone();
+        [info.samples_wide, info.samples_high] = samples;
+        // 10 m a sample, from the south-west one.
+        info.georeference.pixel_to_crs =
+            Some([corner[0], 10.0, 0.0, corner[1] + 10.0 * f64::from(samples[1] - 1), 0.0, -10.0]);
+        info.georeference.epsg = Some(32633);
+        let path = folder.path().join(name);
+        let options = BuildOptions::default().spacing_m([10.0, 10.0]);
+        build(&Isles { info, at: at.to_vec(), raised }, &path, &options, &Silent).unwrap();
+        Terrain::open(&path).unwrap()
+    };
+    let at = [[0, 0], [700_000, 300_000], [SIDE - ISLE, SIDE - ISLE]];
+    let first = isles("a.iqt", [SIDE; 2], [0.0; 2], &at, 0.0);
+    let whole = SampleWindow::of(first.grid());
+    let each = u64::from(ISLE * ISLE);
+
+    // The same samples, an island of which one has and one has not.
+    let other = [at[0], [123_456, 234_567], at[1], at[2]];
+    let second = isles("b.iqt", [SIDE; 2], [0.0; 2], &other, 2.0);
+    let (summary, reduced) = Difference::new(&first, &second, &whole).unwrap().survey(2048, &Silent).unwrap();
+    assert_eq!([summary.compared, summary.changed], [3 * each; 2]);
+    assert_eq!(summary.alone, [0, each]);
+    assert!((summary.fill_m3 - 2.0 * 100.0 * 3.0 * each as f64).abs() < 1.0 && summary.cut_m3 == 0.0);
+    let shown = reduced.differences_m.iter().filter(|value| !value.is_nan()).count();
+    assert!((3..=12).contains(&shown), "{shown}");
+
+    // Part of one island, on samples of its own: the corner of the second isle, half a sample off.
+    let corner_m = [7_000_000.0 + 5.0, f64::from(SIDE - 1 - 300_000 - 89) * 10.0 + 5.0];
+    let second = isles("c.iqt", [ISLE; 2], corner_m, &[[0, 0]], 0.0);
+    let (summary, _) = Difference::new(&first, &second, &whole).unwrap().survey(2048, &Silent).unwrap();
+    let near = SampleWindow { from: [699_900, SIDE - 1 - 300_200], size: [400; 2], step: 1 };
+    let (wanted, _) = Difference::new(&first, &second, &near).unwrap().survey(2048, &Silent).unwrap();
+    assert_eq!(summary.compared, 89 * 89);
+    assert_eq!(summary.alone, [3 * each - summary.compared, 0]);
+    assert_eq!(
+        (wanted.compared, wanted.cut_m3, wanted.fill_m3),
+        (summary.compared, summary.cut_m3, summary.fill_m3)
+    );
+    assert_eq!([wanted.lowest, wanted.highest], [summary.lowest, summary.highest]);
 }

@@ -115,6 +115,58 @@ impl Raster for Difference<'_> {
     }
 }
 
+impl Difference<'_> {
+    /// Whether neither ground has a height at the samples of a window, as far as is known without a look at each. Places are computed on a mesh; between its nodes they lie no farther from the nearest than that
+    /// from its neighbours.
+    fn has_nothing(&self, window: Window) -> Result<bool, LayoutError> {
+        const NODES: usize = 9;
+        if !self.first.is_void(window)? {
+            return Ok(false);
+        }
+        let Some((here, there)) = &self.frames else { return self.second.is_void(window) };
+        let spacing_m = self.header.grid.spacing_m();
+        let south = f64::from(self.window.size[1] - window.row - window.height);
+        let from = [f64::from(window.col), south];
+        let step = [window.width, window.height].map(|side| f64::from(side - 1) / (NODES - 1) as f64);
+        let place_m = |axis: usize, at: usize| {
+            let sample = from[axis] + at as f64 * step[axis];
+            (f64::from(self.window.from[axis]) + sample * f64::from(self.window.step)) * spacing_m[axis]
+        };
+        let of_second = self.second.grid();
+        let other_m = of_second.spacing_m();
+        let mut nodes = [[[0.0; 2]; NODES]; NODES];
+        for (y, row) in nodes.iter_mut().enumerate() {
+            for (x, node) in row.iter_mut().enumerate() {
+                let place_m = [place_m(0, x), place_m(1, y)];
+                let found = here.coordinates(place_m).and_then(|place| there.place_m(place));
+                let Some(found) = found.filter(|place| place.iter().all(|v| v.is_finite())) else {
+                    return Ok(false);
+                };
+                *node = [found[0] / other_m[0], found[1] / other_m[1]];
+            }
+        }
+        let mut sides = [[0.0; 2]; 2];
+        for (axis, sides) in sides.iter_mut().enumerate() {
+            let at = |y: usize, x: usize| nodes[y][x][axis];
+            let mut apart = 0.0f64;
+            *sides = [f64::INFINITY, f64::NEG_INFINITY];
+            for (y, x) in (0..NODES).flat_map(|y| (0..NODES).map(move |x| (y, x))) {
+                *sides = [sides[0].min(at(y, x)), sides[1].max(at(y, x))];
+                apart = apart
+                    .max((at(y, x) - at(y, x.max(1) - 1)).abs())
+                    .max((at(y, x) - at(y.max(1) - 1, x)).abs());
+            }
+            // A height is made of the samples around its place.
+            *sides = [sides[0] - apart - 1.0, sides[1] + apart + 1.0];
+        }
+        let [[west, east], [south, north]] = sides;
+        match SampleWindow::within(of_second, [west, south, east, north], 1) {
+            Some(part) => self.second.with_reader(|reader| reader.is_void(&part)),
+            None => Ok(true),
+        }
+    }
+}
+
 /// Second less first; 0 where single precision does not tell them apart.
 fn difference(first: f64, second: f64) -> f64 {
     let difference = second - first;

@@ -1,7 +1,7 @@
 //! What two grounds differ by, in numbers, and as a small picture.
 //!
 //! A sample stands for the rectangle around it, one spacing wide and high: volumes are sums of differences times its area, as in any program that counts pixels. Sums are taken tile by tile and added in
-//! the order of tiles, so that threads do not show.
+//! the order of tiles, so that threads do not show. What is void in both is passed over.
 
 use super::{Difference, difference};
 use rayon::prelude::*;
@@ -82,16 +82,7 @@ impl Difference<'_> {
         let longest = size[0].max(size[1]);
         let samples = longest.div_ceil(most.max(128)).next_power_of_two().min(TILE);
         progress.stage("comparing", self.window.samples());
-        let tiles: Vec<Window> = (0..size[1])
-            .step_by(TILE as usize)
-            .flat_map(|row| (0..size[0]).step_by(TILE as usize).map(move |col| (col, row)))
-            .map(|(col, row)| Window {
-                col,
-                row,
-                width: TILE.min(size[0] - col),
-                height: TILE.min(size[1] - row),
-            })
-            .collect();
+        let tiles = self.tiles(progress)?;
         let parts: Vec<Part> = tiles
             .into_par_iter()
             .map(|window| {
@@ -115,6 +106,35 @@ impl Difference<'_> {
         }
         let summary = summed(&parts, self.header.grid.spacing_m().map(|m| m * f64::from(self.window.step)));
         Ok((summary, Reduced { size: reduced_size, samples, differences_m: reduced }))
+    }
+
+    /// Tiles in which either ground may have a height, row by row. Oceans are found from the whole down, half by half.
+    fn tiles(&self, progress: &dyn Progress) -> Result<Vec<Window>, LayoutError> {
+        let [width, height] = self.window.size;
+        let mut tiles = Vec::new();
+        let mut waiting = vec![Window { col: 0, row: 0, width, height }];
+        while let Some(window) = waiting.pop() {
+            let Window { col, row, width, height } = window;
+            if self.has_nothing(window)? {
+                progress.advance(u64::from(width) * u64::from(height));
+                continue;
+            }
+            // In halves of whole tiles.
+            let half = |side: u32| (side.div_ceil(TILE) / 2) * TILE;
+            if width.max(height) <= TILE {
+                tiles.push(window);
+            } else if width >= height {
+                let left = half(width);
+                waiting.push(Window { width: left, ..window });
+                waiting.push(Window { col: col + left, width: width - left, ..window });
+            } else {
+                let upper = half(height);
+                waiting.push(Window { height: upper, ..window });
+                waiting.push(Window { row: row + upper, height: height - upper, ..window });
+            }
+        }
+        tiles.sort_unstable_by_key(|tile| (tile.row, tile.col));
+        Ok(tiles)
     }
 
     fn part(&self, window: Window, samples: u32) -> Result<Part, LayoutError> {

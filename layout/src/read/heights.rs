@@ -66,7 +66,7 @@ impl<'t> Heights<'t> {
         window.check(self.terrain.grid())?;
         into.clear();
         into.reserve(window.size[0] as usize * window.size[1] as usize);
-        if self.terrain.header().has_voids && self.is_void(window)? {
+        if self.is_void(window)? {
             into.resize(window.size[0] as usize * window.size[1] as usize, f64::NAN);
             return Ok(());
         }
@@ -79,8 +79,15 @@ impl<'t> Heights<'t> {
         Ok(())
     }
 
-    /// Whether none of the samples of a window, which lies in the data, nor between them has a height: found from the coarsest records down, so that oceans cost next to nothing.
-    fn is_void(&mut self, window: &SampleWindow) -> Result<bool, LayoutError> {
+    /// Whether none of the samples of a window nor between them has a height: found from the coarsest records down, so that oceans cost next to nothing.
+    ///
+    /// # Errors
+    /// As [`samples`](Self::samples).
+    pub fn is_void(&mut self, window: &SampleWindow) -> Result<bool, LayoutError> {
+        window.check(self.terrain.grid())?;
+        if !self.terrain.header().has_voids {
+            return Ok(false);
+        }
         let (from, last) = (window.from, window.last());
         let mut waiting = vec![([0u32; 2], self.terrain.grid().side_steps())];
         while let Some((at, side)) = waiting.pop() {
