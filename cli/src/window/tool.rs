@@ -9,6 +9,8 @@ use terrasoar_layout::edit::{Area, Brush, BrushAction, Crater, Edit, Falloff};
 const APART: f64 = 0.35;
 /// Smallest and largest radius in metres.
 pub(crate) const RADII_M: [f64; 2] = [1.0, 20_000.0];
+/// Samples in the radius of a tool to begin with, at most.
+const FIRST_SAMPLES: f64 = 200.0;
 /// How much one step makes a tool smaller or larger.
 pub(crate) const STEP: f64 = 1.25;
 
@@ -62,9 +64,11 @@ pub(crate) struct ToolBox {
 }
 
 impl ToolBox {
-    /// A box for a terrain so many metres wide.
-    pub(crate) fn new(extent_m: [f64; 2]) -> Self {
-        let radius_m = 0.01 * extent_m[0].max(extent_m[1]);
+    /// A box for a terrain so many metres wide, with so many between samples. To begin with a tool reaches over a hundredth of it, or what is done in a moment.
+    pub(crate) fn new(extent_m: [f64; 2], spacing_m: [f64; 2]) -> Self {
+        let [share_m, most_m] =
+            [0.01 * extent_m[0].max(extent_m[1]), FIRST_SAMPLES * spacing_m[0].max(spacing_m[1])];
+        let radius_m = share_m.min(most_m);
         Self { tool: Tool::Look, radius_m: radius_m.clamp(RADII_M[0], RADII_M[1]), strength: 0.3 }
     }
 
@@ -134,7 +138,7 @@ mod tests {
     fn every_tool_makes_an_edit_that_holds_and_stays_in_its_ring() {
         let grid = Grid::new([1000, 1000], [10.0, 10.0]).unwrap();
         for tool in Tool::ALL {
-            let tools = ToolBox { tool, ..ToolBox::new([9990.0; 2]) };
+            let tools = ToolBox { tool, ..ToolBox::new([9990.0; 2], [10.0; 2]) };
             let Some(edit) = tools.edit([5000.0, 4000.0], 30.0, Some(7.0)) else {
                 assert_eq!(tool, Tool::Look);
                 continue;
@@ -148,6 +152,14 @@ mod tests {
         }
         let seen: Vec<Tool> = std::iter::successors(Some(Tool::Look), |t| Some(t.next())).take(8).collect();
         assert_eq!((seen[..7].to_vec(), seen[7]), (Tool::ALL.to_vec(), Tool::Look));
+    }
+
+    #[test]
+    fn a_tool_begins_with_a_size_that_suits_the_terrain_and_its_samples() {
+        let radius_m = |extent_m: f64, spacing_m: f64| ToolBox::new([extent_m; 2], [spacing_m; 2]).radius_m;
+        assert_eq!([radius_m(10_000.0, 10.0), radius_m(50.0, 10.0)], [100.0, RADII_M[0]]);
+        // Mostly void, a million samples wide.
+        assert_eq!([radius_m(10_485_760.0, 10.0), radius_m(1e8, 500.0)], [2000.0, RADII_M[1]]);
     }
 
     #[test]

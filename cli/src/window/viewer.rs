@@ -120,7 +120,10 @@ impl Viewer {
         let overlay = Overlay::new(&window, &display, &screen);
         let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
         let rig = sight::start(&stage, &screen, &window, &settings);
-        let tools = ToolBox::new(stage.heights().extent_m());
+        let tools = {
+            let heights = stage.heights();
+            ToolBox::new(heights.extent_m(), heights.spacing_m())
+        };
         let workshop = edit::workshop_for(&stage, &plan, &proxy);
         let mut viewer = Self {
             terrain_name: String::new(),

@@ -168,7 +168,10 @@ impl Viewer {
             Ok(stage) => {
                 self.end_recording();
                 self.take_stage(stage);
-                self.tools = ToolBox::new(self.stage.heights().extent_m());
+                self.tools = {
+                    let heights = self.stage.heights();
+                    ToolBox::new(heights.extent_m(), heights.spacing_m())
+                };
                 self.rig = sight::start(&self.stage, &self.screen, &self.window, &self.settings);
                 self.player = None;
                 self.name_terrain();
