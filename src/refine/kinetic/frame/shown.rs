@@ -86,8 +86,12 @@ impl<S: RecordStore> Kinetic<S> {
     pub(crate) fn list_written(&mut self) {
         let mut written = std::mem::take(&mut self.patch.triangles);
         let mut clusters = std::mem::replace(&mut self.nodes.clusters, Clusters::new(Dealing::Packed));
+        let shape = self.records.shape();
+        let shows_all = !shape.has_voids && !shape.grid.has_padding();
         clusters.take_written(|node, side| {
-            written.push((2 * node + side as u32, self.shown(node, self.nodes.triangle(node, side))));
+            let corners = self.nodes.triangle(node, side);
+            let shown = if shows_all { corners.unwrap_or([0; 3]) } else { self.shown(node, corners) };
+            written.push((2 * node + side as u32, shown));
         });
         self.nodes.clusters = clusters;
         self.patch.triangles = written;
