@@ -301,7 +301,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         let centre_at = square[0].midpoint(square[2]);
         probe.read(CENTRE_SLOT);
-        let centre = self.nodes.create(CENTRE, centre_at, self.first_record(CENTRE_SLOT));
+        let centre = self.nodes.create(CENTRE, centre_at, CENTRE_SLOT, self.first_record(CENTRE_SLOT));
         self.nodes.get_mut(centre).word = STATUS;
         let vertex = self.vertex_of(centre);
         let slot = self.vertices.place(centre_at, &vertex);

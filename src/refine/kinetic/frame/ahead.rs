@@ -124,6 +124,13 @@ impl Ahead {
         self.until[clock]
     }
 
+    /// Starts a clock without words again at tick `now`, with ticks `finer` times as short.
+    pub(crate) fn restart(&mut self, clock: usize, now: u64, finer: f32) {
+        self.far.restart(clock, now as u32);
+        self.until[clock] = now;
+        self.pace[clock] *= finer;
+    }
+
     /// Enters a word whose end has been looked ahead to.
     pub(crate) fn near(&mut self, entry: Entry) {
         self.looks.push(entry.node);

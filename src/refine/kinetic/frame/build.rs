@@ -98,7 +98,8 @@ impl<S: RecordStore> Kinetic<S> {
         let side_steps = self.records.grid().side_steps();
         for node in 1..PLANTED {
             let record = self.nodes.get(node);
-            let (raw, word) = tested(&self.records, judge, record.point, record.raw);
+            let slot = slot_of(self.records.grid().k(), record.point);
+            let (raw, word) = tested(&self.records, judge, record.point, slot, record.raw);
             let is_split = word & ACTIVE != 0 && self.nodes.is_complete(node, side_steps);
             let record = self.nodes.get_mut(node);
             record.raw = raw;
@@ -281,9 +282,10 @@ impl<S: RecordStore> Kinetic<S> {
             let label = parent.turn(turn);
             let here = base + (start + i) as u32;
             let point = point_of(birth);
-            let (raw, word) = tested(records, judge, point, parent.raw);
+            let slot = slot_of(k, point);
+            let (raw, word) = tested(records, judge, point, slot, parent.raw);
             let [p, q] = parent.ends(turn, label);
-            let mut node = Node { word, raw, point, parents: [NONE; 2], body: [NONE; 6] };
+            let mut node = Node::fresh(word, point, slot, raw);
             (node.body[body::P], node.body[body::Q]) = (p, q);
             let side = label >> 1;
             node.parents[side] = parent.node;
@@ -355,10 +357,16 @@ fn list_slots<S: RecordStore>(patch: &mut Patch, shown: &Shown<'_, S>, places: R
     });
 }
 
-/// The record at a point and its word; `raw` stands in for a record that is away.
+/// The record at a point, which the file has in `slot`, and its word; `raw` stands in for a record that is away.
 #[inline(always)]
-fn tested<S: RecordStore>(records: &S, judge: &Judge, point: GridPoint, raw: RawOf<S>) -> (RawOf<S>, u32) {
-    let Some(raw) = records.get(slot_of(records.grid().k(), point)) else { return (raw, UNREAD) };
+fn tested<S: RecordStore>(
+    records: &S,
+    judge: &Judge,
+    point: GridPoint,
+    slot: u64,
+    raw: RawOf<S>,
+) -> (RawOf<S>, u32) {
+    let Some(raw) = records.get(slot) else { return (raw, UNREAD) };
     let vertex = records.decode(raw, level_of(point));
     (raw, judge.word(&judge.metric().sight(records.grid().position_m(point), &vertex)))
 }

@@ -49,15 +49,25 @@ impl<S: RecordStore> Kinetic<S> {
         let is_late = |node: &u32| self.nodes.all.get(*node as usize).is_some_and(|n| n.word & !STATUS == 0);
         self.due.extend(self.late.drain(..).filter(is_late));
         if let Some((number, course)) = moved.next_course {
+            let finer_bits = self.clocks.finer_bits(number);
             for kind in [Kind::Error, Kind::Planes] {
                 for band in 0..BANDS {
                     let (from, to) = (clock_id(number, kind, band), clock_id(0, kind, band));
                     let (then, now) = (self.clocks.now(from) as u32, self.clocks.now(to) as u32);
                     // A tick less, for the two clocks' ticks begin at different points.
-                    self.move_words(from, to, |expiry| now + expiry.saturating_sub(then + 1).min(HORIZON));
+                    self.move_words(from, to, |expiry| {
+                        now + (expiry.saturating_sub(then + 1) >> finer_bits).min(HORIZON)
+                    });
                 }
             }
-            self.clocks.take_course(number, course);
+            let finer = self.clocks.take_course(number, course);
+            for clock in clock_id(number, Kind::Error, 0)..clock_id(number + 1, Kind::Error, 0) {
+                let now = self.clocks.now(clock);
+                self.queue.restart(clock, now as u32);
+                if let Some(ahead) = &mut self.ahead {
+                    ahead.restart(clock, now, finer);
+                }
+            }
         }
         self.work.expired = self.due.len() as u64;
         probe.phase(Phase::Test);
@@ -127,7 +137,7 @@ impl<S: RecordStore> Kinetic<S> {
 
 /// Calls `each` with the clocks of a set.
 #[inline(always)]
-fn each_clock(mut clocks: u128, mut each: impl FnMut(usize)) {
+pub(crate) fn each_clock(mut clocks: u128, mut each: impl FnMut(usize)) {
     while clocks != 0 {
         each(clocks.trailing_zeros() as usize);
         clocks &= clocks - 1;

@@ -9,6 +9,8 @@
 
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::capacity::give_back;
+use crate::refine::kinetic::frame::collect::each_clock;
+use crate::refine::kinetic::time::queue::Queue;
 use terrasoar_layout::read::store::RecordStore;
 
 /// Meshes with fewer words are changed vertex by vertex, whatever happens: that takes no time to speak of.
@@ -25,16 +27,17 @@ impl<S: RecordStore> Kinetic<S> {
         if entries < LEAST {
             return false;
         }
-        let mut over = 0;
-        let mut clocks = moved;
-        while clocks != 0 {
-            let clock = clocks.trailing_zeros() as usize;
-            clocks &= clocks - 1;
-            let now = self.clocks.now(clock);
-            over += self.queue.count_over(clock, now);
-            over += self.ahead.as_ref().map_or(0, |ahead| ahead.far.count_over(clock, now));
-        }
-        4 * over > QUARTERS * entries
+        let queues = [Some(&self.queue), self.ahead.as_ref().map(|ahead| &ahead.far)];
+        let is_most = |over: fn(&Queue, usize, u64) -> usize| {
+            let mut sum = 0;
+            each_clock(moved, |clock| {
+                let now = self.clocks.now(clock);
+                sum += queues.into_iter().flatten().map(|queue| over(queue, clock, now)).sum::<usize>();
+            });
+            4 * sum > QUARTERS * entries
+        };
+        // Hardly ever is there anything to be counted.
+        is_most(Queue::most_over) && is_most(Queue::count_over)
     }
 
     /// Gives up the whole mesh and all that was to be done with it.

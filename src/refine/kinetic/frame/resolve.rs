@@ -11,7 +11,7 @@ use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
 use crate::refine::kinetic::mesh::tree::Fetch;
 use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch, Words};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
-use crate::refine::kinetic::time::queue::Entry;
+use crate::refine::kinetic::time::queue::{Entry, Place};
 use crate::refine::{Phase, Probe};
 #[cfg(feature = "files")]
 use rayon::prelude::*;
@@ -21,8 +21,6 @@ use terrasoar_layout::read::store::{RawOf, RecordStore};
 
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
-/// How many words ahead memory is asked for their places in the queue.
-const ENTER_AHEAD: usize = 6;
 /// How many splits or merges ahead memory is asked for what.
 const FETCH_AHEAD: [(Fetch, usize); 3] = [(Fetch::Node, 6), (Fetch::Near, 4), (Fetch::Far, 2)];
 
@@ -72,11 +70,14 @@ impl<S: RecordStore> Kinetic<S> {
             } else {
                 batches(&mut batch, part, &mut verdicts);
             }
-            for (i, (node, (raw, word))) in part.iter().zip(&verdicts).enumerate() {
-                if let Some((_, later)) = verdicts.get(i + ENTER_AHEAD) {
-                    self.queue.prefetch(clock_of(*later), *later);
+            for (nodes, verdicts) in part.chunks(BATCH).zip(verdicts.chunks(BATCH)) {
+                let mut places = [Place::default(); BATCH];
+                for (place, (_, word)) in places.iter_mut().zip(verdicts) {
+                    *place = self.queue.place(clock_of(*word), *word);
                 }
-                self.take_verdict(*node, fresh, *raw, *word, probe);
+                for ((node, (raw, word)), place) in nodes.iter().zip(verdicts).zip(places) {
+                    self.take_verdict(*node, fresh, *raw, *word, place, probe);
+                }
             }
         }
         (self.verdicts, self.batch) = (verdicts, Some(batch));
@@ -92,11 +93,10 @@ impl<S: RecordStore> Kinetic<S> {
         judge: &Judge,
         verdicts: &mut [(RawOf<S>, u32)],
     ) {
-        let k = self.records.grid().k();
         let together = judge.makes_batches();
         for (i, (node, verdict)) in nodes.iter().zip(verdicts.iter_mut()).enumerate() {
             let node = self.nodes.get(*node);
-            let raw = if fresh { self.records.get(slot_of(k, node.point)) } else { Some(node.raw) };
+            let raw = if fresh { self.records.get(node.slot()) } else { Some(node.raw) };
             let Some(raw) = raw else { continue };
             let vertex = self.records.decode(raw, level_of(node.point));
             let at_m = self.records.grid().position_m(node.point);
@@ -120,7 +120,15 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Enters a node's new word, and lists the node if it is to be split or merged.
     #[inline(always)]
-    fn take_verdict<P: Probe>(&mut self, node: u32, fresh: bool, raw: RawOf<S>, word: u32, probe: &mut P) {
+    fn take_verdict<P: Probe>(
+        &mut self,
+        node: u32,
+        fresh: bool,
+        raw: RawOf<S>,
+        word: u32,
+        place: Place,
+        probe: &mut P,
+    ) {
         let record = self.nodes.get_mut(node);
         let (old, point) = (record.word, record.point);
         if !S::IS_COMPLETE && word == UNREAD {
@@ -136,7 +144,13 @@ impl<S: RecordStore> Kinetic<S> {
             return;
         }
         record.word = word | (old & SPLIT);
-        self.enter(clock_of(word), Entry { node, word });
+        let entry = Entry { node, word };
+        // Where pages may be away, it may go into the other queue.
+        if S::IS_COMPLETE {
+            self.queue.enter_at(place, entry)
+        } else {
+            self.enter(clock_of(word), entry)
+        }
         match (word & ACTIVE != 0, old & SPLIT != 0) {
             (true, false) => self.to_split[level_of(point) as usize].push(node),
             (false, true) => self.to_merge[level_of(point) as usize].push(node),

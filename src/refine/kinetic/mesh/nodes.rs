@@ -39,6 +39,8 @@ pub(crate) mod body {
     pub(in crate::refine::kinetic) const APEX: usize = 2;
     /// Split node: its own vertex slot. Children by label lie before it if the level is above 0.
     pub(in crate::refine::kinetic) const HERE: usize = 4;
+    /// Leaf whose record has not been read: where the file has it, low half first.
+    pub(super) const SLOT: usize = 4;
     /// Split node of level 0: its annex.
     pub(in crate::refine::kinetic) const ANNEX: usize = 5;
 }
@@ -59,6 +61,19 @@ pub(crate) struct Node<R> {
 }
 
 impl<R> Node<R> {
+    /// A leaf without parents, whose record is to be read from `slot`.
+    #[inline(always)]
+    pub(crate) fn fresh(word: u32, point: GridPoint, slot: u64, raw: R) -> Self {
+        let [low, high] = [slot as u32, (slot >> 32) as u32];
+        Self { word, raw, point, parents: [NONE; 2], body: [NONE, NONE, NONE, NONE, low, high] }
+    }
+
+    /// Where the file has the record of a leaf that has not been tested.
+    #[inline(always)]
+    pub(crate) fn slot(&self) -> u64 {
+        u64::from(self.body[body::SLOT]) | u64::from(self.body[body::SLOT + 1]) << 32
+    }
+
     /// A place that holds nothing; some record fills it.
     pub(crate) fn free(raw: R) -> Self {
         Self { word: NO_VERTEX, raw, point: GridPoint::default(), parents: [NONE; 2], body: [NONE; 6] }
@@ -100,7 +115,8 @@ impl<R: Copy> Nodes<R> {
     /// The word at a place that may have been given up since, if it is the one that was entered for it.
     #[inline(always)]
     pub(crate) fn word_if(&mut self, node: u32, entered: u32) -> Option<&mut u32> {
-        self.all.get_mut(node as usize).map(|node| &mut node.word).filter(|word| **word & !SPLIT == entered)
+        let word = &mut self.all.get_mut(node as usize)?.word;
+        if *word & !SPLIT == entered { Some(word) } else { None }
     }
 
     /// Whether the place holds a vertex. Lists of nodes may name places that have been given up since, beyond the array's end too.
@@ -120,9 +136,9 @@ impl<R: Copy> Nodes<R> {
         self.get(node).word & SPLIT != 0
     }
 
-    /// A new node beside another, without parents and certificate; `raw` stands in for its record until that is read.
-    pub(crate) fn create(&mut self, beside: u32, point: GridPoint, raw: R) -> u32 {
-        self.place(beside, Node { word: 0, raw, point, parents: [NONE; 2], body: [NONE; 6] })
+    /// A new node beside another, without parents and certificate; `raw` stands in for its record until that is read from `slot`.
+    pub(crate) fn create(&mut self, beside: u32, point: GridPoint, slot: u64, raw: R) -> u32 {
+        self.place(beside, Node::fresh(0, point, slot, raw))
     }
 
     /// A new annex of `owner`, beside it.

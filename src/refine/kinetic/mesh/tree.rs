@@ -34,7 +34,7 @@ impl<S: RecordStore> Kinetic<S> {
     pub(crate) fn plant_root(&mut self, label: usize, [apex, p, q]: [u32; 3]) {
         let centre = *self.nodes.get(CENTRE);
         let point = child_point(centre.point, level_of(centre.point), label);
-        let node = self.nodes.create(CENTRE, point, centre.raw);
+        let node = self.nodes.create(CENTRE, point, slot_of(self.records.grid().k(), point), centre.raw);
         self.nodes.get_mut(CENTRE).body[label] = node;
         self.adopt(node, CENTRE, label, [apex, p, q]);
         self.cover(node, &[apex, p, q]);
@@ -178,8 +178,9 @@ impl<S: RecordStore> Kinetic<S> {
         };
         let child = if shared == NONE {
             let at = child_point(*point, level, label);
-            self.records.prefetch(slot_of(self.records.grid().k(), at));
-            let child = self.nodes.create(node, at, self.nodes.get(node).raw);
+            let slot = slot_of(self.records.grid().k(), at);
+            self.records.prefetch(slot);
+            let child = self.nodes.create(node, at, slot, self.nodes.get(node).raw);
             self.fresh.push(child);
             child
         } else {

@@ -42,6 +42,11 @@ pub(crate) enum Kind {
     Planes,
 }
 
+/// The course of a clock.
+fn course_of(clock: usize) -> usize {
+    clock / (2 * BANDS) % COURSES
+}
+
 /// Number of a clock.
 pub(crate) const fn clock_id(course: usize, kind: Kind, band: usize) -> usize {
     course * 2 * BANDS + (kind as usize) * BANDS + band
@@ -54,8 +59,8 @@ pub(crate) struct Clocks {
     totals: [u64; CLOCKS],
     /// Units that the newest move has used.
     steps: [u64; CLOCKS],
-    /// Units a tick: 2^shift.
-    shift: u32,
+    /// Units a tick, by course: 2^shift.
+    shifts: [u32; COURSES],
     least_band_m: f64,
     /// Largest height or depth in metres: what a change of exaggeration moves.
     tallest_m: f64,
@@ -92,7 +97,7 @@ impl Clocks {
             // Expiry 0 is kept for words that are not in the queue.
             totals: [1 << shift; CLOCKS],
             steps: [0; CLOCKS],
-            shift,
+            shifts: [shift; COURSES],
             least_band_m: 4.0 * spacing_m,
             tallest_m,
             last: None,
@@ -120,8 +125,8 @@ impl Clocks {
         if step == DVec3::ZERO && !turned && raised_m + zoomed == 0.0 {
             return moved;
         }
-        let beyond = (u64::from(HORIZON) + 1) << self.shift;
         for course in 0..COURSES {
+            let beyond = (u64::from(HORIZON) + 1) << self.shifts[course];
             let used_m = self.courses[course].used_m(step) + raised_m;
             let expects_turn = self.courses[course].turn_per_m > 0.0;
             let used_rad =
@@ -168,14 +173,22 @@ impl Clocks {
         moved
     }
 
-    /// Makes new words on course `number` from now on. No word may be left on it.
-    pub(crate) fn take_course(&mut self, number: usize, course: Course) {
+    /// Makes new words on course `number` from now on. No word may be left on it, for its clocks start again; told is how many of their ticks make one of those before.
+    pub(crate) fn take_course(&mut self, number: usize, course: Course) -> f32 {
+        // The less of the way is counted, the shorter are ticks: who is tested a tick too early is tested again.
+        let shift = self.shifts[0].saturating_sub(portable::log2(1.0 / course.rate).round() as u32);
+        let finer = 2f32.powi(self.shifts[number] as i32 - shift as i32);
+        self.shifts[number] = shift;
+        for clock in (0..CLOCKS).filter(|clock| course_of(*clock) == number) {
+            self.totals[clock] = 1 << shift;
+        }
         self.courses[number] = course;
         self.current = number;
         self.newest = number;
         // What the new course will make of it is yet to be seen.
         self.way.used = 0.0;
         self.turn.used = 0.0;
+        finer
     }
 
     /// The course that new words are made on, and its number.
@@ -185,12 +198,12 @@ impl Clocks {
 
     /// Current tick of a clock; may exceed the horizon until [`Clocks::set_back`] is called.
     pub(crate) fn now(&self, clock: usize) -> u64 {
-        self.totals[clock] >> self.shift
+        self.totals[clock] >> self.shifts[course_of(clock)]
     }
 
     /// Ticks, and parts of them, that the newest move took on a clock.
     pub(crate) fn newest_step(&self, clock: usize) -> f32 {
-        self.steps[clock] as f32 / (1u64 << self.shift) as f32
+        self.steps[clock] as f32 / (1u64 << self.shifts[course_of(clock)]) as f32
     }
 
     /// Ticks of all clocks, once none exceeds the horizon.
@@ -204,13 +217,18 @@ impl Clocks {
         if now < u64::from(HORIZON) {
             return None;
         }
-        self.totals[clock] -= (now - 1) << self.shift;
+        self.totals[clock] -= (now - 1) << self.shifts[course_of(clock)];
         Some(now - 1)
     }
 
-    /// Ticks a metre.
+    /// Ticks a metre, of the clocks that new words are made on.
     pub(crate) fn ticks_per_m(&self) -> f64 {
-        UNITS_PER_M / (1u64 << self.shift) as f64
+        UNITS_PER_M / (1u64 << self.shifts[self.current]) as f64
+    }
+
+    /// How many ticks of course `number` make one of course 0: 2^bits.
+    pub(crate) fn finer_bits(&self, number: usize) -> u32 {
+        self.shifts[0] - self.shifts[number]
     }
 
     /// The metres that band `band` stands for. The last one stands for any distance.
@@ -293,7 +311,7 @@ mod tests {
     fn a_straight_flight_takes_its_course_and_uses_little_of_it() {
         let mut clocks = Clocks::new(256.0, 0.0);
         let mut taken = 0;
-        for i in 0..60 {
+        for i in 0..30 {
             let moved = clocks.move_to(pose(DVec3::Y * f64::from(10 * i)));
             if let Some((course, direction)) = moved.next_course {
                 clocks.take_course(course, direction);
@@ -303,7 +321,8 @@ mod tests {
         assert_eq!((taken, clocks.course().0), (1, 1));
         let (of_course, of_path) =
             (clocks.now(clock_id(1, Kind::Error, 3)), clocks.now(clock_id(0, Kind::Error, 3)));
-        assert!(of_path > 580 && of_course < 80, "{of_path} {of_course}");
+        let of_course = of_course >> clocks.finer_bits(1);
+        assert!(of_path > 280 && of_course < 50, "{of_path} {of_course}");
     }
 
     /// A course is flown at the lower rate once it has been kept for long, and given up for another at the first bend.
@@ -322,7 +341,7 @@ mod tests {
             }
             taken
         };
-        assert_eq!(fly(&mut clocks, 60, DVec3::Y * 10.0), [RATE]);
+        assert_eq!(fly(&mut clocks, 30, DVec3::Y * 10.0), [RATE]);
         assert_eq!(fly(&mut clocks, 200, DVec3::Y * 10.0), [STEADY_RATE]);
         assert_eq!(clocks.course().1.direction, DVec3::Y);
         let bent = DVec3::new(1.0, 9.9, 0.0);

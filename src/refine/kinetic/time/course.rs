@@ -11,13 +11,13 @@ use terrasoar_layout::portable;
 /// Share of the way along the course that is counted. A smaller one lets words last longer on course and shorter off it.
 pub(crate) const RATE: f64 = 0.1;
 /// That share on the course of an eye that has flown as straight as can be for some time.
-pub(crate) const STEADY_RATE: f64 = 0.02;
+pub(crate) const STEADY_RATE: f64 = 0.005;
 /// A course is left when more than this times its rate of the recent way was counted.
 const LEAVE: f64 = 2.5;
 /// A way is steady while no more than this share of it went off the course.
 pub(super) const STEADY: f64 = 0.003;
-/// Share of the newest frame in what has gone off the course of late: what is over for some seventy frames counts no more.
-pub(super) const LONG: f64 = 0.08;
+/// Share of the newest frame in what has gone off the course of late: what is over for some forty frames counts no more.
+pub(super) const LONG: f64 = 0.15;
 /// A course is taken only if the recent way leads this straight.
 const STRAIGHT: f64 = 0.9;
 /// How far ahead of a bend its course points.

@@ -5,3 +5,4 @@ pub(crate) mod clocks;
 pub(crate) mod course;
 pub(crate) mod queue;
 mod ring;
+mod wheel;

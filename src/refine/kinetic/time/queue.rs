@@ -1,29 +1,22 @@
 //! The expiry queue: it finds the words that are over now, without looking at any other.
 //!
-//! Each clock has a hierarchical timing wheel, after G. Varghese, T. Lauck, "Hashed and Hierarchical Timing Wheels", SOSP 1987: an entry lies on
-//! the level of the highest digit (of 6 bits) in which its expiry differs from the clock, and moves down at most once a
-//! level as the clock advances. Entries of words that have changed since are left where they are; they no longer equal the
+//! Each clock has a timing wheel (`super::wheel`): an entry lies in the slot of the highest digit in which its expiry differs from the clock. When the clock comes into the slot, the entry is
+//! looked at in each frame until it is over, or, where the clock is slow, moves down a level. Entries of words that have changed since are left where they are; they no longer equal the
 //! word and are dropped when their turn comes.
 //!
-//! Invariant: an entry's expiry is not below its wheel's tick, and differs from it in no digit above its level. Cost: a few nanoseconds to
-//! enter, the same for each level on the way out, nothing for entries whose turn has not come. All entries lie in chunks of one pool.
+//! Invariant: an entry is handed out in the first frame whose tick is not below its expiry. Cost: a few nanoseconds to
+//! enter, the same on the way out, nothing for entries whose turn has not come. All entries lie in chunks of one pool.
 
 use super::clocks::{CLOCKS, EXPIRY_BITS};
+use super::wheel::{LEVELS, NONE, PLACES, SLOTS, Wheels, frames_a_slot, level_of, over, place_of, slot_at};
 use crate::refine::kinetic::capacity::give_up;
 use crate::refine::kinetic::chunked::Chunked;
 use terrasoar_layout::read::prefetch::prefetch;
 
-/// Bits of a digit.
-const DIGIT: u32 = 6;
-/// Slots of a level.
-const SLOTS: usize = 1 << DIGIT;
-/// Levels that cover every expiry.
-const LEVELS: usize = EXPIRY_BITS.div_ceil(DIGIT) as usize;
-/// No chunk.
-const NONE: u32 = u32::MAX;
 /// Entries a chunk, which is two cache lines that a processor brings together.
 const CHUNK_ENTRIES: usize = 15;
-
+/// A slot that its wheel's tick is in is looked through in each frame, up to about so many times; where the clock is slower, its entries move down a level.
+const LOOKS: u32 = 8;
 /// How many entries ahead memory is asked for where they move to.
 const MOVE_AHEAD: usize = 6;
 
@@ -40,6 +33,10 @@ impl Entry {
     }
 }
 
+/// Where a word is to be entered, while its clock stands still.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Place(u32);
+
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 struct Chunk {
@@ -48,56 +45,10 @@ struct Chunk {
     entries: [Entry; CHUNK_ENTRIES],
 }
 
-/// The wheel of one clock. All but its heads is one cache line.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-struct Wheel {
-    /// Bit s of level l: slot s holds something.
-    occupied: [u64; LEVELS],
-    /// Entries of a level.
-    counts: [u32; LEVELS],
-    now: u32,
-    heads: [[u32; SLOTS]; LEVELS],
-}
-
-impl Wheel {
-    /// Level and slot of what is over at `expiry`.
-    #[inline(always)]
-    fn place(&self, expiry: u32) -> (usize, usize) {
-        let expiry = expiry.max(self.now);
-        let differing = expiry ^ self.now;
-        let level = (31 - (differing | 1).leading_zeros()) / DIGIT;
-        ((level as usize).min(LEVELS - 1), (expiry >> (level * DIGIT)) as usize % SLOTS)
-    }
-}
-
-const EMPTY: Wheel =
-    Wheel { now: 0, occupied: [0; LEVELS], counts: [0; LEVELS], heads: [[NONE; SLOTS]; LEVELS] };
-
-fn all_empty() -> Box<[Wheel; CLOCKS]> {
-    let all: Box<[Wheel]> = vec![EMPTY; CLOCKS].into();
-    all.try_into().unwrap_or_else(|_| unreachable!("there are as many wheels as clocks"))
-}
-
-/// The slots of a level that are over as a whole when a wheel moves on to `now`: up to the one that holds the new tick, or all of a turn that is over. Whether the turn is
-/// the same, so that levels above have none.
-#[inline(always)]
-fn over(then: u32, now: u32, level: usize) -> (u64, bool) {
-    let shift = level as u32 * DIGIT;
-    let same_turn = then >> (shift + DIGIT) == now >> (shift + DIGIT);
-    let digit = (now >> shift) % SLOTS as u32;
-    let over = match (same_turn, level) {
-        (false, _) => u64::MAX,
-        (true, 0) => u64::MAX >> (SLOTS as u32 - 1 - digit),
-        (true, _) => (1 << digit) - 1,
-    };
-    (over, same_turn)
-}
-
 /// The queue of one engine.
 #[derive(Debug)]
 pub(crate) struct Queue {
-    wheels: Box<[Wheel; CLOCKS]>,
+    wheels: Wheels,
     chunks: Chunked<Chunk, 8>,
     free: u32,
     /// Entries on their way to another level.
@@ -110,7 +61,7 @@ pub(crate) struct Queue {
 impl Queue {
     pub(crate) fn new() -> Self {
         Self {
-            wheels: all_empty(),
+            wheels: Wheels::new(),
             chunks: Chunked::default(),
             free: NONE,
             moving: Vec::new(),
@@ -121,32 +72,35 @@ impl Queue {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.wheels.len() * size_of::<Wheel>()
-            + self.chunks.bytes()
-            + self.moving.capacity() * size_of::<Entry>()
+        self.wheels.bytes() + self.chunks.bytes() + self.moving.capacity() * size_of::<Entry>()
     }
 
-    /// Asks memory for what entering a word on clock `clock` will write to.
+    /// Where a word on clock `clock` is to be entered. Asks memory for what that will write to.
     #[inline(always)]
-    pub(crate) fn prefetch(&self, clock: usize, word: u32) {
-        let wheel = &self.wheels[clock % CLOCKS];
-        let (level, slot) = wheel.place(word & ((1 << EXPIRY_BITS) - 1));
-        self.chunks.prefetch(wheel.heads[level][slot] as usize);
+    pub(crate) fn place(&self, clock: usize, word: u32) -> Place {
+        let place = self.wheels.place(clock, word & ((1 << EXPIRY_BITS) - 1));
+        self.chunks.prefetch(self.wheels.heads[place] as usize);
+        Place(place as u32)
     }
 
     /// Enters a node under its word's expiry on clock `clock`.
     #[inline(always)]
     pub(crate) fn enter(&mut self, clock: usize, entry: Entry) {
+        let place = self.wheels.place(clock, entry.expiry());
+        self.enter_at(Place(place as u32), entry);
+    }
+
+    /// Enters a node where its word belongs.
+    #[inline(always)]
+    pub(crate) fn enter_at(&mut self, place: Place, entry: Entry) {
+        let place = place.0 as usize;
         self.entries += 1;
-        let wheel = &mut self.wheels[clock % CLOCKS];
-        let (level, slot) = wheel.place(entry.expiry());
-        wheel.occupied[level] |= 1 << slot;
-        wheel.counts[level] += 1;
-        let head = &mut wheel.heads[level][slot];
+        self.wheels.counts[level_of(place)] += 1;
+        let head = &mut self.wheels.heads[place];
         if *head != NONE {
             let chunk = &mut self.chunks[*head as usize];
-            if (chunk.used as usize) < CHUNK_ENTRIES {
-                chunk.entries[chunk.used as usize] = entry;
+            if let Some(free) = chunk.entries.get_mut(chunk.used as usize) {
+                *free = entry;
                 chunk.used += 1;
                 return;
             }
@@ -163,34 +117,42 @@ impl Queue {
             chunk.entries[0] = entry;
             *head = std::mem::replace(&mut self.free, next);
         }
+        self.wheels.set_occupied(place, true);
     }
 
     /// Moves a wheel on to tick `now` and hands out all entries whose expiry is not above it.
     pub(crate) fn advance(&mut self, clock: usize, now: u64, mut due: impl FnMut(Entry)) {
-        let wheel = &mut self.wheels[clock % CLOCKS];
-        if wheel.occupied == [0; LEVELS] {
-            wheel.now = now.min(u64::from(u32::MAX)) as u32;
+        let then =
+            std::mem::replace(&mut self.wheels.now[clock % CLOCKS], now.min(u64::from(u32::MAX)) as u32);
+        if self.wheels.is_empty(clock) {
             return;
         }
         if now >= 1 << EXPIRY_BITS {
-            wheel.now = now.min(u64::from(u32::MAX)) as u32;
             return self.drain(clock, due);
         }
-        let (then, now) = (wheel.now, now as u32);
-        wheel.now = now;
+        let now = now as u32;
+        let mut open = u32::from(std::mem::take(&mut self.wheels.open[clock % CLOCKS]));
         for level in 0..LEVELS {
-            let (over, same_turn) = over(then, now, level);
-            let digit = (now >> (level as u32 * DIGIT)) % SLOTS as u32;
-            let mut slots = self.wheels[clock % CLOCKS].occupied[level] & over;
-            while slots != 0 {
-                self.take_slot(clock, level, slots.trailing_zeros() as usize, &mut due);
-                slots &= slots - 1;
-            }
+            let (end, same_turn) = over(then, now, level);
+            self.take_slots(clock, level, end, &mut due);
             if same_turn {
-                if level > 0 && self.wheels[clock % CLOCKS].occupied[level] >> digit & 1 == 1 {
-                    self.spread(clock, level, digit as usize, &mut due);
-                }
-                return;
+                // This level's slot, and those above that have been open before.
+                open = open >> level << level | 1 << level;
+                break;
+            }
+        }
+        open &= !1;
+        while open != 0 {
+            let level = open.trailing_zeros() as usize % LEVELS;
+            open &= open - 1;
+            let place = place_of(clock, level, slot_at(now, level));
+            if !self.wheels.is_occupied(place) {
+                continue;
+            }
+            if frames_a_slot(now - then, level) < LOOKS {
+                self.sift(clock, place, &mut due);
+            } else {
+                self.spread(clock, place, &mut due);
             }
         }
     }
@@ -198,19 +160,22 @@ impl Queue {
     /// Asks memory for what [`Queue::advance`] will look at: for the heads of slots, then, those having come, for what the heads name.
     #[inline(always)]
     pub(crate) fn fetch(&self, clock: usize, now: u64, heads: bool) {
-        let wheel = &self.wheels[clock % CLOCKS];
-        let now = now as u32;
+        if self.wheels.is_empty(clock) {
+            return;
+        }
+        let (then, now) = (self.wheels.now[clock % CLOCKS], now as u32);
         for level in 0..LEVELS {
-            let (over, same_turn) = over(wheel.now, now, level);
-            // The slot that the tick is in, too: what it holds moves to lower levels.
-            let digit = 1 << ((now >> (level as u32 * DIGIT)) % SLOTS as u32);
-            let mut slots = wheel.occupied[level] & (over | digit);
-            if heads && slots != 0 {
-                prefetch(&wheel.heads[level], slots.trailing_zeros() as usize);
-            }
-            while !heads && slots != 0 {
-                self.chunks.prefetch(wheel.heads[level][slots.trailing_zeros() as usize] as usize);
-                slots &= slots - 1;
+            let (end, same_turn) = over(then, now, level);
+            // The slot that the tick is in, too: what it holds is looked at.
+            let end = place_of(clock, level, end.max(slot_at(now, level) + 1));
+            let mut at = place_of(clock, level, 0);
+            while let Some(place) = self.wheels.next_occupied(at, end) {
+                if heads {
+                    prefetch(&self.wheels.heads, place);
+                    break;
+                }
+                self.chunks.prefetch(self.wheels.heads[place] as usize);
+                at = place + 1;
             }
             if same_turn {
                 return;
@@ -218,35 +183,49 @@ impl Queue {
         }
     }
 
+    /// No fewer entries than would be over if a wheel moved on to tick `now`: all of the levels that have some.
+    pub(crate) fn most_over(&self, clock: usize, now: u64) -> usize {
+        if self.wheels.is_empty(clock) {
+            return 0;
+        }
+        self.sum_over(clock, now, |place, end, count| {
+            let has_some = self.wheels.next_occupied(place, end).is_some();
+            if has_some { count } else { 0 }
+        })
+    }
+
     /// About how many entries would be over if a wheel moved on to tick `now`: those of levels that would be over as a whole, and of others the share of their slots.
     pub(crate) fn count_over(&self, clock: usize, now: u64) -> usize {
-        let wheel = &self.wheels[clock % CLOCKS];
+        self.sum_over(clock, now, |place, end, count| {
+            let all = self.wheels.count_occupied(place, place + SLOTS).max(1);
+            (self.wheels.count_occupied(place, end) * count as u64 / all) as usize
+        })
+    }
+
+    /// Sums what `of` makes of each level that a wheel passes on its way to tick `now`: from its first place and the end of what is over, and its number of entries.
+    #[inline(always)]
+    fn sum_over(&self, clock: usize, now: u64, of: impl Fn(usize, usize, usize) -> usize) -> usize {
+        let counts = self.wheels.counts_of(clock).map(|count| count as usize);
         if now >= 1 << EXPIRY_BITS {
-            return wheel.counts.iter().map(|count| *count as usize).sum();
+            return counts.iter().sum();
         }
-        let now = now as u32;
-        let mut count = 0;
-        for level in 0..LEVELS {
-            let (over, same_turn) = over(wheel.now, now, level);
-            let occupied = wheel.occupied[level];
-            if occupied & over != 0 {
-                let share = u64::from((occupied & over).count_ones()) * u64::from(wheel.counts[level]);
-                count += (share / u64::from(occupied.count_ones())) as usize;
+        let mut sum = 0;
+        for (level, count) in counts.into_iter().enumerate() {
+            let (end, same_turn) = over(self.wheels.now[clock % CLOCKS], now as u32, level);
+            if count > 0 {
+                let place = place_of(clock, level, 0);
+                sum += of(place, place + end, count);
             }
             if same_turn {
                 break;
             }
         }
-        count
+        sum
     }
 
     /// Takes all entries out; memory stays, and so do the wheels' ticks.
     pub(crate) fn clear(&mut self) {
-        for wheel in self.wheels.iter_mut() {
-            if wheel.occupied != [0; LEVELS] {
-                *wheel = Wheel { now: wheel.now, ..EMPTY };
-            }
-        }
+        self.wheels.clear();
         self.chunks.clear();
         (self.free, self.entries) = (NONE, 0);
     }
@@ -259,11 +238,7 @@ impl Queue {
     /// Takes all entries of a clock out.
     pub(crate) fn drain(&mut self, clock: usize, mut each: impl FnMut(Entry)) {
         for level in 0..LEVELS {
-            let mut slots = self.wheels[clock % CLOCKS].occupied[level];
-            while slots != 0 {
-                self.take_slot(clock, level, slots.trailing_zeros() as usize, &mut each);
-                slots &= slots - 1;
-            }
+            self.take_slots(clock, level, SLOTS, &mut each);
         }
     }
 
@@ -275,18 +250,16 @@ impl Queue {
     /// Looks through a few slots and drops entries that `keep` does not want, and all but one of those that are alike: ground that is changed back and forth under an eye that
     /// stands still gives a node the same word again and again, and the same entry with it.
     pub(crate) fn sweep_some(&mut self, keep: impl Fn(Entry) -> bool) {
-        const SLOTS_A_FRAME: usize = 64;
+        const SLOTS_A_FRAME: usize = 256;
         let mut kept = std::mem::take(&mut self.moving);
         for _ in 0..SLOTS_A_FRAME {
-            self.swept = (self.swept + 1) % (CLOCKS * LEVELS * SLOTS);
-            let (clock, level, slot) =
-                (self.swept / (LEVELS * SLOTS), self.swept / SLOTS % LEVELS, self.swept % SLOTS);
-            if self.wheels[clock % CLOCKS].occupied[level] >> slot & 1 == 1 {
-                self.take_slot(clock, level, slot, &mut |entry| kept.extend(keep(entry).then_some(entry)));
+            self.swept = (self.swept + 1) % PLACES;
+            if self.wheels.is_occupied(self.swept) {
+                self.take_slot(self.swept, &mut |entry| kept.extend(keep(entry).then_some(entry)));
                 kept.sort_unstable_by_key(|entry| (entry.node, entry.word));
                 kept.dedup();
                 for entry in kept.drain(..) {
-                    self.enter(clock, entry);
+                    self.enter(self.swept / (LEVELS * SLOTS), entry);
                 }
             }
         }
@@ -295,20 +268,20 @@ impl Queue {
 
     /// Sets the tick of an empty wheel.
     pub(crate) fn restart(&mut self, clock: usize, now: u32) {
-        debug_assert_eq!(self.wheels[clock % CLOCKS].occupied, [0; LEVELS]);
-        self.wheels[clock % CLOCKS].now = now;
+        debug_assert!(self.wheels.is_empty(clock));
+        (self.wheels.now[clock % CLOCKS], self.wheels.open[clock % CLOCKS]) = (now, 0);
     }
 
     /// Moves the entries of a slot, which the wheel's tick has reached, to lower levels.
-    fn spread(&mut self, clock: usize, level: usize, slot: usize, due: &mut impl FnMut(Entry)) {
-        let now = self.wheels[clock % CLOCKS].now;
+    fn spread(&mut self, clock: usize, place: usize, due: &mut impl FnMut(Entry)) {
+        let now = self.wheels.now[clock % CLOCKS];
         let mut moving = std::mem::take(&mut self.moving);
-        self.take_slot(clock, level, slot, &mut |entry| {
+        self.take_slot(place, &mut |entry| {
             if entry.expiry() <= now { due(entry) } else { moving.push(entry) }
         });
         for (i, entry) in moving.iter().enumerate() {
             if let Some(later) = moving.get(i + MOVE_AHEAD) {
-                self.prefetch(clock, later.word);
+                self.place(clock, later.word);
             }
             self.enter(clock, *entry);
         }
@@ -316,20 +289,75 @@ impl Queue {
         self.moving = moving;
     }
 
-    fn take_slot(&mut self, clock: usize, level: usize, slot: usize, each: &mut impl FnMut(Entry)) {
-        let wheel = &mut self.wheels[clock % CLOCKS];
-        wheel.occupied[level] &= !(1 << slot);
-        let mut at = std::mem::replace(&mut wheel.heads[level][slot], NONE);
+    /// Hands out those entries of a slot, which the wheel's tick is in, that are over. The others stay.
+    fn sift(&mut self, clock: usize, place: usize, due: &mut impl FnMut(Entry)) {
+        let now = self.wheels.now[clock % CLOCKS];
+        let (mut at, mut before, mut head) = (self.wheels.heads[place], NONE, NONE);
+        let mut out = 0;
+        while at != NONE {
+            self.chunks.prefetch(self.chunks[at as usize].next as usize);
+            let Chunk { next, used, entries } = &mut self.chunks[at as usize];
+            let (this, mut kept) = (at, 0);
+            at = *next;
+            for i in 0..(*used as usize).min(CHUNK_ENTRIES) {
+                let entry = entries[i];
+                if entry.expiry() <= now {
+                    due(entry);
+                } else {
+                    entries[kept] = entry;
+                    kept += 1;
+                }
+            }
+            out += *used - kept as u32;
+            *used = kept as u32;
+            if kept == 0 {
+                *next = std::mem::replace(&mut self.free, this);
+                continue;
+            }
+            match before {
+                NONE => head = this,
+                _ => self.chunks[before as usize].next = this,
+            }
+            before = this;
+        }
+        if before != NONE {
+            self.chunks[before as usize].next = NONE;
+        }
+        self.wheels.heads[place] = head;
+        self.wheels.counts[level_of(place)] -= out;
+        self.entries -= out as usize;
+        if head == NONE {
+            self.wheels.set_occupied(place, false);
+        } else {
+            self.wheels.open[clock % CLOCKS] |= 1 << (level_of(place) % LEVELS);
+        }
+    }
+
+    /// Takes the entries of the first `end` slots of a level out.
+    #[inline(always)]
+    fn take_slots(&mut self, clock: usize, level: usize, end: usize, each: &mut impl FnMut(Entry)) {
+        let (mut at, end) = (place_of(clock, level, 0), place_of(clock, level, end));
+        while let Some(place) = self.wheels.next_occupied(at, end) {
+            self.take_slot(place, each);
+            at = place + 1;
+        }
+    }
+
+    fn take_slot(&mut self, place: usize, each: &mut impl FnMut(Entry)) {
+        self.wheels.set_occupied(place, false);
+        let mut at = std::mem::replace(&mut self.wheels.heads[place], NONE);
+        let mut out = 0;
         while at != NONE {
             self.chunks.prefetch(self.chunks[at as usize].next as usize);
             let chunk = &mut self.chunks[at as usize];
             chunk.entries[..chunk.used as usize].iter().for_each(|entry| each(*entry));
-            self.entries -= chunk.used as usize;
-            self.wheels[clock % CLOCKS].counts[level] -= chunk.used;
+            out += chunk.used;
             let next = std::mem::replace(&mut chunk.next, self.free);
             self.free = at;
             at = next;
         }
+        self.entries -= out as usize;
+        self.wheels.counts[level_of(place)] -= out;
     }
 }
 

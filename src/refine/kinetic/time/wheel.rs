@@ -1,0 +1,157 @@
+//! Timing wheels, one a clock: which of their slots hold something, and which are over when a clock has moved on.
+//!
+//! Hierarchical timing wheels, after G. Varghese, T. Lauck, "Hashed and Hierarchical Timing Wheels", SOSP 1987: an entry lies on the level of the highest digit in which its expiry
+//! differs from the clock. Digits have 8 bits: a frame takes some hundred ticks on a straight way, so that most entries are over on the level that they were entered on.
+//!
+//! Invariant: an entry's expiry is not below its wheel's tick, and differs from it in no digit above its level. Cost: 3 KiB a wheel. A place is one number, so that finding one takes few
+//! instructions.
+
+use super::clocks::{CLOCKS, EXPIRY_BITS};
+
+/// Bits of a digit.
+const DIGIT: u32 = 8;
+/// Slots of a level.
+pub(super) const SLOTS: usize = 1 << DIGIT;
+/// Levels that cover every expiry.
+pub(super) const LEVELS: usize = EXPIRY_BITS.div_ceil(DIGIT) as usize;
+/// Levels of all wheels.
+const ALL_LEVELS: usize = CLOCKS * LEVELS;
+/// Slots of all wheels.
+pub(super) const PLACES: usize = ALL_LEVELS * SLOTS;
+/// Slots whose bits are one word.
+const WORD: usize = 64;
+/// No chunk.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// The wheels of all clocks.
+#[derive(Debug)]
+pub(super) struct Wheels {
+    /// First chunk of each slot.
+    pub heads: Box<[u32]>,
+    /// Bit p % 64 of word p / 64: the slot at place p holds something.
+    occupied: Box<[u64]>,
+    /// Entries of a level.
+    pub counts: Box<[u32; ALL_LEVELS]>,
+    /// Tick of a wheel.
+    pub now: [u32; CLOCKS],
+    /// Bit l: the slot of level l that the tick is in has entries.
+    pub open: [u8; CLOCKS],
+}
+
+impl Wheels {
+    pub(super) fn new() -> Self {
+        Self {
+            heads: vec![NONE; PLACES].into(),
+            occupied: vec![0; PLACES / WORD].into(),
+            counts: Box::new([0; ALL_LEVELS]),
+            now: [0; CLOCKS],
+            open: [0; CLOCKS],
+        }
+    }
+
+    /// Empties all wheels, whose ticks stay.
+    pub(super) fn clear(&mut self) {
+        self.heads.fill(NONE);
+        self.occupied.fill(0);
+        self.counts.fill(0);
+        self.open.fill(0);
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.heads) + size_of_val(&*self.occupied) + size_of_val(&*self.counts)
+    }
+
+    /// The place of what is over at `expiry` on a clock.
+    #[inline(always)]
+    pub(super) fn place(&self, clock: usize, expiry: u32) -> usize {
+        const { assert!(LEVELS == 3) };
+        let now = self.now[clock % CLOCKS];
+        let expiry = expiry.max(now);
+        let differing = expiry ^ now;
+        let level = usize::from(differing >= 1 << DIGIT) + usize::from(differing >= 1 << (2 * DIGIT));
+        place_of(clock, level, slot_at(expiry, level))
+    }
+
+    /// Entries of each level of a clock.
+    #[inline(always)]
+    pub(super) fn counts_of(&self, clock: usize) -> [u32; LEVELS] {
+        std::array::from_fn(|level| self.counts[clock % CLOCKS * LEVELS + level])
+    }
+
+    #[inline(always)]
+    pub(super) fn is_empty(&self, clock: usize) -> bool {
+        self.counts_of(clock) == [0; LEVELS]
+    }
+
+    /// Whether a slot holds something.
+    #[inline(always)]
+    pub(super) fn is_occupied(&self, place: usize) -> bool {
+        self.occupied[place / WORD] >> (place % WORD) & 1 == 1
+    }
+
+    /// Notes whether a slot holds something.
+    #[inline(always)]
+    pub(super) fn set_occupied(&mut self, place: usize, holds: bool) {
+        let word = &mut self.occupied[place / WORD];
+        *word = *word & !(1 << (place % WORD)) | u64::from(holds) << (place % WORD);
+    }
+
+    /// The first place from `from` on and before `end` that holds something.
+    #[inline(always)]
+    pub(super) fn next_occupied(&self, from: usize, end: usize) -> Option<usize> {
+        let mut from = from;
+        while from < end {
+            let rest = self.occupied[from / WORD] >> (from % WORD);
+            if rest != 0 {
+                return Some(from + rest.trailing_zeros() as usize).filter(|place| *place < end);
+            }
+            from = (from / WORD + 1) * WORD;
+        }
+        None
+    }
+
+    /// How many places hold something.
+    pub(super) fn count_occupied(&self, from: usize, end: usize) -> u64 {
+        let (mut at, mut count) = (from, 0);
+        while let Some(place) = self.next_occupied(at, end) {
+            (at, count) = (place + 1, count + 1);
+        }
+        count
+    }
+}
+
+/// The place of a slot.
+#[inline(always)]
+pub(super) fn place_of(clock: usize, level: usize, slot: usize) -> usize {
+    (clock % CLOCKS * LEVELS + level) * SLOTS + slot
+}
+
+/// The level of all wheels' levels that a place is on.
+#[inline(always)]
+pub(super) fn level_of(place: usize) -> usize {
+    place / SLOTS % ALL_LEVELS
+}
+
+/// How many slots of a level, from the first one, are over as a whole when a wheel moves on from `then` to `now`: up to the one that the new tick is in, or all of a turn that is over. Whether the
+/// turn is the same, so that levels above have none.
+#[inline(always)]
+pub(super) fn over(then: u32, now: u32, level: usize) -> (usize, bool) {
+    let shift = level as u32 * DIGIT;
+    let same_turn = then >> (shift + DIGIT) == now >> (shift + DIGIT);
+    // On the lowest level a slot is a tick.
+    let end = if same_turn { slot_at(now, level) + usize::from(level == 0) } else { SLOTS };
+    (end, same_turn)
+}
+
+/// The slot of a level that a tick is in.
+#[inline(always)]
+pub(super) fn slot_at(tick: u32, level: usize) -> usize {
+    (tick >> (level as u32 * DIGIT)) as usize % SLOTS
+}
+
+/// How often so many ticks go into a slot of a level.
+#[inline(always)]
+pub(super) fn frames_a_slot(ticks: u32, level: usize) -> u32 {
+    (1u32 << (level as u32 * DIGIT)).checked_div(ticks).unwrap_or(u32::MAX)
+}
