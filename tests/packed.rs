@@ -32,6 +32,7 @@ fn engines_fly_edited_packed_terrain_as_the_terrain() {
     for (samples, holes, (sample_type, record)) in [
         ([257, 257], false, compact),
         ([330, 190], true, compact),
+        ([250, 210], true, (SampleType::I16, Some(RecordKind::Fine))),
         ([260, 190], true, exact(SampleType::F32)),
         ([150, 130], false, exact(SampleType::F64)),
     ] {

@@ -120,7 +120,7 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
     let (damaged, wrong_sums) = checksums(terrain, &present, progress)?;
     let (grid, scale) = (terrain.grid(), &terrain.header().scale);
     let (records, vertices) = match terrain.header().record_kind {
-        RecordKind::Compact => {
+        RecordKind::Compact | RecordKind::Fine => {
             nesting::check(terrain, &Compact::new(grid, scale), &present, &damaged, progress)?
         }
         RecordKind::Exact8 => {

@@ -91,7 +91,7 @@ fn is_spare(bytes: &[u8], at: usize) -> bool {
 
 #[test]
 fn sound_files_are_sound() {
-    for record in [None, Some(RecordKind::Exact8)] {
+    for record in [None, Some(RecordKind::Fine), Some(RecordKind::Exact8)] {
         for sample_type in [SampleType::I16, SampleType::F64] {
             for samples in [[50, 37], [2, 2], [3, 2], [65, 65], [2, 90], [130, 70]] {
                 for holes in [false, true] {
@@ -140,7 +140,7 @@ fn a_cut_file_is_refused_at_every_length() {
 
 #[test]
 fn every_changed_byte_that_matters_is_found() {
-    for (seed, record) in [(1, None), (2, Some(RecordKind::Exact8))] {
+    for (seed, record) in [(1, None), (2, Some(RecordKind::Exact8)), (3, Some(RecordKind::Fine))] {
         let bytes = file(record);
         let mut random = Random(seed);
         for round in 0..2500 {

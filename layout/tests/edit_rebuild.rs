@@ -185,16 +185,20 @@ fn options(record: Option<RecordKind>, error: ErrorKind, spacing: [f64; 2]) -> B
     BuildOptions::default().record(record).error(error).spacing_m(spacing)
 }
 
+fn records() -> impl Strategy<Value = RecordKind> {
+    prop_oneof![2 => Just(RecordKind::Compact), 1 => Just(RecordKind::Fine), 1 => Just(RecordKind::Exact8)]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
     fn edited_records_are_a_rebuilds(
         wide in 5u32..90, high in 5u32..90, seed in any::<u64>(), voids in any::<bool>(), bounded in prop::bool::weighted(0.8),
-        exact in prop::bool::weighted(0.3), fractions in any::<bool>(), strokes in strokes(),
+        record in records(), fractions in any::<bool>(), strokes in strokes(),
     ) {
         let error = if bounded { ErrorKind::Bounded } else { ErrorKind::Step };
-        let record = if exact { Some(RecordKind::Exact8) } else { Some(RecordKind::Compact) };
+        let record = Some(record);
         let dem = dem([wide, high], seed, voids, fractions);
         let mut bench = Bench::new(&dem, &options(record, error, [10.3, 7.7]));
         for stroke in strokes {

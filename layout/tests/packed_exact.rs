@@ -1,4 +1,4 @@
-//! Packed terrain with exact records: the same terrain file, byte for byte, in whatever way it is read, edited or damaged.
+//! Packed terrain with exact and with fine records: the same terrain file, byte for byte, in whatever way it is read, edited or damaged.
 
 mod common;
 
@@ -29,9 +29,16 @@ fn dem(size: [u32; 2], sample_type: SampleType, rough_m: f64, voids: u32) -> Mem
     })
 }
 
-fn options() -> BuildOptions {
-    BuildOptions::default().record(Some(RecordKind::Exact8)).spacing_m([20.0, 25.0])
+fn options(record: RecordKind) -> BuildOptions {
+    BuildOptions::default().record(Some(record)).spacing_m([20.0, 25.0])
 }
+
+/// Samples and the kind asked for: records of 4, 8 and 16 bytes come of them.
+const KINDS: [(SampleType, RecordKind); 3] = [
+    (SampleType::F32, RecordKind::Fine),
+    (SampleType::F32, RecordKind::Exact8),
+    (SampleType::F64, RecordKind::Exact8),
+];
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
@@ -40,9 +47,10 @@ proptest! {
     fn packed_terrain_is_the_terrain(
         wide in 2u32..300, high in 2u32..300, rough in prop_oneof![Just(0.0), Just(0.3), Just(9000.0)], voids in 0u32..8,
         sample_type in prop_oneof![Just(SampleType::F32), Just(SampleType::F64), Just(SampleType::I16)], is_step: bool,
+        record in prop_oneof![Just(RecordKind::Fine), Just(RecordKind::Exact8)],
     ) {
         let error = if is_step { ErrorKind::Step } else { ErrorKind::Bounded };
-        let options = options().error(error).z_scale(if is_step { -0.3 } else { 1.0 });
+        let options = options(record).error(error).z_scale(if is_step { -0.3 } else { 1.0 });
         let bytes = build_bytes(&dem([wide, high], sample_type, rough, voids), &options).unwrap();
         let bench = Bench::of(&bytes).unwrap();
         let back = bench.plain.with_file_name("back.iqt");
@@ -55,16 +63,16 @@ proptest! {
 /// Made packed at once, as large as two groups of tiles, and smaller by what was promised.
 #[test]
 fn builds_pack_exact_records() {
-    for (sample_type, most) in [(SampleType::F32, 0.45), (SampleType::F64, 0.55)] {
+    for ((sample_type, record), most) in KINDS.into_iter().zip([0.45, 0.45, 0.55]) {
         let dem = dem([700, 530], sample_type, 0.05, 1);
         let folder = tempfile::tempdir().unwrap();
         let [packed, back] = ["packed.iqt", "back.iqt"].map(|name| folder.path().join(name));
-        build(&dem, &packed, &options().packed(true), &Silent).unwrap();
-        let plain = build_bytes(&dem, &options()).unwrap();
+        build(&dem, &packed, &options(record).packed(true), &Silent).unwrap();
+        let plain = build_bytes(&dem, &options(record)).unwrap();
         unpack(&SystemDisk, &packed, &back, &Silent).unwrap();
         assert!(std::fs::read(&back).unwrap() == plain);
         let share = std::fs::metadata(&packed).unwrap().len() as f64 / plain.len() as f64;
-        assert!(share < most, "{sample_type:?} {share}");
+        assert!(share < most, "{sample_type:?} {record:?} {share}");
         let (plain, packed) = (open_bytes(plain).unwrap(), Terrain::open_unmapped(&packed).unwrap());
         assert_eq!(verify(&packed, &|_| {}).unwrap(), verify(&plain, &|_| {}).unwrap());
         for place in [[0.0, 0.0], [133.0, 207.0], [7777.0, 9999.0], [13_980.0, 13_225.0]] {
@@ -77,8 +85,8 @@ fn builds_pack_exact_records() {
 /// The terrain file and the packed one lead the same life.
 #[test]
 fn edited_packed_terrain_is_the_edited_terrain() {
-    for sample_type in [SampleType::F32, SampleType::F64] {
-        let bytes = build_bytes(&dem([210, 160], sample_type, 0.3, 2), &options()).unwrap();
+    for (sample_type, record) in KINDS {
+        let bytes = build_bytes(&dem([210, 160], sample_type, 0.3, 2), &options(record)).unwrap();
         let bench = Bench::of(&bytes).unwrap();
         let (plain, packed, back) = (&bench.plain, &bench.packed, bench.plain.with_file_name("back.iqt"));
         let both = || [plain, packed].map(|path| EditSession::open(path).unwrap());
@@ -124,8 +132,8 @@ fn seal(bytes: &mut [u8]) {
 /// Cuts and flipped bits anywhere are told, or do no harm; nothing panics. Compact records that claim to be exact, and the other way round, are told.
 #[test]
 fn damage_is_told() {
-    for sample_type in [SampleType::F32, SampleType::F64] {
-        let bytes = build_bytes(&dem([200, 150], sample_type, 0.3, 1), &options()).unwrap();
+    for (sample_type, record) in KINDS {
+        let bytes = build_bytes(&dem([200, 150], sample_type, 0.3, 1), &options(record)).unwrap();
         let bench = Bench::of(&bytes).unwrap();
         let (packed, plain) = (bench.bytes(&bench.packed), open_bytes(bytes).unwrap());
         let look = |damaged: Vec<u8>| -> Result<(), terrasoar_layout::LayoutError> {
@@ -158,7 +166,7 @@ fn damage_is_told() {
             told += usize::from(look(damaged).is_err());
         }
         assert!(told > 250, "{told}");
-        for kind in 1..=3 {
+        for kind in 1..=4 {
             let mut other = packed.clone();
             other[0x011] = kind;
             seal(&mut other);
@@ -170,8 +178,8 @@ fn damage_is_told() {
 /// The bytes that the specification says: the same on every machine.
 #[test]
 fn packed_bytes_are_what_they_were() {
-    for (sample_type, length, sum) in
-        [(SampleType::F32, 51_553, 4_152_384_434), (SampleType::F64, 134_277, 2_859_103_161)]
+    for ((sample_type, record), length, sum) in
+        [(KINDS[0], 0, 0), (KINDS[1], 51_553, 4_152_384_434), (KINDS[2], 134_277, 2_859_103_161)]
     {
         // By whole numbers alone, so that every machine makes the same.
         let dem = MemoryDem::from_fn([150, 110], sample_type, |x, y| {
@@ -182,8 +190,8 @@ fn packed_bytes_are_what_they_were() {
                 + f64::from(((x * 37) ^ (y * 11)) % 64) / 1021.0;
             if sample_type == SampleType::F32 { f64::from(height as f32) } else { height }
         });
-        let bench = Bench::of(&build_bytes(&dem, &options()).unwrap()).unwrap();
+        let bench = Bench::of(&build_bytes(&dem, &options(record)).unwrap()).unwrap();
         let bytes = bench.bytes(&bench.packed);
-        assert_eq!((bytes.len(), crc32fast::hash(&bytes)), (length, sum), "{sample_type:?}");
+        assert_eq!((bytes.len(), crc32fast::hash(&bytes)), (length, sum), "{sample_type:?} {record:?}");
     }
 }

@@ -48,7 +48,7 @@ impl Built {
             height_range_m: header.height_range_m,
             record: header.record_kind.name(),
             record_bytes: header.record_kind.bytes(),
-            height_step_m: (header.record_kind == RecordKind::Compact).then_some(header.scale.height_step_m),
+            height_step_m: header.record_kind.has_height_codes().then_some(header.scale.height_step_m),
             heights_rounded: header.heights_rounded,
             compact_step_m,
             compact_bytes: compact_step_m.map(|_| compact_bytes),

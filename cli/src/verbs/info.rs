@@ -7,7 +7,6 @@ use super::terrain::{self, TerrainArgs};
 use anyhow::Result;
 use serde::Serialize;
 use terrasoar_layout::edit::history;
-use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::imagery::Imagery;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::verify::unused::unused_bytes;
@@ -156,7 +155,7 @@ impl Info {
             spacing_origin: terrain::spacing_origin(header),
             extent_m: header.grid.extent_m(),
             height_range_m: header.height_range_m,
-            height_step_m: (header.record_kind == RecordKind::Compact).then_some(header.scale.height_step_m),
+            height_step_m: header.record_kind.has_height_codes().then_some(header.scale.height_step_m),
             heights_rounded: header.heights_rounded,
             nodata_samples: header.nodata_samples,
             crs: terrain::crs(header),

@@ -80,7 +80,9 @@ pub fn numbers_of(header: &Header) -> Numbers {
     // The lowest integer stands for "no data".
     let fits = header.height_range_m.iter().all(|metres| (-32767.0..=32767.0).contains(metres));
     match header.record_kind {
-        RecordKind::Compact if is_whole(scale.height_base_m) && is_whole(scale.height_step_m) && fits => {
+        RecordKind::Compact | RecordKind::Fine
+            if is_whole(scale.height_base_m) && is_whole(scale.height_step_m) && fits =>
+        {
             Numbers::Int16
         }
         RecordKind::Exact16 => Numbers::Float64,

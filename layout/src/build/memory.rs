@@ -52,7 +52,7 @@ impl MemoryPlan {
         let single = sample_type.fits_f32();
         // The widest record the samples may need; the range of 16-bit integers always fits the compact one.
         let record_bytes = match (sample_type.is_integer(), single) {
-            (true, true) if options.record.is_none_or(|kind| kind == RecordKind::Compact) => 4,
+            (true, true) if options.record.is_none_or(RecordKind::has_height_codes) => 4,
             (_, true) => 8,
             (_, false) => 16,
         };

@@ -34,7 +34,9 @@ use crate::file::disk::{Disk, SystemDisk};
 use crate::file::header::{ErrorKind, Header, SpacingOrigin};
 use crate::grid::Grid;
 use crate::grid::order::corners;
-use crate::grid::record::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, VertexClass};
+use crate::grid::record::{
+    Compact, Exact8, Exact16, RadiusCodes, RecordCodec, RecordKind, RecordScale, VertexClass,
+};
 use crate::packing::{Check, publish_packed};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
@@ -158,6 +160,7 @@ pub fn build_on(
         Some(step_m) => step::in_steps(info, options.z_scale, &stats, step_m, options.head_room)?,
         None => HeightCode::choose(info, options.z_scale, &stats, options.record, options.head_room),
     };
+    let code = code.of_kind(options.record);
     let height_range_m = survey::check_heights(info, &code, &stats)?;
     let steepest_m = survey::steepest_steps_m(&spool, &grid, &code, &advance)?;
     header.record_kind = code.kind;
@@ -197,7 +200,7 @@ fn first_header(
             height_base_m: 0.0,
             height_step_m,
             error_top_m: 1.0,
-            radius_steps_per_octave: 64,
+            radius_codes: RadiusCodes::Octaves(64),
         },
         error_kind: options.error,
         has_voids: false,
@@ -240,7 +243,7 @@ impl Work<'_> {
         header.check_numbers()?;
         let (grid, scale) = (header.grid, header.scale);
         match header.record_kind {
-            RecordKind::Compact => self.run(Compact::new(&grid, &scale), header),
+            RecordKind::Compact | RecordKind::Fine => self.run(Compact::new(&grid, &scale), header),
             RecordKind::Exact8 => self.run(Exact8::new(&grid, &scale), header),
             RecordKind::Exact16 => self.run(Exact16::new(&grid, &scale), header),
         }

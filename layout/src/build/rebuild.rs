@@ -158,7 +158,7 @@ fn rebuild_kind<C: RecordCodec>(
         samples_wide: wide,
         samples_high: high,
         sample_type: match old.record_kind {
-            RecordKind::Compact => SampleType::U16,
+            RecordKind::Compact | RecordKind::Fine => SampleType::U16,
             RecordKind::Exact8 => SampleType::F32,
             RecordKind::Exact16 => SampleType::F64,
         },
@@ -256,7 +256,7 @@ fn roomy_code(path: &Path, old: &Header, room: HeightRoom) -> Result<HeightCode,
         )));
     }
     let same = same_code(old);
-    if old.record_kind != RecordKind::Compact {
+    if !old.record_kind.has_height_codes() {
         return Ok(same);
     }
     // Whole steps, so that every height stays what it is. Where the base moves, it moves by what the next edits may need, too.
@@ -275,7 +275,7 @@ fn roomy_code(path: &Path, old: &Header, room: HeightRoom) -> Result<HeightCode,
 }
 
 /// Room for slopes too: as steep as the whole range over one step.
-fn roomy_scale(old: &Header, code: &HeightCode, room: HeightRoom, steepest_m: [f64; 2]) -> RecordScale {
+fn roomy_scale(old: &Header, code: &HeightCode, room: HeightRoom, steepest_m: [f64; 3]) -> RecordScale {
     let range_m = range_with(old, room);
     let tall = range_m[1] - range_m[0];
     let steepest_m = steepest_m.map(|s| s.max(tall));

@@ -25,7 +25,7 @@ pub(super) fn check(step_m: Option<f64>, asked: Option<RecordKind>) -> Result<()
             number(step_m)
         ));
     }
-    if asked.is_some_and(|kind| kind != RecordKind::Compact) {
+    if asked.is_some_and(|kind| !kind.has_height_codes()) {
         return refused(
             "exact records keep heights as they are, in no steps; leave out one of the two".into(),
         );
@@ -133,7 +133,7 @@ fn readable_above(value: f64) -> f64 {
 pub fn compact_step_m(header: &Header) -> Option<f64> {
     let [low, high] = header.height_range_m;
     let step_m = smallest_step_m(high - low, true);
-    (header.record_kind != RecordKind::Compact && step_m.is_finite() && step_m > 0.0)
+    (!header.record_kind.has_height_codes() && step_m.is_finite() && step_m > 0.0)
         .then(|| readable_above(step_m))
 }
 

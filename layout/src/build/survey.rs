@@ -6,7 +6,7 @@ use crate::bound::{larger, largest_difference};
 use crate::dem::DemInfo;
 use crate::error::LayoutError;
 use crate::grid::Grid;
-use crate::grid::record::{RecordKind, RecordScale};
+use crate::grid::record::{RadiusCodes, RecordKind, RecordScale};
 use crate::portable::{hypot, log2, pow};
 use crate::remedy::Remedy;
 use crate::words::number;
@@ -31,7 +31,13 @@ pub(super) struct HeightCode {
 }
 
 impl HeightCode {
-    /// Chooses the smallest record that keeps every height exactly, or what the user asked for.
+    /// The code for these samples with records of a kind: fine ones have the heights of compact ones.
+    pub(super) fn of_kind(self, asked: Option<RecordKind>) -> Self {
+        let is_fine = asked == Some(RecordKind::Fine) && self.kind == RecordKind::Compact;
+        Self { kind: if is_fine { RecordKind::Fine } else { self.kind }, ..self }
+    }
+
+    /// Chooses the smallest record that keeps every height exactly, or what the user asked for. Whether compact records are to be fine ones is for [`HeightCode::of_kind`] to say.
     pub(super) fn choose(
         info: &DemInfo,
         z_scale: f64,
@@ -64,7 +70,9 @@ impl HeightCode {
         };
         let range_steps = (range / raw_step).abs();
         let (below, reach_steps) = match kind {
-            RecordKind::Compact if has_room => (codes_below(range_steps), reach_steps(range_steps)),
+            kind if kind.has_height_codes() && has_room => {
+                (codes_below(range_steps), reach_steps(range_steps))
+            }
             _ => (0.0, 0.0),
         };
         let raw_base = raw_base - below * raw_step;
@@ -83,7 +91,7 @@ impl HeightCode {
     #[inline]
     pub(super) fn code(&self, raw: f64) -> f64 {
         match self.kind {
-            RecordKind::Compact => round_whole((raw - self.raw_base) / self.raw_step),
+            RecordKind::Compact | RecordKind::Fine => round_whole((raw - self.raw_base) / self.raw_step),
             RecordKind::Exact8 => f64::from((raw * self.raw_step) as f32),
             RecordKind::Exact16 => raw * self.raw_step,
         }
@@ -130,19 +138,20 @@ fn round_whole(value: f64) -> f64 {
 /// Rows read at a time.
 const ROWS: u32 = 64;
 
-/// Steepest height difference in metres between neighbouring samples that are not void, in x and in y.
+/// Steepest height differences in metres between neighbouring samples that are not void: in x, in y, and along either diagonal, which fine records alone ask for.
 pub(super) fn steepest_steps_m(
     spool: &Spool<'_>,
     grid: &Grid,
     code: &HeightCode,
     advance: &(dyn Fn(u64) + Sync),
-) -> Result<[f64; 2], LayoutError> {
+) -> Result<[f64; 3], LayoutError> {
     let [wide, high] = grid.samples();
+    let has_diagonals = code.kind == RecordKind::Fine;
     let blocks: Vec<u32> = (0..high).step_by(ROWS as usize).collect();
     let steepest = blocks
         .into_par_iter()
         .map(|first| {
-            let mut steepest = [0.0f64; 2];
+            let mut steepest = [0.0f64; 3];
             // The row below the block belongs to it, so that no pair of rows is left out.
             let rows = first.saturating_sub(1)..(first + ROWS).min(high);
             for run in spool.land().runs(rows.start..=rows.end - 1) {
@@ -159,6 +168,11 @@ pub(super) fn steepest_steps_m(
                     steepest[0] = larger(steepest[0], largest_difference(&row, &row[1..]));
                     if follows_row {
                         steepest[1] = larger(steepest[1], largest_difference(&row, &last_row));
+                        if has_diagonals {
+                            let climbing = largest_difference(&row[1..], &last_row);
+                            let falling = largest_difference(&row, &last_row[1..]);
+                            steepest[2] = larger(steepest[2], larger(climbing, falling));
+                        }
                     }
                     std::mem::swap(&mut row, &mut last_row);
                     follows_row = true;
@@ -167,7 +181,7 @@ pub(super) fn steepest_steps_m(
             advance(u64::from(ROWS.min(high - first)) * u64::from(wide));
             Ok(steepest)
         })
-        .try_reduce(|| [0.0; 2], |a, b| Ok([a[0].max(b[0]), a[1].max(b[1])]))?;
+        .try_reduce(|| [0.0; 3], |a, b| Ok(std::array::from_fn(|i| a[i].max(b[i]))))?;
     Ok(steepest.map(|s| s * code.step_m))
 }
 
@@ -176,15 +190,42 @@ pub(super) fn record_scale(
     grid: &Grid,
     code: &HeightCode,
     range_m: [f64; 2],
-    steepest_m: [f64; 2],
+    steepest_m: [f64; 3],
 ) -> RecordScale {
     let [dx, dy] = grid.spacing_m();
-    let [gx, gy] = steepest_m;
+    let [gx, gy, diagonal] = steepest_m;
     // Largest |p_v - p_c| over its flat counterpart, for black and for white vertices.
-    let black = hypot(1.0, (gx + gy) / hypot(dx, dy));
+    let black = |rise: f64| hypot(1.0, rise / hypot(dx, dy));
     let white = hypot(dx, gx).max(hypot(dy, gy)) / dx.max(dy);
-    let stretch = black.max(white);
-    let steps = [64, 32, 16]
+    let radius_codes = match code.kind {
+        RecordKind::Fine => excess_codes(black(diagonal).max(white)),
+        _ => RadiusCodes::Octaves(steps_per_octave(black(gx + gy).max(white))),
+    };
+    let top_m = (range_m[1] - range_m[0]).max(code.reach_steps * code.step_m);
+    RecordScale {
+        height_base_m: code.base_m,
+        height_step_m: code.step_m,
+        error_top_m: (top_m * (1.0 + 1e-6)).max(code.step_m).max(1e-6),
+        radius_codes,
+    }
+}
+
+/// Radius codes of fine records that hold all radii, where no child is more than `stretch` times as far from its parent as on flat ground.
+///
+/// A radius over flat ground's lies between the stretches of what is below: it is a mean of the vertex's own and of its farthest child's. So rounding up does not add up over levels, beyond one code for the margin that keeps radii nested.
+fn excess_codes(stretch: f64) -> RadiusCodes {
+    /// What the last code stands for, in first octaves.
+    const LAST: f64 = 112.0;
+    /// Rounding up twice, by an eighth each time.
+    const ROUNDING: f64 = 1.3;
+    let holds = |octave: &i32| LAST * 2.0f64.powi(*octave) >= (stretch - 1.0) * ROUNDING;
+    let first_octave = RadiusCodes::FIRST_OCTAVES.into_iter().find(holds);
+    RadiusCodes::Excess { first_octave: first_octave.unwrap_or(*RadiusCodes::FIRST_OCTAVES.end()) }
+}
+
+/// Radius codes an octave of compact records that hold all radii, where no child is more than `stretch` times as far from its parent as on flat ground.
+fn steps_per_octave(stretch: f64) -> u32 {
+    [64, 32, 16]
         .into_iter()
         .find(|steps| {
             // Rounding up by q at each level adds up to the sum of a geometric series over levels that shrink by sqrt(2).
@@ -194,12 +235,5 @@ pub(super) fn record_scale(
             // Levels of uneven spacing shrink unevenly; a factor of two covers them.
             log2(stretch * growth * 2.0) * f64::from(*steps) <= 254.0
         })
-        .unwrap_or(8);
-    let top_m = (range_m[1] - range_m[0]).max(code.reach_steps * code.step_m);
-    RecordScale {
-        height_base_m: code.base_m,
-        height_step_m: code.step_m,
-        error_top_m: (top_m * (1.0 + 1e-6)).max(code.step_m).max(1e-6),
-        radius_steps_per_octave: steps,
-    }
+        .unwrap_or(8)
 }

@@ -72,7 +72,7 @@ impl Editor {
     pub fn new(terrain: Arc<Terrain>) -> Self {
         let (grid, scale) = (*terrain.grid(), terrain.header().scale);
         let core = match terrain.header().record_kind {
-            crate::grid::record::RecordKind::Compact => {
+            crate::grid::record::RecordKind::Compact | crate::grid::record::RecordKind::Fine => {
                 ByKind::Compact(Core::new(terrain, Compact::new(&grid, &scale)))
             }
             crate::grid::record::RecordKind::Exact8 => {

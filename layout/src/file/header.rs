@@ -12,7 +12,7 @@ use crate::dem::{About, HorizontalUnit};
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::grid::order::slot_count;
-use crate::grid::record::{RecordKind, RecordScale};
+use crate::grid::record::{RadiusCodes, RecordKind, RecordScale};
 use fields::Fields;
 use std::path::Path;
 
@@ -176,6 +176,7 @@ impl Header {
         p[..8].copy_from_slice(&MAGIC);
         put_u16(p, 0x008, 1);
         let minor = match (self.about.is_empty(), &self.history, self.imagery) {
+            _ if self.record_kind == RecordKind::Fine => 4,
             (false, ..) => 3,
             (true, Some(_), _) => 2,
             (true, None, imagery) => u16::from(imagery.is_some()),
@@ -185,6 +186,7 @@ impl Header {
         p[0x010] = self.grid.k() as u8;
         p[0x011] = match self.record_kind {
             RecordKind::Compact => 1,
+            RecordKind::Fine => 4,
             RecordKind::Exact8 => 2,
             RecordKind::Exact16 => 3,
         };
@@ -203,8 +205,17 @@ impl Header {
         put_f64(p, 0x040, self.height_range_m[0]);
         put_f64(p, 0x048, self.height_range_m[1]);
         put_f64(p, 0x050, self.scale.error_top_m);
-        let compact = self.record_kind == RecordKind::Compact;
-        put_u32(p, 0x058, if compact { self.scale.radius_steps_per_octave } else { 0 });
+        put_u32(
+            p,
+            0x058,
+            match self.scale.radius_codes {
+                RadiusCodes::Octaves(steps) if self.record_kind == RecordKind::Compact => steps,
+                RadiusCodes::Excess { first_octave } if self.record_kind == RecordKind::Fine => {
+                    first_octave as u32
+                }
+                _ => 0,
+            },
+        );
         put_u64(p, 0x060, self.nodata_samples);
         put_u64(p, 0x068, self.record_pages());
         put_u64(p, 0x070, self.stored_pages);

@@ -82,7 +82,7 @@ pub(crate) fn inert_page(kind: RecordKind) -> Box<Page> {
         page
     }
     match kind {
-        RecordKind::Compact => fill::<Compact>(),
+        RecordKind::Compact | RecordKind::Fine => fill::<Compact>(),
         RecordKind::Exact8 => fill::<Exact8>(),
         RecordKind::Exact16 => fill::<Exact16>(),
     }

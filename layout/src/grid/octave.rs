@@ -4,6 +4,11 @@
 //! IEEE 754, where `exp2` may differ in the last bit from one C library to another. Cost: a lookup to decode, a lookup and
 //! at most three comparisons to encode.
 
+/// `2^(1 / steps)` for a power of two, by repeated square roots.
+pub(crate) fn root_of_two(steps: u32) -> f64 {
+    (0..steps.trailing_zeros()).fold(2.0, |root: f64, _| root.sqrt())
+}
+
 /// Powers `2^(i / steps)` for `i` in 0..=255.
 #[derive(Debug, Clone)]
 pub struct OctaveTable {
@@ -18,10 +23,7 @@ impl OctaveTable {
     /// The table with `steps` entries an octave, a power of two from 1 to 64.
     pub fn new(steps: u32) -> Self {
         debug_assert!(steps.is_power_of_two() && steps <= 64);
-        let mut root = 2.0f64;
-        for _ in 0..steps.trailing_zeros() {
-            root = root.sqrt();
-        }
+        let root = root_of_two(steps);
         let mut powers = [1.0; 259];
         for i in 1..256 {
             // Whole octaves are set exactly, so that errors do not add up beyond one.

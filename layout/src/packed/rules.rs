@@ -4,7 +4,7 @@
 
 use crate::grid::Grid;
 use crate::grid::octave::OctaveTable;
-use crate::grid::record::{Compact, RecordCodec, RecordScale, VertexClass};
+use crate::grid::record::{Compact, RadiusCodes, RecordCodec, RecordScale, VertexClass};
 
 /// Factor on errors, and on radii, that a build applies before it rounds up.
 const ERROR_MARGIN: f64 = 1.0 + 1e-9;
@@ -43,7 +43,12 @@ impl Rules {
                 raw.map_or(TOP_RADIUS, |raw| raw.to_le_bytes()[3])
             })
         };
-        let powers = OctaveTable::new(scale.radius_steps_per_octave);
+        // Fine records go the way of exact ones.
+        let steps = match scale.radius_codes {
+            RadiusCodes::Octaves(steps) => steps,
+            RadiusCodes::Excess { .. } => 64,
+        };
+        let powers = OctaveTable::new(steps);
         let slope = |octave: u32| {
             std::array::from_fn(|i| {
                 let (octaves, part) = (i as u32 / SLOPE_STEPS, i as u32 % SLOPE_STEPS);

@@ -10,7 +10,7 @@ use super::token::TOKENS;
 use super::walk::{Scratch, walk};
 use super::wide::Width;
 use crate::grid::Grid;
-use crate::grid::record::RecordScale;
+use crate::grid::record::{RadiusCodes, RecordScale};
 use crate::mix::Random;
 use proptest::prelude::*;
 
@@ -20,7 +20,7 @@ fn rules() -> Rules {
         height_base_m: 100.0,
         height_step_m: 0.5,
         error_top_m: 3000.0,
-        radius_steps_per_octave: 32,
+        radius_codes: RadiusCodes::Octaves(32),
     };
     Rules::new(&grid, &scale)
 }

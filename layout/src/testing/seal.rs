@@ -53,7 +53,7 @@ fn settle_grid(image: &mut Image<'_>) {
         let Ok(grid) = Grid::new(samples, [1.0; 2]) else { continue };
         let Some(kind) = image.get(at + 0x011, 1).map(|kind| kind[0]) else { continue };
         let per_page = match kind {
-            1 => 1024,
+            1 | 4 => 1024,
             2 => 512,
             _ => 256,
         };

@@ -49,6 +49,7 @@ fn make_packed() -> Result<Vec<Seed>, LayoutError> {
         "packed",
         "packed islands",
         "packed edits",
+        "packed, fine",
         "packed, exact 8",
         "packed, exact 16",
         "packed nodes",
@@ -59,6 +60,7 @@ fn make_packed() -> Result<Vec<Seed>, LayoutError> {
         match name {
             "packed islands" => islands(&plain)?,
             "packed nodes" => shore(&plain)?,
+            "packed, fine" => terrain(&plain, RecordKind::Fine)?,
             "packed, exact 8" => terrain(&plain, RecordKind::Exact8)?,
             "packed, exact 16" => terrain(&plain, RecordKind::Exact16)?,
             _ => terrain(&plain, RecordKind::Compact)?,
@@ -91,9 +93,12 @@ fn make() -> Result<Vec<Seed>, LayoutError> {
         Ok::<(), LayoutError>(())
     };
     let path = at("t.iqt");
-    for (name, kind) in
-        [("compact", RecordKind::Compact), ("exact 8", RecordKind::Exact8), ("exact 16", RecordKind::Exact16)]
-    {
+    for (name, kind) in [
+        ("compact", RecordKind::Compact),
+        ("fine", RecordKind::Fine),
+        ("exact 8", RecordKind::Exact8),
+        ("exact 16", RecordKind::Exact16),
+    ] {
         terrain(&path, kind)?;
         keep(name, None)?;
     }

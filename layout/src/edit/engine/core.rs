@@ -17,7 +17,7 @@ use crate::file::bytes::Page;
 use crate::file::entries::Entry;
 use crate::file::header::Header;
 use crate::grid::GridPoint;
-use crate::grid::record::{RecordCodec, RecordKind, Vertex};
+use crate::grid::record::{RecordCodec, Vertex};
 use crate::read::store::page_of;
 use crate::read::terrain::Terrain;
 use std::sync::Arc;
@@ -335,14 +335,14 @@ impl<C: RecordCodec> Core<C> {
         let [low, high] = self.header.height_range_m;
         let range_m = [low.min(metres[0]), high.max(metres[1])];
         let needed_top_m = (range_m[1] - range_m[0]) * (1.0 + 1e-6);
-        let is_compact = self.header.record_kind == RecordKind::Compact;
-        let fits = if is_compact {
+        let has_codes = self.header.record_kind.has_height_codes();
+        let fits = if has_codes {
             codes[0] >= 0.0 && codes[1] <= LARGEST_CODE && needed_top_m <= scale.error_top_m * (1.0 + 1e-12)
         } else {
             metres.iter().all(|m| m.abs() <= 1e9)
         };
         if !fits {
-            let [holds_from, holds_to] = if is_compact {
+            let [holds_from, holds_to] = if has_codes {
                 let top_m = scale.error_top_m / (1.0 + 1e-6);
                 let codes_to = scale.height_base_m + LARGEST_CODE * scale.height_step_m;
                 [scale.height_base_m.max(high - top_m), codes_to.min(low + top_m)]
@@ -358,7 +358,7 @@ impl<C: RecordCodec> Core<C> {
                 ),
             });
         }
-        if !is_compact {
+        if !has_codes {
             scale.error_top_m = scale.error_top_m.max(needed_top_m);
             self.header.scale.error_top_m = scale.error_top_m;
         }

@@ -7,7 +7,6 @@ use crate::edit::operations::area::shared;
 use crate::edit::{Edit, Editor, HeightWindow, SampleRect};
 use crate::error::LayoutError;
 use crate::file::header::Header;
-use crate::grid::record::RecordKind;
 use crate::read::terrain::Terrain;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -111,7 +110,7 @@ fn copy(from: &HeightWindow, to: &mut HeightWindow) {
 /// Whether the records of a file can hold these heights (lowest and highest) beside its own. Slopes may still be too steep for it.
 pub fn holds_heights(header: &Header, heights_m: [f64; 2]) -> bool {
     let scale = header.scale;
-    if header.record_kind != RecordKind::Compact {
+    if !header.record_kind.has_height_codes() {
         return heights_m.iter().all(|height| height.abs() <= 1e9);
     }
     let [low, high] = header.height_range_m;

@@ -9,7 +9,6 @@ use crate::file::disk::Disk;
 use crate::file::header::Header;
 use crate::file::lock::WriteLock;
 use crate::file::slots::Slots;
-use crate::grid::record::RecordKind;
 use crate::packing::{Check, publish_packed};
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
@@ -112,7 +111,7 @@ pub fn room_for(header: &Header, heights_m: [f64; 2]) -> HeightRoom {
     let highest = if heights_m[1].is_nan() { high } else { heights_m[1].max(high) };
     let roomy = HeightRoom { lowest_m: 2.0 * lowest - low, highest_m: 2.0 * highest - high };
     let steps = (roomy.highest_m - roomy.lowest_m) / header.scale.height_step_m;
-    if header.record_kind == RecordKind::Compact && steps > 60_000.0 {
+    if header.record_kind.has_height_codes() && steps > 60_000.0 {
         return HeightRoom { lowest_m: lowest, highest_m: highest };
     }
     roomy

@@ -9,7 +9,7 @@ use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, get_f64, get_text, get_u16, get_u32, get_u64};
 use crate::file::version::{PACKED_VERSION, is_another};
 use crate::grid::Grid;
-use crate::grid::record::{RecordKind, RecordScale};
+use crate::grid::record::{RadiusCodes, RecordKind, RecordScale};
 use std::path::Path;
 
 /// A header slot of a file.
@@ -72,6 +72,7 @@ impl Fields<'_> {
         let p = &self.page[..];
         let record_kind = match p[0x011] {
             1 => RecordKind::Compact,
+            4 => RecordKind::Fine,
             2 => RecordKind::Exact8,
             3 => RecordKind::Exact16,
             _ => return Err(self.out_of_range("record_kind")),
@@ -101,10 +102,13 @@ impl Fields<'_> {
             height_base_m: get_f64(p, 0x030),
             height_step_m: get_f64(p, 0x038),
             error_top_m: get_f64(p, 0x050),
-            radius_steps_per_octave: match (record_kind, get_u32(p, 0x058)) {
-                (RecordKind::Compact, steps @ (8 | 16 | 32 | 64)) => steps,
-                (RecordKind::Exact8 | RecordKind::Exact16, 0) => 64,
-                _ => return Err(self.out_of_range("radius_steps_per_octave")),
+            radius_codes: match (record_kind, get_u32(p, 0x058)) {
+                (RecordKind::Compact, steps @ (8 | 16 | 32 | 64)) => RadiusCodes::Octaves(steps),
+                (RecordKind::Fine, octave) if RadiusCodes::FIRST_OCTAVES.contains(&(octave as i32)) => {
+                    RadiusCodes::Excess { first_octave: octave as i32 }
+                }
+                (RecordKind::Exact8 | RecordKind::Exact16, 0) => RadiusCodes::Octaves(64),
+                _ => return Err(self.out_of_range("radius_codes")),
             },
         })
     }

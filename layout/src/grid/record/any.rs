@@ -1,4 +1,4 @@
-//! The codec of a file, of whichever kind.
+//! The codec of a file, of whichever kind. Compact and fine records have one codec with two sets of tables.
 
 use super::{Compact, Exact8, Exact16, RecordCodec, RecordKind, RecordScale, Vertex};
 use crate::grid::Grid;
@@ -15,7 +15,7 @@ pub(crate) enum AnyCodec {
 impl AnyCodec {
     pub(crate) fn new(kind: RecordKind, grid: &Grid, scale: &RecordScale) -> Self {
         match kind {
-            RecordKind::Compact => Self::Compact(Compact::new(grid, scale)),
+            RecordKind::Compact | RecordKind::Fine => Self::Compact(Compact::new(grid, scale)),
             RecordKind::Exact8 => Self::Exact8(Exact8::new(grid, scale)),
             RecordKind::Exact16 => Self::Exact16(Exact16::new(grid, scale)),
         }

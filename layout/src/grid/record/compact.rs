@@ -1,6 +1,10 @@
-//! The 4-byte record: heights in steps, errors and radii as logarithms (FORMAT.md, section 3.1).
+//! The 4-byte records, compact and fine: heights in steps, errors and radii in steps that grow with them (FORMAT.md, sections 3.1 and 3.4).
+//!
+//! Both kinds have the same fields. Fine records lend two bits of the radius to the error. So one codec decodes both, by tables that are made for the kind.
 
-use super::{RecordCodec, RecordScale, Vertex, VertexClass};
+use super::error_codes::ErrorCodes;
+use super::excess::ExcessCodes;
+use super::{RadiusCodes, RecordCodec, RecordScale, Vertex, VertexClass};
 use crate::grid::octave::OctaveTable;
 use crate::grid::{Grid, MAX_K};
 
@@ -12,57 +16,15 @@ const FRINGE_VOID: u8 = 252;
 const FRINGE_FACTORS: [f64; 4] = [1.0, 16.0, 256.0, f64::INFINITY];
 /// Levels that a grid may have.
 const PER_LEVEL: usize = 2 * MAX_K as usize;
-/// Plain error codes an octave.
-const ERROR_STEPS: u32 = 16;
 /// Fringe radius codes an octave.
 const FRINGE_RADIUS_STEPS: u32 = 8;
+/// Plain error codes that have the same upper bits.
+const ERRORS_TOGETHER: u16 = FRINGE as u16;
+/// Values of the bits that errors of fine records may have.
+const ERROR_FIELDS: usize = 1 << 10;
 
 /// Makes a rounded quotient a lower bound; comparing products then decides.
 const BELOW: f64 = 1.0 - 1e-12;
-
-/// Parts of an octave that plain errors are looked up by; a part holds one error at most.
-const PARTS_BITS: u32 = 6;
-/// Bits of a double behind those parts.
-const SHIFT: u32 = 52 - PARTS_BITS;
-/// Parts of all plain errors, and one to look ahead.
-const PARTS: usize = (FRINGE as usize / ERROR_STEPS as usize + 2) << PARTS_BITS;
-
-/// Codes of errors by the leading bits of a number.
-#[derive(Debug, Clone)]
-struct ErrorCodes {
-    /// Leading bits of the least error.
-    first: u64,
-    /// For each part, the first code that stands for at least where it begins.
-    codes: Box<[u8; PARTS]>,
-}
-
-impl ErrorCodes {
-    fn new(errors: &[f64; 256]) -> Self {
-        let first = errors[1].to_bits() >> SHIFT;
-        let mut codes = Box::new([FRINGE; PARTS]);
-        let mut code = 1;
-        for (part, place) in (0..).zip(codes.iter_mut()) {
-            let begins = f64::from_bits((first + part) << SHIFT);
-            while code < FRINGE && errors[usize::from(code)] < begins {
-                code += 1;
-            }
-            *place = code;
-        }
-        Self { first, codes }
-    }
-
-    /// The first code that stands for at least `error_m`, more than 0; [`FRINGE`] or more if none does.
-    #[inline(always)]
-    fn at_least(&self, errors: &[f64; 256], error_m: f64) -> u8 {
-        if error_m <= errors[1] {
-            return 1;
-        }
-        // Infinity and what is not a number lie behind all parts.
-        let part = (error_m.to_bits() >> SHIFT).wrapping_sub(self.first) as usize;
-        let code = self.codes.get(part).copied().unwrap_or(FRINGE);
-        code + u8::from(errors[usize::from(code)] < error_m)
-    }
-}
 
 /// The first code from `guess` on that stands for at least `value`.
 #[inline(always)]
@@ -75,45 +37,85 @@ fn first_at_least(guess: u8, value: f64, stands_for: impl Fn(u8) -> f64) -> Opti
     }
 }
 
-/// Codec of 4-byte records.
+/// Radius codes of plain vertices.
+#[derive(Debug, Clone)]
+enum PlainRadii {
+    /// Of compact records.
+    Octaves(OctaveTable),
+    /// Of fine ones.
+    Excess(ExcessCodes),
+}
+
+/// Codec of 4-byte records, compact or fine ones as the scale's radius codes have it.
 #[derive(Debug, Clone)]
 pub struct Compact {
     height_base_m: f64,
     height_step_m: f64,
     error_codes: ErrorCodes,
-    errors: [f64; 256],
+    /// The bits above the height's that tell plain errors.
+    error_mask: u32,
+    /// Metres by those bits, and factors on the radius of flat ground by a record's last byte.
+    errors: [f64; ERROR_FIELDS],
     radii: [f64; 256],
     flat_radius_m: [f64; PER_LEVEL],
     per_flat_radius: [f64; PER_LEVEL],
     edge_m: [f64; PER_LEVEL],
-    radius_steps: OctaveTable,
+    plain_radii: PlainRadii,
     fringe_radius_steps: OctaveTable,
 }
 
 impl Compact {
     /// The codec of a file with this grid and scale.
     pub fn new(grid: &Grid, scale: &RecordScale) -> Self {
-        let error_steps = OctaveTable::new(ERROR_STEPS);
-        let radius_steps = OctaveTable::new(scale.radius_steps_per_octave);
-        let bottom = scale.error_top_m / error_steps.power(FRINGE - 2);
-        let errors = std::array::from_fn(|i| match i as u8 {
-            0 => 0.0,
-            code => bottom * error_steps.power(code - 1),
-        });
+        let (count, steps, plain_radii) = match scale.radius_codes {
+            RadiusCodes::Octaves(steps) => {
+                (ERRORS_TOGETHER, 16, PlainRadii::Octaves(OctaveTable::new(steps)))
+            }
+            RadiusCodes::Excess { first_octave } => {
+                (4 * ERRORS_TOGETHER, 64, PlainRadii::Excess(ExcessCodes::new(first_octave)))
+            }
+        };
+        let error_codes = ErrorCodes::new(count, steps, scale.error_top_m);
+        let mut errors = [0.0; ERROR_FIELDS];
+        for code in 0..count {
+            let (field, lent) = Self::error_field(&plain_radii, code);
+            errors[usize::from(field) | usize::from(lent) << 8] = error_codes.metres(code);
+        }
         let per_level = |f: &dyn Fn(u32) -> f64| {
             std::array::from_fn(|l| if (l as u32) < grid.levels() { f(l as u32) } else { 0.0 })
         };
         Self {
             height_base_m: scale.height_base_m,
             height_step_m: scale.height_step_m,
-            error_codes: ErrorCodes::new(&errors),
+            error_codes,
+            error_mask: match plain_radii {
+                PlainRadii::Octaves(_) => 0xff,
+                PlainRadii::Excess(_) => ERROR_FIELDS as u32 - 1,
+            },
             errors,
-            radii: std::array::from_fn(|i| if i == 255 { 0.0 } else { radius_steps.power(i as u8) }),
+            radii: std::array::from_fn(|i| match &plain_radii {
+                // Those of inert vertices, and what no writer makes.
+                PlainRadii::Octaves(_) if i == 255 => 0.0,
+                PlainRadii::Excess(_) if i >= 252 => 0.0,
+                PlainRadii::Octaves(table) => table.power(i as u8),
+                PlainRadii::Excess(codes) => codes.factor(i as u8 >> 2),
+            }),
             flat_radius_m: per_level(&|l| grid.flat_radius_m(l)),
             per_flat_radius: per_level(&|l| BELOW / grid.flat_radius_m(l)),
             edge_m: per_level(&|l| grid.edge_m(l)),
-            radius_steps,
+            plain_radii,
             fringe_radius_steps: OctaveTable::new(FRINGE_RADIUS_STEPS),
+        }
+    }
+
+    /// The error byte of a plain error code, and the bits that the radius lends it. Counted down, so that an inert record's are 0 in either kind.
+    #[inline(always)]
+    fn error_field(radii: &PlainRadii, code: u16) -> (u8, u8) {
+        match radii {
+            PlainRadii::Octaves(_) => (code as u8, 0),
+            PlainRadii::Excess(_) => {
+                ((code % ERRORS_TOGETHER) as u8, 3u8.wrapping_sub((code / ERRORS_TOGETHER) as u8) & 3)
+            }
         }
     }
 
@@ -139,6 +141,34 @@ impl Compact {
         }
         let guess = table.index_at_least(radius_m * self.per_flat_radius[level as usize])?;
         first_at_least(guess, radius_m, |code| flat * table.power(code))
+    }
+
+    /// The last byte of a plain record, without the bits that it lends the error.
+    #[inline(always)]
+    fn plain_radius(&self, level: u32, radius_m: f64) -> Option<u8> {
+        match &self.plain_radii {
+            PlainRadii::Octaves(table) => self.radius_code(table, level, radius_m).filter(|code| *code < 255),
+            PlainRadii::Excess(codes) => {
+                let flat = self.flat_radius_m[level as usize];
+                if radius_m <= flat {
+                    return Some(0);
+                }
+                let share = radius_m * self.per_flat_radius[level as usize];
+                Some(codes.first_at_least(share, |factor| flat * factor >= radius_m)? << 2)
+            }
+        }
+    }
+
+    /// Plain error code and radius code of a record, and back: numbers that grow with what they stand for.
+    pub(crate) fn fine_codes(raw: u32) -> (u16, u8) {
+        let [_, _, error, last] = raw.to_le_bytes();
+        (u16::from(error) + ERRORS_TOGETHER * u16::from(3 - (last & 3)), last >> 2)
+    }
+
+    /// The upper half of a fine record with these codes, of which the error is a plain one.
+    pub(crate) fn of_fine_codes(error: u16, radius: u8) -> u32 {
+        let (field, lent) = ((error % ERRORS_TOGETHER) as u8, 3 - (error / ERRORS_TOGETHER).min(3) as u8);
+        u32::from(field) << 16 | u32::from(radius << 2 | lent) << 24
     }
 }
 
@@ -167,7 +197,8 @@ impl RecordCodec for Compact {
         } else {
             // The remainder keeps the level inside the table without a check; every level of a grid is below it.
             let flat_m = self.flat_radius_m[level as usize % PER_LEVEL];
-            (self.errors[usize::from(error_code)], flat_m * self.radii[usize::from(radius_code)])
+            let field = (raw >> 16 & self.error_mask) as usize % ERROR_FIELDS;
+            (self.errors[field], flat_m * self.radii[usize::from(radius_code)])
         };
         let class = match error_code {
             FRINGE_VOID.. => VertexClass::FringeVoid,
@@ -183,10 +214,11 @@ impl RecordCodec for Compact {
         if !(0.0..=65535.0).contains(&value) {
             return None;
         }
-        let error_code = if error_m <= 0.0 { 0 } else { self.error_codes.at_least(&self.errors, error_m) };
-        let radius_code = self.radius_code(&self.radius_steps, level, radius_m).filter(|code| *code < 255)?;
+        let code = self.error_codes.at_least(error_m)?;
+        let radius_code = self.plain_radius(level, radius_m)?;
         let [low, high] = (value as u16).to_le_bytes();
-        (error_code < FRINGE).then_some(u32::from_le_bytes([low, high, error_code, radius_code]))
+        let (error_code, lent) = Self::error_field(&self.plain_radii, code);
+        Some(u32::from_le_bytes([low, high, error_code, radius_code | lent]))
     }
 
     #[inline]
@@ -234,25 +266,74 @@ impl RecordCodec for Compact {
 mod tests {
     use super::*;
 
+    /// The first plain record that says at least as much, found by looking at all of them.
     #[test]
-    fn the_code_of_an_error_is_the_first_that_reaches_it() {
+    fn codes_are_the_first_that_reach() {
         let grid = Grid::new([33, 33], [10.0; 2]).unwrap();
-        for error_top_m in [1e-3, 0.7, 1.0, 1000.0, 12_345.678, 9e6] {
-            let scale = RecordScale {
-                height_base_m: 0.0,
-                height_step_m: 1.0,
-                error_top_m,
-                radius_steps_per_octave: 16,
-            };
+        let kinds = [RadiusCodes::Octaves(16), RadiusCodes::Excess { first_octave: -4 }];
+        for (error_top_m, radius_codes) in [1e-3, 0.7, 1.0, 1000.0, 12_345.678, 9e6]
+            .into_iter()
+            .flat_map(|top| kinds.map(|kind| (top, kind)))
+        {
+            let scale = RecordScale { height_base_m: 0.0, height_step_m: 1.0, error_top_m, radius_codes };
             let codec = Compact::new(&grid, &scale);
-            let exact = (1..FRINGE).map(|code| codec.errors[usize::from(code)]);
-            let around = exact.flat_map(|error_m| [error_m.next_down(), error_m, error_m.next_up()]);
+            let plain = |raw: &u32| codec.decode(*raw, 5).class == VertexClass::Plain;
+            let all: Vec<u32> = (0..=0xffff).map(|codes| codes << 16).filter(plain).collect();
+            let told = |f: &dyn Fn(Vertex) -> f64| {
+                let mut told: Vec<f64> = all.iter().map(|raw| f(codec.decode(*raw, 5))).collect();
+                told.sort_by(f64::total_cmp);
+                told.dedup();
+                told
+            };
+            let errors = told(&|v| v.error_m);
+            // The last radius code of fine records is none of a plain vertex.
+            let mut radii = told(&|v| v.radius_m);
+            let is_fine = matches!(radius_codes, RadiusCodes::Excess { .. });
+            assert_eq!((errors.len(), radii.len()), if is_fine { (992, 64) } else { (248, 256) });
+            let top_m = codec.radii[if is_fine { 4 * 62 } else { 254 }] * codec.flat_radius_m[5];
+            radii.retain(|radius| (codec.flat_radius_m[5]..=top_m).contains(radius));
+            let around = |told: &[f64]| -> Vec<f64> {
+                told.iter().flat_map(|v| [v.next_down(), *v, v.next_up()]).filter(|v| *v >= 0.0).collect()
+            };
+            let first = |told: &[f64], v: f64| told.iter().copied().find(|t| *t >= v);
             let between = (0..4000).map(|i| error_top_m * 0.997f64.powi(i));
-            for error_m in around.chain(between).chain([error_top_m * 1.01, f64::INFINITY, f64::NAN]) {
-                let naive = (1..FRINGE).find(|code| codec.errors[usize::from(*code)] >= error_m);
-                let made = codec.encode(0, 0.0, VertexClass::Plain, error_m, 0.0);
-                assert_eq!(made.map(|raw| (raw >> 16) as u8), naive, "{error_m} of {error_top_m}");
+            for error_m in around(&errors).into_iter().chain(between).chain([
+                error_top_m * 1.01,
+                f64::INFINITY,
+                f64::NAN,
+            ]) {
+                let made = codec.encode(5, 0.0, VertexClass::Plain, error_m, 0.0);
+                let told = made.map(|raw| codec.decode(raw, 5).error_m);
+                assert_eq!(told, first(&errors, error_m), "{error_m} of {error_top_m}");
+            }
+            let between = (0..4000).map(|i| top_m * 1.01 * 0.999f64.powi(i));
+            for radius_m in around(&radii).into_iter().chain(between).chain([f64::INFINITY, f64::NAN]) {
+                let made = codec.encode(5, 0.0, VertexClass::Plain, 0.0, radius_m);
+                let told = made.map(|raw| codec.decode(raw, 5).radius_m);
+                assert_eq!(told, first(&radii, radius_m), "{radius_m}");
             }
         }
+    }
+
+    #[test]
+    fn fine_codes_come_back_and_grow() {
+        let grid = Grid::new([33, 33], [10.0; 2]).unwrap();
+        let scale = RecordScale {
+            height_base_m: 0.0,
+            height_step_m: 1.0,
+            error_top_m: 100.0,
+            radius_codes: RadiusCodes::Excess { first_octave: 2 },
+        };
+        let codec = Compact::new(&grid, &scale);
+        let mut last = codec.decode(Compact::of_fine_codes(0, 0), 5);
+        for (error, radius) in (1..992).map(|error| (error, (error / 16) as u8)) {
+            let raw = Compact::of_fine_codes(error, radius);
+            assert_eq!(Compact::fine_codes(raw), (error, radius));
+            let v = codec.decode(raw, 5);
+            assert!(v.error_m > last.error_m && v.radius_m >= last.radius_m, "{v:?} {last:?}");
+            assert_eq!(v.class, VertexClass::Plain);
+            last = v;
+        }
+        assert_eq!(Compact::fine_codes(Compact::INERT), (0, 63));
     }
 }

@@ -1,4 +1,4 @@
-//! Bytes to vertices and back: the three record kinds of FORMAT.md, section 3.
+//! Bytes to vertices and back: the record kinds of FORMAT.md, section 3.
 //!
 //! Any bytes can be decoded and give some vertex. Encoding rounds errors and radii up, so that what holds for the
 //! numbers holds for the records too. A codec is a few kilobytes of tables; each decoder has a copy of its own.
@@ -6,7 +6,9 @@
 
 mod any;
 mod compact;
+mod error_codes;
 mod exact;
+mod excess;
 
 pub(crate) use any::AnyCodec;
 pub use compact::Compact;
@@ -17,6 +19,8 @@ pub use exact::{Exact8, Exact16};
 pub enum RecordKind {
     /// 4 bytes: 16-bit height, logarithmic error and radius.
     Compact,
+    /// 4 bytes: 16-bit height, an error in four times as many steps, a radius in 63 of its own.
+    Fine,
     /// 8 bytes: single-precision height, 16-bit error and radius.
     Exact8,
     /// 16 bytes: double-precision height, single-precision error and radius.
@@ -27,7 +31,7 @@ impl RecordKind {
     /// Bytes a record.
     pub const fn bytes(self) -> usize {
         match self {
-            Self::Compact => 4,
+            Self::Compact | Self::Fine => 4,
             Self::Exact8 => 8,
             Self::Exact16 => 16,
         }
@@ -37,8 +41,14 @@ impl RecordKind {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Compact => "compact",
+            Self::Fine => "fine",
             Self::Exact8 | Self::Exact16 => "exact",
         }
+    }
+
+    /// Whether heights are 16-bit numbers of steps. Otherwise they are floating-point numbers.
+    pub const fn has_height_codes(self) -> bool {
+        matches!(self, Self::Compact | Self::Fine)
     }
 }
 
@@ -87,10 +97,27 @@ pub struct RecordScale {
     pub height_base_m: f64,
     /// Metres of height a code or value.
     pub height_step_m: f64,
-    /// Error in metres that the largest plain code of compact records stands for.
+    /// Error in metres that the largest plain code of compact and fine records stands for.
     pub error_top_m: f64,
-    /// Radius codes an octave: 8, 16, 32 or 64.
-    pub radius_steps_per_octave: u32,
+    /// What radius codes stand for.
+    pub radius_codes: RadiusCodes,
+}
+
+/// What the radius codes of plain vertices stand for. It is what tells the codecs of compact and of fine records apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RadiusCodes {
+    /// Compact records: so many codes, 8, 16, 32 or 64, to an octave above the radius of flat ground.
+    Octaves(u32),
+    /// Fine records: what a radius has above that of flat ground, as a share of it, in eighths of octaves from 2^n on and in eighths of 2^n below.
+    Excess {
+        /// The n of the first octave, one of [`RadiusCodes::FIRST_OCTAVES`].
+        first_octave: i32,
+    },
+}
+
+impl RadiusCodes {
+    /// First octaves that fine records may have. The least one holds slopes of 83 degrees.
+    pub const FIRST_OCTAVES: std::ops::RangeInclusive<i32> = -4..=27;
 }
 
 /// Turns the bytes of one record into a vertex and back.
@@ -159,10 +186,18 @@ mod tests {
         height_base_m: -12.5,
         height_step_m: 0.25,
         error_top_m: 900.0,
-        radius_steps_per_octave: 64,
+        radius_codes: RadiusCodes::Octaves(64),
     };
+    const FINE: RecordScale = RecordScale { radius_codes: RadiusCodes::Excess { first_octave: -4 }, ..SCALE };
 
-    fn rounds_up<C: RecordCodec>(codec: &C, level: u32, value: f64, error_m: f64, stretch: f64) {
+    fn rounds_up<C: RecordCodec>(
+        codec: &C,
+        [error_ratio, radius_ratio]: [f64; 2],
+        level: u32,
+        value: f64,
+        error_m: f64,
+        stretch: f64,
+    ) {
         let value = C::round_height(value);
         let radius_m = grid().flat_radius_m(level) * stretch;
         for class in [VertexClass::Plain, VertexClass::Fringe, VertexClass::FringeVoid] {
@@ -174,8 +209,8 @@ mod tests {
             assert_eq!(C::is_void(raw), class.is_void());
             assert!(v.error_m >= error_m && v.radius_m >= radius_m, "{v:?} {error_m} {radius_m}");
             if class == VertexClass::Plain && error_m > 0.02 {
-                assert!(v.error_m <= error_m * 1.06, "{v:?} {error_m}");
-                assert!(v.radius_m <= radius_m.max(grid().flat_radius_m(level)) * 1.0175 + 1e-9);
+                assert!(v.error_m <= error_m * error_ratio, "{v:?} {error_m}");
+                assert!(v.radius_m <= radius_m.max(grid().flat_radius_m(level)) * radius_ratio + 1e-9);
             }
             // Encoding what was decoded changes nothing.
             assert_eq!(codec.encode(level, value, class, v.error_m, v.radius_m), Some(raw));
@@ -190,15 +225,20 @@ mod tests {
         fn encoding_rounds_up_and_is_idempotent(
             level in 0u32..12, value in 0f64..65535.0, error in prop_oneof![Just(0.0), 1e-6f64..900.0], stretch in 0.5f64..15.0,
         ) {
-            rounds_up(&Compact::new(&grid(), &SCALE), level, value, error, stretch);
-            rounds_up(&Exact8::new(&grid(), &SCALE), level, value, error, stretch);
-            rounds_up(&Exact16::new(&grid(), &SCALE), level, value, error, stretch);
+            rounds_up(&Compact::new(&grid(), &SCALE), [1.06, 1.0175], level, value, error, stretch);
+            // A radius of less than a sixteenth more than flat ground's is told to a 128th of that; eight times flat ground's is all there is.
+            let gentle = stretch.min(8.0);
+            rounds_up(&Compact::new(&grid(), &FINE), [1.014, 1.112], level, value, error, gentle);
+            rounds_up(&Compact::new(&grid(), &FINE), [1.014, 1.008], level, value, error, 0.9 + gentle / 53.0);
+            rounds_up(&Exact8::new(&grid(), &SCALE), [1.06, 1.0175], level, value, error, stretch);
+            rounds_up(&Exact16::new(&grid(), &SCALE), [1.06, 1.0175], level, value, error, stretch);
         }
 
         #[test]
         fn decoding_is_total(raw: u128, level in 0u32..12) {
             for v in [
                 Compact::new(&grid(), &SCALE).decode(raw as u32, level),
+                Compact::new(&grid(), &FINE).decode(raw as u32, level),
                 Exact8::new(&grid(), &SCALE).decode(raw as u64, level),
                 Exact16::new(&grid(), &SCALE).decode(raw, level),
             ] {
@@ -206,6 +246,7 @@ mod tests {
             }
             let is_void = |class: VertexClass| class.is_void();
             prop_assert_eq!(Compact::is_void(raw as u32), is_void(Compact::new(&grid(), &SCALE).decode(raw as u32, level).class));
+            prop_assert_eq!(Compact::is_void(raw as u32), is_void(Compact::new(&grid(), &FINE).decode(raw as u32, level).class));
             prop_assert_eq!(Exact8::is_void(raw as u64), is_void(Exact8::new(&grid(), &SCALE).decode(raw as u64, level).class));
             prop_assert_eq!(Exact16::is_void(raw), is_void(Exact16::new(&grid(), &SCALE).decode(raw, level).class));
         }

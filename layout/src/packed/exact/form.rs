@@ -1,17 +1,23 @@
-//! Exact records in parts: the bits of a height, of an error and of a radius.
+//! Exact and fine records in parts: the bits of a height, of an error and of a radius.
 
-use crate::grid::record::RecordKind;
+use crate::grid::record::{Compact, RecordCodec, RecordKind};
 
-/// Which kind of exact records a terrain has.
+/// Which kind of exact or fine records a terrain has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
+    /// 4 bytes: a height of 16 bits, an error of ten and a radius of six.
+    Fine,
     /// 8 bytes: a single, and the upper halves of two more.
     Single,
     /// 16 bytes: a double and two singles.
     Double,
 }
 
-/// A record's parts, as bits.
+/// First error code of fine records on the fringe, and the largest of others.
+const FRINGE: u8 = 248;
+pub(super) const TOP_FINE_ERROR: u32 = 991;
+
+/// A record's parts, as bits. The codes of fine records are numbers that grow with error and radius; on the fringe the sign bit and the record's own codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Parts {
     pub(super) height: u64,
@@ -24,6 +30,7 @@ impl Form {
     pub(crate) fn of(kind: RecordKind) -> Option<Self> {
         match kind {
             RecordKind::Compact => None,
+            RecordKind::Fine => Some(Self::Fine),
             RecordKind::Exact8 => Some(Self::Single),
             RecordKind::Exact16 => Some(Self::Double),
         }
@@ -32,6 +39,7 @@ impl Form {
     /// Words of 4 bytes a record.
     pub(crate) fn words(self) -> usize {
         match self {
+            Self::Fine => 1,
             Self::Single => 2,
             Self::Double => 4,
         }
@@ -40,6 +48,7 @@ impl Form {
     /// The words of an inert record.
     pub(crate) fn inert_words(self) -> &'static [u32] {
         match self {
+            Self::Fine => &[Compact::INERT],
             Self::Single => &[0, 0xffff_0000],
             Self::Double => &[0, 0, 0, u32::MAX],
         }
@@ -48,6 +57,7 @@ impl Form {
     /// Bits of a height.
     pub(super) fn height_bits(self) -> u32 {
         match self {
+            Self::Fine => 16,
             Self::Single => 32,
             Self::Double => 64,
         }
@@ -56,7 +66,7 @@ impl Form {
     /// Bits of an error or a radius.
     pub(super) fn code_bits(self) -> u32 {
         match self {
-            Self::Single => 16,
+            Self::Fine | Self::Single => 16,
             Self::Double => 32,
         }
     }
@@ -80,6 +90,16 @@ impl Form {
     #[inline(always)]
     pub(super) fn parts(self, words: &[u32]) -> Parts {
         match (self, words) {
+            (Self::Fine, [raw]) if *raw == Compact::INERT => self.inert(),
+            (Self::Fine, [raw]) => {
+                let (height, [_, _, error, last]) = (u64::from(raw & 0xffff), raw.to_le_bytes());
+                if error >= FRINGE {
+                    let error = self.sign() | u32::from(error - FRINGE);
+                    return Parts { height, error, radius: last.into() };
+                }
+                let (error, radius) = Compact::fine_codes(*raw);
+                Parts { height, error: error.into(), radius: radius.into() }
+            }
             (Self::Single, [height, codes]) => {
                 Parts { height: u64::from(*height), error: codes & 0xffff, radius: codes >> 16 }
             }
@@ -94,6 +114,21 @@ impl Form {
     #[inline(always)]
     pub(super) fn put(self, parts: Parts, words: &mut [u32]) {
         match (self, words) {
+            (Self::Fine, [raw]) => {
+                let height = parts.height as u32 & 0xffff;
+                *raw = if parts == self.inert() {
+                    Compact::INERT
+                } else if parts.error & self.sign() != 0 {
+                    height | u32::from(FRINGE | parts.error as u8 & 7) << 16 | parts.radius << 24
+                } else {
+                    // What no writer makes is cut to what there is.
+                    height
+                        | Compact::of_fine_codes(
+                            parts.error.min(TOP_FINE_ERROR) as u16,
+                            parts.radius as u8 & 63,
+                        )
+                };
+            }
             (Self::Single, [height, codes]) => {
                 *height = parts.height as u32;
                 *codes = parts.error & 0xffff | parts.radius << 16;
@@ -112,6 +147,7 @@ impl Form {
     #[inline(always)]
     pub(super) fn value(self, bits: u64) -> f64 {
         let value = match self {
+            Self::Fine => f64::from(bits as u16),
             Self::Single => f64::from(f32::from_bits(bits as u32)),
             Self::Double => f64::from_bits(bits),
         };
@@ -122,6 +158,8 @@ impl Form {
     #[inline(always)]
     pub(super) fn nearest(self, value: f64) -> u64 {
         match self {
+            // Between codes a conversion cuts off what lies behind the point, and what lies beyond all codes.
+            Self::Fine => u64::from((value + 0.5).floor() as u16),
             Self::Single if (value as f32).is_finite() => u64::from((value as f32).to_bits()),
             Self::Double if value.is_finite() => value.to_bits(),
             _ => 0,
@@ -131,12 +169,18 @@ impl Form {
     /// A height's bits as a number that grows with the height, and back again.
     #[inline(always)]
     fn ordered(self, bits: u64) -> u64 {
+        if self == Self::Fine {
+            return bits;
+        }
         let sign = 1 << (self.height_bits() - 1);
         if bits & sign == 0 { bits | sign } else { !bits & (u64::MAX >> (64 - self.height_bits())) }
     }
 
     #[inline(always)]
     fn bits_at(self, place: u64) -> u64 {
+        if self == Self::Fine {
+            return place;
+        }
         let sign = 1 << (self.height_bits() - 1);
         if place & sign != 0 { place ^ sign } else { !place & (u64::MAX >> (64 - self.height_bits())) }
     }
@@ -177,7 +221,7 @@ mod tests {
     proptest! {
         #[test]
         fn parts_and_residuals_come_back(words: [u32; 4], predicted: u64) {
-            for form in [Form::Single, Form::Double] {
+            for form in [Form::Fine, Form::Single, Form::Double] {
                 let words = &words[..form.words()];
                 let parts = form.parts(words);
                 let mut back = vec![0; form.words()];

@@ -27,10 +27,11 @@ pub(super) fn half_octaves(value: f64) -> i64 {
     (value.abs().to_bits() >> 51) as i64
 }
 
-/// The class of a height whose surroundings are `uneven`, predicted to be `predicted`, of whose numbers `shift` low bits stand as they are. `mantissa` is how many bits a height has behind its leading one.
+/// The class of a height whose surroundings are `uneven`, predicted to be `predicted`, of whose numbers `shift` low bits stand as they are. `mantissa` is how many bits a height has behind its leading one;
+/// whole numbers have none.
 #[inline(always)]
-pub(super) fn class_of(uneven: f64, predicted: f64, mantissa: i64, shift: u32) -> u8 {
+pub(super) fn class_of(uneven: f64, predicted: f64, mantissa: Option<i64>, shift: u32) -> u8 {
     // What a height's last bit is worth, in half octaves.
-    let last = half_octaves(predicted) / 2 * 2 - 2 * mantissa;
+    let last = mantissa.map_or(half_octaves(1.0), |mantissa| half_octaves(predicted) / 2 * 2 - 2 * mantissa);
     (half_octaves(uneven) - last - 2 * i64::from(shift) - 4).clamp(0, CLASSES - 1) as u8
 }

@@ -1,12 +1,15 @@
 //! What follows from heights: errors and radii of the two finest levels, as a build makes them, and what others are expected to be.
 
-use super::form::Form;
+use super::form::{Form, TOP_FINE_ERROR};
 use crate::grid::Grid;
-use crate::grid::record::{RecordScale, f32_at_least};
+use crate::grid::record::{Compact, RecordCodec, RecordScale, f32_at_least};
 
 /// Factors on errors and on radii that a build applies before it rounds up.
 const ERROR_MARGIN: f64 = 1.0 + 1e-9;
 const RADIUS_MARGIN: f64 = 1.0 + 1.0 / (1 << 19) as f64;
+
+/// Largest radius code of a plain fine record.
+const TOP_FINE_RADIUS: u32 = 62;
 
 /// Numbers of one file.
 #[derive(Debug)]
@@ -16,6 +19,8 @@ pub(crate) struct Rules {
     base_m: f64,
     spacing_m: [f64; 2],
     flat_m: Vec<f64>,
+    /// Of fine records.
+    codec: Option<Box<Compact>>,
 }
 
 impl Rules {
@@ -26,6 +31,7 @@ impl Rules {
             base_m: scale.height_base_m,
             spacing_m: grid.spacing_m(),
             flat_m: (0..grid.levels()).map(|level| grid.flat_radius_m(level)).collect(),
+            codec: (form == Form::Fine).then(|| Compact::new(grid, scale).into()),
         }
     }
 
@@ -33,31 +39,55 @@ impl Rules {
         self.form
     }
 
-    /// The code of the smallest error or radius that is at least `metres`.
+    /// The code of the smallest error that is at least `metres`.
     #[inline(always)]
-    pub(super) fn at_least(&self, metres: f64) -> u32 {
+    fn error_at_least(&self, metres: f64) -> u32 {
+        match &self.codec {
+            Some(codec) => {
+                let raw = codec.encode_plain(0, 0.0, metres, 0.0);
+                raw.map_or(TOP_FINE_ERROR, |raw| Compact::fine_codes(raw).0.into())
+            }
+            None => self.bits_at_least(metres),
+        }
+    }
+
+    /// The code of the smallest radius of a level that is at least `metres`.
+    #[inline(always)]
+    fn radius_at_least(&self, level: usize, metres: f64) -> u32 {
+        match &self.codec {
+            Some(codec) => {
+                let raw = codec.encode_plain(level as u32, 0.0, 0.0, metres);
+                raw.map_or(TOP_FINE_RADIUS, |raw| Compact::fine_codes(raw).1.into())
+            }
+            None => self.bits_at_least(metres),
+        }
+    }
+
+    /// The bits of the smallest error or radius of exact records that is at least `metres`.
+    #[inline(always)]
+    fn bits_at_least(&self, metres: f64) -> u32 {
         // What heights beyond all numbers lead to counts as 0.
         let bits = if metres.is_nan() { 0 } else { f32_at_least(metres).to_bits() & !(1 << 31) };
         match self.form {
             Form::Single => bits.div_ceil(0x1_0000),
-            Form::Double => bits,
+            Form::Fine | Form::Double => bits,
         }
     }
 
-    /// Metres of a code without its sign.
+    /// Metres of an exact record's code without its sign.
     #[inline(always)]
-    pub(super) fn metres(&self, code: u32) -> f64 {
+    fn metres(&self, code: u32) -> f64 {
         let code = code & !self.form.sign();
         f64::from(match self.form {
             Form::Single => f32::from_bits(code << 16),
-            Form::Double => f32::from_bits(code),
+            Form::Fine | Form::Double => f32::from_bits(code),
         })
     }
 
     /// The error code of a vertex alone: how far it is from the middle of its edge.
     #[inline(always)]
     pub(super) fn step(&self, v: f64, b: f64, d: f64) -> u32 {
-        self.at_least((v - 0.5 * (b + d)).abs() * self.step_m * ERROR_MARGIN)
+        self.error_at_least((v - 0.5 * (b + d)).abs() * self.step_m * ERROR_MARGIN)
     }
 
     /// The radius code of a vertex of level 1, from its height and those of its children beside, and north and south.
@@ -71,13 +101,13 @@ impl Rules {
                 radius_m = radius_m.max((spacing_m * spacing_m + rise_m * rise_m).sqrt() * RADIUS_MARGIN);
             }
         }
-        self.at_least(radius_m)
+        self.radius_at_least(1, radius_m)
     }
 
     /// The error code that a range of heights would have.
     #[inline(always)]
     pub(super) fn of_range(&self, range: f64) -> u32 {
-        self.at_least(range * self.step_m)
+        self.error_at_least(range * self.step_m)
     }
 
     /// How steep a range of heights is over the steps of an octave.
@@ -86,14 +116,17 @@ impl Rules {
         range * self.step_m / (f64::from(1u32 << octave) * self.spacing_m[0])
     }
 
-    /// The radius code expected at a level: that of the parents' larger radius over flat ground's; without parents, of the slope.
+    /// The radius code expected at a level: that of the parents' larger radius over flat ground's, which fine records have as their code; without parents, of the slope.
     #[inline(always)]
     pub(super) fn expected_radius(&self, level: usize, parents: Option<u32>, slope: f64) -> u32 {
+        if let (Some(code), true) = (parents, self.form == Form::Fine) {
+            return code;
+        }
         let flat_m = self.flat_m.get(level).copied().unwrap_or(0.0);
         let radius_m = match (parents, self.flat_m.get(level + 1)) {
             (Some(code), Some(above_m)) => self.metres(code) * (flat_m / above_m),
             _ => flat_m * (1.0 + slope * slope).sqrt(),
         };
-        if radius_m.is_finite() { self.at_least(radius_m) } else { 0 }
+        if radius_m.is_finite() { self.radius_at_least(level, radius_m) } else { 0 }
     }
 }

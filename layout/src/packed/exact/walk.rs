@@ -152,7 +152,11 @@ fn residuals<C: Coder>(
     range: Range<usize>,
     first: u16,
 ) {
-    let mantissa = if form == Form::Single { 23 } else { 52 };
+    let mantissa = match form {
+        Form::Fine => None,
+        Form::Single => Some(23),
+        Form::Double => Some(52),
+    };
     let Scratch { kinds, flat_heights, values, numbers, contexts, heads, chosen, predicted, uneven, .. } =
         scratch;
     chosen.clear();
