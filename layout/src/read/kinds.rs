@@ -1,4 +1,4 @@
-//! The three kinds of records behind one type: a terrain's records and pools, whichever kind its file has.
+//! Records of 4, 8 and 16 bytes behind one type: a terrain's records and pools, whichever kind its file has.
 
 use super::pool::PagePool;
 use super::records::{Records, Slices};
@@ -9,7 +9,7 @@ use crate::grid::record::{AnyCodec, Compact, Exact8, Exact16};
 /// One thing for whichever kind of records a terrain has.
 #[derive(Debug, Clone)]
 pub enum ByKind<A, B, C> {
-    /// 4-byte records.
+    /// 4-byte records, compact or fine.
     Compact(A),
     /// 8-byte records.
     Exact8(B),

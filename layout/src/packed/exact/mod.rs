@@ -1,9 +1,9 @@
-//! Exact records through a tile and back, every bit of them (FORMAT.md, section 9.9).
+//! Exact and fine records through a tile and back, every bit of them (FORMAT.md, sections 9.9 and 9.10).
 //!
-//! A height is predicted in double precision from the twelve coarser ones around it, as those of compact records are. What is coded is how many floating-point numbers lie between the two. Errors and radii
-//! are the bits of singles, or their upper halves; those of the two finest levels follow from heights, and those of other levels are coded as what is missing to their parents'.
+//! A height is predicted in double precision from the twelve coarser ones around it, as those of compact records are. What is coded is how many floating-point numbers lie between the two, of fine records how many codes. Errors and radii
+//! are the bits of singles, or their upper halves, or the codes of fine records; those of the two finest levels follow from heights, and those of other levels are coded as what is missing to their parents'.
 //!
-//! * `form`: the two kinds of exact records in parts.
+//! * `form`: the three kinds of records in parts.
 //! * `walk`: the way through a tile; `heights`, `codes`, `special` are its steps.
 //! * `numbers`: values of up to 64 bits by the coder of values below 65,536.
 //! * `rules`: what follows from heights.

@@ -1,4 +1,4 @@
-//! The way through a tile of exact records, octave by octave, the same for writing and reading.
+//! The way through a tile of exact or fine records, octave by octave, the same for writing and reading.
 //!
 //! It is that of compact records with other parts.
 
