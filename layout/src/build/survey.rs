@@ -212,13 +212,13 @@ pub(super) fn record_scale(
 
 /// Radius codes of fine records that hold all radii, where no child is more than `stretch` times as far from its parent as on flat ground.
 ///
-/// A radius over flat ground's lies between the stretches of what is below: it is a mean of the vertex's own and of its farthest child's. So rounding up does not add up over levels, beyond one code for the margin that keeps radii nested.
+/// A radius over flat ground's lies between the stretches of what is below: it is a mean of the vertex's own and of its farthest child's. So rounding up does not add up over levels, beyond one code: the margin that keeps radii nested may lead from a code to the next, and no further.
 fn excess_codes(stretch: f64) -> RadiusCodes {
-    /// What the last code stands for, in first octaves.
-    const LAST: f64 = 112.0;
-    /// Rounding up twice, by an eighth each time.
-    const ROUNDING: f64 = 1.3;
-    let holds = |octave: &i32| LAST * 2.0f64.powi(*octave) >= (stretch - 1.0) * ROUNDING;
+    /// What the last code but one stands for, in first octaves.
+    const LAST_BUT_ONE: f64 = 104.0;
+    /// Lets the sum of rounded steps stay below what exact ones add up to.
+    const SLACK: f64 = 1.0 + 1e-3;
+    let holds = |octave: &i32| LAST_BUT_ONE * 2.0f64.powi(*octave) >= (stretch - 1.0) * SLACK;
     let first_octave = RadiusCodes::FIRST_OCTAVES.into_iter().find(holds);
     RadiusCodes::Excess { first_octave: first_octave.unwrap_or(*RadiusCodes::FIRST_OCTAVES.end()) }
 }

@@ -1,6 +1,6 @@
 //! Errors and radii of ordinary vertices: what follows from heights, or what is missing to the parents'.
 
-use super::form::{Parts, folded, unfolded};
+use super::form::{Form, Parts, folded, unfolded};
 use super::heights::half_octaves;
 use super::numbers::{Row, row, shift};
 use super::rules::Rules;
@@ -162,7 +162,12 @@ fn take<C: Coder>(
         for (at, i) in chosen.iter().map(|i| *i as usize).enumerate() {
             let around =
                 if is_white { Around::white(scratch, octave, i) } else { Around::black(scratch, octave, i) };
-            let (expected, class) = if is_radius {
+            let (expected, class) = if is_radius && form == Form::Fine {
+                let known = around.radii.into_iter().filter(|radius| *radius != UNKNOWN).max();
+                let expected = known.unwrap_or(0);
+                let steep = rules.slope_radius(level, 0.5 * rules.slope(around.range, octave_of_square));
+                (expected, radius_class(expected, steep))
+            } else if is_radius {
                 let slope = rules.slope(around.range, octave_of_square);
                 let parents = around.radii.into_iter().filter(|radius| *radius != UNKNOWN).max();
                 // Half octaves from a 64th on.
@@ -174,11 +179,13 @@ fn take<C: Coder>(
                 let [b, d] = around.ends;
                 let own = rules.step(scratch.values[i], b, d);
                 match parents {
+                    Some(most) if form == Form::Fine => (most, codes_between(most, own)),
                     Some(most) => (most, errors_between(most, own, bits)),
                     None => (rules.of_range(around.range), NO_PARENTS),
                 }
             };
             scratch.expected[at] = expected;
+            let first = if is_radius && form == Form::Fine { 0 } else { first };
             scratch.contexts[at] = first + class as u8;
             // Errors are no larger than the parents'; where these are not known, and radii, lie on either side.
             let is_folded = is_radius || class == NO_PARENTS;
@@ -211,6 +218,25 @@ fn take<C: Coder>(
         }
     }
     scratch.chosen = chosen;
+}
+
+/// The class of an error between the parents' code and its own, of fine records.
+fn codes_between(most: u32, own: u32) -> i64 {
+    let between = i64::from(most.saturating_sub(own));
+    let quarters = between >> 2;
+    if quarters == 0 {
+        return between;
+    }
+    (3 + quarters.min(12) + ((quarters - 12).clamp(0, 12) >> 1) + ((quarters - 24).clamp(0, 88) >> 3)).min(30)
+}
+
+/// The class of a fine record's radius, from the parents' larger code and the code of what slopes around it make of flat ground.
+fn radius_class(expected: u32, steep: u32) -> i64 {
+    let (expected, steep) = (i64::from(expected), i64::from(steep));
+    let more = expected - steep;
+    let steps = 7 + more.clamp(-7, 5) + ((more - 5).clamp(0, 23) >> 3);
+    let size = [4, 10, 18].into_iter().filter(|size| expected >= *size).count() as i64;
+    16 * size + steps
 }
 
 /// The class of an error between the parents' and its own.

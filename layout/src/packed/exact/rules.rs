@@ -116,6 +116,13 @@ impl Rules {
         range * self.step_m / (f64::from(1u32 << octave) * self.spacing_m[0])
     }
 
+    /// The radius code that a slope makes of flat ground at a level.
+    #[inline(always)]
+    pub(super) fn slope_radius(&self, level: usize, slope: f64) -> u32 {
+        let flat_m = self.flat_m.get(level).copied().unwrap_or(0.0);
+        self.radius_at_least(level, flat_m * (1.0 + slope * slope).sqrt())
+    }
+
     /// The radius code expected at a level: that of the parents' larger radius over flat ground's, which fine records have as their code; without parents, of the slope.
     #[inline(always)]
     pub(super) fn expected_radius(&self, level: usize, parents: Option<u32>, slope: f64) -> u32 {
