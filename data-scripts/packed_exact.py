@@ -1,11 +1,8 @@
-"""Tiles of exact records after FORMAT.md, section 9.9: the part of read_packed_all.py for kinds 2 and 3."""
+"""Tiles of exact records after FORMAT.md, section 9.9: the part of read_packed_all.py for kinds 2 and 3. Those of packed_fine.py go the same way."""
 import math
 import struct
 
 from read_packed import AROUND, Lattice, unzigzag as unfold
-
-INERT = {2: b"\0" * 6 + b"\xff\xff", 3: b"\0" * 12 + b"\xff" * 4}
-
 
 def half(value):
     return struct.unpack("<Q", struct.pack("<d", abs(value)))[0] >> 51
@@ -16,6 +13,7 @@ class Rules:
         self.height_bits, self.code_bits, self.mantissa = (32, 16, 23) if header[0x11] == 2 else (64, 32, 52)
         self.spacing, self.flat = struct.unpack_from("<dd", header, 0x20), []
         self.base, self.step_m = struct.unpack_from("<dd", header, 0x30)
+        self.inert = b"\0" * 6 + b"\xff\xff" if header[0x11] == 2 else b"\0" * 12 + b"\xff" * 4
         spacing = self.spacing
         for level in range(2 * header[0x10]):
             s = 1 << level // 2
@@ -53,8 +51,31 @@ class Rules:
         code &= (1 << self.code_bits - 1) - 1
         return struct.unpack("<f", struct.pack("<I", code << 32 - self.code_bits))[0]
 
+    def error_code(self, metres):
+        return self.code(metres)
+
+    def radius_code(self, metres, level):
+        return self.code(metres)
+
     def step(self, v, ends):
-        return self.code(abs(v - 0.5 * (ends[0] + ends[1])) * self.step_m * (1.0 + 1e-9))
+        return self.error_code(abs(v - 0.5 * (ends[0] + ends[1])) * self.step_m * (1.0 + 1e-9))
+
+    def half_of_last_bit(self, bits):
+        return half(self.number(bits)) // 2 * 2 - 2 * self.mantissa
+
+    def error_class(self, most, own):
+        y = (max(most - own, 0) >> self.code_bits - 16) + 1
+        n = y.bit_length()
+        return min(2 * (n - 1) + (y >> n - 2 & 1 if n > 1 else 0), 30)
+
+    def radius(self, level, colour, parents, slope):
+        """The code from which a radius is told, and its class."""
+        if parents and level + 1 < len(self.flat):
+            radius = self.metres(max(parents)) * (self.flat[level] / self.flat[level + 1])
+        else:
+            radius = self.flat[level] * math.sqrt(1.0 + slope * slope)
+        kind = min(max(half(slope) - half(1.0) + 12, 0), 15) + (16 if parents else 0)
+        return self.code(radius) if math.isfinite(radius) else 0, 32 * colour + kind
 
     def record(self, bits, error, radius):
         return struct.pack("<IHH" if self.code_bits == 16 else "<QII", bits, error, radius)
@@ -117,8 +138,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                 uneven[p] = 8.0 * abs(a + b - c - d) + abs(2.0 * four - eight) + 2.0 * (max(a, b, c, d) - min(a, b, c, d))
 
             def context(p, shift):
-                last = half(rules.number(raw[p])) // 2 * 2 - 2 * rules.mantissa
-                return first + min(max(half(uneven[p]) - last - 2 * shift - 4, 0), 31)
+                return first + min(max(half(uneven[p]) - rules.half_of_last_bit(raw[p]) - 2 * shift - 4, 0), 31)
 
             found = row(coder, hb, 65535, [p for p in places if kinds.get(p) != 1], context)
             for p in places:
@@ -143,7 +163,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                     for w in children:
                         r = z[x, y] * rules.step_m - ((rules.base + z[w] * rules.step_m) - rules.base)
                         radius = max(radius, math.sqrt(g * g + r * r) * (1.0 + 1.0 / (1 << 19)))
-                rule[x, y] = error, rules.code(radius)
+                rule[x, y] = error, rules.radius_code(radius, 1)
             codes.update((p, rule[p]) for p in ordinary)
             if coder.take(1):
                 other, turn = {}, 0
@@ -164,21 +184,13 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                     slope = reach * rules.step_m / ((1 << stride_log + octave) * rules.spacing[0])
                     if parents:
                         most = min(error for error, _ in parents)
-                        y = (max(most - step(p), 0) >> cb - 16) + 1
-                        n = y.bit_length()
-                        errors[p] = most, min(2 * (n - 1) + (y >> n - 2 & 1 if n > 1 else 0), 30)
+                        errors[p] = most, rules.error_class(most, step(p))
                     else:
-                        errors[p] = rules.code(reach * rules.step_m), 31
-                    if parents and level + 1 < len(rules.flat):
-                        radius = rules.metres(max(radius for _, radius in parents)) * (rules.flat[level] / rules.flat[level + 1])
-                    else:
-                        radius = rules.flat[level] * math.sqrt(1.0 + slope * slope)
-                    kind = min(max(half(slope) - half(1.0) + 12, 0), 15) + (16 if parents else 0)
-                    radii[p] = rules.code(radius) if math.isfinite(radius) else 0, kind
+                        errors[p] = rules.error_code(reach * rules.step_m), 31
+                    radii[p] = rules.radius(level, colour, [radius for _, radius in parents], slope)
                     asked.append(p)
-                first = 32 * colour
-                found = row(coder, cb, 255, asked, lambda p, _: 256 + first + errors[p][1])
-                lies = row(coder, cb, 255, asked, lambda p, _: 320 + first + radii[p][1])
+                found = row(coder, cb, 255, asked, lambda p, _: 256 + 32 * colour + errors[p][1])
+                lies = row(coder, cb, 255, asked, lambda p, _: 320 + radii[p][1])
                 for p in asked:
                     most, kind = errors[p]
                     error = most + unfold(found[p]) if kind == 31 else most - found[p]
@@ -186,7 +198,7 @@ def tile(segments, rules, octaves, stride_log, is_top, is_last):
                 known.update((p, codes[p]) for p in asked)
         for p in vertices:
             if kinds.get(p) == 1:
-                out[p] = INERT[2 if cb == 16 else 3]
+                out[p] = rules.inert
             elif inside(p):
                 out[p] = rules.record(raw[p], *codes[p])
     for segment in segments:

@@ -4,7 +4,7 @@
     read_packed.py PACKED.iqt > SAMPLES.csv
 
 A line a sample, rows from the south and in a row from the west; a void has no height. It needs nothing but Python, and it is slow.
-What edits changed, and exact records, take the larger reader, read_packed_all.py, which builds on this one.
+What edits changed, and exact or fine records, take the larger reader, read_packed_all.py, which builds on this one.
 """
 import functools
 import math
@@ -313,7 +313,7 @@ def main(packed):
         data = file.read()
     header, sections = opened(data)
     if header[0x11] != 1 or struct.unpack_from("<I", header, 0xE8) != (0,):
-        sys.exit(f"{packed}: it has exact records or edits, which read_packed_all.py reads")
+        sys.exit(f"{packed}: it has exact or fine records or edits, which read_packed_all.py reads")
     rules, (wide, high) = Rules(header), struct.unpack_from("<II", header, 0x14)
     found = dict(records(data, header, sections, rules, tile))
     print("x,y,height_m,error_m,radius_m,height_code,error_code,radius_code")

@@ -4,7 +4,7 @@
     read_packed_all.py PACKED.iqt OUT
 
 OUT has the record of every sample, of 4, 8 or 16 bytes as section 3 has it; rows from the south, in a row from the west.
-To what read_packed.py reads it adds exact records and what edits appended. It needs nothing but Python, and it is slow.
+To what read_packed.py reads it adds exact and fine records and what edits appended. It needs nothing but Python, and it is slow.
 """
 import struct
 import sys
@@ -12,6 +12,7 @@ import zlib
 
 sys.dont_write_bytecode = True
 import packed_exact  # noqa: E402
+import packed_fine  # noqa: E402
 import read_packed  # noqa: E402
 from read_packed import runs  # noqa: E402
 
@@ -127,8 +128,8 @@ def main(packed, target):
         rules, read, written = read_packed.Rules(header), read_packed.tile, lambda record: struct.pack("<HBB", *record)
         inert = written((0, 0, 255))
     else:
-        rules, read, written = packed_exact.Rules(header), packed_exact.tile, bytes
-        inert = packed_exact.INERT[kind]
+        rules, read, written = (packed_fine if kind == 4 else packed_exact).Rules(header), packed_exact.tile, bytes
+        inert = rules.inert
     found = read_packed.records(data, header, sections, rules, read)
     by_slot = {slot_of(k, *point): written(record) for point, record in found}
     by_slot.update(Unpacked(data, header, sections, by_slot, inert).edited(header))
