@@ -7,11 +7,10 @@ use proptest::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::build::{BuildOptions, HeightRoom, build};
-use terrasoar_layout::dem::{MemoryDem, SampleType};
-use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, history, room_for, widen};
+use terrasoar_layout::build::{BuildOptions, HeightRoom};
+use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, history, widen};
 use terrasoar_layout::file::disk::{Disk, FailingDisk, Failure, SystemDisk};
-use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage};
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::terrain::Terrain;
@@ -428,31 +427,4 @@ fn damage_of_the_journal_is_told() {
         }
     }
     assert!(told > 500);
-}
-
-/// Fine records tell steep radii in coarser steps than they have to: only as steep as the ground is, and a little more. A cliff takes a wider file, which has fine records too.
-#[test]
-fn cliffs_take_a_wider_file_of_fine_records() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("t.iqt");
-    let dem = MemoryDem::from_fn([90, 70], SampleType::I16, |x, y| f64::from(3 * x + 2 * y));
-    let options = BuildOptions::default().spacing_m([10.0; 2]).record(RecordKind::Fine);
-    build(&dem, &path, &options, &Silent).unwrap();
-    let rect = SampleRect { west: 30, south: 30, east: 50, north: 40 };
-    let cliff = Edit::Set { area: Area::Rect(rect), height_m: 900.0 };
-    let mut session = EditSession::open(&path).unwrap();
-    let Err(LayoutError::OutOfRange { problem, heights_m, .. }) = session.apply(std::slice::from_ref(&cliff))
-    else {
-        panic!("a cliff of 700 m over 10 fits")
-    };
-    assert!(problem.contains("steeper"), "{problem}");
-    let room = room_for(session.header(), heights_m);
-    let header = session.widen(room, 512, &Silent).unwrap();
-    assert_eq!(header.record_kind, RecordKind::Fine);
-    let mut session = EditSession::open(&path).unwrap();
-    session.apply(&[cliff]).unwrap();
-    session.commit("cliff").unwrap();
-    let terrain = Terrain::open(&path).unwrap();
-    assert!(is_sound(&terrain));
-    assert_eq!(terrain.height_m(405.0, 355.0).unwrap(), Some(900.0));
 }

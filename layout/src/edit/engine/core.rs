@@ -173,7 +173,13 @@ impl<C: RecordCodec> Core<C> {
         let former = (self.header.height_range_m, self.header.scale.error_top_m);
         let mut changes = Changes::default();
         let done = work(self, &mut changes);
-        if let Err(error) = done {
+        if let Err(mut error) = done {
+            // Slopes are found to be too steep where heights are no longer at hand. The range has those of the batch.
+            if let LayoutError::OutOfRange { heights_m, .. } = &mut error
+                && heights_m.iter().all(|height| height.is_nan())
+            {
+                *heights_m = self.header.height_range_m;
+            }
             self.pages.take_back();
             self.set_range(former);
             return Err(error);

@@ -103,8 +103,8 @@ fn header_of_renamed(disk: &dyn Disk, path: &Path) -> Option<Header> {
 }
 
 /// Room for heights that a file cannot hold, `heights_m` from the lowest to the highest as [`LayoutError::OutOfRange`] tells them: as much again beyond its range as they ask for,
-/// so that many edits do not rewrite it many times; less where that would take larger records. Heights that are not numbers ask for nothing: slopes that are too steep come without
-/// any, and [`widen`] makes room for slopes in any case.
+/// so that many edits do not rewrite it many times; less where that would take larger records. Where slopes are too steep these are the heights of the ground with the edit, and [`widen`] makes room for slopes
+/// between any of them. Heights that are not numbers ask for nothing.
 pub fn room_for(header: &Header, heights_m: [f64; 2]) -> HeightRoom {
     let [low, high] = header.height_range_m;
     let lowest = if heights_m[0].is_nan() { low } else { heights_m[0].min(low) };
