@@ -158,8 +158,8 @@ impl Form {
     #[inline(always)]
     pub(super) fn nearest(self, value: f64) -> u64 {
         match self {
-            // Between codes a conversion cuts off what lies behind the point, and what lies beyond all codes.
-            Self::Fine => u64::from((value + 0.5).floor() as u16),
+            // The conversion cuts off what lies behind the point, and what lies beyond all codes.
+            Self::Fine => u64::from((value + 0.5) as u16),
             Self::Single if (value as f32).is_finite() => u64::from((value as f32).to_bits()),
             Self::Double if value.is_finite() => value.to_bits(),
             _ => 0,
