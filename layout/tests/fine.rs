@@ -49,7 +49,7 @@ proptest! {
     fn errors_and_radii_are_near_exact_ones(seed in 0u32..1000, tall in prop_oneof![Just(3.0), Just(60.0), Just(900.0)], uneven: bool) {
         let dem = MemoryDem::from_fn([65, 65], SampleType::I16, |x, y| {
             let (u, v) = (f64::from(x), f64::from(y));
-            let rough = f64::from(((x * 31 + seed) * 57 ^ (y * 17 + seed)) % 97) / 97.0;
+            let rough = f64::from((((x * 31 + seed) * 57) ^ (y * 17 + seed)) % 97) / 97.0;
             (tall * ((u * 0.1).sin() + (v * 0.07).cos() + 0.2 * rough)).round()
         });
         let folder = tempfile::tempdir().unwrap();

@@ -35,6 +35,10 @@ fn the_summary_says_size_record_and_spacing() {
     for words in ["exact records of 8 bytes", "step", "10 x 30 m", "stated"] {
         assert!(said.contains(words), "{words}: {said}");
     }
+    let said = bench.good(&["build", "land.tif", "-o", "c.iqt", "--record", "fine", "--packed"]);
+    assert!(said.contains("fine records of 4 bytes"), "{said}");
+    let info = bench.json(&["info", "c.iqt", "--json"]);
+    assert!(info["record"] == "fine" && info["height_step_m"].is_number(), "{info}");
     let ranges = ["a.iqt", "b.iqt"].map(|f| bench.json(&["info", f, "--json"])["height_range_m"].clone());
     assert!((ranges[1][1].as_f64().unwrap() - 2.0 * ranges[0][1].as_f64().unwrap()).abs() < 1e-6);
 }

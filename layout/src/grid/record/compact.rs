@@ -37,8 +37,9 @@ fn first_at_least(guess: u8, value: f64, stands_for: impl Fn(u8) -> f64) -> Opti
     }
 }
 
-/// Radius codes of plain vertices.
+/// Radius codes of plain vertices. A codec has one, in place: what it is looked up by lies beside it.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "a codec has one, beside tables that are larger")]
 enum PlainRadii {
     /// Of compact records.
     Octaves(OctaveTable),
