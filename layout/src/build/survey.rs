@@ -216,7 +216,7 @@ pub(super) fn record_scale(
 fn excess_codes(stretch: f64) -> RadiusCodes {
     /// What the last code but one stands for, in first octaves.
     const LAST_BUT_ONE: f64 = 104.0;
-    /// Lets the sum of rounded steps stay below what exact ones add up to.
+    /// More than rounding adds to the sums of a radius.
     const SLACK: f64 = 1.0 + 1e-3;
     let holds = |octave: &i32| LAST_BUT_ONE * 2.0f64.powi(*octave) >= (stretch - 1.0) * SLACK;
     let first_octave = RadiusCodes::FIRST_OCTAVES.into_iter().find(holds);
