@@ -71,6 +71,35 @@ fn a_mesh_made_at_once_is_the_one_that_splits_make() {
     }
 }
 
+/// Levels of more split vertices than are made together, with padding and voids, whose corners are looked at: all of them have to be there by then.
+#[test]
+fn a_mesh_of_many_pieces_is_what_is_drawn() {
+    for (samples, holes) in [([600, 500], true), ([500, 600], false), ([513, 513], true)] {
+        let terrain = rugged_terrain(samples, 7, holes);
+        let view = frame(&terrain, [0.5, 0.5], 9000.0, 20.0, -80.0).view(VIEWPORT, 0.05);
+        with_records!(terrain.records().unwrap(), records => {
+            for culling in Culling::ALL {
+                let mut soar = Soar::new(records.clone(), culling);
+                let mut kinetic = Kinetic::new(records.clone(), culling);
+                let [mut mirror, mut whole] = [Mirror::default(), Mirror::default()];
+                soar.update(&view, &mut Unobserved);
+                kinetic.update(&view, &mut Unobserved);
+                assert!(kinetic.node_count() > 150_000, "{}", kinetic.node_count());
+                let mesh = triangles(&kinetic);
+                assert!(keys(&mesh) == keys(&triangles(&soar)), "{samples:?}");
+                mirror.apply(kinetic.patch());
+                mirror.check_vertices(&records);
+                whole.apply(&kinetic.whole_patch());
+                mirror.check_same(&whole);
+                assert!(mirror.triangles() == whole.triangles());
+                if culling == Culling::Vertices {
+                    assert!(mirror.triangles() == drawn(&records, &mesh));
+                }
+            }
+        });
+    }
+}
+
 /// Jumps about; tells all patches.
 fn patches(terrain: &Terrain, culling: Culling, threads: usize) -> Vec<Patch> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -57,7 +57,7 @@ impl<S: RecordStore> Kinetic<S> {
         let (mut line, mut below) = (Line::default(), Line::default());
         line.start(level_of(self.nodes.get(1).point), 1);
         self.list_slots(0..1, stale);
-        self.survey(1..PLANTED, &mut line, stale);
+        self.survey(1..PLANTED, &mut line, 1, stale);
         let (parents, births) = (Vec::new(), Vec::new());
         let mut piece = Piece { start: 0, parents, births, base: 0, next: 0, places };
         while !line.split.is_empty() {
@@ -73,7 +73,10 @@ impl<S: RecordStore> Kinetic<S> {
                 self.make_children(judge, &children, &line, &piece);
                 self.tell_parents(&line, &piece);
                 if line.level > 0 {
-                    self.survey(children, &mut below, stale);
+                    // Corners of children may be vertices of later pieces: what slots show is listed behind the last.
+                    let is_last = start + PIECE >= line.split.len();
+                    let first = if is_last { below.range.start } else { children.end };
+                    self.survey(children, &mut below, first, stale);
                 }
             }
             if line.level == 0 {
@@ -107,9 +110,9 @@ impl<S: RecordStore> Kinetic<S> {
         }
     }
 
-    /// Takes new vertices into their level: those that are split are listed, words go into the queue, leaves into the patch. At the finest level slots wait until split vertices
-    /// have their own.
-    fn survey(&mut self, range: Range<u32>, line: &mut Line, stale: usize) {
+    /// Takes new vertices into their level: those that are split are listed, words go into the queue, leaves from the place `first` on into the patch. At the finest level slots wait until split
+    /// vertices have their own.
+    fn survey(&mut self, range: Range<u32>, line: &mut Line, first: u32, stale: usize) {
         let all = &self.nodes.all;
         let from = range.start as usize;
         let known = line.split.len();
@@ -150,7 +153,7 @@ impl<S: RecordStore> Kinetic<S> {
                 }
             }
         };
-        let slots = if line.level > 0 { from..range.end as usize } else { 0..0 };
+        let slots = if line.level > 0 { first as usize..range.end as usize } else { 0..0 };
         both(range.len(), enter_words, || list_slots(patch, &shown, slots, stale));
     }
 
