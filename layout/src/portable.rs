@@ -64,6 +64,11 @@ pub fn pow(base: f64, power: f64) -> f64 {
     libm::pow(base, power)
 }
 
+/// `2^exponent`, exactly, for exponents from -1022 to 1023; others are cut to these.
+pub fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((1023 + exponent.clamp(-1022, 1023)) as u64) << 52)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,7 +102,7 @@ mod tests {
     fn whole_powers_and_squares_are_exact() {
         for i in -300..300 {
             let power = if i < 0 { 1.0 / 2f64.powi(-i) } else { 2f64.powi(i) };
-            assert_eq!(log2(power), f64::from(i));
+            assert_eq!((log2(power), power_of_two(i)), (f64::from(i), power));
         }
         assert_eq!([hypot(3.0, 4.0), hypot(5.0, 12.0), hypot(7.0, 0.0)], [5.0, 13.0, 7.0]);
         assert!(hypot(1e300, 1e300).is_finite());

@@ -7,7 +7,7 @@ use crate::dem::DemInfo;
 use crate::error::LayoutError;
 use crate::grid::Grid;
 use crate::grid::record::{RadiusCodes, RecordKind, RecordScale};
-use crate::portable::{hypot, log2, pow};
+use crate::portable::{hypot, log2, pow, power_of_two};
 use crate::remedy::Remedy;
 use crate::words::number;
 use rayon::prelude::*;
@@ -218,7 +218,7 @@ fn excess_codes(stretch: f64) -> RadiusCodes {
     const LAST_BUT_ONE: f64 = 104.0;
     /// More than rounding adds to the sums of a radius.
     const SLACK: f64 = 1.0 + 1e-3;
-    let holds = |octave: &i32| LAST_BUT_ONE * 2.0f64.powi(*octave) >= (stretch - 1.0) * SLACK;
+    let holds = |octave: &i32| LAST_BUT_ONE * power_of_two(*octave) >= (stretch - 1.0) * SLACK;
     let first_octave = RadiusCodes::FIRST_OCTAVES.into_iter().find(holds);
     RadiusCodes::Excess { first_octave: first_octave.unwrap_or(*RadiusCodes::FIRST_OCTAVES.end()) }
 }

@@ -2,6 +2,8 @@
 //!
 //! Where ground is gentle a radius is hardly larger than flat ground's. Steps of the whole radius would round that up as coarsely as on a cliff, and so would all that lies above.
 
+use crate::portable::power_of_two;
+
 /// Plain codes there are.
 const COUNT: u8 = 63;
 /// Codes an octave.
@@ -19,7 +21,7 @@ pub(super) struct ExcessCodes {
 impl ExcessCodes {
     /// Steps of an eighth of 2^`first_octave` up to there, and of eighths of octaves from there on. All are exact in double precision.
     pub(super) fn new(first_octave: i32) -> Self {
-        let first = 2.0f64.powi(first_octave);
+        let first = power_of_two(first_octave);
         let mut factors = [f64::INFINITY; COUNT as usize + 1];
         for code in 0..COUNT {
             let (octave, part) = (code / STEPS, f64::from(code % STEPS) / f64::from(STEPS));

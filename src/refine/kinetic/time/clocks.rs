@@ -177,7 +177,7 @@ impl Clocks {
     pub(crate) fn take_course(&mut self, number: usize, course: Course) -> f32 {
         // The less of the way is counted, the shorter are ticks: who is tested a tick too early is tested again.
         let shift = self.shifts[0].saturating_sub(portable::log2(1.0 / course.rate).round() as u32);
-        let finer = 2f32.powi(self.shifts[number] as i32 - shift as i32);
+        let finer = portable::power_of_two(self.shifts[number] as i32 - shift as i32) as f32;
         self.shifts[number] = shift;
         for clock in (0..CLOCKS).filter(|clock| course_of(*clock) == number) {
             self.totals[clock] = 1 << shift;
