@@ -100,13 +100,19 @@ fn filling_a_pool_ends_where_pages_for_later_have_no_room_in_it() {
     let mut streamed = Streamed::new(pool, loader, Culling::Vertices, Prefetch::Frustum);
     let begun = Instant::now();
     let mut pages_come = 0;
-    for frame in exercise::frames(&terrain) {
-        let view = frame.view(terrasoar::view::Viewport { width_px: 160, height_px: 120 }, 1.0);
-        streamed.fill(&view, Duration::from_secs(60), &mut Unobserved);
-        assert!(begun.elapsed() < PATIENCE, "{:?}", begun.elapsed());
-        let frame = streamed.update(&view, &mut Unobserved);
-        pages_come += frame.pages_come;
-        assert!(frame.work.late > 0, "the file is not what it is to be: {frame:?}");
+    // Whether a page comes between filling and the update is for the threads that read to decide: in some round one does.
+    for _ in 0..200 {
+        for frame in exercise::frames(&terrain) {
+            let view = frame.view(terrasoar::view::Viewport { width_px: 160, height_px: 120 }, 1.0);
+            streamed.fill(&view, Duration::from_secs(60), &mut Unobserved);
+            assert!(begun.elapsed() < PATIENCE, "{:?}", begun.elapsed());
+            let frame = streamed.update(&view, &mut Unobserved);
+            pages_come += frame.pages_come;
+            assert!(frame.work.late > 0, "the file is not what it is to be: {frame:?}");
+        }
+        if pages_come > 0 {
+            break;
+        }
     }
     assert!(pages_come > 0, "the pool is not too small");
 }
