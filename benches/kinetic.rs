@@ -91,7 +91,6 @@ fn fly_only<C: RecordCodec>(
         legs.push((cpu_ns(start) - before, in_leg.max(1) as f64));
         views.reverse();
     }
-    // The first leg has the first frame.
     let updates = (legs.len() * views.len()) as f64;
     // The first leg has the first frame. Some systems tell a thread's time to a few milliseconds only, hence groups.
     let later: Vec<f64> = legs

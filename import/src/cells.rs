@@ -57,23 +57,18 @@ impl Cells {
     }
 }
 
-/// Calls `make` with every block, of at most `size` columns and rows, of those cells of a grid that `is_met` says something may lie in, on all threads, each with a state of its own; and `pass` with windows
-/// that are made of the others. `is_met` is asked of the whole grid first, then of halves. The sides of blocks divide that of a cell.
-pub(crate) fn each_block_met<S>(
+/// The cells of a grid that `is_met` says something may lie in, row by row; `pass` is called with windows that are made of the others. `is_met` is asked of the whole grid first, then of halves.
+pub(crate) fn cells_met(
     [wide, high]: [u32; 2],
-    size: [u32; 2],
     cell: u32,
-    is_met: impl Fn(Window) -> bool,
+    is_met: impl Fn(Window) -> Result<bool, LayoutError>,
     pass: impl Fn(Window) -> Result<(), LayoutError>,
-    open: impl Fn() -> S + Sync,
-    make: impl Fn(&mut S, Window) -> Result<(), LayoutError> + Sync,
-) -> Result<(), LayoutError> {
-    debug_assert!(size.iter().all(|side| cell.is_multiple_of(*side)));
+) -> Result<Vec<Window>, LayoutError> {
     let mut met: Vec<Window> = Vec::new();
     let mut waiting = vec![Window { col: 0, row: 0, width: wide, height: high }];
     while let Some(window) = waiting.pop() {
         let Window { col, row, width, height } = window;
-        if !is_met(window) {
+        if !is_met(window)? {
             pass(window)?;
         } else if width.max(height) <= cell {
             met.push(window);
@@ -91,8 +86,24 @@ pub(crate) fn each_block_met<S>(
             }
         }
     }
-    // Cells side by side are one, so that the order of blocks is that of rows.
     met.sort_unstable_by_key(|cell| (cell.row, cell.col));
+    Ok(met)
+}
+
+/// Calls `make` with every block, of at most `size` columns and rows, of those cells of a grid that `is_met` says something may lie in, on all threads, each with a state of its own; and `pass` with windows
+/// that are made of the others, as [`cells_met`] finds them. The sides of blocks divide that of a cell.
+pub(crate) fn each_block_met<S>(
+    [wide, high]: [u32; 2],
+    size: [u32; 2],
+    cell: u32,
+    is_met: impl Fn(Window) -> bool,
+    pass: impl Fn(Window) -> Result<(), LayoutError>,
+    open: impl Fn() -> S + Sync,
+    make: impl Fn(&mut S, Window) -> Result<(), LayoutError> + Sync,
+) -> Result<(), LayoutError> {
+    debug_assert!(size.iter().all(|side| cell.is_multiple_of(*side)));
+    let mut met = cells_met([wide, high], cell, |window| Ok(is_met(window)), pass)?;
+    // Cells side by side are one, so that the order of blocks is that of rows.
     met.dedup_by(|cell, last| {
         let is_beside = cell.row == last.row && cell.col == last.col + last.width;
         last.width += if is_beside { cell.width } else { 0 };

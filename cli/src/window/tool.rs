@@ -64,7 +64,7 @@ pub(crate) struct ToolBox {
 }
 
 impl ToolBox {
-    /// A box for a terrain so many metres wide, with so many between samples. To begin with a tool reaches over a hundredth of it, or what is done in a moment.
+    /// A box for a terrain so many metres wide, with so many between samples, east and north. To begin with a tool reaches over a hundredth of it, or what is done in a moment.
     pub(crate) fn new(extent_m: [f64; 2], spacing_m: [f64; 2]) -> Self {
         let [share_m, most_m] =
             [0.01 * extent_m[0].max(extent_m[1]), FIRST_SAMPLES * spacing_m[0].max(spacing_m[1])];

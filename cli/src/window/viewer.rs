@@ -32,7 +32,6 @@ use anyhow::Result;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terrasoar::flight::Flight;
-use terrasoar::flight::generate::Ground;
 use terrasoar::view::View;
 use terrasoar_layout::read::terrain::Terrain;
 use winit::event_loop::{EventLoopProxy, OwnedDisplayHandle};
@@ -120,10 +119,7 @@ impl Viewer {
         let overlay = Overlay::new(&window, &display, &screen);
         let stage = Stage::new(terrain, &screen.gpu, settings.culling(), plan.cache_bytes)?;
         let rig = sight::start(&stage, &screen, &window, &settings);
-        let tools = {
-            let heights = stage.heights();
-            ToolBox::new(heights.extent_m(), heights.spacing_m())
-        };
+        let tools = edit::tools_for(&stage);
         let workshop = edit::workshop_for(&stage, &plan, &proxy);
         let mut viewer = Self {
             terrain_name: String::new(),

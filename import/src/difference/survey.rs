@@ -4,6 +4,7 @@
 //! the order of tiles, so that threads do not show. What is void in both is passed over.
 
 use super::{Difference, difference};
+use crate::cells::cells_met;
 use rayon::prelude::*;
 use terrasoar_layout::dem::Window;
 use terrasoar_layout::error::LayoutError;
@@ -82,7 +83,13 @@ impl Difference<'_> {
         let longest = size[0].max(size[1]);
         let samples = longest.div_ceil(most.max(128)).next_power_of_two().min(TILE);
         progress.stage("comparing", self.window.samples());
-        let tiles = self.tiles(progress)?;
+        // Oceans are found from the whole down, half by half.
+        let is_met = |window| Ok(!self.has_nothing(window)?);
+        let pass = |window: Window| {
+            progress.advance(u64::from(window.width) * u64::from(window.height));
+            Ok(())
+        };
+        let tiles = cells_met(size, TILE, is_met, pass)?;
         let parts: Vec<Part> = tiles
             .into_par_iter()
             .map(|window| {
@@ -106,35 +113,6 @@ impl Difference<'_> {
         }
         let summary = summed(&parts, self.header.grid.spacing_m().map(|m| m * f64::from(self.window.step)));
         Ok((summary, Reduced { size: reduced_size, samples, differences_m: reduced }))
-    }
-
-    /// Tiles in which either ground may have a height, row by row. Oceans are found from the whole down, half by half.
-    fn tiles(&self, progress: &dyn Progress) -> Result<Vec<Window>, LayoutError> {
-        let [width, height] = self.window.size;
-        let mut tiles = Vec::new();
-        let mut waiting = vec![Window { col: 0, row: 0, width, height }];
-        while let Some(window) = waiting.pop() {
-            let Window { col, row, width, height } = window;
-            if self.has_nothing(window)? {
-                progress.advance(u64::from(width) * u64::from(height));
-                continue;
-            }
-            // In halves of whole tiles.
-            let half = |side: u32| (side.div_ceil(TILE) / 2) * TILE;
-            if width.max(height) <= TILE {
-                tiles.push(window);
-            } else if width >= height {
-                let left = half(width);
-                waiting.push(Window { width: left, ..window });
-                waiting.push(Window { col: col + left, width: width - left, ..window });
-            } else {
-                let upper = half(height);
-                waiting.push(Window { height: upper, ..window });
-                waiting.push(Window { row: row + upper, height: height - upper, ..window });
-            }
-        }
-        tiles.sort_unstable_by_key(|tile| (tile.row, tile.col));
-        Ok(tiles)
     }
 
     fn part(&self, window: Window, samples: u32) -> Result<Part, LayoutError> {

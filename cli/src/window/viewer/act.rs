@@ -1,6 +1,6 @@
 //! Does what keys, panels and dropped files ask for.
 
-use super::{Viewer, sight};
+use super::{Viewer, edit, sight};
 use crate::fit;
 use crate::window::camera::ground_below_m;
 use crate::window::flights::{Player, Recorder};
@@ -9,7 +9,7 @@ use crate::window::keep;
 use crate::window::keys::Action;
 use crate::window::panel::Wish;
 use crate::window::stage::Stage;
-use crate::window::tool::{STEP, Tool, ToolBox};
+use crate::window::tool::{STEP, Tool};
 use crate::window::wake::Wake;
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
@@ -168,10 +168,7 @@ impl Viewer {
             Ok(stage) => {
                 self.end_recording();
                 self.take_stage(stage);
-                self.tools = {
-                    let heights = self.stage.heights();
-                    ToolBox::new(heights.extent_m(), heights.spacing_m())
-                };
+                self.tools = edit::tools_for(&self.stage);
                 self.rig = sight::start(&self.stage, &self.screen, &self.window, &self.settings);
                 self.player = None;
                 self.name_terrain();

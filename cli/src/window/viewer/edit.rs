@@ -7,7 +7,7 @@ use super::Viewer;
 use crate::window::Plan;
 use crate::window::coordinates::Coordinates;
 use crate::window::stage::Stage;
-use crate::window::tool::{RADII_M, Stroke, Tool};
+use crate::window::tool::{RADII_M, Stroke, Tool, ToolBox};
 use crate::window::wake::Wake;
 use crate::window::workshop::{News, Seen, Workshop};
 use std::time::{Duration, Instant};
@@ -43,6 +43,12 @@ const RING_POINTS: usize = 72;
 pub(in crate::window) struct Rain {
     fallen: u64,
     since: Instant,
+}
+
+/// The tools to begin with over a terrain.
+pub(super) fn tools_for(stage: &Stage) -> ToolBox {
+    let heights = stage.heights();
+    ToolBox::new(heights.extent_m(), heights.spacing_m())
 }
 
 /// A workshop for what is on show, which wakes the window.
