@@ -21,11 +21,24 @@ impl BitWriter {
         }
     }
 
-    /// All bytes, the last one filled up with zeros.
-    pub(crate) fn finish(mut self) -> Vec<u8> {
+    /// Appends all bytes to `bytes`, the last one filled up with zeros.
+    pub(crate) fn write(&self, bytes: &mut Vec<u8>) {
         let last = self.waiting.to_le_bytes();
-        self.bytes.extend(&last[..self.count.div_ceil(8) as usize]);
-        self.bytes
+        bytes.extend_from_slice(&self.bytes);
+        bytes.extend_from_slice(&last[..self.count.div_ceil(8) as usize]);
+    }
+
+    /// All bytes.
+    pub(crate) fn finish(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        self.write(&mut bytes);
+        bytes
+    }
+
+    /// Forgets all bits, and keeps the room.
+    pub(crate) fn clear(&mut self) {
+        self.bytes.clear();
+        (self.waiting, self.count) = (0, 0);
     }
 }
 

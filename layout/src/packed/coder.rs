@@ -1,21 +1,20 @@
-//! Values in contexts into bytes and back: what a segment is made of (FORMAT.md, section 9.4).
+//! Values in contexts out of bytes: what a segment is made of (FORMAT.md, section 9.4). Module `encoder` is the way into bytes.
 //!
 //! Tokens are coded by a range variant of asymmetric numeral systems (J. Duda, 2013) over tables that do not change. Several states take turns over one row of words, so that a processor has
 //! several independent steps at hand. Invariant: decoding never reads outside the bytes, and [`Decoder::finish`] says whether all of them, and nothing else, were used.
 
-use super::bits::{BitReader, BitWriter};
-use super::model::{Counts, DecodeTable, DecodeTables, ERRORS};
-use super::symbols::EncodeTables;
-use super::token::{BASES, TOKENS, token_of};
+use super::bits::BitReader;
+use super::model::{DecodeTable, DecodeTables, ERRORS};
+use super::token::{BASES, TOKENS};
 
 /// What a state is before the first and after the last symbol.
-const START: u32 = 1 << 16;
+pub(super) const START: u32 = 1 << 16;
 /// Most states that take turns.
-const MOST_LANES: usize = 32;
+pub(super) const MOST_LANES: usize = 32;
 /// Contexts that a row of values may be in, counted from its first.
-const SPAN: usize = 64;
+pub(super) const SPAN: usize = 64;
 /// Values that are decoded at a time; all numbers of lanes divide it.
-const ROW: usize = 1024;
+pub(super) const ROW: usize = 1024;
 
 /// Either way through the values of a tile: walking over it is the same for both.
 pub(crate) trait Coder {
@@ -29,151 +28,8 @@ pub(crate) trait Coder {
     fn raw(&mut self, bits: u32, value: &mut u16);
 }
 
-/// Symbols of a segment on their way into bytes.
-#[derive(Debug, Default)]
-pub(crate) struct Encoder {
-    symbols: Vec<Symbol>,
-    bits: BitWriter,
-}
-
-/// A token in its context, and whose turn it is.
-#[derive(Debug, Clone, Copy)]
-struct Symbol(u32);
-
-impl Symbol {
-    const TURN_BITS: u32 = MOST_LANES.ilog2();
-    const TOKEN_BITS: u32 = TOKENS.ilog2();
-
-    #[inline(always)]
-    fn new(context: u16, token: u8, turn: usize) -> Self {
-        let turn = turn as u32 % MOST_LANES as u32;
-        Self(((u32::from(context) << Self::TOKEN_BITS) | u32::from(token)) << Self::TURN_BITS | turn)
-    }
-
-    #[inline(always)]
-    fn context(self) -> usize {
-        (self.0 >> (Self::TURN_BITS + Self::TOKEN_BITS)) as usize
-    }
-
-    #[inline(always)]
-    fn token(self) -> usize {
-        (self.0 >> Self::TURN_BITS) as usize % TOKENS
-    }
-
-    /// Its turn among `lanes` states, a power of two that is no larger than [`MOST_LANES`].
-    #[inline(always)]
-    fn lane(self, lanes: usize) -> usize {
-        self.0 as usize & (lanes - 1) & (MOST_LANES - 1)
-    }
-}
-
-impl Coder for Encoder {
-    #[inline(always)]
-    fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
-        self.symbols.extend(contexts.iter().zip(&*values).enumerate().map(|(turn, (context, value))| {
-            Symbol::new(first + u16::from(*context), token_of(*value), turn)
-        }));
-        // Most rows of flat ground have no bits beside their tokens.
-        for values in values.chunks(16) {
-            if values.iter().fold(0, |all, value| all | value) >= 16 {
-                values.iter().for_each(|value| self.beside(*value));
-            }
-        }
-    }
-
-    fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
-        self.symbols.push(Symbol::new(context, token_of(*value), turn));
-        self.beside(*value);
-    }
-
-    fn raw(&mut self, bits: u32, value: &mut u16) {
-        self.bits.put(u32::from(*value), bits);
-    }
-}
-
-impl Encoder {
-    /// The bits beside a value's token.
-    #[inline(always)]
-    fn beside(&mut self, value: u16) {
-        let (base, bits) = BASES[usize::from(token_of(value))];
-        self.bits.put(u32::from(value - base), bits.into());
-    }
-
-    /// Counts its symbols.
-    pub(crate) fn count(&self, counts: &mut Counts) {
-        self.symbols.iter().for_each(|symbol| counts[symbol.context()][symbol.token()] += 1);
-    }
-
-    /// The segment. `None` if the tables lack one of its tokens.
-    pub(crate) fn finish(self, tables: &EncodeTables) -> Option<Vec<u8>> {
-        let lanes: usize = match self.symbols.len() {
-            0..1_000 => 4,
-            1_000..3_000 => 8,
-            3_000..11_000 => 16,
-            _ => MOST_LANES,
-        };
-        let mut states = [START; MOST_LANES];
-        // A symbol gives a word at most. They are filled from behind, for the last symbol comes first.
-        let mut words = vec![[0; 2]; self.symbols.len()];
-        let (mut at, mut has_all) = (words.len(), true);
-        for symbol in self.symbols.iter().rev() {
-            let step = tables.step(symbol.context(), symbol.token());
-            has_all &= step.is_known();
-            let state = &mut states[symbol.lane(lanes)];
-            let is_full = step.is_full(*state);
-            // Without a branch, which nothing foretells: a word that does not count is written over by the next.
-            if let Some(word) = words.get_mut(at.wrapping_sub(1)) {
-                *word = (*state as u16).to_le_bytes();
-            }
-            at -= usize::from(is_full);
-            *state = step.after(*state >> (16 * u32::from(is_full)));
-        }
-        if !has_all {
-            return None;
-        }
-        let words = words[at..].as_flattened();
-        let bits = self.bits.finish();
-        let mut bytes = Vec::with_capacity(3 + 4 * lanes + words.len() + bits.len());
-        bytes.push(lanes as u8);
-        bytes.extend(u16::try_from(words.len() / 2).ok()?.to_le_bytes());
-        states[..lanes].iter().for_each(|state| bytes.extend(state.to_le_bytes()));
-        bytes.extend(words);
-        bytes.extend(bits);
-        Some(bytes)
-    }
-}
-
-/// Values as they are: for segments whose tokens the tables of the file lack. What tables are is not needed.
-#[derive(Debug, Default)]
-pub(crate) struct PlainEncoder(BitWriter);
-
-impl Coder for PlainEncoder {
-    fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
-        for (context, value) in contexts.iter().zip(values) {
-            self.value(first + u16::from(*context), 0, value);
-        }
-    }
-
-    fn value(&mut self, context: u16, _: usize, value: &mut u16) {
-        self.0.put(u32::from(*value), plain_bits(context));
-    }
-
-    fn raw(&mut self, bits: u32, value: &mut u16) {
-        self.0.put(u32::from(*value), bits);
-    }
-}
-
-impl PlainEncoder {
-    /// The segment.
-    pub(crate) fn finish(self) -> Vec<u8> {
-        let mut bytes = vec![0];
-        bytes.extend(self.0.finish());
-        bytes
-    }
-}
-
 /// Bits of a value that is stored as it is.
-fn plain_bits(context: u16) -> u32 {
+pub(super) fn plain_bits(context: u16) -> u32 {
     if context < ERRORS { 16 } else { 8 }
 }
 

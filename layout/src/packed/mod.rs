@@ -7,7 +7,7 @@
 //! * `leaves`: directory leaves of that file, each from its block.
 //! * `appended`: what was appended to it since.
 //! * `tile`, `blocks`: a tile's records, and where those of a page lie in tiles.
-//! * `coder`, `model`, `token`, `bits`: values into bytes and back.
+//! * `coder`, `encoder`, `model`, `token`, `bits`: values into bytes and back.
 //!
 //! Invariant: what is read is what was written, or an error; no bytes make reading panic, or take memory beyond a tile's.
 
@@ -17,6 +17,7 @@ mod blocks;
 mod cache;
 pub(crate) mod coder;
 pub(crate) mod container;
+pub(crate) mod encoder;
 pub(crate) mod exact;
 pub(crate) mod leaves;
 pub(crate) mod model;

@@ -52,6 +52,17 @@ impl<T: Copy + Default> Plane<T> {
     }
 }
 
+/// How heights are predicted, a row at a time.
+///
+/// A type and no function that is handed on: what is called through a function is compiled for any processor.
+pub(crate) trait Prediction<T> {
+    /// What it has to say of the ground around.
+    type Around;
+
+    /// Given the corners of diamonds, two opposite pairs, and the eight vertices around.
+    fn row(near: [&[T]; 4], far: [&[T]; 8], predicted: &mut [T], around: &mut [Self::Around]);
+}
+
 /// A square lattice of `m` cells a side, and what refines it to the next.
 #[derive(Debug, Default)]
 pub(crate) struct Lattices<T> {
@@ -128,33 +139,30 @@ impl<T: Copy + Default + Add<Output = T> + Sub<Output = T>> Lattices<T> {
         }
     }
 
-    /// Predicts all whites, row by row: `predict` is given the corners of their diamonds, two opposite pairs, and the eight vertices around, and writes what it predicts and what it has to say of
-    /// the ground around.
+    /// Predicts all whites, row by row.
     #[inline(always)]
-    pub(crate) fn predict_whites<A>(
+    pub(crate) fn predict_whites<P: Prediction<T>>(
         &self,
         m: usize,
         predicted: &mut [T],
-        around: &mut [A],
-        predict: impl Fn([&[T]; 4], [&[T]; 8], &mut [T], &mut [A]),
+        around: &mut [P::Around],
     ) {
         for (j, (predicted, around)) in
             predicted.chunks_exact_mut(m).zip(around.chunks_exact_mut(m)).enumerate()
         {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m);
             let far = [e(-1, 0), e(-1, 1), e(2, 0), e(2, 1), e(0, -1), e(1, -1), e(0, 2), e(1, 2)];
-            predict([e(0, 0), e(1, 1), e(1, 0), e(0, 1)], far, predicted, around);
+            P::row([e(0, 0), e(1, 1), e(1, 0), e(0, 1)], far, predicted, around);
         }
     }
 
     /// The same of all blacks: those on edges that run east, row by row, then the others.
     #[inline(always)]
-    pub(crate) fn predict_blacks<A>(
+    pub(crate) fn predict_blacks<P: Prediction<T>>(
         &self,
         m: usize,
         predicted: &mut [T],
-        around: &mut [A],
-        predict: impl Fn([&[T]; 4], [&[T]; 8], &mut [T], &mut [A]),
+        around: &mut [P::Around],
     ) {
         let of_east = m * (m + 1);
         let (east, north) = predicted.split_at_mut(of_east);
@@ -164,14 +172,14 @@ impl<T: Copy + Default + Add<Output = T> + Sub<Output = T>> Lattices<T> {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m);
             let w = |dx: isize, dy: isize| self.whites.row(dx, j as isize + dy, m);
             let far = [w(-1, -1), w(-1, 0), w(1, -1), w(1, 0), e(0, -1), e(1, -1), e(0, 1), e(1, 1)];
-            predict([e(0, 0), e(1, 0), w(0, -1), w(0, 0)], far, predicted, around);
+            P::row([e(0, 0), e(1, 0), w(0, -1), w(0, 0)], far, predicted, around);
         }
         let rows = north.chunks_exact_mut(m + 1).zip(north_around.chunks_exact_mut(m + 1));
         for (j, (predicted, around)) in rows.enumerate() {
             let e = |dx: isize, dy: isize| self.coarse.row(dx, j as isize + dy, m + 1);
             let w = |dx: isize, dy: isize| self.whites.row(dx, j as isize + dy, m + 1);
             let far = [w(-1, -1), w(0, -1), w(-1, 1), w(0, 1), e(-1, 0), e(-1, 1), e(1, 0), e(1, 1)];
-            predict([e(0, 0), e(0, 1), w(-1, 0), w(0, 0)], far, predicted, around);
+            P::row([e(0, 0), e(0, 1), w(-1, 0), w(0, 0)], far, predicted, around);
         }
     }
 }
@@ -179,18 +187,24 @@ impl<T: Copy + Default + Add<Output = T> + Sub<Output = T>> Lattices<T> {
 /// Vertices of a row that are predicted together.
 const TOGETHER: usize = 8;
 
-/// Predictions and classes of a row, from two opposite pairs of corners and the eight vertices around.
-#[inline(always)]
-pub(crate) fn predict(near: [&[i32]; 4], far: [&[i32]; 8], predicted: &mut [i32], classes: &mut [u8]) {
-    let count = predicted.len();
-    let mut done = 0;
-    // The last ones together with some that were predicted before.
-    while done < count && count >= TOGETHER {
-        let from = done.min(count - TOGETHER);
-        predict_some::<TOGETHER>(near, far, from, predicted, classes);
-        done = from + TOGETHER;
+/// Heights of whole numbers, and their classes.
+pub(crate) struct Whole;
+
+impl Prediction<i32> for Whole {
+    type Around = u8;
+
+    #[inline(always)]
+    fn row(near: [&[i32]; 4], far: [&[i32]; 8], predicted: &mut [i32], classes: &mut [u8]) {
+        let count = predicted.len();
+        let mut done = 0;
+        // The last ones together with some that were predicted before.
+        while done < count && count >= TOGETHER {
+            let from = done.min(count - TOGETHER);
+            predict_some::<TOGETHER>(near, far, from, predicted, classes);
+            done = from + TOGETHER;
+        }
+        (done..count).for_each(|from| predict_some::<1>(near, far, from, predicted, classes));
     }
-    (done..count).for_each(|from| predict_some::<1>(near, far, from, predicted, classes));
 }
 
 /// Some of a row, by copies of it: then the compiler knows that what is written is none of what is read.
@@ -255,7 +269,7 @@ mod tests {
         }
         lattices.ring_coarse(m);
         let (mut predicted, mut classes) = (vec![0; m * m], vec![0; m * m]);
-        lattices.predict_whites(m, &mut predicted, &mut classes, predict);
+        lattices.predict_whites::<Whole>(m, &mut predicted, &mut classes);
         for (x, y) in (1..m - 1).flat_map(|y| (1..m - 1).map(move |x| (x, y))) {
             let exact = f(x as f64 + 0.5, y as f64 + 0.5);
             assert!((f64::from(predicted[y * m + x]) - exact).abs() < 1.3, "{x} {y}");

@@ -66,11 +66,12 @@ impl EncodeTables {
         Self { table_of: model.table_of.clone(), tables: model.tables.iter().map(steps).collect() }
     }
 
-    /// What a token in a context does; nothing is known of contexts that there are not.
+    /// What tokens in a context do; nothing is known of contexts that there are not.
     #[inline(always)]
-    pub(crate) fn step(&self, context: usize, token: usize) -> Step {
+    pub(crate) fn of_context(&self, context: usize) -> &[Step; TOKENS] {
+        const NONE: [Step; TOKENS] = [Step { inverse: 0, frequency: 0, start: 0 }; TOKENS];
         let table = self.table_of.get(context).and_then(|table| self.tables.get(usize::from(*table)));
-        table.map_or_else(Step::default, |steps| steps[token % TOKENS])
+        table.unwrap_or(&NONE)
     }
 }
 
@@ -107,7 +108,7 @@ mod tests {
         let mut table = [0; TOKENS];
         table[3] = 1 << SCALE_LOG;
         let tables = EncodeTables::of(&Model { table_of: vec![0], tables: vec![table] });
-        assert!(tables.step(0, 3).is_known());
-        assert!(!tables.step(0, 2).is_known() && !tables.step(1, 3).is_known());
+        assert!(tables.of_context(0)[3].is_known());
+        assert!(!tables.of_context(0)[2].is_known() && !tables.of_context(1)[3].is_known());
     }
 }

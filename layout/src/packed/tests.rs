@@ -1,6 +1,7 @@
 //! Tiles through the coder and back.
 
-use super::coder::{Decoder, Encoder, PlainEncoder};
+use super::coder::Decoder;
+use super::encoder::{Encoder, PlainEncoder};
 use super::model::{CONTEXTS, DecodeTables, Model};
 use super::rules::Rules;
 use super::shape::{SEGMENTS, TileShape};
@@ -52,8 +53,22 @@ fn records(shape: &TileShape, seed: u64, wildness: u64) -> TileRecords {
 
 fn encoded(width: Width, shape: &TileShape, rules: &Rules, truth: &TileRecords) -> [Encoder; SEGMENTS] {
     let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-    width.walk(shape, rules, &mut Scratch::default(), &mut encoders, Some(truth));
+    let made = width.walk(shape, rules, &mut Scratch::default(), &mut encoders, Some(truth));
+    assert!(made.gives_same(truth, shape), "what is written is not what was made of it");
     encoders
+}
+
+/// The bytes of each segment.
+pub(super) fn finished(
+    width: Width,
+    tables: &EncodeTables,
+    encoders: &[Encoder; SEGMENTS],
+) -> [Vec<u8>; SEGMENTS] {
+    encoders.each_ref().map(|encoder| {
+        let mut bytes = Vec::new();
+        encoder.finish(width, tables, &mut Vec::new(), &mut bytes).unwrap();
+        bytes
+    })
 }
 
 /// What a tile of this shape gives, down to an octave; everything else inert.
@@ -124,12 +139,14 @@ proptest! {
         let model = Model::from_counts(&counts);
         let model = Model::parse(&model.to_bytes()).unwrap();
         let encode = EncodeTables::of(&model);
-        let segments = encoders.map(|encoder| encoder.finish(&encode).unwrap());
-        for width in Width::all() {
-            let same = encoded(width, &shape, &rules, &truth).map(|encoder| encoder.finish(&encode).unwrap());
-            prop_assert!(same == segments, "{width:?}");
-        }
+        let segments = finished(Width::Portable, &encode, &encoders);
         let tables = DecodeTables::of(&model);
+        for width in Width::all() {
+            let same = encoded(width, &shape, &rules, &truth);
+            prop_assert!(finished(width, &encode, &same) == segments, "{width:?}");
+            let mut pairs = same.iter().zip(&segments);
+            prop_assert!(pairs.all(|(encoder, segment)| encoder.is_given_by(width, &tables, segment)));
+        }
         let mut scratch = Scratch::default();
         for count in (1..=SEGMENTS).rev() {
             let mut decoders: Vec<Decoder<'_>> =
@@ -148,7 +165,11 @@ proptest! {
         // Without tables.
         let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
         walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
-        let segments = encoders.map(PlainEncoder::finish);
+        let segments = encoders.map(|encoder| {
+            let mut bytes = Vec::new();
+            encoder.finish(&mut bytes);
+            bytes
+        });
         let mut decoders = segments.each_ref().map(|bytes| Decoder::new(&tables, bytes).unwrap());
         let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
         prop_assert!(decoders.iter().all(|decoder| decoder.finish()));
@@ -164,8 +185,14 @@ proptest! {
         encoders.iter().for_each(|encoder| encoder.count(&mut counts));
         let model = Model::from_counts(&counts);
         let tables = DecodeTables::of(&model);
-        let mut segments = encoders.map(|encoder| encoder.finish(&EncodeTables::of(&model)).unwrap());
+        let whole = finished(Width::best(), &EncodeTables::of(&model), &encoders);
+        let mut segments = whole.clone();
         spoil(&mut segments, seed, &bytes);
+        for width in Width::all() {
+            for ((encoder, segment), whole) in encoders.iter().zip(&segments).zip(&whole) {
+                prop_assert!(segment == whole || !encoder.is_given_by(width, &tables, segment));
+            }
+        }
         let segments: Vec<_> = segments.into_iter().take_while(|bytes| Decoder::new(&tables, bytes).is_some()).collect();
         if !segments.is_empty() {
             let found = Width::all().into_iter().map(|width| read(width, &shape, &rules, &tables, &segments));

@@ -9,7 +9,7 @@ pub(super) mod special;
 
 use super::coder::Coder;
 use super::model::{HEIGHT_CLASSES, HEIGHTS};
-use super::plane::{Lattices, predict};
+use super::plane::{Lattices, Whole};
 use super::rules::{Rules, TOP_ERROR};
 use super::shape::{TILE_LOG, TileShape};
 use super::tile::{INERT, TileRecords};
@@ -248,12 +248,12 @@ fn heights<C: Coder>(
     let (m, whites) = (octave.m, octave.whites());
     let first = HEIGHTS + 2 * coded as u16 * HEIGHT_CLASSES;
     let Scratch { heights, flat_heights, contexts, .. } = scratch;
-    heights.predict_whites(m, &mut flat_heights[..whites], &mut contexts[..whites], predict);
+    heights.predict_whites::<Whole>(m, &mut flat_heights[..whites], &mut contexts[..whites]);
     residuals(scratch, coder, truth, 0..whites, first, is_special);
     let Scratch { heights, flat_heights, contexts, .. } = scratch;
     heights.take_whites(m, &flat_heights[..whites]);
     heights.ring_whites(m);
-    heights.predict_blacks(m, &mut flat_heights[octave.blacks()], &mut contexts[octave.blacks()], predict);
+    heights.predict_blacks::<Whole>(m, &mut flat_heights[octave.blacks()], &mut contexts[octave.blacks()]);
     residuals(scratch, coder, truth, octave.blacks(), first + HEIGHT_CLASSES, is_special);
 }
 

@@ -52,6 +52,25 @@ impl Width {
         }
     }
 
+    /// Does some work with these instructions.
+    pub(crate) fn run<W: Work>(self, work: W) -> W::Made {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            #[expect(unsafe_code, reason = "instructions that not every processor has")]
+            Self::Avx2 if self.is_here() => {
+                // SAFETY: the processor has all that the function is compiled for.
+                unsafe { run_avx2(work) }
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[expect(unsafe_code, reason = "instructions that not every processor has")]
+            Self::Avx512 if self.is_here() => {
+                // SAFETY: the processor has all that the function is compiled for.
+                unsafe { run_avx512(work) }
+            }
+            _ => run_portable(work),
+        }
+    }
+
     /// Takes a tile's values through its segments, as [`walk`] does.
     pub(crate) fn walk<C: Coder>(
         self,
@@ -61,55 +80,47 @@ impl Width {
         segments: &mut [C],
         truth: Option<&TileRecords>,
     ) -> TileRecords {
-        match self {
-            #[cfg(target_arch = "x86_64")]
-            #[expect(unsafe_code, reason = "instructions that not every processor has")]
-            Self::Avx2 if self.is_here() => {
-                // SAFETY: the processor has all that the function is compiled for.
-                unsafe { walk_avx2(shape, rules, scratch, segments, truth) }
-            }
-            #[cfg(target_arch = "x86_64")]
-            #[expect(unsafe_code, reason = "instructions that not every processor has")]
-            Self::Avx512 if self.is_here() => {
-                // SAFETY: the processor has all that the function is compiled for.
-                unsafe { walk_avx512(shape, rules, scratch, segments, truth) }
-            }
-            _ => walk_portable(shape, rules, scratch, segments, truth),
-        }
+        self.run(Walk { shape, rules, scratch, segments, truth })
+    }
+}
+
+/// What is compiled for each width: all of it that counts is inlined into `run`.
+pub(crate) trait Work {
+    type Made;
+
+    fn run(self) -> Self::Made;
+}
+
+struct Walk<'w, C> {
+    shape: &'w TileShape,
+    rules: &'w Rules,
+    scratch: &'w mut Scratch,
+    segments: &'w mut [C],
+    truth: Option<&'w TileRecords>,
+}
+
+impl<C: Coder> Work for Walk<'_, C> {
+    type Made = TileRecords;
+
+    #[inline(always)]
+    fn run(self) -> TileRecords {
+        walk(self.shape, self.rules, self.scratch, self.segments, self.truth)
     }
 }
 
 #[inline(never)]
-fn walk_portable<C: Coder>(
-    shape: &TileShape,
-    rules: &Rules,
-    scratch: &mut Scratch,
-    segments: &mut [C],
-    truth: Option<&TileRecords>,
-) -> TileRecords {
-    walk(shape, rules, scratch, segments, truth)
+fn run_portable<W: Work>(work: W) -> W::Made {
+    work.run()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn walk_avx2<C: Coder>(
-    shape: &TileShape,
-    rules: &Rules,
-    scratch: &mut Scratch,
-    segments: &mut [C],
-    truth: Option<&TileRecords>,
-) -> TileRecords {
-    walk(shape, rules, scratch, segments, truth)
+fn run_avx2<W: Work>(work: W) -> W::Made {
+    work.run()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn walk_avx512<C: Coder>(
-    shape: &TileShape,
-    rules: &Rules,
-    scratch: &mut Scratch,
-    segments: &mut [C],
-    truth: Option<&TileRecords>,
-) -> TileRecords {
-    walk(shape, rules, scratch, segments, truth)
+fn run_avx512<W: Work>(work: W) -> W::Made {
+    work.run()
 }

@@ -40,9 +40,10 @@ fn fill<C: RecordCodec>(
     words: &mut [u32],
     words_each: usize,
 ) {
+    let mut near = records.near();
     for (record, slot) in words.chunks_exact_mut(words_each).zip(slots) {
         let mut bytes = [0; 16];
-        C::write(records.raw(slot), &mut bytes);
+        C::write(near.raw(slot), &mut bytes);
         record.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, from)| *to = u32::from_le_bytes(*from));
     }
 }

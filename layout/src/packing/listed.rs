@@ -6,6 +6,8 @@ use rayon::prelude::*;
 /// A leaf of the tile directory that is written.
 pub(super) struct ListedLeaf {
     pub(super) leaf: usize,
+    /// Its place among those that are written.
+    pub(super) place: usize,
     /// Numbers of its first tile, and of the one behind its last, among the tiles of all that are written.
     pub(super) first: usize,
     pub(super) end: usize,
@@ -29,12 +31,12 @@ pub(super) fn listed(groups: &Groups, may_hold: impl Fn(TileId) -> bool + Sync) 
         candidates.dedup();
     }
     let mut end = 0;
-    let number = |leaf| {
+    let number = |(place, leaf)| {
         let first = end;
         end += groups.leaf_size(leaf);
-        ListedLeaf { leaf, first, end }
+        ListedLeaf { leaf, place, first, end }
     };
-    leaves.into_iter().map(number).collect()
+    leaves.into_iter().enumerate().map(number).collect()
 }
 
 /// All tiles of leaves, with their numbers among those of all leaves that are listed.

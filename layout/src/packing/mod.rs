@@ -7,6 +7,7 @@ mod front;
 mod gather;
 mod listed;
 mod pack;
+mod packer;
 mod unpack;
 
 pub(crate) use compare::Check;

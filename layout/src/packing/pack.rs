@@ -5,8 +5,8 @@
 
 use super::compare::{CHUNK_BYTES, Check, compare, read_back, refused};
 use super::front::Front;
-use super::gather::tile_of;
 use super::listed::{ListedLeaf, listed, tiles_of};
+use super::packer::{Made, Packer, Tables};
 use crate::error::LayoutError;
 use crate::file::atomic::AtomicFile;
 use crate::file::bytes::{PAGE_BYTES, Page, checksum, put_u32, put_u64, to_usize};
@@ -16,35 +16,25 @@ use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
 use crate::file::packed_end::{FRONT, Run};
 use crate::file::source::Source;
-use crate::grid::GridPoint;
-use crate::grid::order::slot_of;
 use crate::grid::record::RecordCodec;
-use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
 use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
 use crate::packed::leaves::packed_leaves;
-use crate::packed::model::{CONTEXTS, Counts, DecodeTables, Model};
+use crate::packed::model::DecodeTables;
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace, TileRoot};
-use crate::packed::shape::{Groups, SEGMENTS, TileId};
+use crate::packed::shape::Groups;
 use crate::packed::symbols::EncodeTables;
-use crate::packed::tile::TileRecords;
-use crate::packed::token::TOKENS;
-use crate::packed::way::{Scratch, Way};
+use crate::packed::way::Way;
 use crate::packed::wide::Width;
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
-use crate::read::records::Records;
 use crate::read::terrain::Terrain;
 use crate::with_records;
 use rayon::prelude::*;
 use std::path::Path;
 
 const PAGE: u64 = PAGE_BYTES as u64;
-/// Tiles packed before they are written.
-const TILES_AT_ONCE: usize = 4096;
-
-/// Tiles of which all are counted, and of more one in so many.
-const TILES_COUNTED: usize = 1024;
-const TILES_A_SAMPLE: u32 = 8;
+/// Tiles packed before they are written. The next ones are packed meanwhile.
+const TILES_AT_ONCE: usize = 2048;
 
 /// What became of a terrain that was packed.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,9 +120,13 @@ pub(crate) fn publish_packed(
         let terrain = Terrain::mapped(read_back(&plain)?)?;
         pack_into(disk, &terrain, &terrain, &file, check, progress)?
     };
-    drop(plain);
     progress.stage("syncing", 0);
-    Ok((publish_terrain(disk, file, over)?, packed.bytes))
+    // To remove a large file takes a while, in which the disk can take in the other.
+    let header = std::thread::scope(|scope| {
+        scope.spawn(|| drop(plain));
+        publish_terrain(disk, file, over)
+    })?;
+    Ok((header, packed.bytes))
 }
 
 /// Whether a file is laid out as a build leaves it: then its directory follows from which pages there are. Where that ends.
@@ -165,119 +159,7 @@ fn check_pages(terrain: &Terrain, progress: &dyn Progress) -> Result<(), LayoutE
         .try_for_each(|page| terrain.checked_page(page).map(|_| progress.advance(per_page)))
 }
 
-/// The tables of a file, as writing and reading have them.
-struct Tables {
-    encode: EncodeTables,
-    decode: DecodeTables,
-}
-
-/// A packed tile.
-struct Made {
-    segments: [Vec<u8>; SEGMENTS],
-}
-
-struct Packer<'p, C: RecordCodec> {
-    path: &'p Path,
-    records: Records<'p, C>,
-    groups: Groups,
-    way: Way,
-    width: Width,
-    check: Check,
-    progress: &'p dyn Progress,
-}
-
 impl<C: RecordCodec> Packer<'_, C> {
-    /// Whether a tile may give anything but inert records. All that it gives lies below its centre, unless it gives the corners of the square, too.
-    fn may_hold(&self, id: TileId) -> bool {
-        let group = &self.groups.groups[usize::from(id.group)];
-        let (shift, half) =
-            (group.stride_log + group.tile_log, 1 << (group.stride_log + group.tile_log) >> 1);
-        let [x, y] = id.at.map(|v| (v << shift) + half);
-        let centre = slot_of(self.records.grid().k(), GridPoint::new(x, y));
-        group.is_top || self.records.raw(centre) != C::INERT
-    }
-
-    /// The records of a tile; `None` if all that it gives are inert.
-    fn records_of(&self, id: TileId) -> Option<TileRecords> {
-        if !self.may_hold(id) {
-            return None;
-        }
-        let (shape, inert) = (self.groups.shape(id), self.way.inert());
-        let records = tile_of(&self.records, &self.groups, id, inert);
-        (!records.gives_nothing(&shape, inert)).then_some(records)
-    }
-
-    fn samples_of(&self, id: TileId) -> u64 {
-        3 << (2 * self.groups.groups[usize::from(id.group)].tile_log) >> 2
-    }
-
-    fn encoded(&self, id: TileId, records: &TileRecords, scratch: &mut Scratch) -> [Encoder; SEGMENTS] {
-        let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        self.way.walk(self.width, &self.groups.shape(id), scratch, &mut encoders, Some(records));
-        encoders
-    }
-
-    /// Whether a tile's values are counted, of the finest group of many tiles one in a few: those that chance takes, so that no pattern of the ground's is in step with them.
-    fn is_counted(&self, number: usize, tiles: usize, id: TileId) -> bool {
-        let chance = (number as u32).wrapping_mul(0x9e37_79b1) >> 16;
-        tiles <= TILES_COUNTED || id.group > 0 || chance.is_multiple_of(TILES_A_SAMPLE)
-    }
-
-    /// Counts what occurs.
-    fn model(&self, leaves: &[ListedLeaf]) -> Model {
-        let none = || (vec![[0; TOKENS]; CONTEXTS], self.way.scratch());
-        let count = leaves.last().map_or(0, |last| last.end);
-        let counts = leaves
-            .par_iter()
-            .flat_map_iter(|leaf| tiles_of(&self.groups, std::slice::from_ref(leaf)))
-            .filter(|(number, id)| self.is_counted(*number, count, *id))
-            .fold(none, |(mut counts, mut scratch), (_, id)| {
-                if let Some(records) = self.records_of(id) {
-                    for encoder in self.encoded(id, &records, &mut scratch) {
-                        encoder.count(&mut counts);
-                    }
-                }
-                self.progress.advance(self.samples_of(id));
-                (counts, scratch)
-            })
-            .map(|(counts, _)| counts)
-            .reduce(|| none().0, sum);
-        if count > TILES_COUNTED { Model::from_sample(&counts) } else { Model::from_counts(&counts) }
-    }
-
-    /// Packs a tile; `None` if all that it gives are inert.
-    fn make(&self, id: TileId, tables: &Tables, scratch: &mut Scratch) -> Result<Option<Made>, LayoutError> {
-        let shape = self.groups.shape(id);
-        self.progress.advance(self.samples_of(id));
-        let Some(records) = self.records_of(id) else { return Ok(None) };
-        let segments = self.encoded(id, &records, scratch).map(|encoder| encoder.finish(&tables.encode));
-        let segments = match segments {
-            [Some(a), Some(b), Some(c)] => [a, b, c],
-            // A sample lacked a token: values are stored as they are.
-            _ => {
-                let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
-                self.way.walk(self.width, &shape, scratch, &mut encoders, Some(&records));
-                encoders.map(PlainEncoder::finish)
-            }
-        };
-        if self.check == Check::Tiles {
-            let decoders = segments.iter().map(|bytes| Decoder::new(&tables.decode, bytes));
-            let same = decoders.collect::<Option<Vec<_>>>().is_some_and(|mut decoders| {
-                let found = self.way.walk(self.width, &shape, scratch, &mut decoders, None);
-                decoders.iter().all(Decoder::finish) && found.gives_same(&records, &shape)
-            });
-            if !same {
-                let [x, y] = id.at;
-                let stride = 1u64 << shape.stride_log;
-                let problem = format!(
-                    "tile {x}, {y} of stride {stride} does not come out as it went in; please report it"
-                );
-                return Err(refused(self.path, &problem));
-            }
-        }
-        Ok(Some(Made { segments }))
-    }
-
     /// Writes the whole file: what was `built`, whose directory ends at `directory_end`, and what `terrain` has behind it. Its length.
     fn write(
         &self,
@@ -323,44 +205,43 @@ impl<C: RecordCodec> Packer<'_, C> {
             LayoutError::write(file.target(), "cannot write the packed file", when_full, e)
         };
         let write = |bytes: &[u8], offset| disk.write_at(file.file(), bytes, offset).map_err(failed);
-        let mut done = 0;
-        while done < leaves.len() {
-            let few =
-                leaves[done..].partition_point(|listed| listed.end - leaves[done].first <= TILES_AT_ONCE);
-            let batch = &leaves[done..done + few.max(1)];
-            let tiles: Vec<TileId> = tiles_of(&self.groups, batch).map(|(_, id)| id).collect();
-            let made: Vec<Option<Made>> = tiles
-                .par_iter()
-                .with_min_len(16)
-                .map_init(|| self.way.scratch(), |scratch, id| self.make(*id, &tables, scratch))
-                .collect::<Result<_, LayoutError>>()?;
-            let mut bytes = Vec::new();
-            let mut made = made.into_iter();
-            for (i, listed) in (done..).zip(batch) {
-                let mut entries = vec![0; (listed.end - listed.first) * PLACE_BYTES];
-                let mut is_present = false;
-                for (within, made) in made.by_ref().take(listed.end - listed.first).enumerate() {
-                    let Some(Made { segments }) = made else { continue };
-                    let mut place = TilePlace { offset: at + bytes.len() as u64, ..TilePlace::default() };
-                    for (s, segment) in segments.iter().enumerate() {
-                        place.lengths[s] = segment.len() as u16;
-                        place.checksums[s] = checksum(segment);
-                        bytes.extend(segment);
+        let mut batches = batches_of(&leaves);
+        let mut next = batches.next();
+        let mut made = next.map_or(Ok(Vec::new()), |batch| self.make_all(batch, &tables))?;
+        while let Some(batch) = next {
+            next = batches.next();
+            // One batch is written while the next is made.
+            let (written, later) = rayon::join(
+                || {
+                    let mut bytes = Vec::new();
+                    let mut made = std::mem::take(&mut made).into_iter();
+                    for listed in batch {
+                        let mut entries = vec![0; (listed.end - listed.first) * PLACE_BYTES];
+                        let mut is_present = false;
+                        for (within, made) in made.by_ref().take(listed.end - listed.first).enumerate() {
+                            let Some(Made { bytes: segments, lengths, checksums }) = made else { continue };
+                            let offset = at + bytes.len() as u64;
+                            TilePlace { offset, lengths, checksums }.write(&mut entries, within);
+                            bytes.extend(segments);
+                            is_present = true;
+                        }
+                        let offset = first_leaf + (listed.first * PLACE_BYTES) as u64;
+                        if is_present {
+                            let place = if is_sparse { listed.place } else { listed.leaf };
+                            let to = root + place * LEAF_BYTES;
+                            put_u64(&mut front.bytes, to, offset);
+                            put_u32(&mut front.bytes, to + 8, checksum(&entries));
+                        }
+                        write(&entries, offset)?;
                     }
-                    place.write(&mut entries, within);
-                    is_present = true;
-                }
-                let offset = first_leaf + (listed.first * PLACE_BYTES) as u64;
-                if is_present {
-                    let to = root + if is_sparse { i } else { listed.leaf } * LEAF_BYTES;
-                    put_u64(&mut front.bytes, to, offset);
-                    put_u32(&mut front.bytes, to + 8, checksum(&entries));
-                }
-                write(&entries, offset)?;
-            }
-            write(&bytes, at)?;
-            at += bytes.len() as u64;
-            done += batch.len();
+                    write(&bytes, at)?;
+                    at += bytes.len() as u64;
+                    Ok(())
+                },
+                || next.map_or(Ok(Vec::new()), |batch| self.make_all(batch, &tables)),
+            );
+            written?;
+            made = later?;
         }
         front.seal(ROOT);
         front.list(BLOCKS, &blocks, at);
@@ -408,9 +289,16 @@ impl<C: RecordCodec> Packer<'_, C> {
     }
 }
 
-fn sum(mut a: Counts, b: Counts) -> Counts {
-    a.iter_mut().flatten().zip(b.iter().flatten()).for_each(|(a, b)| *a += b);
-    a
+/// Leaves of about [`TILES_AT_ONCE`] tiles, one batch after the other.
+fn batches_of(leaves: &[ListedLeaf]) -> impl Iterator<Item = &[ListedLeaf]> {
+    let mut rest = leaves;
+    std::iter::from_fn(move || {
+        let first = rest.first()?.first;
+        let few = rest.partition_point(|listed| listed.end - first <= TILES_AT_ONCE);
+        let (batch, later) = rest.split_at(few.max(1));
+        rest = later;
+        Some(batch)
+    })
 }
 
 /// The two header pages of a terrain file; zeros for the one that does not count, should it be no header.

@@ -109,6 +109,11 @@ impl<'a, C: RecordCodec> Records<'a, C> {
         self.bytes.record::<C>(page * PAGE_BYTES + within)
     }
 
+    /// Reads records of which one after the other lie in one page.
+    pub(crate) fn near(&self) -> Near<'_, C> {
+        Near { records: self, page: u64::MAX, bytes: &[0; PAGE_BYTES] }
+    }
+
     /// Asks memory for the record at `slot`. A hint: reads nothing, and does nothing for a slot past the last page.
     #[inline(always)]
     pub fn prefetch(&self, slot: u64) {
@@ -137,6 +142,36 @@ impl<'a, C: RecordCodec> Records<'a, C> {
     pub fn vertex_at(&self, p: GridPoint) -> Vertex {
         let level = if self.grid().is_corner(p) { 0 } else { self.grid().level(p) };
         self.vertex(slot_of(self.grid().k(), p), level)
+    }
+}
+
+/// Records of the page that was read last, which is not looked up again.
+pub(crate) struct Near<'r, C: RecordCodec> {
+    records: &'r Records<'r, C>,
+    page: u64,
+    bytes: &'r [u8; PAGE_BYTES],
+}
+
+impl<C: RecordCodec> Near<'_, C> {
+    /// As [`Records::raw`].
+    #[inline(always)]
+    pub(crate) fn raw(&mut self, slot: u64) -> C::Raw {
+        let page = page_of::<C>(slot);
+        if page != self.page && !self.turn_to(page) {
+            return self.records.raw(slot);
+        }
+        let within = byte_in_page::<C>(slot);
+        C::read(&self.bytes[within..within + C::BYTES])
+    }
+
+    /// Whether the page lies in the first slice.
+    #[inline(always)]
+    fn turn_to(&mut self, page: u64) -> bool {
+        let first = self.records.page(page) * PAGE_BYTES;
+        let bytes = self.records.bytes.first.get(first..).and_then(|bytes| bytes.first_chunk());
+        let Some(bytes) = bytes else { return false };
+        (self.page, self.bytes) = (page, bytes);
+        true
     }
 }
 

@@ -1,23 +1,31 @@
 //! Heights predicted in double precision, and the classes in whose contexts residuals are coded.
 
+use crate::packed::plane::Prediction;
+
 /// Classes of heights.
 pub(super) const CLASSES: i64 = 32;
 
-/// Predictions of a row from the corners of diamonds and the eight vertices around, in the order in which they are given.
-#[inline(always)]
-pub(super) fn predict(near: [&[f64]; 4], far: [&[f64]; 8], predicted: &mut [f64], uneven: &mut [f64]) {
-    let count = predicted.len();
-    let ([a, b, c, d], far) = (near.map(|row| &row[..count]), far.map(|row| &row[..count]));
-    let uneven = &mut uneven[..count];
-    for i in 0..count {
-        let corners = a[i] + b[i] + c[i] + d[i];
-        let around =
-            far[0][i] + far[1][i] + far[2][i] + far[3][i] + far[4][i] + far[5][i] + far[6][i] + far[7][i];
-        predicted[i] = (10.0 * corners - around) / 32.0;
-        let twist = (a[i] + b[i] - c[i] - d[i]).abs();
-        let curve = (2.0 * corners - around).abs();
-        let range = a[i].max(b[i]).max(c[i].max(d[i])) - a[i].min(b[i]).min(c[i].min(d[i]));
-        uneven[i] = 8.0 * twist + curve + 2.0 * range;
+/// Heights in double precision, and how uneven the ground around is. Sums are in the order in which they are written.
+pub(super) struct Real;
+
+impl Prediction<f64> for Real {
+    type Around = f64;
+
+    #[inline(always)]
+    fn row(near: [&[f64]; 4], far: [&[f64]; 8], predicted: &mut [f64], uneven: &mut [f64]) {
+        let count = predicted.len();
+        let ([a, b, c, d], far) = (near.map(|row| &row[..count]), far.map(|row| &row[..count]));
+        let uneven = &mut uneven[..count];
+        for i in 0..count {
+            let corners = a[i] + b[i] + c[i] + d[i];
+            let around =
+                far[0][i] + far[1][i] + far[2][i] + far[3][i] + far[4][i] + far[5][i] + far[6][i] + far[7][i];
+            predicted[i] = (10.0 * corners - around) / 32.0;
+            let twist = (a[i] + b[i] - c[i] - d[i]).abs();
+            let curve = (2.0 * corners - around).abs();
+            let range = a[i].max(b[i]).max(c[i].max(d[i])) - a[i].min(b[i]).min(c[i].min(d[i]));
+            uneven[i] = 8.0 * twist + curve + 2.0 * range;
+        }
     }
 }
 

@@ -4,13 +4,15 @@ use super::{Form, Rules, Scratch, walk};
 use crate::grid::Grid;
 use crate::grid::record::{Compact, RadiusCodes, RecordScale};
 use crate::mix::Random;
-use crate::packed::coder::{Decoder, Encoder, PlainEncoder};
+use crate::packed::coder::Decoder;
+use crate::packed::encoder::{Encoder, PlainEncoder};
 use crate::packed::model::{CONTEXTS, DecodeTables, Model};
 use crate::packed::shape::{SEGMENTS, TileShape};
 use crate::packed::symbols::EncodeTables;
-use crate::packed::tests::spoil;
+use crate::packed::tests::{finished, spoil};
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
+use crate::packed::wide::Width;
 use proptest::prelude::*;
 
 fn rules(form: Form) -> Rules {
@@ -115,12 +117,20 @@ proptest! {
     fn tiles_come_back(shape in shapes(), seed: u64, form in forms(), wildness in prop_oneof![Just(0u64), Just(9), Just(60_000)]) {
         let (rules, truth, mut scratch) = (rules(form), records(form, &shape, seed, wildness), Scratch::default());
         let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
+        let made = walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
+        prop_assert!(made.gives_same(&truth, &shape));
         let model = model_of(&encoders);
-        let segments = encoders.map(|encoder| encoder.finish(&EncodeTables::of(&model)).unwrap());
+        let segments = finished(Width::best(), &EncodeTables::of(&model), &encoders);
+        for (encoder, segment) in encoders.iter().zip(&segments) {
+            prop_assert!(encoder.is_given_by(Width::best(), &DecodeTables::of(&model), segment));
+        }
         let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
         walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
-        let plain = encoders.map(PlainEncoder::finish);
+        let plain = encoders.map(|encoder| {
+            let mut bytes = Vec::new();
+            encoder.finish(&mut bytes);
+            bytes
+        });
         let tables = DecodeTables::of(&model);
         for (segments, count) in [(&segments, 3), (&segments, 2), (&segments, 1), (&plain, 3)] {
             prop_assert!(segments.iter().all(|segment| segment.len() < 1 << 16));
@@ -142,7 +152,7 @@ proptest! {
         walk(&shape, &rules, &mut scratch, &mut encoders, Some(&records(form, &shape, seed, 9)));
         let model = model_of(&encoders);
         let tables = DecodeTables::of(&model);
-        let mut segments = encoders.map(|encoder| encoder.finish(&EncodeTables::of(&model)).unwrap());
+        let mut segments = finished(Width::best(), &EncodeTables::of(&model), &encoders);
         spoil(&mut segments, seed, &bytes);
         let mut decoders: Vec<_> = segments.iter().map_while(|bytes| Decoder::new(&tables, bytes)).collect();
         let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);

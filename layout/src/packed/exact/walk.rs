@@ -3,7 +3,7 @@
 //! It is that of compact records with other parts.
 
 use super::form::{Form, Parts};
-use super::heights::{class_of, predict};
+use super::heights::{Real, class_of};
 use super::numbers::{Row, raw, row, shift};
 use super::rules::Rules;
 use super::scratch::{Scratch, UNKNOWN};
@@ -134,12 +134,12 @@ fn heights<C: Coder>(
     let (m, whites) = (octave.m, octave.whites());
     let first = HEIGHTS + 2 * coded as u16 * HEIGHT_CLASSES;
     let Scratch { heights, predicted, uneven, .. } = scratch;
-    heights.predict_whites(m, &mut predicted[..whites], &mut uneven[..whites], predict);
+    heights.predict_whites::<Real>(m, &mut predicted[..whites], &mut uneven[..whites]);
     residuals(form, scratch, coder, truth, 0..whites, first);
     let Scratch { heights, predicted, uneven, values, .. } = scratch;
     heights.take_whites(m, &values[..whites]);
     heights.ring_whites(m);
-    heights.predict_blacks(m, &mut predicted[octave.blacks()], &mut uneven[octave.blacks()], predict);
+    heights.predict_blacks::<Real>(m, &mut predicted[octave.blacks()], &mut uneven[octave.blacks()]);
     residuals(form, scratch, coder, truth, octave.blacks(), first + HEIGHT_CLASSES);
 }
 
