@@ -21,6 +21,33 @@ impl BitWriter {
         }
     }
 
+    /// Appends numbers of so many bits, at most 14 each: faster than one by one.
+    #[inline(always)]
+    pub(crate) fn put_some<const N: usize>(&mut self, some: [(u16, u8); N]) {
+        let mut at = self.bytes.len();
+        // Whole bytes of what waits, bits of the numbers, and a word that is stored over what follows.
+        self.bytes.resize(at + 4 + 2 * N + 8, 0);
+        let mut store = |waiting: &mut u64, count: &mut u32| {
+            if let Some(place) = self.bytes.get_mut(at..at + 8) {
+                place.copy_from_slice(&waiting.to_le_bytes());
+            }
+            at += (*count / 8) as usize;
+            *waiting >>= *count & !7;
+            *count &= 7;
+        };
+        let (mut waiting, mut count) = (self.waiting, self.count);
+        store(&mut waiting, &mut count);
+        for few in some.chunks(4) {
+            for (value, bits) in few {
+                waiting |= u64::from(*value) << count;
+                count += u32::from(*bits);
+            }
+            store(&mut waiting, &mut count);
+        }
+        self.bytes.truncate(at);
+        (self.waiting, self.count) = (waiting, count);
+    }
+
     /// Appends all bytes to `bytes`, the last one filled up with zeros.
     pub(crate) fn write(&self, bytes: &mut Vec<u8>) {
         let last = self.waiting.to_le_bytes();
@@ -136,6 +163,20 @@ mod tests {
             let low = |value: u32, count: u32| (u64::from(value) & ((1 << count) - 1)) as u32;
             values.iter().for_each(|(value, count)| writer.put(low(*value, *count), *count));
             let bytes = writer.finish();
+            let mut other = BitWriter::default();
+            for (i, (value, count)) in values.iter().enumerate() {
+                let [low_count, high_count] = [*count / 3, *count - *count / 3].map(|bits| bits.min(14));
+                let rest = *count - low_count - high_count;
+                let parts = [(0, low_count), (low_count, high_count), (low_count + high_count, rest)];
+                let part = |(from, bits): (u32, u32)| low(value.checked_shr(from).unwrap_or(0), bits);
+                if i % 3 == 0 {
+                    parts.into_iter().for_each(|at| other.put(part(at), at.1));
+                } else {
+                    let [a, b, c] = parts.map(|at| (part(at) as u16, at.1 as u8));
+                    other.put_some([a, b, c, (0, 0), (0, 0)]);
+                }
+            }
+            prop_assert_eq!(&other.finish(), &bytes);
             let mut reader = BitReader::new(&bytes);
             for (value, count) in &values {
                 prop_assert_eq!(reader.take(*count), low(*value, *count));

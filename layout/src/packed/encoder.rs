@@ -43,15 +43,26 @@ impl Coder for Encoder {
         self.tokens.extend(values.iter().map(|value| *value as u8));
         let from = self.tokens.len() - values.len();
         // Most rows of flat ground have nothing but bare tokens.
-        for (tokens, values) in self.tokens[from..].chunks_mut(TOGETHER).zip(values.chunks(TOGETHER)) {
+        let (tokens, last_tokens) = self.tokens[from..].as_chunks_mut::<TOGETHER>();
+        let (values, last_values) = values.as_chunks::<TOGETHER>();
+        let beside = |token: u8, value: u16| {
+            let (base, bits) = BASES[usize::from(token) % TOKENS];
+            (value.wrapping_sub(base), bits)
+        };
+        for (tokens, values) in tokens.iter_mut().zip(values) {
             if values.iter().fold(0, |all, value| all | value) < BARE {
                 continue;
             }
-            for (token, value) in tokens.iter_mut().zip(values) {
-                *token = token_of(*value);
-                let (base, bits) = BASES[usize::from(*token) % TOKENS];
-                self.bits.put(u32::from(value - base), bits.into());
+            *tokens = values.map(token_of);
+            let mut some = [(0, 0); TOGETHER];
+            for i in 0..TOGETHER {
+                some[i] = beside(tokens[i], values[i]);
             }
+            self.bits.put_some(some);
+        }
+        for (token, value) in last_tokens.iter_mut().zip(last_values) {
+            *token = token_of(*value);
+            self.bits.put_some([beside(*token, *value)]);
         }
     }
 

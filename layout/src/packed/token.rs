@@ -21,14 +21,32 @@ pub(crate) const BASES: [(u16, u8); TOKENS] = {
     bases
 };
 
-/// Token of a number.
-#[inline]
-pub(crate) fn token_of(value: u16) -> u8 {
+/// Tokens of the numbers that occur much.
+const NEAR: [u8; 1024] = {
+    let mut near = [0; 1024];
+    let mut value = 0;
+    while value < near.len() {
+        near[value] = found_token(value as u16);
+        value += 1;
+    }
+    near
+};
+
+const fn found_token(value: u16) -> u8 {
     if value < 16 {
         return value as u8;
     }
     let octave = value.ilog2();
-    (16 + (octave - 4) * 4 + u32::from(value >> (octave - 2) & 3)) as u8
+    (16 + (octave - 4) * 4 + (value >> (octave - 2) & 3) as u32) as u8
+}
+
+/// Token of a number.
+#[inline(always)]
+pub(crate) fn token_of(value: u16) -> u8 {
+    match NEAR.get(usize::from(value)) {
+        Some(token) => *token,
+        None => found_token(value),
+    }
 }
 
 /// A signed number as one that is small if it is near 0; both count modulo 65,536.

@@ -7,6 +7,10 @@ use crate::packed::shape::{Groups, TileId};
 use crate::packed::tile::TileRecords;
 use crate::read::records::Records;
 
+/// Rows that memory is asked for ahead, and of which vertices of one: those whose records lie in one line of it are four by four, whites upright, blacks on a corner.
+const AHEAD: u32 = 4;
+const EACH: usize = 4;
+
 /// The records of a tile; `inert` is the words of an inert one.
 pub(super) fn tile_of<C: RecordCodec>(
     records: &Records<'_, C>,
@@ -24,9 +28,23 @@ pub(super) fn tile_of<C: RecordCodec>(
         if octave >= k {
             let xs = (0u32..).map(|i| x + i * (step << group.stride_log));
             fill(records, xs.map(|x| slot_of(k, GridPoint::new(x, y))), words, inert.len());
-        } else if x.trailing_zeros() == y.trailing_zeros() {
+            return;
+        }
+        // Records of a few rows lie together: those of rows ahead are asked for where they may be new ones.
+        let ahead = y + (AHEAD * step << group.stride_log);
+        let is_there = ahead <= first[1] + (1 << (group.stride_log + group.tile_log));
+        if x.trailing_zeros() == y.trailing_zeros() {
+            let is_first = (y >> (octave + 1)).is_multiple_of(AHEAD);
+            let slots = WhiteAlong::new(k, 2 * octave + 1, x, ahead).take(words.len() / inert.len());
+            if is_there && is_first {
+                slots.step_by(EACH).for_each(|slot| records.prefetch(slot));
+            }
             fill(records, WhiteAlong::new(k, 2 * octave + 1, x, y), words, inert.len());
         } else {
+            let slots = BlackAlong::new(k, 2 * octave, x, ahead).take(words.len() / inert.len());
+            if is_there {
+                slots.step_by(EACH).for_each(|slot| records.prefetch(slot));
+            }
             fill(records, BlackAlong::new(k, 2 * octave, x, y), words, inert.len());
         }
     })

@@ -12,6 +12,7 @@ const KIND_COUNT: u16 = 3;
 pub(in crate::packed) const OTHERS: u16 = KINDS + KIND_COUNT * KIND_COUNT;
 
 /// Kinds of all vertices of an octave, where any is not ordinary; whether that is so. Of vertices whose records other tiles give, what is fringe counts as ordinary.
+#[inline(always)]
 pub(super) fn kinds<C: Coder>(
     scratch: &mut Scratch,
     coder: &mut C,
@@ -47,7 +48,7 @@ pub(in crate::packed) fn coded_kinds<C: Coder>(
     octave: &Octave,
     is_writing: bool,
 ) -> bool {
-    let is_any = is_writing && kinds[..octave.count()].iter().any(|kind| *kind != ORDINARY);
+    let is_any = is_writing && kinds[..octave.count()].iter().fold(0, |all, kind| all | kind) != ORDINARY;
     let mut is_special = u16::from(is_any);
     coder.raw(1, &mut is_special);
     if is_special == 0 {
@@ -85,6 +86,7 @@ pub(super) fn fringe<C: Coder>(scratch: &mut Scratch, coder: &mut C, truth: Opti
 }
 
 /// Codes that are others than follow from heights, where there are any.
+#[inline(always)]
 pub(super) fn others<C: Coder>(
     scratch: &mut Scratch,
     coder: &mut C,
@@ -99,8 +101,13 @@ pub(super) fn others<C: Coder>(
         codes.is_some_and(|codes| codes != [scratch.flat_errors[i], scratch.flat_radii[i]])
     };
     let count = octave.count();
-    // Nearly none differs, and to look whether it does is quick.
-    let are_any = truth.is_some() && (0..count).any(|i| differs(scratch, i) && is_asked(scratch, i));
+    // Nearly none differs, and to look whether it does is quick where nothing ends the look.
+    let codes = scratch.flat_errors.iter().zip(&scratch.flat_radii);
+    let is_other = |any: u32, (record, (error, radius)): (&u32, (&u8, &u8))| {
+        any | (record >> 16) ^ (u32::from(*error) | u32::from(*radius) << 8)
+    };
+    let may_be_any = truth.is_some_and(|truth| truth.iter().zip(codes).fold(0, is_other) != 0);
+    let are_any = may_be_any && (0..count).any(|i| differs(scratch, i) && is_asked(scratch, i));
     let mut are_any = u16::from(are_any);
     coder.raw(1, &mut are_any);
     if are_any == 0 {
