@@ -17,6 +17,9 @@ pub(crate) trait Raster: Sync {
 
     /// The numbers of a window, rows from the north, in `into`, whatever was in it; NaN where there is none.
     fn read(&self, window: Window, into: &mut Vec<f64>) -> Result<(), LayoutError>;
+
+    /// Whether it is known at little cost that a window has no number.
+    fn has_nothing(&self, window: Window) -> Result<bool, LayoutError>;
 }
 
 /// The samples of a window of a terrain.
@@ -63,6 +66,10 @@ impl<'t> TerrainSamples<'t> {
 impl Raster for TerrainSamples<'_> {
     fn size(&self) -> [u32; 2] {
         self.window.size
+    }
+
+    fn has_nothing(&self, window: Window) -> Result<bool, LayoutError> {
+        self.is_void(window)
     }
 
     fn read(&self, window: Window, into: &mut Vec<f64>) -> Result<(), LayoutError> {

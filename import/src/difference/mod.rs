@@ -106,6 +106,11 @@ impl Raster for Difference<'_> {
         self.window.size
     }
 
+    /// Where the first ground has no height, or neither has one.
+    fn has_nothing(&self, window: Window) -> Result<bool, LayoutError> {
+        Ok(self.first.is_void(window)? || self.have_nothing(window)?)
+    }
+
     fn read(&self, window: Window, into: &mut Vec<f64>) -> Result<(), LayoutError> {
         let mut heights = [Vec::new(), Vec::new()];
         self.heights(window, &mut heights)?;
@@ -118,7 +123,7 @@ impl Raster for Difference<'_> {
 impl Difference<'_> {
     /// Whether neither ground has a height at the samples of a window, as far as is known without a look at each. Places are computed on a mesh; between its nodes they lie no farther from the nearest than that
     /// from its neighbours.
-    fn has_nothing(&self, window: Window) -> Result<bool, LayoutError> {
+    pub(super) fn have_nothing(&self, window: Window) -> Result<bool, LayoutError> {
         const NODES: usize = 9;
         if !self.first.is_void(window)? {
             return Ok(false);

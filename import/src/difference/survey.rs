@@ -84,7 +84,7 @@ impl Difference<'_> {
         let samples = longest.div_ceil(most.max(128)).next_power_of_two().min(TILE);
         progress.stage("comparing", self.window.samples());
         // Oceans are found from the whole down, half by half.
-        let is_met = |window| Ok(!self.has_nothing(window)?);
+        let is_met = |window| Ok(!self.have_nothing(window)?);
         let pass = |window: Window| {
             progress.advance(u64::from(window.width) * u64::from(window.height));
             Ok(())

@@ -1,7 +1,7 @@
 //! The file itself: header, what GDAL calls its structural metadata, the directories of all levels, then tiles, the coarsest level first.
 //!
 //! Tiles are in the order of their rows, each with its length before it and its last four bytes again behind it, which the metadata promises: readers then need no table of lengths.
-//! Places are known once all tiles are made, so the directories are made last and everything is written in one go. BigTIFF from some 4 GiB on.
+//! Tiles without a number are not there: their places and lengths are 0, as GDAL writes and reads sparse files. Places are known once all tiles are made, so the directories are made last and everything is written in one go. BigTIFF from some 4 GiB on.
 
 use super::Meaning;
 use super::encode::Numbers;
@@ -47,11 +47,12 @@ pub(super) fn write(
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<u64, LayoutError> {
-    let tiles = || made.levels.iter().flat_map(|level| &level.kept);
+    let tiles = || made.levels.iter().flat_map(Level::stored);
     let data: u64 = tiles().map(|tile| u64::from(tile.bytes) + AROUND).sum();
     progress.stage("arranging", tiles().count() as u64);
-    // Tables take 16 bytes a tile at most.
-    let big = data + 16 * tiles().count() as u64 > CLASSIC_BYTES;
+    // Tables take 16 bytes a tile at most, stored or not.
+    let places: usize = made.levels.iter().map(|level| level.kept.len()).sum();
+    let big = data + 16 * places as u64 > CLASSIC_BYTES;
     let mut directories: Vec<Tags> =
         made.levels.iter().enumerate().map(|(i, level)| level_tags(big, i > 0, level, numbers)).collect();
     describe(&mut directories[0], meaning, place, keys);
@@ -71,6 +72,9 @@ pub(super) fn write(
             .kept
             .iter()
             .map(|tile| {
+                if tile.bytes == 0 {
+                    return 0;
+                }
                 let offset = at + AROUND / 2;
                 at += u64::from(tile.bytes) + AROUND;
                 offset
@@ -103,7 +107,7 @@ pub(super) fn write(
 /// Copies the tiles, the coarsest level first.
 fn copy(made: &Made, out: &mut impl Write, progress: &dyn Progress) -> io::Result<()> {
     let mut bytes = Vec::new();
-    for tile in made.levels.iter().rev().flat_map(|level| &level.kept) {
+    for tile in made.levels.iter().rev().flat_map(Level::stored) {
         bytes.resize(tile.bytes as usize, 0);
         read_at(&made.spool, &mut bytes, tile.offset)?;
         out.write_all(&tile.bytes.to_le_bytes())?;

@@ -2,7 +2,7 @@
 //!
 //! Written is what the file holds: metres, a sample a pixel, `PixelIsPoint`, for heights are measured at points. Voids are the declared "no data". Overviews are means of four. The
 //! directories stand before the data and the coarsest overview comes first, so that a reader over a network needs the file's beginning and the tiles it looks at (`cog`). **Memory does not
-//! follow the terrain**: some tiles a thread and 24 bytes a tile (`pyramid`); on the output's disk twice the file's room is taken while it is made.
+//! follow the terrain**: some tiles a thread and 50 bytes a tile (`pyramid`); tiles without a number are not stored; on the output's disk twice the file's room is taken while it is made.
 //!
 //! Crates that write such files were looked at: `tiff` 0.11.3 writes strips alone, with the directory behind them; `geotiff-writer` 0.10 lays tiles uncompressed into the system's folder for
 //! temporary files, which may be memory, and compresses on one thread.

@@ -1,13 +1,13 @@
 //! Tiles of all levels, each made of the four below it, compressed as soon as they are made and kept in a nameless temporary file.
 //!
-//! The walk goes down by quarters, so a tile's four are at hand when it is due, and samples that lie near each other in the terrain file are read together. Held are a few tiles a thread and
-//! level, and 24 bytes a tile. Which thread makes what shows nowhere: where a tile lies in the temporary file depends on it, and what is written in the end does not.
+//! The walk goes down by quarters, so a tile's four are at hand when it is due, and samples that lie near each other in the terrain file are read together. Tiles without a number are neither made nor
+//! kept, and squares of them are passed over as a whole, so an ocean costs its places in the tables. Held are a few tiles a thread and level, and 16 bytes a tile. Which thread makes what shows nowhere: where a tile lies in the temporary file depends on it, and what is written in the end does not.
 
 use super::encode::{Numbers, encode};
 use crate::raster::Raster;
 use std::fs::File;
 use std::path::Path;
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use terrasoar_layout::dem::Window;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::atomic::folder_of;
@@ -18,7 +18,7 @@ use terrasoar_layout::progress::Progress;
 pub(crate) const TILE: u32 = 512;
 const SIDE: usize = TILE as usize;
 
-/// Where a tile lies in the temporary file.
+/// Where a tile lies in the temporary file; one without a number takes no bytes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Kept {
     pub(super) offset: u64,
@@ -34,6 +34,13 @@ pub(super) struct Level {
     pub(super) tiles: [u32; 2],
     /// By rows from the north.
     pub(super) kept: Vec<Kept>,
+}
+
+impl Level {
+    /// Tiles that have a number.
+    pub(super) fn stored(&self) -> impl Iterator<Item = &Kept> {
+        self.kept.iter().filter(|tile| tile.bytes > 0)
+    }
 }
 
 /// All tiles.
@@ -59,8 +66,6 @@ struct Maker<'r> {
     out: &'r Path,
     file: &'r File,
     spool: Mutex<Spool>,
-    /// A tile without numbers, compressed.
-    empty: OnceLock<Vec<u8>>,
     progress: &'r dyn Progress,
 }
 
@@ -96,7 +101,6 @@ pub(super) fn make(
         out,
         file: &file,
         spool: Mutex::new(Spool { end: 0, levels, voids: 0 }),
-        empty: OnceLock::new(),
         progress,
     };
     maker.tile(maker.tiles.len() - 1, [0; 2])?;
@@ -107,25 +111,22 @@ pub(super) fn make(
 impl Maker<'_> {
     /// Makes a tile and all below it; its numbers, `None` where it has none.
     fn tile(&self, level: usize, at: [u32; 2]) -> Result<Option<Vec<f64>>, LayoutError> {
-        let values = if level == 0 { self.finest(at)? } else { self.coarser(level, at)? };
+        let covered = self.covered(level, at);
+        if self.raster.has_nothing(covered)? {
+            let samples = u64::from(covered.width) * u64::from(covered.height);
+            self.lock().voids += samples;
+            self.progress.advance(samples);
+            return Ok(None);
+        }
+        let values = if level == 0 { self.finest(covered)? } else { self.coarser(level, at)? };
+        let Some(values) = values else { return Ok(None) };
         let failed = |e| {
             let when_full = "no room for the temporary file beside it, which takes as much as the output; make some on its disk, or name an output on another";
             LayoutError::write(self.out, "cannot write the temporary file beside it", when_full, e)
         };
-        let compressed;
-        let bytes = match (&values, self.empty.get()) {
-            (Some(values), _) => {
-                compressed = encode(values, SIDE, self.numbers).map_err(failed)?;
-                &compressed
-            }
-            (None, Some(empty)) => empty,
-            (None, None) => {
-                let empty = encode(&vec![f64::NAN; SIDE * SIDE], SIDE, self.numbers).map_err(failed)?;
-                self.empty.get_or_init(|| empty)
-            }
-        };
+        let bytes = encode(&values, SIDE, self.numbers).map_err(failed)?;
         let offset = {
-            let mut spool = self.spool.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut spool = self.lock();
             let offset = spool.end;
             spool.end += bytes.len() as u64;
             let level = &mut spool.levels[level];
@@ -133,19 +134,32 @@ impl Maker<'_> {
             level.kept[index] = Kept { offset, bytes: bytes.len() as u32 };
             offset
         };
-        write_at(self.file, bytes, offset).map_err(failed)?;
-        Ok(values)
+        write_at(self.file, &bytes, offset).map_err(failed)?;
+        Ok(Some(values))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Spool> {
+        self.spool.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What a tile covers of the raster.
+    fn covered(&self, level: usize, at: [u32; 2]) -> Window {
+        let side = u64::from(TILE) << level;
+        let span = |axis: usize| {
+            let from = u64::from(at[axis]) * side;
+            [from, side.min(u64::from(self.raster.size()[axis]) - from)].map(|v| v as u32)
+        };
+        let ([col, width], [row, height]) = (span(0), span(1));
+        Window { col, row, width, height }
     }
 
     /// A tile of the raster itself.
-    fn finest(&self, at: [u32; 2]) -> Result<Option<Vec<f64>>, LayoutError> {
-        let size = self.raster.size();
-        let [col, row] = at.map(|tile| tile * TILE);
-        let (width, height) = ((size[0] - col).min(TILE), (size[1] - row).min(TILE));
+    fn finest(&self, window: Window) -> Result<Option<Vec<f64>>, LayoutError> {
+        let Window { width, height, .. } = window;
         let mut read = Vec::new();
-        self.raster.read(Window { col, row, width, height }, &mut read)?;
+        self.raster.read(window, &mut read)?;
         let voids = read.iter().map(|value| u64::from(value.is_nan())).sum::<u64>();
-        self.spool.lock().unwrap_or_else(PoisonError::into_inner).voids += voids;
+        self.lock().voids += voids;
         self.progress.advance(read.len() as u64);
         if voids == read.len() as u64 {
             return Ok(None);

@@ -8,6 +8,7 @@ mod kernel;
 mod mapping;
 mod store;
 mod target;
+mod touch;
 
 use crate::cells::{CELL, Cells, each_block_met};
 use crate::crs::{Ground, HorizontalSize, Kind, System, is_earth};
@@ -271,35 +272,6 @@ impl Resampler {
     pub(crate) fn places(&self, window: Window) -> Vec<[f64; 2]> {
         let first = [f64::from(window.col), f64::from(window.row)];
         self.mapping.places(first, [window.width as usize, window.height as usize])
-    }
-
-    /// Whether new samples of a window may be made of old ones in `cells`. Places are computed on a mesh; between its nodes they lie no farther from the nearest than that from its neighbours.
-    pub(crate) fn may_touch(&self, window: Window, cells: &Cells) -> bool {
-        const NODES: usize = 9;
-        let first = [f64::from(window.col) - 0.5, f64::from(window.row) - 0.5];
-        let step = [window.width, window.height].map(|side| f64::from(side) / (NODES - 1) as f64);
-        let places: [[[f64; 2]; NODES]; NODES] = std::array::from_fn(|y| {
-            std::array::from_fn(|x| {
-                self.mapping.place([first[0] + x as f64 * step[0], first[1] + y as f64 * step[1]])
-            })
-        });
-        let all = || places.iter().flatten();
-        if self.kernel.wraps || all().flatten().any(|value| !value.is_finite()) {
-            return true;
-        }
-        let Some((low, high)) = rim(all()) else { return true };
-        let reach = self.kernel.reach();
-        let span: [(i64, u32); 2] = std::array::from_fn(|i| {
-            let apart = |a: [f64; 2], b: [f64; 2]| (a[i] - b[i]).abs();
-            let along = places.iter().flat_map(|row| row.windows(2)).map(|two| apart(two[0], two[1]));
-            let across =
-                places.windows(2).flat_map(|two| two[0].iter().zip(&two[1])).map(|(a, b)| apart(*a, *b));
-            let widest = along.chain(across).fold(0.0, f64::max);
-            let margin = widest + reach[i] + 1.0;
-            let [from, to] = [low[i] - margin, high[i] + margin].map(|value| value.clamp(-1.0, 4.0e9) as i64);
-            (from, (to - from + 1) as u32)
-        });
-        cells.touch(span.map(|(from, _)| from), span.map(|(_, size)| size))
     }
 
     /// Makes the samples of a window, in halves where it needs too many old ones.

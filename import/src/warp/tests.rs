@@ -101,6 +101,51 @@ fn degrees_become_metres_and_the_seam_of_the_globe_closes() {
     assert!(seen > 3000, "{seen}");
 }
 
+/// Of a globe with a few samples here and there, its seam among them, every window that one reaches may hold something, and most of the others are known to hold nothing.
+#[test]
+fn windows_around_the_globe_hold_what_reaches_them() {
+    use crate::cells::Cells;
+    const OLD: [u32; 2] = [3600, 1800];
+    const SIDE: u32 = 16;
+    for (system, least) in [("EPSG:3857", 80), ("EPSG:3413", 50)] {
+        let options = OpenOptions {
+            reproject: Some(system.into()),
+            resolution: Some(120_000.0),
+            resampling: Some(Resampling::Cubic),
+            ..OpenOptions::default()
+        };
+        let map = [-179.95, 0.1, 0.0, 89.95, 0.0, -0.1];
+        let known = by_text("EPSG:4326").unwrap();
+        let warp = Warp::plan(Path::new("a"), &known, Some(map), OLD, SampleType::F32, false, &options);
+        let warp = warp.unwrap().unwrap();
+        let resampler = &warp.resampler;
+        assert!(resampler.kernel.wraps);
+        let reach = resampler.kernel.reach();
+        let [wide, high] = warp.samples().map(|side| side / SIDE);
+        let windows = (0..high).flat_map(|row| (0..wide).map(move |col| [col * SIDE, row * SIDE]));
+        let windows: Vec<(Window, Vec<[f64; 2]>)> = windows
+            .map(|[col, row]| Window { col, row, width: SIDE, height: SIDE })
+            .map(|window| (window, resampler.places(window)))
+            .collect();
+        for [x, y] in [[0, 900], [3599, 300], [3590, 1500], [10, 1200], [1800, 20], [700, 905], [5, 1790]] {
+            let mut cells = Cells::of(4);
+            cells.add([x, y], [x + 1, y + 1]);
+            let is_reached = |place: &[f64; 2]| {
+                let apart = (place[0] - f64::from(x)).rem_euclid(f64::from(OLD[0]));
+                apart.min(f64::from(OLD[0]) - apart) <= reach[0]
+                    && (place[1] - f64::from(y)).abs() <= reach[1]
+            };
+            let of_nothing = windows.iter().filter(|(window, places)| {
+                let may_touch = resampler.may_touch(*window, &cells);
+                assert!(may_touch || !places.iter().any(is_reached), "{system} {x} {y}: {window:?}");
+                !may_touch
+            });
+            let of_nothing = of_nothing.count();
+            assert!(100 * of_nothing > least * windows.len(), "{system} {x} {y}: {of_nothing}");
+        }
+    }
+}
+
 #[test]
 fn utm_is_the_zone_of_the_centre_and_auto_goes_beyond() {
     let named = |text: &str, x: f64, y: f64, samples: [u32; 2]| {

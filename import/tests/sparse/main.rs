@@ -3,6 +3,7 @@
 #[path = "../import_support/mod.rs"]
 mod import_support;
 mod make;
+mod out;
 #[path = "../import_support/tools.rs"]
 mod tools;
 
