@@ -31,7 +31,7 @@ pub(super) fn tile_of<C: RecordCodec>(
             return;
         }
         // Records of a few rows lie together: those of rows ahead are asked for where they may be new ones.
-        let ahead = y + (AHEAD * step << group.stride_log);
+        let ahead = y + ((AHEAD * step) << group.stride_log);
         let is_there = ahead <= first[1] + (1 << (group.stride_log + group.tile_log));
         if x.trailing_zeros() == y.trailing_zeros() {
             let is_first = (y >> (octave + 1)).is_multiple_of(AHEAD);
