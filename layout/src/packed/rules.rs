@@ -91,9 +91,11 @@ pub(crate) fn slope_place(apart: i32) -> usize {
     bits.wrapping_sub(127 * SLOPE_STEPS) as usize & 255
 }
 
-/// A rising function of 0.. with byte values, asked some 20 times for each value it has.
-fn filled<const COUNT: usize>(code: impl Fn(usize) -> u8) -> Box<[u8; COUNT]> {
-    let mut table = Box::new([0; COUNT]);
+/// A rising function of 0.., asked some 20 times for each value it has.
+pub(super) fn filled<T: Copy + Default + PartialEq, const COUNT: usize>(
+    code: impl Fn(usize) -> T,
+) -> Box<[T; COUNT]> {
+    let mut table = Box::new([T::default(); COUNT]);
     let mut from = 0;
     while from < COUNT {
         let here = code(from);
@@ -115,7 +117,7 @@ mod tests {
     #[test]
     fn tables_hold_what_is_asked_of_every_number() {
         let squares = |i: usize| ((i as f64).sqrt() / 2.0) as u8;
-        assert_eq!(filled::<9000>(squares).to_vec(), (0..9000).map(squares).collect::<Vec<_>>());
+        assert_eq!(filled::<u8, 9000>(squares).to_vec(), (0..9000).map(squares).collect::<Vec<_>>());
         assert_eq!(slope_place(0), 0);
         for apart in 1..65_536u32 {
             let octaves = apart.ilog2();
