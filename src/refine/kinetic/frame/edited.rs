@@ -199,11 +199,18 @@ impl<S: RecordStore> Kinetic<S> {
         let k = self.records.grid().k();
         for (i, side) in self.nodes.sides(node, level).into_iter().enumerate() {
             let Some(side) = side else { continue };
+            let at =
+                [child_point(record.point, level, side.first), child_point(record.point, level, side.last)];
+            let are_met = [edits.areas.concern(at[0], level - 1), edits.areas.concern(at[1], level - 1)];
+            if are_met == [false; 2] {
+                continue;
+            }
+            // The other parent may be far away in memory.
             let apex = self.nodes.get(side.parent).body[body::HERE];
             let [p, q] = if i == 0 { ends } else { [ends[1], ends[0]] };
-            for (label, edge) in [(side.first, [apex, p]), (side.last, [q, apex])] {
-                let at = child_point(record.point, level, label);
-                if edits.areas.concern(at, level - 1) {
+            let edges = [(side.first, [apex, p]), (side.last, [q, apex])];
+            for (((label, edge), at), is_met) in edges.into_iter().zip(at).zip(are_met) {
+                if is_met {
                     let child = record.body[label];
                     let side = (label >> 1) as u32;
                     visits.push(Visit { slot: slot_of(k, at), node: child, ends: turned(edge, label), side });
