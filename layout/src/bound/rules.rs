@@ -166,13 +166,20 @@ impl Below {
     /// Four children, `ground2` square metres away over the ground from a vertex at `height_m` above `base_m`.
     #[inline(always)]
     pub(crate) fn of(children: &[Vertex; 4], ground2: &[f64; 4], height_m: f64, base_m: f64) -> Self {
-        let mut below = Self::default();
-        if children.iter().any(|child| child.class != VertexClass::Plain) {
-            for (child, ground2) in children.iter().zip(ground2) {
-                below.add(child, *ground2, height_m, base_m);
-            }
-            return below;
+        if children.iter().all(|child| child.class == VertexClass::Plain) {
+            return Self::of_plain(children, ground2, height_m, base_m);
         }
+        let mut below = Self::default();
+        for (child, ground2) in children.iter().zip(ground2) {
+            below.add(child, *ground2, height_m, base_m);
+        }
+        below
+    }
+
+    /// [`Below::of`] of plain children.
+    #[inline(always)]
+    pub(crate) fn of_plain(children: &[Vertex; 4], ground2: &[f64; 4], height_m: f64, base_m: f64) -> Self {
+        let mut below = Self::default();
         // Roots side by side.
         let mut radii_m = [0.0; 4];
         for i in 0..4 {

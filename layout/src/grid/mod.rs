@@ -199,13 +199,14 @@ impl Grid {
     /// How far, in steps along either axis, the diamonds of a vertex of `level` and of all its
     /// descendants reach.
     pub fn reach_steps(&self, level: u32) -> u32 {
-        let mut reach = 1;
-        for l in 1..=level {
-            let step = 1u32 << (l / 2);
-            let to_child = if l & 1 == 1 { step } else { step / 2 };
-            reach = step.max(to_child + reach);
-        }
-        reach
+        (0..=level).fold(0, |below, level| Self::reach_above(level, below))
+    }
+
+    /// [`Grid::reach_steps`] of a level, `below` being that of the level below it, or 0.
+    pub(crate) fn reach_above(level: u32, below: u32) -> u32 {
+        let step = 1u32 << (level / 2);
+        let to_child = if level & 1 == 1 { step } else { step / 2 };
+        step.max(to_child + below)
     }
 
     /// Whether a vertex lies so far beyond the data that neither its diamond nor any descendant's

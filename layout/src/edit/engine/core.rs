@@ -9,7 +9,7 @@ use super::midway::NewCodes;
 use super::near::MARGIN;
 use super::pages::{Overwritten, Pages};
 use super::update::{Scratch, Update};
-use crate::bound::Rules;
+use crate::bound::{Rules, larger, smaller};
 use crate::edit::operations::window::{HeightWindow, SampleRect};
 use crate::edit::{Changes, Edit};
 use crate::error::LayoutError;
@@ -145,7 +145,7 @@ impl<C: RecordCodec> Core<C> {
                 let original =
                     if edit.needs_original() { Some(core.original_heights(around)?) } else { None };
                 if bounds.count() <= BLOCK_SAMPLES && edit.margin() <= MARGIN {
-                    core.load_block(bounds);
+                    core.load_block(bounds, edit.margin());
                     let mut window = core.heights_in_block(around)?;
                     edit.apply(&grid, &mut window, original.as_ref());
                     core.set_block(bounds, &window, changes)?;
@@ -247,16 +247,16 @@ impl<C: RecordCodec> Core<C> {
                     east: (west + BLOCK_SIDE - 1).min(rect.east),
                     north: (south + BLOCK_SIDE - 1).min(rect.north),
                 };
-                self.load_block(block);
+                self.load_block(block, 0);
                 self.set_block(block, window, changes)?;
             }
         }
         Ok(())
     }
 
-    /// Brings the finest levels around a block to hand.
-    fn load_block(&mut self, block: SampleRect) {
-        self.scratch.near.load(&self.rules.grid, block, &mut self.pages);
+    /// Brings the finest levels around a block to hand, and at least `margin` samples on each side.
+    fn load_block(&mut self, block: SampleRect, margin: u32) {
+        self.scratch.near.load(&self.rules.grid, block, margin, &mut self.pages);
     }
 
     /// Heights around the block that was loaded last.
@@ -282,9 +282,6 @@ impl<C: RecordCodec> Core<C> {
         let [mut then, mut now] = std::mem::take(&mut self.codes);
         then.clear();
         now.clear();
-        // What changes: its bounds, and the range of new heights there.
-        let mut changed: Option<SampleRect> = None;
-        let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
         for y in block.south..=block.north {
             let (at, first) = (then.len(), window.index(block.west, y));
             let heights_m = &window.heights_m()[first..first + block.wide() as usize];
@@ -293,28 +290,15 @@ impl<C: RecordCodec> Core<C> {
                 let new = C::round_height((height_m - scale.height_base_m) / scale.height_step_m);
                 if height_m.is_nan() || old.is_nan() { *old } else { new }
             }));
-            // Voids differ from everything, and stay.
-            let (mut east, mut west) = (None, None);
-            for (x, (old, new)) in (block.west..).zip(then[at..].iter().zip(&now[at..])) {
-                if new != old && !old.is_nan() {
-                    lowest = lowest.min(*new);
-                    highest = highest.max(*new);
-                    west = west.or(Some(x));
-                    east = Some(x);
-                }
-            }
-            let voids = heights_m.iter().zip(&then[at..]).filter(|(m, old)| old.is_nan() && !m.is_nan());
-            changes.voids_passed += voids.count() as u64;
-            if let (Some(west), Some(east)) = (west, east) {
-                changed = Some(match changed {
-                    None => SampleRect { west, south: y, east, north: y },
-                    Some(r) => SampleRect { west: r.west.min(west), east: r.east.max(east), north: y, ..r },
-                });
+            if self.pages.has_voids() {
+                let voids = heights_m.iter().zip(&then[at..]).filter(|(m, old)| old.is_nan() && !m.is_nan());
+                changes.voids_passed += voids.count() as u64;
             }
         }
+        let (changed, range) = (changed_within(block, &then, &now), range_of_changed(&then, &now));
         self.codes = [then, now];
         let Some(changed) = changed else { return Ok(()) };
-        self.check_range([lowest, highest])?;
+        self.check_range(range)?;
         self.renew(block, changed);
         self.pages.check()?;
         changes.samples.push(changed);
@@ -371,6 +355,49 @@ impl<C: RecordCodec> Core<C> {
         self.header.height_range_m = range_m;
         Ok(())
     }
+}
+
+/// Whether a sample with these height codes changed. Voids differ from everything, and stay.
+#[inline(always)]
+fn is_changed(old: f64, new: f64) -> bool {
+    new != old && !old.is_nan()
+}
+
+/// The rectangle around the samples of `block` that have other height codes `now` than `then`; `None` if none has.
+fn changed_within(block: SampleRect, then: &[f64], now: &[f64]) -> Option<SampleRect> {
+    let wide = block.wide() as usize;
+    let mut changed: Option<SampleRect> = None;
+    for (y, (then, now)) in (block.south..).zip(then.chunks_exact(wide).zip(now.chunks_exact(wide))) {
+        let mut samples = then.iter().zip(now);
+        let Some(first) = samples.position(|(old, new)| is_changed(*old, *new)) else { continue };
+        let last = samples.rposition(|(old, new)| is_changed(*old, *new)).map_or(first, |at| first + 1 + at);
+        let (west, east) = (block.west + first as u32, block.west + last as u32);
+        changed = Some(match changed {
+            None => SampleRect { west, south: y, east, north: y },
+            Some(r) => SampleRect { west: r.west.min(west), east: r.east.max(east), north: y, ..r },
+        });
+    }
+    changed
+}
+
+/// Lowest and highest of the height codes `now` that differ from those `then`.
+#[inline(always)]
+fn range_of_changed(then: &[f64], now: &[f64]) -> [f64; 2] {
+    // Eight lanes, so that the compiler can vectorise.
+    let (mut lowest, mut highest) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
+    let mut look = |lane: usize, old: f64, new: f64| {
+        let is_changed = is_changed(old, new);
+        lowest[lane] = smaller(lowest[lane], if is_changed { new } else { f64::INFINITY });
+        highest[lane] = larger(highest[lane], if is_changed { new } else { f64::NEG_INFINITY });
+    };
+    let ((then, then_rest), (now, now_rest)) = (then.as_chunks::<8>(), now.as_chunks::<8>());
+    for (then, now) in then.iter().zip(now) {
+        for lane in 0..8 {
+            look(lane, then[lane], now[lane]);
+        }
+    }
+    then_rest.iter().zip(now_rest).for_each(|(old, new)| look(0, *old, *new));
+    [lowest.into_iter().fold(f64::INFINITY, smaller), highest.into_iter().fold(f64::NEG_INFINITY, larger)]
 }
 
 /// Leaves of `values`, one for each sample of `rect`, those of `part`, which lies in it.

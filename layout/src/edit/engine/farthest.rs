@@ -25,6 +25,24 @@ struct Piece {
     outside: [bool; 3],
 }
 
+/// A triangle that waits until the more promising half beside it is done.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Waiting {
+    piece: Piece,
+    split: Split,
+    /// Codes of distance that none of its samples exceeds.
+    bound: f64,
+}
+
+/// The vertex that splits a triangle.
+#[derive(Debug, Clone, Copy)]
+struct Split {
+    v: GridPoint,
+    /// Height code; not a number for a void.
+    code: f64,
+    level: u32,
+}
+
 /// The search in one triangle.
 pub(crate) struct Search<'s, C: RecordCodec> {
     rules: &'s Rules<C>,
@@ -66,22 +84,16 @@ impl<'s, C: RecordCodec> Search<'s, C> {
         self.enough = self.limit_m * self.per_step * (1.0 - 2e-7);
     }
 
-    /// Searches the triangle (apex; b, d) with these slots of its apex and its split vertex, whose record is `raw`.
+    /// Searches the triangle (apex; b, d) with these slots of its apex and its split vertex, whose record is `raw`. `waiting` is a list that is empty, and is again afterwards.
+    #[inline(always)]
     pub(crate) fn run(
         &mut self,
         ground: &mut Ground<'_, C>,
         corners: [GridPoint; 3],
         slots: [u64; 2],
         raw: C::Raw,
+        waiting: &mut Vec<Waiting>,
     ) {
-        let piece = Piece {
-            corners,
-            // A plane passes through its corners.
-            off: [0.0; 3],
-            apex_slot: slots[0],
-            split_slot: slots[1],
-            outside: [false, true, true],
-        };
         let vertex = self.rules.codec.decode(raw, self.level);
         if vertex.class == VertexClass::Inert {
             return;
@@ -89,7 +101,32 @@ impl<'s, C: RecordCodec> Search<'s, C> {
         // The vertex's record is the only one that may not say the new height yet.
         let v = corners[1].midpoint(corners[2]);
         let code = if vertex.class.is_void() { f64::NAN } else { ground.code_of(v, raw) };
-        self.visit(ground, piece, v, code, self.level);
+        let mut piece = Piece {
+            corners,
+            // A plane passes through its corners.
+            off: [0.0; 3],
+            apex_slot: slots[0],
+            split_slot: slots[1],
+            outside: [false, true, true],
+        };
+        let mut split = Split { v, code, level: self.level };
+        loop {
+            let Some(next) = self.visit(ground, &piece, split, waiting).or_else(|| self.next(waiting)) else {
+                return;
+            };
+            (piece, split) = next;
+        }
+    }
+
+    /// The last triangle that waits and can still change the record.
+    #[inline(always)]
+    fn next(&self, waiting: &mut Vec<Waiting>) -> Option<(Piece, Split)> {
+        while let Some(Waiting { piece, split, bound }) = waiting.pop() {
+            if bound > self.enough {
+                return Some((piece, split));
+            }
+        }
+        None
     }
 
     /// Codes by which a sample is off the plane; infinite for a void, whose code is not a number.
@@ -115,8 +152,15 @@ impl<'s, C: RecordCodec> Search<'s, C> {
         }
     }
 
-    /// Looks at the vertex `v` that splits `piece`, whose level is `level`, 1 or more, and whose height code is `code`, not a number for a void; and at what lies below it.
-    fn visit(&mut self, ground: &mut Ground<'_, C>, piece: Piece, v: GridPoint, code: f64, level: u32) {
+    /// Looks at the vertex that splits `piece`, which is of level 1 or more. Gives the half to go on with, and lets the other one wait, as far as they can change the record.
+    #[inline(always)]
+    fn visit(
+        &mut self,
+        ground: &mut Ground<'_, C>,
+        piece: &Piece,
+        Split { v, code, level }: Split,
+        waiting: &mut Vec<Waiting>,
+    ) -> Option<(Piece, Split)> {
         let [a, b, d] = piece.corners;
         let off = self.off(v, code);
         let [base_out, b_out, d_out] = piece.outside;
@@ -124,60 +168,57 @@ impl<'s, C: RecordCodec> Search<'s, C> {
             self.consider(off);
         }
         // The centre's triangles are no part of the walk that slots follow.
+        let splits = [a.midpoint(b), a.midpoint(d)];
         let slots = if piece.split_slot == CENTRE_SLOT {
-            [slot_of(ground.grid.k(), a.midpoint(b)), slot_of(ground.grid.k(), a.midpoint(d))]
+            [slot_of(ground.grid.k(), splits[0]), slot_of(ground.grid.k(), splits[1])]
         } else {
             child_slots(piece.apex_slot, piece.split_slot)
         };
         let raws = ground.pages.raw_pair(slots);
-        let splits = [a.midpoint(b), a.midpoint(d)];
         // All levels below the asked vertex's say the new heights.
-        let code_of = |raw: C::Raw| if C::is_void(raw) { f64::NAN } else { C::height_value(raw) };
+        let code_of =
+            |raw: C::Raw| if !C::is_plain(raw) && C::is_void(raw) { f64::NAN } else { C::height_value(raw) };
+        let codes = [code_of(raws[0]), code_of(raws[1])];
         if level == 1 {
             for i in [0, 1] {
                 if ![b_out, d_out][i] {
-                    let off = self.off(splits[i], code_of(raws[i]));
+                    let off = self.off(splits[i], codes[i]);
                     self.consider(off);
                 }
             }
-            return;
+            return None;
         }
         let [off_a, off_b, off_d] = piece.off;
         let shared = larger(off, off_a);
-        let bounds = [0, 1].map(|i| self.bound(larger(shared, [off_b, off_d][i]), raws[i], level - 1));
-        let mut go = |search: &mut Self, i: usize| {
-            // The ends of the new base turn about, so that slots follow.
-            let half = if i == 0 {
-                Piece {
-                    corners: [v, b, a],
-                    off: [off, off_b, off_a],
-                    apex_slot: piece.split_slot,
-                    split_slot: slots[0],
-                    outside: [b_out, base_out, false],
-                }
+        let bounds = [
+            self.bound(larger(shared, off_b), raws[0], level - 1),
+            self.bound(larger(shared, off_d), raws[1], level - 1),
+        ];
+        // The ends of the new base turn about, so that slots follow.
+        let half = |i: usize| {
+            let (corners, off, outside) = if i == 0 {
+                ([v, b, a], [off, off_b, off_a], [b_out, base_out, false])
             } else {
-                Piece {
-                    corners: [v, a, d],
-                    off: [off, off_a, off_d],
-                    apex_slot: piece.split_slot,
-                    split_slot: slots[1],
-                    outside: [d_out, false, base_out],
-                }
+                ([v, a, d], [off, off_a, off_d], [d_out, false, base_out])
             };
-            search.visit(ground, half, splits[i], code_of(raws[i]), level - 1);
+            let half = Piece { corners, off, apex_slot: piece.split_slot, split_slot: slots[i], outside };
+            (half, Split { v: splits[i], code: codes[i], level: level - 1 })
         };
         let first = usize::from(bounds[1] > bounds[0]);
-        for i in [first, 1 - first] {
-            if bounds[i] > self.enough {
-                go(self, i);
-            }
+        if bounds[1 - first] > self.enough {
+            let (piece, split) = half(1 - first);
+            waiting.push(Waiting { piece, split, bound: bounds[1 - first] });
         }
+        (bounds[first] > self.enough).then(|| half(first))
     }
 
     /// Codes of distance that no sample of a triangle exceeds whose corners are `off` at most, `raw` being the record of the vertex that splits it.
     #[inline(always)]
     fn bound(&self, off: f64, raw: C::Raw, level: u32) -> f64 {
         let split = self.rules.codec.decode(raw, level);
+        if C::is_plain(raw) {
+            return off + self.slack + split.error_m * self.per_step;
+        }
         if split.class == VertexClass::Inert {
             return 0.0;
         }

@@ -98,6 +98,12 @@ impl<C: RecordCodec> Near<C> {
         }
     }
 
+    /// Notes a record that was written, by its index.
+    #[inline(always)]
+    pub(crate) fn set_raw(&mut self, at: usize, raw: C::Raw) {
+        self.raws[at] = raw;
+    }
+
     /// Column and row of a grid point within the rectangle.
     #[inline(always)]
     pub(crate) fn within(&self, p: GridPoint) -> [u32; 2] {

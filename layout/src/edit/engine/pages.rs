@@ -22,6 +22,9 @@ use std::sync::Arc;
 /// Pages kept that can be read again, unless another number is asked for: 64 MiB.
 const CLEAN_PAGES: usize = 16_384;
 
+/// Bytes of a line of the processor's caches.
+const LINE_BYTES: usize = 64;
+
 /// The page differs, or once differed, from the terrain's.
 const EDITED: u8 = 1;
 /// It was written to since the last commit began.
@@ -115,15 +118,13 @@ impl<C: RecordCodec> Pages<C> {
     /// The records of two slots, most often of one page.
     #[inline(always)]
     pub(crate) fn raw_pair(&mut self, slots: [u64; 2]) -> [C::Raw; 2] {
-        let pages = slots.map(page_of::<C>);
-        if pages[0] != pages[1] {
-            return slots.map(|slot| self.raw(slot));
+        let [a, b] = slots;
+        if page_of::<C>(a) != page_of::<C>(b) {
+            return [self.raw(a), self.raw(b)];
         }
-        let page = self.page_at(slots[0]);
-        slots.map(|slot| {
-            let within = byte_in_page::<C>(slot);
-            C::read(&page[within..within + C::BYTES])
-        })
+        let page = self.page_at(a);
+        let read = |slot: u64| C::read(&page[byte_in_page::<C>(slot)..][..C::BYTES]);
+        [read(a), read(b)]
     }
 
     /// The record of a slot whose page is here.
@@ -140,11 +141,15 @@ impl<C: RecordCodec> Pages<C> {
         self.raw(slot_of(self.k, p))
     }
 
-    /// Asks memory for the record of a slot, if its page is here.
+    /// Asks memory for the records of `count` slots from one on, as far as they lie in its page and that is here.
     #[inline(always)]
-    pub(crate) fn prefetch(&self, slot: u64) {
+    pub(crate) fn prefetch_row(&self, slot: u64, count: u64) {
         if let Some(page) = self.held(page_of::<C>(slot)) {
-            prefetch(&page[..], byte_in_page::<C>(slot));
+            let first = byte_in_page::<C>(slot);
+            let last = first + (count as usize - 1) * C::BYTES;
+            for at in (first..last).step_by(LINE_BYTES).chain([last]) {
+                prefetch(&page[..], at);
+            }
         }
     }
 
@@ -180,8 +185,9 @@ impl<C: RecordCodec> Pages<C> {
         &mut self.touched[place]
     }
 
+    /// The page of a slot.
     #[inline(always)]
-    fn page_at(&mut self, slot: u64) -> &mut Page {
+    pub(crate) fn page_at(&mut self, slot: u64) -> &mut Page {
         let logical = page_of::<C>(slot);
         let place = self.place(logical);
         self.page_in(place, logical)
@@ -226,19 +232,19 @@ impl<C: RecordCodec> Pages<C> {
         Err(LayoutError::Usage(format!("page {logical} does not exist; the terrain has {pages}")))
     }
 
-    /// Overwrites a record.
+    /// Overwrites a record, which is `old`.
     #[inline(always)]
-    pub(crate) fn write(&mut self, point: GridPoint, slot: u64, raw: C::Raw) {
+    pub(crate) fn write(&mut self, point: GridPoint, slot: u64, old: C::Raw, raw: C::Raw) {
         let (logical, within) = (page_of::<C>(slot), byte_in_page::<C>(slot));
         let at = self.place(logical);
         if self.touched[at].marked == 0 {
             self.begin_writing(at, logical);
         }
-        let place = &mut self.page_in(at, logical)[within..within + C::BYTES];
-        let old = C::read(place);
-        C::write(raw, place);
+        let touched = &mut self.touched[at];
+        let Some(page) = touched.held.as_deref_mut() else { return };
+        C::write(raw, &mut page[within..within + C::BYTES]);
         let record = within / C::BYTES;
-        let word = &mut self.marks[self.touched[at].marked as usize - 1].1[record / 64];
+        let word = &mut self.marks[touched.marked as usize - 1].1[record / 64];
         let bit = 1 << (record % 64);
         if *word & bit == 0 {
             *word |= bit;

@@ -8,6 +8,7 @@
 mod bounded;
 mod finest;
 
+use super::farthest::Waiting;
 use super::midway::{Ground, NewCodes};
 use super::near::{NEAR_LEVELS, Near, first_of_row};
 use super::pages::Pages;
@@ -30,11 +31,19 @@ pub(crate) struct Scratch<C: RecordCodec> {
     here: Vec<(GridPoint, C::Raw)>,
     /// Parents of changed children that lie apart from what changed.
     apart: Vec<GridPoint>,
+    /// Triangles of a search.
+    waiting: Vec<Waiting>,
 }
 
 impl<C: RecordCodec> Default for Scratch<C> {
     fn default() -> Self {
-        Self { near: Near::default(), below: Vec::new(), here: Vec::new(), apart: Vec::new() }
+        Self {
+            near: Near::default(),
+            below: Vec::new(),
+            here: Vec::new(),
+            apart: Vec::new(),
+            waiting: Vec::new(),
+        }
     }
 }
 
@@ -65,8 +74,10 @@ impl<'u, C: RecordCodec> Update<'u, C> {
         // An update that failed may have left both as they were.
         self.scratch.below.clear();
         self.scratch.here.clear();
+        let mut reach = 0;
         for level in 0..grid.levels() {
-            self.level(level);
+            reach = Grid::reach_above(level, reach);
+            self.level(level, reach);
             if self.ground.pages.has_failed() {
                 return;
             }
@@ -90,10 +101,10 @@ impl<'u, C: RecordCodec> Update<'u, C> {
         }
     }
 
-    fn level(&mut self, level: u32) {
+    /// Makes the records of a level anew, whose vertices reach `reach` steps.
+    fn level(&mut self, level: u32, reach: u32) {
         let grid = self.rules.grid;
         let s = 1u32 << (level / 2);
-        let reach = grid.reach_steps(level);
         let limit = grid.samples().map(|count| (count - 1 + reach - 1).min(grid.side_steps()));
         let (south, north) = (self.area.south.saturating_sub(s), (self.area.north + s).min(limit[1]));
         for y in (south.next_multiple_of(s)..=north).step_by(s as usize) {
@@ -110,6 +121,7 @@ impl<'u, C: RecordCodec> Update<'u, C> {
     }
 
     /// Makes the records of a level's vertices in a row from column `first` to `last` anew.
+    #[inline(never)]
     fn renew_along(&mut self, level: u32, y: u32, first: u32, last: u32) {
         match level {
             0 => self.renew_row::<0>(y, first, last),
@@ -165,6 +177,7 @@ impl<'u, C: RecordCodec> Update<'u, C> {
     }
 
     /// Makes the record of one vertex anew.
+    #[inline(never)]
     fn renew(&mut self, v: GridPoint, level: u32) {
         let (grid, rules) = (self.rules.grid, self.rules);
         let slot = slot_of(grid.k(), v);
@@ -206,24 +219,30 @@ impl<'u, C: RecordCodec> Update<'u, C> {
     fn put(&mut self, v: GridPoint, slot: u64, old: C::Raw, new: Option<C::Raw>) -> Option<C::Raw> {
         match new {
             Some(new) if new != old => {
-                self.ground.pages.write(v, slot, new);
+                self.ground.pages.write(v, slot, old, new);
                 self.scratch.near.note(v, new);
                 Some(new)
             }
             Some(_) => None,
             None => {
-                self.ground.pages.fail(LayoutError::OutOfRange {
-                    path: self.ground.pages.terrain().path().to_owned(),
-                    heights_m: [f64::NAN; 2],
-                    problem: format!(
-                        "the ground at ({}, {}) would be steeper than this file's records can say; rewrite it with room for that",
-                        v.x(),
-                        v.y()
-                    ),
-                });
+                self.fail(v);
                 None
             }
         }
+    }
+
+    /// Notes that no record can say what is at a vertex.
+    #[cold]
+    fn fail(&mut self, v: GridPoint) {
+        self.ground.pages.fail(LayoutError::OutOfRange {
+            path: self.ground.pages.terrain().path().to_owned(),
+            heights_m: [f64::NAN; 2],
+            problem: format!(
+                "the ground at ({}, {}) would be steeper than this file's records can say; rewrite it with room for that",
+                v.x(),
+                v.y()
+            ),
+        });
     }
 }
 

@@ -251,6 +251,12 @@ impl RecordCodec for Compact {
     }
 
     #[inline(always)]
+    fn is_plain(raw: u32) -> bool {
+        // An inert record's error is 0.
+        (1..FRINGE).contains(&((raw >> 16) as u8))
+    }
+
+    #[inline(always)]
     fn height_value(raw: u32) -> f64 {
         f64::from(raw as u16)
     }

@@ -158,6 +158,12 @@ pub trait RecordCodec: Clone + Send + Sync + 'static {
     /// Whether a record's sample is void, or the record inert: as [`Vertex::class`] says it, without decoding the rest.
     fn is_void(raw: Self::Raw) -> bool;
 
+    /// Whether a record is surely a plain one's, found more quickly than by decoding it.
+    #[inline(always)]
+    fn is_plain(_raw: Self::Raw) -> bool {
+        false
+    }
+
     /// The raw height of a record that is not inert, as [`RecordCodec::encode`] takes it.
     fn height_value(raw: Self::Raw) -> f64;
 

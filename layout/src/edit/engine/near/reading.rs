@@ -2,22 +2,21 @@
 //!
 //! Cost: some thirty instructions a record, and the wait for memory, which is asked for all records at once.
 
-use super::{MARGIN, NEAR_LEVELS, Near, first_of_row};
+use super::{NEAR_LEVELS, Near, first_of_row};
 use crate::edit::engine::pages::Pages;
 use crate::edit::operations::window::SampleRect;
 use crate::grid::order::{BlackAlong, FAMILY, WhiteAlong, family, slot_of};
 use crate::grid::record::RecordCodec;
 use crate::grid::{Grid, GridPoint};
+use crate::read::store::{byte_in_page, page_of};
 
 /// Steps between the points that belong to coarser levels.
 const COARSER: u32 = 1 << (NEAR_LEVELS / 2);
-/// Bytes of a line of the processor's caches.
-const LINE_BYTES: usize = 64;
 
 impl<C: RecordCodec> Near<C> {
-    /// Reads the records of `rect` and of the samples around it.
-    pub(crate) fn load(&mut self, grid: &Grid, rect: SampleRect, pages: &mut Pages<C>) {
-        let around = rect.grown(MARGIN, grid);
+    /// Reads the records of `rect` and of the samples around it, at least `margin` on each side.
+    pub(crate) fn load(&mut self, grid: &Grid, rect: SampleRect, margin: u32, pages: &mut Pages<C>) {
+        let around = looked_at(grid, rect, margin);
         ask(grid, around, pages);
         (self.west, self.south) = (around.west, around.south);
         (self.wide, self.high) = (around.wide(), around.high());
@@ -69,17 +68,49 @@ impl<C: RecordCodec> Near<C> {
         let (mut at, end) = (self.index(x, y), self.index(self.west, y) + self.row_length());
         let (slots, raws) = (&mut self.slots[..end], &mut self.raws[..end]);
         // What lies beyond the row is not asked for: it may lie beyond the square.
-        while at < end
-            && let Some(slot) = along.next()
-        {
-            slots[at] = slot;
-            raws[at] = pages.raw(slot);
-            at += apart as usize;
+        if at >= end {
+            return;
+        }
+        let Some(mut slot) = along.next() else { return };
+        loop {
+            // Slots of a row stay in a page for long.
+            let logical = page_of::<C>(slot);
+            let page = pages.page_at(slot);
+            while page_of::<C>(slot) == logical {
+                let within = byte_in_page::<C>(slot);
+                slots[at] = slot;
+                raws[at] = C::read(&page[within..within + C::BYTES]);
+                at += apart as usize;
+                if at >= end {
+                    return;
+                }
+                match along.next() {
+                    Some(next) => slot = next,
+                    None => return,
+                }
+            }
         }
     }
 }
 
+/// What the vertices of these levels look at whose diamonds touch `rect`, and at least `margin` samples on each side.
+#[inline(always)]
+fn looked_at(grid: &Grid, rect: SampleRect, margin: u32) -> SampleRect {
+    // A vertex of the coarsest of these levels lies at a multiple of its step, at most one step away, and looks one step farther. Those of finer levels look less far.
+    let step = COARSER / 2;
+    let ([wide, high], around) = (grid.samples(), rect.grown(margin, grid));
+    let before = |v: u32| v.next_multiple_of(step).saturating_sub(2 * step);
+    let behind = |v: u32| v / step * step + 2 * step;
+    SampleRect {
+        west: around.west.min(before(rect.west)),
+        south: around.south.min(before(rect.south)),
+        east: around.east.max(behind(rect.east)).min(wide - 1),
+        north: around.north.max(behind(rect.north)).min(high - 1),
+    }
+}
+
 /// Asks memory for the records of a rectangle, as far as their pages are here: family by family.
+#[inline(always)]
 fn ask<C: RecordCodec>(grid: &Grid, rect: SampleRect, pages: &Pages<C>) {
     let (k, n) = (grid.k(), grid.side_steps());
     for level in 0..NEAR_LEVELS.min(grid.levels().saturating_sub(4)) {
@@ -88,12 +119,7 @@ fn ask<C: RecordCodec>(grid: &Grid, rect: SampleRect, pages: &Pages<C>) {
         let (step, reach) = (1 << (above / 2), 3 << (level / 2));
         let (west, south) = (rect.west.saturating_sub(reach), rect.south.saturating_sub(reach));
         let (east, north) = ((rect.east + reach).min(n), (rect.north + reach).min(n));
-        let ask = |slot: u64| {
-            let slot = family(k, level, slot);
-            for at in (0..FAMILY).step_by(LINE_BYTES / C::BYTES).chain([FAMILY - 1]) {
-                pages.prefetch(slot + at);
-            }
-        };
+        let ask = |slot: u64| pages.prefetch_row(family(k, level, slot), FAMILY);
         for y in (south.next_multiple_of(step)..=north).step_by(step as usize) {
             let Some(first) = first_of_row(above, west, y).filter(|first| *first <= east) else { continue };
             let count = ((east - first) / (2 * step) + 1) as usize;

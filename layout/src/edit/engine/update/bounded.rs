@@ -38,6 +38,7 @@ pub(super) struct Asked<'v, R> {
 
 impl<C: RecordCodec> Update<'_, C> {
     /// The error in metres, children included, of a vertex whose triangles lie in the data: a number that its record says as it is.
+    #[inline(always)]
     pub(super) fn bounded_error_m(&mut self, asked: &Asked<'_, C::Raw>) -> f64 {
         let before_m = asked.was.error_m;
         let mut limit_m = self.recorded_m(asked, asked.children_m);
@@ -75,8 +76,16 @@ impl<C: RecordCodec> Update<'_, C> {
             return limit_m;
         }
         let kept = || triangles.iter().flatten().filter(|triangle| !triangle.is_moved);
-        if kept().count() == triangles.iter().flatten().count() && self.is_made_elsewhere(asked, then_m) {
-            return before_m;
+        if kept().count() == triangles.iter().flatten().count() {
+            // The ranges alone say most of the time that the samples that changed are not what made it.
+            if self.stored_m(asked, then_m) >= before_m {
+                let then =
+                    kept().map(|triangle| self.farthest_before(triangle, [low, high])).fold(0.0, larger);
+                then_m = f64::from(self.rules.scanned_error_m(then));
+            }
+            if self.is_made_elsewhere(asked, then_m) {
+                return before_m;
+            }
         }
         kept().for_each(|triangle| self.search(asked, triangle, &mut limit_m));
         limit_m
@@ -121,6 +130,7 @@ impl<C: RecordCodec> Update<'_, C> {
     }
 
     /// The triangles that a vertex splits, but for those with a void corner.
+    #[inline(always)]
     fn triangles(&mut self, v: GridPoint) -> [Option<Triangle>; 2] {
         let [b, d] = self.rules.grid.edge_ends(v);
         let ends = [b, d].map(|p| self.ground.code_unless_void(p));
@@ -138,16 +148,35 @@ impl<C: RecordCodec> Update<'_, C> {
     }
 
     /// Raises an error, as records say it, to what the samples of a triangle make of it.
+    #[inline(never)]
     fn search(&mut self, asked: &Asked<'_, C::Raw>, triangle: &Triangle, limit_m: &mut f64) {
         let (rules, level) = (self.rules, asked.level);
         let mut search = Search::new(rules, triangle.plane, level, asked.was.class, *limit_m);
         let corners = in_walk_order(&rules.grid, triangle.corners, level);
         let apex = slot_of(rules.grid.k(), triangle.corners[0]);
-        search.run(&mut self.ground, corners, [apex, asked.slot], asked.old);
+        search.run(&mut self.ground, corners, [apex, asked.slot], asked.old, &mut self.scratch.waiting);
         *limit_m = search.limit_m;
     }
 
+    /// Codes by which the samples of a triangle were off it before, from `low` to `high` within what changed.
+    #[inline(always)]
+    fn farthest_before(&self, triangle: &Triangle, [low, high]: [[u32; 2]; 2]) -> f64 {
+        let (rect, codes) = (self.ground.new.rect, self.ground.new.old_codes);
+        let mut farthest = 0.0;
+        for y in low[1]..=high[1] {
+            let Some([first, last]) = columns(triangle.corners, y) else { continue };
+            let (first, last) = (first.max(low[0]), last.min(high[0]));
+            if first <= last {
+                let at = (y - rect.south) as usize * rect.wide() as usize + (first - rect.west) as usize;
+                let row = &codes[at..=at + (last - first) as usize];
+                farthest = larger(farthest, triangle.plane.farthest_in_row(first, y, row));
+            }
+        }
+        farthest
+    }
+
     /// Raises an error, as records say it, to what samples of a triangle make of it that lie where something changed, from `low` to `high`.
+    #[inline(always)]
     fn look_at_changed(
         &self,
         asked: &Asked<'_, C::Raw>,
@@ -173,6 +202,7 @@ impl<C: RecordCodec> Update<'_, C> {
 }
 
 /// First and last column of a triangle's samples in row `y`, if it has any. Those of its base count; those of its legs are its children's.
+#[inline(always)]
 fn columns([a, b, d]: [GridPoint; 3], y: u32) -> Option<[u32; 2]> {
     let (west, east) = (b.x().min(d.x()), b.x().max(d.x()));
     if b.y() == d.y() {

@@ -6,7 +6,7 @@
 //! Voids need no question: their codes are not numbers, so no distance of theirs is larger than another, and none from a plane through one of them.
 
 use super::Update;
-use crate::bound::{Below, FIRST_SCANNED, larger};
+use crate::bound::{Below, FIRST_SCANNED, Rules, larger};
 use crate::file::header::ErrorKind;
 use crate::grid::GridPoint;
 use crate::grid::record::{RecordCodec, VertexClass};
@@ -32,16 +32,19 @@ impl<C: RecordCodec> Update<'_, C> {
     }
 
     /// Makes the records of a row's vertices from column `first` to `last` anew.
+    #[inline(always)]
     pub(super) fn renew_row<const LEVEL: u32>(&mut self, y: u32, first: u32, last: u32) {
         let s = 1u32 << (LEVEL / 2);
         let of = &self.finest::<LEVEL>();
         let [wide, high] = self.rules.grid.samples();
         let is_inside = y >= s && y + s < high;
-        for x in (first..=last).step_by(2 * s as usize) {
+        let mut x = first;
+        while x <= last {
             let is_done = is_inside && x >= s && x + s < wide && self.renew_near::<LEVEL>(x, y, of);
             if !is_done {
                 self.renew(GridPoint::new(x, y), LEVEL);
             }
+            x += 2 * s;
         }
     }
 
@@ -52,15 +55,23 @@ impl<C: RecordCodec> Update<'_, C> {
         let s = 1usize << (LEVEL / 2);
         let (at, row) = (near.index(x, y), near.row_length());
         let old = near.raw(at);
-        if rules.codec.decode(old, LEVEL).class != VertexClass::Plain {
+        if !C::is_plain(old) && rules.codec.decode(old, LEVEL).class != VertexClass::Plain {
             return false;
         }
         let code = near.value(at);
         let mut below = Below::default();
         if LEVEL > 0 {
-            let children = children::<LEVEL>(at, row).map(|at| rules.codec.decode(near.raw(at), LEVEL - 1));
+            let [a, b, c, d] = children::<LEVEL>(at, row);
+            let [a, b, c, d] = [near.raw(a), near.raw(b), near.raw(c), near.raw(d)];
             let height_m = code * rules.scale.height_step_m;
-            below = Below::of(&children, &of.ground2, height_m, rules.scale.height_base_m);
+            below = if C::is_plain(a) & C::is_plain(b) & C::is_plain(c) & C::is_plain(d) {
+                // Not by a function of arrays: those are not always compiled into what calls them.
+                let [a, b] = [rules.codec.decode(a, LEVEL - 1), rules.codec.decode(b, LEVEL - 1)];
+                let [c, d] = [rules.codec.decode(c, LEVEL - 1), rules.codec.decode(d, LEVEL - 1)];
+                Below::of_plain(&[a, b, c, d], &of.ground2, height_m, rules.scale.height_base_m)
+            } else {
+                below_any(rules, LEVEL, [a, b, c, d], &of.ground2, height_m)
+            };
         }
         let own_m = if of.is_scanned {
             f64::from(rules.scanned_error_m(farthest::<LEVEL>(near.samples(), at, row, [x, y])))
@@ -79,11 +90,28 @@ impl<C: RecordCodec> Update<'_, C> {
             return true;
         }
         let v = GridPoint::new(x, y);
-        if self.put(v, slot, old, new).is_some() {
-            self.scratch.here.push((v, old));
-        }
+        let Some(new) = new else {
+            self.fail(v);
+            return true;
+        };
+        self.ground.pages.write(v, slot, old, new);
+        self.scratch.near.set_raw(at, new);
+        self.scratch.here.push((v, old));
         true
     }
+}
+
+/// What children add up to of which one is perhaps not plain.
+#[inline(never)]
+fn below_any<C: RecordCodec>(
+    rules: &Rules<C>,
+    level: u32,
+    raws: [C::Raw; 4],
+    ground2: &[f64; 4],
+    height_m: f64,
+) -> Below {
+    let children = raws.map(|raw| rules.codec.decode(raw, level - 1));
+    Below::of(&children, ground2, height_m, rules.scale.height_base_m)
 }
 
 /// Indices of the children of the vertex at index `at`, in rows of `row`: first those whose distance is the one along the row, for white vertices.
@@ -151,7 +179,7 @@ fn farthest_upright(samples: &[f64], at: usize, row: usize, s: usize) -> f64 {
     let middle = 0.5 * (b + d);
     let up = (d - b) * (0.5 * per);
     // Away from the edge on both sides.
-    let out = apexes.map(|a| (a - middle) * per);
+    let out = [(apexes[0] - middle) * per, (apexes[1] - middle) * per];
     let mut best = [0.0; 2];
     for j in 0..2 * s - 1 {
         let dy = j as f64 - (s - 1) as f64;
@@ -161,7 +189,7 @@ fn farthest_upright(samples: &[f64], at: usize, row: usize, s: usize) -> f64 {
         let line = &samples[centre - (s - 1)..centre + s];
         for i in 0..=reach {
             let values = [line[s - 1 - i], line[s - 1 + i]];
-            both(&mut best, values, base, out.map(|out| out * i as f64));
+            both(&mut best, values, base, [out[0] * i as f64, out[1] * i as f64]);
         }
     }
     larger(best[0], best[1])
@@ -175,12 +203,13 @@ fn farthest_level(samples: &[f64], at: usize, row: usize, s: usize) -> f64 {
     let apexes = [samples[at - s * row], samples[at + s * row]];
     let middle = 0.5 * (b + d);
     let along = (d - b) * (0.5 * per);
-    let out = apexes.map(|a| (a - middle) * per);
+    let out = [(apexes[0] - middle) * per, (apexes[1] - middle) * per];
     let mut best = [0.0; 2];
     for j in 0..s {
-        let base = out.map(|out| middle + out * j as f64);
+        let base = [middle + out[0] * j as f64, middle + out[1] * j as f64];
         let reach = s - 1 - j;
-        let lines = [at - j * row, at + j * row].map(|centre| &samples[centre - (s - 1)..centre + s]);
+        let line = |centre: usize| &samples[centre - (s - 1)..centre + s];
+        let lines = [line(at - j * row), line(at + j * row)];
         for i in 0..=2 * reach {
             let rise = along * (i as f64 - reach as f64);
             both(&mut best, [lines[0][j + i], lines[1][j + i]], base, [rise; 2]);
@@ -229,8 +258,8 @@ fn farthest_halves(
     for j in 0..2 * s - 1 {
         let dy = j as f64 - (s - 1) as f64;
         let base = [middle + north[0] * dy, middle + north[1] * -dy];
-        let centres = [at + (j + 1) * row - s * row, at + (s - 1) * row - j * row];
-        let lines = centres.map(|centre| &samples[centre - (s - 1)..centre + s]);
+        let line = |centre: usize| &samples[centre - (s - 1)..centre + s];
+        let lines = [line(at + (j + 1) * row - s * row), line(at + (s - 1) * row - j * row)];
         for i in first(j)..2 * s - 1 {
             let dx = i as f64 - (s - 1) as f64;
             both(&mut best, [lines[0][i], lines[1][2 * (s - 1) - i]], base, [east[0] * dx, east[1] * -dx]);
