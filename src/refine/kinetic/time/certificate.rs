@@ -22,12 +22,15 @@
 //! the bound is concave. A course that has both turns by w s in a way s: the clock counts c s, c = rho (1 + G w), a plane's distance changes by at most
 //! (k + B w) s + (d w^2 + 2 w) s^2 / 2, and with S the way at which that or the sphere of radius R ends it, L = min(m(0), c S).
 //!
+//! Courses that turn by themselves: `super::curve`.
+//!
 //! By the line of sight a vertex is selected inside the tube about a ring (`crate::metric`); `super::ring` brings that down to spheres.
 //!
 //! Where a course has no direction, L = m(0). Everything is rounded towards a shorter life. Cost: two square roots a vertex, and one a plane while turning.
 
 use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, band_of, clock_id, power_of_two};
 use super::course::Course;
+use super::curve::{Curve, Seen};
 use super::ring;
 use crate::metric::{Metric, PLANES, Sighting};
 use crate::view::ErrorMetric;
@@ -68,6 +71,9 @@ pub(crate) struct Judge {
     direction: [f64; 3],
     axis: [f64; 3],
     turn_per_m: f64,
+    curve: Curve,
+    /// What a plane's distance bends by a metre of way and another, the turn's arm left out.
+    bend_per_m: f64,
     /// Share of the way along the course that its clocks count.
     rate: f64,
     /// What each plane's distance grows by a metre of way, the eye's turn left out.
@@ -93,6 +99,10 @@ enum Motion {
     Way,
     /// The eye moves and the view turns by the way.
     Bend,
+    /// The way turns, and planes are not asked.
+    Curve,
+    /// The way turns, and so may the view.
+    CurvedBend,
 }
 
 /// What a margin rests on.
@@ -109,19 +119,25 @@ struct Life {
 impl Judge {
     /// The judge of a frame, after the clocks have moved to it. Without `culls` the view's planes are not asked.
     pub(crate) fn new(metric: Metric, clocks: &Clocks, culls: bool) -> Self {
-        let (course, Course { direction, axis, turn_per_m, rate }) = clocks.course();
+        let (number, course) = clocks.course();
+        let Course { direction, axis, turn_per_m, rate, .. } = course;
+        let curve = Curve::of(&course);
+        // Of a way that turns as the view does, what the planes see of it is a turn about one axis.
+        let apart_per_m = (course.curve - axis * turn_per_m).length();
         let normals = metric.normals().map(DVec3::from_array);
         let slopes = normals.map(|n| n.dot(direction));
         let moves = direction != DVec3::ZERO;
         let share = |falls: f64| if moves { rate / rate.max(falls) } else { 1.0 };
         Self {
             culls,
-            course,
+            course: number,
             moves,
             turns: axis != DVec3::ZERO,
             direction: direction.to_array(),
             axis: axis.to_array(),
             turn_per_m,
+            bend_per_m: (turn_per_m + apart_per_m).min(2.0 * turn_per_m + curve.per_m),
+            curve,
             rate,
             // The eye's way takes it nearer to what lies ahead.
             slopes: slopes.map(|k| -k),
@@ -152,6 +168,9 @@ impl Judge {
     /// What happens to the view on the course.
     #[inline(always)]
     fn motion(&self) -> Motion {
+        if self.moves && self.curve.per_m > 0.0 {
+            return if self.culls { Motion::CurvedBend } else { Motion::Curve };
+        }
         match (self.moves, self.turns && self.culls) {
             (false, false) => Motion::None,
             (false, true) => Motion::Turn,
@@ -198,11 +217,16 @@ impl Judge {
         let (selected, reach_m) = (sighting.is_selected(), sighting.reach_m());
         let margin_m = self.error_margin_m(sighting, motion);
         let scale_m = if selected { reach_m } else { sighting.distance_m() };
-        if motion != Motion::Bend {
+        if !matches!(motion, Motion::Bend | Motion::CurvedBend) {
             return self.weigh(sighting, margin_m, scale_m, motion, culls);
         }
         let now_m = reach_m - sighting.distance_m();
-        let bending = self.bending_life(sighting, now_m, self.chord_m(sighting, reach_m));
+        let chord_m = if motion == Motion::CurvedBend {
+            self.curve.chord_m(&self.seen(sighting))
+        } else {
+            self.chord_m(sighting, reach_m)
+        };
+        let bending = self.bending_life(sighting, now_m, chord_m);
         // Field by field, so that no branch comes of it.
         Life {
             active: selected & bending.active,
@@ -215,6 +239,9 @@ impl Judge {
     /// The life of a vertex whose errors are measured along the line of sight.
     #[inline(never)]
     fn ring_life(&self, sighting: &Sighting, motion: Motion) -> Life {
+        if self.curve.per_m > 0.0 {
+            return self.curved_ring_life(sighting);
+        }
         if motion == Motion::Bend && sighting.is_selected() {
             return self.bending_life(sighting, sighting.margin_m(), ring::chord_m(sighting, self.direction));
         }
@@ -223,6 +250,17 @@ impl Judge {
         let scale_m = sighting.distance_m().max(sighting.reach_m());
         let culls = self.culls && motion != Motion::Bend;
         self.weigh(sighting, margin_m, scale_m, motion, culls)
+    }
+
+    /// The same on a course that turns by itself, which the eye leaves soon: see `Clocks`. A course straight ahead that counts half as much is off by no more than the other half, for a while.
+    fn curved_ring_life(&self, sighting: &Sighting) -> Life {
+        let ahead_m = ring::margin_m(sighting, Some(self.direction), 0.5 * self.rate);
+        let margin_m = ahead_m.min(self.rate * self.rate / self.curve.per_m);
+        if self.culls && sighting.is_selected() {
+            return self.bending_life(sighting, margin_m, f64::INFINITY);
+        }
+        let scale_m = sighting.distance_m().max(sighting.reach_m());
+        self.weigh(sighting, margin_m, scale_m, Motion::Curve, false)
     }
 
     /// The life of a vertex with that margin of the error test, planes included if it `culls`.
@@ -276,7 +314,7 @@ impl Judge {
     #[inline(always)]
     fn bending_life(&self, sighting: &Sighting, margin_m: f64, chord_m: f64) -> Life {
         let arm_m = self.arm_m(sighting);
-        let bend = self.turn_per_m * (arm_m * self.turn_per_m + 2.0);
+        let bend = self.turn_per_m * (arm_m * self.turn_per_m) + self.bend_per_m;
         // Of each plane: how far the sphere is beyond it, and the way until that changes sign.
         let plane = |i: usize| {
             let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
@@ -305,6 +343,20 @@ impl Judge {
         Life { active: !culled, kind: Kind::Planes, margin_m, scale_m }
     }
 
+    /// A vertex as a course that turns passes it.
+    #[inline(always)]
+    fn seen(&self, sighting: &Sighting) -> Seen {
+        let offset_m = sighting.offset_m();
+        Seen {
+            foot_m: dot(self.direction, offset_m),
+            distance_m: sighting.distance_m(),
+            distance2: sighting.distance2(),
+            reach_m: sighting.reach_m(),
+            inward: dot(self.curve.inward_per_m, offset_m),
+            across_m: dot(self.curve.across, offset_m),
+        }
+    }
+
     /// Distance from the course's axis, rounded up.
     #[inline(always)]
     fn arm_m(&self, sighting: &Sighting) -> f64 {
@@ -331,6 +383,12 @@ impl Judge {
         let now_m = (reach_m - distance_m).abs();
         if matches!(motion, Motion::None | Motion::Turn) {
             return now_m;
+        }
+        if matches!(motion, Motion::Curve | Motion::CurvedBend) {
+            let seen = self.seen(sighting);
+            let inside_m = now_m.min((rate * self.curve.chord_m(&seen)).max(self.curve.always_m(&seen)));
+            let outside_m = self.curve.outside_m(&seen, rate);
+            return if selected { inside_m } else { outside_m };
         }
         // Way along the course to the foot of the vertex, and squares of the distances.
         let b = dot(self.direction, sighting.offset_m());

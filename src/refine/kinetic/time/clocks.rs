@@ -4,7 +4,7 @@
 //! positive. A clock adds up, rounded up, how much the camera's movement can have taken from the margin since. There is one clock for every combination of
 //!
 //! * a *course*: the direction the eye is expected to keep, and the axis it is expected to turn about. Course 0 expects nothing and counts the whole
-//!   path and every turn. Any other course counts its `rate`, [`RATE`] or [`STEADY_RATE`], times the way along its direction and the angle about its axis, and all of the way and angle that goes off
+//!   path and every turn. Any other course counts its `rate` times the way along its direction and the angle about its axis, and all of the way and angle that goes off
 //!   them. What lies ahead on the course was taken into account when the margin was made (`super::certificate`). A word made on one course stays on it
 //!   when the eye takes another;
 //! * a *kind*: whether the status depends on the view's planes, so that turning uses it up too;
@@ -13,7 +13,8 @@
 //! Claim: with L = f0 + floor(m / q), m metres of margin made at tick f0 and ticks of q metres, `f < L` implies that less than m has been used.
 //! Proof: a rounding down rho of the total has rho(x) - rho(y) > x - y - 1 in ticks. Cost: some hundred additions a frame.
 
-use super::course::{Course, LONG, Pose, RATE, STEADY, STEADY_RATE, Trend};
+use super::course::{Bend, Course, LONG, Pose, RATE, STEADY, Trend};
+use crate::view::ErrorMetric;
 use glam::DVec3;
 use terrasoar_layout::portable;
 
@@ -71,6 +72,7 @@ pub(crate) struct Clocks {
     newest: usize,
     way: Trend,
     turn: Trend,
+    bend: Bend,
     /// Share of the way that went off the current course, over a long time.
     off: f64,
 }
@@ -106,6 +108,7 @@ impl Clocks {
             newest: 0,
             way: Trend::default(),
             turn: Trend::default(),
+            bend: Bend::default(),
             off: 1.0,
         }
     }
@@ -153,11 +156,17 @@ impl Clocks {
         if way_m > 0.0 {
             self.off += LONG * (current.off_m(step) / way_m - self.off);
         }
-        let next = Course::of(&self.way, &self.turn);
+        self.bend.follow(step);
+        self.courses.iter_mut().for_each(|course| course.lead_on(step));
+        // Certificates by the line of sight know of no curves that would be of use.
+        let bend = if pose.metric == ErrorMetric::Ball { self.bend } else { Bend::default() };
+        let next = Course::of(&self.way, &self.turn, &bend);
         // Whoever keeps no direction is on no course that could be better.
         let changes =
             |off: bool, current: DVec3, next: DVec3| off && (current != DVec3::ZERO || next != DVec3::ZERO);
-        let becomes_steady = self.off <= STEADY && current.rate == RATE && current.is_straight();
+        let is_steady = self.off <= STEADY && current.rate == RATE && self.turn.keeps(current.rate);
+        let becomes_steady =
+            next.steady_rate().filter(|rate| is_steady && current.steady_rate() == Some(*rate));
         if changes(self.way.is_off(current.rate), current.direction, next.direction)
             || changes(self.turn.is_off(current.rate), current.axis, next.axis)
         {
@@ -167,8 +176,8 @@ impl Clocks {
             } else {
                 moved.next_course = Some((self.newest % (COURSES - 1) + 1, next));
             }
-        } else if becomes_steady && next.is_straight() {
-            moved.next_course = Some((self.newest % (COURSES - 1) + 1, Course { rate: STEADY_RATE, ..next }));
+        } else if let Some(rate) = becomes_steady {
+            moved.next_course = Some((self.newest % (COURSES - 1) + 1, Course { rate, ..next }));
         }
         moved
     }
@@ -258,6 +267,7 @@ pub(crate) fn power_of_two(exponent: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::course::{STEADY_CURVE_RATE, STEADY_RATE};
     use super::*;
     use crate::view::ErrorMetric;
 
@@ -348,6 +358,37 @@ mod tests {
         let taken = fly(&mut clocks, 30, bent);
         assert!(!taken.is_empty() && taken.iter().all(|rate| *rate == RATE), "{taken:?}");
         assert!(clocks.course().1.direction.dot(bent.normalize()) > 0.98);
+    }
+
+    /// A circle is a course of its own, flown at a lower rate before long, and its clocks count nearly nothing else.
+    #[test]
+    fn a_circle_is_kept_as_long_as_it_is_flown() {
+        let mut clocks = Clocks::new(256.0, 0.0);
+        let at = |i: i32| {
+            let (sin, cos) = (f64::from(i) * 0.01).sin_cos();
+            Pose {
+                normals: [DVec3::new(cos, sin, 0.0); 4],
+                axes: [DVec3::new(cos, sin, 0.0), DVec3::Z, DVec3::new(-sin, cos, 0.0)],
+                ..pose(1000.0 * DVec3::new(cos, sin, 0.0))
+            }
+        };
+        let taken: Vec<f64> = (0..700)
+            .filter_map(|i| {
+                let (number, course) = clocks.move_to(at(i)).next_course?;
+                clocks.take_course(number, course);
+                (course.curve != DVec3::ZERO).then_some(course.rate)
+            })
+            .collect();
+        assert_eq!(taken, [RATE, STEADY_CURVE_RATE]);
+        let (number, course) = clocks.course();
+        assert!((course.curve - DVec3::Z / 1000.0).length() < 1e-6, "{course:?}");
+        let before = clocks.now(clock_id(number, Kind::Planes, 6));
+        (700..800).for_each(|i| {
+            clocks.move_to(at(i));
+        });
+        // 1,000 m of way, and a turn of 1 on an arm of 65,536 m.
+        let used_m = (clocks.now(clock_id(number, Kind::Planes, 6)) - before) as f64 / clocks.ticks_per_m();
+        assert!(used_m < 1.1 * STEADY_CURVE_RATE * (1000.0 + 65_536.0), "{used_m}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What the eye has been doing, and what it is expected to keep doing.
 //!
 //! A course counts little of the way along it and all of the way off it (`super::clocks`). So it is worth taking while the eye keeps to it, and worth leaving soon.
+//! It leads straight on, or along a circle, or a helix where the eye climbs in its turn. All words of one course expect the same of the eye: that its direction goes on turning as the course's does.
 //! Invariant: nothing here decides a status. Courses only move the time at which a vertex is tested again. Cost: a few dozen operations a frame.
 
 use crate::metric::Metric;
@@ -12,6 +13,8 @@ use terrasoar_layout::portable;
 pub(crate) const RATE: f64 = 0.1;
 /// That share on the course of an eye that has flown as straight as can be for some time.
 pub(crate) const STEADY_RATE: f64 = 0.005;
+/// The same on a course that turns.
+pub(super) const STEADY_CURVE_RATE: f64 = 0.01;
 /// A course is left when more than this times its rate of the recent way was counted.
 const LEAVE: f64 = 2.5;
 /// A way is steady while no more than this share of it went off the course.
@@ -24,6 +27,10 @@ const STRAIGHT: f64 = 0.9;
 const LEAD_RAD: f64 = 0.12;
 /// Share of the newest frame in what "recent" means.
 const RECENT: f64 = 0.2;
+/// Ways that turn by less a frame are straight.
+const LEAST_BEND_RAD: f64 = 0.0005;
+/// Ways that turn by more a frame are none.
+const MOST_BEND_RAD: f64 = 0.2;
 /// What of a view moves the clocks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pose {
@@ -54,8 +61,10 @@ impl Pose {
 /// What the eye is expected to keep doing.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Course {
-    /// Unit vector it moves along, or zero.
+    /// Unit vector it moves along now, or zero.
     pub direction: DVec3,
+    /// The axis that the direction turns about by itself, as long as the radians it turns a metre of way; zero where it leads straight on.
+    pub curve: DVec3,
     /// Unit vector it turns about, right-handed, or zero.
     pub axis: DVec3,
     /// Radians it turns about the axis a metre of way, if it has both.
@@ -66,7 +75,7 @@ pub(crate) struct Course {
 
 impl Default for Course {
     fn default() -> Self {
-        Self { direction: DVec3::ZERO, axis: DVec3::ZERO, turn_per_m: 0.0, rate: RATE }
+        Self { direction: DVec3::ZERO, curve: DVec3::ZERO, axis: DVec3::ZERO, turn_per_m: 0.0, rate: RATE }
     }
 }
 
@@ -97,6 +106,11 @@ impl Trend {
         self.used > LEAVE * rate * self.length
     }
 
+    /// Whether a course of that rate misses next to nothing.
+    pub(super) fn keeps(&self, rate: f64) -> bool {
+        self.used <= (rate + STEADY) * self.length
+    }
+
     /// The direction it keeps, or zero if it keeps none.
     fn direction(&self) -> DVec3 {
         if self.vector.length() >= STRAIGHT * self.length {
@@ -107,43 +121,110 @@ impl Trend {
     }
 }
 
+/// How the way itself has been turning of late.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Bend {
+    /// The newest step that led anywhere.
+    step: DVec3,
+    /// Radians a metre of way, as the length of the axis.
+    curve: DVec3,
+    length: f64,
+}
+
+impl Bend {
+    /// Takes in the newest step.
+    pub(super) fn follow(&mut self, step: DVec3) {
+        let [before_m, now_m] = [self.step, step].map(DVec3::length);
+        if now_m == 0.0 {
+            return;
+        }
+        if before_m > 0.0 {
+            let curve = self.step.cross(step) / (before_m * now_m * 0.5 * (before_m + now_m));
+            self.curve += RECENT * (curve - self.curve);
+            self.length += RECENT * (curve.length() - self.length);
+        }
+        self.step = step;
+    }
+
+    /// The curve that it keeps, or zero if it keeps none.
+    fn curve(&self) -> DVec3 {
+        let bend_rad = self.curve.length() * self.step.length();
+        let is_kept = self.curve.length() >= STRAIGHT * self.length;
+        if is_kept && (LEAST_BEND_RAD..MOST_BEND_RAD).contains(&bend_rad) { self.curve } else { DVec3::ZERO }
+    }
+}
+
 impl Course {
     /// The course that goes on as it has been going.
-    pub(super) fn of(way: &Trend, turn: &Trend) -> Self {
-        let (direction, axis) = (way.direction(), turn.direction());
+    pub(super) fn of(way: &Trend, turn: &Trend, bend: &Bend) -> Self {
+        let (direction, axis, curve) = (way.direction(), turn.direction(), bend.curve());
+        let turn_per_m = if axis == DVec3::ZERO { 0.0 } else { turn.length / way.length };
+        if direction != DVec3::ZERO && curve != DVec3::ZERO {
+            let step = bend.step;
+            let direction = (turn_along(curve, 0.5 * step.length()) * step).normalize();
+            return Self { direction, curve, axis, turn_per_m, rate: RATE };
+        }
         if direction == DVec3::ZERO || axis == DVec3::ZERO {
             return Self { direction, axis, ..Self::default() };
         }
         // Who turns flies a bend: straight ahead of where the trend, which lags behind, will have led in a while.
         let lead = turn_about(axis, turn.length / RECENT + LEAD_RAD);
-        Self {
-            direction: (lead * direction).normalize(),
-            axis,
-            turn_per_m: turn.length / way.length,
-            rate: RATE,
-        }
+        Self { direction: (lead * direction).normalize(), axis, turn_per_m, ..Self::default() }
     }
 
     /// Metres that a step uses up.
     pub(super) fn used_m(&self, step: DVec3) -> f64 {
-        self.rate * step.dot(self.direction).max(0.0) + self.off_m(step)
+        self.rate * self.along_m(step) + self.off_m(step)
     }
 
     /// Metres of a step that lead off the course.
     pub(super) fn off_m(&self, step: DVec3) -> f64 {
-        let along = step.dot(self.direction).max(0.0);
-        (step - self.direction * along).length()
+        (step - self.path(self.along_m(step))).length()
     }
 
-    /// Whether it leads on without a turn.
-    pub(super) fn is_straight(&self) -> bool {
-        self.direction != DVec3::ZERO && self.axis == DVec3::ZERO
+    /// The way along the course that a step makes.
+    fn along_m(&self, step: DVec3) -> f64 {
+        let middle = if self.curve == DVec3::ZERO {
+            self.direction
+        } else {
+            turn_along(self.curve, 0.5 * step.length()) * self.direction
+        };
+        step.dot(middle).max(0.0)
+    }
+
+    /// Where a way of `way_m` metres along it leads.
+    pub(super) fn path(&self, way_m: f64) -> DVec3 {
+        let per_m = self.curve.length();
+        if per_m == 0.0 {
+            return self.direction * way_m;
+        }
+        let axis = self.curve / per_m;
+        let up = axis * axis.dot(self.direction);
+        let across = self.direction - up;
+        let (sin, cos) = portable::sin_cos(0.5 * per_m * way_m);
+        up * way_m + (across * cos + axis.cross(across) * sin) * (2.0 * sin / per_m)
+    }
+
+    /// Turns the direction as a step makes it turn.
+    pub(super) fn lead_on(&mut self, step: DVec3) {
+        if self.curve != DVec3::ZERO {
+            self.direction =
+                (turn_along(self.curve, self.along_m(step)) * self.direction).normalize_or_zero();
+        }
+    }
+
+    /// The rate for an eye that has kept to such a course for long, if there is one.
+    pub(super) fn steady_rate(&self) -> Option<f64> {
+        if self.curve != DVec3::ZERO {
+            return Some(STEADY_CURVE_RATE);
+        }
+        (self.direction != DVec3::ZERO && self.axis == DVec3::ZERO).then_some(STEADY_RATE)
     }
 
     /// Radians that a turn uses up: a bound on how far the planes' normals are from where the counted angle would take them.
     pub(super) fn used_rad(&self, last: &Pose, pose: &Pose) -> f64 {
         let about = if self.turn_per_m > 0.0 {
-            self.turn_per_m * (pose.eye_m - last.eye_m).dot(self.direction).max(0.0)
+            self.turn_per_m * self.along_m(pose.eye_m - last.eye_m)
         } else {
             portable::asin(last.turn_to(pose).dot(self.axis).clamp(0.0, 1.0))
         };
@@ -151,6 +232,12 @@ impl Course {
         let off = |i: usize| (pose.normals[i] - expected * last.normals[i]).length();
         self.rate * about + (0..4).map(off).fold(0.0, f64::max)
     }
+}
+
+/// The turn of a curve in `way_m` metres.
+fn turn_along(curve: DVec3, way_m: f64) -> DQuat {
+    let per_m = curve.length();
+    turn_about(curve / per_m, per_m * way_m)
 }
 
 /// The turn by an angle in radians about an axis of length 1.

@@ -3,6 +3,7 @@
 pub(crate) mod certificate;
 pub(crate) mod clocks;
 pub(crate) mod course;
+mod curve;
 pub(crate) mod queue;
 mod ring;
 mod wheel;

@@ -145,6 +145,8 @@ fn words_together(judge: &Judge, blocks: &[Block], words: &mut [[u32; LANES]]) {
         (Motion::Way, true) => words_of(judge, blocks, words, Motion::Way, true),
         (Motion::Turn, _) => words_of(judge, blocks, words, Motion::Turn, true),
         (Motion::Bend, _) => words_of(judge, blocks, words, Motion::Bend, true),
+        (Motion::Curve, _) => words_of(judge, blocks, words, Motion::Curve, false),
+        (Motion::CurvedBend, _) => words_of(judge, blocks, words, Motion::CurvedBend, true),
     }
 }
 
@@ -194,8 +196,10 @@ mod tests {
             let mut unit = || DVec3::new(next(2.0) - 1.0, next(2.0) - 1.0, next(2.0) - 1.0).normalize();
             let (along, about) = (unit(), unit());
             let (moves, turns) = (round % 4 > 1, round % 2 > 0);
+            let curve = if moves && round % 3 > 0 { about * (next(0.01) + 1e-9) } else { DVec3::ZERO };
             let course = Course {
                 direction: if moves { along } else { DVec3::ZERO },
+                curve,
                 axis: if turns { about } else { DVec3::ZERO },
                 turn_per_m: if moves && turns { next(0.01) + 1e-9 } else { 0.0 },
                 rate: if turns { RATE } else { STEADY_RATE },

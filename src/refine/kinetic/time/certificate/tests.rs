@@ -27,7 +27,7 @@ fn direction() -> impl Strategy<Value = DVec3> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(3000))]
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
     /// Whatever the camera does, a word that is alive has the status that a new test gives.
     #[test]
     fn a_live_word_is_a_true_word(
@@ -37,13 +37,17 @@ proptest! {
         steps in prop::collection::vec((direction(), 0.0f64..0.5, -0.01f64..0.01, 0.98f64..1.02, 0.99f64..1.01), 1..80),
         kind in prop_oneof![Just(ErrorMetric::Ball), Just(ErrorMetric::Sight)], is_below in prop::bool::weighted(0.1), is_plain in prop::bool::weighted(0.9), others in 0u8..60,
         turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, rate in prop_oneof![Just(RATE), Just(STEADY_RATE), 0.001f64..0.5], axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in -0.01f64..0.02,
+        curves in prop::option::of((prop_oneof![Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], 0.0f64..0.04, prop::bool::weighted(0.3))),
     ) {
         let mut clocks = Clocks::new(10.0, 3000.0);
         let mut now = view(DVec3::new(100.0, 200.0, 1000.0), 0.3, -0.2, 0.8, 1.0).metric(kind);
+        // The way turns, by itself or as the view does, and by less a metre where frames are far apart.
+        let curve = curves.map_or(DVec3::ZERO, |(about, rad, is_alike)| if is_alike { axis * spin.abs() } else { about * rad } / speed);
+        let (per_m, mut course) = (curve.length(), course);
         if start_course {
-            let direction = if speed > 1.0 { course } else { DVec3::ZERO };
+            let (direction, curve) = if speed > 1.0 { (course, curve) } else { (DVec3::ZERO, DVec3::ZERO) };
             let turn_per_m = if speed > 1.0 && axis != DVec3::ZERO { spin.abs() / speed + 1e-9 } else { 0.0 };
-            clocks.take_course(2, Course { direction, axis, turn_per_m, rate });
+            clocks.take_course(2, Course { direction, curve, axis, turn_per_m, rate });
         }
         let mut metric = Metric::new(&now);
         clocks.move_to(Pose::of(&now, &metric));
@@ -67,7 +71,8 @@ proptest! {
         let word = Judge::new(metric, &clocks, culls).word(&sight(&metric));
         for (i, (side, off, turn, zoom, stretch)) in (0u8..).zip(steps) {
             if i == others { now.metric = if kind == ErrorMetric::Ball { ErrorMetric::Sight } else { ErrorMetric::Ball }; }
-            now.eye_m += speed * (course + off * side);
+            now.eye_m += Course { direction: course, curve, ..Default::default() }.path(speed) + speed * off * side;
+            if per_m > 0.0 { course = (glam::DQuat::from_axis_angle(curve / per_m, per_m * speed) * course).normalize(); }
             if turning { now.yaw_rad += spin + 0.1 * turn; now.pitch_rad += 0.1 * turn; }
             if zooming { now.vertical_fov_rad = (now.vertical_fov_rad * zoom).clamp(0.05, 2.0); }
             if stretching { now.vertical_exaggeration = (now.vertical_exaggeration * stretch).clamp(0.2, 5.0); }
