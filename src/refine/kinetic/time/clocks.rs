@@ -164,7 +164,8 @@ impl Clocks {
         // Whoever keeps no direction is on no course that could be better.
         let changes =
             |off: bool, current: DVec3, next: DVec3| off && (current != DVec3::ZERO || next != DVec3::ZERO);
-        let is_steady = self.off <= STEADY && current.rate == RATE && self.turn.keeps(current.rate);
+        let keeps_turn = current.axis == DVec3::ZERO || self.turn.keeps(current.rate);
+        let is_steady = self.off <= STEADY && current.rate == RATE && keeps_turn;
         let becomes_steady =
             next.steady_rate().filter(|rate| is_steady && current.steady_rate() == Some(*rate));
         if changes(self.way.is_off(current.rate), current.direction, next.direction)
@@ -389,6 +390,26 @@ mod tests {
         // 1,000 m of way, and a turn of 1 on an arm of 65,536 m.
         let used_m = (clocks.now(clock_id(number, Kind::Planes, 6)) - before) as f64 / clocks.ticks_per_m();
         assert!(used_m < 1.1 * STEADY_CURVE_RATE * (1000.0 + 65_536.0), "{used_m}");
+    }
+
+    #[test]
+    fn who_looks_around_may_be_on_a_steady_way() {
+        let mut clocks = Clocks::new(256.0, 0.0);
+        let taken: Vec<f64> = (0..200)
+            .filter_map(|i| {
+                let (sin, cos) = (0.02 * f64::from(i % 7)).sin_cos();
+                let forward = DVec3::new(sin, cos, 0.0);
+                let ahead = Pose {
+                    axes: [DVec3::new(cos, -sin, 0.0), DVec3::Z, forward],
+                    normals: [forward; 4],
+                    ..pose(DVec3::Y * f64::from(10 * i))
+                };
+                let (number, course) = clocks.move_to(ahead).next_course?;
+                clocks.take_course(number, course);
+                Some(course.rate)
+            })
+            .collect();
+        assert_eq!(taken.last(), Some(&STEADY_RATE), "{taken:?}");
     }
 
     #[test]

@@ -17,6 +17,8 @@
 //! Each holds up to the turn T only, so that L is at most rho T / w. A short turn, which is near the truth, and a long one are tried. Besides, in whole turns D is at least, and at the most, what it is at the ends of its
 //! swing: with the margin m1 there, and the climb sin c a metre, L = m1 rho / max(rho, sin c).
 //!
+//! Planes that turn as the way does see the vertex turn about one axis: a plane's distance bends by d w^2 + w, d being the distance from the axis through the eye; where they turn otherwise, by the difference more.
+//!
 //! Invariant: as for straight courses, rounded towards a shorter life. Cost: five square roots a turn.
 
 use super::course::Course;
