@@ -240,11 +240,11 @@ impl<C: RecordCodec> Pages<C> {
         if self.touched[at].marked == 0 {
             self.begin_writing(at, logical);
         }
-        let touched = &mut self.touched[at];
-        let Some(page) = touched.held.as_deref_mut() else { return };
-        C::write(raw, &mut page[within..within + C::BYTES]);
+        let place = &mut self.page_in(at, logical)[within..within + C::BYTES];
+        debug_assert!(C::read(place) == old, "what is taken back would be another record");
+        C::write(raw, place);
         let record = within / C::BYTES;
-        let word = &mut self.marks[touched.marked as usize - 1].1[record / 64];
+        let word = &mut self.marks[self.touched[at].marked as usize - 1].1[record / 64];
         let bit = 1 << (record % 64);
         if *word & bit == 0 {
             *word |= bit;
