@@ -2,6 +2,7 @@
 
 mod beside;
 mod fit;
+mod lost;
 mod numbers;
 mod verbs;
 #[cfg(feature = "view")]

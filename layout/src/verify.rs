@@ -5,7 +5,7 @@
 //! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children, `imagery` reads the tiles. Of an edited file
 //! `journal` looks at all states that it can go back and forth to, by checksums and page numbers; how their records are nested is checked of the current one alone.
 //! Cost: each page is read some ten times; each thread holds a few hundred kilobytes at most, and there is the directory. Some bytes are not checked, because nothing depends
-//! on them: the header slot that is not current, the bytes after the directory root's last entry, pages that no state reaches.
+//! on them: the header slot that is older than the current one, the bytes after the directory root's last entry, pages that no state reaches.
 //!
 //! Invariant: a report without problems means that every promise refinement relies on holds for the bytes as they were read.
 
@@ -116,7 +116,14 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
         }
         Err(other) => return Err(other),
     };
-    let findings = structure::check(terrain);
+    let mut findings = structure::check(terrain);
+    if let Some(lost) = terrain.lost_header()? {
+        let problem = format!(
+            "it is damaged and was newer than the other, of generation {}, which is read instead; if a power cut stopped the edit that wrote it, nothing is lost and the next edit writes it anew",
+            lost.generation
+        );
+        findings.add(format!("header slot on page {}", lost.page), problem);
+    }
     let (damaged, wrong_sums) = checksums(terrain, &present, progress)?;
     let (grid, scale) = (terrain.grid(), &terrain.header().scale);
     let (records, vertices) = match terrain.header().record_kind {

@@ -5,6 +5,7 @@
 
 use super::output::complain;
 use crate::beside::named_beside;
+use crate::lost::newest_header_is_lost;
 use anyhow::{Result, bail};
 use std::path::Path;
 use terrasoar_layout::read::terrain::Terrain;
@@ -28,8 +29,11 @@ pub(super) fn refuse_rewriting(file: &Path, is_forced: bool) -> Result<()> {
     );
 }
 
-/// Says so where a terrain is seen with an overlay that is older than what its file was given last.
+/// Says so where a terrain is not in the last state that its files were written in: it is seen with an overlay that is older than what its file was given last, or its last header is damaged.
 pub(super) fn tell_of_older(terrain: &Terrain) {
+    if let Some(words) = newest_header_is_lost(terrain) {
+        complain(&format!("warning: {words}"));
+    }
     if let Some(base) = terrain.base_path().filter(|_| terrain.base_has_grown()) {
         complain(&format!(
             "note: {} was edited or draped after {} was begun; it is seen as it was then",

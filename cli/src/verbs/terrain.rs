@@ -47,8 +47,10 @@ impl TerrainArgs {
 
     /// Opens it without maps: what is cut short while it is read is an error, where a map would be a signal.
     pub(super) fn open_unmapped(&self) -> Result<Terrain> {
-        let Some(overlay) = &self.overlay else { return Ok(Terrain::open_unmapped(&self.file)?) };
-        let terrain = Terrain::open_with_overlay_unmapped(&self.file, overlay)?;
+        let terrain = match &self.overlay {
+            Some(overlay) => Terrain::open_with_overlay_unmapped(&self.file, overlay)?,
+            None => Terrain::open_unmapped(&self.file)?,
+        };
         overlays::tell_of_older(&terrain);
         Ok(terrain)
     }
@@ -62,7 +64,9 @@ impl TerrainArgs {
 
 /// Opens a terrain file, naming what to do when it is elevation data instead.
 pub(super) fn open(path: &Path) -> Result<Terrain> {
-    Ok(Terrain::open(path)?)
+    let terrain = Terrain::open(path)?;
+    overlays::tell_of_older(&terrain);
+    Ok(terrain)
 }
 
 /// Where the spacing came from, in words.

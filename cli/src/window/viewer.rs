@@ -28,6 +28,7 @@ use super::stage::Stage;
 use super::tool::{Stroke, ToolBox};
 use super::wake::Wake;
 use super::workshop::Workshop;
+use crate::lost::newest_header_is_lost;
 use anyhow::Result;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -160,6 +161,9 @@ impl Viewer {
         };
         viewer.name_terrain();
         if let Some(words) = suited {
+            viewer.news(words);
+        }
+        if let Some(words) = newest_header_is_lost(viewer.stage.terrain()) {
             viewer.news(words);
         }
         if let (Some(overlay), true) = (&viewer.plan.overlay, viewer.stage.terrain().base_has_grown()) {

@@ -17,6 +17,8 @@ use fields::Fields;
 use std::path::Path;
 
 pub use super::version::MAGIC;
+/// Where a header page has its generation, 4 bytes.
+pub(crate) const GENERATION: usize = 0x01c;
 /// The page that absent record pages read as.
 pub const INERT_PAGE: u32 = 2;
 
@@ -197,7 +199,7 @@ impl Header {
         p[0x013] = u8::from(self.has_voids) | u8::from(self.heights_rounded) << 1;
         put_u32(p, 0x014, self.grid.samples()[0]);
         put_u32(p, 0x018, self.grid.samples()[1]);
-        put_u32(p, 0x01c, self.generation);
+        put_u32(p, GENERATION, self.generation);
         put_f64(p, 0x020, self.grid.spacing_m()[0]);
         put_f64(p, 0x028, self.grid.spacing_m()[1]);
         put_f64(p, 0x030, self.scale.height_base_m);
@@ -262,7 +264,7 @@ impl Header {
         if get_u16(&page[..], 0x00a) < get_u16(&ours[..], 0x00a) {
             page[0x00a..0x00c].copy_from_slice(&ours[0x00a..0x00c]);
         }
-        for range in [0x01c..0x020, 0x040..0x058, 0x070..0x07c, 0x080..0x084, 0x088..0x0a0, 0x0e8..0x0f0] {
+        for range in [GENERATION..0x020, 0x040..0x058, 0x070..0x07c, 0x080..0x084, 0x088..0x0a0, 0x0e8..0x0f0] {
             page[range.clone()].copy_from_slice(&ours[range]);
         }
         seal(&mut page);

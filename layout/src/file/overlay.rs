@@ -16,7 +16,7 @@ use crate::file::slots::Slots;
 use std::path::Path;
 
 /// First bytes of an overlay.
-pub(crate) const MAGIC: [u8; 8] = *b"\x89IQO\r\n\x1a\n";
+pub(crate) use super::version::OVERLAY_MAGIC as MAGIC;
 /// Pages that an overlay begins with: its header slots.
 pub(crate) const FIRST_PAGES: u64 = 2;
 

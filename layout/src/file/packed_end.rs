@@ -6,7 +6,7 @@
 use super::bytes::{
     PAGE_BYTES, Page, checksum, get_u16, get_u32, get_u64, put_u16, put_u32, put_u64, to_usize,
 };
-use super::header::seal;
+use super::header::{GENERATION, seal};
 use super::version::{MAGIC, PACKED_VERSION};
 use crate::error::LayoutError;
 use std::ops::Range;
@@ -241,13 +241,18 @@ impl PackedEnd {
     }
 }
 
-/// The header page of the terrain file that a header page of a packed file stands for; zeros for what is none.
+/// The header page of the terrain file that a header page of a packed file stands for. For a damaged one a page that is no header and says the same generation; zeros for one that was never written.
 pub(crate) fn from_file(page: &Page) -> Box<Page> {
     let is_sound = page[..8] == MAGIC
         && get_u16(page, 0x008) == PACKED_VERSION
         && get_u32(page, 0xffc) == checksum(&page[..0xffc]);
     if !is_sound {
-        return Box::new([0; PAGE_BYTES]);
+        let mut none = Box::new([0; PAGE_BYTES]);
+        if page.iter().any(|byte| *byte != 0) {
+            none[..8].copy_from_slice(&MAGIC);
+            none[GENERATION..GENERATION + 4].copy_from_slice(&page[GENERATION..GENERATION + 4]);
+        }
+        return none;
     }
     let mut own = Box::new(*page);
     put_u16(&mut own[..], 0x008, 1);

@@ -6,6 +6,8 @@ use std::path::Path;
 
 /// First bytes of every terrain file.
 pub const MAGIC: [u8; 8] = *b"\x89IQT\r\n\x1a\n";
+/// First bytes of every overlay of edits.
+pub(crate) const OVERLAY_MAGIC: [u8; 8] = *b"\x89IQO\r\n\x1a\n";
 /// Version of files that hold packed terrain.
 pub(crate) const PACKED_VERSION: u16 = 2;
 

@@ -8,6 +8,7 @@ pub mod kinds;
 #[cfg(feature = "files")]
 pub(crate) mod layers;
 pub mod loader;
+pub mod lost;
 #[cfg(feature = "files")]
 pub(crate) mod opened;
 pub mod opening;

@@ -36,6 +36,7 @@
 //! ```
 
 use crate::error::LayoutError;
+use crate::file::bytes::PAGE_BYTES;
 use crate::file::header::Header;
 use crate::file::page_table::PageTable;
 use crate::file::source::Source;
@@ -168,12 +169,19 @@ fn look(known: &Arc<Known>) -> Result<Found, LayoutError> {
     Ok(Found::Plain(header, table))
 }
 
-/// Whether a source holds packed terrain.
+/// Whether a source holds packed terrain, as either header slot says: one of them may be damaged.
 pub(crate) fn starts_packed(source: &dyn Source) -> Result<bool, LayoutError> {
-    let mut start = [0; 16];
-    let have = source.byte_count().min(start.len() as u64) as usize;
-    source.read_at(0, &mut start[..have])?;
-    Ok(is_packed(&start[..have]))
+    for slot in [0, PAGE_BYTES as u64] {
+        let mut start = [0; 16];
+        let have = source.byte_count().saturating_sub(slot).min(start.len() as u64) as usize;
+        if have > 0 {
+            source.read_at(slot, &mut start[..have])?;
+        }
+        if is_packed(&start[..have]) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// What is known of a file.

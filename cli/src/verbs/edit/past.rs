@@ -125,6 +125,7 @@ impl TurnArgs {
             );
         }
         let mut session = target.session()?;
+        overlays::tell_of_older(session.editor().terrain());
         let before = done(&session.history()?);
         let (mut batches, mut records_changed) = (0, 0);
         while batches < self.count {
@@ -138,7 +139,6 @@ impl TurnArgs {
                 target.path().display()
             );
         }
-        overlays::tell_of_older(session.editor().terrain());
         let entries = session.history()?;
         let after = done(&entries);
         let mut labels: Vec<String> =

@@ -158,7 +158,7 @@ impl Fields<'_> {
             error_kind,
             has_voids: p[0x013] & 1 != 0,
             heights_rounded: p[0x013] & 2 != 0,
-            generation: get_u32(p, 0x01c),
+            generation: get_u32(p, super::GENERATION),
             height_range_m: [get_f64(p, 0x040), get_f64(p, 0x048)],
             nodata_samples: get_u64(p, 0x060),
             stored_pages: get_u64(p, 0x070),

@@ -1,0 +1,94 @@
+//! The page of the newest header is damaged: the file reads as before the last commit, and says so; what is made of it opens.
+
+mod common;
+
+use common::edits::{Bench, set};
+use std::path::Path;
+use terrasoar_layout::edit::EditSession;
+use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::packing::pack;
+use terrasoar_layout::packing::unpack;
+use terrasoar_layout::progress::Silent;
+use terrasoar_layout::read::terrain::Terrain;
+use terrasoar_layout::verify::verify;
+
+const PAGE: usize = 4096;
+
+fn commit(mut session: EditSession, i: u32) {
+    session.apply(&[set(i)]).unwrap();
+    session.commit("set").unwrap();
+}
+
+/// Flips a bit of a byte of a page.
+fn damaged(path: &Path, page: usize, byte: usize) -> Vec<u8> {
+    let whole = std::fs::read(path).unwrap();
+    let mut bytes = whole.clone();
+    bytes[page * PAGE + byte] ^= 4;
+    std::fs::write(path, &bytes).unwrap();
+    whole
+}
+
+#[test]
+fn a_damaged_newest_header_is_told_and_an_older_one_passed_over() {
+    for bench in Bench::both() {
+        let (path, overlay) = (bench.path("t.iqt"), bench.path("t.iqo"));
+        for commits in 1..4 {
+            // In the file itself, and in an overlay over what it is then.
+            commit(EditSession::open(&path).unwrap(), commits);
+            let _ = std::fs::remove_file(&overlay);
+            commit(EditSession::open_overlay(&path, &overlay).unwrap(), 7);
+            let open_file = || Terrain::open(&path).unwrap();
+            let open_both = || Terrain::open_with_overlay(&path, &overlay).unwrap();
+            let newest = commits as usize % 2;
+            for (file, newest, open) in [
+                (&path, newest, &open_file as &dyn Fn() -> Terrain),
+                (&overlay, 1, &open_both as &dyn Fn() -> Terrain),
+            ] {
+                let generation = open().header().generation;
+                assert_eq!(open().lost_header().unwrap(), None);
+                assert!(verify(&open(), &|_| {}).unwrap().is_sound());
+                for byte in [9, 0x20, 0x88, 0x3ff, 0xfff] {
+                    let whole = damaged(file, newest, byte);
+                    if byte != 9 || file == &overlay {
+                        let terrain = open();
+                        let lost = terrain.lost_header().unwrap().unwrap();
+                        assert_eq!((lost.page, lost.generation), (newest as u64, generation - 1));
+                        let report = verify(&terrain, &|_| {}).unwrap();
+                        assert!(!report.is_sound(), "{:?}", report.problems);
+                    }
+                    std::fs::write(file, &whole).unwrap();
+                    damaged(file, 1 - newest, byte);
+                    let terrain = open();
+                    assert_eq!(terrain.header().generation, generation);
+                    assert_eq!(terrain.lost_header().unwrap(), None);
+                    assert!(verify(&terrain, &|_| {}).unwrap().is_sound());
+                    std::fs::write(file, &whole).unwrap();
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_packed_of_a_file_with_one_header_opens() {
+    for bench in Bench::both() {
+        let [path, packed, plain] = ["t.iqt", "packed.iqt", "plain.iqt"].map(|name| bench.path(name));
+        commit(EditSession::open(&path).unwrap(), 1);
+        for slot in [0, 1] {
+            let mut bytes = std::fs::read(&path).unwrap();
+            let whole = bytes.clone();
+            bytes[slot * PAGE..(slot + 1) * PAGE].fill(0x5a);
+            std::fs::write(&path, &bytes).unwrap();
+            let there = Terrain::open(&path).unwrap();
+            if there.source().packed_bytes().is_some() {
+                unpack(&SystemDisk, &path, &plain, &Silent).unwrap();
+            } else {
+                pack(&SystemDisk, &path, &packed, &Silent).unwrap();
+                unpack(&SystemDisk, &packed, &plain, &Silent).unwrap();
+                assert_eq!(Terrain::open(&packed).unwrap().header(), there.header());
+            }
+            assert_eq!(Terrain::open(&plain).unwrap().header(), there.header());
+            std::fs::write(&path, &whole).unwrap();
+        }
+    }
+}
