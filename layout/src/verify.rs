@@ -19,6 +19,7 @@ pub mod unused;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, checksum};
 use crate::grid::record::{Compact, Exact8, Exact16, RecordKind};
+use crate::read::lost::LostHeader;
 use crate::read::terrain::Terrain;
 use rayon::prelude::*;
 use std::fmt;
@@ -57,10 +58,12 @@ pub struct VerifyReport {
     pub problems: Vec<Problem>,
     /// All problems.
     pub problem_count: u64,
+    /// The newest header, if it is damaged. It is no problem of the state that was checked, which is the one before it, and a power cut may leave it so.
+    pub lost_header: Option<LostHeader>,
 }
 
 impl VerifyReport {
-    /// Whether the file is sound.
+    /// Whether the file is sound, in the state that it is read in.
     pub fn is_sound(&self) -> bool {
         self.problem_count == 0
     }
@@ -116,14 +119,7 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
         }
         Err(other) => return Err(other),
     };
-    let mut findings = structure::check(terrain);
-    if let Some(lost) = terrain.lost_header()? {
-        let problem = format!(
-            "it is damaged and was newer than the other, of generation {}, which is read instead; if a power cut stopped the edit that wrote it, nothing is lost and the next edit writes it anew",
-            lost.generation
-        );
-        findings.add(format!("header slot on page {}", lost.page), problem);
-    }
+    let findings = structure::check(terrain);
     let (damaged, wrong_sums) = checksums(terrain, &present, progress)?;
     let (grid, scale) = (terrain.grid(), &terrain.header().scale);
     let (records, vertices) = match terrain.header().record_kind {
@@ -147,6 +143,7 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
         tiles_checked: tiles,
         problems: listed,
         problem_count: count,
+        lost_header: terrain.lost_header()?,
     })
 }
 

@@ -184,3 +184,23 @@ fn rounded_terrain_is_packed_and_edited() -> Result<(), LayoutError> {
     assert!(verify(&terrain, &|_| {})?.is_sound());
     Ok(())
 }
+
+/// A lake, or the one sample that is no void: there is no range of heights to make a step of.
+#[test]
+fn heights_that_are_all_the_same_are_rounded_too() {
+    for (height, z_scale) in [(79.940_750_215_718_85, 1.0), (-200_165.413_348_907_6, 1.0), (3e-7, -0.5)] {
+        let flat = MemoryDem::from_fn([9, 6], SampleType::F64, |x, _| if x < 3 { f64::NAN } else { height });
+        for record in [RecordKind::Compact, RecordKind::Fine] {
+            let options =
+                BuildOptions::default().spacing_m([10.0; 2]).record(Some(record)).z_scale(z_scale);
+            let terrain = open_bytes(build_bytes(&flat, &options).unwrap()).unwrap();
+            assert_eq!(terrain.header().record_kind, record);
+            assert!(terrain.header().scale.height_step_m > 0.001);
+            for (sample_m, height_m) in pairs(&flat, &terrain, z_scale) {
+                assert_eq!(height_m.is_none(), sample_m.is_nan());
+                assert!(height_m.is_none_or(|height_m| (height_m - sample_m).abs() < 1e-9));
+            }
+            assert!(verify(&terrain, &|_| {}).unwrap().is_sound());
+        }
+    }
+}

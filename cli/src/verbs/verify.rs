@@ -4,7 +4,7 @@ use super::Lines;
 use super::output::{grouped, print_line};
 use super::progress::Meter;
 use super::terrain::TerrainArgs;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use terrasoar_layout::verify::{verify, verify_pages};
 
 /// Check every page of a terrain file.
@@ -27,6 +27,13 @@ pub(super) fn run(args: &Args) -> Result<()> {
     progress.begin("verifying", verify_pages(&terrain));
     let report = verify(&terrain, &|pages| progress.add(pages))?;
     drop(progress);
+    if let (true, Some(lost)) = (report.is_sound(), report.lost_header) {
+        bail!(
+            "{}: the newest header, on page {}, is damaged; the state before it, which is read instead, is sound; restore a copy of the file, or let the next edit write it anew if a power cut stopped the last one",
+            terrain.path().display(),
+            lost.page
+        );
+    }
     if report.is_sound() {
         let tiles = match report.tiles_checked {
             0 => String::new(),

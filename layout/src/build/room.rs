@@ -23,8 +23,14 @@ pub(super) fn codes_below(range_steps: f64) -> f64 {
     free.min(reach_steps(range_steps) - range_steps).floor().max(0.0)
 }
 
+/// Steps of heights that are all the same, in raw units. Any would do for these; edits have room for 256 units up and down.
+const FLAT_STEP: f64 = 1.0 / 64.0;
+
 /// Steps that heights of `range` are rounded to where they do not fit whole steps: as fine as room above and below allows.
 pub(super) fn rounding_step(range: f64, has_room: bool) -> f64 {
+    if range == 0.0 {
+        return FLAT_STEP;
+    }
     range * if has_room { REACH_FACTOR } else { 1.0 } / LARGEST_CODE
 }
 
