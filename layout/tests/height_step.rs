@@ -191,8 +191,7 @@ fn heights_that_are_all_the_same_are_rounded_too() {
     for (height, z_scale) in [(79.940_750_215_718_85, 1.0), (-200_165.413_348_907_6, 1.0), (3e-7, -0.5)] {
         let flat = MemoryDem::from_fn([9, 6], SampleType::F64, |x, _| if x < 3 { f64::NAN } else { height });
         for record in [RecordKind::Compact, RecordKind::Fine] {
-            let options =
-                BuildOptions::default().spacing_m([10.0; 2]).record(Some(record)).z_scale(z_scale);
+            let options = BuildOptions::default().spacing_m([10.0; 2]).record(Some(record)).z_scale(z_scale);
             let terrain = open_bytes(build_bytes(&flat, &options).unwrap()).unwrap();
             assert_eq!(terrain.header().record_kind, record);
             assert!(terrain.header().scale.height_step_m > 0.001);

@@ -36,6 +36,8 @@ fn a_damaged_newest_header_is_told_and_an_older_one_passed_over() {
             // In the file itself, and in an overlay over what it is then.
             commit(EditSession::open(&path).unwrap(), commits);
             let _ = std::fs::remove_file(&overlay);
+            drop(EditSession::open_overlay(&path, &overlay).unwrap());
+            assert_eq!(Terrain::open_with_overlay(&path, &overlay).unwrap().lost_header().unwrap(), None);
             commit(EditSession::open_overlay(&path, &overlay).unwrap(), 7);
             let open_file = || Terrain::open(&path).unwrap();
             let open_both = || Terrain::open_with_overlay(&path, &overlay).unwrap();
@@ -63,6 +65,16 @@ fn a_damaged_newest_header_is_told_and_an_older_one_passed_over() {
                     assert_eq!(terrain.header().generation, generation);
                     assert_eq!(terrain.lost_header().unwrap(), None);
                     assert!(verify(&terrain, &|_| {}).unwrap().is_sound());
+                    std::fs::write(file, &whole).unwrap();
+                }
+                for fill in [0, 0x5a, 0xff] {
+                    let whole = std::fs::read(file).unwrap();
+                    let mut bytes = whole.clone();
+                    bytes[newest * PAGE..(newest + 1) * PAGE].fill(fill);
+                    std::fs::write(file, &bytes).unwrap();
+                    // After a first commit the other slot knows of none.
+                    let is_told = fill != 0 || (commits > 1 && file == &path);
+                    assert_eq!(open().lost_header().unwrap().is_some(), is_told, "{fill}");
                     std::fs::write(file, &whole).unwrap();
                 }
             }

@@ -81,6 +81,7 @@ impl Built {
         let filled = header.about.origins.iter().find(|(what, _)| what == "voids");
         let filled = filled.map(|(_, words)| format!("; {words}")).unwrap_or_default();
         let rounded = match self.height_step_m.filter(|_| self.heights_rounded) {
+            Some(step_m) if step_m < 1e-9 => format!(", heights rounded to {} m", number(step_m)),
             Some(step_m) => format!(", heights rounded to {} m", decimal(step_m, 9)),
             None => String::new(),
         };

@@ -7,7 +7,9 @@ use super::output::complain;
 use crate::beside::named_beside;
 use crate::lost::newest_header_is_lost;
 use anyhow::{Result, bail};
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Says that overlays beside `file` will not show the picture that it is given now.
@@ -31,7 +33,11 @@ pub(super) fn refuse_rewriting(file: &Path, is_forced: bool) -> Result<()> {
 
 /// Says so where a terrain is not in the last state that its files were written in: it is seen with an overlay that is older than what its file was given last, or its last header is damaged.
 pub(super) fn tell_of_older(terrain: &Terrain) {
-    if let Some(words) = newest_header_is_lost(terrain) {
+    // Verbs that open a file twice say so once.
+    static TOLD: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    if let Some(words) = newest_header_is_lost(terrain)
+        && TOLD.lock().is_ok_and(|mut told| told.insert(terrain.path().to_owned()))
+    {
         complain(&format!("warning: {words}"));
     }
     if let Some(base) = terrain.base_path().filter(|_| terrain.base_has_grown()) {

@@ -32,17 +32,22 @@ impl Terrain {
     }
 
     fn look_for_lost(&self) -> Result<Option<LostHeader>, LayoutError> {
-        let (source, generation) = (self.source(), self.header().generation);
-        let is_header = |page: &Page| {
-            [MAGIC, OVERLAY_MAGIC].iter().any(|magic| Header::parse_as(self.path(), page, *magic).is_ok())
+        let (source, header) = (self.source(), self.header());
+        let magics = [MAGIC, OVERLAY_MAGIC];
+        let is_header =
+            |page: &Page| magics.iter().any(|magic| Header::parse_as(self.path(), page, *magic).is_ok());
+        let is_lost = |page: &Page| {
+            if page.iter().all(|byte| *byte == 0) {
+                // Before the first commit the second slot is empty, after it neither.
+                return header.history.is_some();
+            }
+            let says_it_is_older = magics.iter().any(|magic| page.starts_with(magic))
+                && get_u32(page, GENERATION) < header.generation;
+            !says_it_is_older && !is_header(page)
         };
         let mut slots = [[0; PAGE_BYTES]; 2];
         source.read_at(source.own_start(), slots.as_flattened_mut())?;
-        let lost = slots.iter().position(|page| {
-            page.iter().any(|byte| *byte != 0)
-                && get_u32(page, GENERATION) >= generation
-                && !is_header(page)
-        });
-        Ok(lost.map(|page| LostHeader { page: page as u64, generation }))
+        let lost = slots.iter().position(is_lost);
+        Ok(lost.map(|page| LostHeader { page: page as u64, generation: header.generation }))
     }
 }
