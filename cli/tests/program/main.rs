@@ -20,6 +20,7 @@ mod iobench;
 mod killed;
 #[cfg(unix)]
 mod kills;
+mod lost_header;
 mod misread;
 mod mosaics;
 mod outputs;

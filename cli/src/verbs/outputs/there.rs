@@ -39,6 +39,10 @@ pub(super) fn terrain(path: &Path, start: &[u8]) -> Option<Option<String>> {
             _ => "a picture".into(),
         });
     }
+    // A commit that cannot be read any more may be there, and a person may have a way to it.
+    if !matches!(terrain.lost_header(), Ok(None)) {
+        held.push("a damaged header".into());
+    }
     let held = held.join(" and ");
     Some((!held.is_empty()).then(|| format!("a terrain that holds {held}")))
 }

@@ -1,0 +1,40 @@
+//! A terrain whose newest header is damaged: all verbs warn, and none replaces it unasked.
+
+use crate::edit::{read, with_script};
+use crate::support::text;
+
+/// A script of one batch, the file or overlay that it goes to, and the verbs' flags for it.
+const PLACES: [(&str, &[&str]); 2] = [("land.iqt", &[]), ("dam.iqo", &["--overlay", "dam.iqo"])];
+
+#[test]
+fn verbs_tell_of_a_damaged_newest_header_once() {
+    for (file, flags) in PLACES {
+        let bench = with_script("set rect 10,10,20,20 to 100\n");
+        let before = bench.good(&["height", "land.iqt", "--at", "300,300"]);
+        bench.good(&[&["edit", "land.iqt", "--script", "a.edits"], flags].concat());
+        let at = [&["height", "land.iqt", "--at", "300,300"], flags].concat();
+        assert_eq!(bench.good(&at), "100 m\n");
+        let mut bytes = read(&bench, file);
+        bytes[4096 + 0x85] ^= 1;
+        std::fs::write(bench.path(file), &bytes).unwrap();
+        let told = format!("warning: {file}: the newest header, on page 1, is damaged");
+        for verb in [&at[..], &[&["info", "land.iqt"], flags].concat()] {
+            let output = bench.run(verb);
+            let said = text(&output.stderr);
+            assert!(output.status.success() && said.matches(&told).count() == 1, "{verb:?}: {said}");
+        }
+        assert_eq!(text(&bench.run(&at).stdout), before);
+        let said = bench.bad(1, &[&["verify", "land.iqt"], flags].concat());
+        assert!(said.contains("is damaged; the state before it, which is read instead, is sound"), "{said}");
+        if file == "land.iqt" {
+            let said = bench.bad(1, &["build", "land.tif", "-o", "land.iqt"]);
+            assert!(said.contains("a terrain that holds a damaged header"), "{said}");
+        }
+        assert!(read(&bench, file) == bytes);
+        // The next edit writes the header anew.
+        let edited = bench.run(&[&["edit", "land.iqt", "--script", "a.edits"], flags].concat());
+        assert!(edited.status.success() && text(&edited.stderr).contains(&told));
+        bench.good(&[&["verify", "land.iqt"], flags].concat());
+        assert_eq!(text(&bench.run(&at).stderr), "");
+    }
+}
