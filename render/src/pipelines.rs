@@ -17,7 +17,7 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
         view_dimension,
         multisampled: false,
     };
-    let page_table = wgpu::BindingType::Texture {
+    let table_of_tiles = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Uint,
         view_dimension: wgpu::TextureViewDimension::D2,
         multisampled: false,
@@ -37,12 +37,12 @@ pub(crate) fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout 
             ),
             entry(1, vertex, storage),
             entry(2, vertex, storage),
-            entry(3, fragment, page_table),
+            entry(3, fragment, table_of_tiles),
             entry(4, fragment, texture(wgpu::TextureViewDimension::D2Array, true)),
             entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
             entry(6, fragment, texture(wgpu::TextureViewDimension::D2, false)),
             entry(7, vertex, storage),
-            entry(8, fragment, page_table),
+            entry(8, fragment, table_of_tiles),
             entry(9, fragment, texture(wgpu::TextureViewDimension::D2Array, true)),
         ],
     })

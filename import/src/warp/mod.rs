@@ -184,9 +184,13 @@ impl Warp {
             pass,
             || (),
             |(), window| {
+                // Cells are large: around a pole, where what they hold is in doubt, most of their blocks are not.
+                if !is_met(window) {
+                    return pass(window);
+                }
                 self.resampler.block(&store, window, &mut |window, samples| match samples {
                     Some(samples) => sink.put(window, samples),
-                    None => sink.put_void(window),
+                    None => pass(window),
                 })
             },
         )

@@ -146,6 +146,43 @@ fn windows_around_the_globe_hold_what_reaches_them() {
     }
 }
 
+/// An equal-area map of the globe has rows of which a part lies beyond the poles: what they hold is in doubt, and they alone are made beside what the samples reach.
+#[test]
+fn few_rows_are_made_where_the_globe_ends() {
+    /// Samples that were made, and of how many in all.
+    struct Counting(Mutex<[u64; 2]>);
+    impl SampleSink for Counting {
+        fn put(&self, window: Window, samples: &[f64]) -> Result<(), LayoutError> {
+            self.put_void(window)?;
+            self.0.lock().unwrap()[0] += samples.len() as u64;
+            Ok(())
+        }
+
+        fn put_void(&self, window: Window) -> Result<(), LayoutError> {
+            self.0.lock().unwrap()[1] += u64::from(window.width) * u64::from(window.height);
+            Ok(())
+        }
+    }
+    const OLD: [u32; 2] = [21_600, 10_800];
+    let step = 1.0 / 60.0;
+    let map = [-180.0 + step / 2.0, step, 0.0, 90.0 - step / 2.0, 0.0, -step];
+    let options = OpenOptions { reproject: Some("EPSG:6933".into()), ..OpenOptions::default() };
+    let known = by_text("EPSG:4326").unwrap();
+    let warp = Warp::plan(Path::new("a"), &known, Some(map), OLD, SampleType::F32, false, &options);
+    let warp = warp.unwrap().unwrap();
+    let counting = Counting(Mutex::default());
+    let old = |sink: &dyn SampleSink| {
+        sink.put(Window { col: 9000, row: 4000, width: 64, height: 64 }, &[7.0; 64 * 64])
+    };
+    warp.stream(&old, &counting).unwrap();
+    let [made, all] = counting.0.into_inner().unwrap();
+    let [wide, high] = warp.samples().map(u64::from);
+    assert_eq!(all, wide * high);
+    // Two rows of blocks, and the cell of old samples with those around it.
+    let rows = 2 * u64::from(BLOCK[1]) * wide;
+    assert!(made <= rows + 9 * u64::from(CELL).pow(2), "{made} of {all}, of which {rows} at the poles");
+}
+
 #[test]
 fn utm_is_the_zone_of_the_centre_and_auto_goes_beyond() {
     let named = |text: &str, x: f64, y: f64, samples: [u32; 2]| {

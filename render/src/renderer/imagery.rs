@@ -18,7 +18,7 @@ impl Renderer {
     /// # Errors
     ///
     /// [`RenderError::Usage`] for a shape that is none, a format the device does not take, and a pool that does not hold the coarsest
-    /// level, or is smaller than the table of all tiles (where the image has more than a million texels a side). The image before is then gone too.
+    /// level. The image before is then gone too.
     pub fn set_imagery(&mut self, shape: &ImageryShape, format: TileFormat, pool_bytes: u64) -> Result<()> {
         self.clear_imagery();
         self.imagery = Some(Imagery::new(&self.device, &self.terrain, shape, format, pool_bytes)?);

@@ -352,12 +352,12 @@ impl Renderer {
             wgpu::BindingResource::Buffer(uniform),
             self.mesh.vertices.as_entire_binding(),
             self.mesh.indices.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&self.tiles.page_table_view),
+            wgpu::BindingResource::TextureView(&self.tiles.table_view),
             wgpu::BindingResource::TextureView(&self.tiles.view),
             wgpu::BindingResource::Sampler(&self.sampler),
             wgpu::BindingResource::TextureView(ramp),
             self.morph.moved_heights().as_entire_binding(),
-            wgpu::BindingResource::TextureView(&image.page_table_view),
+            wgpu::BindingResource::TextureView(&image.table_view),
             wgpu::BindingResource::TextureView(&image.view),
         ];
         let entries: Vec<_> = (0..)

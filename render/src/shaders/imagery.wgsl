@@ -23,7 +23,7 @@ fn image_tile(f: Footprint, from_level: u32) -> vec4<f32> {
     for (var level = from_level; level < frame.image.x; level++) {
         let side = i32(frame.image.y << level);
         let tile = f.cell / side;
-        let entry = textureLoad(image_table, tile, i32(level)).r;
+        let entry = layer_in(image_table, tile, level);
         if entry != 0u {
             let scale = exp2(-f32(level));
             let at = (vec2<f32>(f.cell - tile * side) + f.within) * scale + f32(frame.image.w);

@@ -1,6 +1,6 @@
-// The finest resident tile at a place that is not finer than needed, found through the page table.
+// The finest resident tile at a place that is not finer than needed, found through the table of those that are here.
 
-@group(0) @binding(3) var page_table: texture_2d<u32>;
+@group(0) @binding(3) var tile_table: texture_2d<u32>;
 @group(0) @binding(4) var tile_layers: texture_2d_array<f32>;
 @group(0) @binding(5) var smooth_sampler: sampler;
 
@@ -12,14 +12,33 @@ fn needed_level(from_eye_m: vec3<f32>) -> f32 {
     return log2(distance_m / (frame.lod_more.z * sample_m * sqrt(steepness)));
 }
 
+// The layer of a tile and 1, or 0 where it is not resident. A tile stands in the slot that its hash gives or in the first free one after that;
+// tiles/table.rs does the same.
+fn layer_in(slots: texture_2d<u32>, tile: vec2<i32>, level: u32) -> u32 {
+    let size = textureDimensions(slots);
+    let last = size.x * size.y - 1u;
+    let key = vec3(vec2<u32>(tile), level);
+    let parts = key * vec3(0x9e3779b1u, 0x85ebca77u, 0xc2b2ae3du);
+    let mixed = parts.x ^ parts.y ^ parts.z;
+    var slot = ((mixed ^ (mixed >> 15u)) * 0x2c1b3c6du) >> (32u - countOneBits(last));
+    // Some slots are free, so the search ends; the bound is for a device that has lost them.
+    for (var looked_at = 0u; looked_at <= last; looked_at++) {
+        let entry = textureLoad(slots, vec2<i32>(vec2(slot % size.x, slot / size.x)), 0);
+        if entry.w == 0u || all(entry.xyz == key) {
+            return entry.w;
+        }
+        slot = (slot + 1u) & last;
+    }
+    return 0u;
+}
+
 // Slopes east and north, and 1 if a tile was found.
 fn tile_at(cell: vec2<i32>, last_inside: vec2<i32>, within: vec2<f32>, from_level: u32) -> vec3<f32> {
     for (var level = from_level; level < frame.tiles.x; level++) {
         let shift = frame.tiles.y + level;
         // The last sample belongs to the last tile; its neighbours beyond do not exist.
         let tile = min(cell, last_inside) >> vec2(shift);
-        // A signed level: OpenGL takes no other.
-        let entry = textureLoad(page_table, tile, i32(level)).r;
+        let entry = layer_in(tile_table, tile, level);
         if entry != 0u {
             let samples = vec2<f32>(cell - (tile << vec2(shift))) + within;
             let texel = samples * exp2(-f32(level)) + 0.5;

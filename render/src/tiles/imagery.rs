@@ -18,9 +18,6 @@ use crate::view::TerrainShape;
 use terrasoar::view::View;
 use terrasoar_layout::imagery::{ImageryShape, TILE_TEXELS, TileFormat, TileId};
 
-/// Memory that a page table may take beside a small pool: that of an image of a million texels a side needs a third.
-const MOST_PAGE_TABLE_BYTES: u64 = 64 << 20;
-
 /// Longest side of an image in texels.
 const MOST_TEXELS: u32 = 1 << 29;
 
@@ -118,22 +115,9 @@ impl Imagery {
             ));
         }
         let pyramid = Pyramid::of_image(shape);
-        let [east, north] = pyramid.across(0).map(u32::next_power_of_two);
-        if east.max(north) > device.limits().max_texture_dimension_2d {
-            return Err(RenderError::Usage(
-                "the image has more tiles in a row than the device's textures texels",
-            ));
-        }
-        // With all its levels the page table is a third larger.
-        let page_table_bytes = u64::from(east) * u64::from(north) * 16 / 3;
-        if page_table_bytes > pool_bytes.max(MOST_PAGE_TABLE_BYTES) {
-            return Err(RenderError::Usage(
-                "the image has so many tiles that the table of them is larger than the pool; give it more memory",
-            ));
-        }
-        let coarsest = pyramid.roots().count();
+        let [east, north] = pyramid.across(pyramid.levels() - 1).map(u64::from);
         let pool = TilePool::new(device, pyramid, layout_of(format), pool_bytes);
-        if coarsest > pool.residency.capacity() as usize {
+        if east * north > pool.residency.capacity().into() {
             return Err(RenderError::Usage(
                 "the image's coarsest level alone does not fit the pool; give it more levels, or more memory",
             ));

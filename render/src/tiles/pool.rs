@@ -1,9 +1,9 @@
-//! Layers of an array texture, and the page table that says what is in them.
+//! Layers of an array texture, and the table that says what is in them.
 //!
-//! It knows how many bytes a block of texels has, and not what they mean. An upload is one texture write and one or two texels of the
-//! page table; nothing else moves.
+//! It knows how many bytes a block of texels has, and not what they mean. An upload is one texture write and a few texels of the
+//! table; nothing else moves.
 
-use super::{Pyramid, Residency};
+use super::{Pyramid, Residency, TileTable};
 use crate::error::{RenderError, Result};
 use terrasoar_layout::imagery::TileId;
 
@@ -46,8 +46,8 @@ pub struct TileStats {
     pub dropped: u64,
 }
 
-/// An entry of the page table: the layer of a tile and 1, or 0 where there is none. A level of the pyramid is a mip level.
-const PAGE_TABLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+/// A slot of the table.
+const TABLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
 /// Tiles on the device.
 #[derive(Debug)]
@@ -55,8 +55,9 @@ pub(crate) struct TilePool {
     pub pyramid: Pyramid,
     pub residency: Residency,
     pub view: wgpu::TextureView,
-    pub page_table_view: wgpu::TextureView,
-    page_table: wgpu::Texture,
+    pub table_view: wgpu::TextureView,
+    table: TileTable,
+    table_texture: wgpu::Texture,
     texture: wgpu::Texture,
     layout: TileLayout,
     stats: TileStats,
@@ -92,15 +93,15 @@ impl TilePool {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..Default::default()
         });
-        // A mip level for each of the pyramid's: powers of two halve evenly, and are at least the tiles across.
-        let [width, height] = pyramid.across(0).map(u32::next_power_of_two);
-        let page_table = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("page table"),
+        let table = TileTable::new(capacity);
+        let [width, height] = table.size();
+        let table_texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("table of tiles"),
             size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: pyramid.levels(),
+            mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: PAGE_TABLE_FORMAT,
+            format: TABLE_FORMAT,
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
@@ -108,8 +109,9 @@ impl TilePool {
             residency: Residency::new(&pyramid, capacity),
             pyramid,
             view,
-            page_table_view: page_table.create_view(&Default::default()),
-            page_table,
+            table_view: table_texture.create_view(&Default::default()),
+            table,
+            table_texture,
             texture,
             layout,
             stats: TileStats::default(),
@@ -151,9 +153,10 @@ impl TilePool {
         let mut sent = bytes.len() as u64;
         if let Some(gone) = place.evicted {
             self.stats.evictions += 1;
-            sent += self.set_entry(queue, gone, 0);
+            sent += self.take_out(queue, gone);
         }
-        sent += self.set_entry(queue, tile, place.layer + 1);
+        let slot = self.table.insert(tile, place.layer);
+        sent += self.send_slot(queue, slot);
         self.stats.uploads += 1;
         self.stats.uploaded_bytes += sent;
         Ok(sent)
@@ -162,23 +165,28 @@ impl TilePool {
     /// Forgets a tile whose content changed.
     pub(crate) fn forget(&mut self, queue: &wgpu::Queue, tile: TileId) {
         if self.pyramid.contains(tile) && self.residency.forget(tile) {
-            self.set_entry(queue, tile, 0);
+            self.take_out(queue, tile);
         }
     }
 
-    fn set_entry(&self, queue: &wgpu::Queue, tile: TileId, value: u32) -> u64 {
+    fn take_out(&mut self, queue: &wgpu::Queue, tile: TileId) -> u64 {
+        self.table.remove(tile).into_iter().map(|slot| self.send_slot(queue, slot)).sum()
+    }
+
+    fn send_slot(&self, queue: &wgpu::Queue, slot: u32) -> u64 {
+        let ([x, y], entry) = self.table.texel(slot);
         queue.write_texture(
             wgpu::TexelCopyTextureInfo {
-                texture: &self.page_table,
-                mip_level: tile.level,
-                origin: wgpu::Origin3d { x: tile.x, y: tile.y, z: 0 },
+                texture: &self.table_texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x, y, z: 0 },
                 aspect: wgpu::TextureAspect::All,
             },
-            &value.to_le_bytes(),
+            bytemuck::bytes_of(&entry),
             wgpu::TexelCopyBufferLayout::default(),
             wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
         );
-        4
+        size_of_val(&entry) as u64
     }
 
     pub(crate) fn stats(&self) -> TileStats {
@@ -192,8 +200,7 @@ impl TilePool {
 
     /// Bytes of device memory held.
     pub(crate) fn device_bytes(&self) -> u64 {
-        self.layout.layer_bytes() * u64::from(self.texture.depth_or_array_layers())
-            + 4 * self.pyramid.len() as u64
+        self.layout.layer_bytes() * u64::from(self.texture.depth_or_array_layers()) + self.table.bytes()
     }
 }
 

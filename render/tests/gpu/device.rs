@@ -1,7 +1,9 @@
 //! The device itself: repeatable, timed, lost and made anew.
 
 use glam::DVec3;
-use terrasoar_render::{Gpu, Look, RenderError, RendererOptions, View, wgpu};
+use terrasoar_render::{
+    Gpu, ImageryShape, Look, RenderError, Renderer, RendererOptions, TerrainShape, TileFormat, View, wgpu,
+};
 
 use crate::support::landscape::hills;
 use crate::support::picture::Picture;
@@ -14,6 +16,7 @@ pub fn tests() -> Vec<(&'static str, Test)> {
         ("device::two_runs_are_identical", repeatable),
         ("device::loss_is_reported_and_survived", loss),
         ("device::frames_are_timed", timed),
+        ("device::memory_does_not_follow_the_side_of_the_terrain", memory),
     ]
 }
 
@@ -64,4 +67,20 @@ fn timed(gpu: &Gpu) -> Outcome {
     }
     let expected = gpu.capabilities.timestamps;
     ensure(time_ms.is_some() == expected && time_ms.is_none_or(|t| t > 0.0), || format!("{time_ms:?}"))
+}
+
+/// Neither the light's tiles nor a picture's take memory for ground that is not shown.
+fn memory(gpu: &Gpu) -> Outcome {
+    let bytes = |side: u32| {
+        let terrain =
+            TerrainShape { spacing_m: [10.0; 2], samples: [side + 1; 2], height_range_m: [0.0, 1000.0] };
+        let made = Renderer::new(&gpu.device, &gpu.queue, terrain, RendererOptions::default());
+        let mut renderer = made.map_err(|e| e.to_string())?;
+        let bare = renderer.device_bytes();
+        let image = ImageryShape::new(TileFormat::Rgba8, [4 * side; 2], [0.0; 2], [2.5; 2]);
+        renderer.set_imagery(&image, image.format, Renderer::IMAGERY_BYTES).map_err(|e| e.to_string())?;
+        Ok::<_, String>([bare, renderer.device_bytes()])
+    };
+    let [small, vast] = [bytes(1 << 13)?, bytes(1 << 20)?];
+    ensure(small == vast, || format!("{small:?} bytes at 8,193 samples a side, {vast:?} at 1,048,577"))
 }

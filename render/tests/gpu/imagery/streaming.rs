@@ -338,8 +338,8 @@ fn wrong_use(gpu: &Gpu) -> Outcome {
         ImageryShape { levels: 0, ..shape },
         ImageryShape { texel_m: [1.0, -1.0], ..shape },
         ImageryShape { origin_m: [f64::NAN, 0.0], ..shape },
-        // More tiles than anyone could list.
-        ImageryShape { texels: [1 << 22; 2], ..shape },
+        // More tiles at the coarsest level than anyone could list.
+        ImageryShape { texels: [1 << 29; 2], levels: 1, ..shape },
         // A coarsest level of many tiles in a pool of one.
         ImageryShape { levels: 1, ..shape },
     ] {
