@@ -8,9 +8,10 @@ use super::append::Append;
 use super::encode::check_format;
 use super::mosaic::Mosaic;
 use super::place::{Extent, PlaceOrigin};
-use super::pyramid::{Pyramid, STEP_ROWS, memory_bytes};
+use super::pyramid::{Pyramid, memory_bytes};
+use super::rows::{Arrival, STEP_ROWS};
 use super::shape::{ImageryShape, TileFormat};
-use super::source::{ImageSource, RowReader};
+use super::source::ImageSource;
 use crate::error::LayoutError;
 use crate::file::disk::{Disk, SystemDisk};
 use crate::file::header::Header;
@@ -121,7 +122,7 @@ fn append_all(
     let slots = Slots::read(source, 0)?;
     let mosaic = Mosaic::new(&images, &slots.header, options.extent)?;
     let shape = mosaic.shape(options.format);
-    let needed = memory_bytes(&shape).saturating_add(mosaic.memory_bytes());
+    let needed = memory_bytes(&shape, &mosaic.areas()).saturating_add(mosaic.memory_bytes());
     if needed.div_ceil(1 << 20) > options.memory_mib {
         let needed_mib = needed.div_ceil(1 << 20);
         return Err(LayoutError::Usage(format!(
@@ -161,19 +162,17 @@ fn append_tiles(
 ) -> Result<(), LayoutError> {
     let mut pyramid = Pyramid::new(*shape);
     let mut rows = mosaic.rows()?;
-    let row_bytes = shape.texels[0] as usize * 4;
-    let (mut arriving, mut arrived): (Vec<u8>, Vec<u8>) = (Vec::new(), Vec::new());
+    let (mut arriving, mut arrived) = (Arrival::default(), Arrival::default());
     let mut left = shape.texels[1];
     // One turn more than there are steps: each reads one and works on the one before.
     loop {
         let step = left.min(STEP_ROWS);
         left -= step;
-        arriving.resize(step as usize * row_bytes, 0);
-        let read = || if step > 0 { rows.read(&mut arriving) } else { Ok(()) };
+        let read = || rows.read(step, &mut arriving);
         let work = || pyramid.push(&arrived, &mut |tile| append.put(&tile));
         let (read, worked) = rayon::join(read, work);
         read.and(worked)?;
-        progress.advance(arrived.len() as u64 / 4);
+        progress.advance(u64::from(arrived.rows) * u64::from(shape.texels[0]));
         std::mem::swap(&mut arriving, &mut arrived);
         if step == 0 {
             break;

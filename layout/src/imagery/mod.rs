@@ -17,6 +17,8 @@ mod place;
 #[cfg(feature = "files")]
 mod pyramid;
 mod reader;
+#[cfg(feature = "files")]
+mod rows;
 mod section;
 mod shape;
 mod source;

@@ -1,15 +1,17 @@
 //! Several images as one picture: the smallest rectangle of texels around them. Later images in the list lie above earlier ones.
 //!
 //! Images of a mosaic have one texel size and lie on one grid of texels. Others must be resampled first, for example by gdalwarp. Where no image is, the picture is
-//! transparent. Cost: a copy of the rows.
+//! transparent, and costs nothing. Cost: a copy of the rows.
 
 use super::place::{Extent, Place, PlaceOrigin, place};
+use super::rows::{Area, Arrival, Stretch};
 use super::shape::{ImageryShape, MAX_TEXELS, TileFormat};
 use super::source::{ImageSource, RowReader};
 use crate::error::LayoutError;
 use crate::file::header::Header;
 use crate::remedy::Remedy;
 use crate::words::{harmless, number};
+use std::ops::Range;
 
 /// How far off the common grid an image may lie, in texels.
 const GRID_TEXELS: f64 = 0.1;
@@ -129,6 +131,16 @@ impl<'i> Mosaic<'i> {
         self.parts.iter().fold(0, |sum: u64, part| sum.saturating_add(part.image.info().memory_bytes))
     }
 
+    /// What the images cover.
+    pub(super) fn areas(&self) -> Vec<Area> {
+        let area = |part: &Part<'_>| {
+            let [wide, high] = part.image.info().texels;
+            let north = self.texels[1] - part.at[1];
+            Area { columns: part.at[0]..part.at[0] + wide, rows: north - high..north }
+        };
+        self.parts.iter().map(area).collect()
+    }
+
     /// The rows of the picture.
     pub(super) fn rows(&self) -> Result<MosaicRows<'_>, LayoutError> {
         Ok(MosaicRows {
@@ -148,20 +160,27 @@ pub(super) struct MosaicRows<'m> {
     rows: Vec<u8>,
 }
 
-impl RowReader for MosaicRows<'_> {
-    fn read(&mut self, rgba: &mut [u8]) -> Result<(), LayoutError> {
-        let wide = self.mosaic.texels[0] as usize;
-        let (from, to) = (self.y, self.y + (rgba.len() / (4 * wide)) as u32);
+impl MosaicRows<'_> {
+    /// Reads the next rows of the picture.
+    pub(super) fn read(&mut self, rows: u32, into: &mut Arrival) -> Result<(), LayoutError> {
+        let (from, to) = (self.y, self.y + rows);
         self.y = to;
-        if let [part] = &self.mosaic.parts[..] {
-            if self.readers[0].is_none() {
-                self.readers[0] = Some(part.image.rows()?);
-            }
-            return self.readers[0].as_mut().map_or(Ok(()), |reader| reader.read(rgba));
+        into.rows = rows;
+        let parts = &self.mosaic.parts;
+        let meets = |part: &Part<'_>| {
+            let [wide, high] = part.image.info().texels;
+            let is_met = rows > 0 && part.at[1] < to && from < part.at[1] + high;
+            is_met.then_some(part.at[0]..part.at[0] + wide)
+        };
+        lay_out(parts.iter().filter_map(meets).collect(), into);
+        if let [part] = &parts[..] {
+            let reader = match &mut self.readers[0] {
+                Some(reader) => reader,
+                reader => reader.insert(part.image.rows()?),
+            };
+            return into.stretches.iter_mut().try_for_each(|stretch| reader.read(&mut stretch.rgba));
         }
-        rgba.fill(0);
-        let (picture, _) = rgba.as_chunks_mut::<4>();
-        for (part, reader) in self.mosaic.parts.iter().zip(&mut self.readers) {
+        for (part, reader) in parts.iter().zip(&mut self.readers) {
             let [part_wide, part_high] = part.image.info().texels;
             let (first, last) = (from.max(part.at[1]), to.min(part.at[1] + part_high));
             if first >= last {
@@ -174,9 +193,14 @@ impl RowReader for MosaicRows<'_> {
             };
             self.rows.resize((last - first) as usize * part_wide as usize * 4, 0);
             reader.read(&mut self.rows)?;
+            // The stretch that holds the part's columns.
+            let at = into.stretches.partition_point(|stretch| stretch.columns.end <= part.at[0]);
+            let Stretch { columns, rgba } = &mut into.stretches[at];
+            let wide = columns.len();
+            let (picture, _) = rgba.as_chunks_mut::<4>();
             let (texels, _) = self.rows.as_chunks::<4>();
             for (y, row) in (first..last).zip(texels.chunks_exact(part_wide as usize)) {
-                let at = (y - from) as usize * wide + part.at[0] as usize;
+                let at = (y - from) as usize * wide + (part.at[0] - columns.start) as usize;
                 for (below, above) in picture[at..].iter_mut().zip(row) {
                     if above[3] > 0 {
                         *below = *above;
@@ -185,5 +209,22 @@ impl RowReader for MosaicRows<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// Makes transparent stretches of the columns, those that overlap or meet as one.
+fn lay_out(mut columns: Vec<Range<u32>>, into: &mut Arrival) {
+    columns.sort_by_key(|columns| columns.start);
+    columns.dedup_by(|next, last| {
+        let is_met = next.start <= last.end;
+        last.end = if is_met { last.end.max(next.end) } else { last.end };
+        is_met
+    });
+    into.stretches.resize_with(columns.len(), Stretch::default);
+    for (stretch, columns) in into.stretches.iter_mut().zip(columns) {
+        let bytes = columns.len() * into.rows as usize * 4;
+        stretch.columns = columns;
+        stretch.rgba.clear();
+        stretch.rgba.resize(bytes, 0);
     }
 }

@@ -15,15 +15,14 @@ fn needed_level(from_eye_m: vec3<f32>) -> f32 {
 // The layer of a tile and 1, or 0 where it is not resident. A tile stands in the slot that its hash gives or in the first free one after that;
 // tiles/table.rs does the same.
 fn layer_in(slots: texture_2d<u32>, tile: vec2<i32>, level: u32) -> u32 {
-    let size = textureDimensions(slots);
-    let last = size.x * size.y - 1u;
+    let last = (textureDimensions(slots).y << 6u) - 1u;
     let key = vec3(vec2<u32>(tile), level);
     let parts = key * vec3(0x9e3779b1u, 0x85ebca77u, 0xc2b2ae3du);
     let mixed = parts.x ^ parts.y ^ parts.z;
-    var slot = ((mixed ^ (mixed >> 15u)) * 0x2c1b3c6du) >> (32u - countOneBits(last));
+    var slot = ((mixed ^ (mixed >> 15u)) * 0x2c1b3c6du) >> countLeadingZeros(last);
     // Some slots are free, so the search ends; the bound is for a device that has lost them.
     for (var looked_at = 0u; looked_at <= last; looked_at++) {
-        let entry = textureLoad(slots, vec2<i32>(vec2(slot % size.x, slot / size.x)), 0);
+        let entry = textureLoad(slots, vec2<i32>(vec2(slot & 63u, slot >> 6u)), 0);
         if entry.w == 0u || all(entry.xyz == key) {
             return entry.w;
         }

@@ -8,7 +8,7 @@
 
 use terrasoar_layout::imagery::TileId;
 
-/// Slots in a row of the texture.
+/// Slots in a row of the texture; the shader says the same.
 const ROW_SLOTS: u32 = 64;
 /// Slots for each layer of the pool, at least.
 const SLOTS_A_LAYER: u32 = 4;
