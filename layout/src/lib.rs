@@ -56,6 +56,8 @@ pub mod error;
 pub mod file;
 pub mod grid;
 pub mod imagery;
+#[cfg(feature = "files")]
+pub mod machine;
 pub mod mix;
 mod numbers;
 mod packed;

@@ -8,6 +8,7 @@ use terrasoar::flyover::EngineKind;
 use terrasoar::refine::Culling;
 use terrasoar::view::{ErrorMetric, Viewport};
 use terrasoar_import::Stretch;
+use terrasoar_import::synth::MAX_SIZE;
 
 fn number(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
@@ -176,10 +177,10 @@ pub(super) fn viewport(text: &str) -> Result<Viewport, String> {
 /// Samples a side of synthetic terrain: 2^k + 1.
 pub(super) fn synth_size(text: &str) -> Result<u32, String> {
     let size: u32 = text.parse().map_err(|_| format!("`{text}` is not a whole number"))?;
-    if (3..=65_537).contains(&size) && (size - 1).is_power_of_two() {
+    if (3..=MAX_SIZE).contains(&size) && (size - 1).is_power_of_two() {
         Ok(size)
     } else {
-        Err("it must be 2^k + 1: 3, 5, 9, ... 1025, 2049, 4097, 8193, ... 65537".into())
+        Err(format!("it must be 2^k + 1: 3, 5, 9, ... 1025, 2049, 4097, 8193, ... {MAX_SIZE}"))
     }
 }
 
@@ -244,6 +245,7 @@ mod tests {
         assert!(range("3,2").is_err() && range("0,2").is_err() && range("1,2,3").is_err());
         assert_eq!(viewport("800x600").unwrap(), Viewport::default());
         assert_eq!(synth_size("1025").unwrap(), 1025);
+        assert_eq!(synth_size("1048577").unwrap(), 1_048_577);
         for wrong in ["", "0", "-1", "nan", "inf", "1,2,3", "10,", "1e9"] {
             assert!(spacing_m(wrong).is_err(), "{wrong}");
         }
@@ -268,7 +270,7 @@ mod tests {
         for wrong in ["800", "0x600", "800x", "800x600x3", "99999999x1"] {
             assert!(viewport(wrong).is_err(), "{wrong}");
         }
-        for wrong in ["1024", "2", "131073", "x"] {
+        for wrong in ["1024", "2", "2097153", "x"] {
             assert!(synth_size(wrong).is_err(), "{wrong}");
         }
         assert!(percent("100.5").is_err() && tolerance_px("0").is_err() && not_negative("-1").is_err());

@@ -1,12 +1,15 @@
 //! `terrasoar synth`: fractal terrain, and pictures of terrain, for tests and figures.
 
-use super::output::{grouped, print};
+use super::output::{complain, grouped, print};
 use super::outputs::{Force, Kind};
 use super::progress::Meter;
 use super::{WrongUsage, parse, terrain};
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 use terrasoar_import::synth::{ColourOptions, SynthOptions, write, write_colour};
+
+/// From so many bytes on it is said how many there will be.
+const MUCH_BYTES: u64 = 1 << 30;
 
 /// Make synthetic elevation data in the manner of Puget Sound, or a picture of a terrain.
 ///
@@ -23,7 +26,7 @@ Examples:
   terrasoar synth --colour land.iqt -o photo.tif
   terrasoar synth --colour land.iqt --texels 4 -o sharp.tif")]
 pub(super) struct Args {
-    /// Samples a side, 2^k + 1 up to 65537
+    /// Samples a side, 2^k + 1 up to 1048577: 2 bytes each in a GeoTIFF, 34 GB at 131073 and 2.2 TB at the most
     #[arg(long, value_name = "N", value_parser = parse::synth_size, required_unless_present = "colour")]
     size: Option<u32>,
     /// Which landscape, or which picture
@@ -53,6 +56,14 @@ pub(super) fn run(args: &Args) -> Result<()> {
     args.force.file(&args.output, Kind::Synthetic, &[])?;
     let size = args.size.unwrap_or(1025);
     let options = SynthOptions::default().size(size).seed(seed).spacing_m(args.spacing);
+    if options.sample_bytes() >= MUCH_BYTES {
+        complain(&format!(
+            "note: {}: {} samples take {} bytes in a GeoTIFF",
+            args.output.display(),
+            grouped(u64::from(size).pow(2)),
+            grouped(options.sample_bytes())
+        ));
+    }
     let progress = Meter::new("rows");
     progress.begin("making terrain", size.into());
     write(&options, &args.output, &|rows| progress.set(rows))?;

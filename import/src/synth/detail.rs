@@ -187,3 +187,27 @@ impl Weights {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of the largest grid is made alone as with others, and neighbours are near each other.
+    #[test]
+    fn rows_of_the_largest_grid_are_the_same_one_by_one() {
+        let size = super::super::MAX_SIZE;
+        let terrain = Terrain::new(size, 7, 20.0);
+        let (first, width) = (size / 3, size as usize);
+        let mut scratch = Scratch::default();
+        let mut together = vec![0; 2 * width];
+        terrain.rows(first, &mut together, &mut scratch);
+        let mut alone = vec![0; width];
+        for (row, wanted) in (first..).zip(together.chunks(width)) {
+            terrain.rows(row, &mut alone, &mut scratch);
+            assert!(alone == wanted, "{row}");
+        }
+        assert!(
+            together.windows(2).all(|two| two[0].abs_diff(two[1]) < 1000) && together.iter().any(|h| *h > 0)
+        );
+    }
+}

@@ -7,10 +7,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, StreamWriter};
 
-use super::{HEIGHT_SCALE, tiff_header};
+use super::{HEIGHT_SCALE, SynthOptions, tiff_header};
 use crate::{PNG_HEIGHT_SCALE_KEY, PNG_SPACING_KEY};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::atomic::AtomicFile;
+use terrasoar_layout::machine::free_disk_bytes;
 
 /// The words of a PNG, in their order.
 pub(super) const PNG_KEYS: [&str; 2] = [PNG_SPACING_KEY, PNG_HEIGHT_SCALE_KEY];
@@ -32,7 +33,8 @@ enum Encoding {
 
 impl Output {
     /// Starts a file of `size` rows of `size` samples.
-    pub(super) fn create(out: &Path, size: u32, spacing_m: f64) -> Result<Self, LayoutError> {
+    pub(super) fn create(out: &Path, options: &SynthOptions) -> Result<Self, LayoutError> {
+        let SynthOptions { size, spacing_m, .. } = *options;
         let extension = out.extension().map(|extension| extension.to_ascii_lowercase());
         let png = match extension.as_ref().and_then(|extension| extension.to_str()) {
             Some("png") => true,
@@ -45,6 +47,12 @@ impl Output {
             }
         };
         let failed = |source| LayoutError::io(out, CANNOT_WRITE, source);
+        // How much a PNG takes only its samples tell.
+        if !png {
+            let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let free = free_disk_bytes(folder.unwrap_or(Path::new(".")));
+            check_room(out, options.sample_bytes(), free)?;
+        }
         let atomic = AtomicFile::create(out)?;
         let failure = Failure::default();
         let watched =
@@ -99,6 +107,18 @@ impl Output {
     }
 }
 
+/// Refuses what does not fit the disk.
+fn check_room(out: &Path, bytes: u64, free: Option<u64>) -> Result<(), LayoutError> {
+    match free {
+        Some(free) if free < bytes => Err(LayoutError::Usage(format!(
+            "{}: every sample is stored, which takes {bytes} bytes, and {free} are free on that disk; take a smaller size, or another disk. Terrain \
+             of this size is mostly void as a rule: a sparse GeoTIFF holds that in as little as it has heights",
+            out.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// The first failure of a [`Watched`] file.
 type Failure = Arc<Mutex<Option<io::Error>>>;
 
@@ -138,5 +158,23 @@ fn png_error(error: EncodingError) -> std::io::Error {
     match error {
         EncodingError::IoError(source) => source,
         other => std::io::Error::other(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_the_disk_is_refused_before_it_is_begun() {
+        let bytes = SynthOptions::default().size(1_048_577).sample_bytes();
+        assert_eq!(bytes, 2_199_027_449_858);
+        assert!(check_room(Path::new("a.tif"), bytes, None).is_ok());
+        assert!(check_room(Path::new("a.tif"), bytes, Some(bytes)).is_ok());
+        let said = check_room(Path::new("a.tif"), bytes, Some(5000)).unwrap_err().to_string();
+        assert!(
+            said.contains("a.tif: ") && said.contains("2199027449858 bytes, and 5000 are free"),
+            "{said}"
+        );
     }
 }

@@ -174,12 +174,17 @@ impl PackedSource {
     /// All bytes of the terrain file.
     fn unpack_whole(&self) -> Result<Vec<u8>, LayoutError> {
         let count = self.header.file_bytes;
+        #[cfg(feature = "files")]
+        let free = crate::machine::free_memory_bytes();
+        #[cfg(not(feature = "files"))]
+        let free = None;
+        let refused = |free| LayoutError::unsupported(self.path(), too_large(count, free));
+        if free.is_some_and(|free| free < count) {
+            return Err(refused(free));
+        }
         let mut bytes = Vec::new();
         if usize::try_from(count).map_or(true, |count| bytes.try_reserve_exact(count).is_err()) {
-            let problem = format!(
-                "unpacked it takes {count} bytes of memory, and there are not so many; write it unpacked, and take that file"
-            );
-            return Err(LayoutError::unsupported(self.path(), problem));
+            return Err(refused(None));
         }
         bytes.resize(to_usize(count)?, 0);
         let mut pages: Vec<(u64, &mut [u8])> = (0..).zip(bytes.chunks_mut(PAGE_BYTES)).collect();
@@ -244,6 +249,15 @@ impl PackedSource {
         }
         Ok(())
     }
+}
+
+/// What is said of a terrain that is larger unpacked than memory.
+fn too_large(bytes: u64, free: Option<u64>) -> String {
+    let free = free.map_or("there are not so many".into(), |free| format!("{free} are free"));
+    format!(
+        "what is asked for takes all of it unpacked, which is {bytes} bytes of memory, and {free}; write it unpacked, and take that file, \
+         which is read where it lies"
+    )
 }
 
 impl Source for PackedSource {
