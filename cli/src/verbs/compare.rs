@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         .map(|(name, file)| (name, Kind::Report(file)))
         .collect();
     args.force.folder(&args.output, &files, &args.terrain.inputs(&[&args.flight]))?;
-    let terrain = args.terrain.open()?;
+    let terrain = args.terrain.open_whole()?;
     let flight = Flight::read(&args.flight)?;
     args.quality.look_at(&terrain, &flight, &args.flight)?;
     let quality = args.quality.quality();

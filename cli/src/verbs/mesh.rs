@@ -144,7 +144,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let others: Vec<&Path> =
         [&args.flight, &args.edits].into_iter().flatten().map(PathBuf::as_path).collect();
     args.force.file(&args.output, Kind::Mesh, &args.terrain.inputs(&others))?;
-    let terrain = std::sync::Arc::new(args.terrain.open()?);
+    let terrain = std::sync::Arc::new(args.terrain.open_whole()?);
     let placing = args.placing(&terrain, format)?;
     let (mesh, part_m) = match (&args.flight, args.max_error) {
         (None, Some(max_error_m)) => simplified(args, &terrain, max_error_m)?,

@@ -171,7 +171,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
             [Some(&args.flight), args.edits.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
         args.force.table(stats, Kind::Report(ReportFile::Frames), &args.terrain.inputs(&others))?;
     }
-    let terrain = Arc::new(args.terrain.open()?);
+    let terrain = Arc::new(args.terrain.open_whole()?);
     let flight = Flight::read(&args.flight)?;
     args.quality.look_at(&terrain, &flight, &args.flight)?;
     let progress = Meter::new("frames");

@@ -178,14 +178,14 @@ impl PackedSource {
         let free = crate::machine::free_memory_bytes();
         #[cfg(not(feature = "files"))]
         let free = None;
-        let refused = |free| LayoutError::unsupported(self.path(), too_large(count, free));
-        if free.is_some_and(|free| free < count) {
-            return Err(refused(free));
-        }
         let mut bytes = Vec::new();
-        if usize::try_from(count).map_or(true, |count| bytes.try_reserve_exact(count).is_err()) {
-            return Err(refused(None));
-        }
+        let fits = |bytes: &mut Vec<u8>| {
+            fits_memory(count, free)?;
+            let is_reserved =
+                usize::try_from(count).is_ok_and(|count| bytes.try_reserve_exact(count).is_ok());
+            if is_reserved { Ok(()) } else { fits_memory(count, Some(0)) }
+        };
+        fits(&mut bytes).map_err(|problem| LayoutError::unsupported(self.path(), problem))?;
         bytes.resize(to_usize(count)?, 0);
         let mut pages: Vec<(u64, &mut [u8])> = (0..).zip(bytes.chunks_mut(PAGE_BYTES)).collect();
         // Pages that lie side by side one after the other, so that a tile is unpacked once for all of them.
@@ -251,13 +251,16 @@ impl PackedSource {
     }
 }
 
-/// What is said of a terrain that is larger unpacked than memory.
-fn too_large(bytes: u64, free: Option<u64>) -> String {
-    let free = free.map_or("there are not so many".into(), |free| format!("{free} are free"));
-    format!(
-        "what is asked for takes all of it unpacked, which is {bytes} bytes of memory, and {free}; write it unpacked, and take that file, \
-         which is read where it lies"
-    )
+/// Refuses what is larger unpacked than the memory that is free, where that is known.
+fn fits_memory(bytes: u64, free: Option<u64>) -> Result<(), String> {
+    match free {
+        Some(free) if free < bytes => Err(format!(
+            "what is asked for takes all of it unpacked, which is {bytes} bytes of memory, and there are not so many{}; write it unpacked, and \
+             take that file, which is read where it lies",
+            if free > 0 { format!(", but {free}") } else { String::new() }
+        )),
+        _ => Ok(()),
+    }
 }
 
 impl Source for PackedSource {
@@ -378,4 +381,22 @@ impl Front {
 /// A part that contradicts the header.
 fn odd(path: &Path, place: &'static str) -> LayoutError {
     LayoutError::damaged_terrain(path, place.into(), "they are not what the header says")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_memory_does_not_hold_is_refused_before_it_is_unpacked() {
+        let bytes = 28_632_000_000;
+        assert_eq!(fits_memory(bytes, None), Ok(()));
+        assert_eq!(fits_memory(bytes, Some(bytes)), Ok(()));
+        let said = fits_memory(bytes, Some(24_000_000_000)).unwrap_err();
+        assert!(
+            said.contains("28632000000 bytes of memory, and there are not so many, but 24000000000; "),
+            "{said}"
+        );
+        assert!(fits_memory(bytes, Some(0)).unwrap_err().contains("not so many; write it unpacked"));
+    }
 }
