@@ -14,8 +14,8 @@ const TEXEL_M: f64 = 1.0 / 2048.0;
 
 /// A colour of its own for each place of a mosaic, transparent here and there.
 fn texel(x: u32, y: u32) -> [u8; 4] {
-    let alpha = if (x / 9 + y / 7) % 5 == 0 { 0 } else { 255 };
-    [(x * 7) as u8, (y * 3) as u8, (x / 8 ^ y / 8) as u8, alpha]
+    let alpha = if (x / 9 + y / 7).is_multiple_of(5) { 0 } else { 255 };
+    [(x * 7) as u8, (y * 3) as u8, ((x / 8) ^ (y / 8)) as u8, alpha]
 }
 
 /// A picture whose north-west corner is so many texels east and south of the mosaic's.
@@ -27,8 +27,11 @@ fn part([east, south]: [u32; 2], texels: [u32; 2]) -> Box<dyn ImageSource> {
     Box::new(image)
 }
 
-/// Every tile of a file, absent ones too, with its mean colour.
-fn tiles(path: &Path) -> Vec<Option<(Vec<u8>, Option<[u8; 4]>)>> {
+/// A tile's texels and their mean colour.
+type Tile = (Vec<u8>, Option<[u8; 4]>);
+
+/// Every tile of a file, absent ones too.
+fn tiles(path: &Path) -> Vec<Option<Tile>> {
     let terrain = Terrain::open(path).unwrap();
     let imagery = Imagery::open(&terrain).unwrap().unwrap();
     let shape = imagery.shape();

@@ -232,17 +232,22 @@ impl Rows<[u8; 4]> {
 mod tests {
     use super::*;
 
+    #[expect(clippy::single_range_in_vec_init, reason = "a list of one stretch is meant")]
+    fn stretches_at(y: u32, wide: u32) -> Vec<Range<u32>> {
+        match y {
+            2500.. => vec![100..300, 700..701],
+            1500..2500 => vec![],
+            900..1500 => vec![0..wide],
+            _ => vec![1290..1300],
+        }
+    }
+
     /// Rows of two stretches that move, taken in steps, are those of a plain picture; what was seen is let go of.
     #[test]
     fn chunks_hold_what_arrives_and_nothing_else() {
         let (wide, high) = (1300_u32, 3000_u32);
         let texel = |x: u32, y: u32| [x as u8, y as u8, (x / 256) as u8, 255];
-        let stretches_at = |y: u32| match y {
-            2500.. => vec![100..300, 700..701],
-            1500..2500 => vec![],
-            900..1500 => vec![0..wide],
-            _ => vec![1290..1300],
-        };
+        let stretches_at = |y| stretches_at(y, wide);
         let mut rows = Rows::new([wide, high]);
         let mut low = high;
         let mut line = Vec::new();
