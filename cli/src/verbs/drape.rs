@@ -107,9 +107,7 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     super::overlays::tell_of_growing(&args.file);
-    if let Ok(terrain) = Terrain::open_unmapped(&args.file) {
-        super::overlays::tell_of_older(&terrain);
-    }
+    super::overlays::tell_of_lost_in(&args.file, None);
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         pool = pool.num_threads(usize::from(threads));

@@ -195,7 +195,10 @@ fn simplified(args: &Args, terrain: &Terrain, max_error_m: f64) -> Result<(Index
         SimplifyOptions::default().max_error_m(max_error_m).window(window).max_triangles(args.max_triangles);
     let mesh = simplify(terrain, &options)?;
     if mesh.triangles.is_empty() {
-        bail!("{}: there is nothing but voids in it, so there are no triangles", args.terrain.file.display());
+        bail!(
+            "{}: no three samples beside each other have heights there, so there are no triangles",
+            args.terrain.file.display()
+        );
     }
     let ([x0, y0], [x1, y1]) = (window.from, window.last());
     let [east, north] = terrain.grid().spacing_m();

@@ -33,13 +33,7 @@ pub(super) fn refuse_rewriting(file: &Path, is_forced: bool) -> Result<()> {
 
 /// Says so where a terrain is not in the last state that its files were written in: it is seen with an overlay that is older than what its file was given last, or its last header is damaged.
 pub(super) fn tell_of_older(terrain: &Terrain) {
-    // Verbs that open a file twice say so once.
-    static TOLD: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-    if let Some(words) = newest_header_is_lost(terrain)
-        && TOLD.lock().is_ok_and(|mut told| told.insert(terrain.path().to_owned()))
-    {
-        complain(&format!("warning: {words}"));
-    }
+    tell_of_lost(terrain);
     if let Some(base) = terrain.base_path().filter(|_| terrain.base_has_grown()) {
         complain(&format!(
             "note: {} was edited or draped after {} was begun; it is seen as it was then",
@@ -47,4 +41,26 @@ pub(super) fn tell_of_older(terrain: &Terrain) {
             terrain.path().display()
         ));
     }
+}
+
+/// Warns where the newest header of a terrain is damaged; of a file that a verb opens twice, once.
+fn tell_of_lost(terrain: &Terrain) {
+    static TOLD: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    if let Some(words) = newest_header_is_lost(terrain)
+        && TOLD.lock().is_ok_and(|mut told| told.insert(terrain.path().to_owned()))
+    {
+        complain(&format!("warning: {words}"));
+    }
+}
+
+/// Warns of that where a verb hands the names of its files on; gives whether it is so. What keeps them from being opened is for the verb to say.
+pub(super) fn tell_of_lost_in(file: &Path, overlay: Option<&Path>) -> bool {
+    let opened = match overlay {
+        Some(overlay) => Terrain::open_with_overlay_unmapped(file, overlay),
+        None => Terrain::open_unmapped(file),
+    };
+    opened.is_ok_and(|terrain| {
+        tell_of_lost(&terrain);
+        !matches!(terrain.lost_header(), Ok(None))
+    })
 }

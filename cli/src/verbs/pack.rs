@@ -2,6 +2,7 @@
 
 use super::output::{grouped, print, print_json};
 use super::outputs::{Force, Kind};
+use super::overlays;
 use super::progress::Meter;
 use anyhow::Result;
 use serde::Serialize;
@@ -80,6 +81,7 @@ impl Rewriting {
     fn run(&self, rewrite: impl FnOnce(&Meter) -> Result<Sizes, LayoutError>) -> Result<()> {
         let start = Instant::now();
         self.force.file(&self.output, Kind::Terrain, &[self.file.as_path()])?;
+        overlays::tell_of_lost_in(&self.file, None);
         let progress = Meter::new("samples");
         let Sizes { bytes_before, bytes_after, bytes_per_sample } = rewrite(&progress)?;
         drop(progress);

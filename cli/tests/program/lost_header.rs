@@ -29,6 +29,12 @@ fn verbs_tell_of_a_damaged_newest_header_once() {
         assert!(output.status.code() == Some(1) && output.stdout.is_empty(), "{said}");
         assert!(said.contains("is damaged; the state before it, which is read instead, is sound"), "{said}");
         if file == "land.iqt" {
+            for verb in ["pack", "compact"] {
+                let output = bench.run(&[verb, "land.iqt", "-o", "out.iqt", "--force"]);
+                assert!(output.status.success() && text(&output.stderr).contains(&told), "{verb}");
+            }
+            let output = bench.run(&["compact", "land.iqt"]);
+            assert!(text(&output.stderr).contains("would be gone") && !output.status.success());
             let said = bench.bad(1, &["build", "land.tif", "-o", "land.iqt"]);
             assert!(said.contains("a terrain that holds a damaged header"), "{said}");
         }

@@ -6,7 +6,7 @@ use crate::verbs::outputs::{Force, Kind};
 use crate::verbs::overlays;
 use crate::verbs::progress::Meter;
 use crate::verbs::terrain::TerrainArgs;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -55,6 +55,7 @@ struct Answer {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let start = Instant::now();
+    let is_lost = overlays::tell_of_lost_in(&args.terrain.file, args.terrain.overlay.as_deref());
     let out = match (&args.output, &args.terrain.overlay) {
         (Some(out), _) => {
             args.force.file(out, Kind::Terrain, &args.terrain.inputs(&[]))?;
@@ -62,6 +63,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         }
         (None, None) => {
             overlays::refuse_rewriting(&args.terrain.file, args.force.is_given())?;
+            if is_lost && !args.force.is_given() {
+                bail!(
+                    "{}: its newest header is damaged, and what that led to would be gone; name another output with -o, or give it up with --force",
+                    args.terrain.file.display()
+                );
+            }
             &args.terrain.file
         }
         (None, Some(_)) => {

@@ -2,6 +2,7 @@
 
 use super::{Viewer, edit, sight};
 use crate::fit;
+use crate::lost::newest_header_is_lost;
 use crate::window::camera::ground_below_m;
 use crate::window::flights::{Player, Recorder};
 use crate::window::job::{self, Job};
@@ -173,6 +174,9 @@ impl Viewer {
                 self.player = None;
                 self.name_terrain();
                 self.tell(&format!("opened {}", path.display()));
+                if let Some(words) = newest_header_is_lost(self.stage.terrain()) {
+                    self.news(words);
+                }
             }
             Err(error) => {
                 self.trouble(format!("{error:#}"));
