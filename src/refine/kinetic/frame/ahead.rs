@@ -124,11 +124,11 @@ impl Ahead {
         self.until[clock]
     }
 
-    /// Starts a clock without words again at tick `now`, with ticks `finer` times as short.
-    pub(crate) fn restart(&mut self, clock: usize, now: u64, finer: f32) {
+    /// Starts a clock without words again at tick `now`, with a pace of `pace` ticks a frame.
+    pub(crate) fn restart(&mut self, clock: usize, now: u64, pace: f32) {
         self.far.restart(clock, now as u32);
         self.until[clock] = now;
-        self.pace[clock] *= finer;
+        self.pace[clock] = pace;
     }
 
     /// Enters a word whose end has been looked ahead to.

@@ -60,12 +60,12 @@ impl<S: RecordStore> Kinetic<S> {
                     });
                 }
             }
-            let finer = self.clocks.take_course(number, course);
+            self.clocks.take_course(number, course);
             for clock in clock_id(number, Kind::Error, 0)..clock_id(number + 1, Kind::Error, 0) {
                 let now = self.clocks.now(clock);
                 self.queue.restart(clock, now as u32);
                 if let Some(ahead) = &mut self.ahead {
-                    ahead.restart(clock, now, finer);
+                    ahead.restart(clock, now, self.clocks.newest_step(clock));
                 }
             }
         }

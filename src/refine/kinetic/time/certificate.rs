@@ -19,7 +19,7 @@
 //!
 //! A course may also turn about an axis through the eye. The clock then counts rho G t for an angle t, G being the band; a plane's distance h changes by at
 //! most B t + d t^2 / 2, B = (axis x normal) . offset and d the distance from the axis. With T the angle at which that uses up m(0), L = min(m(0), rho G T), since
-//! the bound is concave. A course that has both turns by w s in a way s: the clock counts c s, c = rho (1 + G w), a plane's distance changes by at most
+//! the bound is concave. That distance swings (`super::swing`), which may promise more. A course that has both turns by w s in a way s: the clock counts c s, c = rho (1 + G w), a plane's distance changes by at most
 //! (k + B w) s + (d w^2 + 2 w) s^2 / 2, and with S the way at which that or the sphere of radius R ends it, L = min(m(0), c S).
 //!
 //! Courses that turn by themselves: `super::curve`.
@@ -32,6 +32,7 @@ use super::clocks::{BANDS, CLOCKS, Clocks, EXPIRY_BITS, HORIZON, Kind, band_of, 
 use super::course::Course;
 use super::curve::{Curve, Seen};
 use super::ring;
+use super::swing::TINY;
 use crate::metric::{Metric, PLANES, Sighting};
 use crate::view::ErrorMetric;
 use batch::Way;
@@ -80,6 +81,12 @@ pub(crate) struct Judge {
     slopes: [f64; PLANES],
     /// Axis x normal of each plane.
     sweeps: [[f64; 3]; PLANES],
+    /// Of each plane: normal . axis; what its distance from the circle's centre is, and what its sweep makes of that.
+    along_axis: [f64; PLANES],
+    centres_m: [f64; PLANES],
+    centre_sweeps_m: [f64; PLANES],
+    /// What planes are apart from where the way turns them, half a turn on, a metre of distance.
+    apart: f64,
     /// Share of a margin to each plane that counts: from inside, from outside.
     from_inside: [f64; PLANES],
     from_outside: [f64; PLANES],
@@ -127,6 +134,8 @@ impl Judge {
         let normals = metric.normals().map(DVec3::from_array);
         let slopes = normals.map(|n| n.dot(direction));
         let moves = direction != DVec3::ZERO;
+        // From the eye to the centre of the circle that it flies.
+        let centre_m = course.curve.cross(direction) / (curve.per_m * curve.per_m).max(TINY);
         let share = |falls: f64| if moves { rate / rate.max(falls) } else { 1.0 };
         Self {
             culls,
@@ -142,6 +151,10 @@ impl Judge {
             // The eye's way takes it nearer to what lies ahead.
             slopes: slopes.map(|k| -k),
             sweeps: normals.map(|n| axis.cross(n).to_array()),
+            along_axis: normals.map(|n| axis.dot(n)),
+            centres_m: normals.map(|n| n.dot(centre_m)),
+            centre_sweeps_m: normals.map(|n| axis.cross(n).dot(centre_m)),
+            apart: apart_per_m * curve.half_m,
             // A plane moves with the eye: m = r - h grows by the slope inside, m = h - r falls by it outside.
             from_inside: slopes.map(|k| share(-k)),
             from_outside: slopes.map(share),
@@ -220,13 +233,12 @@ impl Judge {
         if !matches!(motion, Motion::Bend | Motion::CurvedBend) {
             return self.weigh(sighting, margin_m, scale_m, motion, culls);
         }
-        let now_m = reach_m - sighting.distance_m();
-        let chord_m = if motion == Motion::CurvedBend {
-            self.curve.chord_m(&self.seen(sighting))
+        let (chord_m, now_m) = if motion == Motion::CurvedBend {
+            self.curve.chord_m(&self.seen(sighting), self.most_counted_per_m(sighting))
         } else {
-            self.chord_m(sighting, reach_m)
+            (self.chord_m(sighting, reach_m), reach_m - sighting.distance_m())
         };
-        let bending = self.bending_life(sighting, now_m, chord_m);
+        let bending = self.bending_life(sighting, motion, now_m, chord_m);
         // Field by field, so that no branch comes of it.
         Life {
             active: selected & bending.active,
@@ -243,7 +255,12 @@ impl Judge {
             return self.curved_ring_life(sighting);
         }
         if motion == Motion::Bend && sighting.is_selected() {
-            return self.bending_life(sighting, sighting.margin_m(), ring::chord_m(sighting, self.direction));
+            return self.bending_life(
+                sighting,
+                motion,
+                sighting.margin_m(),
+                ring::chord_m(sighting, self.direction),
+            );
         }
         // Near the axis of the ring an error may grow beyond the distance before it shows.
         let margin_m = ring::margin_m(sighting, self.moves.then_some(self.direction), self.rate);
@@ -257,7 +274,7 @@ impl Judge {
         let ahead_m = ring::margin_m(sighting, Some(self.direction), 0.5 * self.rate);
         let margin_m = ahead_m.min(self.rate * self.rate / self.curve.per_m);
         if self.culls && sighting.is_selected() {
-            return self.bending_life(sighting, margin_m, f64::INFINITY);
+            return self.bending_life(sighting, Motion::Bend, margin_m, f64::INFINITY);
         }
         let scale_m = sighting.distance_m().max(sighting.reach_m());
         self.weigh(sighting, margin_m, scale_m, Motion::Curve, false)
@@ -292,57 +309,6 @@ impl Judge {
         }
     }
 
-    /// What a margin that rests on the planes may be if the view turns on the spot.
-    #[inline(always)]
-    fn turning_margin_m(&self, sighting: &Sighting, life: &Life, band_m: f64) -> f64 {
-        let arm_m = self.arm_m(sighting);
-        let (mut inside, mut outside_m) = (f64::INFINITY, 0.0f64);
-        for i in 0..PLANES {
-            let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
-            let sweep_m = dot(self.sweeps[i], sighting.offset_m());
-            let (margin, slope) = if life.active { (-beyond, sweep_m) } else { (beyond, -sweep_m) };
-            let turn = used_up_at(margin.max(0.0), slope, arm_m);
-            inside = inside.min(turn);
-            // Each plane may vouch by itself.
-            let vouched_m = beyond.min(self.rate * band_m * turn);
-            outside_m = outside_m.max(if beyond > 0.0 { vouched_m } else { 0.0 });
-        }
-        if life.active { self.rate * band_m * inside } else { outside_m }
-    }
-
-    /// The life of a selected vertex on a course that goes along and turns; the error test's margin, and the way along the course until it ends.
-    #[inline(always)]
-    fn bending_life(&self, sighting: &Sighting, margin_m: f64, chord_m: f64) -> Life {
-        let arm_m = self.arm_m(sighting);
-        let bend = self.turn_per_m * (arm_m * self.turn_per_m) + self.bend_per_m;
-        // Of each plane: how far the sphere is beyond it, and the way until that changes sign.
-        let plane = |i: usize| {
-            let beyond = self.metric.height_over_plane(i, sighting) - sighting.radius_m();
-            let grows = self.slopes[i] + self.turn_per_m * dot(self.sweeps[i], sighting.offset_m());
-            let way_m = used_up_at(beyond.abs(), if beyond > 0.0 { -grows } else { grows }, bend);
-            (beyond, way_m)
-        };
-        let planes = [plane(0), plane(1), plane(2), plane(3)];
-        let inside_m = fold(&planes, margin_m, |least, (beyond, _)| least.min(-beyond));
-        let least_m = fold(&planes, chord_m, |least, (_, way_m)| least.min(way_m));
-        let outside = |beyond: f64, m: f64| if beyond > 0.0 { m } else { 0.0 };
-        let most_m = fold(&planes, 0.0, |most, (beyond, way_m)| most.max(outside(beyond, way_m)));
-        let culled = fold(&planes, 0.0, |most, (beyond, _)| most.max(beyond)) > 0.0;
-        let nearest = if culled { sighting.distance_m() } else { sighting.reach_m() };
-        // A way of many times the distance would weigh on every turn.
-        let longest_m = 4.0 * nearest;
-        let way_m = if culled { most_m } else { least_m }.min(longest_m);
-        let scale_m = nearest + way_m;
-        let band_m = power_of_two(band_of(scale_m * self.bands_per_m)) / self.bands_per_m;
-        let counted_per_m = self.rate * (1.0 + band_m * self.turn_per_m);
-        // Each plane may vouch by itself.
-        let outside_m = fold(&planes, 0.0, |most, (beyond, way_m)| {
-            most.max(outside(beyond, beyond.min(counted_per_m * way_m.min(longest_m))))
-        });
-        let margin_m = if culled { outside_m } else { inside_m.min(counted_per_m * way_m) };
-        Life { active: !culled, kind: Kind::Planes, margin_m, scale_m }
-    }
-
     /// A vertex as a course that turns passes it.
     #[inline(always)]
     fn seen(&self, sighting: &Sighting) -> Seen {
@@ -355,14 +321,6 @@ impl Judge {
             inward: dot(self.curve.inward_per_m, offset_m),
             across_m: dot(self.curve.across, offset_m),
         }
-    }
-
-    /// Distance from the course's axis, rounded up.
-    #[inline(always)]
-    fn arm_m(&self, sighting: &Sighting) -> f64 {
-        let along_m = dot(self.axis, sighting.offset_m());
-        let square = sighting.distance2() - along_m * along_m;
-        square.max(0.0).sqrt() + sighting.distance_m() * SQUARE_ERROR.sqrt()
     }
 
     /// Way along the course to where it leaves the sphere of radius `reach_m` around the vertex, rounded down.
@@ -386,7 +344,8 @@ impl Judge {
         }
         if matches!(motion, Motion::Curve | Motion::CurvedBend) {
             let seen = self.seen(sighting);
-            let inside_m = now_m.min((rate * self.curve.chord_m(&seen)).max(self.curve.always_m(&seen)));
+            let (chord_m, left_m) = self.curve.chord_m(&seen, rate);
+            let inside_m = now_m.min(left_m.min(rate * chord_m).max(self.curve.always_m(&seen)));
             let outside_m = self.curve.outside_m(&seen, rate);
             return if selected { inside_m } else { outside_m };
         }
@@ -417,25 +376,12 @@ fn ticks(life: f64) -> u32 {
     (life.max(0.5).min(f64::from(HORIZON)) - 0.5 + WHOLE).to_bits() as u32
 }
 
-/// A fold without a loop: of loops within loops the compiler makes no vector instructions.
-#[inline(always)]
-fn fold<T: Copy>([a, b, c, d]: &[T; PLANES], start: f64, each: impl Fn(f64, T) -> f64) -> f64 {
-    each(each(each(each(start, *a), *b), *c), *d)
-}
-
 #[inline(always)]
 fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
     a * x + b * y + c * z
 }
 
-/// The least t at which `slope` t + `bend` t^2 / 2 reaches `margin`, which is 0 or more, as `bend` is.
-#[inline(always)]
-fn used_up_at(margin: f64, slope: f64, bend: f64) -> f64 {
-    let root = (slope * slope + 2.0 * bend * margin).sqrt();
-    let (part, whole) = if slope > 0.0 { (2.0 * margin, slope + root) } else { (root - slope, bend) };
-    part / whole
-}
-
 pub(crate) mod batch;
+mod planes;
 #[cfg(test)]
 mod tests;

@@ -13,7 +13,7 @@
 //! Claim: with L = f0 + floor(m / q), m metres of margin made at tick f0 and ticks of q metres, `f < L` implies that less than m has been used.
 //! Proof: a rounding down rho of the total has rho(x) - rho(y) > x - y - 1 in ticks. Cost: some hundred additions a frame.
 
-use super::course::{Bend, Course, LONG, Pose, RATE, STEADY, Trend};
+use super::course::{Bend, Course, LONG, Pose, Trend};
 use crate::view::ErrorMetric;
 use glam::DVec3;
 use terrasoar_layout::portable;
@@ -73,7 +73,9 @@ pub(crate) struct Clocks {
     way: Trend,
     turn: Trend,
     bend: Bend,
-    /// Share of the way that went off the current course, over a long time.
+    /// Metres and radians of the newest move that the next course would have counted.
+    next_counts: (f64, f64),
+    /// Share of the way, or of the turn, that went off the current course, over a long time.
     off: f64,
 }
 
@@ -109,6 +111,7 @@ impl Clocks {
             way: Trend::default(),
             turn: Trend::default(),
             bend: Bend::default(),
+            next_counts: (0.0, 0.0),
             off: 1.0,
         }
     }
@@ -121,28 +124,23 @@ impl Clocks {
         let raised_m = self.tallest_m * (pose.exaggeration - last.exaggeration).abs();
         let ratio = |now: f64, then: f64| if now == then { 0.0 } else { portable::ln(now / then).abs() };
         let zoomed = EXP_SLOPE * (ratio(pose.nu, last.nu) + ratio(pose.exaggeration, last.exaggeration));
-        let turned = pose.normals != last.normals;
         // Another measure is another mesh.
         let zoomed = if pose.metric == last.metric { zoomed } else { f64::INFINITY };
         let mut moved = Moved::default();
-        if step == DVec3::ZERO && !turned && raised_m + zoomed == 0.0 {
+        if step == DVec3::ZERO && pose.normals == last.normals && raised_m + zoomed == 0.0 {
             return moved;
         }
         for course in 0..COURSES {
             let beyond = (u64::from(HORIZON) + 1) << self.shifts[course];
-            let used_m = self.courses[course].used_m(step) + raised_m;
-            let expects_turn = self.courses[course].turn_per_m > 0.0;
-            let used_rad =
-                if turned || expects_turn { self.courses[course].used_rad(&last, &pose) } else { 0.0 };
+            let (used_m, used_rad) = self.courses[course].counts(&last, &pose);
             for (kind, angle) in [(Kind::Error, zoomed), (Kind::Planes, zoomed + used_rad)] {
-                if used_m + angle == 0.0 {
+                if used_m + raised_m + angle == 0.0 {
                     continue;
                 }
                 for band in 0..BANDS {
                     let clock = clock_id(course, kind, band);
-                    let metres = used_m + if angle > 0.0 { self.band_m(band) * angle } else { 0.0 };
-                    // One unit more covers the rounding of the sum itself; beyond the horizon nothing is alive.
-                    let units = ((metres * UNITS_PER_M).ceil() as u64).min(beyond) + 1;
+                    // Beyond the horizon nothing is alive.
+                    let units = self.units(used_m + raised_m, angle, band).min(beyond) + 1;
                     self.totals[clock] += units;
                     self.steps[clock] = units;
                     moved.clocks |= 1 << clock;
@@ -150,11 +148,15 @@ impl Clocks {
             }
         }
         let current = self.courses[self.current];
+        let (turn, used_rad) = (last.turn_to(&pose), current.used_rad(&last, &pose));
         self.way.follow(step, current.used_m(step));
-        self.turn.follow(last.turn_to(&pose), current.used_rad(&last, &pose));
-        let way_m = step.length();
-        if way_m > 0.0 {
-            self.off += LONG * (current.off_m(step) / way_m - self.off);
+        self.turn.follow(turn, used_rad);
+        let (way_m, turn_rad) = (step.length(), turn.length());
+        let off_way = if way_m > 0.0 { current.off_m(step) / way_m } else { 0.0 };
+        let is_about = current.axis != DVec3::ZERO && turn_rad > 0.0;
+        let off_turn = if is_about { (used_rad / turn_rad - current.rate).max(0.0) } else { 0.0 };
+        if way_m > 0.0 || is_about {
+            self.off += LONG * (off_way.max(off_turn) - self.off);
         }
         self.bend.follow(step);
         self.courses.iter_mut().for_each(|course| course.lead_on(step));
@@ -164,10 +166,7 @@ impl Clocks {
         // Whoever keeps no direction is on no course that could be better.
         let changes =
             |off: bool, current: DVec3, next: DVec3| off && (current != DVec3::ZERO || next != DVec3::ZERO);
-        let keeps_turn = current.axis == DVec3::ZERO || self.turn.keeps(current.rate);
-        let is_steady = self.off <= STEADY && current.rate == RATE && keeps_turn;
-        let becomes_steady =
-            next.steady_rate().filter(|rate| is_steady && current.steady_rate() == Some(*rate));
+        let steady_rate = next.steady_rate(self.off);
         if changes(self.way.is_off(current.rate), current.direction, next.direction)
             || changes(self.turn.is_off(current.rate), current.axis, next.axis)
         {
@@ -177,20 +176,34 @@ impl Clocks {
             } else {
                 moved.next_course = Some((self.newest % (COURSES - 1) + 1, next));
             }
-        } else if let Some(rate) = becomes_steady {
-            moved.next_course = Some((self.newest % (COURSES - 1) + 1, Course { rate, ..next }));
+        } else if steady_rate < current.rate && next.is_like(&current) {
+            let steady = Course { rate: steady_rate, ..next };
+            moved.next_course = Some((self.newest % (COURSES - 1) + 1, steady));
+        }
+        if let Some((_, next)) = moved.next_course {
+            self.next_counts = next.before(step).counts(&last, &pose);
         }
         moved
     }
 
-    /// Makes new words on course `number` from now on. No word may be left on it, for its clocks start again; told is how many of their ticks make one of those before.
-    pub(crate) fn take_course(&mut self, number: usize, course: Course) -> f32 {
+    /// Units of a way and an angle, rounded up. [`Clocks::move_to`] adds one more, for the rounding of the sum itself.
+    fn units(&self, metres: f64, angle: f64, band: usize) -> u64 {
+        let metres = metres + if angle > 0.0 { self.band_m(band) * angle } else { 0.0 };
+        (metres * UNITS_PER_M).ceil() as u64
+    }
+
+    /// Makes new words on course `number` from now on. No word may be left on it, for its clocks start again.
+    pub(crate) fn take_course(&mut self, number: usize, course: Course) {
         // The less of the way is counted, the shorter are ticks: who is tested a tick too early is tested again.
         let shift = self.shifts[0].saturating_sub(portable::log2(1.0 / course.rate).round() as u32);
-        let finer = portable::power_of_two(self.shifts[number] as i32 - shift as i32) as f32;
         self.shifts[number] = shift;
         for clock in (0..CLOCKS).filter(|clock| course_of(*clock) == number) {
             self.totals[clock] = 1 << shift;
+            // What the newest move would have taken on it.
+            let (used_m, used_rad) = self.next_counts;
+            let angle = if clock / BANDS % 2 == Kind::Planes as usize { used_rad } else { 0.0 };
+            let beyond = (u64::from(HORIZON) + 1) << shift;
+            self.steps[clock] = self.units(used_m, angle, clock % BANDS).min(beyond);
         }
         self.courses[number] = course;
         self.current = number;
@@ -198,7 +211,6 @@ impl Clocks {
         // What the new course will make of it is yet to be seen.
         self.way.used = 0.0;
         self.turn.used = 0.0;
-        finer
     }
 
     /// The course that new words are made on, and its number.
@@ -268,7 +280,7 @@ pub(crate) fn power_of_two(exponent: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::course::{STEADY_CURVE_RATE, STEADY_RATE};
+    use super::super::course::{RATE, STEADY_CURVE_RATES, STEADY_RATES};
     use super::*;
     use crate::view::ErrorMetric;
 
@@ -353,7 +365,7 @@ mod tests {
             taken
         };
         assert_eq!(fly(&mut clocks, 30, DVec3::Y * 10.0), [RATE]);
-        assert_eq!(fly(&mut clocks, 200, DVec3::Y * 10.0), [STEADY_RATE]);
+        assert_eq!(fly(&mut clocks, 200, DVec3::Y * 10.0), STEADY_RATES.map(|(rate, _)| rate));
         assert_eq!(clocks.course().1.direction, DVec3::Y);
         let bent = DVec3::new(1.0, 9.9, 0.0);
         let taken = fly(&mut clocks, 30, bent);
@@ -380,7 +392,8 @@ mod tests {
                 (course.curve != DVec3::ZERO).then_some(course.rate)
             })
             .collect();
-        assert_eq!(taken, [RATE, STEADY_CURVE_RATE]);
+        let [(first, _), (steady, _)] = STEADY_CURVE_RATES;
+        assert_eq!(taken, [RATE, first, steady]);
         let (number, course) = clocks.course();
         assert!((course.curve - DVec3::Z / 1000.0).length() < 1e-6, "{course:?}");
         let before = clocks.now(clock_id(number, Kind::Planes, 6));
@@ -389,7 +402,7 @@ mod tests {
         });
         // 1,000 m of way, and a turn of 1 on an arm of 65,536 m.
         let used_m = (clocks.now(clock_id(number, Kind::Planes, 6)) - before) as f64 / clocks.ticks_per_m();
-        assert!(used_m < 1.1 * STEADY_CURVE_RATE * (1000.0 + 65_536.0), "{used_m}");
+        assert!(used_m < 1.1 * steady * (1000.0 + 65_536.0), "{used_m}");
     }
 
     #[test]
@@ -409,7 +422,7 @@ mod tests {
                 Some(course.rate)
             })
             .collect();
-        assert_eq!(taken.last(), Some(&STEADY_RATE), "{taken:?}");
+        assert_eq!(taken.last(), Some(&STEADY_RATES[1].0), "{taken:?}");
     }
 
     #[test]

@@ -11,14 +11,12 @@ use terrasoar_layout::portable;
 
 /// Share of the way along the course that is counted. A smaller one lets words last longer on course and shorter off it.
 pub(crate) const RATE: f64 = 0.1;
-/// That share on the course of an eye that has flown as straight as can be for some time.
-pub(crate) const STEADY_RATE: f64 = 0.005;
-/// The same on a course that turns.
-pub(super) const STEADY_CURVE_RATE: f64 = 0.01;
+/// That share for an eye that has kept to its course for some time, and the share of the way that may have gone off it: the less, the lower.
+pub(crate) const STEADY_RATES: [(f64, f64); 2] = [(0.005, 0.003), (0.001, 0.0006)];
+/// The same on a course that turns, or on the spot.
+pub(super) const STEADY_CURVE_RATES: [(f64, f64); 2] = [(0.01, 0.003), (0.002, 0.0006)];
 /// A course is left when more than this times its rate of the recent way was counted.
 const LEAVE: f64 = 2.5;
-/// A way is steady while no more than this share of it went off the course.
-pub(super) const STEADY: f64 = 0.003;
 /// Share of the newest frame in what has gone off the course of late: what is over for some forty frames counts no more.
 pub(super) const LONG: f64 = 0.15;
 /// A course is taken only if the recent way leads this straight.
@@ -31,6 +29,9 @@ const RECENT: f64 = 0.2;
 const LEAST_BEND_RAD: f64 = 0.0005;
 /// Ways that turn by more a frame are none.
 const MOST_BEND_RAD: f64 = 0.2;
+/// A view turns as the way does where its turn is no further from the way's than this share of that.
+const ALIKE: f64 = 0.001;
+
 /// What of a view moves the clocks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pose {
@@ -106,11 +107,6 @@ impl Trend {
         self.used > LEAVE * rate * self.length
     }
 
-    /// Whether a course of that rate misses next to nothing.
-    pub(super) fn keeps(&self, rate: f64) -> bool {
-        self.used <= (rate + STEADY) * self.length
-    }
-
     /// The direction it keeps, or zero if it keeps none.
     fn direction(&self) -> DVec3 {
         if self.vector.length() >= STRAIGHT * self.length {
@@ -139,7 +135,10 @@ impl Bend {
             return;
         }
         if before_m > 0.0 {
-            let curve = self.step.cross(step) / (before_m * now_m * 0.5 * (before_m + now_m));
+            // That of the circle through the places of three frames.
+            let across_m = (self.step + step).length();
+            let curve = self.step.cross(step) * (2.0 / (before_m * now_m * across_m));
+            let curve = if across_m > 0.0 { curve } else { DVec3::ZERO };
             self.curve += RECENT * (curve - self.curve);
             self.length += RECENT * (curve.length() - self.length);
         }
@@ -162,6 +161,10 @@ impl Course {
         if direction != DVec3::ZERO && curve != DVec3::ZERO {
             let step = bend.step;
             let direction = (turn_along(curve, 0.5 * step.length()) * step).normalize();
+            // The view may well turn as the way does, as far as one can tell.
+            let is_alike = (curve - axis * turn_per_m).length() <= ALIKE * curve.length();
+            let (axis, turn_per_m) =
+                if is_alike { (curve.normalize(), curve.length()) } else { (axis, turn_per_m) };
             return Self { direction, curve, axis, turn_per_m, rate: RATE };
         }
         if direction == DVec3::ZERO || axis == DVec3::ZERO {
@@ -170,6 +173,20 @@ impl Course {
         // Who turns flies a bend: straight ahead of where the trend, which lags behind, will have led in a while.
         let lead = turn_about(axis, turn.length / RECENT + LEAD_RAD);
         Self { direction: (lead * direction).normalize(), axis, turn_per_m, ..Self::default() }
+    }
+
+    /// What a move uses up: metres, and radians on the planes.
+    pub(super) fn counts(&self, last: &Pose, pose: &Pose) -> (f64, f64) {
+        let turns = pose.normals != last.normals || self.turn_per_m > 0.0;
+        (self.used_m(pose.eye_m - last.eye_m), if turns { self.used_rad(last, pose) } else { 0.0 })
+    }
+
+    /// The course as it was before a step that kept to it.
+    pub(super) fn before(self, step: DVec3) -> Self {
+        if self.curve == DVec3::ZERO {
+            return self;
+        }
+        Self { direction: turn_along(self.curve, -step.length()) * self.direction, ..self }
     }
 
     /// Metres that a step uses up.
@@ -189,7 +206,9 @@ impl Course {
         } else {
             turn_along(self.curve, 0.5 * step.length()) * self.direction
         };
-        step.dot(middle).max(0.0)
+        let chord_m = step.dot(middle).max(0.0);
+        let per_m = self.curve.length();
+        if per_m == 0.0 { chord_m } else { portable::asin((0.5 * per_m * chord_m).min(1.0)) * (2.0 / per_m) }
     }
 
     /// Where a way of `way_m` metres along it leads.
@@ -213,12 +232,22 @@ impl Course {
         }
     }
 
-    /// The rate for an eye that has kept to such a course for long, if there is one.
-    pub(super) fn steady_rate(&self) -> Option<f64> {
-        if self.curve != DVec3::ZERO {
-            return Some(STEADY_CURVE_RATE);
-        }
-        (self.direction != DVec3::ZERO && self.axis == DVec3::ZERO).then_some(STEADY_RATE)
+    /// The rate for an eye that has kept to such a course but for the share `off` of its way.
+    pub(super) fn steady_rate(&self, off: f64) -> f64 {
+        let [moves, curves, turns] = [self.direction, self.curve, self.axis].map(|v| v != DVec3::ZERO);
+        let rates = match (moves, curves, turns) {
+            (true, true, _) | (false, _, true) => STEADY_CURVE_RATES,
+            (true, false, false) => STEADY_RATES,
+            // A view that turns on a straight way will see it bend before long.
+            _ => return RATE,
+        };
+        rates.iter().filter(|(_, most_off)| off <= *most_off).fold(RATE, |_, (rate, _)| *rate)
+    }
+
+    /// Whether it is of the same kind as another.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let kind = |course: &Self| [course.direction, course.curve, course.axis].map(|v| v == DVec3::ZERO);
+        kind(self) == kind(other)
     }
 
     /// Radians that a turn uses up: a bound on how far the planes' normals are from where the counted angle would take them.

@@ -14,32 +14,45 @@
 //! * Not selected, k > b^2 / D(0)^2: the root is convex, and all is as on a straight course (`super::certificate`), with b / k in the place of b and rho / sqrt(k) in that of rho. Else the root lies above a concave one:
 //!   L = min(m(0), rho s1), s1 where the parabola below reaches R^2.
 //!
-//! Each holds up to the turn T only, so that L is at most rho T / w. A short turn, which is near the truth, and a long one are tried. Besides, in whole turns D is at least, and at the most, what it is at the ends of its
-//! swing: with the margin m1 there, and the climb sin c a metre, L = m1 rho / max(rho, sin c).
+//! Each holds up to the turn T only, so that L is at most rho T / w.
 //!
-//! Planes that turn as the way does see the vertex turn about one axis: a plane's distance bends by d w^2 + w, d being the distance from the axis through the eye; where they turn otherwise, by the difference more.
+//! For longer turns: but for the climb, D^2 swings about a mean. D(s)^2 = D(0)^2 + A - A cos(w s) - C sin(w s) - 2 (b - f) s + sin^2 c s^2 with A = 2 q / w^2 and C = 2 f / w. The last two terms are left out, and the most
+//! that they can be in half a turn is taken from what is left. So `super::swing` says how the rest comes to nothing.
 //!
-//! Invariant: as for straight courses, rounded towards a shorter life. Cost: five square roots a turn.
+//! * Selected: m >= (R^2 - D^2) / (2 R), which swings.
+//! * Not selected: where D^2 is above its mean, D is concave as D^2 is; below it m >= (D^2 - R^2) / (D + R), where D is at most the root of the mean. So the claim of `super::swing` holds with a slope of rho times that
+//!   root plus R, and with the margin (D(0)^2 - R^2) / (D(0) + R), which is m(0) where the eye does not climb.
+//!
+//! Besides, in whole turns D is at least, and at the most, what it is at the ends of its swing: with the margin m1 there, and the climb sin c a metre, L = m1 rho / max(rho, sin c).
+//!
+//! Planes that turn as the way does see the vertex turn about one axis: a plane's distance bends by d w^2 + w, d being the distance from the axis through the eye; where they turn otherwise, by the difference more. And it
+//! swings about the circle's centre (`super::certificate::planes`).
+//!
+//! Invariant: as for straight courses, rounded towards a shorter life. Cost: five square roots.
 
 use super::course::Course;
+use super::swing::{Swing, TINY};
+use std::f64::consts::PI;
 
-/// The turns that bounds are made for, in radians.
-const TURNS_RAD: [f64; 2] = [0.35, 2.0];
+/// The turn that parabolas bound, in radians.
+const TURN_RAD: f64 = 0.35;
 /// A bound on the error of squares, relative to them.
 const SQUARE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
-/// What stands for nothing where a number is divided by.
-const TINY: f64 = 1e-30;
 
 /// A course's curve.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Curve {
-    /// Radians a metre of way.
+    /// Radians a metre of way, and of what that is one.
     pub per_m: f64,
+    pub radius_m: f64,
     /// What the direction grows by a metre of way: the curve x direction.
     pub inward_per_m: [f64; 3],
     /// The part of the direction that is square to the axis.
     pub across: [f64; 3],
     across2: f64,
+    /// Metres of a half turn, and the climb on it.
+    pub half_m: f64,
+    pub half_climb_m: f64,
     /// Share of a margin over whole turns that counts while the eye climbs.
     share: f64,
 }
@@ -65,33 +78,43 @@ impl Curve {
             return Self::default();
         }
         let axis = course.curve / per_m;
+        let climb = axis.dot(course.direction).abs();
         let across = course.direction - axis * axis.dot(course.direction);
         Self {
             per_m,
+            radius_m: 1.0 / per_m,
             inward_per_m: course.curve.cross(course.direction).to_array(),
             across: across.to_array(),
             across2: across.length_squared(),
-            share: course.rate / course.rate.max(axis.dot(course.direction).abs()),
+            half_m: PI / per_m,
+            half_climb_m: climb * PI / per_m,
+            share: course.rate / course.rate.max(climb),
         }
     }
 
-    /// Way along the course on which a selected vertex stays so, rounded down. Up to there its margin is concave or better.
+    /// Way along the course on which a selected vertex stays so, rounded down, and a margin: up to there its own margin is that, less `least_slope` a metre, or better.
     #[inline(always)]
-    pub(super) fn chord_m(&self, seen: &Seen) -> f64 {
+    pub(super) fn chord_m(&self, seen: &Seen, least_slope: f64) -> (f64, f64) {
         let reach2 = seen.reach_m * seen.reach_m;
         let within2 = (reach2 - seen.distance2 - (reach2 + seen.distance2) * SQUARE_ERROR).max(0.0);
         let (b, q) = (seen.foot_m, self.across2 - seen.inward);
         let line = b * b / seen.distance2.max(TINY);
-        let until = |turn: f64| {
-            let k = 1.0 - seen.inward
-                + (-q).max(0.0) * (turn * turn / 12.0)
-                + self.per_m * seen.across_m.max(0.0) * (turn / 3.0);
-            let k = k.max(line).max(TINY) + (k.abs() + line) * SQUARE_ERROR;
-            let root = (b * b + k * within2).sqrt();
-            let (part, whole) = if b > 0.0 { (b + root, k) } else { (within2, (root - b).max(TINY)) };
-            (part / whole).min(turn / self.per_m)
-        };
-        until(TURNS_RAD[0]).max(until(TURNS_RAD[1]))
+        let k = 1.0 - seen.inward
+            + (-q).max(0.0) * (TURN_RAD * TURN_RAD / 12.0)
+            + self.per_m * seen.across_m.max(0.0) * (TURN_RAD / 3.0);
+        let k = k.max(line).max(TINY) + (k.abs() + line) * SQUARE_ERROR;
+        let root = (b * b + k * within2).sqrt();
+        let (part, whole) = if b > 0.0 { (b + root, k) } else { (within2, (root - b).max(TINY)) };
+        let short_m = (part / whole).min(TURN_RAD / self.per_m);
+        // The climb may take the eye away from the vertex.
+        let (swing2, sine2, error2) = self.swing2(seen);
+        let climb2 = 2.0 * (seen.across_m - b).max(0.0) * self.half_m + self.half_climb_m * self.half_climb_m;
+        let now = reach2 - seen.distance2 - error2 - climb2;
+        let swing = Swing { now, opposite: now - 2.0 * swing2, grows: sine2 };
+        let long_m = swing.turn_rad(2.0 * seen.reach_m * least_slope / self.per_m) / self.per_m;
+        let (is_long, left_m) = (long_m > short_m, seen.reach_m - seen.distance_m);
+        // Field by field, so that no branch comes of it.
+        (if is_long { long_m } else { short_m }, if is_long { now / (2.0 * seen.reach_m) } else { left_m })
     }
 
     /// The margin of a selected vertex that stays selected in a whole turn, or less than nothing.
@@ -109,32 +132,50 @@ impl Curve {
         let now_m = distance_m - reach_m;
         let beyond2 = (distance2 - reach2 - (reach2 + distance2) * SQUARE_ERROR).max(0.0);
         let (line, q) = (b * b / distance2.max(TINY), self.across2 - seen.inward);
-        let until = |turn: f64| {
-            let k = 1.0
-                - seen.inward
-                - q.max(0.0) * (turn * turn / 12.0)
-                - self.per_m * (-seen.across_m).max(0.0) * (turn / 3.0);
-            let k = k - (1.0 + k.abs() + seen.inward.abs()) * SQUARE_ERROR;
-            let convex = k > line;
-            let above = k.max(TINY);
-            let off2 = (distance2 - b * b / above - distance2 * SQUARE_ERROR).max(0.0);
-            let across2 = (1.0 - rate * rate / above).max(0.0);
-            let enters = off2 <= across2 * reach2;
-            let square = if enters { (reach2 - off2) / above } else { across2 * off2 };
-            let root = square.max(0.0).sqrt();
-            let foot_m = rate * b / above;
-            let past_m = if enters { foot_m - rate * root } else { foot_m + root - reach_m };
-            // On the way along a line or a bow, the first place at the distance that selects.
-            let nears = b + (b * b - k * beyond2).max(0.0).sqrt();
-            let straight_m = if nears > TINY { rate * beyond2 / nears } else { f64::INFINITY };
-            let falls_slowly = b <= rate * distance_m;
-            let convex_m = if falls_slowly { now_m } else { past_m };
-            let ahead_m = if convex { convex_m } else { straight_m };
-            ahead_m.min(rate * turn / self.per_m)
-        };
+        let k = 1.0
+            - seen.inward
+            - q.max(0.0) * (TURN_RAD * TURN_RAD / 12.0)
+            - self.per_m * (-seen.across_m).max(0.0) * (TURN_RAD / 3.0);
+        let k = k - (1.0 + k.abs() + seen.inward.abs()) * SQUARE_ERROR;
+        let convex = k > line;
+        let above = k.max(TINY);
+        let off2 = (distance2 - b * b / above - distance2 * SQUARE_ERROR).max(0.0);
+        let across2 = (1.0 - rate * rate / above).max(0.0);
+        let enters = off2 <= across2 * reach2;
+        let square = if enters { (reach2 - off2) / above } else { across2 * off2 };
+        let root = square.max(0.0).sqrt();
+        let foot_m = rate * b / above;
+        let past_m = if enters { foot_m - rate * root } else { foot_m + root - reach_m };
+        // On the way along a line or a bow, the first place at the distance that selects.
+        let nears = b + (b * b - k * beyond2).max(0.0).sqrt();
+        let straight_m = if nears > TINY { rate * beyond2 / nears } else { f64::INFINITY };
+        let falls_slowly = b <= rate * distance_m;
+        let convex_m = if falls_slowly { now_m } else { past_m };
+        let ahead_m = if convex { convex_m } else { straight_m };
+        let short_m = ahead_m.min(rate * TURN_RAD / self.per_m);
+        // The climb may take the eye nearer to the vertex.
+        let (swing2, sine2, error2) = self.swing2(seen);
+        let now = distance2 - reach2 - error2 - 2.0 * (b - seen.across_m).max(0.0) * self.half_m;
+        let swing = Swing { now, opposite: now + 2.0 * swing2, grows: -sine2 };
+        // Below the mean of its square, the distance is at most the mean's root, which is no more than this.
+        let mean_m = distance_m + 0.5 * swing2 / distance_m.max(TINY);
+        let long_m = rate * swing.turn_rad((mean_m + reach_m) * rate / self.per_m) / self.per_m;
+        let long_m = long_m.min(now / (distance_m + reach_m).max(TINY));
         let nearest2 = self.extreme2(seen, -1.0);
         let never_m = self.share * (nearest2.max(0.0).sqrt() - reach_m);
-        until(TURNS_RAD[0]).max(until(TURNS_RAD[1])).max(never_m).min(now_m)
+        short_m.max(long_m).max(never_m).min(now_m)
+    }
+
+    /// How the square of the distance swings, the climb left out: it is distance2 + A - A cos t - C sin t. A, C and the error of it all.
+    #[inline(always)]
+    fn swing2(&self, seen: &Seen) -> (f64, f64, f64) {
+        let per_m2 = self.per_m * self.per_m;
+        let swing2 = 2.0 * (self.across2 - seen.inward) / per_m2;
+        let sine2 = 2.0 * seen.across_m / self.per_m;
+        let reach2 = seen.reach_m * seen.reach_m;
+        let error2 =
+            (seen.distance2 + reach2 + swing2.abs() + sine2.abs() + 1.0 / per_m2) * (64.0 * SQUARE_ERROR);
+        (swing2, sine2, error2)
     }
 
     /// The squared distance that the eye has at the most in a whole turn without the climb, with a `sign` of 1, or at the least, with -1.
@@ -203,7 +244,8 @@ mod tests {
             let selected = distance_m <= reach_m;
             let now_m = (reach_m - distance_m).abs();
             let margin_m = if selected {
-                now_m.min((rate * curve.chord_m(&seen)).max(curve.always_m(&seen)))
+                let (chord_m, left_m) = curve.chord_m(&seen, rate);
+                now_m.min(left_m.min(rate * chord_m).max(curve.always_m(&seen)))
             } else {
                 curve.outside_m(&seen, rate)
             };

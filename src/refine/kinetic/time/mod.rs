@@ -6,4 +6,5 @@ pub(crate) mod course;
 mod curve;
 pub(crate) mod queue;
 mod ring;
+mod swing;
 mod wheel;

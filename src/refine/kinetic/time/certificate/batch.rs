@@ -170,7 +170,7 @@ fn words_of(judge: &Judge, blocks: &[Block], words: &mut [[u32; LANES]], motion:
 #[cfg(test)]
 mod tests {
     use super::super::super::clocks::Clocks;
-    use super::super::super::course::{Course, Pose, RATE, STEADY_RATE};
+    use super::super::super::course::{Course, Pose, RATE, STEADY_RATES};
     use super::super::ACTIVE;
     use super::*;
     use crate::metric::Metric;
@@ -202,7 +202,7 @@ mod tests {
                 curve,
                 axis: if turns { about } else { DVec3::ZERO },
                 turn_per_m: if moves && turns { next(0.01) + 1e-9 } else { 0.0 },
-                rate: if turns { RATE } else { STEADY_RATE },
+                rate: if turns { RATE } else { STEADY_RATES[round % 2].0 },
             };
             clocks.take_course(1 + round % 3, course);
             let judge = Judge::new(metric, &clocks, round % 7 > 0);

@@ -1,6 +1,6 @@
 //! Certificates against what the camera then does.
 
-use super::super::course::{Pose, RATE, STEADY_RATE};
+use super::super::course::{Pose, RATE, STEADY_RATES};
 use super::*;
 use crate::view::{ErrorMetric, View, Viewport};
 use glam::DVec3;
@@ -36,7 +36,9 @@ proptest! {
         closeness in prop_oneof![0.2f64..2.0, 2.0f64..20.0], radius in 0.0f64..300.0,
         steps in prop::collection::vec((direction(), 0.0f64..0.5, -0.01f64..0.01, 0.98f64..1.02, 0.99f64..1.01), 1..80),
         kind in prop_oneof![Just(ErrorMetric::Ball), Just(ErrorMetric::Sight)], is_below in prop::bool::weighted(0.1), is_plain in prop::bool::weighted(0.9), others in 0u8..60,
-        turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, rate in prop_oneof![Just(RATE), Just(STEADY_RATE), 0.001f64..0.5], axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in -0.01f64..0.02,
+        turning: bool, zooming: bool, stretching: bool, culls: bool, start_course: bool, rate in prop_oneof![Just(RATE), Just(STEADY_RATES[0].0), Just(STEADY_RATES[1].0), 0.001f64..0.5], axis in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], spin in prop_oneof![-0.01f64..0.02, 0.0f64..0.06],
+        // Who keeps to a course tests what is promised along it.
+        unrest in prop_oneof![Just(0.0), Just(1e-4), Just(0.01), Just(1.0)],
         curves in prop::option::of((prop_oneof![Just(DVec3::NEG_Z), Just(DVec3::Z), direction()], 0.0f64..0.04, prop::bool::weighted(0.3))),
     ) {
         let mut clocks = Clocks::new(10.0, 3000.0);
@@ -71,9 +73,9 @@ proptest! {
         let word = Judge::new(metric, &clocks, culls).word(&sight(&metric));
         for (i, (side, off, turn, zoom, stretch)) in (0u8..).zip(steps) {
             if i == others { now.metric = if kind == ErrorMetric::Ball { ErrorMetric::Sight } else { ErrorMetric::Ball }; }
-            now.eye_m += Course { direction: course, curve, ..Default::default() }.path(speed) + speed * off * side;
+            now.eye_m += Course { direction: course, curve, ..Default::default() }.path(speed) + speed * off * unrest * side;
             if per_m > 0.0 { course = (glam::DQuat::from_axis_angle(curve / per_m, per_m * speed) * course).normalize(); }
-            if turning { now.yaw_rad += spin + 0.1 * turn; now.pitch_rad += 0.1 * turn; }
+            if turning { now.yaw_rad += spin + 0.1 * turn * unrest; now.pitch_rad += 0.1 * turn * unrest; }
             if zooming { now.vertical_fov_rad = (now.vertical_fov_rad * zoom).clamp(0.05, 2.0); }
             if stretching { now.vertical_exaggeration = (now.vertical_exaggeration * stretch).clamp(0.2, 5.0); }
             metric = Metric::new(&now);
@@ -83,6 +85,50 @@ proptest! {
             }
             let s = sight(&metric);
             let active = s.is_selected() && (!culls || metric.cull(&s, crate::metric::ALL_PLANES).is_some());
+            prop_assert_eq!(word & ACTIVE != 0, active);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(10_000))]
+    /// Who flies a circle, climbing or not, and turns as it does, or a little otherwise, or turns on the spot.
+    #[test]
+    fn a_live_word_is_true_all_the_way_round(
+        heading in 0.0f64..6.3, climb in prop_oneof![Just(0.0), -0.2f64..0.2], radius_m in prop_oneof![Just(0.0), (3.0f64..9.0).prop_map(f64::exp)],
+        turn_rad in 0.002f64..0.1, other in prop_oneof![Just(0.0), -0.01f64..0.01, -0.3f64..0.3], rate in prop_oneof![Just(RATE), 0.001f64..0.3],
+        distance in (0.0f64..10.0).prop_map(f64::exp), edge in (-1.3f64..1.3, -1.3f64..1.3), closeness in prop_oneof![0.9f64..1.5, 1.5f64..20.0], radius in 0.0f64..300.0, pitch in -0.5f64..0.2,
+    ) {
+        let moves = radius_m > 0.0;
+        let mut course = DVec3::new(heading.sin(), heading.cos(), climb).normalize();
+        let curve = DVec3::NEG_Z * if moves { 1.0 / radius_m } else { 0.0 };
+        let step_m = radius_m * turn_rad;
+        let spin = turn_rad * (1.0 + other);
+        let mut now = View { roll_rad: 0.0, ..view(DVec3::new(100.0, 200.0, 1000.0), 0.3, pitch, 0.8, 1.0) };
+        let mut clocks = Clocks::new(10.0, 3000.0);
+        let (direction, turn_per_m) = if moves { (course, spin / step_m) } else { (DVec3::ZERO, 0.0) };
+        clocks.take_course(1, Course { direction, curve, axis: DVec3::NEG_Z, turn_per_m, rate });
+        let mut metric = Metric::new(&now);
+        clocks.move_to(Pose::of(&now, &metric));
+        let [right, up, forward] = now.axes();
+        let away = (forward + 0.42 * (4.0 / 3.0 * edge.0 * right + edge.1 * up)).normalize();
+        let at = now.eye_m + away * distance;
+        let radius_m = radius.min(0.5 * distance);
+        let error_m = ((distance * closeness - radius_m) / metric.nu()).max(0.0);
+        let vertex = Vertex { height_m: at.z, error_m, radius_m, class: VertexClass::Plain };
+        let sight = |metric: &Metric| metric.sight([at.x, at.y], &vertex);
+        let word = Judge::new(metric, &clocks, true).word(&sight(&metric));
+        for _ in 0..200 {
+            now.eye_m += Course { direction: course, curve, ..Default::default() }.path(step_m);
+            if moves { course = (glam::DQuat::from_rotation_z(-turn_rad) * course).normalize(); }
+            now.yaw_rad += spin;
+            metric = Metric::new(&now);
+            clocks.move_to(Pose::of(&now, &metric));
+            if clocks.now(clock_of(word)) >= u64::from(expiry_of(word)) {
+                break;
+            }
+            let s = sight(&metric);
+            let active = s.is_selected() && metric.cull(&s, crate::metric::ALL_PLANES).is_some();
             prop_assert_eq!(word & ACTIVE != 0, active);
         }
     }
