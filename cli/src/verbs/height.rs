@@ -39,7 +39,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["at", "json"])]
     points: Option<PathBuf>,
     /// Write the table to this file instead of standard output; it appears when it is complete
-    #[arg(short, long, value_name = "FILE", requires = "points")]
+    #[arg(short, long, value_name = "FILE", requires = "points", conflicts_with_all = ["at", "json"])]
     output: Option<PathBuf>,
     #[command(flatten)]
     force: Force,

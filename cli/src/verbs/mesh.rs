@@ -39,7 +39,7 @@ pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
     /// Largest distance of any sample from the mesh, in metres
-    #[arg(long, value_name = "M", value_parser = parse::not_negative, required_unless_present = "flight", conflicts_with = "flight")]
+    #[arg(long, value_name = "M", value_parser = parse::not_negative, required_unless_present = "flight", conflicts_with_all = OF_A_FLIGHT)]
     max_error: Option<f64>,
     #[command(flatten)]
     area: AreaArgs,
@@ -47,7 +47,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 20_000_000, value_parser = clap::value_parser!(u64).range(1..=1 << 31), conflicts_with = "flight")]
     max_triangles: u64,
     /// Flight file
-    #[arg(long, value_name = "F", requires = "frame", conflicts_with = "window")]
+    #[arg(long, value_name = "F", requires = "frame", conflicts_with_all = ["window", "crs"])]
     flight: Option<PathBuf>,
     /// Frame, from 0
     #[arg(long, value_name = "N", requires = "flight")]
@@ -74,10 +74,14 @@ pub(super) struct Args {
     /// What coordinates are
     #[arg(long, value_name = "SYSTEM", default_value = "local")]
     coordinates: CoordinatesWord,
-    /// Largest side of GLB's picture in texels; 0 for no picture
-    #[arg(long, value_name = "TEXELS", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(0..=16_384))]
-    texture: u32,
+    /// Largest side of GLB's picture in texels, 4096 without it; 0 for no picture
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(0..=16_384))]
+    texture: Option<u32>,
 }
+
+/// What means something with `--flight` alone.
+const OF_A_FLIGHT: [&str; 9] =
+    ["flight", "frame", "edits", "engine", "tolerance_px", "metric", "viewport", "exaggeration", "culling"];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum FormatWord {
@@ -111,6 +115,15 @@ impl Args {
                 self.output.display()
             ))
         })?;
+        if self.ascii && word != FormatWord::Ply {
+            return Err(WrongUsage("--ascii is for PLY; leave it away, or write PLY".into()).into());
+        }
+        if self.texture.is_some() && word != FormatWord::Glb {
+            return Err(WrongUsage(
+                "--texture is for GLB, which alone has a picture; leave it away, or write GLB".into(),
+            )
+            .into());
+        }
         Ok(match (word, self.ascii) {
             (FormatWord::Ply, false) => Format::PlyBinary,
             (FormatWord::Ply, true) => Format::PlyText,
@@ -165,7 +178,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
         (None, None) => return Err(WrongUsage("give --max-error, or --flight and --frame".into()).into()),
     };
     let texture = match format {
-        Format::Glb if args.texture > 0 => Texture::of(&terrain, part_m, args.texture)?,
+        Format::Glb => match args.texture.unwrap_or(4096) {
+            0 => None,
+            side => Texture::of(&terrain, part_m, side)?,
+        },
         _ => None,
     };
     let notes = siting::mesh_notes(terrain.header(), args.coordinates == CoordinatesWord::Dem);

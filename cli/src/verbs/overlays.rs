@@ -34,6 +34,11 @@ pub(super) fn refuse_rewriting(file: &Path, is_forced: bool) -> Result<()> {
 /// Says so where a terrain is not in the last state that its files were written in: it is seen with an overlay that is older than what its file was given last, or its last header is damaged.
 pub(super) fn tell_of_older(terrain: &Terrain) {
     tell_of_lost(terrain);
+    tell_of_grown(terrain);
+}
+
+/// Says so where a terrain is seen with an overlay that is older than what its file was given last.
+pub(super) fn tell_of_grown(terrain: &Terrain) {
     if let Some(base) = terrain.base_path().filter(|_| terrain.base_has_grown()) {
         complain(&format!(
             "note: {} was edited or draped after {} was begun; it is seen as it was then",
@@ -44,7 +49,7 @@ pub(super) fn tell_of_older(terrain: &Terrain) {
 }
 
 /// Warns where the newest header of a terrain is damaged; of a file that a verb opens twice, once.
-fn tell_of_lost(terrain: &Terrain) {
+pub(super) fn tell_of_lost(terrain: &Terrain) {
     static TOLD: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     if let Some(words) = newest_header_is_lost(terrain)
         && TOLD.lock().is_ok_and(|mut told| told.insert(terrain.path().to_owned()))

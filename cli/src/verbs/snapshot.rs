@@ -49,19 +49,19 @@ pub(super) struct Args {
     #[arg(long, value_name = "F", requires = "frame")]
     flight: Option<PathBuf>,
     /// Frame of the flight, from 0
-    #[arg(long, value_name = "N", requires = "flight")]
+    #[arg(long, value_name = "N", requires = "flight", conflicts_with_all = ["at", "look", "fov"])]
     frame: Option<usize>,
     /// Where the eye is: metres east and north of the south-west sample, or coordinates of --crs, and metres up
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true, conflicts_with = "flight")]
     at: Option<DVec3>,
     /// Where it looks: degrees clockwise from north, and above the horizon; to the terrain's middle without it
-    #[arg(long, value_name = "YAW,PITCH", value_parser = look, allow_hyphen_values = true, requires = "at")]
+    #[arg(long, value_name = "YAW,PITCH", value_parser = look, allow_hyphen_values = true, requires = "at", conflicts_with = "flight")]
     look: Option<[f64; 2]>,
     /// Show the whole terrain from straight above as a map, north at the top; --size is the most that the picture may have
-    #[arg(long, conflicts_with_all = ["flight", "at", "look", "fov"])]
+    #[arg(long, conflicts_with_all = OF_A_VIEW)]
     ortho: bool,
     /// Part that --ortho shows: west, south, east, north in metres from the south-west sample, or in what --crs says; all of it without this
-    #[arg(long, value_name = "W,S,E,N", value_parser = parse::extent, allow_hyphen_values = true, requires = "ortho")]
+    #[arg(long, value_name = "W,S,E,N", value_parser = parse::extent, allow_hyphen_values = true, requires = "ortho", conflicts_with_all = OF_A_VIEW)]
     window: Option<[f64; 4]>,
     /// System of --at and --window: dem for the elevation model's own coordinates, EPSG:n, WKT or a PROJ string; samples too for --window
     #[arg(long, value_name = "SYSTEM")]
@@ -70,7 +70,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", value_parser = dots)]
     dpi: Option<f64>,
     /// Write beside the map where it lies, for other programs: a world file (.pgw), and the reference system (.prj, .png.aux.xml)
-    #[arg(long, requires = "ortho")]
+    #[arg(long, requires = "ortho", conflicts_with_all = OF_A_VIEW)]
     world_file: bool,
     /// Vertical field of view in degrees, 45 without it
     #[arg(long, value_name = "DEG", value_parser = field_of_view, conflicts_with = "flight")]
@@ -86,6 +86,9 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
 }
+
+/// What says where the eye is or how it looks, which a map from straight above has no use for.
+const OF_A_VIEW: [&str; 5] = ["flight", "frame", "at", "look", "fov"];
 
 fn dots(text: &str) -> Result<f64, String> {
     let dots = parse::positive(text)?;

@@ -39,7 +39,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE.iqt", visible_alias = "color", conflicts_with_all = ["size", "spacing"])]
     colour: Option<PathBuf>,
     /// Texels a sample of the picture
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "colour", value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "colour", conflicts_with_all = ["size", "spacing"], value_parser = clap::value_parser!(u32).range(1..=64))]
     texels: u32,
     /// File to write: GeoTIFF or 16-bit PNG by its extension
     #[arg(short, long, value_name = "OUT.(tif|png)", value_parser = parse::with_extension(&["tif", "tiff", "png"]))]

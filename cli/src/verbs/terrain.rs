@@ -61,11 +61,18 @@ impl TerrainArgs {
 
     /// Opens it without maps: what is cut short while it is read is an error, where a map would be a signal.
     pub(super) fn open_unmapped(&self) -> Result<Terrain> {
+        let terrain = self.open_to_verify()?;
+        overlays::tell_of_lost(&terrain);
+        Ok(terrain)
+    }
+
+    /// Opens it without maps, for a verb that tells itself of a damaged newest header.
+    pub(super) fn open_to_verify(&self) -> Result<Terrain> {
         let terrain = match &self.overlay {
             Some(overlay) => Terrain::open_with_overlay_unmapped(&self.file, overlay)?,
             None => Terrain::open_unmapped(&self.file)?,
         };
-        overlays::tell_of_older(&terrain);
+        overlays::tell_of_grown(&terrain);
         Ok(terrain)
     }
 

@@ -1,9 +1,9 @@
 //! `terrasoar verify`: checks every page of a terrain file.
 
-use super::Lines;
 use super::output::{grouped, print_line};
 use super::progress::Meter;
 use super::terrain::TerrainArgs;
+use super::{Lines, overlays};
 use anyhow::{Result, bail};
 use terrasoar_layout::verify::{verify, verify_pages};
 
@@ -22,10 +22,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     // Plain reads: a file that is cut while it is checked is an error, where a map would be a signal.
-    let terrain = args.terrain.open_unmapped()?;
+    let terrain = args.terrain.open_to_verify()?;
     let progress = Meter::new("pages");
     progress.begin("verifying", verify_pages(&terrain));
-    let report = verify(&terrain, &|pages| progress.add(pages))?;
+    let report =
+        verify(&terrain, &|pages| progress.add(pages)).inspect_err(|_| overlays::tell_of_lost(&terrain))?;
     drop(progress);
     if let (true, Some(lost)) = (report.is_sound(), report.lost_header) {
         bail!(
@@ -56,6 +57,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let more = report.problem_count - report.problems.len() as u64;
     if more > 0 {
         lines.push(format!("  and {} more", grouped(more)));
+    }
+    if let Some(lost) = report.lost_header {
+        lines.push(format!(
+            "  the newest header, on page {}, is damaged, too; the state before it was read instead",
+            lost.page
+        ));
     }
     Err(Lines(lines).into())
 }

@@ -10,6 +10,7 @@ const PLACES: [(&str, &[&str]); 2] = [("land.iqt", &[]), ("dam.iqo", &["--overla
 fn verbs_tell_of_a_damaged_newest_header_once() {
     for (file, flags) in PLACES {
         let bench = with_script("set rect 10,10,20,20 to 100\n");
+        let built = read(&bench, "land.iqt");
         let before = bench.good(&["height", "land.iqt", "--at", "300,300"]);
         bench.good(&[&["edit", "land.iqt", "--script", "a.edits"], flags].concat());
         let at = [&["height", "land.iqt", "--at", "300,300"], flags].concat();
@@ -28,6 +29,15 @@ fn verbs_tell_of_a_damaged_newest_header_once() {
         let said = text(&output.stderr);
         assert!(output.status.code() == Some(1) && output.stdout.is_empty(), "{said}");
         assert!(said.contains("is damaged; the state before it, which is read instead, is sound"), "{said}");
+        assert!(said.starts_with("error: ") && said.matches("is damaged").count() == 1, "{said}");
+        // Of a file that is not sound either, it is said once, too.
+        let terrain = read(&bench, "land.iqt");
+        let mut worse = terrain.clone();
+        worse[built.len() / 2] ^= 1;
+        std::fs::write(bench.path("land.iqt"), &worse).unwrap();
+        let said = text(&bench.run(&[&["verify", "land.iqt"], flags].concat()).stderr).to_owned();
+        assert!(said.contains("is damaged, too") && said.matches("the newest header").count() == 1, "{said}");
+        std::fs::write(bench.path("land.iqt"), &terrain).unwrap();
         if file == "land.iqt" {
             for verb in ["pack", "compact"] {
                 let output = bench.run(&[verb, "land.iqt", "-o", "out.iqt", "--force"]);

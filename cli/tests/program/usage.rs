@@ -107,7 +107,7 @@ fn completions_know_verbs_and_flags_and_are_sound() {
 #[test]
 fn wrong_command_lines_end_with_2() {
     let bench = Bench::with_terrain();
-    let wrong: [&[&str]; 46] = [
+    let wrong: [&[&str]; 62] = [
         &["fly"],
         &["info"],
         &["info", "a.iqt", "b.iqt"],
@@ -144,6 +144,22 @@ fn wrong_command_lines_end_with_2() {
         &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--coordinates", "utm"],
         &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--max-triangles", "0"],
         &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--edits", "e"],
+        &["mesh", "land.iqt", "--flight", "f", "--frame", "0", "-o", "x.ply", "--crs", "dem"],
+        &["mesh", "land.iqt", "--flight", "f", "--frame", "0", "-o", "x.ply", "--window", "0,0,9,9"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--frame", "0"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--engine", "soar"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--tolerance-px", "2"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--metric", "sight"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--viewport", "80x60"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--exaggeration", "2"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.ply", "--culling", "clusters"],
+        &["mesh", "land.iqt", "--engine", "soar", "-o", "x.ply"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.stl", "--ascii"],
+        &["mesh", "land.iqt", "--max-error", "1", "-o", "x.obj", "--texture", "64"],
+        &["height", "land.iqt", "--at", "1,1", "-o", "x.csv"],
+        &["height", "land.iqt", "--at", "1,1", "--json", "-o", "x.csv"],
+        &["synth", "--size", "129", "--seed", "1", "--texels", "2", "-o", "x.tif"],
+        &["synth", "--colour", "land.iqt", "--texels", "2", "--spacing", "1", "-o", "x.tif"],
         &["export", "land.iqt"],
         &["export", "land.iqt", "-o", "x.png"],
         &["export", "land.iqt", "-o", "x.tif", "--step", "3"],
@@ -165,7 +181,7 @@ fn wrong_command_lines_end_with_2() {
 #[cfg(feature = "pictures")]
 fn pictures_that_make_no_sense_end_with_2() {
     let bench = Bench::with_terrain();
-    let wrong: [&[&str]; 18] = [
+    let wrong: [&[&str]; 31] = [
         &["snapshot", "land.iqt"],
         &["snapshot", "land.iqt", "-o", "a.jpg"],
         &["snapshot", "land.iqt", "-o", "a.png", "--style", "cubist"],
@@ -180,6 +196,19 @@ fn pictures_that_make_no_sense_end_with_2() {
         &["snapshot", "land.iqt", "-o", "a.png", "--flight", "f", "--frame", "1", "--at", "1,2,3"],
         &["snapshot", "land.iqt", "-o", "a.png", "--at", "1,2"],
         &["snapshot", "land.iqt", "-o", "a.png", "--look", "1,2"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--flight", "f", "--frame", "1", "--look", "1,2"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--flight", "f", "--frame", "1", "--window", "0,0,9,9"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--flight", "f", "--frame", "1", "--world-file"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--flight", "f", "--frame", "1", "--crs", "dem"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--at", "1,2,3000", "--window", "0,0,9,9"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--at", "1,2,3000", "--world-file"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--at", "1,2,3000", "--frame", "1"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--window", "0,0,9,9", "--look", "1,2"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--window", "0,0,9,9", "--fov", "30"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--world-file", "--fov", "30"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--ortho", "--frame", "1"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--fov", "30", "--frame", "1"],
+        &["snapshot", "land.iqt", "-o", "a.png", "--frame", "1"],
         &["movie", "land.iqt", "-o", "a.gif"],
         &["movie", "land.iqt", "--flight", "f", "-o", "a.avi"],
         &["movie", "land.iqt", "--flight", "f", "-o", "a.gif", "--every", "0"],
