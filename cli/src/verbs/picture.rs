@@ -64,7 +64,7 @@ pub(super) struct PictureArgs {
     /// what they say of meadows and snow
     #[arg(long, value_name = "LOW,HIGH|stretch", value_parser = ramp_range, allow_hyphen_values = true)]
     pub ramp_range: Option<RampRange>,
-    /// Engine: kinetic (the mesh changes from frame to frame) or soar (the whole mesh anew); the pictures are the same
+    /// Engine: kinetic (the mesh changes from frame to frame) or soar (the whole mesh anew); they draw the same triangles
     #[arg(long, value_name = "ENGINE", default_value = "kinetic", value_parser = engine())]
     pub engine: PictureEngine,
     /// What is left out of view: vertices (the mesh is coarse there) or clusters (the mesh is refined all around, clusters are not drawn)
