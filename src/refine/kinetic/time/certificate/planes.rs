@@ -43,18 +43,13 @@ impl Judge {
         sighting: &Sighting,
         [along_m, arm_m, counted_m]: [f64; 3],
     ) -> (f64, f64) {
-        let height_m = self.metric.height_over_plane(plane, sighting);
-        let beyond = height_m - sighting.radius_m();
+        let beyond = self.metric.height_over_plane(plane, sighting) - sighting.radius_m();
         let sweep_m = dot(self.sweeps[plane], sighting.offset_m());
-        let sign = if beyond > 0.0 { 1.0 } else { -1.0 };
-        let bent_rad = used_up_at(beyond.abs(), -sign * sweep_m, arm_m);
-        let error_m = (sighting.distance_m() + sighting.radius_m()) * (64.0 * SQUARE_ERROR);
-        let now = beyond.abs() - error_m;
-        let swing_m = height_m - self.along_axis[plane] * along_m;
-        let swing = Swing { now, opposite: now - 2.0 * sign * swing_m, grows: sign * sweep_m };
+        let bent_rad = used_up_at(beyond.abs(), if beyond > 0.0 { -sweep_m } else { sweep_m }, arm_m);
+        let swing = self.swing(plane, sighting, along_m, [sighting.distance_m(), 0.0]);
         let swung_rad = swing.turn_rad(counted_m);
         let lasts = swung_rad > bent_rad;
-        let left_m = if lasts { now } else { beyond.abs() };
+        let left_m = if lasts { swing.now } else { beyond.abs() };
         (beyond, left_m.min(counted_m * if lasts { swung_rad } else { bent_rad }))
     }
 
@@ -112,17 +107,24 @@ impl Judge {
     /// Of a vertex on one side of a plane that turns as the way does: its distance from there, and the way on which that lasts, as `super::swing` claims it.
     #[inline(always)]
     fn swing_m(&self, plane: usize, sighting: &Sighting, passing: &Passing) -> (f64, f64) {
-        let (height_m, radius_m) = (self.metric.height_over_plane(plane, sighting), sighting.radius_m());
-        let sign = if height_m > radius_m { 1.0 } else { -1.0 };
-        // The distance from the plane is constant + swing cos t + sine sin t, but for the climb, and for what turns otherwise.
-        let swing_m = height_m - self.along_axis[plane] * passing.along_m - self.centres_m[plane];
-        let sine_m = dot(self.sweeps[plane], sighting.offset_m()) - self.centre_sweeps_m[plane];
+        // The climb, and what turns otherwise, may take the plane nearer.
         let round_m = sighting.distance_m() + 2.0 * self.curve.radius_m + self.curve.half_climb_m;
         let other_m = self.apart * round_m + self.along_axis[plane].abs() * self.curve.half_climb_m;
+        let swing = self.swing(plane, sighting, passing.along_m, [round_m, other_m]);
+        (swing.now, swing.turn_rad(passing.least_slope * self.curve.radius_m) * self.curve.radius_m)
+    }
+
+    /// How a vertex's distance from its side of a plane swings while the view turns about the circle's centre, or on the spot, less `other_m`. Its offset along the axis is `along_m`, and nothing in it is larger than `round_m`.
+    #[inline(always)]
+    fn swing(&self, plane: usize, sighting: &Sighting, along_m: f64, [round_m, other_m]: [f64; 2]) -> Swing {
+        let (height_m, radius_m) = (self.metric.height_over_plane(plane, sighting), sighting.radius_m());
+        let sign = if height_m > radius_m { 1.0 } else { -1.0 };
+        // The distance from the plane is constant + swing cos t + sine sin t. On the spot the centre is the eye.
+        let swing_m = height_m - self.along_axis[plane] * along_m - self.centres_m[plane];
+        let sine_m = dot(self.sweeps[plane], sighting.offset_m()) - self.centre_sweeps_m[plane];
         let error_m = (round_m + radius_m) * (64.0 * SQUARE_ERROR);
         let now = sign * (height_m - radius_m) - other_m - error_m;
-        let swing = Swing { now, opposite: now - 2.0 * sign * swing_m, grows: sign * sine_m };
-        (now, swing.turn_rad(passing.least_slope * self.curve.radius_m) * self.curve.radius_m)
+        Swing { now, opposite: now - 2.0 * sign * swing_m, grows: sign * sine_m }
     }
 
     /// No clock counts more of a metre of way.
