@@ -41,6 +41,22 @@ rows = db.execute(
 )
 write("units.txt", "# code|name|type|metres or radians", [f"{c}|{n}|{t}|{repr(f)}" for c, n, t, f in rows])
 
+datums = {
+    str(code): name
+    for code, name in db.execute(
+        "select g.code, d.name from geodetic_crs g join geodetic_datum d on d.auth_name = g.datum_auth_name and d.code = g.datum_code "
+        "where g.auth_name = 'EPSG'"
+    )
+}
+bases = {str(code): str(base) for code, base in db.execute("select code, geodetic_crs_code from projected_crs where auth_name = 'EPSG'")}
+methods = {
+    str(code): method
+    for code, method in db.execute(
+        "select p.code, c.method_name from projected_crs p join conversion c on c.auth_name = p.conversion_auth_name and c.code = p.conversion_code "
+        "where p.auth_name = 'EPSG'"
+    )
+}
+
 lines = []
 systems = list(db.execute("select code, name, 'p' from projected_crs where auth_name = 'EPSG'")) + list(
     db.execute("select code, name, 'g' from geodetic_crs where auth_name = 'EPSG' and type <> 'geocentric'")
@@ -50,9 +66,13 @@ for code, name, kind in sorted(systems, key=lambda row: int(row[0])):
         continue
     said = subprocess.run(["gdalsrsinfo", "-o", "proj4", f"EPSG:{code}"], capture_output=True, text=True)
     proj = said.stdout.strip()
+    # PROJ before 9.2 leaves out of its strings that this one is drawn on a sphere.
+    if methods.get(code) == "Lambert Azimuthal Equal Area (Spherical)" and "+R_A" not in proj:
+        proj = proj.replace("+proj=laea", "+proj=laea +R_A")
+    datum = datums.get(bases.get(code, code), "")
     wkt = subprocess.run(["gdalsrsinfo", "-o", "wkt2", "--single-line", f"EPSG:{code}"], capture_output=True, text=True).stdout
     word = "LENGTHUNIT" if kind == "p" else "ANGLEUNIT"
     units = re.findall(word + r'\["([^"]*)",([0-9.eE+-]+)', wkt)
     if units:
-        lines.append(f"{code}|{name}|{kind}|{units[-1][0]}|{units[-1][1]}|{proj}")
-write("missing.txt", "# code|name|kind|unit|metres or radians|PROJ string", lines)
+        lines.append(f"{code}|{name}|{kind}|{units[-1][0]}|{units[-1][1]}|{datum}|{proj}")
+write("missing.txt", "# code|name|kind|unit|metres or radians|datum|PROJ string", lines)

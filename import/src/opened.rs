@@ -323,7 +323,7 @@ impl SampleSink for Voiding<'_> {
 pub(crate) fn shift_lost(name: &str) -> Warning {
     let name = terrasoar_layout::words::harmless(name, 80);
     Warning::new(format!(
-        "the shift of datum of {} is a grid that is not here, and was left out, so places may be off by up to some hundred metres; for true places bring the data over before: gdalwarp -t_srs SYSTEM INPUT output.tif",
+        "the shift of datum of {} is not known here, or a grid that is not here, and was left out, so places may be off by up to some hundred metres; for true places bring the data over before: gdalwarp -t_srs SYSTEM INPUT output.tif",
         if name.is_empty() { "the reference system" } else { name.as_str() }
     ))
 }

@@ -1,7 +1,7 @@
 //! Places on the ground: coordinates of a terrain's own reference system, or of another, to metres from its south-west sample and back.
 //!
 //! Coordinates are east before north in every system: longitude before latitude. A [`Frame`] is a terrain seen in one system. Longitudes may have any number of full turns added. Datums are
-//! shifted by parameters. Where the shift needs a grid, which is not here, it is left out and [`Frame::is_rough`] says so. Cost: in the terrain's own system a few operations a place, in
+//! shifted by parameters. Where the shift needs a grid, which is not here, or is not known, it is left out and [`Frame::is_rough`] says so. Cost: in the terrain's own system a few operations a place, in
 //! others a microsecond.
 //!
 //! ```
@@ -70,7 +70,15 @@ impl Crs {
     pub fn of(header: &Header) -> Option<Self> {
         let about = &header.about;
         let by_code = || header.epsg.and_then(|code| by_text(&format!("EPSG:{code}")));
-        let found = by_text(&about.crs_text).filter(|_| !about.crs_text.is_empty()).or_else(by_code);
+        let by_own_text = by_text(&about.crs_text).filter(|_| !about.crs_text.is_empty());
+        let found = match by_own_text {
+            // A PROJ string that the registry gave has neither name nor code.
+            Some(said) if said.code.is_none() => {
+                Some(by_code().filter(|code| code.text == said.text).unwrap_or(said))
+            }
+            Some(said) => Some(said),
+            None => by_code(),
+        };
         let mut system = found.unwrap_or_else(System::unknown);
         if let Some(unit) = unit_of(header) {
             // What the data states by itself wins over the registry.
@@ -278,10 +286,9 @@ impl Frame {
 
     /// Whether places may be off by some hundred metres, for the shift between the two datums is not known here.
     pub fn is_rough(&self) -> bool {
-        let lost = |crs: &Option<Crs>| {
-            crs.as_ref().and_then(|crs| crs.ground.as_ref()).is_some_and(Ground::is_shift_lost)
-        };
-        !self.is_same && (lost(&self.own) || lost(&self.other))
+        let ground = |crs: &'_ Option<Crs>| crs.as_ref().and_then(|crs| crs.ground.clone());
+        matches!((ground(&self.own), ground(&self.other)), (Some(own), Some(other)) if own.is_rough_to(&other))
+            && !self.is_same
     }
 
     /// Metres east and north of the south-west sample to coordinates; `None` where the projection has none. Longitudes of other systems than the own one lie within half a turn of 0.

@@ -189,7 +189,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
 fn warn(first: &Terrain, second: &Terrain, difference: &Difference<'_>) {
     if difference.is_rough() {
         complain(
-            "note: the shift between the two datums is a grid that is not here; places may be off by up to some hundred metres",
+            "note: the shift between the two datums is not known here, or a grid that is not here; places may be off by up to some hundred metres",
         );
     }
     let [a, b] = [first, second].map(|terrain| terrain.header().about.vertical_name.as_str());

@@ -175,7 +175,7 @@ pub(super) fn frame(header: &Header, crs: Option<&str>) -> Result<Option<Frame>>
     };
     if frame.is_rough() {
         complain(
-            "note: the shift between the two datums is a grid that is not here; places may be off by up to some hundred metres",
+            "note: the shift between the two datums is not known here, or a grid that is not here; places may be off by up to some hundred metres",
         );
     }
     Ok(Some(frame))

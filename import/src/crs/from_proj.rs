@@ -76,6 +76,7 @@ pub(super) fn system(text: &str) -> Option<System> {
         system.unit = metres.map(|m| Unit { name, size: HorizontalSize::Metres(exact_metres(m)) });
     }
     system.signs = signs(text);
+    system.is_south_first = word(text, "axis").is_some_and(|axis| axis.starts_with("sw"));
     let vertical_m =
         word(text, "vto_meter").and_then(number).or_else(|| word(text, "vunits").and_then(unit_m));
     system.vertical = vertical_m.map(|metres| Vertical {

@@ -13,6 +13,7 @@ const GEOCENTRIC: [&str; 1] = ["GEOCCS"];
 const LOCAL: [&str; 3] = ["LOCAL_CS", "ENGCRS", "ENGINEERINGCRS"];
 const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
 const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
+const DATUM: [&str; 5] = ["DATUM", "GEODETICDATUM", "GEODETICREFERENCEFRAME", "TRF", "ENSEMBLE"];
 const UNITS: [&str; 3] = ["UNIT", "LENGTHUNIT", "ANGLEUNIT"];
 
 /// The system that a text describes; `None` if it is no such text or says nothing of the horizontal.
@@ -63,7 +64,8 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
     };
     system.radius_m =
         spheroid.and_then(|found| Some(found.number(1)? * length(found))).filter(|radius| *radius > 0.0);
-    system.signs = signs(node);
+    system.datum = node.find(&DATUM).and_then(|datum| datum.text(0)).map(datum_key).unwrap_or_default();
+    (system.signs, system.is_south_first) = axes(node);
     if kind != Kind::Local {
         system.proj = projection(node, system.code);
         // A grid is named where the registry does not tell the shift.
@@ -83,6 +85,18 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
 fn plain_name(name: &str) -> String {
     let name = name.trim();
     if name.contains(' ') { name.to_owned() } else { name.replace('_', " ") }
+}
+
+/// The name of a datum as it is compared: letters and digits alone; empty for one that only says that it is not known.
+pub(super) fn datum_key(name: &str) -> String {
+    let key = squeezed(name);
+    let is_unknown = ["unknown", "unnamed", "notspecified"].iter().any(|word| key.contains(word));
+    if is_unknown { String::new() } else { key }
+}
+
+/// Small letters and digits alone.
+fn squeezed(text: &str) -> String {
+    text.chars().filter(char::is_ascii_alphanumeric).map(|letter| letter.to_ascii_lowercase()).collect()
 }
 
 /// The EPSG code of a node itself.
@@ -108,14 +122,50 @@ fn unit(node: &Node, kind: Kind) -> Option<Unit> {
     Some(Unit { name, size })
 }
 
-/// Whether the axis of eastings points west and that of northings south.
+/// Whether the axis of eastings points west and that of northings south, and whether the one to the south comes first.
+fn axes(node: &Node) -> ([f64; 2], bool) {
+    let directions: Vec<Option<&str>> = node.children(&["AXIS"]).map(direction).collect();
+    match directions.as_slice() {
+        [] => unsaid_axes(node),
+        [first, second, ..] => (signs(node), *first == Some("SOUTH") && *second == Some("WEST")),
+        _ => (signs(node), false),
+    }
+}
+
+/// The axes of a text that leaves them out, as its projection has them: GDAL writes none for the grids of South Africa, which count to the west and south, and ESRI turns Krovak's by
+/// parameters.
+fn unsaid_axes(node: &Node) -> ([f64; 2], bool) {
+    let method = node.find(&["PROJECTION", "METHOD"]).and_then(|method| method.text(0)).map(squeezed);
+    match method.as_deref() {
+        Some("transversemercatorsouthorientated") => ([-1.0; 2], false),
+        Some("krovak")
+            if parameter(node, "XY_Plane_Rotation") == Some(0.0)
+                && parameter(node, "X_Scale") == Some(1.0) =>
+        {
+            ([-1.0; 2], true)
+        }
+        _ => ([1.0; 2], false),
+    }
+}
+
+/// The number of a parameter of WKT 1.
+fn parameter(node: &Node, name: &str) -> Option<f64> {
+    let mut all = node.children(&["PARAMETER"]);
+    all.find(|parameter| parameter.text(0).is_some_and(|text| text.eq_ignore_ascii_case(name)))?.number(1)
+}
+
+/// The word for where an axis points.
+fn direction(axis: &Node) -> Option<&str> {
+    axis.values.iter().rev().find_map(|value| match value {
+        wkt::Value::Node(word) if word.values.is_empty() => Some(word.key.as_str()),
+        _ => None,
+    })
+}
+
 fn signs(node: &Node) -> [f64; 2] {
     let mut signs = [1.0; 2];
     for axis in node.children(&["AXIS"]) {
-        let direction = axis.values.iter().rev().find_map(|value| match value {
-            wkt::Value::Node(word) if word.values.is_empty() => Some(word.key.as_str()),
-            _ => None,
-        });
+        let direction = direction(axis);
         // Both axes of a polar projection point north, or south, from the pole: no turn is meant.
         let along_meridian = axis.child(&["MERIDIAN"]).is_some();
         match direction {
@@ -149,11 +199,24 @@ fn projection(node: &Node, code: Option<u32>) -> Option<String> {
     quiet(|| proj4wkt::wkt_to_projstring(&written(node)).ok())
         .flatten()
         .filter(|proj| proj.contains("+proj="))
-        .map(|proj| match proj.split_whitespace().any(|word| word == "+proj=mill") {
-            // Miller's is drawn on the sphere of the ellipsoid's area.
-            true => format!("{proj} +R_A"),
-            false => proj,
-        })
+        .map(|proj| completed(proj, node))
+}
+
+/// A string with what its parser leaves out.
+fn completed(proj: String, node: &Node) -> String {
+    let has = |words: &[&str]| {
+        proj.split_whitespace().any(|word| words.iter().any(|start| word.starts_with(start)))
+    };
+    // Miller's is drawn on the sphere of the ellipsoid's area.
+    if has(&["+proj=mill"]) {
+        return format!("{proj} +R_A");
+    }
+    // ESRI scales maps with two standard parallels, as those of Michigan are.
+    let scale = parameter(node, "Scale_Factor").filter(|scale| *scale > 0.0 && *scale != 1.0);
+    match scale {
+        Some(scale) if has(&["+proj=lcc"]) && !has(&["+k=", "+k_0="]) => format!("{proj} +k_0={scale}"),
+        _ => proj,
+    }
 }
 
 /// The string with another shift of datum.

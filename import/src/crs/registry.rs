@@ -9,12 +9,24 @@ const COMPOUND: &str = include_str!("registry/compound.txt");
 const MISSING: &str = include_str!("registry/missing.txt");
 const UNITS: &str = include_str!("registry/units.txt");
 
+/// PROJ strings that the list of definitions has wrong: a false easting of 40,000 chains taken for metres.
+const MENDED: [(u32, &str); 1] = [(
+    3167,
+    "+proj=omerc +lat_0=4 +lonc=102.25 +alpha=323.0257905 +k=0.99984 +x_0=804670.24 +y_0=0 +no_uoff +gamma=323.1301023611111 +a=6377295.664 +b=6356094.667915204 +to_meter=20.116756 +no_defs",
+)];
+
 /// A horizontal system.
 pub(super) enum Horizontal {
     /// Its WKT and its PROJ string.
     Text { wkt: &'static str, proj: &'static str },
     /// Its parts.
-    Parts { name: &'static str, unit_name: &'static str, size: HorizontalSize, proj: &'static str },
+    Parts {
+        name: &'static str,
+        unit_name: &'static str,
+        size: HorizontalSize,
+        datum: &'static str,
+        proj: &'static str,
+    },
 }
 
 /// A vertical system.
@@ -39,12 +51,13 @@ fn line<const N: usize>(table: &'static str, code: u32) -> Option<[&'static str;
 pub(super) fn horizontal(code: u32) -> Option<Horizontal> {
     let known = u16::try_from(code).ok().and_then(crs_definitions::from_code);
     if let Some(def) = known.filter(|def| !def.wkt.is_empty() && !def.wkt.starts_with("COMPD_CS")) {
-        return Some(Horizontal::Text { wkt: def.wkt, proj: def.proj4 });
+        let mended = MENDED.iter().find(|(mended, _)| *mended == code).map(|(_, proj)| *proj);
+        return Some(Horizontal::Text { wkt: def.wkt, proj: mended.unwrap_or(def.proj4) });
     }
-    let [name, kind, unit_name, size, proj] = line(MISSING, code)?;
+    let [name, kind, unit_name, size, datum, proj] = line(MISSING, code)?;
     let size: f64 = size.parse().ok()?;
     let size = if kind == "p" { HorizontalSize::Metres(size) } else { HorizontalSize::Radians(size) };
-    Some(Horizontal::Parts { name, unit_name, size, proj })
+    Some(Horizontal::Parts { name, unit_name, size, datum, proj })
 }
 
 /// Whether a system's own first axis goes north: so do those of longitudes and latitudes, and projected ones of which the list of definitions leaves the axes out, for such programs of

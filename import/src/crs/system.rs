@@ -47,10 +47,14 @@ pub(crate) struct System {
     pub(crate) vertical: Option<Vertical>,
     /// Semi-major axis of the ellipsoid, in metres.
     pub(crate) radius_m: Option<f64>,
+    /// The datum by its name, letters and digits alone; empty where it is not told. Systems of one datum are not shifted against each other.
+    pub(crate) datum: String,
     /// How it is projected, as a PROJ string.
     pub(crate) proj: Option<String>,
     /// Whether x grows to the east and y to the north (1) or the other way (-1).
     pub(crate) signs: [f64; 2],
+    /// Whether its first axis points south and its second west, so that its first number is no easting or westing.
+    pub(crate) is_south_first: bool,
     /// The system in full: WKT or a PROJ string.
     pub(crate) text: String,
     /// Where it was found.
@@ -67,8 +71,10 @@ impl System {
             unit: None,
             vertical: None,
             radius_m: None,
+            datum: String::new(),
             proj: None,
             signs: [1.0; 2],
+            is_south_first: false,
             text: String::new(),
             by: String::new(),
         }

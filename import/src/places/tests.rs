@@ -143,3 +143,13 @@ fn texts_and_codes_of_the_registry_agree() {
     }
     assert!(seen > 5000, "{seen}");
 }
+
+/// A system that the registry gives by its parts keeps its code and name in a terrain file, and a note about datums is made where they differ alone.
+#[test]
+fn systems_of_parts_keep_their_code() {
+    let file = header("EPSG:21226", [9, 9], [26_250_000.0, 6_000_000.0], [10.0; 2]);
+    assert_eq!(Crs::of(&file).unwrap().name(), "GSK-2011 / GSK 3GK zone 26 (EPSG:21226)");
+    let old = header("EPSG:26714", [9, 9], [500_000.0, 5_000_000.0], [10.0; 2]);
+    let is_rough = |crs: &str| Frame::of(&old, &Crs::named(crs).unwrap()).unwrap().is_rough();
+    assert!(is_rough("EPSG:4326") && !is_rough("EPSG:4267") && !is_rough("EPSG:26714"));
+}
