@@ -5,7 +5,10 @@ mod cases_support;
 
 use cases_support::{Built, built, case, refused};
 use terrasoar_import::OpenOptions;
+use terrasoar_import::export::{Numbers, export_heights};
 use terrasoar_layout::Remedy;
+use terrasoar_layout::progress::Silent;
+use terrasoar_layout::read::window::SampleWindow;
 
 const US_FOOT_M: f64 = 1200.0 / 3937.0;
 
@@ -262,4 +265,28 @@ fn depths_are_negated_and_bands_are_named() {
     assert!(refused(&case("01-northup.tif"), &wrong).0.contains("there is no band \"depth\""));
     let green = OpenOptions { band: Some("2".into()), ..OpenOptions::default() };
     assert!(built(&case("26-terrainrgb.tif"), &green, None).unwrap().height_m([0, 0]) == Some(138.0));
+}
+
+/// Ground that is exported and built again has its samples as far apart as before, and as high, whatever was known of its system: also where that is a unit alone.
+#[test]
+fn what_is_exported_is_as_large_and_as_high_as_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut seen = 0;
+    for entry in std::fs::read_dir(case("")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.extension().is_none_or(|ending| ending != "tif") || name.starts_with('d') {
+            continue;
+        }
+        let Ok(first) = built(&path, &OpenOptions::default(), None) else { continue };
+        let window = SampleWindow::of(first.terrain.grid());
+        let out = folder.path().join(&name);
+        export_heights(&first.terrain, &window, Some(Numbers::Float64), &out, &Silent).unwrap();
+        let again = built(&out, &OpenOptions::default(), None).unwrap();
+        let [a, b] = [&first, &again].map(Built::spacing_m);
+        assert!((0..2).all(|axis| (a[axis] / b[axis] - 1.0).abs() < 1e-9), "{name}: {a:?} {b:?}");
+        assert_eq!(first.heights_m(), again.heights_m(), "{name}");
+        seen += 1;
+    }
+    assert!(seen > 25, "{seen}");
 }

@@ -361,6 +361,27 @@ fn heights_beyond_the_files_range_make_it_rewrite_itself_aloud() {
     assert_eq!(bench.names(), ["a.edits", "land.iqt", "land.tif"]);
 }
 
+/// A rewritten file no longer knows the ground of before its edits, so a script that restores some of it is not begun there.
+#[test]
+fn nothing_is_restored_to_ground_that_a_rewriting_would_lose() {
+    let bench = with_script("restore rect 5,5,9,9\n\nset rect 20,20,22,22 to 3000\n");
+    let built = heights_of(&bench, "land.iqt");
+    bench.good(&["crater", "land.iqt", "--at", "140,140", "--radius", "90", "--depth", "9"]);
+    let dug = heights_of(&bench, "land.iqt");
+    let message = bench.bad(1, &["edit", "land.iqt", "--script", "a.edits"]);
+    assert!(message.contains("restore first") && message.contains("--force"), "{message}");
+    assert!(heights_of(&bench, "land.iqt") == dug);
+    // Without an edit before there is nothing to lose, and both are done.
+    bench.good(&["undo", "land.iqt"]);
+    bench.good(&["compact", "land.iqt"]);
+    bench.good(&["edit", "land.iqt", "--script", "a.edits"]);
+    let step = Terrain::open(&bench.path("land.iqt")).unwrap().header().scale.height_step_m;
+    let found = heights_of(&bench, "land.iqt");
+    let is_set = |at: usize| (20..=22).contains(&(at % 129)) && (20..=22).contains(&(at / 129));
+    let wanted = |at: usize| if is_set(at) { 3000.0 } else { built[at] };
+    assert!((0..found.len()).all(|at| (found[at] - wanted(at)).abs() <= step));
+}
+
 /// Craters scorch the picture over the ground, in the same commit; undoing brings both back.
 #[test]
 fn craters_scorch_the_picture() {

@@ -4,8 +4,8 @@
 //! unit is stated in any case. Heights are metres whatever they were measured in, so the vertical system is the one in metres, and is left out where there is none.
 
 use super::methods::{self, OWN, Value, Values};
-use crate::crs::{HorizontalSize, System, unit_of_code, vertical_in_metres};
-use crate::places::Crs;
+use crate::crs::{HorizontalSize, System, Unit, unit_of_code, vertical_in_metres};
+use crate::places::{Crs, coordinate_unit_m};
 use terrasoar_layout::file::header::Header;
 use terrasoar_layout::words::harmless;
 
@@ -54,7 +54,7 @@ pub(super) fn of(header: &Header, are_heights: bool) -> GeoKeys {
 fn horizontal(header: &Header) -> (Values, Named) {
     let Some(crs) = Crs::of(header) else {
         if header.sample_to_crs.is_some() {
-            return (Vec::new(), Named::Nothing);
+            return (unit_alone(header), Named::Nothing);
         }
         let local = [
             (1024, Value::Short(1)),
@@ -109,6 +109,16 @@ fn horizontal(header: &Header) -> (Values, Named) {
         values.push((type_key, Value::Short(OWN)));
     }
     (values, named)
+}
+
+/// The unit of coordinates that are in no system that is known; nothing where it is not known either.
+fn unit_alone(header: &Header) -> Values {
+    let Some(metres) = coordinate_unit_m(header) else { return Vec::new() };
+    let unit_m = Unit { name: String::new(), size: HorizontalSize::Metres(metres) };
+    let system = System { unit: Some(unit_m), ..System::unknown() };
+    let mut values = vec![(1024, Value::Short(1)), (3072, Value::Short(OWN))];
+    values.extend(unit(&system, false));
+    values
 }
 
 /// The system as WKT, if it is known so and the text goes into a citation.

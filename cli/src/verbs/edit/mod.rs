@@ -37,7 +37,7 @@ pub(super) struct Args {
     /// Script of edits
     #[arg(long, value_name = "E.edits")]
     script: PathBuf,
-    /// Rewrite the file for heights that it has no room for, also where overlays beside it would be lost
+    /// Rewrite the file for heights that it has no room for, also where overlays beside it, or the ground that the script restores, would be lost
     #[arg(long)]
     force: bool,
     #[command(flatten)]

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use terrasoar::edits::LoadedBatch;
 use terrasoar_layout::LayoutError;
-use terrasoar_layout::edit::{EditSession, Editor, Foresight, holds_heights, room_for, widen};
+use terrasoar_layout::edit::{Edit, EditSession, Editor, Foresight, holds_heights, room_for, widen};
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::file::header::Header;
 use terrasoar_layout::grid::Grid;
@@ -95,6 +95,7 @@ impl Work<'_> {
         self.widen(
             &header,
             heights_m,
+            self.batches,
             &format!("the edits lead to heights from {lowest} to {highest} m, and records of a file from {low} to {high} m cannot hold them"),
         )?;
         Ok(1)
@@ -167,10 +168,13 @@ impl Work<'_> {
             let before = told.batches;
             let failed = || match before {
                 0 => self.named(number, batch),
+                1 => format!(
+                    "{}; the batch before it is in the file, and terrasoar undo takes it back",
+                    self.named(number, batch)
+                ),
                 done => format!(
-                    "{}; {} before it are in the file, and terrasoar undo takes them back",
-                    self.named(number, batch),
-                    if done == 1 { "the batch".to_owned() } else { format!("{done} batches") },
+                    "{}; {done} batches before it are in the file, and terrasoar undo takes them back",
+                    self.named(number, batch)
                 ),
             };
             let mut widenings = 0;
@@ -190,7 +194,8 @@ impl Work<'_> {
                         // The rewriting takes the lock for itself, and some systems do not replace what is open.
                         ground_before = None;
                         drop(session);
-                        self.widen(&header, heights_m, &problem).with_context(failed)?;
+                        let rest = self.batches.get(number as usize - 1..).unwrap_or_default();
+                        self.widen(&header, heights_m, rest, &problem).with_context(failed)?;
                         session = self.target.session()?;
                         self.progress
                             .begin("editing", self.batches.iter().map(|b| b.edits.len() as u64).sum());
@@ -219,8 +224,8 @@ impl Work<'_> {
         Ok(told)
     }
 
-    /// Rewrites the file, which has this header, with room for other heights.
-    fn widen(&self, header: &Header, heights_m: [f64; 2], problem: &str) -> Result<()> {
+    /// Rewrites the file, which has this header, with room for other heights, before it goes on with `rest`.
+    fn widen(&self, header: &Header, heights_m: [f64; 2], rest: &[LoadedBatch], problem: &str) -> Result<()> {
         let file = self.target.file.display();
         if let Some(overlay) = self.target.overlay {
             let with =
@@ -228,6 +233,12 @@ impl Work<'_> {
             bail!(
                 "{}: {problem}; an overlay cannot change that: make a file of its own with `terrasoar compact {file}{with} -o NEW.iqt` and edit that",
                 overlay.display()
+            );
+        }
+        let restores = rest.iter().flat_map(|batch| &batch.edits).any(Edit::needs_original);
+        if restores && header.history.is_some() && !self.is_forced {
+            bail!(
+                "{file}: {problem}; the file would be rewritten for that, and the ground as it is now would be what the script's restore leads back to: restore first, in a script of its own, or rewrite it all the same (--force)"
             );
         }
         overlays::refuse_rewriting(self.target.file, self.is_forced)
