@@ -106,7 +106,8 @@ impl OpenedDem {
             (samples, map, sample_type) = (warp.samples(), Some(warp.map()), warp.sample_type());
             placed.push(warp.words());
             if warp.is_rough() {
-                warnings.push(shift_lost(&system.name));
+                let target = warp.system().map_or("", |target| target.name.as_str());
+                warnings.push(Warning::new(crs::shift_lost(&system.name, target)));
             }
             if let Some(target) = warp.system() {
                 system = System { vertical: system.vertical.clone(), ..target.clone() };
@@ -318,12 +319,4 @@ impl SampleSink for Voiding<'_> {
     fn put_void(&self, window: Window) -> Result<(), LayoutError> {
         self.sink.put_void(window)
     }
-}
-/// That places are off by a shift of datums.
-pub(crate) fn shift_lost(name: &str) -> Warning {
-    let name = terrasoar_layout::words::harmless(name, 80);
-    Warning::new(format!(
-        "the shift of datum of {} is not known here, or a grid that is not here, and was left out, so places may be off by up to some hundred metres; for true places bring the data over before: gdalwarp -t_srs SYSTEM INPUT output.tif",
-        if name.is_empty() { "the reference system" } else { name.as_str() }
-    ))
 }

@@ -213,3 +213,20 @@ fn what_has_no_way_to_the_terrain_is_refused_with_words() {
     let moon = refused("+proj=longlat +R=1737400 +no_defs").to_string();
     assert!(moon.contains("another body"), "{moon}");
 }
+
+/// A picture whose datum lies elsewhere by a shift that is not known is laid beside its place, which is told.
+#[test]
+fn a_picture_of_a_datum_that_is_not_tied_is_told() {
+    let header = terrain("d00-flat.tif");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.jpg");
+    std::fs::copy(case("d07-upper.jpg"), &path).unwrap();
+    std::fs::write(folder.path().join("p.jgw"), "2 0 0 -2 500000 5000300").unwrap();
+    let told = |system: &str| {
+        std::fs::write(folder.path().join("p.prj"), system).unwrap();
+        let brought = open_images_on(std::slice::from_ref(&path), &header).unwrap();
+        brought[0].info().notes.iter().any(|note| note.contains("shift between the datums"))
+    };
+    assert!(told("+proj=utm +zone=32 +datum=NAD27") && told("+proj=utm +zone=32 +ellps=intl"));
+    assert!(!told("+proj=utm +zone=32 +ellps=intl +towgs84=-87,-98,-121"));
+}

@@ -31,6 +31,17 @@ pub(crate) const MAX_TEXT_BYTES: u64 = wkt::MAX_BYTES as u64;
 /// Longest name kept.
 const MAX_NAME_CHARS: usize = 200;
 
+/// Words for places that are off by a shift between the datums of two systems, which is not known.
+pub(crate) fn shift_lost(from: &str, to: &str) -> String {
+    let [from, to] = [from, to].map(|name| match terrasoar_layout::words::harmless(name, 80) {
+        name if name.is_empty() => "a system without a name".to_owned(),
+        name => name,
+    });
+    format!(
+        "the shift between the datums of {from} and {to} is not known here, or a grid that is not here, and was left out, so places may be off by up to some hundred metres; for true places bring the data over before: gdalwarp -t_srs SYSTEM INPUT output.tif"
+    )
+}
+
 /// The unit by which terrain files know it.
 pub(crate) fn horizontal_unit(system: &System) -> HorizontalUnit {
     match system.unit.as_ref().map(|unit| unit.size) {

@@ -19,9 +19,9 @@ mod told;
 mod values;
 
 use crate::cells::{CELL, Cells, each_block_met};
-use crate::crs::System;
+use crate::crs::{System, shift_lost};
 use crate::guard::is_ours;
-use crate::opened::{Known, OpenedDem, shift_lost};
+use crate::opened::{Known, OpenedDem};
 use crate::options::{OpenOptions, Priority, Resampling};
 use crate::reader::{Declared, Reader, Said};
 use crate::value::Voids;
@@ -168,7 +168,11 @@ impl Mosaic {
         declared.notes = vec![note(&placed, &sheets, resampled, resampling, options)];
         let (vertical, unlike) = levels::of(&placed.sources);
         let is_rough = |tied: &&Tied| matches!((&tied.ground, &target.tied.ground), (Some(from), Some(to)) if from.is_rough_to(to));
-        let rough = placed.systems.iter().find(is_rough).map(|tied| shift_lost(&tied.system.name));
+        let rough = placed
+            .systems
+            .iter()
+            .find(is_rough)
+            .map(|tied| Warning::new(shift_lost(&tied.system.name, &target.tied.system.name)));
         let bytes = Store::all_bytes(sheets.iter().map(|sheet| &sheet.samples), sample_bytes);
         let bytes = if blend.is_some() { bytes.saturating_mul(2) } else { bytes };
         let allowed = options.memory_mib.unwrap_or(512) << 20;
