@@ -1,5 +1,7 @@
 //! The program `terrasoar`. The work is done in libraries; the command line is in [`verbs`].
 
+#[cfg(all(unix, feature = "view"))]
+mod asked;
 mod beside;
 mod fit;
 mod lost;

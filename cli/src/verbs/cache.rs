@@ -1,6 +1,6 @@
 //! Elevation data given where a terrain file is needed. It is built once into the user's folder for caches, and taken from there afterwards.
 //!
-//! A kept file is identified by what it was made of: name, length and time of the elevation data and of the files beside it, the content (the whole of small files, both ends of large ones), and this
+//! A kept file is identified by what it was made of: name, length and times of the elevation data and of the files beside it, the content (the whole of small files, both ends of large ones), and this
 //! program's version. **If any of that changes, it is built anew**, and so is a kept file that does not open. Files that were not used for a month are removed when another is built. Cost of a second call: reading
 //! at most 8 MiB.
 
@@ -9,6 +9,7 @@ use super::progress::Meter;
 use super::remedy;
 use anyhow::{Context, Result};
 use etcetera::{BaseStrategy, choose_base_strategy};
+use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -35,6 +36,8 @@ pub(super) fn of_elevation_data(path: &Path) -> Result<Option<PathBuf>> {
     if !fs::metadata(path).is_ok_and(|meta| meta.is_file()) {
         return Ok(None);
     }
+    // Before it is opened, so that what replaces it meanwhile is not taken for it.
+    let key = key(path).with_context(|| format!("{}: cannot read the elevation data", path.display()));
     let dem = match terrasoar_import::open_file(path) {
         Ok(dem) => dem,
         Err(LayoutError::NotThisFormat { .. }) => return Ok(None),
@@ -52,7 +55,7 @@ pub(super) fn of_elevation_data(path: &Path) -> Result<Option<PathBuf>> {
         .filter(|c| c.is_alphanumeric() || matches!(c, '-' | '_' | '.'))
         .take(MAX_NAME_CHARS)
         .collect();
-    let key = key(path).with_context(|| format!("{}: cannot read the elevation data", path.display()))?;
+    let key = key?;
     let kept = folder.join(format!("{stem}-{key:016x}.iqt"));
     if Terrain::open_unmapped(&kept).is_ok() {
         // So that it counts as asked for; where that fails it is built again in a month.
@@ -109,34 +112,54 @@ fn key(path: &Path) -> std::io::Result<u64> {
     file.seek(SeekFrom::Start(length.saturating_sub(END_BYTES).max(bytes.len() as u64)))?;
     file.take(END_BYTES).read_to_end(&mut bytes)?;
     bytes.hash(&mut key);
-    // World files, masks, projections: whatever shares the name.
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
-    let mut beside: Vec<PathBuf> = fs::read_dir(path.parent().unwrap_or(Path::new(".")))?
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|other| *other != path && other.extension().is_none_or(|end| end != "iqt"))
-        .filter(|other| {
-            let name = other.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-            name.strip_prefix(&stem).is_some_and(|rest| rest.starts_with('.'))
-        })
-        .collect();
-    beside.sort();
-    for other in beside {
-        // One that goes away meanwhile is not beside it.
-        let _ = describe(&other, &mut key);
-    }
     // What a virtual raster is made of.
-    for part in terrasoar_import::files_of(&path) {
-        let _ = describe(&part, &mut key);
+    let mut files = vec![path];
+    files.extend(terrasoar_import::files_of(&files[0]));
+    // One that goes away meanwhile is no part, and not beside one.
+    for part in &files[1..] {
+        let _ = describe(part, &mut key);
+    }
+    for other in beside(&files)? {
+        let _ = describe(&other, &mut key);
     }
     Ok(key.finish())
 }
 
-/// Name, length and time of a file.
+/// World files, masks, projections: whatever shares the name of one of the files, the first of which has a folder that can be listed.
+fn beside(files: &[PathBuf]) -> std::io::Result<Vec<PathBuf>> {
+    let mut stems: BTreeMap<&Path, HashSet<String>> = BTreeMap::new();
+    for file in files {
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+        stems.entry(file.parent().unwrap_or(Path::new("."))).or_default().insert(stem);
+    }
+    let mut found = Vec::new();
+    for (folder, stems) in stems {
+        let entries = match fs::read_dir(folder) {
+            Err(error) if files[0].parent() == Some(folder) => return Err(error),
+            Err(_) => continue,
+            Ok(entries) => entries,
+        };
+        found.extend(entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|other| {
+            let name = other.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+            let is_beside = name.match_indices('.').any(|(at, _)| stems.contains(&name[..at]));
+            is_beside && other.extension().is_none_or(|end| end != "iqt")
+        }));
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Name, length and times of a file. That of its last change cannot be set back, as copies and archives do with the other.
 fn describe(path: &Path, key: &mut DefaultHasher) -> std::io::Result<()> {
     let meta = fs::metadata(path)?;
     path.file_name().hash(key);
     meta.len().hash(key);
     meta.modified()?.hash(key);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        (meta.ino(), meta.ctime(), meta.ctime_nsec()).hash(key);
+    }
     Ok(())
 }
 
@@ -190,6 +213,22 @@ mod tests {
             .and_then(|file| file.set_modified(SystemTime::now()))
             .unwrap();
         seen.push(key(&at("a.tif")).unwrap());
+        // A file that is written over and keeps its time, as copies do; of a part of a virtual raster, and of what stands beside that, too.
+        if cfg!(unix) {
+            large[END_BYTES as usize + 9] = 1;
+            seen.push(write("a.tif", &large));
+            seen.push(write("a.tfw", b"2"));
+            let vrt = concat!(
+                r#"<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Int16" band="1"><SimpleSource>"#,
+                r#"<SourceFilename relativeToVRT="1">p/part.tif</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand></VRTDataset>"#
+            );
+            fs::create_dir(at("p")).unwrap();
+            seen.push(write("p/part.tif", b"1"));
+            seen.push(write("a.tif", vrt.as_bytes()));
+            for name in ["p/part.tif", "p/part.tif.msk", "p/part.tif.msk", "p/part.tif.aux.xml"] {
+                seen.push(write(name, b"2"));
+            }
+        }
         let count = seen.len();
         seen.sort_unstable();
         seen.dedup();

@@ -5,7 +5,7 @@
 //! the write fails with an error like that of a full disk, which is reported.
 //!
 //! SIGINT, SIGTERM and SIGHUP end the program as usual, but first files and folders that have a name before they are complete are removed (`unfinished` in the layout package). A thread waits for these signals,
-//! because a handler may do very little. Signals that the program was started to ignore, as by `nohup`, stay ignored. While a copy of the program does the work, the signal is passed to the copy.
+//! because a handler may do very little. A window saves its edits and closes first; a second signal ends it at once. Signals that the program was started to ignore, as by `nohup`, stay ignored. While a copy of the program does the work, the signal is passed to the copy.
 
 use signal_hook::consts::{SIGBUS, SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::{flag, low_level};
@@ -76,6 +76,11 @@ fn end(signal: i32) {
         let _ = unsafe { libc::kill(copy, signal) };
         return;
     }
+    #[cfg(feature = "view")]
+    if crate::asked::anybody() {
+        CAME.store(signal, Ordering::SeqCst);
+        return;
+    }
     unfinished::remove_all();
     // It comes back only for signals that end nothing.
     let _ = low_level::emulate_default_handler(signal);
@@ -98,9 +103,14 @@ pub(super) fn run_copy(command: &mut Command, after: impl FnOnce()) -> std::io::
     let status = copy.wait();
     COPY.store(0, Ordering::SeqCst);
     after();
+    end_as_asked();
+    status
+}
+
+/// Ends the program as the signal would have that came meanwhile, if one did.
+pub(super) fn end_as_asked() {
     let came = CAME.load(Ordering::SeqCst);
     if came != 0 {
         end(came);
     }
-    status
 }

@@ -65,7 +65,7 @@ fn after_help() -> String {
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let kept = args.terrain.kept()?;
-    window::run(Plan {
+    let done = window::run(Plan {
         is_kept: kept.is_some(),
         file: kept.unwrap_or_else(|| args.terrain.file.clone()),
         overlay: args.terrain.overlay.clone(),
@@ -81,5 +81,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
         exit_after_frames: args.exit_after_frames,
         lose_device_after_frames: args.lose_device_after_frames,
         cache_bytes: args.cache << 20,
-    })
+    });
+    #[cfg(unix)]
+    if done.is_ok() {
+        super::signals::end_as_asked();
+    }
+    done
 }

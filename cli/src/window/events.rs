@@ -10,6 +10,7 @@ use super::wake::Wake;
 use anyhow::{Result, anyhow};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use terrasoar::flight::Flight;
 use terrasoar_layout::read::terrain::Terrain;
@@ -27,20 +28,39 @@ pub(super) fn run(
     terrain: Terrain,
     flight: Option<Flight>,
 ) -> Result<()> {
+    let closing = Arc::new(AtomicBool::new(false));
+    #[cfg(unix)]
+    crate::asked::first({
+        let (closing, proxy) = (Arc::clone(&closing), event_loop.create_proxy());
+        move || {
+            closing.store(true, Ordering::SeqCst);
+            let _ = proxy.send_event(Wake);
+        }
+    });
     let mut session = Session {
+        closing,
         proxy: event_loop.create_proxy(),
         settings_path: Settings::path(),
         waiting: Some((plan, terrain, flight)),
         viewer: None,
         failure: None,
     };
-    event_loop
-        .run_app(&mut session)
-        .map_err(|e| anyhow!("the window's events came to an end: {}", plain(&e)))?;
+    let ended = event_loop.run_app(&mut session);
+    if let Err(error) = ended {
+        // Where the display is gone, edits are saved all the same.
+        let saved = session.viewer.as_mut().map_or(Ok(()), Viewer::close_workshop);
+        let words = anyhow!("the window's events came to an end: {}", plain(&error));
+        return Err(match saved {
+            Ok(()) => words,
+            Err(lost) => words.context(format!("the last edits could not be saved: {lost}")),
+        });
+    }
     session.failure.map_or(Ok(()), Err)
 }
 
 struct Session {
+    /// Whether a signal asks the program to end.
+    closing: Arc<AtomicBool>,
     proxy: EventLoopProxy<Wake>,
     settings_path: Option<PathBuf>,
     /// What the viewer is made of, once there may be a window.
@@ -128,7 +148,14 @@ impl ApplicationHandler<Wake> for Session {
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, _: Wake) {
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, _: Wake) {
+        if self.closing.swap(false, Ordering::SeqCst) {
+            let Some(viewer) = &mut self.viewer else { return event_loop.exit() };
+            viewer.quit();
+            if viewer.may_end() {
+                return self.end(event_loop);
+            }
+        }
         if let Some(viewer) = &self.viewer {
             viewer.window().request_redraw();
         }

@@ -203,6 +203,12 @@ impl Window<'_> {
         self.hear("moving false").map(drop)
     }
 
+    /// Sends a signal to the program, such as "-TERM".
+    pub fn signal(&self, name: &str) -> Result<(), String> {
+        let sent = Command::new("kill").args([name, &self.child.id().to_string()]).status();
+        sent.map_err(|e| e.to_string()).map(|_| ())
+    }
+
     /// Waits for the end; gives the exit code and what was said on standard error.
     pub fn end(mut self) -> Result<(Option<i32>, String, Vec<String>), String> {
         while let Ok(line) = self.lines.recv_timeout(PATIENCE) {

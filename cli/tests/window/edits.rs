@@ -217,8 +217,8 @@ pub fn edits_of_a_file_that_is_taken(display: &Display) -> Outcome {
     ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))
 }
 
-/// A terrain whose records hold its own heights only: the window makes room for a crater while it goes on, what is ordered meanwhile follows, and a window that is closed meanwhile
-/// loses nothing.
+/// A terrain whose records hold its own heights only: the window makes room for a crater while it goes on, what is ordered meanwhile follows, and a window that is closed meanwhile,
+/// or asked to end by a signal, loses nothing.
 pub fn edits_without_room(display: &Display) -> Outcome {
     let input = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/puget_sound_1025.png");
     let dem = terrasoar_import::open(&[input.into()]).map_err(|e| e.to_string())?;
@@ -227,7 +227,7 @@ pub fn edits_without_room(display: &Display) -> Outcome {
     let history_of = || -> Result<_, String> {
         history(&Terrain::open(&path).map_err(|e| e.to_string())?).map_err(|e| e.to_string())
     };
-    for quits_at_once in [false, true] {
+    for ends in ["at leisure", "at once", "by a signal"] {
         build(&*dem, &path, &options, &Silent).map_err(|e| e.to_string())?;
         let before = Terrain::open_unmapped(&path).map_err(|e| e.to_string())?;
         let mut window = display.open_file("tight.iqt", &["--size", "800x600", "--style", "relief"], "1")?;
@@ -241,7 +241,7 @@ pub fn edits_without_room(display: &Display) -> Outcome {
             window.key("bracketright")?;
         }
         window.xdotool(&["click", "1"])?;
-        if quits_at_once {
+        if ends != "at leisure" {
             window.hear("widening")?;
         } else {
             window.hear_all(&["widening", "widened", "saved", "at-rest"])?;
@@ -255,9 +255,13 @@ pub fn edits_without_room(display: &Display) -> Outcome {
             window.hear("redone")?;
             picture_that(&mut window, "the crater is back to the last pixel", |now| *now == cratered)?;
         }
-        window.key("ctrl+q")?;
+        match ends {
+            "by a signal" => window.signal("-TERM")?,
+            _ => window.key("ctrl+q")?,
+        }
         let (code, words, heard) = window.end()?;
-        ensure(code == Some(0), || format!("it ended with {code:?}: {words}"))?;
+        let wanted = if ends == "by a signal" { None } else { Some(0) };
+        ensure(code == wanted, || format!("{ends} it ended with {code:?}: {words}"))?;
         ensure(!heard.iter().any(|line| line.starts_with("trouble")), || format!("{heard:?}"))?;
         let told = history_of()?;
         ensure(told.len() == 1 && told[0].label == "crater", || format!("{told:?}"))?;
