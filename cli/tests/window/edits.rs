@@ -3,6 +3,7 @@
 use super::driver::{Display, Window};
 use super::{Outcome, ensure};
 use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
 use terrasoar_layout::build::{BuildOptions, HeightRoom, build, rebuild};
 use terrasoar_layout::edit::{EditSession, history};
@@ -270,6 +271,34 @@ pub fn edits_without_room(display: &Display) -> Outcome {
         ensure(report.is_sound(), || format!("{:?}", report.problems))?;
         let lowest_m = [&before, &terrain].map(|terrain| terrain.header().height_range_m[0]);
         ensure(lowest_m[1] < lowest_m[0], || format!("dug from {} to {} m", lowest_m[0], lowest_m[1]))?;
+    }
+    Ok(())
+}
+
+/// A session that ends while the button is still down: what was done of the ground is saved.
+pub fn signals_save_what_is_held(display: &Display) -> Outcome {
+    for signal in ["-TERM", "-HUP"] {
+        let path = copy(display, "held.iqt")?;
+        let mut window = display.open_file("held.iqt", &["--size", "640x480"], "1")?;
+        window.rest()?;
+        let id = window.focus()?;
+        window.xdotool(&["mousemove", "--window", &id, "450", "260"])?;
+        window.key("b")?;
+        window.key("b")?;
+        window.hear("tool raise")?;
+        window.xdotool(&["mousedown", "1"])?;
+        for _ in 0..6 {
+            window.xdotool(&["mousemove_relative", "--", "15", "6"])?;
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+        window.signal(signal)?;
+        let (code, words, heard) = window.end()?;
+        ensure(code.is_none(), || format!("{signal}: it ended with {code:?}: {words}"))?;
+        ensure(!heard.iter().any(|line| line.starts_with("trouble")), || format!("{heard:?}"))?;
+        let told = history(&Terrain::open(&path).map_err(|e| e.to_string())?).map_err(|e| e.to_string())?;
+        ensure(told.len() == 1 && told[0].label == "raise", || format!("{signal}: {told:?}"))?;
+        let mut up = display.in_display(Command::new("xdotool"));
+        up.args(["mouseup", "1"]).status().map_err(|e| e.to_string())?;
     }
     Ok(())
 }

@@ -30,6 +30,7 @@ const TESTS: &[(&str, Test)] = &[
     ("ground_and_picture_changed_by_hand", edits::ground_and_picture_changed_by_hand),
     ("edits_of_a_file_that_is_taken", edits::edits_of_a_file_that_is_taken),
     ("edits_without_room", edits::edits_without_room),
+    ("signals_save_what_is_held", edits::signals_save_what_is_held),
     ("windows_of_ones_own", example::windows_of_ones_own),
     ("broken_settings", troubles::broken_settings),
     ("lost_device", troubles::lost_device),
