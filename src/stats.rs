@@ -31,6 +31,16 @@ pub struct FrameStats {
     pub pages_touched: u64,
     /// Bytes of records read, every read counted.
     pub record_bytes_touched: u64,
+    /// Pages that were read for the update, each as often as it was; this and the next four are `None` for records that lie in memory or are mapped.
+    pub pages_read: Option<u64>,
+    /// Of packed terrain, tiles that were unpacked for it, each as often as it was; `None` for terrain that is not packed, as are the next and the last of these.
+    pub tiles_unpacked: Option<u64>,
+    /// Bytes of these tiles in the file.
+    pub tile_bytes_read: Option<u64>,
+    /// Time that the update waited for pages, in milliseconds; over all threads, where the first frame or one after a jump is made by several.
+    pub read_ms: Option<f64>,
+    /// The part of it spent on unpacking tiles.
+    pub unpack_ms: Option<f64>,
     /// Time the mesh update took, in milliseconds. Times are the only figures that differ between two replays.
     pub update_ms: f64,
     /// The part of it spent on finding what is over, in microseconds; this and the next two are `None` for engines without such parts.
@@ -111,6 +121,16 @@ pub struct ReplaySummary {
     pub pages_touched_total: u64,
     /// Sum over all frames.
     pub record_bytes_touched_total: u64,
+    /// Sum over all frames; this and the next four are `None` as those of [`FrameStats`] are.
+    pub pages_read_total: Option<u64>,
+    /// Sum over all frames.
+    pub tiles_unpacked_total: Option<u64>,
+    /// Sum over all frames.
+    pub tile_bytes_read_total: Option<u64>,
+    /// Sum over all frames, in milliseconds.
+    pub read_ms_total: Option<f64>,
+    /// Sum over all frames, in milliseconds.
+    pub unpack_ms_total: Option<f64>,
 }
 
 /// One engine of a comparison: its figures and their ratio to the first engine named, first frame left out.
@@ -202,6 +222,11 @@ impl ReplaySummary {
             mesh_hash: format!("{hash:016x}"),
             pages_touched_total: sum(|f| f.pages_touched),
             record_bytes_touched_total: sum(|f| f.record_bytes_touched),
+            pages_read_total: frames.iter().map(|f| f.pages_read).sum(),
+            tiles_unpacked_total: frames.iter().map(|f| f.tiles_unpacked).sum(),
+            tile_bytes_read_total: frames.iter().map(|f| f.tile_bytes_read).sum(),
+            read_ms_total: frames.iter().map(|f| f.read_ms).sum(),
+            unpack_ms_total: frames.iter().map(|f| f.unpack_ms).sum(),
         }
     }
 }

@@ -22,8 +22,9 @@ use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Area, Changes, Crater, Edit, Editor, SampleRect};
 use terrasoar_layout::error::LayoutError;
-use terrasoar_layout::grid::record::{RecordCodec, RecordKind};
+use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -48,8 +49,8 @@ fn terrains() -> [Arc<Terrain>; 4] {
 }
 
 /// Tells an engine what changed.
-fn tell<'r, C: RecordCodec>(
-    engine: &mut impl Engine<Store = EditedRecords<'r, C>>,
+fn tell<S: CompleteStore>(
+    engine: &mut impl Engine<Store = EditedRecords<S>>,
     editor: &Editor,
     changes: &Changes,
 ) {

@@ -58,9 +58,6 @@ pub enum TileService {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// The terrain's source does not lend its bytes.
-    #[error("{0}: pictures need a mapped or in-memory terrain")]
-    NotInAddressSpace(String),
     /// The scene was made for another terrain, or for this one opened another time.
     #[error("{0}: the scene was made for another terrain; make one for this ground")]
     AnotherTerrain(String),

@@ -20,11 +20,11 @@ pub struct Studio<'a> {
 }
 
 impl<'a> Studio<'a> {
-    /// A studio for a mapped terrain, on the best adapter there is.
+    /// A studio for a terrain, on the best adapter there is. Pages of one that does not lend its records are read as views need them.
     ///
     /// # Errors
     /// [`SceneError::Render`] with [`RenderError::NoAdapter`] where there is none, which says what to install; a size that the device cannot have;
-    /// [`SceneError::NotInAddressSpace`] for a terrain that is not mapped.
+    /// [`SceneError::Layout`] for damage and I/O.
     pub fn new(
         terrain: &'a Terrain,
         engine: PictureEngine,
@@ -32,9 +32,6 @@ impl<'a> Studio<'a> {
         viewport: Viewport,
     ) -> Result<Self, SceneError> {
         let gpu = Gpu::headless_blocking()?;
-        if !terrain.lends_records() {
-            return Err(SceneError::NotInAddressSpace(terrain.path().display().to_string()));
-        }
         let ground = Ground::mapped(terrain, engine, culling)?;
         let scene = Scene::new(&ground, &gpu, SceneOptions::default())?;
         let offscreen = offscreen(&gpu, viewport)?;
@@ -65,7 +62,7 @@ impl<'a> Studio<'a> {
     /// A picture of the mesh as it is: three bytes a pixel, row by row from the top.
     ///
     /// # Errors
-    /// [`SceneError::Render`].
+    /// [`SceneError::Render`]; [`SceneError::Layout`] if the ground that was flown over could not be read.
     pub fn picture(&mut self, view: &View, look: &Look) -> Result<Vec<u8>, SceneError> {
         match self.try_picture(view, look) {
             Err(SceneError::Render(RenderError::DeviceLost { .. })) => {
@@ -82,6 +79,7 @@ impl<'a> Studio<'a> {
         let Gpu { device, queue, watch, .. } = &self.gpu;
         let mut encoder = device.create_command_encoder(&Default::default());
         self.scene.sync(&mut self.ground, &mut encoder, view, look)?;
+        self.ground.take_error().map_or(Ok(()), Err)?;
         self.scene.draw(&mut encoder, self.offscreen.target(), view, look, None)?;
         queue.submit([encoder.finish()]);
         let rgba = self.offscreen.read_rgba(device, queue);

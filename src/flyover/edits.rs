@@ -6,8 +6,8 @@ use crate::refine::change::GroundChange;
 use std::sync::Arc;
 use std::time::Instant;
 use terrasoar_layout::edit::{Changes, Edit, Editor};
-use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Edits that happen before one frame of a flight.
@@ -69,7 +69,7 @@ impl<'b> Changing<'b> {
     }
 }
 
-impl<'r, C: RecordCodec, E: Engine<Store = EditedRecords<'r, C>>> Ground<E> for Changing<'_> {
+impl<S: CompleteStore, E: Engine<Store = EditedRecords<S>>> Ground<E> for Changing<'_> {
     fn edit(&mut self, frame: usize) -> Result<Edited, ReplayError> {
         self.changes.clear();
         let start = Instant::now();
@@ -93,7 +93,7 @@ impl<'r, C: RecordCodec, E: Engine<Store = EditedRecords<'r, C>>> Ground<E> for 
 
 impl Changing<'_> {
     /// Both at once, for those who do not time.
-    pub(super) fn edit_and_tell<'r, C: RecordCodec, E: Engine<Store = EditedRecords<'r, C>>>(
+    pub(super) fn edit_and_tell<S: CompleteStore, E: Engine<Store = EditedRecords<S>>>(
         &mut self,
         frame: usize,
         engine: &mut E,
@@ -104,7 +104,7 @@ impl Changing<'_> {
 }
 
 /// Replaces the pages that changed in an engine's store, and tells the engine.
-fn tell_engine<'r, C: RecordCodec, E: Engine<Store = EditedRecords<'r, C>>>(
+fn tell_engine<S: CompleteStore, E: Engine<Store = EditedRecords<S>>>(
     editor: &Editor,
     changes: &Changes,
     engine: &mut E,

@@ -1,15 +1,23 @@
 //! A frame's drawn triangles as a mesh for other programs.
 
+use super::ReplayError;
 use crate::mesh::{IndexedMesh, Triangle, is_drawn};
 use crate::refine::Engine;
 use std::collections::HashMap;
-use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::read::store::{CompleteStore, RecordStore};
 
 /// The mesh of an engine over its records.
-pub(super) fn collect_mesh<E: Engine>(mut engine: E) -> IndexedMesh {
+///
+/// # Errors
+/// What the records could not be read for.
+pub(super) fn collect_mesh<E: Engine>(mut engine: E) -> Result<IndexedMesh, ReplayError>
+where
+    E::Store: CompleteStore,
+{
     let mut triangles: Vec<Triangle> = Vec::new();
     engine.for_each_triangle(&mut |triangle| triangles.push(triangle));
-    mesh_of(&triangles, engine.store_mut())
+    let mesh = mesh_of(&triangles, engine.store_mut());
+    engine.store_mut().take_error().map_or(Ok(mesh), |error| Err(error.into()))
 }
 
 fn mesh_of(triangles: &[Triangle], records: &impl RecordStore) -> IndexedMesh {

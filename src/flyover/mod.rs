@@ -7,27 +7,31 @@
 mod edits;
 mod mesh;
 mod passes;
+mod quality;
 mod sets;
 
 /// One frame's drawn triangles.
 pub use crate::mesh::IndexedMesh as FrameMesh;
 pub use edits::TimedBatch;
+pub use quality::Quality;
 
 use crate::flight::FlightFrame;
-use crate::refine::kinetic::{Budget, Kinetic};
+use crate::refine::kinetic::{Budget, Kinetic, alone};
 use crate::refine::naive::Naive;
 use crate::refine::smart::Smart;
 use crate::refine::soar::Soar;
-use crate::refine::{Culling, Engine, Unobserved};
+use crate::refine::{Engine, Unobserved};
 use crate::stats::FrameStats;
-use crate::view::{ErrorMetric, View, Viewport};
-use edits::{Changing, Still};
+use crate::view::Viewport;
+use edits::{Changing, Ground, Still};
 use mesh::collect_mesh;
 use passes::{FrameTimes, count_frames, time_updates};
 use sets::{FrameSets, not_in};
 use std::sync::Arc;
+use std::time::Duration;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -87,9 +91,6 @@ pub enum ReplayError {
     /// The vertical exaggeration is not usable.
     #[error("a vertical exaggeration is a number from 0.01 to 100, not {0}")]
     Exaggeration(f64),
-    /// The terrain's source does not lend its bytes.
-    #[error("{0}: refinement needs a mapped or in-memory terrain")]
-    NotInAddressSpace(String),
     /// The terrain cannot be read, or not be edited as asked.
     #[error(transparent)]
     Terrain(#[from] LayoutError),
@@ -110,96 +111,6 @@ pub enum ReplayError {
         /// Last frame.
         last: usize,
     },
-}
-
-/// Picture and precision of a replay.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct Quality {
-    /// Size of the picture.
-    pub viewport: Viewport,
-    /// Tolerance in pixels, 0.01 to 10,000.
-    pub tolerance_px: f64,
-    /// How errors are measured on the screen.
-    pub metric: ErrorMetric,
-    /// What heights are multiplied by, 0.01 to 100.
-    pub vertical_exaggeration: f64,
-    /// Where what lies out of view is left out.
-    pub culling: Culling,
-    /// Vertex tests of one frame that [`EngineKind::Kinetic`] may make; other engines know no bounds.
-    pub budget_tests: Option<u64>,
-}
-
-impl Default for Quality {
-    fn default() -> Self {
-        Self {
-            viewport: Viewport::default(),
-            tolerance_px: 1.0,
-            metric: ErrorMetric::default(),
-            vertical_exaggeration: 1.0,
-            culling: Culling::default(),
-            budget_tests: None,
-        }
-    }
-}
-
-impl Quality {
-    /// This quality with a picture of another size.
-    pub fn viewport(self, viewport: Viewport) -> Self {
-        Self { viewport, ..self }
-    }
-
-    /// This quality with another tolerance in pixels.
-    pub fn tolerance_px(self, tolerance_px: f64) -> Self {
-        Self { tolerance_px, ..self }
-    }
-
-    /// This quality with errors measured in another way.
-    pub fn metric(self, metric: ErrorMetric) -> Self {
-        Self { metric, ..self }
-    }
-
-    /// This quality with heights multiplied by another number.
-    pub fn vertical_exaggeration(self, vertical_exaggeration: f64) -> Self {
-        Self { vertical_exaggeration, ..self }
-    }
-
-    /// This quality with another way of culling.
-    pub fn culling(self, culling: Culling) -> Self {
-        Self { culling, ..self }
-    }
-
-    /// This quality with so many vertex tests a frame at most.
-    pub fn budget_tests(self, budget_tests: u64) -> Self {
-        Self { budget_tests: Some(budget_tests), ..self }
-    }
-}
-
-impl Quality {
-    /// Checks it, and that `kind` can fly over `terrain` at all.
-    fn check(self, terrain: &Terrain, kind: EngineKind) -> Result<Self, ReplayError> {
-        let steps = terrain.grid().side_steps();
-        if kind == EngineKind::Naive && steps > crate::refine::naive::MOST_STEPS {
-            return Err(ReplayError::TooLargeForNaive { steps });
-        }
-        if !(0.01..=10_000.0).contains(&self.tolerance_px) {
-            return Err(ReplayError::Tolerance(self.tolerance_px));
-        }
-        if !(0.01..=100.0).contains(&self.vertical_exaggeration) {
-            return Err(ReplayError::Exaggeration(self.vertical_exaggeration));
-        }
-        let Viewport { width_px, height_px } = self.viewport;
-        if [width_px, height_px].iter().any(|p| !(1..=65_536).contains(p)) {
-            return Err(ReplayError::Viewport(self.viewport));
-        }
-        Ok(self)
-    }
-
-    /// A frame of a flight at this quality.
-    pub fn view(self, frame: &FlightFrame) -> View {
-        let view = frame.view(self.viewport, self.tolerance_px);
-        View { vertical_exaggeration: self.vertical_exaggeration, metric: self.metric, ..view }
-    }
 }
 
 /// Runs `$body` with `$engine` bound to a new engine of `$kind` over `$records`, as `$quality` wants it.
@@ -229,8 +140,10 @@ macro_rules! with_engine {
 
 /// Flies `frames` over `terrain` with one engine. `done` hears the number of frame passes finished, twice the frames in all.
 ///
+/// The figures of a terrain whose pages are read on the way ([`Quality::cache_bytes`]) are those of one whose records are at hand, and tell what was read besides.
+///
 /// # Errors
-/// [`ReplayError`] for a tolerance, viewport or source that cannot be used.
+/// [`ReplayError`] for a tolerance or viewport that cannot be used; damage and I/O.
 pub fn replay(
     terrain: &Terrain,
     frames: &[FlightFrame],
@@ -239,10 +152,48 @@ pub fn replay(
     done: &mut dyn FnMut(u64),
 ) -> Result<Vec<FrameStats>, ReplayError> {
     let quality = quality.check(terrain, kind)?;
-    with_records!(records_of(terrain)?, records => {
+    if let Some(cache_bytes) = terrain.cache_bytes(quality.cache_bytes) {
+        return over_pages(terrain, frames, quality, kind, cache_bytes, None, done);
+    }
+    with_records!(terrain.records()?, records => {
         let times = with_engine!(kind, records.clone(), quality, engine => time_updates(engine, &mut Still, frames, quality, done))?;
         let stats = with_engine!(kind, records.clone(), quality, engine => count_frames(engine, &mut Still, &records, frames, quality, done))?;
         Ok(timed(stats, times, kind))
+    })
+}
+
+/// Edits on the way, and the terrain that they change in memory.
+type Edits<'e> = (&'e Arc<Terrain>, &'e [TimedBatch]);
+
+/// A replay over pages that are read into memory of a fixed size. Each pass begins with none. The counting one shares no work, so that what it reads repeats.
+fn over_pages(
+    terrain: &Terrain,
+    frames: &[FlightFrame],
+    quality: Quality,
+    kind: EngineKind,
+    cache_bytes: u64,
+    edits: Option<Edits<'_>>,
+    done: &mut dyn FnMut(u64),
+) -> Result<Vec<FrameStats>, ReplayError> {
+    with_records!(terrain.paged(cache_bytes), records => {
+        let times = with_engine!(kind, EditedRecords::new(records.clone()), quality, engine => {
+            time_updates(engine, &mut *ground_of(edits)?, frames, quality, done)
+        })?;
+        let records = records.anew();
+        let stats = alone(|| with_engine!(kind, EditedRecords::new(records.clone()), quality, engine => {
+            count_frames(engine, &mut *ground_of(edits)?, &records, frames, quality, done)
+        }))?;
+        Ok(timed(stats, times, kind))
+    })
+}
+
+/// The ground as it is, or edited.
+fn ground_of<'e, S: CompleteStore, E: Engine<Store = EditedRecords<S>>>(
+    edits: Option<Edits<'e>>,
+) -> Result<Box<dyn Ground<E> + 'e>, ReplayError> {
+    Ok(match edits {
+        None => Box::new(Still),
+        Some((terrain, batches)) => Box::new(Changing::new(terrain, batches)?),
     })
 }
 
@@ -273,12 +224,18 @@ pub fn replay_edited(
     done: &mut dyn FnMut(u64),
 ) -> Result<Vec<FrameStats>, ReplayError> {
     let quality = quality.check(terrain, kind)?;
-    with_records!(records_of(terrain)?, records => {
+    let edits = Some((terrain, batches));
+    if let Some(cache_bytes) = terrain.cache_bytes(quality.cache_bytes) {
+        return over_pages(terrain, frames, quality, kind, cache_bytes, edits, done);
+    }
+    with_records!(terrain.records()?, records => {
         let store = || EditedRecords::new(records.clone());
-        let mut ground = Changing::new(terrain, batches)?;
-        let times = with_engine!(kind, store(), quality, engine => time_updates(engine, &mut ground, frames, quality, done))?;
-        let mut ground = Changing::new(terrain, batches)?;
-        let stats = with_engine!(kind, store(), quality, engine => count_frames(engine, &mut ground, &records, frames, quality, done))?;
+        let times = with_engine!(kind, store(), quality, engine => {
+            time_updates(engine, &mut *ground_of(edits)?, frames, quality, done)
+        })?;
+        let stats = with_engine!(kind, store(), quality, engine => {
+            count_frames(engine, &mut *ground_of(edits)?, &records, frames, quality, done)
+        })?;
         Ok(timed(stats, times, kind))
     })
 }
@@ -294,15 +251,11 @@ fn timed(mut stats: Vec<FrameStats>, times: Vec<FrameTimes>, kind: EngineKind) -
             (stats.expired, stats.slots_written, stats.patch_bytes) = (None, None, None);
         }
         stats.edit_ms = times.edit_ms;
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        stats.read_ms = times.read.map(|read| ms(read.time));
+        stats.unpack_ms = times.read.and_then(|read| Some(ms(read.unpacked?.time)));
     }
     stats
-}
-
-fn records_of(terrain: &Terrain) -> Result<terrasoar_layout::read::kinds::AnyRecords<'_>, ReplayError> {
-    if !terrain.lends_records() {
-        return Err(ReplayError::NotInAddressSpace(terrain.path().display().to_string()));
-    }
-    Ok(terrain.records()?)
 }
 
 /// Mean over pairs of consecutive frames of the share of the second one's triangles that the first did not have, in percent.
@@ -315,19 +268,30 @@ pub fn mean_incoherence_percent(
     quality: Quality,
 ) -> Result<f64, ReplayError> {
     let quality = quality.check(terrain, EngineKind::Soar)?;
-    with_records!(records_of(terrain)?, records => {
-        let mut engine = Soar::new(records.clone(), quality.culling);
-        let mut sets = |frame: &FlightFrame| {
-            engine.update(&quality.view(frame), &mut Unobserved);
-            FrameSets::of(&engine, &records)
-        };
-        let mut sum = 0.0;
-        for (first, second) in pairs {
-            let (first, second) = (sets(first), sets(second));
-            sum += 100.0 * not_in(&second.triangles, &first.triangles) as f64 / second.triangles.len().max(1) as f64;
-        }
-        Ok(sum / pairs.len().max(1) as f64)
-    })
+    match terrain.cache_bytes(quality.cache_bytes) {
+        None => with_records!(terrain.records()?, records => mean_incoherence_over(records, pairs, quality)),
+        Some(bytes) => with_records!(terrain.paged(bytes), records => mean_incoherence_over(records, pairs, quality)),
+    }
+}
+
+fn mean_incoherence_over<S: CompleteStore + Clone>(
+    records: S,
+    pairs: &[(FlightFrame, FlightFrame)],
+    quality: Quality,
+) -> Result<f64, ReplayError> {
+    let mut engine = Soar::new(records.clone(), quality.culling);
+    let mut sets = |frame: &FlightFrame| {
+        engine.update(&quality.view(frame), &mut Unobserved);
+        FrameSets::of(&engine, &records)
+    };
+    let mut sum = 0.0;
+    for (first, second) in pairs {
+        let (first, second) = (sets(first), sets(second));
+        records.take_error().map_or(Ok(()), Err)?;
+        sum += 100.0 * not_in(&second.triangles, &first.triangles) as f64
+            / second.triangles.len().max(1) as f64;
+    }
+    Ok(sum / pairs.len().max(1) as f64)
 }
 
 /// The mesh that an engine draws in frame `frame` after flying all frames before it, over ground that is edited on the way as `batches` say.
@@ -346,13 +310,33 @@ pub fn frame_mesh(
     let Some(flown) = frames.get(..=frame) else {
         return Err(ReplayError::NoSuchFrame { asked: frame, last: frames.len().saturating_sub(1) });
     };
+    match terrain.cache_bytes(quality.cache_bytes) {
+        None => with_records!(terrain.records()?, records => {
+            frame_mesh_over(records, terrain, flown, quality, kind, batches)
+        }),
+        Some(bytes) => with_records!(terrain.paged(bytes), records => {
+            frame_mesh_over(records, terrain, flown, quality, kind, batches)
+        }),
+    }
+}
+
+/// The mesh of the last frame.
+fn frame_mesh_over<S: CompleteStore>(
+    records: S,
+    terrain: &Arc<Terrain>,
+    frames: &[FlightFrame],
+    quality: Quality,
+    kind: EngineKind,
+    batches: &[TimedBatch],
+) -> Result<FrameMesh, ReplayError> {
     let mut ground = Changing::new(terrain, batches)?;
-    with_records!(records_of(terrain)?, records => with_engine!(kind, EditedRecords::new(records), quality, engine => {
+    with_engine!(kind, EditedRecords::new(records), quality, engine => {
         let mut engine = engine;
-        for (i, frame) in flown.iter().enumerate() {
+        for (i, frame) in frames.iter().enumerate() {
             ground.edit_and_tell(i, &mut engine)?;
             engine.update(&quality.view(frame), &mut Unobserved);
+            engine.store_mut().take_error().map_or(Ok(()), Err)?;
         }
-        Ok(collect_mesh(engine))
-    }))
+        collect_mesh(engine)
+    })
 }

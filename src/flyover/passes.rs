@@ -8,8 +8,7 @@ use crate::refine::{Engine, Phase, Probe};
 use crate::stats::FrameStats;
 use std::time::Instant;
 use terrasoar_layout::grid::record::RecordCodec;
-use terrasoar_layout::read::records::Records;
-use terrasoar_layout::read::store::page_of;
+use terrasoar_layout::read::store::{CompleteStore, PagesRead, RecordStore, page_of};
 
 /// Times of one frame.
 pub(super) struct FrameTimes {
@@ -17,6 +16,8 @@ pub(super) struct FrameTimes {
     /// Scan, test, apply.
     pub(super) phases_us: [f64; 3],
     pub(super) edit_ms: f64,
+    /// What reading took of the update.
+    pub(super) read: Option<PagesRead>,
 }
 
 /// Reads the clock at the seams of an update.
@@ -43,44 +44,74 @@ impl Probe for PhaseTimer {
 /// Flies and times.
 pub(super) fn time_updates<E: Engine>(
     mut engine: E,
-    ground: &mut impl Ground<E>,
+    ground: &mut dyn Ground<E>,
     frames: &[FlightFrame],
     quality: Quality,
     done: &mut dyn FnMut(u64),
-) -> Result<Vec<FrameTimes>, ReplayError> {
+) -> Result<Vec<FrameTimes>, ReplayError>
+where
+    E::Store: CompleteStore,
+{
     let mut times = Vec::with_capacity(frames.len());
     for (i, frame) in frames.iter().enumerate() {
         let view = quality.view(frame);
         let edit_ms = ground.edit(i)?.edit_ms;
+        let before = engine.store_mut().read_so_far();
         let start = Instant::now();
         ground.tell(&mut engine)?;
         let mut timer = PhaseTimer { since: start, phase: Phase::Done as usize, phases_us: [0.0; 3] };
         engine.update(&view, &mut timer);
         let update_ms = start.elapsed().as_secs_f64() * 1e3;
-        times.push(FrameTimes { update_ms, phases_us: timer.phases_us, edit_ms });
+        let read = read_since(&mut engine, before)?;
+        times.push(FrameTimes { update_ms, phases_us: timer.phases_us, edit_ms, read });
         done(i as u64 + 1);
     }
     Ok(times)
 }
 
+/// What an engine's store has read since `before`.
+///
+/// # Errors
+/// What it could not read: the engine's mesh is not to be used then.
+fn read_since<E: Engine>(
+    engine: &mut E,
+    before: Option<PagesRead>,
+) -> Result<Option<PagesRead>, ReplayError>
+where
+    E::Store: CompleteStore,
+{
+    let store = engine.store_mut();
+    let now = store.read_so_far();
+    match store.take_error() {
+        Some(error) => Err(error.into()),
+        None => Ok(now.zip(before).map(|(now, before)| now.since(before))),
+    }
+}
+
 /// Flies and counts. `records` tell which triangles are drawn.
-pub(super) fn count_frames<E: Engine, C: RecordCodec>(
+pub(super) fn count_frames<E: Engine>(
     mut engine: E,
-    ground: &mut impl Ground<E>,
-    records: &Records<'_, C>,
+    ground: &mut dyn Ground<E>,
+    records: &impl CompleteStore,
     frames: &[FlightFrame],
     quality: Quality,
     done: &mut dyn FnMut(u64),
-) -> Result<Vec<FrameStats>, ReplayError> {
+) -> Result<Vec<FrameStats>, ReplayError>
+where
+    E::Store: CompleteStore,
+{
     let mut before = FrameSets::default();
     let mut stats = Vec::with_capacity(frames.len());
     for (i, frame) in frames.iter().enumerate() {
         let edited_records = ground.edit(i)?.records;
         ground.tell(&mut engine)?;
-        let mut counter = Counter::<C>::default();
+        let before_update = engine.store_mut().read_so_far();
+        let mut counter = Counter::<CodecOf<E>>::default();
         let vertex_tests = engine.update(&quality.view(frame), &mut counter);
+        let read = read_since(&mut engine, before_update)?;
         let pages_touched = distinct(&mut counter.pages);
         let sets = FrameSets::of(&engine, records);
+        records.take_error().map_or(Ok(()), Err)?;
         let work = engine.work();
         stats.push(FrameStats {
             frame: i as u64,
@@ -95,7 +126,10 @@ pub(super) fn count_frames<E: Engine, C: RecordCodec>(
             late: work.late,
             late_error_px: work.late_error_px,
             pages_touched,
-            record_bytes_touched: counter.reads * C::BYTES as u64,
+            record_bytes_touched: counter.reads * CodecOf::<E>::BYTES as u64,
+            pages_read: read.map(|read| read.pages),
+            tiles_unpacked: read.and_then(|read| Some(read.unpacked?.tiles)),
+            tile_bytes_read: read.and_then(|read| Some(read.unpacked?.bytes)),
             edited_records,
             mesh_hash: sets.hash(),
             ..FrameStats::default()
@@ -105,6 +139,9 @@ pub(super) fn count_frames<E: Engine, C: RecordCodec>(
     }
     Ok(stats)
 }
+
+/// How the records of an engine's store are coded.
+type CodecOf<E> = <<E as Engine>::Store as RecordStore>::Codec;
 
 /// Counts reads and remembers pages.
 struct Counter<C> {

@@ -10,20 +10,20 @@ use crate::refine::soar::Soar;
 use crate::refine::{Culling, Engine, Unobserved, Work};
 use crate::stream::{HeightAt, height_at};
 use crate::view::View;
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::grid::record::RecordCodec;
-use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::store::CompleteStore;
 
 /// SOAR and its mesh.
-pub(super) struct FullMesh<'a, C: RecordCodec> {
-    engine: Soar<Records<'a, C>>,
-    records: Records<'a, C>,
+pub(super) struct FullMesh<S: CompleteStore> {
+    engine: Soar<S>,
+    records: S,
     patch: Patch,
 }
 
-impl<'a, C: RecordCodec> FullMesh<'a, C> {
+impl<S: CompleteStore + Clone> FullMesh<S> {
     /// Over `records`, culled as `culling` says.
-    pub(super) fn new(records: Records<'a, C>, culling: Culling) -> Self {
+    pub(super) fn new(records: S, culling: Culling) -> Self {
         Self { engine: Soar::new(records.clone(), culling), records, patch: Patch::default() }
     }
 
@@ -38,7 +38,7 @@ impl<'a, C: RecordCodec> FullMesh<'a, C> {
     }
 }
 
-impl<C: RecordCodec> MeshEngine for FullMesh<'_, C> {
+impl<S: CompleteStore + Clone> MeshEngine for FullMesh<S> {
     fn update(&mut self, view: &View) -> Refined {
         let tests = self.engine.update(view, &mut Unobserved);
         let mut triangles: Vec<Triangle> = Vec::new();
@@ -85,10 +85,14 @@ impl<C: RecordCodec> MeshEngine for FullMesh<'_, C> {
     }
 
     fn height_range_m(&self) -> [f64; 2] {
-        self.records.height_range_m()
+        self.records.shape().height_range_m
     }
 
     fn height_at(&self, east_m: f64, north_m: f64) -> HeightAt {
         height_at(&self.records, east_m, north_m)
+    }
+
+    fn take_error(&mut self) -> Option<LayoutError> {
+        self.records.take_error()
     }
 }

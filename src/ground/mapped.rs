@@ -1,4 +1,4 @@
-//! The kinetic engine over records that are all in memory. It never waits, and it takes no edits.
+//! An engine over records that all have an answer: in memory, mapped, or read there and then. What cannot be read is told afterwards. It takes no edits.
 
 use super::engine::{MeshEngine, Reads, Refined};
 use super::full::FullMesh;
@@ -9,7 +9,7 @@ use crate::stream::{HeightAt, height_at};
 use crate::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::grid::record::RecordCodec;
-use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -32,30 +32,41 @@ pub(super) fn mapped(
     engine: PictureEngine,
     culling: Culling,
 ) -> Result<Box<dyn MeshEngine + '_>, LayoutError> {
-    Ok(with_records!(terrain.records()?, records => match engine {
+    Ok(match terrain.cache_bytes(None) {
+        None => with_records!(terrain.records()?, records => over(records, engine, culling)),
+        Some(bytes) => with_records!(terrain.paged(bytes), records => over(records, engine, culling)),
+    })
+}
+
+fn over<'t, S: CompleteStore + Clone + 't>(
+    records: S,
+    engine: PictureEngine,
+    culling: Culling,
+) -> Box<dyn MeshEngine + 't> {
+    match engine {
         PictureEngine::Kinetic => Box::new(Mapped {
             engine: Kinetic::new(records.clone(), culling),
             reads: Reads::over(&records),
             records,
-        }) as Box<dyn MeshEngine + '_>,
+        }),
         PictureEngine::Soar => Box::new(FullMesh::new(records, culling)),
-    }))
+    }
 }
 
-struct Mapped<'a, C: RecordCodec> {
-    engine: Kinetic<Records<'a, C>>,
-    records: Records<'a, C>,
+struct Mapped<S: CompleteStore> {
+    engine: Kinetic<S>,
+    records: S,
     reads: Reads,
 }
 
-impl<C: RecordCodec> MeshEngine for Mapped<'_, C> {
+impl<S: CompleteStore + Clone> MeshEngine for Mapped<S> {
     fn update(&mut self, view: &View) -> Refined {
         self.engine.update(view, &mut self.reads);
         let [reads, pages_read] = self.reads.take();
         Refined {
             work: self.engine.work(),
             triangles: self.engine.triangle_count() as u64,
-            record_bytes_read: reads * C::BYTES as u64,
+            record_bytes_read: reads * S::Codec::BYTES as u64,
             pages_read,
             ..Refined::default()
         }
@@ -80,10 +91,14 @@ impl<C: RecordCodec> MeshEngine for Mapped<'_, C> {
     }
 
     fn height_range_m(&self) -> [f64; 2] {
-        self.records.height_range_m()
+        self.records.shape().height_range_m
     }
 
     fn height_at(&self, east_m: f64, north_m: f64) -> HeightAt {
         height_at(&self.records, east_m, north_m)
+    }
+
+    fn take_error(&mut self) -> Option<LayoutError> {
+        self.records.take_error()
     }
 }

@@ -110,10 +110,11 @@ impl<'t> Ground<'t> {
         Ok(Ground::new(engine, Opened::Streamed(terrain), *options))
     }
 
-    /// Ground whose records are all in memory or mapped.
+    /// Ground whose records all have an answer at once: in memory, mapped, or read there and then if the source lends no bytes, into [128 MiB](terrasoar_layout::read::kinds::CACHE_BYTES). What cannot be read
+    /// [`Ground::take_error`] tells after the update.
     ///
     /// # Errors
-    /// Damage of the directory, all of which is read; a terrain whose source lends no bytes.
+    /// Damage of the directory, all of which is read where the source lends its bytes.
     pub fn mapped(
         terrain: &'t Terrain,
         engine: PictureEngine,

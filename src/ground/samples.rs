@@ -1,8 +1,8 @@
 //! Square tiles of heights, from which a renderer computes light: every n-th sample, taken from the records that are in memory.
 
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::grid::record::{RecordCodec, Vertex};
-use terrasoar_layout::read::records::Records;
+use terrasoar_layout::grid::record::Vertex;
+use terrasoar_layout::read::store::CompleteStore;
 
 /// A square of samples at equal steps. It may reach beyond the data, whose nearest sample is taken there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -35,7 +35,7 @@ impl HeightTile {
 }
 
 /// Heights of a tile of records that are all at hand.
-pub(super) fn tile_of<C: RecordCodec>(records: &Records<'_, C>, tile: HeightTile, heights_m: &mut Vec<f32>) {
+pub(super) fn tile_of(records: &impl CompleteStore, tile: HeightTile, heights_m: &mut Vec<f32>) {
     heights_m.clear();
     heights_m.reserve(tile.count());
     heights_m.extend(tile.points(records.grid().samples()).map(|point| shown_m(&records.vertex_at(point))));

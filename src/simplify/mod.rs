@@ -32,7 +32,7 @@ use terrasoar_layout::file::header::ErrorKind;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::corners;
 use terrasoar_layout::grid::record::VertexClass;
-use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::read::store::{CompleteStore, RecordStore};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::read::window::SampleWindow;
 use terrasoar_layout::with_records;
@@ -48,11 +48,13 @@ pub struct SimplifyOptions {
     pub window: Option<SampleWindow>,
     /// Most triangles; default 20 million, which take a gigabyte while they are made.
     pub max_triangles: u64,
+    /// Memory for pages, which are read when they are needed, whatever the terrain; without it as [`Terrain::cache_bytes`] has it.
+    pub cache_bytes: Option<u64>,
 }
 
 impl Default for SimplifyOptions {
     fn default() -> Self {
-        Self { max_error_m: 1.0, window: None, max_triangles: 20_000_000 }
+        Self { max_error_m: 1.0, window: None, max_triangles: 20_000_000, cache_bytes: None }
     }
 }
 
@@ -71,12 +73,17 @@ impl SimplifyOptions {
     pub fn max_triangles(self, max_triangles: u64) -> Self {
         Self { max_triangles, ..self }
     }
+
+    /// These options with pages that are read into so many bytes of memory when they are needed.
+    pub fn cache_bytes(self, cache_bytes: impl Into<Option<u64>>) -> Self {
+        Self { cache_bytes: cache_bytes.into(), ..self }
+    }
 }
 
 /// Makes the mesh. Voids are left out; a terrain or part of voids alone gives no triangles.
 ///
 /// # Errors
-/// [`LayoutError::Usage`] for a bound that is no distance, for a terrain that is not mapped or in memory or whose errors bound no distance, and where there would be too many triangles.
+/// [`LayoutError::Usage`] for a bound that is no distance, for a terrain whose errors bound no distance, and where there would be too many triangles; damage and I/O.
 pub fn simplify(terrain: &Terrain, options: &SimplifyOptions) -> Result<IndexedMesh, LayoutError> {
     let shown = terrain.path().display();
     let max_error_m = options.max_error_m;
@@ -91,37 +98,46 @@ pub fn simplify(terrain: &Terrain, options: &SimplifyOptions) -> Result<IndexedM
             "{shown}: its errors are steps from level to level, which bound no distance from the ground; build it again with bounded errors"
         )));
     }
-    if !terrain.lends_records() {
-        return Err(LayoutError::Usage(format!("{shown}: a mesh needs a mapped or in-memory terrain")));
-    }
-    let records = terrain.records()?;
     let [wide, high] = terrain.grid().samples();
     let whole = Rectangle { from: [0; 2], to: [wide - 1, high - 1] };
     let rectangle = options.window.map_or(whole, |window| {
         let last = window.last();
         Rectangle { from: window.from, to: [last[0].min(wide - 1), last[1].min(high - 1)] }
     });
-    with_records!(records, records => {
-        let walk = Walk { records: &records, max_error_m, rectangle };
-        let mut count = 0;
-        let is_few = walk.leaves(&mut |_| {
-            count += 1;
-            count <= options.max_triangles
-        });
-        if !is_few {
-            return Err(LayoutError::Usage(format!(
-                "{shown}: a mesh within {} m has more than {} triangles; allow a larger error, take a smaller window, or allow more triangles",
-                number(max_error_m),
-                thousands(&options.max_triangles.to_string())
-            )));
-        }
-        let mut making = Making::new(terrain.grid().spacing_m());
-        walk.leaves(&mut |triangle| {
-            making.add(triangle.map(|p| walk.corner(p)), &rectangle);
-            true
-        });
-        Ok(making.mesh)
-    })
+    match terrain.cache_bytes(options.cache_bytes) {
+        None => with_records!(terrain.records()?, records => mesh_over(&records, terrain, options, rectangle)),
+        Some(bytes) => with_records!(terrain.paged(bytes), records => mesh_over(&records, terrain, options, rectangle)),
+    }
+}
+
+fn mesh_over(
+    records: &impl CompleteStore,
+    terrain: &Terrain,
+    options: &SimplifyOptions,
+    rectangle: Rectangle,
+) -> Result<IndexedMesh, LayoutError> {
+    let walk = Walk { records, max_error_m: options.max_error_m, rectangle };
+    let mut count = 0;
+    let is_few = walk.leaves(&mut |_| {
+        count += 1;
+        count <= options.max_triangles
+    });
+    // What could not be read has no detail, and no more triangles than what is there.
+    records.take_error().map_or(Ok(()), Err)?;
+    if !is_few {
+        return Err(LayoutError::Usage(format!(
+            "{}: a mesh within {} m has more than {} triangles; allow a larger error, take a smaller window, or allow more triangles",
+            terrain.path().display(),
+            number(options.max_error_m),
+            thousands(&options.max_triangles.to_string())
+        )));
+    }
+    let mut making = Making::new(terrain.grid().spacing_m());
+    walk.leaves(&mut |triangle| {
+        making.add(triangle.map(|p| walk.corner(p)), &rectangle);
+        true
+    });
+    records.take_error().map_or(Ok(making.mesh), Err)
 }
 
 /// A walk of the tree of the mesh.

@@ -9,9 +9,9 @@ use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
 use terrasoar_layout::edit::{Changes, Editor};
 use terrasoar_layout::file::source::MemorySource;
-use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::progress::Silent;
 use terrasoar_layout::read::edited::EditedRecords;
+use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Builds a terrain in memory.
@@ -68,7 +68,7 @@ pub fn roomy_terrain(samples: [u32; 2], seed: u64, holes: bool) -> Terrain {
 }
 
 /// Replaces pages of a store that an edit changed.
-pub fn install<C: RecordCodec>(store: &mut EditedRecords<'_, C>, editor: &Editor, changes: &Changes) {
+pub fn install<S: CompleteStore>(store: &mut EditedRecords<S>, editor: &Editor, changes: &Changes) {
     store.set_height_range_m(editor.header().height_range_m);
     for page in &changes.pages {
         store.install(*page, editor.edited_page(*page).unwrap()).unwrap();

@@ -4,6 +4,7 @@ use super::clock::{self, Clock};
 use super::made::title;
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
+use super::pages::{self, CacheArgs};
 use super::progress::Meter;
 use super::replay::{QualityArgs, Told, fly};
 use super::terrain::TerrainArgs;
@@ -34,6 +35,8 @@ frames a point; --no-sweeps leaves them out.")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Flight file
     #[arg(long, value_name = "F")]
     flight: PathBuf,
@@ -76,10 +79,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
         .map(|(name, file)| (name, Kind::Report(file)))
         .collect();
     args.force.folder(&args.output, &files, &args.terrain.inputs(&[&args.flight]))?;
-    let terrain = args.terrain.open_whole()?;
+    let (terrain, cache_bytes) = args.cache.open(&args.terrain)?;
     let flight = Flight::read(&args.flight)?;
     args.quality.look_at(&terrain, &flight, &args.flight)?;
-    let quality = args.quality.quality();
+    let quality = args.quality.quality().cache_bytes(cache_bytes);
     let progress = Meter::new("frames");
     let mut runs: Vec<(String, Vec<FrameStats>)> = Vec::new();
     let clock = Clock::start();
@@ -87,6 +90,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
         let frames = fly(&terrain, &flight.frames, quality, *engine, engine.name(), &progress)?;
         runs.push((engine.name().to_owned(), frames));
     }
+    let few = runs.iter().find_map(|(_, frames)| pages::too_few(frames, cache_bytes));
+    few.iter().for_each(|words| progress.note(words));
     let processor_percent = clock.processor_percent();
     let comparison = Comparison::of(&runs);
     // Engines that disagree are compared no further.

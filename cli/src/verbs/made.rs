@@ -45,6 +45,7 @@ pub(super) fn title(terrain: &Path, flight: &Path, quality: Quality) -> ReportTi
         viewport: quality.viewport,
         exaggeration: quality.vertical_exaggeration,
         culling: quality.culling,
+        cache_mib: quality.cache_bytes.map(|bytes| bytes >> 20),
         made: Some(made()),
     }
 }

@@ -3,6 +3,7 @@
 use super::area::AreaArgs;
 use super::output::{complain, grouped, print};
 use super::outputs::{Force, Kind};
+use super::pages::CacheArgs;
 use super::replay::{QualityArgs, batches_of};
 use super::siting;
 use super::terrain::TerrainArgs;
@@ -38,6 +39,8 @@ Examples:
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Largest distance of any sample from the mesh, in metres
     #[arg(long, value_name = "M", value_parser = parse::not_negative, required_unless_present = "flight", conflicts_with_all = OF_A_FLIGHT)]
     max_error: Option<f64>,
@@ -157,10 +160,11 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let others: Vec<&Path> =
         [&args.flight, &args.edits].into_iter().flatten().map(PathBuf::as_path).collect();
     args.force.file(&args.output, Kind::Mesh, &args.terrain.inputs(&others))?;
-    let terrain = std::sync::Arc::new(args.terrain.open_whole()?);
+    let (terrain, cache_bytes) = args.cache.open(&args.terrain)?;
+    let terrain = std::sync::Arc::new(terrain);
     let placing = args.placing(&terrain, format)?;
     let (mesh, part_m) = match (&args.flight, args.max_error) {
-        (None, Some(max_error_m)) => simplified(args, &terrain, max_error_m)?,
+        (None, Some(max_error_m)) => simplified(args, &terrain, max_error_m, cache_bytes)?,
         (Some(flight), _) => {
             let path = flight;
             let flight = Flight::read(path)?;
@@ -169,7 +173,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
                 Some(script) => batches_of(script, &flight.frames, &terrain)?,
                 None => Vec::new(),
             };
-            let quality = args.quality.quality();
+            let quality = args.quality.quality().cache_bytes(cache_bytes);
             let frame = args.frame.unwrap_or(0);
             let mesh = frame_mesh(&terrain, &flight.frames, frame, quality, args.engine, &batches)?;
             let [east, north] = terrain.grid().extent_m();
@@ -205,10 +209,16 @@ pub(super) fn run(args: &Args) -> Result<()> {
 }
 
 /// The mesh of a part within the error, and the part's sides in metres.
-fn simplified(args: &Args, terrain: &Terrain, max_error_m: f64) -> Result<(IndexedMesh, [f64; 4])> {
+fn simplified(
+    args: &Args,
+    terrain: &Terrain,
+    max_error_m: f64,
+    cache_bytes: Option<u64>,
+) -> Result<(IndexedMesh, [f64; 4])> {
     let window = args.area.window(terrain, &args.terrain.file, 1)?;
     let options =
         SimplifyOptions::default().max_error_m(max_error_m).window(window).max_triangles(args.max_triangles);
+    let options = options.cache_bytes(cache_bytes);
     let mesh = simplify(terrain, &options)?;
     if mesh.triangles.is_empty() {
         bail!(

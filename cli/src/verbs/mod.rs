@@ -33,6 +33,7 @@ mod output;
 mod outputs;
 mod overlays;
 mod pack;
+mod pages;
 mod parse;
 #[cfg(feature = "pictures")]
 mod picture;

@@ -4,6 +4,7 @@ use super::clock::{self, Clock};
 use super::made::title;
 use super::output::{columns, complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
+use super::pages::{self, CacheArgs};
 use super::progress::Meter;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse, within};
@@ -33,10 +34,13 @@ Examples:
 Totals (vertex tests, splits, merges and what else is called total in --json) are sums over all frames, the first included, which makes the mesh from nothing; so they
 are the sums of the columns of --stats. Triangles a frame are over all frames too. Incoherence and times leave the first frame out. What an engine does not have is -,
 null in --json and empty in --stats: only kinetic has a queue, slots, patches and parts of an update.
+Packed terrain, and all terrain with --cache, is read page by page when a frame needs it; the frame waits, so that its mesh and its counts are those of mapped terrain. What was read is told besides.
 Percentiles are by nearest rank. Incoherence is the mean of the frames' percentages. Times are wall-clock times.")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Flight file
     #[arg(long, value_name = "F")]
     flight: PathBuf,
@@ -171,12 +175,13 @@ pub(super) fn run(args: &Args) -> Result<()> {
             [Some(&args.flight), args.edits.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
         args.force.table(stats, Kind::Report(ReportFile::Frames), &args.terrain.inputs(&others))?;
     }
-    let terrain = Arc::new(args.terrain.open_whole()?);
+    let (terrain, cache_bytes) = args.cache.open(&args.terrain)?;
+    let terrain = Arc::new(terrain);
     let flight = Flight::read(&args.flight)?;
     args.quality.look_at(&terrain, &flight, &args.flight)?;
     let progress = Meter::new("frames");
     let name = args.engine.name();
-    let mut quality = args.quality.quality();
+    let mut quality = args.quality.quality().cache_bytes(cache_bytes);
     quality.budget_tests = args.budget_tests;
     if quality.budget_tests.is_some() && args.engine != EngineKind::Kinetic {
         return Err(WrongUsage(format!(
@@ -197,6 +202,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     drop(progress);
     let processor_percent = clock.processor_percent();
+    pages::too_few(&frames, cache_bytes).iter().for_each(|words| complain(words));
     let title = title(&args.terrain.file, &args.flight, quality);
     if let Some(path) = &args.stats {
         write_frames_csv(path, &title, name, &frames)?;
@@ -255,7 +261,8 @@ fn text(s: &ReplaySummary) -> String {
     let t = s.update_ms;
     // What an engine does not have.
     let none = || "-".to_owned();
-    head + &columns(&[
+    let ms = |value: Option<f64>| value.map_or_else(none, |ms| format!("{ms:.1} ms"));
+    let mut rows = vec![
         row("triangles a frame", format!("{:.0}", s.triangles_mean)),
         row("incoherence", format!("{:.3} %", s.incoherence_percent)),
         row("vertex tests", grouped(s.vertex_tests_total)),
@@ -279,5 +286,13 @@ fn text(s: &ReplaySummary) -> String {
         row("records edited", grouped(s.edited_records_total)),
         row("edits of a frame, worst", format!("{:.3} ms", s.edit_ms_max)),
         row("mesh hash", s.mesh_hash.clone()),
-    ])
+    ];
+    if let Some(pages) = s.pages_read_total {
+        rows.push(row("pages read", grouped(pages)));
+        rows.push(row("tiles unpacked", s.tiles_unpacked_total.map_or_else(none, grouped)));
+        rows.push(row("bytes of tiles", s.tile_bytes_read_total.map_or_else(none, grouped)));
+        rows.push(row("waited for pages", ms(s.read_ms_total)));
+        rows.push(row("of it for unpacking", ms(s.unpack_ms_total)));
+    }
+    head + &columns(&rows)
 }

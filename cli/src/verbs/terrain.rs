@@ -8,11 +8,8 @@ use terrasoar_layout::file::header::{Header, SpacingOrigin};
 use terrasoar_layout::read::terrain::Terrain;
 
 use super::cache;
-use super::output::{complain, decimal, grouped};
+use super::output::decimal;
 use super::overlays;
-
-/// From so many unpacked bytes on it is said how many there are.
-const MUCH_BYTES: u64 = 1 << 28;
 
 /// Which terrain is read: a file, and edits of it in another.
 #[derive(Debug, clap::Args)]
@@ -25,8 +22,16 @@ pub(super) struct TerrainArgs {
 }
 
 impl TerrainArgs {
-    /// Opens it, mapped. Elevation data is built first.
+    /// Opens it: mapped, or, where it is packed, to be unpacked page by page. Elevation data is built first.
     pub(super) fn open(&self) -> Result<Terrain> {
+        let terrain = self.open_mapped()?;
+        if terrain.source().unpacking().is_some() {
+            return Ok(terrain.open_again_unmapped()?);
+        }
+        Ok(terrain)
+    }
+
+    fn open_mapped(&self) -> Result<Terrain> {
         if let Some(overlay) = &self.overlay {
             let terrain = Terrain::open_with_overlay(&self.file, overlay)?;
             overlays::tell_of_older(&terrain);
@@ -36,17 +41,6 @@ impl TerrainArgs {
             Some(kept) => open(&kept),
             None => open(&self.file),
         }
-    }
-
-    /// Opens it for a verb that takes all records at hand, and says what that takes of a packed file.
-    pub(super) fn open_whole(&self) -> Result<Terrain> {
-        let terrain = self.open()?;
-        if terrain.appended_bytes().is_some()
-            && let Some(note) = unpacked_whole(terrain.path(), terrain.header().file_bytes)
-        {
-            complain(&note);
-        }
-        Ok(terrain)
     }
 
     /// Where the terrain file is that elevation data is built into; `None` where this is no elevation data.
@@ -81,17 +75,6 @@ impl TerrainArgs {
         let own = std::iter::once(self.file.as_path()).chain(self.overlay.as_deref());
         own.chain(others.iter().copied()).collect()
     }
-}
-
-/// What is said of a packed file that is unpacked whole, if it is large.
-fn unpacked_whole(path: &Path, bytes: u64) -> Option<String> {
-    (bytes >= MUCH_BYTES).then(|| {
-        format!(
-            "note: {}: all of it is unpacked into memory for this, which is {} bytes; what terrasoar unpack writes is read where it lies",
-            path.display(),
-            grouped(bytes)
-        )
-    })
 }
 
 /// Opens a terrain file, naming what to do when it is elevation data instead.
@@ -149,17 +132,5 @@ pub(super) fn crs(header: &Header) -> Option<String> {
         ("", Some(code)) => Some(format!("EPSG:{code}")),
         (name, Some(code)) if !name.contains(&code.to_string()) => Some(format!("{name} (EPSG:{code})")),
         (name, _) => Some(name.to_owned()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_large_packed_file_is_said_to_be_unpacked() {
-        assert_eq!(unpacked_whole(Path::new("a.iqt"), MUCH_BYTES - 1), None);
-        let note = unpacked_whole(Path::new("a.iqt"), 1_022_263_296).unwrap();
-        assert!(note.starts_with("note: a.iqt: ") && note.contains("1,022,263,296 bytes"), "{note}");
     }
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use terrasoar::sink::FileSink;
 use terrasoar::stats::FrameStats;
 
-pub(super) const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,update_ms,scan_us,test_us,apply_us,edited_records,edit_ms,mesh_hash";
+pub(super) const HEADER: &str = "frame,triangles,new_triangles,vertex_tests,splits,merges,expired,slots_written,patch_bytes,late,late_error_px,pages_touched,record_bytes_touched,pages_read,tiles_unpacked,tile_bytes_read,read_ms,unpack_ms,update_ms,scan_us,test_us,apply_us,edited_records,edit_ms,mesh_hash";
 
 /// Writes `frames`, flown by `engine`, to `path`, behind remarks that say how they came about: a file appears when it is complete, a stream such as a pipe is written to directly.
 ///
@@ -50,6 +50,11 @@ pub(super) fn write_frames(
             late_error_px,
             pages_touched,
             record_bytes_touched,
+            pages_read,
+            tiles_unpacked,
+            tile_bytes_read,
+            read_ms,
+            unpack_ms,
             update_ms,
             scan_us,
             test_us,
@@ -59,12 +64,15 @@ pub(super) fn write_frames(
             mesh_hash,
         } = f;
         let [expired, slots_written, patch_bytes] = [expired, slots_written, patch_bytes].map(|v| known(*v));
+        let [pages_read, tiles_unpacked, tile_bytes_read] =
+            [pages_read, tiles_unpacked, tile_bytes_read].map(|v| known(*v));
+        let [read_ms, unpack_ms] = [read_ms, unpack_ms].map(|v| known(v.map(neat_ms)));
         let [scan_us, test_us, apply_us] = [scan_us, test_us, apply_us].map(|v| known(v.map(neat_us)));
         let [update_ms, edit_ms] = [update_ms, edit_ms].map(|v| neat_ms(*v));
         writeln!(
             to,
             "{frame},{triangles},{new_triangles},{vertex_tests},{splits},{merges},{expired},{slots_written},{patch_bytes},{late},{late_error_px},\
-{pages_touched},{record_bytes_touched},{update_ms},{scan_us},{test_us},{apply_us},{edited_records},{edit_ms},{mesh_hash:016x}"
+{pages_touched},{record_bytes_touched},{pages_read},{tiles_unpacked},{tile_bytes_read},{read_ms},{unpack_ms},{update_ms},{scan_us},{test_us},{apply_us},{edited_records},{edit_ms},{mesh_hash:016x}"
         )?;
     }
     Ok(())

@@ -27,6 +27,8 @@ pub struct ReportTitle {
     pub exaggeration: f64,
     /// What was left out of view.
     pub culling: Culling,
+    /// Memory for pages that were read as frames needed them, in MiB; `None` if records were taken where they lie.
+    pub cache_mib: Option<u64>,
     /// How it was made, if that is said.
     pub made: Option<Made>,
 }
@@ -42,6 +44,7 @@ impl ReportTitle {
             viewport_px: self.viewport.size_px(),
             exaggeration: self.exaggeration,
             culling: self.culling.name(),
+            cache_mib: self.cache_mib,
             made: self.made.as_ref(),
         }
     }
@@ -65,6 +68,8 @@ pub struct Origin<'a> {
     pub exaggeration: f64,
     /// What was left out of view.
     pub culling: &'a str,
+    /// Memory for pages that were read as frames needed them, in MiB; `None` if records were taken where they lie.
+    pub cache_mib: Option<u64>,
     /// How it was made, if that is said.
     pub made: Option<&'a Made>,
 }
@@ -87,7 +92,8 @@ impl Origin<'_> {
         let [wide, high] = self.viewport_px;
         line(to, "viewport_px", &format!("{wide}x{high}"))?;
         line(to, "exaggeration", &self.exaggeration.to_string())?;
-        line(to, "culling", self.culling)
+        line(to, "culling", self.culling)?;
+        self.cache_mib.iter().try_for_each(|mib| line(to, "cache_mib", &mib.to_string()))
     }
 }
 
@@ -131,6 +137,7 @@ mod tests {
             viewport_px: [800, 600],
             exaggeration: 2.0,
             culling: "vertices",
+            cache_mib: Some(64),
             made: Some(&made),
         };
         let mut text = Vec::new();
@@ -156,7 +163,8 @@ mod tests {
                 "metric",
                 "viewport_px",
                 "exaggeration",
-                "culling"
+                "culling",
+                "cache_mib"
             ]
         );
         assert_eq!(skipped(b"frame\n"), b"frame\n");

@@ -33,8 +33,9 @@ impl Cache {
         Self { most_bytes: AtomicUsize::new(most_bytes), inner: Mutex::default() }
     }
 
-    /// From now on no more than so many bytes are kept, one tile excepted.
-    pub(crate) fn set_most_bytes(&self, most_bytes: usize) {
+    /// Begins anew: nothing is kept, and from now on no more than so many bytes, one tile excepted.
+    pub(crate) fn restart(&self, most_bytes: usize) {
+        *self.inner.lock().unwrap_or_else(PoisonError::into_inner) = Inner::default();
         self.most_bytes.store(most_bytes, Ordering::Relaxed);
     }
 
@@ -83,7 +84,7 @@ mod tests {
         for i in 0..1000u32 {
             if i == 500 {
                 most_bytes = 4 * tile(0).bytes();
-                cache.set_most_bytes(most_bytes);
+                cache.restart(most_bytes);
                 cache.put(TileId { group: 1, at: [0; 2] }, tile(0));
             }
             let id = TileId { group: 0, at: [i % 40, i / 40 % 3] };

@@ -287,7 +287,7 @@ impl Source for PackedSource {
 
     fn take_share(&self, cache_bytes: u64) -> u64 {
         let share = (cache_bytes / TILES_SHARE).min(MOST_CACHE_BYTES as u64);
-        self.cache.set_most_bytes(share as usize);
+        self.cache.restart(share as usize);
         share
     }
 

@@ -1,11 +1,10 @@
-//! The records of a mapped terrain with some of its pages replaced. Engines that need all records fly over this while the ground is edited.
+//! The records of a terrain with some of its pages replaced. Engines that need all records fly over this while the ground is edited.
 //!
-//! Pages are the file's until they are installed, and then this store's own. Cost over [`Records`]: a branch a record, and 4 bytes a logical page.
+//! Pages are the file's until they are installed, and then this store's own. Cost over the records beneath: a branch a record, and 4 bytes a logical page.
 
 use super::page_map::PageMap;
 use super::prefetch::prefetch;
-use super::records::Records;
-use super::store::{CompleteStore, RawOf, RecordShape, RecordStore, byte_in_page, page_of};
+use super::store::{CompleteStore, PagesRead, RawOf, RecordShape, RecordStore, byte_in_page, page_of};
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page};
 use crate::grid::record::RecordCodec;
@@ -13,21 +12,21 @@ use crate::grid::record::RecordCodec;
 /// The page is the file's. Zero, so that pages that are never replaced take no memory.
 const FILES: u32 = 0;
 
-/// Records of a terrain, some of them others than the file's.
+/// Records of a terrain, some of them others than the file's, which `S` has.
 #[derive(Debug, Clone)]
-pub struct EditedRecords<'a, C: RecordCodec> {
-    records: Records<'a, C>,
-    shape: RecordShape<C>,
+pub struct EditedRecords<S: RecordStore> {
+    records: S,
+    shape: RecordShape<S::Codec>,
     /// Which own page each logical page is, counted from 1, or [`FILES`].
     own: PageMap,
     /// Own pages, one after the other.
     bytes: Vec<u8>,
 }
 
-impl<'a, C: RecordCodec> EditedRecords<'a, C> {
+impl<S: CompleteStore> EditedRecords<S> {
     /// The records as the file has them.
-    pub fn new(records: Records<'a, C>) -> Self {
-        let own = PageMap::like(records.pages());
+    pub fn new(records: S) -> Self {
+        let own = PageMap::new(records.page_count());
         Self { shape: records.shape().clone(), records, own, bytes: Vec::new() }
     }
 
@@ -59,30 +58,42 @@ impl<'a, C: RecordCodec> EditedRecords<'a, C> {
     /// Own page and byte in it of a slot; `None` if it is the file's.
     #[inline(always)]
     fn place(&self, slot: u64) -> Option<usize> {
-        let own = self.own.get(page_of::<C>(slot))?;
-        let within = byte_in_page::<C>(slot);
+        let own = self.own.get(page_of::<S::Codec>(slot))?;
+        let within = byte_in_page::<S::Codec>(slot);
         (own != FILES).then(|| (own as usize - 1) * PAGE_BYTES + within)
     }
 }
 
-impl<C: RecordCodec> CompleteStore for EditedRecords<'_, C> {}
+impl<S: CompleteStore> CompleteStore for EditedRecords<S> {
+    fn page_count(&self) -> u64 {
+        self.own.count()
+    }
 
-impl<C: RecordCodec> RecordStore for EditedRecords<'_, C> {
-    type Codec = C;
+    fn read_so_far(&self) -> Option<PagesRead> {
+        self.records.read_so_far()
+    }
+
+    fn take_error(&self) -> Option<LayoutError> {
+        self.records.take_error()
+    }
+}
+
+impl<S: CompleteStore> RecordStore for EditedRecords<S> {
+    type Codec = S::Codec;
 
     const IS_COMPLETE: bool = true;
 
     #[inline(always)]
-    fn shape(&self) -> &RecordShape<C> {
+    fn shape(&self) -> &RecordShape<S::Codec> {
         &self.shape
     }
 
     #[inline(always)]
     fn get(&self, slot: u64) -> Option<RawOf<Self>> {
-        Some(match self.place(slot) {
-            Some(at) => C::read(&self.bytes[at..at + C::BYTES]),
-            None => self.records.raw(slot),
-        })
+        match self.place(slot) {
+            Some(at) => Some(S::Codec::read(&self.bytes[at..at + S::Codec::BYTES])),
+            None => self.records.get(slot),
+        }
     }
 
     #[inline(always)]

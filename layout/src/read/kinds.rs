@@ -1,10 +1,14 @@
 //! Records of 4, 8 and 16 bytes behind one type: a terrain's records and pools, whichever kind its file has.
 
+use super::paged::PagedRecords;
 use super::pool::PagePool;
 use super::records::{Records, Slices};
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::grid::record::{AnyCodec, Compact, Exact8, Exact16};
+
+/// Memory for pages that are read when they are needed, if nobody says how much: 128 MiB.
+pub const CACHE_BYTES: u64 = 128 << 20;
 
 /// One thing for whichever kind of records a terrain has.
 #[derive(Debug, Clone)]
@@ -19,6 +23,10 @@ pub enum ByKind<A, B, C> {
 
 /// The records of a terrain, of whichever kind.
 pub type AnyRecords<'a> = ByKind<Records<'a, Compact>, Records<'a, Exact8>, Records<'a, Exact16>>;
+
+/// Records that are read when they are asked for, of whichever kind.
+pub type AnyPaged<'a> =
+    ByKind<PagedRecords<'a, Compact>, PagedRecords<'a, Exact8>, PagedRecords<'a, Exact16>>;
 
 /// A pool of pages, of whichever kind.
 pub type AnyPool = ByKind<PagePool<Compact>, PagePool<Exact8>, PagePool<Exact16>>;
@@ -58,6 +66,21 @@ impl Terrain {
     /// Whether the source lends its bytes, which [`Terrain::records`] needs. Reads nothing.
     pub fn lends_records(&self) -> bool {
         self.source().lends()
+    }
+
+    /// The records, each page of which is read when it is first asked for, into `cache_bytes` of memory, 64 KiB at the least; whatever the source. Reads nothing. Of packed terrain up to a quarter of them is for what pages are
+    /// unpacked from.
+    pub fn paged(&self, cache_bytes: u64) -> AnyPaged<'_> {
+        match self.codec().clone() {
+            AnyCodec::Compact(codec) => ByKind::Compact(PagedRecords::new(self, self.shape(codec), cache_bytes)),
+            AnyCodec::Exact8(codec) => ByKind::Exact8(PagedRecords::new(self, self.shape(codec), cache_bytes)),
+            AnyCodec::Exact16(codec) => ByKind::Exact16(PagedRecords::new(self, self.shape(codec), cache_bytes)),
+        }
+    }
+
+    /// Memory for pages where so much was asked for, or nothing, for [`Terrain::paged`]: [`CACHE_BYTES`] for a terrain that does not lend its records; `None` for one that does, whose [`Terrain::records`] are taken where they lie.
+    pub fn cache_bytes(&self, asked: Option<u64>) -> Option<u64> {
+        asked.or_else(|| (!self.lends_records()).then_some(CACHE_BYTES))
     }
 
     /// A pool of at most `cache_bytes` for the pages of this terrain, whatever its source.

@@ -1,4 +1,4 @@
-//! An opened terrain file: [`terrain`], opened by [`opening`]. The way from a slot to a vertex goes through mapped [`records`], or through a [`pool`] of pages that are read.
+//! An opened terrain file: [`terrain`], opened by [`opening`]. The way from a slot to a vertex goes through mapped [`records`], through [`paged`] ones that are read when they are asked for, or through a [`pool`] of pages that threads read.
 //!
 //! Engines are written for the trait in [`store`], which all of these have.
 
@@ -13,6 +13,7 @@ pub mod lost;
 pub(crate) mod opened;
 pub mod opening;
 pub(crate) mod page_map;
+pub mod paged;
 pub mod pool;
 pub mod prefetch;
 pub mod records;

@@ -32,16 +32,6 @@ impl PageMap {
         Self::with_row(count, if count <= MOST_IN_ROW { count } else { SHORT_ROW })
     }
 
-    /// Of as many pages as another, all of which have the number 0.
-    pub(crate) fn like(other: &Self) -> Self {
-        Self {
-            row: vec![0; other.row.len()],
-            blocks: vec![ZEROS; other.blocks.len()],
-            numbers: other.numbers.iter().take(2).cloned().collect(),
-            count: other.count,
-        }
-    }
-
     fn with_row(count: u64, most: u64) -> Self {
         let row = count.min(most);
         let blocks = place((count - row).div_ceil(BLOCK as u64));

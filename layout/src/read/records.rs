@@ -79,10 +79,6 @@ impl<'a, C: RecordCodec> Records<'a, C> {
         self.pages.count()
     }
 
-    pub(super) fn pages(&self) -> &PageMap {
-        self.pages
-    }
-
     /// File page of a logical page.
     #[inline(always)]
     fn page(&self, logical: u64) -> usize {
@@ -175,7 +171,11 @@ impl<C: RecordCodec> Near<'_, C> {
     }
 }
 
-impl<C: RecordCodec> CompleteStore for Records<'_, C> {}
+impl<C: RecordCodec> CompleteStore for Records<'_, C> {
+    fn page_count(&self) -> u64 {
+        Records::page_count(self)
+    }
+}
 
 impl<C: RecordCodec> RecordStore for Records<'_, C> {
     type Codec = C;

@@ -1,12 +1,15 @@
 //! What refinement reads records from: all of a file, or the part of it that is in memory.
 //!
-//! [`Records`](super::records::Records) lends every record of a mapped file, [`EditedRecords`](super::edited::EditedRecords) those of one that is edited meanwhile; [`PagePool`](super::pool::PagePool) holds some pages of a file of any size and
-//! says which it lacks. An engine written for the trait flies over all of them. Where all records are there, its code for absent ones compiles to nothing.
+//! [`Records`](super::records::Records) lends every record of a mapped file, [`PagedRecords`](super::paged::PagedRecords) those of any source, which it reads when they are asked for, and [`EditedRecords`](super::edited::EditedRecords) those of
+//! either that are edited meanwhile; [`PagePool`](super::pool::PagePool) holds some pages of a file of any size and says which it lacks. An engine written for the trait flies over all of them. Where all records are there, its code for absent ones compiles to nothing.
 
+use crate::error::LayoutError;
 use crate::file::bytes::PAGE_BYTES;
+use crate::file::source::Unpacked;
 use crate::grid::order::slot_of;
 use crate::grid::record::{RecordCodec, Vertex};
 use crate::grid::{Grid, GridPoint};
+use std::time::Duration;
 
 /// What a terrain's records have in common.
 #[derive(Debug, Clone)]
@@ -110,7 +113,46 @@ pub trait RecordStore: Send + Sync {
     }
 }
 
+/// What reading took.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct PagesRead {
+    /// Pages, each as often as it was read.
+    pub pages: u64,
+    /// Time that those who asked waited, over all threads.
+    pub time: Duration,
+    /// Of packed terrain, what was unpacked for it.
+    pub unpacked: Option<Unpacked>,
+}
+
+impl PagesRead {
+    /// What was added since `before`.
+    pub fn since(self, before: Self) -> Self {
+        let unpacked = self.unpacked.map(|now| {
+            let then = before.unpacked.unwrap_or_default();
+            Unpacked {
+                tiles: now.tiles - then.tiles,
+                bytes: now.bytes - then.bytes,
+                time: now.time.saturating_sub(then.time),
+            }
+        });
+        Self { pages: self.pages - before.pages, time: self.time.saturating_sub(before.time), unpacked }
+    }
+}
+
 /// A store in which every record is at hand, always: [`RecordStore::get`] has an answer for every slot that there is, and [`RecordStore::IS_COMPLETE`] says so.
 ///
 /// Engines that read records without asking whether they are there take no other: over a pool they would take what is away for ground without detail.
-pub trait CompleteStore: RecordStore {}
+pub trait CompleteStore: RecordStore {
+    /// Logical pages.
+    fn page_count(&self) -> u64;
+
+    /// What reading took so far; `None` for records that lie in memory or are mapped.
+    fn read_so_far(&self) -> Option<PagesRead> {
+        None
+    }
+
+    /// What kept records from being read, once. After it every record that is not in memory is inert, so that a mesh is not to be used.
+    fn take_error(&self) -> Option<LayoutError> {
+        None
+    }
+}

@@ -6,15 +6,34 @@
 use super::capacity::grow;
 #[cfg(feature = "files")]
 use rayon::prelude::*;
+use std::cell::Cell;
 use std::ops::Range;
 
 /// Elements that one thread takes at the least.
 const SHARE: usize = 2048;
 
+thread_local! {
+    /// Whether this thread shares nothing.
+    static IS_ALONE: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Does something without sharing work of this thread: what is asked of a store of records is asked in the same order then, each time.
+pub(crate) fn alone<T>(work: impl FnOnce() -> T) -> T {
+    /// Puts back what was, on a panic too.
+    struct Before(bool);
+    impl Drop for Before {
+        fn drop(&mut self) {
+            IS_ALONE.set(self.0);
+        }
+    }
+    let _before = Before(IS_ALONE.replace(true));
+    work()
+}
+
 /// Whether work on so many elements is shared, so many at the least by each.
 #[cfg(feature = "files")]
 fn is_shared(count: usize, share: usize) -> bool {
-    count >= 2 * share && rayon::current_num_threads() > 1
+    count >= 2 * share && !IS_ALONE.get() && rayon::current_num_threads() > 1
 }
 
 /// Appends `make(0)` and so on to an array.

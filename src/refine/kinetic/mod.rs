@@ -24,6 +24,7 @@ mod time;
 
 pub(crate) use frame::ahead::Want;
 pub use frame::budget::Budget;
+pub(crate) use hands::alone;
 pub use mesh::bounds::Bounds;
 pub use mesh::patch::{MeshVertex, Patch};
 

@@ -137,7 +137,7 @@ pub trait Source: Send + Sync {
         Ok(())
     }
 
-    /// Bytes, of the `cache_bytes` that a pool of pages is given, that this source takes for itself: what it unpacks is kept in them. The pool that was made last decides.
+    /// Bytes, of the `cache_bytes` that a pool of pages is given, that this source takes for itself: what it unpacks is kept in them. The pool that was made last decides, and finds nothing kept.
     fn take_share(&self, cache_bytes: u64) -> u64 {
         let _ = cache_bytes;
         0

@@ -1,0 +1,70 @@
+//! Memory for pages that a verb reads as it needs them, and words for frames that it is too small for.
+
+use super::output::grouped;
+use super::terrain::TerrainArgs;
+use anyhow::Result;
+use terrasoar::stats::FrameStats;
+use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::terrain::Terrain;
+
+/// Memory for pages.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct CacheArgs {
+    /// Read pages as frames need them, into so much memory; without it packed terrain has 128 MiB, and other terrain is mapped
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
+    cache: Option<u64>,
+}
+
+impl CacheArgs {
+    /// Opens a terrain: mapped, or to be read into the memory that is given too.
+    pub(super) fn open(self, args: &TerrainArgs) -> Result<(Terrain, Option<u64>)> {
+        let mut terrain = args.open()?;
+        if self.cache.is_some() && terrain.lends_records() {
+            terrain = terrain.open_again_unmapped()?;
+        }
+        let cache_bytes = terrain.cache_bytes(self.cache.map(|mib| mib << 20));
+        Ok((terrain, cache_bytes))
+    }
+}
+
+/// In words, that a frame reads more pages than the memory holds, which are read again within it.
+pub(super) fn too_few(frames: &[FrameStats], cache_bytes: Option<u64>) -> Option<String> {
+    let cache_mib = cache_bytes? >> 20;
+    let most = frames.iter().max_by_key(|frame| frame.pages_touched)?;
+    // A quarter may be for what pages are unpacked from.
+    let bytes = (most.pages_touched * PAGE_BYTES as u64).saturating_mul(4).div_ceil(3);
+    let mib = bytes.div_ceil(1 << 20);
+    let count = frames.iter().filter(|frame| Some(frame.pages_touched) < frame.pages_read).count();
+    (mib > cache_mib && count > 0).then(|| {
+        format!(
+            "note: frame {} reads {} pages, for which {} MiB are too few: {} of {} frames read pages more than once; --cache {mib} holds them",
+            most.frame,
+            grouped(most.pages_touched),
+            grouped(cache_mib),
+            grouped(count as u64),
+            grouped(frames.len() as u64)
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_that_is_too_small_for_a_frame_is_told_with_what_would_do() {
+        let frame = |frame, pages_touched, pages_read| FrameStats {
+            frame,
+            pages_touched,
+            pages_read: Some(pages_read),
+            ..FrameStats::default()
+        };
+        let frames = [frame(0, 900, 900), frame(1, 1000, 1400), frame(2, 300, 20)];
+        assert_eq!(too_few(&frames, None), None);
+        assert_eq!(too_few(&frames, Some(6 << 20)), None);
+        assert_eq!(too_few(&frames[..1], Some(1 << 20)), None);
+        let words = too_few(&frames, Some(2 << 20)).unwrap();
+        assert!(words.contains("frame 1 reads 1,000 pages, for which 2 MiB are too few"), "{words}");
+        assert!(words.contains(": 1 of 3 frames") && words.ends_with("--cache 6 holds them"), "{words}");
+    }
+}
