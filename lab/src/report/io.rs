@@ -86,6 +86,8 @@ fn write_io_frames(
         viewport_px: bench.viewport_px,
         exaggeration: bench.exaggeration,
         culling: &bench.culling,
+        // Counted with and flown over, by other rules than a replay: the object has it.
+        cache_mib: None,
         made: bench.made.as_ref(),
     };
     origin.write(to, None)?;

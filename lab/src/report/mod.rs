@@ -324,6 +324,7 @@ mod tests {
             viewport: terrasoar::view::Viewport::default(),
             exaggeration: 1.0,
             culling: terrasoar::refine::Culling::default(),
+            cache_mib: None,
             made: None,
         }
     }

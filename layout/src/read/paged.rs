@@ -15,7 +15,7 @@ use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page};
 use crate::grid::record::RecordCodec;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering, fence};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Places that a page may lie in.
@@ -24,7 +24,8 @@ const WAYS: usize = 8;
 const LEAST_SETS: u64 = 2;
 /// Words a page.
 const WORDS: usize = PAGE_BYTES / 4;
-/// Low bits of a tag, which count how often its place was written. The page, counted from 1, lies above them.
+/// Low bits of a tag, which count how often its place was written: a reader would have to sleep through as many times as they count to take another page's words. The page, counted from 1, lies above
+/// them; the largest square has 2^33 pages.
 const VERSION_BITS: u32 = 24;
 /// Spreads pages that lie side by side over the sets: 2^64 over the golden ratio.
 const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
@@ -55,16 +56,16 @@ struct Inner<'t, C> {
     words: Vec<AtomicU32>,
     /// Whether a place was asked for since the hand passed it.
     recent: Vec<AtomicBool>,
-    reading: Mutex<Reading>,
+    /// The hand of each set, which one thread at a time moves and writes behind.
+    hands: Mutex<Vec<u8>>,
+    failure: Mutex<Failure>,
     pages_read: AtomicU64,
     nanoseconds: AtomicU64,
 }
 
-/// What one thread at a time has to do with.
+/// What kept records from being read.
 #[derive(Debug, Default)]
-struct Reading {
-    /// The hand of each set.
-    hands: Vec<u8>,
+struct Failure {
     has_failed: bool,
     error: Option<LayoutError>,
 }
@@ -87,7 +88,8 @@ impl<'t, C: RecordCodec> PagedRecords<'t, C> {
             // Zeroed lazily by the system: memory is taken as pages come.
             words: bytemuck::zeroed_vec(places.saturating_mul(WORDS)),
             recent: (0..places).map(|_| AtomicBool::new(false)).collect(),
-            reading: Mutex::new(Reading { hands: vec![0; places / WAYS], ..Reading::default() }),
+            hands: Mutex::new(vec![0; places / WAYS]),
+            failure: Mutex::default(),
             pages_read: AtomicU64::new(0),
             nanoseconds: AtomicU64::new(0),
         };
@@ -138,32 +140,41 @@ impl<C: RecordCodec> Inner<'_, C> {
     #[inline(never)]
     fn read(&self, page: u64, within: usize) -> C::Raw {
         let begun = Instant::now();
-        let mut reading = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
-        // Another thread may have read it. Nothing is given up while the lock is held.
-        let known = self.find(page, within);
-        let raw = match known {
-            Some(raw) => raw,
-            None if reading.has_failed => C::INERT,
-            None => match self.keep(page, &mut reading) {
-                Ok(bytes) => C::read(&bytes[within..]),
-                Err(error) => {
-                    reading.has_failed = true;
-                    reading.error = Some(error);
-                    C::INERT
-                }
-            },
-        };
-        drop(reading);
+        let raw = if self.failure().has_failed { C::INERT } else { self.read_page(page, within) };
         self.nanoseconds.fetch_add(begun.elapsed().as_nanos() as u64, Ordering::Relaxed);
         raw
     }
 
-    /// Reads a page and keeps it.
-    fn keep(&self, page: u64, reading: &mut Reading) -> Result<Box<Page>, LayoutError> {
-        let bytes = self.terrain.checked_page(page)?;
-        self.pages_read.fetch_add(1, Ordering::Relaxed);
+    /// Reads a page and keeps it. Threads read side by side, and at worst the same page.
+    fn read_page(&self, page: u64, within: usize) -> C::Raw {
+        match self.terrain.checked_page(page) {
+            Ok(bytes) => {
+                self.pages_read.fetch_add(1, Ordering::Relaxed);
+                let mut hands = self.hands.lock().unwrap_or_else(PoisonError::into_inner);
+                // Nothing is written while the lock is held, unless another thread was before.
+                if self.find(page, within).is_none() {
+                    self.keep(page, &bytes, &mut hands);
+                }
+                C::read(&bytes[within..])
+            }
+            Err(error) => {
+                let mut failure = self.failure();
+                if !std::mem::replace(&mut failure.has_failed, true) {
+                    failure.error = Some(error);
+                }
+                C::INERT
+            }
+        }
+    }
+
+    fn failure(&self) -> MutexGuard<'_, Failure> {
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Puts a page where another was, or none.
+    fn keep(&self, page: u64, bytes: &Page, hands: &mut [u8]) {
         let first = self.set_of(page);
-        let hand = &mut reading.hands[first / WAYS];
+        let hand = &mut hands[first / WAYS];
         let way = loop {
             let way = usize::from(*hand) % WAYS;
             *hand = hand.wrapping_add(1);
@@ -182,7 +193,6 @@ impl<C: RecordCodec> Inner<'_, C> {
         }
         tag.store((page + 1) << VERSION_BITS | version, Ordering::Release);
         self.recent[place].store(true, Ordering::Relaxed);
-        Ok(bytes)
     }
 }
 
@@ -200,7 +210,7 @@ impl<C: RecordCodec> CompleteStore for PagedRecords<'_, C> {
     }
 
     fn take_error(&self) -> Option<LayoutError> {
-        self.inner.reading.lock().unwrap_or_else(PoisonError::into_inner).error.take()
+        self.inner.failure().error.take()
     }
 }
 
