@@ -1,4 +1,4 @@
-//! A few frames over a terrain with every engine, over the map and over pages that come late.
+//! A few frames over a terrain with every engine, over the map, over pages that are read there and then, and over pages that come late.
 //!
 //! Over a sound file all engines draw the mesh of the definition. Over any other they return, whatever they draw.
 
@@ -16,6 +16,7 @@ use terrasoar::stream::{ModelDisk, Prefetch, Streamed};
 use terrasoar::view::{View, Viewport};
 use terrasoar_lab::iobench::{CountOptions, LayoutKind, Reader, count};
 use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -66,33 +67,43 @@ fn keys(engine: &impl Engine) -> HashSet<TriangleKey> {
 fn refines(terrain: &Terrain, views: &[View], culling: Culling, is_sound: bool) {
     let is_small = terrain.grid().k() <= MOST_K;
     // Packed terrain whose pages cannot all be unpacked lends none, nor does one with a damaged directory.
-    let Ok(records) = terrain.records() else {
-        assert!(!is_sound, "a sound terrain does not lend its bytes");
-        return;
-    };
-    with_records!(records, records => {
-        let mut soar = Soar::new(records.clone(), culling);
-        let mut smart = Smart::new(records.clone(), culling);
-        let mut kinetic = Kinetic::new(records.clone(), culling);
-        let mut hurried = Kinetic::new(records.clone(), culling);
-        hurried.set_budget(Budget::default().tests(20));
-        let mut naive = is_small.then(|| Naive::new(records.clone(), culling));
-        for view in views {
-            soar.update(view, &mut Unobserved);
-            smart.update(view, &mut Unobserved);
-            kinetic.update(view, &mut Unobserved);
-            hurried.update(view, &mut Unobserved);
-            let _ = (kinetic.patch(), kinetic.whole_patch(), soar.strip());
-            let Some(naive) = &mut naive else { continue };
+    match terrain.records() {
+        Ok(records) => with_records!(records, records => over(&records, views, culling, is_sound, is_small)),
+        Err(_) => assert!(!is_sound, "a sound terrain does not lend its bytes"),
+    }
+    // Brute force reads all of it in each frame, over little memory again and again.
+    let paged = terrain.paged(64 * PAGE_BYTES as u64);
+    with_records!(paged, records => over(&records, views, culling, is_sound, false));
+}
+
+/// All engines over records that all have an answer, until one cannot be read.
+fn over<S: CompleteStore + Clone>(records: &S, views: &[View], culling: Culling, is_sound: bool, is_small: bool) {
+    let mut soar = Soar::new(records.clone(), culling);
+    let mut smart = Smart::new(records.clone(), culling);
+    let mut kinetic = Kinetic::new(records.clone(), culling);
+    let mut hurried = Kinetic::new(records.clone(), culling);
+    hurried.set_budget(Budget::default().tests(20));
+    let mut naive = is_small.then(|| Naive::new(records.clone(), culling));
+    for view in views {
+        soar.update(view, &mut Unobserved);
+        smart.update(view, &mut Unobserved);
+        kinetic.update(view, &mut Unobserved);
+        hurried.update(view, &mut Unobserved);
+        let _ = (kinetic.patch(), kinetic.whole_patch(), soar.strip());
+        if let Some(naive) = &mut naive {
             naive.update(view, &mut Unobserved);
-            if is_sound {
-                let wanted = keys(naive);
-                assert!(keys(&soar) == wanted, "soar draws another mesh over a file that was called sound");
-                assert!(keys(&smart) == wanted, "smart draws another mesh over a file that was called sound");
-                assert!(keys(&kinetic) == wanted, "kinetic draws another mesh over a file that was called sound");
-            }
         }
-    });
+        if let Some(error) = records.take_error() {
+            assert!(!is_sound, "a sound terrain cannot be read: {error}");
+            return crate::words::refused(&error);
+        }
+        if is_sound {
+            let wanted = naive.as_ref().map_or_else(|| keys(&soar), keys);
+            assert!(keys(&soar) == wanted, "soar draws another mesh over a file that was called sound");
+            assert!(keys(&smart) == wanted, "smart draws another mesh over a file that was called sound");
+            assert!(keys(&kinetic) == wanted, "kinetic draws another mesh over a file that was called sound");
+        }
+    }
 }
 
 /// Over few pages of memory that come a frame late.
