@@ -46,7 +46,8 @@ fn files(folder: &Path, samples: [u32; 2], holes: bool, record: Option<RecordKin
 }
 
 fn path(terrain: &Terrain) -> Vec<FlightFrame> {
-    let frame = |i| frame(terrain, [0.4, 0.1 + 0.1 * f64::from(i)], 1300.0, 15.0 + 15.0 * f64::from(i), -25.0);
+    let frame =
+        |i| frame(terrain, [0.4, 0.1 + 0.1 * f64::from(i)], 1300.0, 15.0 + 15.0 * f64::from(i), -25.0);
     (0..6).map(frame).collect()
 }
 
@@ -124,7 +125,11 @@ fn every_engine_flies_pages_as_it_flies_the_whole() {
                     if kind == EngineKind::Kinetic {
                         let again = [fly(terrain, quality), edited(terrain, quality)];
                         let all = |frames: &Vec<FrameStats>| frames.iter().map(reads).collect::<Vec<_>>();
-                        assert_eq!(flown.each_ref().map(all), again.each_ref().map(all), "what is read repeats");
+                        assert_eq!(
+                            flown.each_ref().map(all),
+                            again.each_ref().map(all),
+                            "what is read repeats"
+                        );
                     }
                     let first = &flown[0][0];
                     assert!(first.pages_read.unwrap() >= first.pages_touched.min(2));
@@ -236,14 +241,16 @@ fn damage_is_told_with_its_place_and_is_no_ground() {
     let mapped = Terrain::open(&plain).unwrap();
     let flight = path(&mapped);
     let quality = Quality::default();
-    let expected = EngineKind::ALL
-        .map(|kind| counts(&replay(&mapped, &flight, quality, kind, &mut |_| {}).unwrap()));
+    let expected =
+        EngineKind::ALL.map(|kind| counts(&replay(&mapped, &flight, quality, kind, &mut |_| {}).unwrap()));
     let sound = std::fs::read(packed).unwrap();
     let mut tiles = 0;
     for part in 4..40 {
         let mut bytes = sound.clone();
         bytes[part * sound.len() / 40] ^= 0x55;
-        let Ok(terrain) = Terrain::from_source(Box::new(MemorySource::new("memory", bytes))) else { continue };
+        let Ok(terrain) = Terrain::from_source(Box::new(MemorySource::new("memory", bytes))) else {
+            continue;
+        };
         let terrain = Arc::new(terrain);
         let names_tile = |error: &dyn std::fmt::Display| error.to_string().starts_with("memory: tile ");
         for (kind, expected) in EngineKind::ALL.into_iter().zip(&expected) {

@@ -77,7 +77,13 @@ fn refines(terrain: &Terrain, views: &[View], culling: Culling, is_sound: bool) 
 }
 
 /// All engines over records that all have an answer, until one cannot be read.
-fn over<S: CompleteStore + Clone>(records: &S, views: &[View], culling: Culling, is_sound: bool, is_small: bool) {
+fn over<S: CompleteStore + Clone>(
+    records: &S,
+    views: &[View],
+    culling: Culling,
+    is_sound: bool,
+    is_small: bool,
+) {
     let mut soar = Soar::new(records.clone(), culling);
     let mut smart = Smart::new(records.clone(), culling);
     let mut kinetic = Kinetic::new(records.clone(), culling);

@@ -175,16 +175,17 @@ fn over_pages(
     edits: Option<Edits<'_>>,
     done: &mut dyn FnMut(u64),
 ) -> Result<Vec<FrameStats>, ReplayError> {
-    with_records!(terrain.paged(cache_bytes), records => {
-        let times = with_engine!(kind, EditedRecords::new(records.clone()), quality, engine => {
+    let times = with_records!(terrain.paged(cache_bytes), records => {
+        with_engine!(kind, EditedRecords::new(records), quality, engine => {
             time_updates(engine, &mut *ground_of(edits)?, frames, quality, done)
-        })?;
-        let records = records.anew();
-        let stats = alone(|| with_engine!(kind, EditedRecords::new(records.clone()), quality, engine => {
+        })?
+    });
+    let stats = with_records!(terrain.paged(cache_bytes), records => {
+        alone(|| with_engine!(kind, EditedRecords::new(records.clone()), quality, engine => {
             count_frames(engine, &mut *ground_of(edits)?, &records, frames, quality, done)
-        }))?;
-        Ok(timed(stats, times, kind))
-    })
+        }))?
+    });
+    Ok(timed(stats, times, kind))
 }
 
 /// The ground as it is, or edited.
@@ -270,7 +271,9 @@ pub fn mean_incoherence_percent(
     let quality = quality.check(terrain, EngineKind::Soar)?;
     match terrain.cache_bytes(quality.cache_bytes) {
         None => with_records!(terrain.records()?, records => mean_incoherence_over(records, pairs, quality)),
-        Some(bytes) => with_records!(terrain.paged(bytes), records => mean_incoherence_over(records, pairs, quality)),
+        Some(bytes) => {
+            with_records!(terrain.paged(bytes), records => mean_incoherence_over(records, pairs, quality))
+        }
     }
 }
 
@@ -288,8 +291,8 @@ fn mean_incoherence_over<S: CompleteStore + Clone>(
     for (first, second) in pairs {
         let (first, second) = (sets(first), sets(second));
         records.take_error().map_or(Ok(()), Err)?;
-        sum += 100.0 * not_in(&second.triangles, &first.triangles) as f64
-            / second.triangles.len().max(1) as f64;
+        sum +=
+            100.0 * not_in(&second.triangles, &first.triangles) as f64 / second.triangles.len().max(1) as f64;
     }
     Ok(sum / pairs.len().max(1) as f64)
 }

@@ -73,10 +73,7 @@ where
 ///
 /// # Errors
 /// What it could not read: the engine's mesh is not to be used then.
-fn read_since<E: Engine>(
-    engine: &mut E,
-    before: Option<PagesRead>,
-) -> Result<Option<PagesRead>, ReplayError>
+fn read_since<E: Engine>(engine: &mut E, before: Option<PagesRead>) -> Result<Option<PagesRead>, ReplayError>
 where
     E::Store: CompleteStore,
 {

@@ -105,8 +105,12 @@ pub fn simplify(terrain: &Terrain, options: &SimplifyOptions) -> Result<IndexedM
         Rectangle { from: window.from, to: [last[0].min(wide - 1), last[1].min(high - 1)] }
     });
     match terrain.cache_bytes(options.cache_bytes) {
-        None => with_records!(terrain.records()?, records => mesh_over(&records, terrain, options, rectangle)),
-        Some(bytes) => with_records!(terrain.paged(bytes), records => mesh_over(&records, terrain, options, rectangle)),
+        None => {
+            with_records!(terrain.records()?, records => mesh_over(&records, terrain, options, rectangle))
+        }
+        Some(bytes) => {
+            with_records!(terrain.paged(bytes), records => mesh_over(&records, terrain, options, rectangle))
+        }
     }
 }
 

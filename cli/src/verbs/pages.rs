@@ -50,8 +50,11 @@ mod tests {
 
     #[test]
     fn memory_that_is_too_small_for_a_frame_is_told_with_what_would_do() {
-        let frames = [900, 1000, 300]
-            .map(|pages_touched| FrameStats { frame: pages_touched / 100, pages_touched, ..FrameStats::default() });
+        let frames = [900, 1000, 300].map(|pages_touched| FrameStats {
+            frame: pages_touched / 100,
+            pages_touched,
+            ..FrameStats::default()
+        });
         assert_eq!(too_few(&frames, None), None);
         assert_eq!(too_few(&frames, Some(6 << 20)), None);
         assert_eq!(too_few(&[], Some(1 << 20)), None);

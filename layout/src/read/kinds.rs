@@ -72,9 +72,15 @@ impl Terrain {
     /// unpacked from.
     pub fn paged(&self, cache_bytes: u64) -> AnyPaged<'_> {
         match self.codec().clone() {
-            AnyCodec::Compact(codec) => ByKind::Compact(PagedRecords::new(self, self.shape(codec), cache_bytes)),
-            AnyCodec::Exact8(codec) => ByKind::Exact8(PagedRecords::new(self, self.shape(codec), cache_bytes)),
-            AnyCodec::Exact16(codec) => ByKind::Exact16(PagedRecords::new(self, self.shape(codec), cache_bytes)),
+            AnyCodec::Compact(codec) => {
+                ByKind::Compact(PagedRecords::new(self, self.shape(codec), cache_bytes))
+            }
+            AnyCodec::Exact8(codec) => {
+                ByKind::Exact8(PagedRecords::new(self, self.shape(codec), cache_bytes))
+            }
+            AnyCodec::Exact16(codec) => {
+                ByKind::Exact16(PagedRecords::new(self, self.shape(codec), cache_bytes))
+            }
         }
     }
 

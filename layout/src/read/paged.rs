@@ -48,7 +48,6 @@ impl<C> Clone for PagedRecords<'_, C> {
 struct Inner<'t, C> {
     terrain: &'t Terrain,
     shape: RecordShape<C>,
-    cache_bytes: u64,
     sets: u64,
     /// Page and version of each place; 0 for an empty one.
     tags: Vec<AtomicU64>,
@@ -82,7 +81,6 @@ impl<'t, C: RecordCodec> PagedRecords<'t, C> {
         let inner = Inner {
             terrain,
             shape,
-            cache_bytes,
             sets,
             tags: (0..places).map(|_| AtomicU64::new(0)).collect(),
             // Zeroed lazily by the system: memory is taken as pages come.
@@ -94,11 +92,6 @@ impl<'t, C: RecordCodec> PagedRecords<'t, C> {
             nanoseconds: AtomicU64::new(0),
         };
         Self { inner: Arc::new(inner) }
-    }
-
-    /// Records of the same terrain in as much memory, of which none was read.
-    pub fn anew(&self) -> Self {
-        Self::new(self.inner.terrain, self.inner.shape.clone(), self.inner.cache_bytes)
     }
 }
 
