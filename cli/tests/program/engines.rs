@@ -3,7 +3,12 @@
 use crate::support::{Bench, fields, text};
 use serde_json::Value;
 
-const REPLAY_FIELDS: [&str; 21] = [
+const REPLAY_FIELDS: [&str; 26] = [
+    "pages_read_total",
+    "tiles_unpacked_total",
+    "tile_bytes_read_total",
+    "read_ms_total",
+    "unpack_ms_total",
     "engine",
     "frames",
     "triangles_mean",
@@ -28,7 +33,8 @@ const REPLAY_FIELDS: [&str; 21] = [
 ];
 
 /// What says where figures come from.
-const ORIGIN_FIELDS: [&str; 9] = [
+const ORIGIN_FIELDS: [&str; 10] = [
+    "cache_mib",
     "terrain",
     "flight",
     "tolerance_px",

@@ -25,6 +25,7 @@ mod misread;
 mod mosaics;
 mod outputs;
 mod overlays;
+mod packed_pages;
 mod pictures;
 mod places;
 mod support;
