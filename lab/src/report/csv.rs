@@ -120,7 +120,7 @@ mod tests {
         assert!(text.starts_with("# "), "{text}");
         let mut table = text.lines().skip_while(|line| line.starts_with('#'));
         assert_eq!(table.next(), Some(HEADER));
-        assert_eq!(table.next(), Some("7,5,0,0,0,0,,,,0,0,0,0,0.1,,,,0,0,00000000000000ab"));
+        assert_eq!(table.next(), Some("7,5,0,0,0,0,,,,0,0,0,0,,,,,,0.1,,,,0,0,00000000000000ab"));
     }
 
     #[test]
