@@ -87,6 +87,19 @@ pub(super) fn change<T: Send>(array: &mut [T], change: impl Fn(usize, &mut [T]) 
     change(0, array);
 }
 
+/// Appends `count` elements like `blank`, and has `make` set them part by part; it is told where a part begins.
+pub(super) fn extend_parts<T: Copy + Send + Sync>(
+    array: &mut Vec<T>,
+    count: usize,
+    blank: T,
+    make: impl Fn(usize, &mut [T]) + Sync,
+) {
+    let before = array.len();
+    grow(array, count);
+    array.resize(before + count, blank);
+    change(&mut array[before..], make);
+}
+
 /// Does two things, side by side if they are worth it.
 pub(super) fn both(count: usize, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     #[cfg(feature = "files")]

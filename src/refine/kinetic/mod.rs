@@ -39,7 +39,8 @@ use frame::budget::Allowance;
 use frame::edited::Edits;
 use mesh::clusters::{Clusters, Dealing};
 use mesh::labels::level_of;
-use mesh::nodes::{CENTRE, NONE, Nodes, SPLIT, STATUS, body};
+use mesh::nodes::{CENTRE, Nodes, SPLIT, STATUS};
+use mesh::rings::{Corner, Ring};
 use mesh::vertices::Vertices;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners};
 use terrasoar_layout::grid::record::{RecordCodec, Vertex};
@@ -215,8 +216,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// The vertex of a node, from the record it holds.
     #[inline(always)]
     fn vertex_of(&self, node: u32) -> Vertex {
-        let node = self.nodes.get(node);
-        self.records.decode(node.raw, level_of(node.point))
+        self.records.decode(self.nodes.get(node).raw, level_of(self.point_of(node)))
     }
 
     /// Counts what is late and how far the largest error of it exceeds the tolerance. Where time counts, [`MOST_ASSESSED`] vertices at the most are asked for their error.
@@ -226,7 +226,7 @@ impl<S: RecordStore> Kinetic<S> {
         // What a vertex leaves on the screen while it is not split, if that shows.
         let error_px = |node: u32| {
             let vertex = self.vertex_of(node);
-            let sighting = metric.sight(self.records.grid().position_m(self.nodes.get(node).point), &vertex);
+            let sighting = metric.sight(self.records.grid().position_m(self.point_of(node)), &vertex);
             let culled = self.culling == Culling::Vertices && metric.cull(&sighting, ALL_PLANES).is_none();
             let shows = sighting.is_selected() && !culled;
             if shows { sighting.error_px(view.tolerance_px, nearest_m) } else { 0.0 }
@@ -246,8 +246,10 @@ impl<S: RecordStore> Kinetic<S> {
         for node in self.unread.iter().filter(|node| self.nodes.is_unread(**node)) {
             unread += 1;
             // Its own error is not known, but no larger than its parents'.
-            let parents = self.nodes.get(*node).parents.into_iter().filter(|parent| *parent != NONE);
-            let bound_px = parents.map(error_px).fold(f64::INFINITY, f64::min);
+            let parents = self.nodes.get(*node).links.into_iter().filter(|parent| parent.is_some());
+            let bound_px = parents
+                .map(|parent| error_px(self.nodes.node_of(parent.slot())))
+                .fold(f64::INFINITY, f64::min);
             late_error_px = late_error_px.max(if bound_px.is_finite() { bound_px } else { 0.0 });
         }
         self.work.late = late + unread;
@@ -297,19 +299,23 @@ impl<S: RecordStore> Kinetic<S> {
             probe.read(slot as u64);
             let vertex = self.records.decode(self.first_record(slot as u64), 0);
             self.corners[slot] = vertex;
-            self.vertices.place(at, &vertex);
+            self.place_vertex(at, &vertex, Ring::new([Corner::NONE; 2], [slot as u32; 2]));
             self.patch.vertices.push((slot as u32, self.patch_vertex(at, &vertex, [slot as u32; 2])));
         }
         let centre_at = square[0].midpoint(square[2]);
         probe.read(CENTRE_SLOT);
-        let centre = self.nodes.create(CENTRE, centre_at, CENTRE_SLOT, self.first_record(CENTRE_SLOT));
-        self.nodes.get_mut(centre).word = STATUS;
-        let vertex = self.vertex_of(centre);
-        let slot = self.vertices.place(centre_at, &vertex);
+        let raw = self.first_record(CENTRE_SLOT);
+        let centre = self.nodes.create(CENTRE, raw);
+        let level = level_of(centre_at);
+        let vertex = self.records.decode(raw, level);
+        // Its corners are told by the roots.
+        let slot = self.place_vertex(centre_at, &vertex, Ring::new([Corner::NONE; 2], [0; 2]));
+        let record = self.nodes.get_mut(centre);
+        record.word = STATUS;
+        record.become_split(slot, level);
         self.patch.vertices.push((slot, self.patch_vertex(centre_at, &vertex, [slot; 2])));
-        self.nodes.get_mut(centre).body[body::HERE] = slot;
         for (side, [b, d]) in ROOTS {
-            self.plant_root(root_label(side), [slot, b as u32, d as u32]);
+            self.plant_root(root_label(side), [b as u32, d as u32]);
         }
         self.triangles = ROOTS.len();
     }

@@ -152,7 +152,7 @@ impl<S: RecordStore> Kinetic<S> {
         let k = self.records.grid().k();
         self.wants.clear();
         self.wants.extend(self.unread.iter().filter(|node| self.nodes.is_unread(**node)).map(|node| {
-            let slot = slot_of(k, self.nodes.get(*node).point);
+            let slot = slot_of(k, self.nodes.get(*node).point(&self.vertices));
             Want { page: S::page_of(slot), in_frames: 0.0, is_lacking: true }
         }));
         let Some(mut ahead) = self.ahead.take() else { return };
@@ -198,8 +198,7 @@ impl<S: RecordStore> Kinetic<S> {
     fn look_from(&mut self, node: u32, ahead: &mut Ahead, judge: &Judge) -> usize {
         let grid = *self.records.grid();
         let (k, side) = (grid.k(), grid.side_steps());
-        let leaf = self.nodes.get(node);
-        let first = ahead.frames_left(leaf.word, judge);
+        let first = ahead.frames_left(self.nodes.get(node).word, judge);
         let most = first + ahead.lead_frames;
         if !most.is_finite() {
             return 0;
@@ -208,7 +207,7 @@ impl<S: RecordStore> Kinetic<S> {
         let mut away = None;
         ahead.stack.clear();
         ahead.seen.clear();
-        ahead.stack.push((leaf.point, first));
+        ahead.stack.push((self.point_of(node), first));
         while let Some((point, in_frames)) = ahead.stack.pop().filter(|_| tests < TESTS_A_LOOK) {
             let level = level_of(point);
             if level == 0 {
@@ -261,7 +260,7 @@ impl<S: RecordStore> Kinetic<S> {
             let Some(record) = self.nodes.all.get_mut(*node as usize).filter(|n| n.word == UNREAD) else {
                 return false;
             };
-            let is_away = self.records.get(slot_of(k, record.point)).is_none();
+            let is_away = self.records.get(slot_of(k, record.point(&self.vertices))).is_none();
             if !is_away {
                 record.word = 0;
                 self.fresh.push(*node);

@@ -16,10 +16,12 @@ use super::piece::{Line, Parent, Piece, Places};
 use crate::refine::kinetic::capacity::grow;
 use crate::refine::kinetic::frame::collect::enter;
 use crate::refine::kinetic::frame::shown::Shown;
-use crate::refine::kinetic::hands::{both, change, extend, extend_by, gather};
+use crate::refine::kinetic::hands::{both, change, extend, extend_by, extend_parts, gather};
 use crate::refine::kinetic::mesh::clusters::{CLUSTER, Dealing};
-use crate::refine::kinetic::mesh::labels::{child_point, first_child, is_on_border, level_of, orientation};
-use crate::refine::kinetic::mesh::nodes::{CENTRE, NO_VERTEX, NONE, Node, SPLIT, STATUS, UNREAD, body};
+use crate::refine::kinetic::mesh::labels::{child_point, is_on_border, level_of, orientation};
+use crate::refine::kinetic::mesh::nodes::{CENTRE, Node, SPLIT, UNREAD};
+use crate::refine::kinetic::mesh::rings::{Corner, NONE, NOTHING, Ring, TURNS, edge_of, label_of};
+use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::kinetic::{Kinetic, MeshVertex, Patch};
@@ -27,15 +29,13 @@ use crate::refine::{Phase, Probe};
 use std::ops::Range;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
-use terrasoar_layout::read::prefetch::prefetch;
+use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::store::{RawOf, RecordStore};
 
 /// Nodes of a mesh that has only been planted: the centre and four roots.
 const PLANTED: u32 = 5;
 /// Split vertices of a piece.
 const PIECE: usize = 1 << 14;
-/// Children ahead whose record memory is asked for.
-const FETCH_AHEAD: usize = 12;
 /// Split vertices ahead whose parents memory is asked for.
 const PARENTS_AHEAD: usize = 8;
 /// Clusters that one thread takes at the least, to find their bounds.
@@ -52,14 +52,15 @@ impl<S: RecordStore> Kinetic<S> {
         let stale = self.nodes.clusters.stale_slots();
         self.fresh.clear();
         self.nodes.all.truncate(PLANTED as usize);
+        let level = level_of(self.point_of(1));
         self.test_roots(judge);
         let mut nodes = PLANTED;
         let (mut line, mut below) = (Line::default(), Line::default());
-        line.start(level_of(self.nodes.get(1).point), 1);
+        line.start(level, 1);
         self.list_slots(0..1, stale);
         self.survey(1..PLANTED, &mut line, 1, stale);
-        let (parents, births) = (Vec::new(), Vec::new());
-        let mut piece = Piece { start: 0, parents, births, base: 0, next: 0, places };
+        let (parents, births, verdicts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut piece = Piece { start: 0, parents, births, verdicts, base: 0, next: 0, places };
         while !line.split.is_empty() {
             let at = self.nodes.all.len() as u32;
             below.start(line.level.saturating_sub(1), at);
@@ -70,7 +71,8 @@ impl<S: RecordStore> Kinetic<S> {
                 self.place_vertices(&line, &piece);
                 nodes += piece.made(line.level);
                 let children = self.nodes.all.len() as u32..places.place(nodes - 1) + 1;
-                self.make_children(judge, &children, &line, &piece);
+                self.judge_children(judge, &line, &mut piece);
+                self.make_children(&children, &line, &piece);
                 self.tell_parents(&line, &piece);
                 if line.level > 0 {
                     // Corners of children may be vertices of later pieces: what slots show is listed behind the last.
@@ -92,22 +94,34 @@ impl<S: RecordStore> Kinetic<S> {
         probe.phase(Phase::Apply);
         let k = self.records.grid().k();
         let nodes = self.nodes.all[1..].iter().filter(|_| P::HEARS_READS);
-        for node in nodes.filter(|node| node.word & !STATUS != NO_VERTEX && node.word != UNREAD) {
-            probe.read(slot_of(k, node.point));
+        for node in nodes.filter(|node| node.is_live() && node.word != UNREAD) {
+            probe.read(slot_of(k, node.point(&self.vertices)));
         }
     }
 
     fn test_roots(&mut self, judge: &Judge) {
         let side_steps = self.records.grid().side_steps();
         for node in 1..PLANTED {
-            let record = self.nodes.get(node);
-            let slot = slot_of(self.records.grid().k(), record.point);
-            let (raw, word) = tested(&self.records, judge, record.point, slot, record.raw);
-            let is_split = word & ACTIVE != 0 && self.nodes.is_complete(node, side_steps);
+            let point = self.point_of(node);
+            let slot = slot_of(self.records.grid().k(), point);
+            let Some(raw) = self.records.get(slot) else {
+                self.nodes.get_mut(node).word = UNREAD;
+                continue;
+            };
+            let word = self.word_of(judge, point, raw);
+            let is_whole = !self.nodes.get(node).links.contains(&Corner::NONE);
+            let is_split = word & ACTIVE != 0 && (is_whole || is_on_border(point, side_steps));
             let record = self.nodes.get_mut(node);
             record.raw = raw;
             record.word = word | if is_split { SPLIT } else { 0 };
         }
+    }
+
+    /// The word of a vertex.
+    #[inline(always)]
+    fn word_of(&self, judge: &Judge, point: GridPoint, raw: RawOf<S>) -> u32 {
+        let vertex = self.records.decode(raw, level_of(point));
+        judge.word(&judge.metric().sight(self.records.grid().position_m(point), &vertex))
     }
 
     /// Takes new vertices into their level: those that are split are listed, words go into the queue, leaves from the place `first` on into the patch. At the finest level slots wait until split
@@ -142,7 +156,7 @@ impl<S: RecordStore> Kinetic<S> {
         let enter_words = || {
             for (node, place) in all[from..range.end as usize].iter().zip(range.clone()) {
                 let word = node.word & !SPLIT;
-                if word & !STATUS == NO_VERTEX {
+                if !node.is_live() {
                     continue;
                 }
                 *vertices += 1;
@@ -154,41 +168,37 @@ impl<S: RecordStore> Kinetic<S> {
             }
         };
         let slots = if line.level > 0 { first as usize..range.end as usize } else { 0..0 };
-        both(range.len(), enter_words, || list_slots(patch, &shown, slots, stale));
+        // Split ones have no rings yet, and will show nothing.
+        both(range.len(), enter_words, || list_slots(patch, &shown, slots, stale, false));
     }
 
     /// Numbers the children of split vertices of a level, from `piece.start` on.
     fn number(&mut self, line: &Line, piece: &mut Piece<RawOf<S>>) {
         let Piece { start, parents, births, .. } = piece;
-        let all = &self.nodes.all;
+        let (all, rings) = (&self.nodes.all, &self.nodes.rings);
         parents.clear();
         extend(parents, PIECE.min(line.split.len() - *start), |i| {
             let (rank, place) = ((*start + i) as u32, line.split[*start + i]);
             if let Some(later) = line.split.get(rank as usize + PARENTS_AHEAD) {
-                all[*later as usize].parents.iter().for_each(|parent| prefetch(all, *parent as usize));
+                all[*later as usize].links.iter().for_each(|parent| rings.fetch(*parent));
             }
             let node = &all[place as usize];
-            let [p, q, apex, other, ..] = node.body;
-            let mut parent = Parent {
-                node: place,
-                raw: node.raw,
-                point: node.point,
-                body: [p, q, apex, other],
-                first: first_child(orientation(node.point), line.level) as u8,
-                makes: 0,
-                sharers: [NONE; 4],
-                before: 0,
-            };
-            for side in (0..2).filter(|side| node.parents[*side] != NONE) {
+            let links = node.links;
+            let around =
+                links.map(|parent| if parent.is_some() { rings.get(parent.slot()) } else { &NOTHING });
+            let ends = edge_of(links, around);
+            // What the node will be is a vertex at the point of a leaf.
+            let point = Node { word: 0, ..*node }.point(&self.vertices);
+            let mut parent =
+                Parent { raw: node.raw, point, links, ends, makes: 0, sharers: [NONE; 4], before: 0 };
+            for side in (0..2).filter(|side| links[*side].is_some()) {
                 parent.makes |= 16 << side;
                 if line.level == 0 {
                     continue;
                 }
-                let own = 2 * side + orientation(node.point);
-                let around = &all[node.parents[side] as usize].body;
                 // The neighbours around the parent share the children beside it.
-                for (turn, step) in [(2 * side, 3), (2 * side + 1, 1)] {
-                    let sharer = line.rank(around[(own + step) & 3]);
+                for (turn, step) in TURNS[side].into_iter().zip([3, 1]) {
+                    let sharer = line.rank(around[side].children[(links[side].turn() + step) & 3]);
                     parent.sharers[turn] = sharer;
                     parent.makes |= u8::from(sharer == NONE || sharer > rank) << turn;
                 }
@@ -214,9 +224,8 @@ impl<S: RecordStore> Kinetic<S> {
         let here = piece.base + piece.start as u32;
         let sent = self.patch.vertices.len();
         extend(&mut self.patch.vertices, parents.len(), |i| {
-            let Parent { point, raw, body, .. } = parents[i];
+            let Parent { point, raw, ends, .. } = parents[i];
             let vertex = records.decode(raw, line.level);
-            let ends = [body[body::P], body[body::Q]];
             (here + i as u32, MeshVertex::of(records, point, &vertex, ends))
         });
         let sent = &self.patch.vertices[sent..];
@@ -228,77 +237,101 @@ impl<S: RecordStore> Kinetic<S> {
         );
     }
 
-    /// Makes split nodes of leaves: they have their own vertices, and the places of their children.
+    /// Makes split nodes of leaves: they have their own vertices, whose rings have the places of their children.
     fn tell_parents(&mut self, line: &Line, piece: &Piece<RawOf<S>>) {
         let Piece { start, parents, base, next, places, .. } = piece;
-        let (Some(first), Some(last)) = (parents.first(), parents.last()) else { return };
-        let (before, leaves) = self.nodes.all.split_at_mut(first.node as usize);
-        let leaves = &mut leaves[..(last.node - first.node) as usize + 1];
-        let ranks = &line.ranks[(first.node - line.range.start) as usize..];
-        change(leaves, |at, part| {
+        if parents.is_empty() {
+            return;
+        }
+        let range = line.split[*start] as usize..line.split[start + parents.len() - 1] as usize + 1;
+        let ranks = &line.ranks[range.start - line.range.start as usize..];
+        change(&mut self.nodes.all[range], |at, part| {
             for (node, rank) in part.iter_mut().zip(&ranks[at..]).filter(|(_, rank)| **rank != NONE) {
-                let i = *rank as usize - start;
-                let parent = &parents[i];
-                node.body[body::HERE] = base + rank;
+                node.become_split(base + rank, line.level);
+            }
+        });
+        let here = *base as usize + start;
+        let rings = &mut self.nodes.rings.all;
+        grow(rings, parents.len());
+        rings.resize(here + parents.len(), NOTHING);
+        let (before, rings) = rings.split_at_mut(here);
+        change(rings, |at, part| {
+            for (i, (ring, parent)) in (at..).zip(part.iter_mut().zip(&parents[at..])) {
+                *ring = Ring::new(parent.links, parent.ends);
                 if line.level == 0 {
-                    node.body[body::ANNEX] = places.place(next + i as u32);
+                    ring.children[0] = places.place(next + i as u32);
                     continue;
                 }
-                for (label, child) in node.body[..4].iter_mut().enumerate() {
-                    let turn = parent.turn(label);
+                for (turn, child) in ring.children.iter_mut().enumerate() {
                     let sharer = parent.sharers[turn];
-                    let opposite = (label + 2) & 3;
+                    let turn_there = parent.turn_there(turn);
                     *child = if parent.makes >> turn & 1 == 1 {
                         places.place(next + parent.child(turn))
                     } else if sharer == NONE {
                         NONE
                     } else if let Some(i) = (sharer as usize).checked_sub(*start) {
-                        places.place(next + parents[i].child(parents[i].turn(opposite)))
+                        places.place(next + parents[i].child(turn_there))
                     } else {
-                        before[line.split[sharer as usize] as usize].body[opposite]
+                        before[*base as usize + sharer as usize].children[turn_there]
                     };
                 }
             }
         });
     }
 
-    /// Makes and tests the children of a piece, or its annexes, at the places of `range`.
-    fn make_children(&mut self, judge: &Judge, range: &Range<u32>, line: &Line, piece: &Piece<RawOf<S>>) {
-        let Piece { start, parents, births, base, next, places } = piece;
-        let (level, records) = (line.level, &self.records);
-        let (k, side_steps) = (records.grid().k(), records.grid().side_steps());
-        let annex = |i: usize| {
-            let Parent { node, raw, .. } = parents[i];
-            Node { parents: [node, NONE], ..Node::free(raw) }
-        };
+    /// Reads the records of a piece's children, and tests them.
+    fn judge_children(&self, judge: &Judge, line: &Line, piece: &mut Piece<RawOf<S>>) {
+        let Piece { parents, births, verdicts, .. } = piece;
+        let (level, k) = (line.level, self.records.grid().k());
+        verdicts.clear();
+        if level == 0 {
+            return;
+        }
         let point_of = |birth: u32| {
-            let parent = &parents[birth as usize >> 2];
-            child_point(parent.point, level, parent.turn(birth as usize & 3))
+            let Parent { point, .. } = parents[birth as usize >> 2];
+            child_point(point, level, label_of(birth as usize & 3, orientation(point), level))
         };
-        let child = |number: usize| {
-            if let Some(later) = births.get(number + FETCH_AHEAD) {
-                records.prefetch(slot_of(k, point_of(*later)));
+        extend_parts(verdicts, births.len(), (S::Codec::INERT, UNREAD), |at, part| {
+            let mut batch = Batch::default();
+            for (i, verdicts) in part.chunks_mut(BATCH).enumerate() {
+                let first = at + i * BATCH;
+                let mut points = [GridPoint::default(); BATCH];
+                for (i, point) in points[..verdicts.len()].iter_mut().enumerate() {
+                    *point = point_of(births[first + i]);
+                    self.records.prefetch(slot_of(k, *point));
+                }
+                self.judge_batch(
+                    &mut batch,
+                    &points[..verdicts.len()],
+                    |i| self.records.get(slot_of(k, points[i])),
+                    judge,
+                    verdicts,
+                );
             }
-            let birth = births[number];
-            let (i, turn) = (birth as usize >> 2, birth as usize & 3);
-            let parent = &parents[i];
-            let label = parent.turn(turn);
-            let here = base + (start + i) as u32;
-            let point = point_of(birth);
-            let slot = slot_of(k, point);
-            let (raw, word) = tested(records, judge, point, slot, parent.raw);
-            let [p, q] = parent.ends(turn, label);
-            let mut node = Node::fresh(word, point, slot, raw);
-            (node.body[body::P], node.body[body::Q]) = (p, q);
+        });
+    }
+
+    /// Makes the children of a piece, or its annexes, at the places of `range`.
+    fn make_children(&mut self, range: &Range<u32>, line: &Line, piece: &Piece<RawOf<S>>) {
+        let Piece { start, parents, births, verdicts, base, next, places } = piece;
+        let (level, side_steps) = (line.level, self.records.grid().side_steps());
+        let here = base + *start as u32;
+        let child = |number: usize| {
+            let (birth, (raw, word)) = (births[number], verdicts[number]);
+            let (i, turn) = (birth >> 2, birth as usize & 3);
+            let parent = &parents[i as usize];
+            let turned = orientation(parent.point);
+            let label = label_of(turn, turned, level);
+            let mut node = Node::leaf(word, raw);
             let side = label >> 1;
-            node.parents[side] = parent.node;
-            node.body[body::APEX + side] = here;
+            node.links[side] = Corner::parent(here + i, turn);
             let sharer = parent.sharers[turn];
             if sharer != NONE {
-                node.parents[1 - side] = line.split[sharer as usize];
-                node.body[body::APEX + 1 - side] = base + sharer;
+                node.links[1 - side] = Corner::parent(base + sharer, parent.turn_there(turn));
             }
-            if word & ACTIVE != 0 && (sharer != NONE || is_on_border(point, side_steps)) {
+            if word & ACTIVE != 0
+                && (sharer != NONE || is_on_border(child_point(parent.point, level, label), side_steps))
+            {
                 node.word |= SPLIT;
             }
             node
@@ -307,13 +340,10 @@ impl<S: RecordStore> Kinetic<S> {
         let nothing = Node::free(parents[0].raw);
         extend(&mut self.nodes.all, range.len(), |i| {
             match places.number(range.start + i as u32).and_then(|number| number.checked_sub(*next)) {
-                Some(number) if number < made => {
-                    if level == 0 {
-                        annex(number as usize)
-                    } else {
-                        child(number as usize)
-                    }
+                Some(number) if number < made && level == 0 => {
+                    Node::annex(here + number, parents[number as usize].raw)
                 }
+                Some(number) if number < made => child(number as usize),
                 _ => nothing,
             }
         });
@@ -322,7 +352,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// Lists what the slots of some places show.
     fn list_slots(&mut self, range: Range<usize>, stale: usize) {
         let shown = Shown { records: &self.records, nodes: &self.nodes, vertices: &self.vertices };
-        list_slots(&mut self.patch, &shown, range, stale);
+        list_slots(&mut self.patch, &shown, range, stale, true);
     }
 
     /// Brings the clusters to the nodes that have been made.
@@ -345,12 +375,20 @@ impl<S: RecordStore> Kinetic<S> {
     }
 }
 
-/// Lists the slots of places that show something, and those below `stale` that do not.
-fn list_slots<S: RecordStore>(patch: &mut Patch, shown: &Shown<'_, S>, places: Range<usize>, stale: usize) {
+/// Lists the slots of places that show something, and those below `stale` that do not. Split nodes show something if they `have_rings`.
+fn list_slots<S: RecordStore>(
+    patch: &mut Patch,
+    shown: &Shown<'_, S>,
+    places: Range<usize>,
+    stale: usize,
+    have_rings: bool,
+) {
     grow(&mut patch.triangles, 2 * places.len());
     gather(&mut patch.triangles, places.len(), |part, list| {
         for place in places.start + part.start..places.start + part.end {
-            for (side, corners) in shown.nodes.triangles(place as u32).into_iter().enumerate() {
+            let shows = have_rings || !shown.nodes.is_split(place as u32);
+            let both = if shows { shown.nodes.triangles(place as u32) } else { [None; 2] };
+            for (side, corners) in both.into_iter().enumerate() {
                 let slot = 2 * place + side;
                 if corners.is_some() || slot < stale {
                     list.push((slot as u32, shown.corners(place as u32, corners)));
@@ -358,18 +396,4 @@ fn list_slots<S: RecordStore>(patch: &mut Patch, shown: &Shown<'_, S>, places: R
             }
         }
     });
-}
-
-/// The record at a point, which the file has in `slot`, and its word; `raw` stands in for a record that is away.
-#[inline(always)]
-fn tested<S: RecordStore>(
-    records: &S,
-    judge: &Judge,
-    point: GridPoint,
-    slot: u64,
-    raw: RawOf<S>,
-) -> (RawOf<S>, u32) {
-    let Some(raw) = records.get(slot) else { return (raw, UNREAD) };
-    let vertex = records.decode(raw, level_of(point));
-    (raw, judge.word(&judge.metric().sight(records.grid().position_m(point), &vertex)))
 }

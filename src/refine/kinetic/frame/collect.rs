@@ -100,6 +100,7 @@ impl<S: RecordStore> Kinetic<S> {
             if let Some(word) = self.nodes.word_if(entry.node, entry.word) {
                 *word &= STATUS;
                 self.due.push(entry.node);
+                self.vertices.fetch(self.nodes.get(entry.node).anchor().slot());
             }
         }
     }

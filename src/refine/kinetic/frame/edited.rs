@@ -9,11 +9,13 @@
 //! area. Nothing is allocated once the lists have grown.
 
 use crate::refine::change::{Areas, GroundChange};
-use crate::refine::kinetic::mesh::labels::{child_point, level_of};
-use crate::refine::kinetic::mesh::nodes::{CENTRE, NONE, STATUS, body};
+use crate::refine::kinetic::mesh::labels::{child_point, level_of, orientation};
+use crate::refine::kinetic::mesh::nodes::{CENTRE, STATUS};
+use crate::refine::kinetic::mesh::rings::{NONE, TURNS, label_of};
 use crate::refine::kinetic::time::certificate::{clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::kinetic::{Kinetic, root_label};
+use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::prefetch::prefetch;
@@ -28,11 +30,8 @@ const AHEAD: [usize; 2] = [12, 6];
 /// A node on the way down.
 #[derive(Debug, Clone, Copy)]
 struct Visit {
-    /// Of its record.
-    slot: u64,
+    point: GridPoint,
     node: u32,
-    /// Vertex slots of the edge that it splits, as its triangle of side 0 has them.
-    ends: [u32; 2],
     /// The side of the parent that led here.
     side: u32,
 }
@@ -45,8 +44,8 @@ pub(crate) struct Edits {
     visits: Vec<Visit>,
     /// Calls since the last update.
     calls: u32,
-    /// Vertex slots, the nodes that split there ([`NONE`] for corners of the square), and the vertex slots of their edges' ends.
-    moved: Vec<(u32, u32, [u32; 2])>,
+    /// Vertex slots, and the nodes that split there ([`NONE`] for corners of the square).
+    moved: Vec<(u32, u32)>,
     /// Leaves that may have a corner that moved, if clusters have bounds.
     leaves: Vec<u32>,
     /// Leaves to look ahead from again.
@@ -59,7 +58,7 @@ impl Edits {
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         self.areas.bytes()
-            + self.moved.capacity() * size_of::<(u32, u32, [u32; 2])>()
+            + self.moved.capacity() * size_of::<(u32, u32)>()
             + self.visits.capacity() * size_of::<Visit>()
             + (self.leaves.capacity() + self.looks.capacity()) * size_of::<u32>()
     }
@@ -135,36 +134,39 @@ impl<S: RecordStore> Kinetic<S> {
             if vertex != self.corners[slot as usize] {
                 self.corners[slot as usize] = vertex;
                 self.vertices.set_height(slot, vertex.height_m);
-                edits.moved.push((slot, NONE, [slot; 2]));
+                edits.moved.push((slot, NONE));
             }
         }
         if let Some(raw) = self.record_now(change, CENTRE_SLOT)
             && raw != self.nodes.get(CENTRE).raw
         {
             self.nodes.get_mut(CENTRE).raw = raw;
-            let slot = self.nodes.get(CENTRE).body[body::HERE];
+            let slot = self.nodes.get(CENTRE).slot();
             self.vertices.set_height(slot, self.vertex_of(CENTRE).height_m);
-            edits.moved.push((slot, CENTRE, [slot; 2]));
+            edits.moved.push((slot, CENTRE));
         }
     }
 
     /// Looks at all nodes that areas can concern, coarser ones before finer ones. Of a node's parents the first one that it has leads to it.
     fn walk(&mut self, edits: &mut Edits, change: &GroundChange<'_>) {
         let mut visits = std::mem::take(&mut edits.visits);
-        for (side, [b, d]) in ROOTS {
+        let centre = self.point_of(CENTRE);
+        for (side, _) in ROOTS {
             let label = root_label(side);
-            let node = self.nodes.get(CENTRE).body[label];
-            let ends = turned([b as u32, d as u32], label);
-            visits.push(Visit { slot: side, node, ends, side: (label >> 1) as u32 });
+            let point = child_point(centre, level_of(centre), label);
+            visits.push(Visit { point, node: self.root(label), side: (label >> 1) as u32 });
         }
+        let k = self.records.grid().k();
         let mut next = 0;
         while let Some(visit) = visits.get(next).copied() {
             if let Some(later) = visits.get(next + AHEAD[0]) {
-                // A record may begin in one cache line and end in the next.
-                [0, 1].iter().for_each(|i| prefetch(&self.nodes.all, later.node as usize + i));
+                prefetch(&self.nodes.all, later.node as usize);
             }
             if let Some(later) = visits.get(next + AHEAD[1]) {
-                self.records.prefetch(later.slot);
+                self.records.prefetch(slot_of(k, later.point));
+                if let Some(node) = self.nodes.all.get(later.node as usize) {
+                    self.nodes.rings.fetch(node.links[0]);
+                }
             }
             next += 1;
             self.visit(visit, &mut visits, edits, change);
@@ -176,17 +178,17 @@ impl<S: RecordStore> Kinetic<S> {
     /// Looks at a node, and lists those below it.
     #[inline(always)]
     fn visit(&mut self, visit: Visit, visits: &mut Vec<Visit>, edits: &mut Edits, change: &GroundChange<'_>) {
-        let Visit { slot, node, ends, side } = visit;
-        let record = *self.nodes.get(node);
-        if side == 1 && record.parents[0] != NONE {
+        let Visit { point, node, side } = visit;
+        if side == 1 && self.nodes.parents(node)[0].is_some() {
             return;
         }
-        let level = level_of(record.point);
+        let k = self.records.grid().k();
+        let level = level_of(point);
         if !self.nodes.is_unread(node)
-            && let Some(raw) = self.record_now(change, slot)
-            && raw != record.raw
+            && let Some(raw) = self.record_now(change, slot_of(k, point))
+            && raw != self.nodes.get(node).raw
         {
-            self.renew(node, raw, ends, edits);
+            self.renew(node, raw, edits);
         } else if !S::IS_COMPLETE && !self.nodes.is_split(node) && self.has_been_looked_from(node) {
             edits.looks.push(node);
         }
@@ -196,35 +198,24 @@ impl<S: RecordStore> Kinetic<S> {
             }
             return;
         }
-        let k = self.records.grid().k();
-        for (i, side) in self.nodes.sides(node, level).into_iter().enumerate() {
-            let Some(side) = side else { continue };
-            let at =
-                [child_point(record.point, level, side.first), child_point(record.point, level, side.last)];
-            let are_met = [edits.areas.concern(at[0], level - 1), edits.areas.concern(at[1], level - 1)];
-            if are_met == [false; 2] {
-                continue;
-            }
-            // The other parent may be far away in memory.
-            let apex = self.nodes.get(side.parent).body[body::HERE];
-            let [p, q] = if i == 0 { ends } else { [ends[1], ends[0]] };
-            let edges = [(side.first, [apex, p]), (side.last, [q, apex])];
-            for (((label, edge), at), is_met) in edges.into_iter().zip(at).zip(are_met) {
-                if is_met {
-                    let child = record.body[label];
-                    let side = (label >> 1) as u32;
-                    visits.push(Visit { slot: slot_of(k, at), node: child, ends: turned(edge, label), side });
-                }
+        let ring = self.nodes.rings.get(self.nodes.get(node).slot());
+        let turned = orientation(point);
+        for turn in TURNS.into_iter().flatten().filter(|turn| ring.children[*turn] != NONE) {
+            let label = label_of(turn, turned, level);
+            let at = child_point(point, level, label);
+            if edits.areas.concern(at, level - 1) {
+                let side = (label >> 1) as u32;
+                visits.push(Visit { point: at, node: ring.children[turn], side });
             }
         }
     }
 
     /// Gives a node another record.
-    fn renew(&mut self, node: u32, raw: RawOf<S>, ends: [u32; 2], edits: &mut Edits) {
+    fn renew(&mut self, node: u32, raw: RawOf<S>, edits: &mut Edits) {
         let is_split = self.nodes.is_split(node);
         let record = self.nodes.get_mut(node);
         record.raw = raw;
-        let slot = record.body[body::HERE];
+        let slot = record.slot();
         // One that is due already is in the list.
         if record.word & !STATUS != 0 {
             record.word &= STATUS;
@@ -232,7 +223,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         if is_split {
             self.vertices.set_height(slot, self.vertex_of(node).height_m);
-            edits.moved.push((slot, node, ends));
+            edits.moved.push((slot, node));
         }
     }
 
@@ -255,16 +246,18 @@ impl<S: RecordStore> Kinetic<S> {
             edits.unite();
         }
         let square = corners(self.records.grid().k());
-        for (slot, node, ends) in edits.moved.drain(..) {
-            let (point, vertex) = if node == NONE {
-                (square[slot as usize], self.corners[slot as usize])
+        for (slot, node) in edits.moved.drain(..) {
+            let (point, vertex, ends) = if node == NONE {
+                (square[slot as usize], self.corners[slot as usize], [slot; 2])
             } else {
-                (self.nodes.get(node).point, self.vertex_of(node))
+                let ends = if node == CENTRE { [slot; 2] } else { self.nodes.rings.get(slot).ends() };
+                (self.point_of(node), self.vertex_of(node), ends)
             };
             self.patch.vertices.push((slot, self.patch_vertex(point, &vertex, ends)));
         }
         for node in edits.leaves.drain(..) {
-            let annex = if self.nodes.is_split(node) { self.nodes.get(node).body[body::ANNEX] } else { NONE };
+            let leaf = self.nodes.get(node);
+            let annex = if leaf.is_split() { self.nodes.rings.get(leaf.slot()).annex() } else { NONE };
             for place in [node, annex].into_iter().filter(|place| *place != NONE) {
                 for corners in self.nodes.triangles(place).into_iter().flatten() {
                     self.cover(place, &corners);
@@ -278,10 +271,4 @@ impl<S: RecordStore> Kinetic<S> {
         }
         self.edits = edits;
     }
-}
-
-/// The ends of a child's edge as its triangle of side 0 has them, from those of the triangle that it has with `label` at its parent.
-#[inline(always)]
-fn turned([p, q]: [u32; 2], label: usize) -> [u32; 2] {
-    if label >> 1 == 0 { [p, q] } else { [q, p] }
 }

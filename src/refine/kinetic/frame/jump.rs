@@ -43,6 +43,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// Gives up the whole mesh and all that was to be done with it.
     pub(crate) fn uproot(&mut self) {
         self.nodes.all.clear();
+        self.nodes.rings.all.clear();
         self.nodes.clusters.clear();
         self.vertices.clear();
         (self.triangles, self.stale, self.sparse) = (0, 0, 0);
@@ -63,6 +64,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         self.is_roomy = false;
         give_back(&mut self.nodes.all, ROOMY);
+        self.nodes.rings.give_back(ROOMY);
         self.vertices.give_back(ROOMY);
         self.queue.give_back();
         if let Some(ahead) = &mut self.ahead {

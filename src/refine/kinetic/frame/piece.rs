@@ -3,7 +3,8 @@
 //! Invariant: numbers of children follow from the order of their parents. Cost: some sixty bytes a split vertex of a piece, eight a vertex of a level.
 
 use crate::refine::kinetic::mesh::clusters::CLUSTER;
-use crate::refine::kinetic::mesh::nodes::NONE;
+use crate::refine::kinetic::mesh::labels::orientation;
+use crate::refine::kinetic::mesh::rings::{Corner, NONE, sharer_of, side_of};
 use std::ops::Range;
 use terrasoar_layout::grid::GridPoint;
 
@@ -33,14 +34,13 @@ impl Places {
 /// A vertex that is split, as the passes over its piece need it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Parent<R> {
-    pub(super) node: u32,
     pub(super) raw: R,
     pub(super) point: GridPoint,
-    /// The leaf's [body](crate::refine::kinetic::mesh::nodes::body): ends of the edge, and apexes.
-    pub(super) body: [u32; 4],
-    /// The label of the first child of side 0. Children are made in turn from there, the first and the last of side 0, then those of side 1.
-    pub(super) first: u8,
-    /// Bit t: it makes the child whose turn is t. Bit 4 + s: it has a triangle on side s.
+    /// Its node's links as a leaf.
+    pub(super) links: [Corner; 2],
+    /// Ends of the edge that it splits.
+    pub(super) ends: [u32; 2],
+    /// Bit t: it makes the child with turn t. Bit 4 + s: it has a triangle on side s.
     pub(super) makes: u8,
     /// By turn: which split vertex of the level shares that child, or [`NONE`].
     pub(super) sharers: [u32; 4],
@@ -49,25 +49,17 @@ pub(super) struct Parent<R> {
 }
 
 impl<R> Parent<R> {
-    /// The turn of the child with a label, or the other way round.
-    #[inline(always)]
-    pub(super) fn turn(&self, label: usize) -> usize {
-        (usize::from(self.first).wrapping_sub(label)) & 3
-    }
-
-    /// Which of the piece's children is the one whose turn it is, which this vertex makes.
+    /// Which of the piece's children is the one with this turn, which this vertex makes.
     #[inline(always)]
     pub(super) fn child(&self, turn: usize) -> u32 {
         self.before + (self.makes & ((1 << turn) - 1)).count_ones()
     }
 
-    /// Ends of the edge of a child, as its triangle of side 0 has them.
+    /// The turn that a child with this turn has at the vertex which shares it.
     #[inline(always)]
-    pub(super) fn ends(&self, turn: usize, label: usize) -> [u32; 2] {
-        let [p, q, apex, other] = self.body;
-        // The edge of side 1 runs the other way.
-        let [p, q] = [[apex, p], [q, apex], [other, q], [p, other]][turn];
-        if label >> 1 == 0 { [p, q] } else { [q, p] }
+    pub(super) fn turn_there(&self, turn: usize) -> usize {
+        let (side, last) = side_of(turn);
+        sharer_of(side, orientation(self.point), last).1
     }
 }
 
@@ -104,6 +96,8 @@ pub(super) struct Piece<R> {
     pub(super) parents: Vec<Parent<R>>,
     /// Children to be made: which parent of the piece makes it, times 4, and its turn there.
     pub(super) births: Vec<u32>,
+    /// Their records and words.
+    pub(super) verdicts: Vec<(R, u32)>,
     /// The vertex slot of the level's first split vertex.
     pub(super) base: u32,
     /// The number of the piece's first child, or annex.

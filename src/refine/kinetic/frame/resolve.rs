@@ -15,6 +15,7 @@ use crate::refine::kinetic::time::queue::{Entry, Place};
 use crate::refine::{Phase, Probe};
 #[cfg(feature = "files")]
 use rayon::prelude::*;
+use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::grid::record::RecordCodec;
 use terrasoar_layout::read::store::{RawOf, RecordStore};
@@ -22,7 +23,8 @@ use terrasoar_layout::read::store::{RawOf, RecordStore};
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
 /// How many splits or merges ahead memory is asked for what.
-const FETCH_AHEAD: [(Fetch, usize); 3] = [(Fetch::Node, 6), (Fetch::Near, 4), (Fetch::Far, 2)];
+const FETCH_AHEAD: [(Fetch, usize); 4] =
+    [(Fetch::Node, 8), (Fetch::Near, 6), (Fetch::Far, 4), (Fetch::Farthest, 2)];
 
 impl<S: RecordStore> Kinetic<S> {
     /// Tests what is due, as far as the budget allows.
@@ -49,6 +51,7 @@ impl<S: RecordStore> Kinetic<S> {
         let mut verdicts = std::mem::take(&mut self.verdicts);
         let mut batch = self.batch.take().unwrap_or_default();
         self.work.tests += nodes.len() as u64;
+        let k = self.records.grid().k();
         #[cfg(feature = "files")]
         let parallel = nodes.len() >= PARALLEL && rayon::current_num_threads() > 1;
         #[cfg(not(feature = "files"))]
@@ -59,7 +62,18 @@ impl<S: RecordStore> Kinetic<S> {
             verdicts.resize(part.len(), (S::Codec::INERT, UNREAD));
             let batches = |batch: &mut Batch, part: &[u32], verdicts: &mut [(RawOf<S>, u32)]| {
                 for (nodes, verdicts) in part.chunks(BATCH).zip(verdicts.chunks_mut(BATCH)) {
-                    self.judge_batch(batch, nodes, fresh, judge, verdicts);
+                    let mut points = [GridPoint::default(); BATCH];
+                    for (point, node) in points.iter_mut().zip(nodes) {
+                        *point = self.point_of(*node);
+                    }
+                    let raw_of = |i: usize| {
+                        if fresh {
+                            self.records.get(slot_of(k, points[i]))
+                        } else {
+                            Some(self.nodes.get(nodes[i]).raw)
+                        }
+                    };
+                    self.judge_batch(batch, &points[..nodes.len()], raw_of, judge, verdicts);
                 }
             };
             if parallel {
@@ -83,23 +97,21 @@ impl<S: RecordStore> Kinetic<S> {
         (self.verdicts, self.batch) = (verdicts, Some(batch));
     }
 
-    /// Makes the words of up to [`BATCH`] nodes, and gives them with the nodes' records. [`UNREAD`] where those are away.
+    /// Makes the words of up to [`BATCH`] vertices at `points` from their records, and gives them with those. [`UNREAD`] where they are away.
     #[inline(always)]
-    fn judge_batch(
+    pub(crate) fn judge_batch(
         &self,
         batch: &mut Batch,
-        nodes: &[u32],
-        fresh: bool,
+        points: &[GridPoint],
+        raw_of: impl Fn(usize) -> Option<RawOf<S>>,
         judge: &Judge,
         verdicts: &mut [(RawOf<S>, u32)],
     ) {
         let together = judge.makes_batches();
-        for (i, (node, verdict)) in nodes.iter().zip(verdicts.iter_mut()).enumerate() {
-            let node = self.nodes.get(*node);
-            let raw = if fresh { self.records.get(node.slot()) } else { Some(node.raw) };
-            let Some(raw) = raw else { continue };
-            let vertex = self.records.decode(raw, level_of(node.point));
-            let at_m = self.records.grid().position_m(node.point);
+        for (i, (point, verdict)) in points.iter().zip(verdicts.iter_mut()).enumerate() {
+            let Some(raw) = raw_of(i) else { continue };
+            let vertex = self.records.decode(raw, level_of(*point));
+            let at_m = self.records.grid().position_m(*point);
             *verdict = (raw, 0);
             if together {
                 batch.set(i, at_m, &vertex);
@@ -109,7 +121,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         if together {
             let mut words = Words::default();
-            judge.words(batch, nodes.len(), &mut words);
+            judge.words(batch, points.len(), &mut words);
             for ((_, verdict), word) in verdicts.iter_mut().zip(words.as_flattened()) {
                 if S::IS_COMPLETE || *verdict != UNREAD {
                     *verdict = *word;
@@ -130,20 +142,22 @@ impl<S: RecordStore> Kinetic<S> {
         probe: &mut P,
     ) {
         let record = self.nodes.get_mut(node);
-        let (old, point) = (record.word, record.point);
+        let old = record.word;
         if !S::IS_COMPLETE && word == UNREAD {
             record.word = UNREAD;
             self.unread.push(node);
             return;
         }
         if fresh {
-            probe.read(slot_of(self.records.grid().k(), point));
             record.raw = raw;
+            if P::HEARS_READS {
+                probe.read(slot_of(self.records.grid().k(), self.point_of(node)));
+            }
         } else if expiry_of(old) != 0 {
             // Twice in the list: it had been late, then gone, then come back.
             return;
         }
-        record.word = word | (old & SPLIT);
+        self.nodes.get_mut(node).word = word | (old & SPLIT);
         let entry = Entry { node, word };
         // Where pages may be away, it may go into the other queue.
         if S::IS_COMPLETE {
@@ -152,10 +166,15 @@ impl<S: RecordStore> Kinetic<S> {
             self.enter(clock_of(word), entry)
         }
         match (word & ACTIVE != 0, old & SPLIT != 0) {
-            (true, false) => self.to_split[level_of(point) as usize].push(node),
-            (false, true) => self.to_merge[level_of(point) as usize].push(node),
+            (true, false) => self.to_split[self.level(node)].push(node),
+            (false, true) => self.to_merge[self.level(node)].push(node),
             _ => {}
         }
+    }
+
+    #[inline(always)]
+    fn level(&self, node: u32) -> usize {
+        level_of(self.point_of(node)) as usize
     }
 
     /// Tests the children that splits have made.

@@ -61,7 +61,7 @@ impl<S: RecordStore> Shown<'_, S> {
         }
         if self.nodes.is_live(node) && !self.nodes.is_split(node) {
             let leaf = self.nodes.get(node);
-            let vertex = || self.records.decode(leaf.raw, level_of(leaf.point));
+            let vertex = || self.records.decode(leaf.raw, level_of(leaf.point(self.vertices)));
             self.nodes.is_unread(node) || vertex().class.is_plain()
         } else {
             corners.iter().all(|v| !self.vertices.is_void(*v))

@@ -1,7 +1,7 @@
 //! The whole mesh at once, for code that cannot follow patches: as one patch, as triangles, as SOAR's strip. Cost: in proportion to the mesh. Updates need
 //! none of it.
 
-use crate::refine::kinetic::mesh::nodes::{CENTRE, body};
+use crate::refine::kinetic::mesh::nodes::CENTRE;
 use crate::refine::kinetic::{Kinetic, Patch, root_label};
 use crate::refine::soar::StripVertex;
 use crate::refine::strip::{Strip, StripBuilder};
@@ -27,14 +27,13 @@ impl<S: RecordStore> Kinetic<S> {
             self.corners.iter().enumerate().map(|(i, vertex)| (i as u32, square[i], *vertex)).collect();
         self.nodes().filter(|node| self.nodes.is_live(*node) && self.nodes.is_split(*node)).for_each(
             |node| {
-                let record = self.nodes.get(node);
-                vertices.push((record.body[body::HERE], record.point, self.vertex_of(node)));
+                vertices.push((self.nodes.get(node).slot(), self.point_of(node), self.vertex_of(node)));
             },
         );
         let slot_at: HashMap<GridPoint, u32> =
             vertices.iter().map(|(slot, point, _)| (*point, *slot)).collect();
         for (slot, point, vertex) in vertices {
-            let own = grid.is_corner(point) || self.nodes.get(CENTRE).point == point;
+            let own = grid.is_corner(point) || self.point_of(CENTRE) == point;
             let ends = if own {
                 [slot; 2]
             } else {
@@ -57,9 +56,9 @@ impl<S: RecordStore> Kinetic<S> {
         let vertex = |i: usize| *self.vertices.get(i as u32);
         let mut made = Strip::in_room(std::mem::take(strip));
         let mut walk = StripWalk { engine: self, strip: made.start(c[0], vertex(0)) };
-        let centre = (self.nodes.get(CENTRE).point, vertex(4));
+        let centre = (self.point_of(CENTRE), vertex(4));
         for (root, (side, [b, d])) in ROOTS.into_iter().enumerate() {
-            let node = self.nodes.get(CENTRE).body[root_label(side)];
+            let node = self.root(root_label(side));
             walk.visit(grid.levels() - 1, Some(node), centre, c[b], c[d]);
             if root < 3 {
                 walk.strip.append(c[root + 1], 0, vertex(root + 1));

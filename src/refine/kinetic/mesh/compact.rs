@@ -7,7 +7,7 @@
 
 use super::clusters::{CLUSTER, Dealing};
 use super::labels::level_of;
-use super::nodes::{CENTRE, NONE, SPLIT, STATUS, UNREAD, body};
+use super::nodes::{CENTRE, SPLIT, STATUS, UNREAD};
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::time::certificate::{ACTIVE, clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::Entry;
@@ -49,8 +49,14 @@ impl<S: RecordStore> Kinetic<S> {
             return;
         }
         for from in self.nodes.clusters.places_of(self.sparse) {
-            let [first, second] = self.nodes.get(from).parents;
-            let beside = if first != NONE { first } else { second };
+            // A node lies beside a parent, an annex beside the node whose it is.
+            let parent = if self.nodes.is_live(from) {
+                let [first, second] = self.nodes.parents(from);
+                if first.is_some() { first } else { second }
+            } else {
+                self.nodes.get(from).links[0]
+            };
+            let beside = self.nodes.node_of(parent.slot());
             if let Some(to) = self.nodes.clusters.take_in_cluster_of(beside, self.sparse) {
                 self.relocate(from, to);
                 for corners in self.nodes.triangles(to).into_iter().flatten() {
@@ -64,31 +70,18 @@ impl<S: RecordStore> Kinetic<S> {
     fn relocate(&mut self, from: u32, to: u32) {
         let record = *self.nodes.get(from);
         *self.nodes.get_mut(to) = record;
-        self.nodes.vacate(from);
+        self.nodes.free(from);
         for side in 0..2 {
             self.nodes.clusters.touch(from, side);
             self.nodes.clusters.touch(to, side);
         }
-        if !self.nodes.is_live(to) {
-            self.nodes.get_mut(record.parents[0]).body[body::ANNEX] = to;
+        if !record.is_live() {
+            self.nodes.rings.get_mut(record.slot()).children[0] = to;
             return;
         }
-        let level = level_of(record.point);
-        for side in 0..2 {
-            if record.parents[side] != NONE {
-                let label = self.nodes.label(to, side);
-                self.nodes.get_mut(record.parents[side]).body[label] = to;
-            }
-        }
-        if self.nodes.is_split(to) {
-            if level == 0 {
-                self.nodes.get_mut(record.body[body::ANNEX]).parents[0] = to;
-            } else {
-                for (label, child) in record.body[..4].iter().enumerate().filter(|(_, child)| **child != NONE)
-                {
-                    self.nodes.get_mut(*child).parents[label >> 1] = to;
-                }
-            }
+        // Children and annexes know the vertex slot, which stays.
+        for parent in self.nodes.parents(to).into_iter().filter(|parent| parent.is_some()) {
+            self.nodes.rings.get_mut(parent.slot()).children[parent.turn()] = to;
         }
         let word = record.word & !SPLIT;
         if word == UNREAD {
@@ -99,7 +92,7 @@ impl<S: RecordStore> Kinetic<S> {
             self.late.push(to);
         }
         if record.word & STATUS == ACTIVE {
-            self.to_split[level as usize].push(to);
+            self.to_split[level_of(self.point_of(to)) as usize].push(to);
         }
     }
 }

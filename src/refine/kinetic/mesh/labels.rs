@@ -22,11 +22,6 @@ pub(crate) fn level_of(p: GridPoint) -> u32 {
     2 * shift + ((p.x() & p.y()) >> shift & 1)
 }
 
-/// Whether a node at this level is white, a cell's centre.
-pub(crate) const fn is_white(level: u32) -> bool {
-    level & 1 == 1
-}
-
 /// The low bit of a node's labels at its parents.
 #[inline(always)]
 pub(crate) fn orientation(p: GridPoint) -> usize {
@@ -40,19 +35,16 @@ pub(crate) fn orientation(p: GridPoint) -> usize {
 /// The label of the child that follows the parent of label `label` counter-clockwise.
 #[inline(always)]
 pub(crate) const fn first_child(label: usize, level: u32) -> usize {
-    (label + if is_white(level) { 2 } else { 3 }) & 3
+    // 2 for white ones, whose levels are odd, 3 for black ones.
+    (label + 3 - (level as usize & 1)) & 3
 }
 
-/// The child with `label` of a node at `p` of `level`, which is above 0.
+/// The child with `label` of a node at `p` of `level`, which is above 0; of level 0 it is the node itself or lies beside it. Without branches, because levels come in no order.
 #[inline(always)]
 pub(crate) fn child_point(p: GridPoint, level: u32, label: usize) -> GridPoint {
-    const WHITE: [[i32; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
-    const BLACK: [[i32; 2]; 4] = [[1, -1], [1, 1], [-1, 1], [-1, -1]];
-    let ([dx, dy], step) = if is_white(level) {
-        (WHITE[label], 1 << (level / 2))
-    } else {
-        (BLACK[label], 1 << (level / 2) >> 1)
-    };
+    const STEPS: [[i32; 2]; 8] = [[1, -1], [1, 1], [-1, 1], [-1, -1], [1, 0], [0, 1], [-1, 0], [0, -1]];
+    let white = level & 1;
+    let ([dx, dy], step) = (STEPS[label & 3 | (white as usize) << 2], (1 << (level / 2)) >> (1 - white));
     GridPoint::new(p.x().wrapping_add_signed(dx * step), p.y().wrapping_add_signed(dy * step))
 }
 

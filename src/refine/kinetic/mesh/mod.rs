@@ -6,5 +6,6 @@ pub(crate) mod compact;
 pub(crate) mod labels;
 pub(crate) mod nodes;
 pub(crate) mod patch;
+pub(crate) mod rings;
 pub(crate) mod tree;
 pub(crate) mod vertices;

@@ -1,16 +1,18 @@
 //! Splitting and merging nodes: relatives, triangles and vertices kept in step.
 //!
-//! Invariant: after each call all of `super::nodes` holds, and the slots that show something else have been noted. A split makes two triangles of
+//! Invariant: after each call all of `super::nodes` and `super::rings` holds, and the slots that show something else have been noted. A split makes two triangles of
 //! each of a node's one or two, a merge the reverse. Cost: six slots, at most four nodes made or freed. Most of the time is the wait for memory, which
 //! [`Fetch`] shortens by prefetching a node's relatives some splits ahead.
 
-use super::labels::{child_point, level_of};
-use super::nodes::{CENTRE, NONE, SPLIT, STATUS, Side, body, half};
+use super::labels::{child_point, first_child, is_on_border, level_of, orientation};
+use super::nodes::{CENTRE, Node, SPLIT, STATUS};
+use super::rings::{Corner, NONE, NOTHING, Ring, TURNS, edge_of, label_of, sharer_of};
 use crate::refine::kinetic::Kinetic;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
+use terrasoar_layout::grid::record::Vertex;
 use terrasoar_layout::read::prefetch::prefetch;
-use terrasoar_layout::read::store::RecordStore;
+use terrasoar_layout::read::store::{RawOf, RecordStore};
 
 /// What is asked of memory ahead of a split or merge. Each needs what the one before has brought.
 #[derive(Debug, Clone, Copy)]
@@ -18,39 +20,71 @@ pub(crate) enum Fetch {
     Node,
     Near,
     Far,
+    Farthest,
+}
+
+/// A node that is being split, or a vertex that is being merged.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    node: u32,
+    /// Its vertex slot.
+    here: u32,
+    point: GridPoint,
+    level: u32,
 }
 
 impl<S: RecordStore> Kinetic<S> {
+    /// The point of a node.
+    #[inline(always)]
+    pub(crate) fn point_of(&self, node: u32) -> GridPoint {
+        self.nodes.get(node).point(&self.vertices)
+    }
+
     /// The child of a split node that lies at `at`; `None` at the finest level, where there are none.
     pub(crate) fn child_at(&self, node: u32, at: GridPoint) -> Option<u32> {
-        let node = self.nodes.get(node);
-        let level = level_of(node.point);
+        let slot = self.nodes.get(node).slot();
+        let point = self.vertices.point(slot);
+        let (level, turned) = (level_of(point), orientation(point));
         (0..4)
-            .find(|label| level > 0 && child_point(node.point, level, *label) == at)
-            .map(|label| node.body[label])
+            .find(|turn| level > 0 && child_point(point, level, label_of(*turn, turned, level)) == at)
+            .map(|turn| self.nodes.rings.get(slot).children[turn])
+    }
+
+    /// Places a vertex, and its ring.
+    #[inline(always)]
+    pub(crate) fn place_vertex(&mut self, at: GridPoint, vertex: &Vertex, ring: Ring) -> u32 {
+        let slot = self.vertices.place(at, vertex);
+        self.nodes.rings.set(slot, ring);
+        slot
     }
 
     /// Makes the root with `label` at the centre: the triangle (centre; p, q), whose split vertex is the middle of a side of the square.
-    pub(crate) fn plant_root(&mut self, label: usize, [apex, p, q]: [u32; 3]) {
+    pub(crate) fn plant_root(&mut self, label: usize, [p, q]: [u32; 2]) {
         let centre = *self.nodes.get(CENTRE);
-        let point = child_point(centre.point, level_of(centre.point), label);
-        let node = self.nodes.create(CENTRE, point, slot_of(self.records.grid().k(), point), centre.raw);
-        self.nodes.get_mut(CENTRE).body[label] = node;
-        self.adopt(node, CENTRE, label, [apex, p, q]);
-        self.cover(node, &[apex, p, q]);
+        let (here, point) = (centre.slot(), self.point_of(CENTRE));
+        let level = level_of(point);
+        let turn = (label + 4 - first_child(orientation(point), level)) & 3;
+        let node = self.nodes.create(CENTRE, centre.raw);
+        let ring = self.nodes.rings.get_mut(here);
+        ring.children[turn] = node;
+        ring.corners[turn] = Corner::of(p);
+        ring.corners[(turn + 1) & 3] = Corner::of(q);
+        self.adopt(node, label >> 1, Corner::parent(here, turn));
+        self.cover(node, &[here, p, q]);
         self.fresh.push(node);
     }
 
-    /// Gives a leaf the triangle (apex; p, q) on the side of its parent, at which it has `label`.
+    /// The root with `label` at the centre.
+    pub(crate) fn root(&self, label: usize) -> u32 {
+        let point = self.point_of(CENTRE);
+        let turn = (label + 4 - first_child(orientation(point), level_of(point))) & 3;
+        self.nodes.rings.get(self.nodes.get(CENTRE).slot()).children[turn]
+    }
+
+    /// Gives a leaf its parent on a side, and with it a triangle.
     #[inline(always)]
-    fn adopt(&mut self, node: u32, parent: u32, label: usize, [apex, p, q]: [u32; 3]) {
-        let side = label >> 1;
-        let child = self.nodes.get_mut(node);
-        child.parents[side] = parent;
-        let [p, q] = if side == 0 { [p, q] } else { [q, p] };
-        child.body[body::P] = p;
-        child.body[body::Q] = q;
-        child.body[body::APEX + side] = apex;
+    fn adopt(&mut self, node: u32, side: usize, parent: Corner) {
+        self.nodes.get_mut(node).links[side] = parent;
         self.nodes.clusters.touch(node, side);
     }
 
@@ -70,171 +104,170 @@ impl<S: RecordStore> Kinetic<S> {
         self.nodes.clusters.set_bounds(cluster, bounds);
     }
 
-    /// Asks memory for what splitting a node will look at, in order: itself; its parents; its neighbours.
+    /// Asks memory for what splitting a node will look at, in order: itself; its parents; the neighbours around each of them; and theirs.
     #[inline(always)]
     pub(crate) fn fetch_for_split(&self, node: u32, what: Fetch) {
         match what {
-            Fetch::Node => self.fetch(node),
-            Fetch::Near => self.parents(node).for_each(|parent| self.fetch(parent)),
-            // The neighbours around each parent, which its body names.
-            Fetch::Far => self.parents(node).for_each(|parent| self.fetch_children(parent)),
+            Fetch::Node => prefetch(&self.nodes.all, node as usize),
+            Fetch::Near => self.leaf_parents(node).for_each(|parent| {
+                self.nodes.rings.fetch(parent);
+                self.vertices.fetch(parent.slot());
+            }),
+            Fetch::Far => self.neighbours(node).for_each(|node| prefetch(&self.nodes.all, node as usize)),
+            Fetch::Farthest => {
+                self.neighbours(node).filter_map(|node| self.nodes.all.get(node as usize)).for_each(|node| {
+                    self.nodes.rings.fetch(node.links[0]);
+                })
+            }
         }
     }
 
-    /// Asks memory for what merging a node will look at: itself; then its children.
+    /// Asks memory for what merging a node will look at: itself; its vertex; then its children.
     #[inline(always)]
     pub(crate) fn fetch_for_merge(&self, node: u32, what: Fetch) {
+        let slot = || self.nodes.all.get(node as usize).map_or(NONE, |node| node.links[0].slot());
         match what {
-            Fetch::Node => self.fetch(node),
-            Fetch::Near => self.fetch_children(node),
-            Fetch::Far => {}
+            Fetch::Node => prefetch(&self.nodes.all, node as usize),
+            Fetch::Near => {
+                self.nodes.rings.fetch(Corner::of(slot()));
+                self.vertices.fetch(slot());
+            }
+            Fetch::Far => {
+                let ring = self.nodes.rings.all.get(slot() as usize);
+                let children = ring.into_iter().flat_map(|ring| ring.children);
+                children.for_each(|child| prefetch(&self.nodes.all, child as usize));
+            }
+            Fetch::Farthest => {}
         }
     }
 
-    /// A record may begin in one cache line and end in the next.
+    /// The parents of a leaf, whose place may have been given up since.
     #[inline(always)]
-    fn fetch(&self, node: u32) {
-        [0, 1].iter().for_each(|i| prefetch(&self.nodes.all, node as usize + i));
+    fn leaf_parents(&self, node: u32) -> impl Iterator<Item = Corner> + use<S> {
+        let links = self.nodes.all.get(node as usize).map_or([Corner::NONE; 2], |node| node.links);
+        links.into_iter().filter(|parent| parent.is_some())
     }
 
+    /// The nodes beside a leaf around its parents, if the leaf still is one.
     #[inline(always)]
-    fn fetch_children(&self, node: u32) {
-        let node = self.nodes.all.get(node as usize);
-        node.into_iter().flat_map(|node| &node.body[..4]).for_each(|child| self.fetch(*child));
-    }
-
-    /// The parents of a node, whose place may have been given up since.
-    #[inline(always)]
-    fn parents(&self, node: u32) -> impl Iterator<Item = u32> + use<S> {
-        let parents = self.nodes.all.get(node as usize).map_or([NONE; 2], |node| node.parents);
-        parents.into_iter().filter(|parent| *parent != NONE)
+    fn neighbours(&self, node: u32) -> impl Iterator<Item = u32> {
+        self.leaf_parents(node).flat_map(|parent| {
+            let ring = self.nodes.rings.all.get(parent.slot() as usize);
+            [1, 3].map(|step| ring.map_or(NONE, |ring| ring.children[(parent.turn() + step) & 3]))
+        })
     }
 
     /// Splits a node. `false`, and nothing done, if a triangle on one of its sides is yet to come.
     pub(crate) fn split(&mut self, node: u32) -> bool {
-        if !self.nodes.is_complete(node, self.records.grid().side_steps()) {
+        let Node { raw, links, .. } = *self.nodes.get(node);
+        let point = self.point_of(node);
+        let is_whole = links[0].is_some() & links[1].is_some();
+        if !is_whole && !is_on_border(point, self.records.grid().side_steps()) {
             return false;
         }
-        let leaf = *self.nodes.get(node);
-        let level = level_of(leaf.point);
-        let sides = self.nodes.sides(node, level);
-        let vertex = self.records.decode(leaf.raw, level);
-        let here = self.vertices.place(leaf.point, &vertex);
-        {
-            let split = self.nodes.get_mut(node);
-            split.word |= SPLIT;
-            split.body[body::HERE] = here;
-            if level > 0 {
-                split.body[..4].fill(NONE);
-            }
-        }
-        for (i, side) in sides.into_iter().enumerate() {
-            let Some(side) = side else { continue };
-            let [_, apex, p, q] = half(&leaf, i);
-            self.nodes.clusters.touch(node, i);
+        let level = level_of(point);
+        let vertex = self.records.decode(raw, level);
+        let around =
+            links.map(|parent| if parent.is_some() { self.nodes.rings.get(parent.slot()) } else { &NOTHING });
+        let ends = edge_of(links, around);
+        let ring = Ring::new(links, ends);
+        let here = self.place_vertex(point, &vertex, ring);
+        self.nodes.get_mut(node).become_split(here, level);
+        let place = Place { node, here, point, level };
+        for (side, parent) in links.into_iter().enumerate().filter(|(_, parent)| parent.is_some()) {
+            self.nodes.clusters.touch(node, side);
             self.triangles += 1;
             if level == 0 {
-                self.cover(node, &[here, apex, p, q]);
+                let [p, q] = ring.edge(2 * side);
+                self.cover(node, &[here, p, q]);
                 continue;
             }
-            self.halve(node, &leaf.point, level, side, side.first, [here, apex, p]);
-            self.halve(node, &leaf.point, level, side, side.last, [here, q, apex]);
+            self.halve(&place, raw, side, parent, false);
+            self.halve(&place, raw, side, parent, true);
         }
         if level == 0 {
-            let annex = self.nodes.create_annex(node);
-            self.nodes.get_mut(node).body[body::ANNEX] = annex;
+            let annex = self.nodes.create_annex(node, here);
+            self.nodes.rings.get_mut(here).children[0] = annex;
             self.nodes.clusters.touch(annex, 0);
             self.nodes.clusters.touch(annex, 1);
-            let corners = [here, leaf.body[body::P], leaf.body[body::Q]];
-            self.cover(annex, &corners);
-            for apex in [0, 1].into_iter().filter(|i| leaf.parents[*i] != NONE) {
-                self.cover(annex, &[leaf.body[body::APEX + apex]]);
+            for corners in self.nodes.triangles(annex).into_iter().flatten() {
+                self.cover(annex, &corners);
             }
         }
-        let patched = self.patch_vertex(leaf.point, &vertex, [leaf.body[body::P], leaf.body[body::Q]]);
+        let patched = self.patch_vertex(point, &vertex, ends);
         self.patch.vertices.push((here, patched));
         self.work.splits += 1;
         true
     }
 
-    /// Gives the half triangle of a node in direction `label` to the child that splits it, made or found.
+    /// Gives the first or the last half of a triangle to the child that splits it, made or found. `parent` is the apex of the triangle, which lies on `side` of the node; `raw` stands in for
+    /// the child's record.
     #[inline(always)]
-    fn halve(
-        &mut self,
-        node: u32,
-        point: &GridPoint,
-        level: u32,
-        side: Side,
-        label: usize,
-        corners: [u32; 3],
-    ) {
+    fn halve(&mut self, place: &Place, raw: RawOf<S>, side: usize, parent: Corner, last: bool) {
+        let Place { node, here, point, level } = *place;
+        let turned = orientation(point);
+        let turn = TURNS[side][usize::from(last)];
+        let (step, turn_there) = sharer_of(side, turned, last);
         // The neighbour around the parent that shares the child.
-        let turn = if label == side.first { 3 } else { 1 };
-        let neighbour = self.nodes.get(side.parent).body[(side.label + turn) & 3];
+        let neighbour = self.nodes.rings.get(parent.slot()).children[(parent.turn() + step) & 3];
         let shared = if neighbour != NONE && self.nodes.is_split(neighbour) {
-            self.nodes.get(neighbour).body[(label + 2) & 3]
+            self.nodes.rings.get(self.nodes.get(neighbour).slot()).children[turn_there]
         } else {
             NONE
         };
+        let label = label_of(turn, turned, level);
         let child = if shared == NONE {
-            let at = child_point(*point, level, label);
-            let slot = slot_of(self.records.grid().k(), at);
-            self.records.prefetch(slot);
-            let child = self.nodes.create(node, at, slot, self.nodes.get(node).raw);
+            let at = child_point(point, level, label);
+            self.records.prefetch(slot_of(self.records.grid().k(), at));
+            let child = self.nodes.create(node, raw);
             self.fresh.push(child);
             child
         } else {
             shared
         };
-        self.nodes.get_mut(node).body[label] = child;
-        self.adopt(child, node, label, corners);
-        self.cover(child, &corners);
+        let ring = self.nodes.rings.get_mut(here);
+        ring.children[turn] = child;
+        let [p, q] = ring.edge(turn);
+        self.adopt(child, label >> 1, Corner::parent(here, turn));
+        self.cover(child, &[here, p, q]);
     }
 
     /// Merges a split node. Children that are still split are merged before it.
     pub(crate) fn merge(&mut self, node: u32) {
-        let split = *self.nodes.get(node);
-        let level = level_of(split.point);
-        let sides = self.nodes.sides(node, level);
-        self.nodes.get_mut(node).word &= !SPLIT;
+        let here = self.nodes.get(node).slot();
+        let ring = *self.nodes.rings.get(here);
+        let point = self.vertices.point(here);
+        let level = level_of(point);
         if level == 0 {
-            let annex = split.body[body::ANNEX];
+            let annex = ring.annex();
             self.nodes.clusters.touch(annex, 0);
             self.nodes.clusters.touch(annex, 1);
-            self.nodes.get_mut(annex).parents = [NONE; 2];
             self.nodes.free(annex);
         } else {
-            self.merge_children(&split.body[..4]);
-            let mut leaf = [NONE; 6];
-            for (i, side) in sides.into_iter().enumerate() {
-                let Some(side) = side else { continue };
-                // From the first half (v; parent, p) and the last one (v; q, parent).
-                let child = |label: usize| half(self.nodes.get(split.body[label]), label >> 1);
-                let ([_, _, apex, p], [_, _, q, _]) = (child(side.first), child(side.last));
-                leaf[body::APEX + i] = apex;
-                [leaf[body::P], leaf[body::Q]] = if i == 0 { [p, q] } else { [q, p] };
-            }
-            self.nodes.get_mut(node).body = leaf;
-            for (label, child) in split.body[..4].iter().enumerate() {
-                if *child != NONE {
-                    self.desert(*child, label >> 1);
-                }
+            self.merge_children(&ring.children);
+            let first = first_child(orientation(point), level);
+            for (turn, child) in ring.children.into_iter().enumerate().filter(|(_, child)| *child != NONE) {
+                self.desert(child, ((first + turn) & 3) >> 1);
             }
         }
-        for i in 0..2 {
-            if split.parents[i] != NONE {
-                self.nodes.clusters.touch(node, i);
-                self.triangles -= 1;
-                let [_, apex, p, q] = half(self.nodes.get(node), i);
-                self.cover(node, &[apex, p, q]);
+        let merged = self.nodes.get_mut(node);
+        merged.word &= !SPLIT;
+        merged.links = ring.parents();
+        for side in (0..2).filter(|side| ring.parents()[*side].is_some()) {
+            self.nodes.clusters.touch(node, side);
+            self.triangles -= 1;
+            if self.nodes.clusters.has_bounds()
+                && let Some(corners) = self.nodes.triangle(node, side)
+            {
+                self.cover(node, &corners);
             }
         }
-        self.vertices.remove(split.body[body::HERE]);
+        self.vertices.remove(here);
         self.work.merges += 1;
     }
 
     /// Merges those children of a node that are late: in time they have merged before it.
-    fn merge_children(&mut self, children: &[u32]) {
+    fn merge_children(&mut self, children: &[u32; 4]) {
         for child in children.iter().copied().filter(|child| *child != NONE) {
             if self.nodes.is_split(child) {
                 self.merge(child);
@@ -250,8 +283,8 @@ impl<S: RecordStore> Kinetic<S> {
     fn desert(&mut self, node: u32, side: usize) {
         self.nodes.clusters.touch(node, side);
         let leaf = self.nodes.get_mut(node);
-        leaf.parents[side] = NONE;
-        if leaf.parents == [NONE; 2] {
+        leaf.links[side] = Corner::NONE;
+        if leaf.links == [Corner::NONE; 2] {
             self.nodes.free(node);
         }
     }

@@ -8,6 +8,7 @@ use crate::refine::kinetic::hands::extend;
 use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::Vertex;
+use terrasoar_layout::read::prefetch::prefetch;
 
 #[derive(Debug, Default)]
 pub(crate) struct Vertices {
@@ -76,6 +77,12 @@ impl Vertices {
     pub(crate) fn remove(&mut self, slot: u32) {
         grow(&mut self.free, 1);
         self.free.push(slot);
+    }
+
+    /// Asks memory for a vertex.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, slot: u32) {
+        prefetch(&self.all, slot as usize);
     }
 
     #[inline(always)]
