@@ -20,7 +20,7 @@ use crate::refine::kinetic::hands::{both, change, extend, extend_by, extend_part
 use crate::refine::kinetic::mesh::clusters::{CLUSTER, Dealing};
 use crate::refine::kinetic::mesh::labels::{child_point, is_on_border, level_of, orientation};
 use crate::refine::kinetic::mesh::nodes::{CENTRE, Node, SPLIT, UNREAD};
-use crate::refine::kinetic::mesh::rings::{Corner, NONE, NOTHING, Ring, TURNS, edge_of, label_of};
+use crate::refine::kinetic::mesh::rings::{Corner, NONE, Ring, TURNS, label_of};
 use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of};
 use crate::refine::kinetic::time::queue::Entry;
@@ -184,9 +184,7 @@ impl<S: RecordStore> Kinetic<S> {
             }
             let node = &all[place as usize];
             let links = node.links;
-            let around =
-                links.map(|parent| if parent.is_some() { rings.get(parent.slot()) } else { &NOTHING });
-            let ends = edge_of(links, around);
+            let ends = rings.edge_of(links);
             // What the node will be is a vertex at the point of a leaf.
             let point = Node { word: 0, ..*node }.point(&self.vertices);
             let mut parent =
@@ -198,7 +196,7 @@ impl<S: RecordStore> Kinetic<S> {
                 }
                 // The neighbours around the parent share the children beside it.
                 for (turn, step) in TURNS[side].into_iter().zip([3, 1]) {
-                    let sharer = line.rank(around[side].children[(links[side].turn() + step) & 3]);
+                    let sharer = line.rank(rings.child(links[side].slot(), links[side].turn() + step));
                     parent.sharers[turn] = sharer;
                     parent.makes |= u8::from(sharer == NONE || sharer > rank) << turn;
                 }
@@ -250,32 +248,27 @@ impl<S: RecordStore> Kinetic<S> {
                 node.become_split(base + rank, line.level);
             }
         });
-        let here = *base as usize + start;
-        let rings = &mut self.nodes.rings.all;
-        grow(rings, parents.len());
-        rings.resize(here + parents.len(), NOTHING);
-        let (before, rings) = rings.split_at_mut(here);
-        change(rings, |at, part| {
-            for (i, (ring, parent)) in (at..).zip(part.iter_mut().zip(&parents[at..])) {
-                *ring = Ring::new(parent.links, parent.ends);
-                if line.level == 0 {
-                    ring.children[0] = places.place(next + i as u32);
-                    continue;
-                }
-                for (turn, child) in ring.children.iter_mut().enumerate() {
-                    let sharer = parent.sharers[turn];
-                    let turn_there = parent.turn_there(turn);
-                    *child = if parent.makes >> turn & 1 == 1 {
-                        places.place(next + parent.child(turn))
-                    } else if sharer == NONE {
-                        NONE
-                    } else if let Some(i) = (sharer as usize).checked_sub(*start) {
-                        places.place(next + parents[i].child(turn_there))
-                    } else {
-                        before[*base as usize + sharer as usize].children[turn_there]
-                    };
-                }
+        self.nodes.rings.append(parents.len(), |i, children_before| {
+            let parent = &parents[i];
+            let mut ring = Ring::new(parent.links, parent.ends);
+            if line.level == 0 {
+                ring.children[0] = places.place(next + i as u32);
+                return ring;
             }
+            for (turn, child) in ring.children.iter_mut().enumerate() {
+                let sharer = parent.sharers[turn];
+                let turn_there = parent.turn_there(turn);
+                *child = if parent.makes >> turn & 1 == 1 {
+                    places.place(next + parent.child(turn))
+                } else if sharer == NONE {
+                    NONE
+                } else if let Some(i) = (sharer as usize).checked_sub(*start) {
+                    places.place(next + parents[i].child(turn_there))
+                } else {
+                    children_before(base + sharer)[turn_there]
+                };
+            }
+            ring
         });
     }
 

@@ -43,7 +43,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// Gives up the whole mesh and all that was to be done with it.
     pub(crate) fn uproot(&mut self) {
         self.nodes.all.clear();
-        self.nodes.rings.all.clear();
+        self.nodes.rings.clear();
         self.nodes.clusters.clear();
         self.vertices.clear();
         (self.triangles, self.stale, self.sparse) = (0, 0, 0);

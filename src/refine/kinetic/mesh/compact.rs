@@ -76,12 +76,12 @@ impl<S: RecordStore> Kinetic<S> {
             self.nodes.clusters.touch(to, side);
         }
         if !record.is_live() {
-            self.nodes.rings.get_mut(record.slot()).children[0] = to;
+            self.nodes.rings.children_mut(record.slot())[0] = to;
             return;
         }
         // Children and annexes know the vertex slot, which stays.
         for parent in self.nodes.parents(to).into_iter().filter(|parent| parent.is_some()) {
-            self.nodes.rings.get_mut(parent.slot()).children[parent.turn()] = to;
+            self.nodes.rings.children_mut(parent.slot())[parent.turn()] = to;
         }
         let word = record.word & !SPLIT;
         if word == UNREAD {

@@ -165,15 +165,15 @@ impl<R: Copy> Nodes<R> {
     #[inline(always)]
     pub(crate) fn parents(&self, node: u32) -> [Corner; 2] {
         let node = self.get(node);
-        if node.is_split() { self.rings.get(node.slot()).parents() } else { node.links }
+        if node.is_split() { self.rings.parents(node.slot()) } else { node.links }
     }
 
     /// The node of the vertex in a slot, which is no corner of the square.
     pub(crate) fn node_of(&self, slot: u32) -> u32 {
-        let [first, second] = self.rings.get(slot).parents();
+        let [first, second] = self.rings.parents(slot);
         let parent = if first.is_some() { first } else { second };
         // The centre alone has no parents.
-        if parent.is_none() { CENTRE } else { self.rings.get(parent.slot()).children[parent.turn()] }
+        if parent.is_none() { CENTRE } else { self.rings.child(parent.slot(), parent.turn()) }
     }
 
     /// A new node beside another, without parents and certificate; `raw` stands in for its record until that is read.
@@ -229,12 +229,11 @@ impl<R: Copy> Nodes<R> {
         if corner.is_none() | (!is_annex & is_split & links[1].is_none()) {
             return None;
         }
-        let ring = self.rings.get(corner.slot());
         // A vertex of the finest level shows the first half of each side, and its annex the last.
         let half = if is_annex { 3 - 2 * side } else { 2 * side };
         let turn = if own { half } else { corner.turn() };
-        let [p, q] = ring.edge(turn);
-        let has_some = !own | ring.corners[2 * side].is_some();
+        let [p, q] = self.rings.edge(corner.slot(), turn);
+        let has_some = !own | self.rings.corner(corner.slot(), 2 * side).is_some();
         has_some.then_some([corner.slot(), p, q])
     }
 }

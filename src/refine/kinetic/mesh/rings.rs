@@ -10,6 +10,7 @@
 
 use super::labels::first_child;
 use crate::refine::kinetic::capacity::{give_back, grow};
+use crate::refine::kinetic::hands::change;
 use terrasoar_layout::read::prefetch::prefetch;
 
 /// No node, no vertex.
@@ -59,7 +60,6 @@ impl Corner {
 
 /// What lies around one vertex.
 #[derive(Debug, Clone, Copy, Default)]
-#[repr(C, align(32))]
 pub(crate) struct Ring {
     /// Parent of side 0, end, parent of side 1, end. A parent that is missing is [`Corner::NONE`].
     pub corners: [Corner; 4],
@@ -86,30 +86,9 @@ impl Ring {
         [self.corners[1].slot(), self.corners[3].slot()]
     }
 
-    /// The edge beyond which the child with this turn lies.
-    #[inline(always)]
-    pub(crate) fn edge(&self, turn: usize) -> [u32; 2] {
-        [self.corners[turn & 3].slot(), self.corners[(turn + 1) & 3].slot()]
-    }
-
     /// The annex of a vertex of the finest level.
     pub(crate) fn annex(&self) -> u32 {
         self.children[0]
-    }
-}
-
-/// The ring of no vertex.
-pub(crate) const NOTHING: Ring = Ring { corners: [Corner::NONE; 4], children: [NONE; 4] };
-
-/// The edge that a leaf splits, as its triangle of side 0 has it, from its parents and their rings; one of them is enough.
-#[inline(always)]
-pub(crate) fn edge_of(parents: [Corner; 2], rings: [&Ring; 2]) -> [u32; 2] {
-    if parents[0].is_some() {
-        rings[0].edge(parents[0].turn())
-    } else {
-        // Side 1 has it the other way round.
-        let [q, p] = rings[1].edge(parents[1].turn());
-        [p, q]
     }
 }
 
@@ -138,48 +117,130 @@ pub(crate) fn sharer_of(side: usize, orientation: usize, last: bool) -> (usize, 
     (step, TURNS[label >> 1][usize::from(!last)])
 }
 
-/// The rings of all vertices, by slot.
+/// Half a ring.
+type Half = [u32; 4];
+
+/// The rings of all vertices, by slot. One half goes before the first one: large allocations begin 16 bytes into a page, and so each ring lies in one cache line. An array of
+/// aligned elements would be copied whenever it grows, where this one is mapped elsewhere.
 #[derive(Debug, Default)]
 pub(crate) struct Rings {
-    pub all: Vec<Ring>,
+    halves: Vec<Half>,
 }
 
 impl Rings {
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.all.capacity() * size_of::<Ring>()
+        self.halves.capacity() * size_of::<Half>()
     }
 
+    /// The parents of the vertex in a slot, by side.
     #[inline(always)]
-    pub(crate) fn get(&self, slot: u32) -> &Ring {
-        &self.all[slot as usize]
+    pub(crate) fn parents(&self, slot: u32) -> [Corner; 2] {
+        [self.corner(slot, 0), self.corner(slot, 2)]
     }
 
+    /// One corner of a ring.
     #[inline(always)]
-    pub(crate) fn get_mut(&mut self, slot: u32) -> &mut Ring {
-        &mut self.all[slot as usize]
+    pub(crate) fn corner(&self, slot: u32, corner: usize) -> Corner {
+        Corner(self.halves[2 * slot as usize + 1][corner & 3])
+    }
+
+    /// The node of one child.
+    #[inline(always)]
+    pub(crate) fn child(&self, slot: u32, turn: usize) -> u32 {
+        self.halves[2 * slot as usize + 2][turn & 3]
+    }
+
+    /// The edge beyond which a child lies.
+    #[inline(always)]
+    pub(crate) fn edge(&self, slot: u32, turn: usize) -> [u32; 2] {
+        let corners = &self.halves[2 * slot as usize + 1];
+        [Corner(corners[turn & 3]).slot(), Corner(corners[(turn + 1) & 3]).slot()]
+    }
+
+    /// The edge that a leaf with these parents splits, as its triangle of side 0 has it; one of them is enough.
+    #[inline(always)]
+    pub(crate) fn edge_of(&self, parents: [Corner; 2]) -> [u32; 2] {
+        let side = usize::from(parents[0].is_none());
+        let ends = self.edge(parents[side].slot(), parents[side].turn());
+        // Side 1 has it the other way round.
+        [ends[side], ends[1 - side]]
+    }
+
+    /// All of a ring.
+    #[inline(always)]
+    pub(crate) fn get(&self, slot: u32) -> Ring {
+        let [corners, children] = self.halves[2 * slot as usize + 1..][..2] else {
+            unreachable!("two halves")
+        };
+        Ring { corners: corners.map(Corner), children }
+    }
+
+    /// Nodes of the children of the vertex in a slot, if that has a ring.
+    #[inline(always)]
+    pub(crate) fn children(&self, slot: u32) -> &[u32; 4] {
+        self.halves.get(2 * slot as usize + 2).unwrap_or(&[NONE; 4])
+    }
+
+    /// Nodes of the children of the vertex in a slot.
+    #[inline(always)]
+    pub(crate) fn children_mut(&mut self, slot: u32) -> &mut [u32; 4] {
+        &mut self.halves[2 * slot as usize + 2]
     }
 
     /// Sets the ring of a slot, which may be the first one behind all others.
     #[inline(always)]
     pub(crate) fn set(&mut self, slot: u32, ring: Ring) {
-        if let Some(present) = self.all.get_mut(slot as usize) {
-            *present = ring;
+        let halves = [ring.corners.map(|corner| corner.0), ring.children];
+        if let Some(present) = self.halves.get_mut(2 * slot as usize + 1..2 * slot as usize + 3) {
+            present.copy_from_slice(&halves);
             return;
         }
-        grow(&mut self.all, 1);
-        self.all.push(ring);
+        self.room(1);
+        self.halves.extend_from_slice(&halves);
+    }
+
+    /// Makes room for more rings.
+    fn room(&mut self, more: usize) {
+        grow(&mut self.halves, 2 * more + 1);
+        if self.halves.is_empty() {
+            self.halves.push([NONE; 4]);
+        }
+    }
+
+    /// Appends rings. `make` has the number of each among them, and tells of a slot before all of them what its children are.
+    pub(crate) fn append(
+        &mut self,
+        count: usize,
+        make: impl Fn(usize, &dyn Fn(u32) -> [u32; 4]) -> Ring + Sync,
+    ) {
+        self.room(count);
+        let before = self.halves.len();
+        self.halves.resize(before + 2 * count, [NONE; 4]);
+        let (before, halves) = self.halves.split_at_mut(before);
+        // Parts are of whole rings: they have even numbers of halves.
+        change(halves, |at, part| {
+            for (i, halves) in part.chunks_exact_mut(2).enumerate() {
+                let ring = make(at / 2 + i, &|slot| before[2 * slot as usize + 2]);
+                halves.copy_from_slice(&[ring.corners.map(|corner| corner.0), ring.children]);
+            }
+        });
+    }
+
+    /// Takes all rings away; memory stays.
+    pub(crate) fn clear(&mut self) {
+        self.halves.clear();
     }
 
     /// Asks memory for a ring.
     #[inline(always)]
     pub(crate) fn fetch(&self, corner: Corner) {
-        prefetch(&self.all, corner.slot() as usize);
+        prefetch(&self.halves, 2 * corner.slot() as usize + 1);
     }
 
     /// Gives memory back if less than one part in `parts` of it is in use.
     pub(crate) fn give_back(&mut self, parts: usize) {
-        give_back(&mut self.all, parts);
+        give_back(&mut self.halves, parts);
     }
 }
 

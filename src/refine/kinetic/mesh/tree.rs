@@ -6,7 +6,7 @@
 
 use super::labels::{child_point, first_child, is_on_border, level_of, orientation};
 use super::nodes::{CENTRE, Node, SPLIT, STATUS};
-use super::rings::{Corner, NONE, NOTHING, Ring, TURNS, edge_of, label_of, sharer_of};
+use super::rings::{Corner, NONE, Ring, TURNS, label_of, sharer_of};
 use crate::refine::kinetic::Kinetic;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
@@ -47,7 +47,7 @@ impl<S: RecordStore> Kinetic<S> {
         let (level, turned) = (level_of(point), orientation(point));
         (0..4)
             .find(|turn| level > 0 && child_point(point, level, label_of(*turn, turned, level)) == at)
-            .map(|turn| self.nodes.rings.get(slot).children[turn])
+            .map(|turn| self.nodes.rings.child(slot, turn))
     }
 
     /// Places a vertex, and its ring.
@@ -65,10 +65,11 @@ impl<S: RecordStore> Kinetic<S> {
         let level = level_of(point);
         let turn = (label + 4 - first_child(orientation(point), level)) & 3;
         let node = self.nodes.create(CENTRE, centre.raw);
-        let ring = self.nodes.rings.get_mut(here);
+        let mut ring = self.nodes.rings.get(here);
         ring.children[turn] = node;
         ring.corners[turn] = Corner::of(p);
         ring.corners[(turn + 1) & 3] = Corner::of(q);
+        self.nodes.rings.set(here, ring);
         self.adopt(node, label >> 1, Corner::parent(here, turn));
         self.cover(node, &[here, p, q]);
         self.fresh.push(node);
@@ -78,7 +79,7 @@ impl<S: RecordStore> Kinetic<S> {
     pub(crate) fn root(&self, label: usize) -> u32 {
         let point = self.point_of(CENTRE);
         let turn = (label + 4 - first_child(orientation(point), level_of(point))) & 3;
-        self.nodes.rings.get(self.nodes.get(CENTRE).slot()).children[turn]
+        self.nodes.rings.child(self.nodes.get(CENTRE).slot(), turn)
     }
 
     /// Gives a leaf its parent on a side, and with it a triangle.
@@ -133,9 +134,8 @@ impl<S: RecordStore> Kinetic<S> {
                 self.vertices.fetch(slot());
             }
             Fetch::Far => {
-                let ring = self.nodes.rings.all.get(slot() as usize);
-                let children = ring.into_iter().flat_map(|ring| ring.children);
-                children.for_each(|child| prefetch(&self.nodes.all, child as usize));
+                let children = self.nodes.rings.children(slot());
+                children.iter().for_each(|child| prefetch(&self.nodes.all, *child as usize));
             }
             Fetch::Farthest => {}
         }
@@ -152,8 +152,8 @@ impl<S: RecordStore> Kinetic<S> {
     #[inline(always)]
     fn neighbours(&self, node: u32) -> impl Iterator<Item = u32> {
         self.leaf_parents(node).flat_map(|parent| {
-            let ring = self.nodes.rings.all.get(parent.slot() as usize);
-            [1, 3].map(|step| ring.map_or(NONE, |ring| ring.children[(parent.turn() + step) & 3]))
+            let children = self.nodes.rings.children(parent.slot());
+            [1, 3].map(|step| children[(parent.turn() + step) & 3])
         })
     }
 
@@ -167,18 +167,15 @@ impl<S: RecordStore> Kinetic<S> {
         }
         let level = level_of(point);
         let vertex = self.records.decode(raw, level);
-        let around =
-            links.map(|parent| if parent.is_some() { self.nodes.rings.get(parent.slot()) } else { &NOTHING });
-        let ends = edge_of(links, around);
-        let ring = Ring::new(links, ends);
-        let here = self.place_vertex(point, &vertex, ring);
+        let ends = self.nodes.rings.edge_of(links);
+        let here = self.place_vertex(point, &vertex, Ring::new(links, ends));
         self.nodes.get_mut(node).become_split(here, level);
         let place = Place { node, here, point, level };
         for (side, parent) in links.into_iter().enumerate().filter(|(_, parent)| parent.is_some()) {
             self.nodes.clusters.touch(node, side);
             self.triangles += 1;
             if level == 0 {
-                let [p, q] = ring.edge(2 * side);
+                let [p, q] = self.nodes.rings.edge(here, 2 * side);
                 self.cover(node, &[here, p, q]);
                 continue;
             }
@@ -187,7 +184,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         if level == 0 {
             let annex = self.nodes.create_annex(node, here);
-            self.nodes.rings.get_mut(here).children[0] = annex;
+            self.nodes.rings.children_mut(here)[0] = annex;
             self.nodes.clusters.touch(annex, 0);
             self.nodes.clusters.touch(annex, 1);
             for corners in self.nodes.triangles(annex).into_iter().flatten() {
@@ -209,9 +206,9 @@ impl<S: RecordStore> Kinetic<S> {
         let turn = TURNS[side][usize::from(last)];
         let (step, turn_there) = sharer_of(side, turned, last);
         // The neighbour around the parent that shares the child.
-        let neighbour = self.nodes.rings.get(parent.slot()).children[(parent.turn() + step) & 3];
+        let neighbour = self.nodes.rings.child(parent.slot(), parent.turn() + step);
         let shared = if neighbour != NONE && self.nodes.is_split(neighbour) {
-            self.nodes.rings.get(self.nodes.get(neighbour).slot()).children[turn_there]
+            self.nodes.rings.child(self.nodes.get(neighbour).slot(), turn_there)
         } else {
             NONE
         };
@@ -225,9 +222,8 @@ impl<S: RecordStore> Kinetic<S> {
         } else {
             shared
         };
-        let ring = self.nodes.rings.get_mut(here);
-        ring.children[turn] = child;
-        let [p, q] = ring.edge(turn);
+        self.nodes.rings.children_mut(here)[turn] = child;
+        let [p, q] = self.nodes.rings.edge(here, turn);
         self.adopt(child, label >> 1, Corner::parent(here, turn));
         self.cover(child, &[here, p, q]);
     }
@@ -235,7 +231,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// Merges a split node. Children that are still split are merged before it.
     pub(crate) fn merge(&mut self, node: u32) {
         let here = self.nodes.get(node).slot();
-        let ring = *self.nodes.rings.get(here);
+        let ring = self.nodes.rings.get(here);
         let point = self.vertices.point(here);
         let level = level_of(point);
         if level == 0 {
