@@ -216,7 +216,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// The vertex of a node, from the record it holds.
     #[inline(always)]
     fn vertex_of(&self, node: u32) -> Vertex {
-        self.records.decode(self.nodes.get(node).raw, level_of(self.point_of(node)))
+        self.records.decode(self.nodes.get(node).raw, self.place_of(node).1)
     }
 
     /// Counts what is late and how far the largest error of it exceeds the tolerance. Where time counts, [`MOST_ASSESSED`] vertices at the most are asked for their error.

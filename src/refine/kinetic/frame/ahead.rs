@@ -152,7 +152,7 @@ impl<S: RecordStore> Kinetic<S> {
         let k = self.records.grid().k();
         self.wants.clear();
         self.wants.extend(self.unread.iter().filter(|node| self.nodes.is_unread(**node)).map(|node| {
-            let slot = slot_of(k, self.nodes.get(*node).point(&self.vertices));
+            let slot = slot_of(k, self.nodes.get(*node).place(&self.vertices).0);
             Want { page: S::page_of(slot), in_frames: 0.0, is_lacking: true }
         }));
         let Some(mut ahead) = self.ahead.take() else { return };
@@ -260,7 +260,7 @@ impl<S: RecordStore> Kinetic<S> {
             let Some(record) = self.nodes.all.get_mut(*node as usize).filter(|n| n.word == UNREAD) else {
                 return false;
             };
-            let is_away = self.records.get(slot_of(k, record.point(&self.vertices))).is_none();
+            let is_away = self.records.get(slot_of(k, record.place(&self.vertices).0)).is_none();
             if !is_away {
                 record.word = 0;
                 self.fresh.push(*node);

@@ -95,7 +95,7 @@ impl<S: RecordStore> Kinetic<S> {
         let k = self.records.grid().k();
         let nodes = self.nodes.all[1..].iter().filter(|_| P::HEARS_READS);
         for node in nodes.filter(|node| node.is_live() && node.word != UNREAD) {
-            probe.read(slot_of(k, node.point(&self.vertices)));
+            probe.read(slot_of(k, node.place(&self.vertices).0));
         }
     }
 
@@ -186,7 +186,7 @@ impl<S: RecordStore> Kinetic<S> {
             let links = node.links;
             let ends = rings.edge_of(links);
             // What the node will be is a vertex at the point of a leaf.
-            let point = Node { word: 0, ..*node }.point(&self.vertices);
+            let point = Node { word: 0, ..*node }.place(&self.vertices).0;
             let mut parent =
                 Parent { raw: node.raw, point, links, ends, makes: 0, sharers: [NONE; 4], before: 0 };
             for side in (0..2).filter(|side| links[*side].is_some()) {
@@ -288,15 +288,15 @@ impl<S: RecordStore> Kinetic<S> {
             let mut batch = Batch::default();
             for (i, verdicts) in part.chunks_mut(BATCH).enumerate() {
                 let first = at + i * BATCH;
-                let mut points = [GridPoint::default(); BATCH];
-                for (i, point) in points[..verdicts.len()].iter_mut().enumerate() {
+                let mut places = [(GridPoint::default(), level - 1); BATCH];
+                for (i, (point, _)) in places[..verdicts.len()].iter_mut().enumerate() {
                     *point = point_of(births[first + i]);
                     self.records.prefetch(slot_of(k, *point));
                 }
                 self.judge_batch(
                     &mut batch,
-                    &points[..verdicts.len()],
-                    |i| self.records.get(slot_of(k, points[i])),
+                    &places[..verdicts.len()],
+                    |i| self.records.get(slot_of(k, places[i].0)),
                     judge,
                     verdicts,
                 );
@@ -317,10 +317,10 @@ impl<S: RecordStore> Kinetic<S> {
             let label = label_of(turn, turned, level);
             let mut node = Node::leaf(word, raw);
             let side = label >> 1;
-            node.links[side] = Corner::parent(here + i, turn);
+            node.links[side] = Corner::parent(here + i, turn, label);
             let sharer = parent.sharers[turn];
             if sharer != NONE {
-                node.links[1 - side] = Corner::parent(base + sharer, parent.turn_there(turn));
+                node.links[1 - side] = Corner::parent(base + sharer, parent.turn_there(turn), label);
             }
             if word & ACTIVE != 0
                 && (sharer != NONE || is_on_border(child_point(parent.point, level, label), side_steps))

@@ -6,7 +6,6 @@
 
 use super::budget::Allowance;
 use crate::refine::kinetic::Kinetic;
-use crate::refine::kinetic::mesh::labels::level_of;
 use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
 use crate::refine::kinetic::mesh::tree::Fetch;
 use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch, Words};
@@ -62,18 +61,18 @@ impl<S: RecordStore> Kinetic<S> {
             verdicts.resize(part.len(), (S::Codec::INERT, UNREAD));
             let batches = |batch: &mut Batch, part: &[u32], verdicts: &mut [(RawOf<S>, u32)]| {
                 for (nodes, verdicts) in part.chunks(BATCH).zip(verdicts.chunks_mut(BATCH)) {
-                    let mut points = [GridPoint::default(); BATCH];
-                    for (point, node) in points.iter_mut().zip(nodes) {
-                        *point = self.point_of(*node);
+                    let mut places = [(GridPoint::default(), 0); BATCH];
+                    for (place, node) in places.iter_mut().zip(nodes) {
+                        *place = self.place_of(*node);
                     }
                     let raw_of = |i: usize| {
                         if fresh {
-                            self.records.get(slot_of(k, points[i]))
+                            self.records.get(slot_of(k, places[i].0))
                         } else {
                             Some(self.nodes.get(nodes[i]).raw)
                         }
                     };
-                    self.judge_batch(batch, &points[..nodes.len()], raw_of, judge, verdicts);
+                    self.judge_batch(batch, &places[..nodes.len()], raw_of, judge, verdicts);
                 }
             };
             if parallel {
@@ -97,20 +96,20 @@ impl<S: RecordStore> Kinetic<S> {
         (self.verdicts, self.batch) = (verdicts, Some(batch));
     }
 
-    /// Makes the words of up to [`BATCH`] vertices at `points` from their records, and gives them with those. [`UNREAD`] where they are away.
+    /// Makes the words of up to [`BATCH`] vertices, given by point and level, from their records, and gives them with those. [`UNREAD`] where they are away.
     #[inline(always)]
     pub(crate) fn judge_batch(
         &self,
         batch: &mut Batch,
-        points: &[GridPoint],
+        places: &[(GridPoint, u32)],
         raw_of: impl Fn(usize) -> Option<RawOf<S>>,
         judge: &Judge,
         verdicts: &mut [(RawOf<S>, u32)],
     ) {
         let together = judge.makes_batches();
-        for (i, (point, verdict)) in points.iter().zip(verdicts.iter_mut()).enumerate() {
+        for (i, ((point, level), verdict)) in places.iter().zip(verdicts.iter_mut()).enumerate() {
             let Some(raw) = raw_of(i) else { continue };
-            let vertex = self.records.decode(raw, level_of(*point));
+            let vertex = self.records.decode(raw, *level);
             let at_m = self.records.grid().position_m(*point);
             *verdict = (raw, 0);
             if together {
@@ -121,7 +120,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         if together {
             let mut words = Words::default();
-            judge.words(batch, points.len(), &mut words);
+            judge.words(batch, places.len(), &mut words);
             for ((_, verdict), word) in verdicts.iter_mut().zip(words.as_flattened()) {
                 if S::IS_COMPLETE || *verdict != UNREAD {
                     *verdict = *word;
@@ -174,7 +173,7 @@ impl<S: RecordStore> Kinetic<S> {
 
     #[inline(always)]
     fn level(&self, node: u32) -> usize {
-        level_of(self.point_of(node)) as usize
+        self.place_of(node).1 as usize
     }
 
     /// Tests the children that splits have made.

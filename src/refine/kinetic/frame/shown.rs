@@ -9,7 +9,6 @@ use crate::refine::Culling;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::mesh::bounds::Bounds;
 use crate::refine::kinetic::mesh::clusters::{Clusters, Dealing};
-use crate::refine::kinetic::mesh::labels::level_of;
 use crate::refine::kinetic::mesh::nodes::Nodes;
 use crate::refine::kinetic::mesh::vertices::Vertices;
 use terrasoar_layout::grid::GridPoint;
@@ -61,7 +60,7 @@ impl<S: RecordStore> Shown<'_, S> {
         }
         if self.nodes.is_live(node) && !self.nodes.is_split(node) {
             let leaf = self.nodes.get(node);
-            let vertex = || self.records.decode(leaf.raw, level_of(leaf.point(self.vertices)));
+            let vertex = || self.records.decode(leaf.raw, leaf.place(self.vertices).1);
             self.nodes.is_unread(node) || vertex().class.is_plain()
         } else {
             corners.iter().all(|v| !self.vertices.is_void(*v))

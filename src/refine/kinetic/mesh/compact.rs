@@ -6,7 +6,6 @@
 //! frame is long. Moved triangles show in the patch like changed ones; vertices keep their slots.
 
 use super::clusters::{CLUSTER, Dealing};
-use super::labels::level_of;
 use super::nodes::{CENTRE, SPLIT, STATUS, UNREAD};
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::time::certificate::{ACTIVE, clock_of, expiry_of};
@@ -92,7 +91,7 @@ impl<S: RecordStore> Kinetic<S> {
             self.late.push(to);
         }
         if record.word & STATUS == ACTIVE {
-            self.to_split[level_of(self.point_of(to)) as usize].push(to);
+            self.to_split[self.place_of(to).1 as usize].push(to);
         }
     }
 }

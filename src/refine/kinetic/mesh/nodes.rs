@@ -12,8 +12,8 @@
 //! Cost: 16 bytes a node with compact records, and a little more than a node a triangle.
 
 use super::clusters::{CLUSTER, Clusters};
-use super::labels::{child_point, level_of, orientation};
-use super::rings::{Corner, Rings, label_of};
+use super::labels::{child_point, level_of};
+use super::rings::{Corner, Rings};
 use super::vertices::Vertices;
 use crate::refine::kinetic::capacity::grow;
 use crate::refine::kinetic::time::certificate::ACTIVE;
@@ -93,14 +93,16 @@ impl<R> Node<R> {
         self.links[usize::from(self.links[0].is_none())]
     }
 
-    /// The point of a node that has a vertex. Without branches, because leaves and split nodes come in no order.
+    /// The point and the level of a node that has a vertex. Without branches, because leaves and split nodes come in no order.
     #[inline(always)]
-    pub(crate) fn point(&self, vertices: &Vertices) -> GridPoint {
-        let anchor = self.anchor();
+    pub(crate) fn place(&self, vertices: &Vertices) -> (GridPoint, u32) {
+        let side = usize::from(self.links[0].is_none());
+        let anchor = self.links[side];
         let own = vertices.point(anchor.slot());
         let level = level_of(own);
-        let child = child_point(own, level, label_of(anchor.turn(), orientation(own), level));
-        if self.is_split() { own } else { child }
+        let child = child_point(own, level, 2 * side + anchor.orientation());
+        let is_split = self.is_split();
+        (if is_split { own } else { child }, if is_split { level } else { level.wrapping_sub(1) })
     }
 }
 

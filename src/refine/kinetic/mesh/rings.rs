@@ -16,19 +16,20 @@ use terrasoar_layout::read::prefetch::prefetch;
 /// No node, no vertex.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// A vertex slot, of which there are at most 2^30, and for a parent the turn of the child that it is told of.
+/// A vertex slot, of which there are at most 2^29, and for a parent how the child lies at it: its turn there, and its orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Corner(u32);
 
 impl Corner {
     /// There is none.
     pub(crate) const NONE: Self = Self(u32::MAX);
-    const TURN_SHIFT: u32 = 30;
+    const TURN_SHIFT: u32 = 29;
+    const ORIENTATION_SHIFT: u32 = 31;
 
-    /// The parent with this vertex slot, of its child with this turn.
+    /// The parent with this vertex slot, of its child with this turn and label.
     #[inline(always)]
-    pub(crate) fn parent(slot: u32, turn: usize) -> Self {
-        Self(slot | (turn as u32) << Self::TURN_SHIFT)
+    pub(crate) fn parent(slot: u32, turn: usize, label: usize) -> Self {
+        Self(slot | (turn as u32) << Self::TURN_SHIFT | (label as u32) << Self::ORIENTATION_SHIFT)
     }
 
     /// A vertex slot.
@@ -44,7 +45,13 @@ impl Corner {
 
     #[inline(always)]
     pub(crate) fn turn(self) -> usize {
-        (self.0 >> Self::TURN_SHIFT) as usize
+        (self.0 >> Self::TURN_SHIFT) as usize & 3
+    }
+
+    /// The child's orientation: see `super::labels`.
+    #[inline(always)]
+    pub(crate) fn orientation(self) -> usize {
+        (self.0 >> Self::ORIENTATION_SHIFT) as usize
     }
 
     #[inline(always)]

@@ -34,10 +34,16 @@ struct Place {
 }
 
 impl<S: RecordStore> Kinetic<S> {
+    /// The point and the level of a node.
+    #[inline(always)]
+    pub(crate) fn place_of(&self, node: u32) -> (GridPoint, u32) {
+        self.nodes.get(node).place(&self.vertices)
+    }
+
     /// The point of a node.
     #[inline(always)]
     pub(crate) fn point_of(&self, node: u32) -> GridPoint {
-        self.nodes.get(node).point(&self.vertices)
+        self.place_of(node).0
     }
 
     /// The child of a split node that lies at `at`; `None` at the finest level, where there are none.
@@ -70,7 +76,7 @@ impl<S: RecordStore> Kinetic<S> {
         ring.corners[turn] = Corner::of(p);
         ring.corners[(turn + 1) & 3] = Corner::of(q);
         self.nodes.rings.set(here, ring);
-        self.adopt(node, label >> 1, Corner::parent(here, turn));
+        self.adopt(node, label >> 1, Corner::parent(here, turn, label));
         self.cover(node, &[here, p, q]);
         self.fresh.push(node);
     }
@@ -160,12 +166,11 @@ impl<S: RecordStore> Kinetic<S> {
     /// Splits a node. `false`, and nothing done, if a triangle on one of its sides is yet to come.
     pub(crate) fn split(&mut self, node: u32) -> bool {
         let Node { raw, links, .. } = *self.nodes.get(node);
-        let point = self.point_of(node);
+        let (point, level) = self.place_of(node);
         let is_whole = links[0].is_some() & links[1].is_some();
         if !is_whole && !is_on_border(point, self.records.grid().side_steps()) {
             return false;
         }
-        let level = level_of(point);
         let vertex = self.records.decode(raw, level);
         let ends = self.nodes.rings.edge_of(links);
         let here = self.place_vertex(point, &vertex, Ring::new(links, ends));
@@ -224,7 +229,7 @@ impl<S: RecordStore> Kinetic<S> {
         };
         self.nodes.rings.children_mut(here)[turn] = child;
         let [p, q] = self.nodes.rings.edge(here, turn);
-        self.adopt(child, label >> 1, Corner::parent(here, turn));
+        self.adopt(child, label >> 1, Corner::parent(here, turn, label));
         self.cover(child, &[here, p, q]);
     }
 
