@@ -22,8 +22,7 @@ use terrasoar_layout::read::store::{RawOf, RecordStore};
 /// From so many tests on they are shared among threads.
 const PARALLEL: usize = 4096;
 /// How many splits or merges ahead memory is asked for what.
-const FETCH_AHEAD: [(Fetch, usize); 4] =
-    [(Fetch::Node, 8), (Fetch::Near, 6), (Fetch::Far, 4), (Fetch::Farthest, 2)];
+const FETCH_AHEAD: [(Fetch, usize); 3] = [(Fetch::Node, 6), (Fetch::Near, 4), (Fetch::Far, 2)];
 
 impl<S: RecordStore> Kinetic<S> {
     /// Tests what is due, as far as the budget allows.

@@ -87,8 +87,7 @@ impl<S: RecordStore> Kinetic<S> {
         let mut clusters = std::mem::replace(&mut self.nodes.clusters, Clusters::new(Dealing::Packed));
         let shape = self.records.shape();
         let shows_all = !shape.has_voids && !shape.grid.has_padding();
-        let soon = |node: u32, side: usize| self.nodes.rings.fetch(self.nodes.get(node).links[side]);
-        clusters.take_written(soon, |node, side| {
+        clusters.take_written(|node, side| {
             let corners = self.nodes.triangle(node, side);
             let shown = if shows_all { corners.unwrap_or([0; 3]) } else { self.shown(node, corners) };
             written.push((2 * node + side as u32, shown));

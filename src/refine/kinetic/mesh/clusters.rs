@@ -276,18 +276,13 @@ impl Clusters {
         }
     }
 
-    /// Hands out the slots that have changed, as places and sides, in the order in which they changed first. `soon` is told some slots before.
-    pub(crate) fn take_written(&mut self, soon: impl Fn(u32, usize), mut each: impl FnMut(u32, usize)) {
-        const SOON: usize = 8;
-        for (i, slot) in self.written.iter().enumerate() {
-            if let Some(later) = self.written.get(i + SOON) {
-                soon(later / 2, *later as usize % 2);
-            }
+    /// Hands out the slots that have changed, as places and sides, in the order in which they changed first.
+    pub(crate) fn take_written(&mut self, mut each: impl FnMut(u32, usize)) {
+        for slot in self.written.drain(..) {
             // All others of the word are in the list as well.
-            self.clusters[*slot as usize / (2 * CLUSTER)].written[*slot as usize / 64 % 4] = 0;
-            each(slot / 2, *slot as usize % 2);
+            self.clusters[slot as usize / (2 * CLUSTER)].written[slot as usize / 64 % 4] = 0;
+            each(slot / 2, slot as usize % 2);
         }
-        self.written.clear();
     }
 
     /// Gives memory back that a frame which changed `used` slots has no need of.

@@ -20,7 +20,6 @@ pub(crate) enum Fetch {
     Node,
     Near,
     Far,
-    Farthest,
 }
 
 /// A node that is being split, or a vertex that is being merged.
@@ -111,7 +110,7 @@ impl<S: RecordStore> Kinetic<S> {
         self.nodes.clusters.set_bounds(cluster, bounds);
     }
 
-    /// Asks memory for what splitting a node will look at, in order: itself; its parents; the neighbours around each of them; and theirs.
+    /// Asks memory for what splitting a node will look at, in order: itself; its parents; the neighbours around each of them.
     #[inline(always)]
     pub(crate) fn fetch_for_split(&self, node: u32, what: Fetch) {
         match what {
@@ -121,11 +120,6 @@ impl<S: RecordStore> Kinetic<S> {
                 self.vertices.fetch(parent.slot());
             }),
             Fetch::Far => self.neighbours(node).for_each(|node| prefetch(&self.nodes.all, node as usize)),
-            Fetch::Farthest => {
-                self.neighbours(node).filter_map(|node| self.nodes.all.get(node as usize)).for_each(|node| {
-                    self.nodes.rings.fetch(node.links[0]);
-                })
-            }
         }
     }
 
@@ -143,7 +137,6 @@ impl<S: RecordStore> Kinetic<S> {
                 let children = self.nodes.rings.children(slot());
                 children.iter().for_each(|child| prefetch(&self.nodes.all, *child as usize));
             }
-            Fetch::Farthest => {}
         }
     }
 
