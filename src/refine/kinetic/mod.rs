@@ -395,3 +395,6 @@ impl<S: RecordStore> Engine for Kinetic<S> {
         self.take_edit(change);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -62,6 +62,10 @@ impl<S: RecordStore> Kinetic<S> {
         let (parents, births, verdicts) = (Vec::new(), Vec::new(), Vec::new());
         let mut piece = Piece { start: 0, parents, births, verdicts, base: 0, next: 0, places };
         while !line.split.is_empty() {
+            if !self.vertices.have_room(line.split.len()) {
+                self.leave(&mut line, stale);
+                break;
+            }
             let at = self.nodes.all.len() as u32;
             below.start(line.level.saturating_sub(1), at);
             piece.base = self.vertices.len();
@@ -170,6 +174,17 @@ impl<S: RecordStore> Kinetic<S> {
         let slots = if line.level > 0 { first as usize..range.end as usize } else { 0..0 };
         // Split ones have no rings yet, and will show nothing.
         both(range.len(), enter_words, || list_slots(patch, &shown, slots, stale, false));
+    }
+
+    /// Leaves a level unsplit for which there are not slots enough; splits one by one take those that are left in the next frame.
+    fn leave(&mut self, line: &mut Line, stale: usize) {
+        for place in line.split.drain(..) {
+            self.nodes.get_mut(place).word &= !SPLIT;
+            self.to_split[line.level as usize].push(place);
+            if line.level > 0 {
+                self.list_slots(place as usize..place as usize + 1, stale);
+            }
+        }
     }
 
     /// Numbers the children of split vertices of a level, from `piece.start` on.

@@ -1,7 +1,7 @@
 //! The vertex array: the vertices that triangles are made of, in slots that they keep for as long as they are in the mesh.
 //!
 //! It lies beside the bin-tree array but has an order of its own, so that nodes moved in that array move no vertex on the GPU. The first
-//! five slots are the square's corners and its centre. Cost: 13 bytes a vertex, half a vertex a triangle.
+//! five slots are the square's corners and its centre. Where slots are all taken, what would split next waits: the mesh is coarser there, and that is told as what is late. Cost: 13 bytes a vertex, half a vertex a triangle.
 
 use crate::refine::kinetic::capacity::{give_back, grow};
 use crate::refine::kinetic::hands::extend;
@@ -10,15 +10,37 @@ use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::Vertex;
 use terrasoar_layout::read::prefetch::prefetch;
 
-#[derive(Debug, Default)]
+/// Slots that there can be: [`Corner`](super::rings::Corner) has bits for no more.
+const MOST: usize = (1 << 29) - 1;
+
+#[derive(Debug)]
 pub(crate) struct Vertices {
     all: Vec<StripVertex>,
     /// Whether a vertex's sample is void.
     void: Vec<bool>,
     free: Vec<u32>,
+    most: usize,
+}
+
+impl Default for Vertices {
+    fn default() -> Self {
+        Self { all: Vec::new(), void: Vec::new(), free: Vec::new(), most: MOST }
+    }
 }
 
 impl Vertices {
+    /// Whether so many more vertices find slots.
+    #[inline(always)]
+    pub(crate) fn have_room(&self, more: usize) -> bool {
+        self.all.len() - self.free.len() + more <= self.most
+    }
+
+    /// Has no more slots than that.
+    #[cfg(test)]
+    pub(crate) fn limit(&mut self, most: usize) {
+        self.most = most;
+    }
+
     /// Places a vertex; returns its slot.
     pub(crate) fn place(&mut self, at: GridPoint, vertex: &Vertex) -> u32 {
         let placed = StripVertex { x: at.x(), y: at.y(), height_m: vertex.height_m as f32 };
