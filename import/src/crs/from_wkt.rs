@@ -211,6 +211,11 @@ fn completed(proj: String, node: &Node) -> String {
     if has(&["+proj=mill"]) {
         return format!("{proj} +R_A");
     }
+    // WKT 1 means the sphere's formulas on the ellipsoid's axis, as does a method of WKT 2 that says so.
+    let method = node.find(&["METHOD"]).and_then(|method| method.text(0)).map(squeezed);
+    if has(&["+proj=ortho"]) && method.is_none_or(|name| name.contains("spherical")) {
+        return format!("{proj} +f=0");
+    }
     // ESRI scales maps with two standard parallels, as those of Michigan are.
     let scale = parameter(node, "Scale_Factor").filter(|scale| *scale > 0.0 && *scale != 1.0);
     match scale {

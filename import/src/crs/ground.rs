@@ -133,8 +133,8 @@ impl Ground {
             true => Proj::from_proj_string("+proj=longlat +datum=WGS84").ok()?,
             false => own.clone(),
         };
-        // The orthographic map of an ellipsoid is not the sphere's, which is all that is here: the wrong one is off by kilometres.
-        if proj.projname() == "ortho" && a - b > 1.0 {
+        // Orthographic maps of an ellipsoid by the sphere's formulas are not here: the ellipsoid's lead to places that are off by kilometres.
+        if proj.projname() == "ortho" && a - b > 1.0 && text.contains("+f=0") {
             return None;
         }
         let turn = match proj.is_latlong() {

@@ -249,10 +249,38 @@ fn scales_of_conic_maps_count() {
     );
 }
 
-/// The orthographic map of an ellipsoid is not drawn by the sphere's formulas.
+/// Orthographic maps of the ellipsoid, against PROJ, wherever they are centred.
 #[test]
-fn an_orthographic_map_of_an_ellipsoid_leads_nowhere() {
-    let of = |text: &str| Ground::new(&by_text(text).unwrap());
-    assert!(of("+proj=ortho +lat_0=90 +datum=WGS84").is_none());
+fn orthographic_maps_of_an_ellipsoid_are_its_own() {
+    let near_and_far = [[15_000.0, 15_000.0], [1_500_000.0, -1_000_000.0]];
+    for (centre_deg, places) in [
+        (0.0, [[3.134_747_791_980_31, 0.135_655_545_752_89], [16.776_998_074_247_3, -9.080_911_186_129_49]]),
+        (20.0, [[3.143_462_165_034_66, 20.135_437_178_455_3], [16.830_256_798_300_4, 10.354_926_822_499_9]]),
+        (46.0, [[3.194_112_328_786_33, 46.134_785_251_972_4], [19.772_017_130_138_8, 35.504_057_723_102_4]]),
+        (80.0, [[3.783_832_124_967_83, 80.133_431_090_069_8], [39.180_612_683_481_9, 66.593_109_101_184_9]]),
+        (-30.0, [[3.155_252_370_432_22, -29.864_591_801_073], [20.343_971_555_920_6, -38.010_062_160_296_8]]),
+        (90.0, [[138.0, 89.810_077_112_907_7], [59.309_932_474_020_2, 73.633_713_289_007_4]]),
+        (-90.0, [[48.0, -89.810_077_112_907_7], [126.690_067_525_98, -73.633_713_289_007_4]]),
+    ] {
+        let text = format!("+proj=ortho +lat_0={centre_deg} +lon_0=3 +datum=WGS84");
+        let ground = Ground::new(&by_text(&text).unwrap()).unwrap();
+        for (at, place) in near_and_far.into_iter().zip(places) {
+            let found = ground.world(at).unwrap().map(f64::to_degrees);
+            let away = (found[0] - place[0]).abs().max((found[1] - place[1]).abs());
+            assert!(away < 1e-9, "{text} {at:?}: {found:?}");
+        }
+    }
+}
+
+/// Where a text means the sphere's formulas on an ellipsoid, as PROJ has it of WKT 1, there is no ground: 5 km would be missed.
+#[test]
+fn an_orthographic_map_of_wkt_1_leads_nowhere_on_an_ellipsoid() {
+    let text = |flattening: &str| {
+        format!(
+            "PROJCS[\"x\",GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"x\",6378137,{flattening}]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],PROJECTION[\"Orthographic\"],PARAMETER[\"false_easting\",0],PARAMETER[\"false_northing\",0],PARAMETER[\"central_meridian\",0],PARAMETER[\"latitude_of_origin\",90],UNIT[\"metre\",1]]"
+        )
+    };
+    let of = |text: &str| by_text(text).ok().and_then(|system| Ground::new(&system));
+    assert!(of(&text("298.257223563")).is_none());
     assert!(of("+proj=ortho +lat_0=90 +R=1737400").is_some());
 }
