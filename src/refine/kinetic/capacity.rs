@@ -14,6 +14,13 @@ pub(super) fn grow<T>(array: &mut Vec<T>, more: usize) {
     }
 }
 
+/// Gives back what an array that has become shorter holds beyond its length, once that is half of it.
+pub(super) fn shorten<T>(array: &mut Vec<T>) {
+    if array.capacity() > 2 * array.len() {
+        array.shrink_to(array.len() + array.len() / 8);
+    }
+}
+
 /// Gives back most of a list's memory if a frame that used `used` of it has no need of it: after the first frame, or a jump.
 pub(super) fn settle<T: Copy + Send + 'static>(list: &mut Vec<T>, used: usize) {
     let bytes = list.capacity() * size_of::<T>();

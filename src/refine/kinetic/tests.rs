@@ -46,10 +46,10 @@ fn where_slots_are_all_taken_the_mesh_is_coarser_and_says_so() {
         View::new([640.0, 640.0, 2500.0], 120.0, -90.0),
     ];
     for culling in [Culling::Vertices, Culling::Clusters] {
-        let mut free = Kinetic::new(records, culling);
+        let mut free = Kinetic::new(records.clone(), culling);
         for budget in [Budget::default(), Budget::default().tests(5000)] {
             for most in [5, 6, 9, 40, 333, 1500, 1 << 20] {
-                let mut engine = Kinetic::new(records, culling);
+                let mut engine = Kinetic::new(records.clone(), culling);
                 engine.vertices.limit(most);
                 engine.set_budget(budget);
                 for (i, view) in views.iter().cycle().take(9).enumerate() {
@@ -59,7 +59,10 @@ fn where_slots_are_all_taken_the_mesh_is_coarser_and_says_so() {
                     let used = engine.nodes.all.iter().filter(|node| node.is_split()).count() + 4;
                     assert!(used <= most, "{used} of {most}");
                     let is_same = engine.triangle_count() == free.triangle_count();
-                    assert_eq!(is_same, engine.work().late == 0, "{most} slots, frame {i}");
+                    let is_late = engine.work().late > 0;
+                    assert!(is_same || is_late, "{most} slots, frame {i}");
+                    // A budget may leave tests for later, too.
+                    assert!(!(is_same && is_late) || budget.tests.is_some(), "{most} slots, frame {i}");
                 }
             }
         }

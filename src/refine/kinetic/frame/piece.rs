@@ -40,7 +40,7 @@ pub(super) struct Parent<R> {
     pub(super) links: [Corner; 2],
     /// Ends of the edge that it splits.
     pub(super) ends: [u32; 2],
-    /// Bit t: it makes the child with turn t. Bit 4 + s: it has a triangle on side s.
+    /// Bit i: it makes the child that comes [i-th](order_of). Bit 4 + s: it has a triangle on side s.
     pub(super) makes: u8,
     /// By turn: which split vertex of the level shares that child, or [`NONE`].
     pub(super) sharers: [u32; 4],
@@ -52,7 +52,13 @@ impl<R> Parent<R> {
     /// Which of the piece's children is the one with this turn, which this vertex makes.
     #[inline(always)]
     pub(super) fn child(&self, turn: usize) -> u32 {
-        self.before + (self.makes & ((1 << turn) - 1)).count_ones()
+        self.before + (self.makes & ((1 << order_of(turn)) - 1)).count_ones()
+    }
+
+    /// Whether it makes the child with this turn.
+    #[inline(always)]
+    pub(super) fn makes(&self, turn: usize) -> bool {
+        self.makes >> order_of(turn) & 1 == 1
     }
 
     /// The turn that a child with this turn has at the vertex which shares it.
@@ -61,6 +67,12 @@ impl<R> Parent<R> {
         let (side, last) = side_of(turn);
         sharer_of(side, orientation(self.point), last).1
     }
+}
+
+/// When the child with a turn comes: children are made in the order of splits, the first and the last of side 0, then those of side 1. The turn of the child that comes then, too.
+#[inline(always)]
+pub(super) fn order_of(turn: usize) -> usize {
+    (4 - turn) & 3
 }
 
 /// The vertices of a level.

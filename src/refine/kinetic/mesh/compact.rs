@@ -3,7 +3,7 @@
 //! Splits take places and merges give them back, so that after a while, or when the mesh shrinks, clusters are part empty. Packed clusters: once a quarter of all
 //! places is free, nodes of the last cluster move to the first places that are free, and empty clusters at the end are given up. Near clusters: the
 //! few nodes of a cluster that is nearly empty move beside their parents. At most [`MOVES_PER_FRAME`] nodes move in a frame, so that no
-//! frame is long. Moved triangles show in the patch like changed ones; vertices keep their slots.
+//! frame is long. Moved triangles show in the patch like changed ones; vertices keep their slots, and slots that are free at the end are given up.
 
 use super::clusters::{CLUSTER, Dealing};
 use super::nodes::{CENTRE, SPLIT, STATUS, UNREAD};
@@ -26,6 +26,9 @@ impl<S: RecordStore> Kinetic<S> {
         }
         if self.nodes.clusters.give_up_empty_end() {
             self.nodes.shorten();
+        }
+        if let Some(slots) = self.vertices.give_up_free_end() {
+            self.nodes.rings.truncate(slots);
         }
     }
 

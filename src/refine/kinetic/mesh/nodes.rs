@@ -15,7 +15,7 @@ use super::clusters::{CLUSTER, Clusters};
 use super::labels::{child_point, level_of};
 use super::rings::{Corner, Rings};
 use super::vertices::Vertices;
-use crate::refine::kinetic::capacity::grow;
+use crate::refine::kinetic::capacity::{grow, shorten};
 use crate::refine::kinetic::time::certificate::ACTIVE;
 use crate::refine::kinetic::time::clocks::EXPIRY_BITS;
 use terrasoar_layout::grid::GridPoint;
@@ -201,9 +201,7 @@ impl<R: Copy> Nodes<R> {
     /// Cuts the array off after the last cluster.
     pub(crate) fn shorten(&mut self) {
         self.all.truncate(self.clusters.places());
-        if self.all.capacity() > 2 * self.all.len() {
-            self.all.shrink_to(self.all.len() + self.all.len() / 8);
-        }
+        shorten(&mut self.all);
     }
 
     /// Frees a node or an annex.

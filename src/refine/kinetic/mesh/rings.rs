@@ -9,7 +9,7 @@
 //! Invariant: a ring is true while its vertex is in the mesh. Cost: 32 bytes a vertex, half a vertex a triangle.
 
 use super::labels::first_child;
-use crate::refine::kinetic::capacity::{give_back, grow};
+use crate::refine::kinetic::capacity::{give_back, grow, shorten};
 use crate::refine::kinetic::hands::change;
 use terrasoar_layout::read::prefetch::prefetch;
 
@@ -232,6 +232,12 @@ impl Rings {
                 halves.copy_from_slice(&[ring.corners.map(|corner| corner.0), ring.children]);
             }
         });
+    }
+
+    /// Gives up rings behind the first ones.
+    pub(crate) fn truncate(&mut self, slots: usize) {
+        self.halves.truncate(2 * slots + 1);
+        shorten(&mut self.halves);
     }
 
     /// Takes all rings away; memory stays.

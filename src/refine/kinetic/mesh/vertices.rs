@@ -3,7 +3,7 @@
 //! It lies beside the bin-tree array but has an order of its own, so that nodes moved in that array move no vertex on the GPU. The first
 //! five slots are the square's corners and its centre. Where slots are all taken, what would split next waits: the mesh is coarser there, and that is told as what is late. Cost: 13 bytes a vertex, half a vertex a triangle.
 
-use crate::refine::kinetic::capacity::{give_back, grow};
+use crate::refine::kinetic::capacity::{give_back, grow, shorten};
 use crate::refine::kinetic::hands::extend;
 use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
@@ -18,13 +18,17 @@ pub(crate) struct Vertices {
     all: Vec<StripVertex>,
     /// Whether a vertex's sample is void.
     void: Vec<bool>,
-    free: Vec<u32>,
+    /// Bit s % 64 of word s / 64: slot s is free.
+    open: Vec<u64>,
+    /// No word before this one has a bit.
+    first_open: usize,
+    free: usize,
     most: usize,
 }
 
 impl Default for Vertices {
     fn default() -> Self {
-        Self { all: Vec::new(), void: Vec::new(), free: Vec::new(), most: MOST }
+        Self { all: Vec::new(), void: Vec::new(), open: Vec::new(), first_open: 0, free: 0, most: MOST }
     }
 }
 
@@ -32,7 +36,7 @@ impl Vertices {
     /// Whether so many more vertices find slots.
     #[inline(always)]
     pub(crate) fn have_room(&self, more: usize) -> bool {
-        self.all.len() - self.free.len() + more <= self.most
+        self.all.len() - self.free + more <= self.most
     }
 
     /// Has no more slots than that.
@@ -41,14 +45,22 @@ impl Vertices {
         self.most = most;
     }
 
-    /// Places a vertex; returns its slot.
+    /// Places a vertex in the first slot that is free, so that those at the end are free before long where the mesh shrinks; returns its slot.
     pub(crate) fn place(&mut self, at: GridPoint, vertex: &Vertex) -> u32 {
         let placed = StripVertex { x: at.x(), y: at.y(), height_m: vertex.height_m as f32 };
         let is_void = vertex.class.is_void();
-        if let Some(slot) = self.free.pop() {
-            self.all[slot as usize] = placed;
-            self.void[slot as usize] = is_void;
-            return slot;
+        if self.free > 0 {
+            while let Some(open) = self.open.get_mut(self.first_open) {
+                if *open != 0 {
+                    let slot = 64 * self.first_open + open.trailing_zeros() as usize;
+                    *open &= *open - 1;
+                    self.free -= 1;
+                    self.all[slot] = placed;
+                    self.void[slot] = is_void;
+                    return slot as u32;
+                }
+                self.first_open += 1;
+            }
         }
         grow(&mut self.all, 1);
         self.all.push(placed);
@@ -80,14 +92,15 @@ impl Vertices {
     pub(crate) fn clear(&mut self) {
         self.all.clear();
         self.void.clear();
-        self.free.clear();
+        self.open.clear();
+        (self.first_open, self.free) = (0, 0);
     }
 
     /// Gives memory back if less than one part in `parts` of it is in use.
     pub(crate) fn give_back(&mut self, parts: usize) {
         give_back(&mut self.all, parts);
         give_back(&mut self.void, parts);
-        give_back(&mut self.free, parts);
+        give_back(&mut self.open, parts);
     }
 
     /// Moves a vertex up or down.
@@ -97,8 +110,39 @@ impl Vertices {
 
     /// Gives a slot back.
     pub(crate) fn remove(&mut self, slot: u32) {
-        grow(&mut self.free, 1);
-        self.free.push(slot);
+        let word = slot as usize / 64;
+        if word >= self.open.len() {
+            let more = word + 1 - self.open.len();
+            grow(&mut self.open, more);
+            self.open.resize(word + 1, 0);
+        }
+        self.open[word] |= 1 << (slot % 64);
+        self.first_open = self.first_open.min(word);
+        self.free += 1;
+    }
+
+    /// Gives up slots at the end that are free, some thousands at a time. Tells how many are left, if any were given up.
+    pub(crate) fn give_up_free_end(&mut self) -> Option<usize> {
+        const WORDS: usize = 64;
+        let before = self.all.len();
+        for _ in 0..WORDS {
+            let last = self.all.len().checked_sub(1)?;
+            // Whole words, once the end is at one.
+            let from = last / 64 * 64;
+            let wanted = u64::MAX >> (63 - last % 64);
+            if self.open.get(last / 64) != Some(&wanted) {
+                break;
+            }
+            self.open.truncate(last / 64);
+            self.all.truncate(from);
+            self.void.truncate(from);
+            self.free -= last % 64 + 1;
+        }
+        (self.all.len() < before).then(|| {
+            shorten(&mut self.all);
+            shorten(&mut self.void);
+            self.all.len()
+        })
     }
 
     /// Asks memory for a vertex.
@@ -127,6 +171,6 @@ impl Vertices {
     pub(crate) fn bytes(&self) -> usize {
         self.all.capacity() * size_of::<StripVertex>()
             + self.void.capacity()
-            + self.free.capacity() * size_of::<u32>()
+            + self.open.capacity() * size_of::<u64>()
     }
 }
