@@ -1,6 +1,7 @@
 //! From a tree of well-known text to a [`System`]: names, codes, units, axes, the ellipsoid; projections by crate `proj4wkt`.
 
 use super::bound;
+use super::from_proj;
 use super::registry;
 use super::system::{Kind, System, Unit, Vertical, exact_metres, exact_radians};
 use super::wkt::{self, Node};
@@ -211,10 +212,17 @@ fn completed(proj: String, node: &Node) -> String {
     if has(&["+proj=mill"]) {
         return format!("{proj} +R_A");
     }
-    // WKT 1 means the sphere's formulas on the ellipsoid's axis, as does a method of WKT 2 that says so.
-    let method = node.find(&["METHOD"]).and_then(|method| method.text(0)).map(squeezed);
-    if has(&["+proj=ortho"]) && method.is_none_or(|name| name.contains("spherical")) {
-        return format!("{proj} +f=0");
+    // The parser makes a sphere of the ellipsoid where the method's formulas are the sphere's. Latitudes stay the ellipsoid's, so no datum is shifted.
+    let flattened =
+        node.find(&["SPHEROID", "ELLIPSOID"]).and_then(|body| body.number(2)).filter(|rf| *rf > 0.0);
+    if let Some((radius_m, rf)) = from_proj::word(&proj, "R").zip(flattened) {
+        let is_of_area = has(&["+proj=laea"]);
+        let left_out: &[&str] = if is_of_area { &["+towgs84=", "+R="] } else { &["+towgs84="] };
+        let kept =
+            proj.split_whitespace().filter(|word| !left_out.iter().any(|start| word.starts_with(start)));
+        let kept = kept.collect::<Vec<_>>().join(" ");
+        // Lambert's equal areas are those of the sphere of the ellipsoid's area, as in the registry's maps by this method.
+        return if is_of_area { format!("{kept} +a={radius_m} +rf={rf} +R_A") } else { kept };
     }
     // ESRI scales maps with two standard parallels, as those of Michigan are.
     let scale = parameter(node, "Scale_Factor").filter(|scale| *scale > 0.0 && *scale != 1.0);

@@ -133,10 +133,6 @@ impl Ground {
             true => Proj::from_proj_string("+proj=longlat +datum=WGS84").ok()?,
             false => own.clone(),
         };
-        // Orthographic maps of an ellipsoid by the sphere's formulas are not here: the ellipsoid's lead to places that are off by kilometres.
-        if proj.projname() == "ortho" && a - b > 1.0 && text.contains("+f=0") {
-            return None;
-        }
         let turn = match proj.is_latlong() {
             true => Some(std::f64::consts::TAU / size),
             false => turn_on_map(&proj, &own).map(|metres| metres / size),
@@ -261,15 +257,19 @@ fn turn_on_map(proj: &Proj, own: &Proj) -> Option<f64> {
     (turn.is_finite() && turn > 0.0).then_some(turn)
 }
 
-/// The string with the sphere of the ellipsoid's area for `+R_A`: its formulas are those of the sphere, and latitudes stay those of the ellipsoid, so that no shift of datum may be made between both.
+/// The string with the sphere of the ellipsoid's area for `+R_A`, and that of its equator for `+f=0` beside an ellipsoid: its formulas are those of the sphere, and latitudes stay those of the
+/// ellipsoid, so that no shift of datum may be made between both.
 fn on_sphere(text: String) -> String {
-    if from_proj::word(&text, "R_A").is_none() {
+    let is_of_area = from_proj::word(&text, "R_A").is_some();
+    let has_no_flattening = from_proj::word(&text, "f").is_some_and(|f| f.parse() == Ok(0.0));
+    if !is_of_area && !has_no_flattening {
         return text;
     }
-    let bare = without(&text, &["R_A"]);
-    let Some([a, b]) = axes_of(&bare) else { return text };
+    let bare = without(&text, if is_of_area { &["R_A"] } else { &["f"] });
+    let Some([a, b]) = axes_of(&bare).filter(|[a, b]| is_of_area || a - b > 1.0) else { return text };
     let e2 = 1.0 - (b / a) * (b / a);
-    let radius = a * (1.0 - e2 * (1.0 / 6.0 + e2 * (17.0 / 360.0 + e2 * 67.0 / 3024.0)));
+    let of_area = a * (1.0 - e2 * (1.0 / 6.0 + e2 * (17.0 / 360.0 + e2 * 67.0 / 3024.0)));
+    let radius = if is_of_area { of_area } else { a };
     let rest = without(&bare, &["a", "b", "R", "rf", "f", "ellps", "datum", "towgs84", "nadgrids"]);
     format!("{rest} +R={radius}")
 }

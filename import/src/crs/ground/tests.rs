@@ -272,15 +272,57 @@ fn orthographic_maps_of_an_ellipsoid_are_its_own() {
     }
 }
 
-/// Where a text means the sphere's formulas on an ellipsoid, as PROJ has it of WKT 1, there is no ground: 5 km would be missed.
+/// Maps of an ellipsoid by the sphere's formulas, as ESRI's orthographic ones and some methods of WKT 2 are, and those of a sphere. Positions by gdaltransform; of Lambert's, on the sphere of the
+/// ellipsoid's area.
 #[test]
-fn an_orthographic_map_of_wkt_1_leads_nowhere_on_an_ellipsoid() {
-    let text = |flattening: &str| {
+fn maps_by_the_sphere_keep_latitudes() {
+    let degree = "0.0174532925199433";
+    let old = |body: &str, names: [&str; 2]| {
         format!(
-            "PROJCS[\"x\",GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"x\",6378137,{flattening}]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],PROJECTION[\"Orthographic\"],PARAMETER[\"false_easting\",0],PARAMETER[\"false_northing\",0],PARAMETER[\"central_meridian\",0],PARAMETER[\"latitude_of_origin\",90],UNIT[\"metre\",1]]"
+            "PROJCS[\"x\",GEOGCS[\"y\",DATUM[\"z\",SPHEROID[\"s\",{body}]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",{degree}]],PROJECTION[\"Orthographic\"],PARAMETER[\"False_Easting\",0],\
+             PARAMETER[\"False_Northing\",0],PARAMETER[\"{}\",3],PARAMETER[\"{}\",46],UNIT[\"metre\",1]]",
+            names[0], names[1]
         )
     };
-    let of = |text: &str| by_text(text).and_then(|system| Ground::new(&system));
-    assert!(of(&text("298.257223563")).is_none());
-    assert!(of("+proj=ortho +lat_0=90 +R=1737400").is_some());
+    let new = |method: &str, body: &str| {
+        format!(
+            "PROJCRS[\"x\",BASEGEOGCRS[\"y\",DATUM[\"z\",ELLIPSOID[\"s\",{body},LENGTHUNIT[\"metre\",1]]],PRIMEM[\"Greenwich\",0,ANGLEUNIT[\"degree\",{degree}]]],CONVERSION[\"c\",METHOD[{method}],\
+             PARAMETER[\"Latitude of natural origin\",46,ANGLEUNIT[\"degree\",{degree}],ID[\"EPSG\",8801]],PARAMETER[\"Longitude of natural origin\",3,ANGLEUNIT[\"degree\",{degree}],ID[\"EPSG\",8802]],\
+             PARAMETER[\"False easting\",0,LENGTHUNIT[\"metre\",1],ID[\"EPSG\",8806]],PARAMETER[\"False northing\",0,LENGTHUNIT[\"metre\",1],ID[\"EPSG\",8807]]],CS[Cartesian,2],\
+             AXIS[\"E\",east,LENGTHUNIT[\"metre\",1]],AXIS[\"N\",north,LENGTHUNIT[\"metre\",1]]]"
+        )
+    };
+    let (earth, moon) = ("6378137,298.257223563", "1737400,0");
+    let gdals = ["central_meridian", "latitude_of_origin"];
+    let esris = ["Longitude_Of_Center", "Latitude_Of_Center"];
+    let own = "\"Orthographic\",ID[\"EPSG\",9840]";
+    let ellipsoid = [4.905_561_999_084_92, 45.084_068_441_410_1];
+    let by_sphere = [4.908_817_554_341_27, 45.085_498_357_257_3];
+    let of_moon = [9.723_848_017_883_56, 42.490_986_440_053_5];
+    for (text, [lon, lat]) in [
+        (old(earth, gdals), ellipsoid),
+        (new(own, earth), ellipsoid),
+        ("+proj=ortho +lat_0=46 +lon_0=3 +a=6378137 +f=0.0033528106647474805".to_owned(), ellipsoid),
+        (old(earth, esris), by_sphere),
+        (new("\"Orthographic (Spherical)\"", earth), by_sphere),
+        ("+proj=ortho +f=0 +lat_0=46 +lon_0=3 +datum=WGS84".to_owned(), by_sphere),
+        (
+            new("\"Equidistant Cylindrical (Spherical)\",ID[\"EPSG\",1029]", earth)
+                .replace("natural origin\",46", "1st standard parallel\",46")
+                .replace("8801", "8823"),
+            [4.939_763_462_85, -0.898_315_284_119_521],
+        ),
+        (
+            new("\"Lambert Azimuthal Equal Area (Spherical)\",ID[\"EPSG\",1027]", earth),
+            [4.910_731_446_477_18, 45.084_550_280_270_5],
+        ),
+        (old(moon, gdals), of_moon),
+        (old(moon, esris), of_moon),
+        (new(own, moon), of_moon),
+    ] {
+        let ground = ground(&text);
+        let found = ground.world([150_000.0, -100_000.0]).unwrap().map(f64::to_degrees);
+        let away = (found[0] - lon).abs().max((found[1] - lat).abs());
+        assert!(away < 1e-9, "{text}: {found:?}");
+    }
 }
