@@ -32,8 +32,13 @@ pub(crate) fn alone<T>(work: impl FnOnce() -> T) -> T {
 
 /// Whether work on so many elements is shared, so many at the least by each.
 #[cfg(feature = "files")]
-fn is_shared(count: usize, share: usize) -> bool {
+pub(super) fn is_shared(count: usize, share: usize) -> bool {
     count >= 2 * share && !IS_ALONE.get() && rayon::current_num_threads() > 1
+}
+
+#[cfg(not(feature = "files"))]
+pub(super) fn is_shared(_: usize, _: usize) -> bool {
+    false
 }
 
 /// Appends `make(0)` and so on to an array.

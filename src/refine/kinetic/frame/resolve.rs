@@ -6,6 +6,7 @@
 
 use super::budget::Allowance;
 use crate::refine::kinetic::Kinetic;
+use crate::refine::kinetic::hands::is_shared;
 use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
 use crate::refine::kinetic::mesh::tree::Fetch;
 use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch, Words};
@@ -50,10 +51,7 @@ impl<S: RecordStore> Kinetic<S> {
         let mut batch = self.batch.take().unwrap_or_default();
         self.work.tests += nodes.len() as u64;
         let k = self.records.grid().k();
-        #[cfg(feature = "files")]
-        let parallel = nodes.len() >= PARALLEL && rayon::current_num_threads() > 1;
-        #[cfg(not(feature = "files"))]
-        let parallel = false;
+        let parallel = is_shared(nodes.len(), PARALLEL / 2);
         // By one thread, what has been tested is still at hand when it is entered.
         for part in nodes.chunks(if parallel { nodes.len() } else { BATCH }) {
             verdicts.clear();
