@@ -127,7 +127,7 @@ pub(crate) fn sharer_of(side: usize, orientation: usize, last: bool) -> (usize, 
 /// Half a ring.
 type Half = [u32; 4];
 
-/// The rings of all vertices, by slot. One half goes before the first one: large allocations begin 16 bytes into a page, and so each ring lies in one cache line. An array of
+/// The rings of all vertices, by slot. One half goes before the first one: where large allocations begin 16 bytes into a page, as those of glibc do, each ring lies in one cache line. An array of
 /// aligned elements would be copied whenever it grows, where this one is mapped elsewhere.
 #[derive(Debug, Default)]
 pub(crate) struct Rings {
@@ -263,7 +263,7 @@ mod tests {
     use crate::refine::kinetic::mesh::labels::{child_point, level_of, orientation};
     use terrasoar_layout::grid::{Grid, GridPoint};
 
-    /// The grid's own parents and edge ends of every vertex, against what its parents' rings say.
+    /// The corners around every vertex, from the grid's own parents and edge ends: its children lie between those that rings say, and are shared as rings say.
     #[test]
     fn rings_agree_with_the_grid() {
         for k in 2..=5 {
@@ -274,16 +274,28 @@ mod tests {
             for p in all.filter(|p| !grid.is_corner(*p) && grid.level(*p) > 1) {
                 let (level, turned) = (level_of(p), orientation(p));
                 let child = |turn: usize| child_point(p, level, label_of(turn, turned, level));
+                let from_p = |at: GridPoint| {
+                    [i64::from(at.x()) - i64::from(p.x()), i64::from(at.y()) - i64::from(p.y())]
+                };
+                // The parents by side: a vertex has the label 2 side + orientation at each.
+                let is_parent = |a: GridPoint, side: usize| child_point(a, level + 1, 2 * side + turned) == p;
+                let parents = [0, 1]
+                    .map(|side| grid.apexes(p).find(|a| level + 1 < grid.levels() && is_parent(*a, side)));
+                let Some(side) = (0..2).find(|side| parents[*side].is_some()) else { continue };
+                let [px, py] = from_p(parents[side].unwrap());
+                // Counter-clockwise from the parent of side 0 comes the first end; from that of side 1 the other one.
+                let mut ends = grid.edge_ends(p);
+                let [ex, ey] = from_p(ends[0]);
+                if (px * ey - py * ex > 0) != (side == 0) {
+                    ends.reverse();
+                }
+                let corners = [parents[0], Some(ends[0]), parents[1], Some(ends[1])];
                 for turn in (0..4).filter(|turn| inside(&child(*turn))) {
-                    let c = child(turn);
-                    let side = label_of(turn, turned, level) >> 1;
-                    // Corner t of the ring is a parent where t is even, and an end of p's edge elsewhere.
-                    let [p0, p1] = [turn, (turn + 1) & 3].map(|t| t % 2 == 0);
-                    assert_ne!(p0, p1);
-                    let ends: Vec<_> = grid.edge_ends(c).to_vec();
-                    assert!(ends.iter().any(|e| grid.edge_ends(p).contains(e)), "{p:?} {turn}");
-                    assert!(ends.iter().any(|e| grid.apexes(p).any(|a| a == *e)), "{p:?} {turn}");
-                    assert!(grid.apexes(c).any(|a| a == p), "{p:?} {turn} {side}");
+                    let [Some(a), Some(b)] = [corners[turn], corners[(turn + 1) & 3]] else {
+                        panic!("{p:?} has no side {turn}");
+                    };
+                    assert_eq!(a.midpoint(b), child(turn), "{p:?} {turn}");
+                    assert!(corners[2 * side_of(turn).0].is_some(), "{p:?} {turn}");
                 }
                 // The same child by its other parent.
                 for (side, last) in [(0, false), (0, true), (1, false), (1, true)] {

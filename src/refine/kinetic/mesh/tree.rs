@@ -66,9 +66,7 @@ impl<S: RecordStore> Kinetic<S> {
     /// Makes the root with `label` at the centre: the triangle (centre; p, q), whose split vertex is the middle of a side of the square.
     pub(crate) fn plant_root(&mut self, label: usize, [p, q]: [u32; 2]) {
         let centre = *self.nodes.get(CENTRE);
-        let (here, point) = (centre.slot(), self.point_of(CENTRE));
-        let level = level_of(point);
-        let turn = (label + 4 - first_child(orientation(point), level)) & 3;
+        let (here, turn) = (centre.slot(), self.root_turn(label));
         let node = self.nodes.create(CENTRE, centre.raw);
         let mut ring = self.nodes.rings.get(here);
         ring.children[turn] = node;
@@ -82,9 +80,12 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// The root with `label` at the centre.
     pub(crate) fn root(&self, label: usize) -> u32 {
-        let point = self.point_of(CENTRE);
-        let turn = (label + 4 - first_child(orientation(point), level_of(point))) & 3;
-        self.nodes.rings.child(self.nodes.get(CENTRE).slot(), turn)
+        self.nodes.rings.child(self.nodes.get(CENTRE).slot(), self.root_turn(label))
+    }
+
+    fn root_turn(&self, label: usize) -> usize {
+        let (centre, level) = self.place_of(CENTRE);
+        (label + 4 - first_child(orientation(centre), level)) & 3
     }
 
     /// Gives a leaf its parent on a side, and with it a triangle.
@@ -240,9 +241,9 @@ impl<S: RecordStore> Kinetic<S> {
             self.nodes.free(annex);
         } else {
             self.merge_children(&ring.children);
-            let first = first_child(orientation(point), level);
+            let turned = orientation(point);
             for (turn, child) in ring.children.into_iter().enumerate().filter(|(_, child)| *child != NONE) {
-                self.desert(child, ((first + turn) & 3) >> 1);
+                self.desert(child, label_of(turn, turned, level) >> 1);
             }
         }
         let merged = self.nodes.get_mut(node);
