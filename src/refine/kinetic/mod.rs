@@ -39,7 +39,7 @@ use frame::budget::Allowance;
 use frame::edited::Edits;
 use mesh::clusters::{Clusters, Dealing};
 use mesh::labels::level_of;
-use mesh::nodes::{CENTRE, Nodes, SPLIT, STATUS};
+use mesh::nodes::{CENTRE, Nodes, STATUS};
 use mesh::rings::{Corner, Ring};
 use mesh::vertices::Vertices;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners};
@@ -117,7 +117,7 @@ impl<S: RecordStore> Kinetic<S> {
         Self {
             culling,
             nodes: Nodes::new(Clusters::new(dealing)),
-            vertices: Vertices::default(),
+            vertices: Vertices::new(dealing == Dealing::Near),
             corners: [nowhere; 4],
             triangles: 0,
             stale: 0,
@@ -362,12 +362,10 @@ impl<S: RecordStore> Engine for Kinetic<S> {
             self.assess_late(&metric, view);
         }
         self.compact();
-        let nodes = &self.nodes.all;
-        let is_true = |e: Entry| nodes.get(e.node as usize).is_some_and(|n| n.word & !SPLIT == e.word);
         for queue in std::iter::once(&mut self.queue).chain(self.ahead.as_mut().map(|ahead| &mut ahead.far)) {
             // The more, the faster: edits end many words long before their time.
             for _ in 0..(queue.len() / (2 * self.nodes.clusters.taken())).min(MOST_SWEEPS) {
-                queue.sweep_some(is_true);
+                queue.sweep_some(&self.nodes.all);
             }
         }
         self.list_written();

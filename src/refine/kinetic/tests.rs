@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::refine::Unobserved;
+use crate::refine::kinetic::mesh::clusters::CLUSTER;
 use std::collections::HashSet;
 use terrasoar_layout::build::{BuildOptions, build};
 use terrasoar_layout::dem::{MemoryDem, SampleType};
@@ -48,9 +49,12 @@ fn where_slots_are_all_taken_the_mesh_is_coarser_and_says_so() {
     for culling in [Culling::Vertices, Culling::Clusters] {
         let mut free = Kinetic::new(records.clone(), culling);
         for budget in [Budget::default(), Budget::default().tests(5000)] {
-            for most in [5, 6, 9, 40, 333, 1500, 1 << 20] {
+            let limits = [5, 6, 9, 40, 333, 1500, 1 << 20].map(|most| (most, 1 << 28));
+            let places = [0, 5, 8, 20, 100].map(|clusters| (1 << 29, clusters * CLUSTER));
+            for (most, most_places) in limits.into_iter().chain(places) {
                 let mut engine = Kinetic::new(records.clone(), culling);
                 engine.vertices.limit(most);
+                engine.nodes.limit(most_places);
                 engine.set_budget(budget);
                 for (i, view) in views.iter().cycle().take(9).enumerate() {
                     engine.update(view, &mut Unobserved);
@@ -58,11 +62,16 @@ fn where_slots_are_all_taken_the_mesh_is_coarser_and_says_so() {
                     check_conforming(&engine);
                     let used = engine.nodes.all.iter().filter(|node| node.is_split()).count() + 4;
                     assert!(used <= most, "{used} of {most}");
+                    assert!(engine.nodes.all.len() <= most_places.max(CLUSTER));
                     let is_same = engine.triangle_count() == free.triangle_count();
                     let is_late = engine.work().late > 0;
-                    assert!(is_same || is_late, "{most} slots, frame {i}");
+                    assert!(is_same || is_late, "{most} slots, {most_places} places, frame {i}");
                     // A budget may leave tests for later, too.
-                    assert!(!(is_same && is_late) || budget.tests.is_some(), "{most} slots, frame {i}");
+                    let is_told = is_same && is_late;
+                    assert!(
+                        !is_told || budget.tests.is_some(),
+                        "{most} slots, {most_places} places, frame {i}"
+                    );
                 }
             }
         }

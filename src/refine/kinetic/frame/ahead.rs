@@ -18,7 +18,7 @@ use crate::refine::kinetic::mesh::labels::{child_point, level_of};
 use crate::refine::kinetic::mesh::nodes::{STATUS, UNREAD};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
 use crate::refine::kinetic::time::clocks::{CLOCKS, Clocks};
-use crate::refine::kinetic::time::queue::{Entry, Queue};
+use crate::refine::kinetic::time::queue::Queue;
 use std::collections::HashSet;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
@@ -132,8 +132,8 @@ impl Ahead {
     }
 
     /// Enters a word whose end has been looked ahead to.
-    pub(crate) fn near(&mut self, entry: Entry) {
-        self.looks.push(entry.node);
+    pub(crate) fn near(&mut self, node: u32) {
+        self.looks.push(node);
     }
 
     /// Frames until a word may be over.

@@ -62,7 +62,9 @@ impl<S: RecordStore> Kinetic<S> {
         let (parents, births, verdicts) = (Vec::new(), Vec::new(), Vec::new());
         let mut piece = Piece { start: 0, parents, births, verdicts, base: 0, next: 0, places };
         while !line.split.is_empty() {
-            if !self.vertices.have_room(line.split.len()) {
+            let most_children = 4 * line.split.len() as u32;
+            let has_places = self.nodes.can_reach(places.place(nodes + most_children));
+            if !has_places || !self.vertices.have_room(line.split.len()) {
                 self.leave(&mut line, stale);
                 break;
             }
@@ -245,8 +247,8 @@ impl<S: RecordStore> Kinetic<S> {
         let is_void = |i: usize| records.decode(parents[i].raw, line.level).class.is_void();
         self.vertices.append(
             parents.len(),
-            |i| (parents[i].point, sent[i].1.height_m),
-            |i| records.shape().has_voids && is_void(i),
+            |i| (parents[i].point, records.shape().has_voids && is_void(i)),
+            |i| sent[i].1.height_m,
         );
     }
 

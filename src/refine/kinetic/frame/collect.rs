@@ -7,7 +7,7 @@ use super::ahead::Ahead;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS};
 use crate::refine::kinetic::time::certificate::{expiry_of, with_certificate};
-use crate::refine::kinetic::time::clocks::{BANDS, HORIZON, Kind, clock_id};
+use crate::refine::kinetic::time::clocks::{BANDS, EXPIRY_BITS, HORIZON, Kind, clock_id};
 use crate::refine::kinetic::time::course::Pose;
 use crate::refine::kinetic::time::queue::{Entry, Queue};
 use crate::refine::{Phase, Probe};
@@ -32,12 +32,14 @@ impl<S: RecordStore> Kinetic<S> {
             let clock = clocks.trailing_zeros() as usize;
             clocks &= clocks - 1;
             self.bring_near(clock);
-            let over = &mut self.over;
-            self.queue.advance(clock, self.clocks.now(clock), |entry| {
-                prefetch(&self.nodes.all, entry.node as usize);
-                over.push(entry);
+            let (over, now) = (&mut self.over, self.clocks.now(clock));
+            let until = latest(clock, now);
+            self.queue.advance(clock, now, &self.nodes.all, |node| {
+                prefetch(&self.nodes.all, node as usize);
+                over.push(Entry { node, word: until });
             });
             if let Some(by) = self.clocks.set_back(clock) {
+                self.keep_true_entries();
                 if let Some(ahead) = &mut self.ahead {
                     ahead.until[clock] = ahead.until[clock].saturating_sub(by);
                 }
@@ -78,11 +80,12 @@ impl<S: RecordStore> Kinetic<S> {
         let Some(ahead) = &mut self.ahead else { return };
         let until = ahead.reach(clock, self.clocks.now(clock));
         let mut near = std::mem::take(&mut self.waiting);
-        ahead.far.advance(clock, until, |entry| near.push(entry));
-        for entry in near.drain(..) {
-            if self.nodes.word_if(entry.node, entry.word).is_some() {
-                ahead.near(entry);
-                self.queue.enter(clock, entry);
+        let word = latest(clock, until);
+        ahead.far.advance(clock, until, &self.nodes.all, |node| near.push(Entry { node, word }));
+        for Entry { node, word } in near.drain(..) {
+            if let Some(word) = self.nodes.word_over(node, word) {
+                ahead.near(node);
+                self.queue.enter(clock, Entry { node, word: *word & !SPLIT });
             }
         }
         self.waiting = near;
@@ -94,13 +97,13 @@ impl<S: RecordStore> Kinetic<S> {
         enter::<S>(&mut self.queue, &mut self.ahead, clock, entry);
     }
 
-    /// Makes due those nodes whose word still is the one that was entered.
+    /// Makes due those nodes whose word is over, once each.
     fn keep_true_entries(&mut self) {
-        for entry in self.over.drain(..) {
-            if let Some(word) = self.nodes.word_if(entry.node, entry.word) {
+        for Entry { node, word: until } in self.over.drain(..) {
+            if let Some(word) = self.nodes.word_over(node, until) {
                 *word &= STATUS;
-                self.due.push(entry.node);
-                self.vertices.fetch(self.nodes.get(entry.node).anchor().slot());
+                self.due.push(node);
+                self.vertices.fetch(self.nodes.get(node).anchor().slot());
             }
         }
     }
@@ -109,21 +112,24 @@ impl<S: RecordStore> Kinetic<S> {
     fn move_words(&mut self, from: usize, to: usize, expiry: impl Fn(u32) -> u32) {
         let mut waiting = std::mem::take(&mut self.waiting);
         let nodes = &mut self.nodes;
-        let mut moved = |entry: Entry| {
-            nodes.word_if(entry.node, entry.word).map(|word| {
-                let moved = with_certificate(entry.word, to, expiry(expiry_of(entry.word)));
-                *word = moved | (*word & SPLIT);
-                Entry { node: entry.node, word: moved }
+        let mut moved = |node: u32| {
+            nodes.word_on(from, node).map(|word| {
+                let moved = with_certificate(*word, to, expiry(expiry_of(*word)));
+                // None while it is in no queue, so that no other entry of the node moves it again.
+                *word &= STATUS;
+                Entry { node, word: moved }
             })
         };
-        self.queue.drain(from, |entry| waiting.extend(moved(entry)));
+        self.queue.drain(from, |node| waiting.extend(moved(node)));
         self.queue.restart(from, self.clocks.now(from) as u32);
         let near = waiting.len();
         if let Some(ahead) = &mut self.ahead {
-            ahead.far.drain(from, |entry| waiting.extend(moved(entry)));
+            ahead.far.drain(from, |node| waiting.extend(moved(node)));
             ahead.far.restart(from, ahead.until[from].min(u64::from(u32::MAX)) as u32);
         }
         for (i, entry) in waiting.drain(..).enumerate() {
+            let word = &mut self.nodes.get_mut(entry.node).word;
+            *word = entry.word | *word & SPLIT;
             let stays_near = |ahead: &Ahead| i < near && u64::from(expiry_of(entry.word)) <= ahead.until[to];
             // What was near has been looked from; that another clock counts it brings nothing that it will need.
             if self.ahead.as_deref().is_none_or(stays_near) {
@@ -134,6 +140,11 @@ impl<S: RecordStore> Kinetic<S> {
         }
         self.waiting = waiting;
     }
+}
+
+/// The word that is over last on a clock whose tick is `now`.
+fn latest(clock: usize, now: u64) -> u32 {
+    with_certificate(0, clock, now.min((1 << EXPIRY_BITS) - 1) as u32)
 }
 
 /// Calls `each` with the clocks of a set.
@@ -159,7 +170,7 @@ pub(crate) fn enter<S: RecordStore>(
         if u64::from(expiry_of(entry.word)) > ahead.until[clock] {
             return ahead.far.enter(clock, entry);
         }
-        ahead.near(entry);
+        ahead.near(entry.node);
     }
     queue.enter(clock, entry);
 }

@@ -13,7 +13,6 @@ use crate::refine::kinetic::mesh::labels::{child_point, level_of, orientation};
 use crate::refine::kinetic::mesh::nodes::{CENTRE, STATUS};
 use crate::refine::kinetic::mesh::rings::{NONE, TURNS, label_of};
 use crate::refine::kinetic::time::certificate::{clock_of, expiry_of};
-use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::kinetic::{Kinetic, root_label};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, corners, slot_of};
@@ -266,7 +265,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         for node in edits.looks.drain(..) {
             if let Some(ahead) = &mut self.ahead {
-                ahead.near(Entry { node, word: self.nodes.get(node).word });
+                ahead.near(node);
             }
         }
         self.edits = edits;

@@ -154,12 +154,11 @@ impl<S: RecordStore> Kinetic<S> {
             return;
         }
         self.nodes.get_mut(node).word = word | (old & SPLIT);
-        let entry = Entry { node, word };
         // Where pages may be away, it may go into the other queue.
         if S::IS_COMPLETE {
-            self.queue.enter_at(place, entry)
+            self.queue.enter_at(place, node)
         } else {
-            self.enter(clock_of(word), entry)
+            self.enter(clock_of(word), Entry { node, word })
         }
         match (word & ACTIVE != 0, old & SPLIT != 0) {
             (true, false) => self.to_split[self.level(node)].push(node),

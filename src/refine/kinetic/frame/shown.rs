@@ -11,7 +11,6 @@ use crate::refine::kinetic::mesh::bounds::Bounds;
 use crate::refine::kinetic::mesh::clusters::{Clusters, Dealing};
 use crate::refine::kinetic::mesh::nodes::Nodes;
 use crate::refine::kinetic::mesh::vertices::Vertices;
-use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::read::store::{RawOf, RecordStore};
 
 /// What slots show follows from these alone.
@@ -28,13 +27,12 @@ impl<S: RecordStore> Shown<'_, S> {
         corners.filter(|corners| self.is_drawn(node, corners)).unwrap_or([0; 3])
     }
 
-    /// Folded position and height of a vertex.
+    /// Folded position and height of a vertex, for bounds.
     #[inline(always)]
     pub(crate) fn place_of(&self, vertex: u32) -> [f32; 3] {
-        let v = self.vertices.get(vertex);
-        let folded = self.records.grid().fold(GridPoint::new(v.x, v.y));
+        let folded = self.records.grid().fold(self.vertices.point(vertex));
         // Columns and rows are below 2^24: exact.
-        [folded.x() as f32, folded.y() as f32, v.height_m]
+        [folded.x() as f32, folded.y() as f32, self.vertices.height_m(vertex)]
     }
 
     /// The box around a cluster's triangles.

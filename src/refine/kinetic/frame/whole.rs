@@ -53,10 +53,13 @@ impl<S: RecordStore> Kinetic<S> {
         }
         let grid = self.records.grid();
         let c = corners(grid.k());
-        let vertex = |i: usize| *self.vertices.get(i as u32);
+        let strip_vertex =
+            |at: GridPoint, v: Vertex| StripVertex { x: at.x(), y: at.y(), height_m: v.height_m as f32 };
+        let vertex = |i: usize| strip_vertex(c[i], self.corners[i]);
         let mut made = Strip::in_room(std::mem::take(strip));
         let mut walk = StripWalk { engine: self, strip: made.start(c[0], vertex(0)) };
-        let centre = (self.point_of(CENTRE), vertex(4));
+        let centre_at = self.point_of(CENTRE);
+        let centre = (centre_at, strip_vertex(centre_at, self.vertex_of(CENTRE)));
         for (root, (side, [b, d])) in ROOTS.into_iter().enumerate() {
             let node = self.root(root_label(side));
             walk.visit(grid.levels() - 1, Some(node), centre, c[b], c[d]);

@@ -184,7 +184,9 @@ impl Clusters {
             self.written.extend((cluster * slots) as u32..((cluster + 1) * slots) as u32);
         }
         self.clusters.push(Cluster { taken: [0; 2], written, spill: (NONE, 0), use_count: 0, used: 0 });
-        self.bounds.push_empty();
+        if self.has_bounds() {
+            self.bounds.push_empty();
+        }
         self.open.resize(cluster / 64 + 1, 0);
         self.open[cluster / 64] |= 1 << (cluster % 64);
         cluster
@@ -242,7 +244,7 @@ impl Clusters {
         }
         self.open[index / 64] |= 1 << (index % 64);
         self.taken -= 1;
-        if is_empty {
+        if is_empty && self.has_bounds() {
             self.bounds.set(index, Bounds::EMPTY);
         }
         if self.dealing == Dealing::Packed {
@@ -331,7 +333,8 @@ impl Clusters {
     /// Bounds and triangle slots of every cluster that is in use.
     pub(crate) fn clusters(&self) -> impl Iterator<Item = (Bounds, Range<u32>)> {
         let used = self.clusters.iter().enumerate().filter(|(_, cluster)| !cluster.is_empty());
-        used.map(|(index, cluster)| (self.bounds.get(index), slots_of(index, cluster)))
+        let bounds = |index| if self.has_bounds() { self.bounds.get(index) } else { Bounds::EMPTY };
+        used.map(move |(index, cluster)| (bounds(index), slots_of(index, cluster)))
     }
 
     /// Calls `draw` with the triangle slots of every cluster that is in use and may be seen.

@@ -16,9 +16,11 @@ use super::labels::{child_point, level_of};
 use super::rings::{Corner, Rings};
 use super::vertices::Vertices;
 use crate::refine::kinetic::capacity::{grow, shorten};
-use crate::refine::kinetic::time::certificate::ACTIVE;
+use crate::refine::kinetic::time::certificate::{ACTIVE, clock_of, expiry_of};
 use crate::refine::kinetic::time::clocks::EXPIRY_BITS;
+use crate::refine::kinetic::time::queue::{NODE_BITS, Words};
 use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::read::prefetch::prefetch;
 
 /// Tree bit of a word: the node's triangles are split.
 pub(crate) const SPLIT: u32 = 1 << 30;
@@ -28,6 +30,8 @@ pub(crate) const STATUS: u32 = ACTIVE | SPLIT;
 pub(crate) const NO_VERTEX: u32 = SPLIT - 1;
 /// The word of a node whose record has not come yet: nor has any this one.
 pub(crate) const UNREAD: u32 = NO_VERTEX - (1 << EXPIRY_BITS);
+/// The expiry of both, which no live word has.
+const UNUSED_EXPIRY: u32 = (1 << EXPIRY_BITS) - 1;
 /// The square's centre, which is always split.
 pub(crate) const CENTRE: u32 = 0;
 
@@ -106,6 +110,18 @@ impl<R> Node<R> {
     }
 }
 
+impl<R> Words for Vec<Node<R>> {
+    #[inline(always)]
+    fn word(&self, node: u32) -> u32 {
+        self.get(node as usize).map_or(NO_VERTEX, |node| node.word & !SPLIT)
+    }
+
+    #[inline(always)]
+    fn fetch(&self, node: u32) {
+        prefetch(self, node as usize);
+    }
+}
+
 /// The bin-tree array, and the rings that it leads to.
 #[derive(Debug)]
 pub(crate) struct Nodes<R> {
@@ -113,11 +129,33 @@ pub(crate) struct Nodes<R> {
     pub rings: Rings,
     /// Which places are taken, and which slots have changed.
     pub clusters: Clusters,
+    /// Places that there can be: numbers of nodes stand in entries of the queue.
+    most: usize,
 }
+
+/// Clusters that a split may take: it makes at most four children.
+const CLUSTERS_A_SPLIT: usize = 4;
 
 impl<R: Copy> Nodes<R> {
     pub(crate) fn new(clusters: Clusters) -> Self {
-        Self { all: Vec::new(), rings: Rings::default(), clusters }
+        Self { all: Vec::new(), rings: Rings::default(), clusters, most: 1 << NODE_BITS }
+    }
+
+    /// Whether there can be places up to this one.
+    pub(crate) fn can_reach(&self, place: u32) -> bool {
+        (place as usize) < self.most
+    }
+
+    /// Whether the children of one more split find places.
+    #[inline(always)]
+    pub(crate) fn have_room(&self) -> bool {
+        self.clusters.places() + CLUSTERS_A_SPLIT * CLUSTER <= self.most
+    }
+
+    /// Has no more places than that.
+    #[cfg(test)]
+    pub(crate) fn limit(&mut self, most: usize) {
+        self.most = most;
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -139,11 +177,18 @@ impl<R: Copy> Nodes<R> {
         &mut self.all[node as usize]
     }
 
-    /// The word at a place that may have been given up since, if it is the one that was entered for it.
+    /// The word at a place that may have been given up since, if it has a certificate on that clock.
     #[inline(always)]
-    pub(crate) fn word_if(&mut self, node: u32, entered: u32) -> Option<&mut u32> {
+    pub(crate) fn word_on(&mut self, clock: usize, node: u32) -> Option<&mut u32> {
         let word = &mut self.all.get_mut(node as usize)?.word;
-        if *word & !SPLIT == entered { Some(word) } else { None }
+        let has_expiry = (1..UNUSED_EXPIRY).contains(&expiry_of(*word));
+        if has_expiry & (clock_of(*word) == clock) { Some(word) } else { None }
+    }
+
+    /// The same, if that is over when its clock has come to the tick that `until`, a word on this clock, has for its expiry.
+    #[inline(always)]
+    pub(crate) fn word_over(&mut self, node: u32, until: u32) -> Option<&mut u32> {
+        self.word_on(clock_of(until), node).filter(|word| expiry_of(**word) <= expiry_of(until))
     }
 
     /// Whether the place holds a vertex. Lists of nodes may name places that have been given up since, beyond the array's end too.

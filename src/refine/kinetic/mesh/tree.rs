@@ -157,13 +157,13 @@ impl<S: RecordStore> Kinetic<S> {
         })
     }
 
-    /// Splits a node. `false`, and nothing done, if a triangle on one of its sides is yet to come, or slots are all taken.
+    /// Splits a node. `false`, and nothing done, if a triangle on one of its sides is yet to come, or slots or places are all taken.
     pub(crate) fn split(&mut self, node: u32) -> bool {
         let Node { raw, links, .. } = *self.nodes.get(node);
         let (point, level) = self.place_of(node);
         let is_whole = links[0].is_some() & links[1].is_some();
         let is_ready = is_whole || is_on_border(point, self.records.grid().side_steps());
-        if !is_ready || !self.vertices.have_room(1) {
+        if !is_ready || !self.vertices.have_room(1) || !self.nodes.have_room() {
             return false;
         }
         let vertex = self.records.decode(raw, level);

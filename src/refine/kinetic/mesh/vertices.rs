@@ -1,11 +1,11 @@
 //! The vertex array: the vertices that triangles are made of, in slots that they keep for as long as they are in the mesh.
 //!
 //! It lies beside the bin-tree array but has an order of its own, so that nodes moved in that array move no vertex on the GPU. The first
-//! five slots are the square's corners and its centre. Where slots are all taken, what would split next waits: the mesh is coarser there, and that is told as what is late. Cost: 13 bytes a vertex, half a vertex a triangle.
+//! five slots are the square's corners and its centre. Where slots are all taken, what would split next waits: the mesh is coarser there, and that is told as what is late. Heights are kept where clusters
+//! have bounds, for these alone. Cost: 8 bytes a vertex, and 4 for its height; half a vertex a triangle.
 
 use crate::refine::kinetic::capacity::{give_back, grow, shorten};
 use crate::refine::kinetic::hands::extend;
-use crate::refine::soar::StripVertex;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::record::Vertex;
 use terrasoar_layout::read::prefetch::prefetch;
@@ -13,11 +13,36 @@ use terrasoar_layout::read::prefetch::prefetch;
 /// Slots that there can be: [`Corner`](super::rings::Corner) has bits for no more.
 const MOST: usize = (1 << 29) - 1;
 
+/// A point, and whether its sample is void.
+#[derive(Debug, Clone, Copy)]
+struct Placed(u64);
+
+impl Placed {
+    const VOID: u64 = 1 << 63;
+
+    #[inline(always)]
+    fn new(at: GridPoint, is_void: bool) -> Self {
+        Self(at.packed() | u64::from(is_void) << 63)
+    }
+
+    #[inline(always)]
+    fn point(self) -> GridPoint {
+        let packed = self.0 & !Self::VOID;
+        GridPoint::new(packed as u32, (packed >> 32) as u32)
+    }
+
+    #[inline(always)]
+    fn is_void(self) -> bool {
+        self.0 & Self::VOID != 0
+    }
+}
+
 #[derive(Debug)]
 pub(crate) struct Vertices {
-    all: Vec<StripVertex>,
-    /// Whether a vertex's sample is void.
-    void: Vec<bool>,
+    all: Vec<Placed>,
+    /// Heights in metres, if they are kept.
+    heights_m: Vec<f32>,
+    has_heights: bool,
     /// Bit s % 64 of word s / 64: slot s is free.
     open: Vec<u64>,
     /// No word before this one has a bit.
@@ -26,13 +51,20 @@ pub(crate) struct Vertices {
     most: usize,
 }
 
-impl Default for Vertices {
-    fn default() -> Self {
-        Self { all: Vec::new(), void: Vec::new(), open: Vec::new(), first_open: 0, free: 0, most: MOST }
-    }
-}
-
 impl Vertices {
+    /// No vertices yet.
+    pub(crate) fn new(has_heights: bool) -> Self {
+        Self {
+            all: Vec::new(),
+            heights_m: Vec::new(),
+            has_heights,
+            open: Vec::new(),
+            first_open: 0,
+            free: 0,
+            most: MOST,
+        }
+    }
+
     /// Whether so many more vertices find slots.
     #[inline(always)]
     pub(crate) fn have_room(&self, more: usize) -> bool {
@@ -47,8 +79,7 @@ impl Vertices {
 
     /// Places a vertex in the first slot that is free, so that those at the end are free before long where the mesh shrinks; returns its slot.
     pub(crate) fn place(&mut self, at: GridPoint, vertex: &Vertex) -> u32 {
-        let placed = StripVertex { x: at.x(), y: at.y(), height_m: vertex.height_m as f32 };
-        let is_void = vertex.class.is_void();
+        let placed = Placed::new(at, vertex.class.is_void());
         if self.free > 0 {
             while let Some(open) = self.open.get_mut(self.first_open) {
                 if *open != 0 {
@@ -56,7 +87,7 @@ impl Vertices {
                     *open &= *open - 1;
                     self.free -= 1;
                     self.all[slot] = placed;
-                    self.void[slot] = is_void;
+                    self.set_height(slot as u32, vertex.height_m);
                     return slot as u32;
                 }
                 self.first_open += 1;
@@ -64,23 +95,27 @@ impl Vertices {
         }
         grow(&mut self.all, 1);
         self.all.push(placed);
-        grow(&mut self.void, 1);
-        self.void.push(is_void);
+        if self.has_heights {
+            grow(&mut self.heights_m, 1);
+            self.heights_m.push(vertex.height_m as f32);
+        }
         self.all.len() as u32 - 1
     }
 
-    /// Places vertices at the end, where none has been removed, by their points, heights and whether they are void.
+    /// Places vertices at the end, where none has been removed, by their points, whether they are void, and their heights.
     pub(crate) fn append(
         &mut self,
         count: usize,
-        place: impl Fn(usize) -> (GridPoint, f32) + Sync + Send,
-        is_void: impl Fn(usize) -> bool + Sync + Send,
+        place: impl Fn(usize) -> (GridPoint, bool) + Sync + Send,
+        height_m: impl Fn(usize) -> f32 + Sync + Send,
     ) {
         extend(&mut self.all, count, |i| {
-            let (at, height_m) = place(i);
-            StripVertex { x: at.x(), y: at.y(), height_m }
+            let (at, is_void) = place(i);
+            Placed::new(at, is_void)
         });
-        extend(&mut self.void, count, is_void);
+        if self.has_heights {
+            extend(&mut self.heights_m, count, height_m);
+        }
     }
 
     /// Slots, those that are free included.
@@ -91,7 +126,7 @@ impl Vertices {
     /// Gives all slots back; memory stays.
     pub(crate) fn clear(&mut self) {
         self.all.clear();
-        self.void.clear();
+        self.heights_m.clear();
         self.open.clear();
         (self.first_open, self.free) = (0, 0);
     }
@@ -99,13 +134,15 @@ impl Vertices {
     /// Gives memory back if less than one part in `parts` of it is in use.
     pub(crate) fn give_back(&mut self, parts: usize) {
         give_back(&mut self.all, parts);
-        give_back(&mut self.void, parts);
+        give_back(&mut self.heights_m, parts);
         give_back(&mut self.open, parts);
     }
 
     /// Moves a vertex up or down.
     pub(crate) fn set_height(&mut self, slot: u32, height_m: f64) {
-        self.all[slot as usize].height_m = height_m as f32;
+        if self.has_heights {
+            self.heights_m[slot as usize] = height_m as f32;
+        }
     }
 
     /// Gives a slot back.
@@ -135,12 +172,12 @@ impl Vertices {
             }
             self.open.truncate(last / 64);
             self.all.truncate(from);
-            self.void.truncate(from);
+            self.heights_m.truncate(from);
             self.free -= last % 64 + 1;
         }
         (self.all.len() < before).then(|| {
             shorten(&mut self.all);
-            shorten(&mut self.void);
+            shorten(&mut self.heights_m);
             self.all.len()
         })
     }
@@ -153,24 +190,24 @@ impl Vertices {
 
     #[inline(always)]
     pub(crate) fn point(&self, slot: u32) -> GridPoint {
-        let v = &self.all[slot as usize];
-        GridPoint::new(v.x, v.y)
+        self.all[slot as usize].point()
     }
 
+    /// The height of a vertex in metres, of which there is one where heights are kept.
     #[inline(always)]
-    pub(crate) fn get(&self, slot: u32) -> &StripVertex {
-        &self.all[slot as usize]
+    pub(crate) fn height_m(&self, slot: u32) -> f32 {
+        self.heights_m[slot as usize]
     }
 
     #[inline(always)]
     pub(crate) fn is_void(&self, slot: u32) -> bool {
-        self.void[slot as usize]
+        self.all[slot as usize].is_void()
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.all.capacity() * size_of::<StripVertex>()
-            + self.void.capacity()
+        self.all.capacity() * size_of::<Placed>()
+            + self.heights_m.capacity() * size_of::<f32>()
             + self.open.capacity() * size_of::<u64>()
     }
 }

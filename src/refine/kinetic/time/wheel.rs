@@ -9,7 +9,7 @@
 use super::clocks::{CLOCKS, EXPIRY_BITS};
 
 /// Bits of a digit.
-const DIGIT: u32 = 8;
+pub(super) const DIGIT: u32 = 8;
 /// Slots of a level.
 pub(super) const SLOTS: usize = 1 << DIGIT;
 /// Levels that cover every expiry.
