@@ -5,12 +5,14 @@ const SMALL_BYTES: usize = 32 << 10;
 /// Lists of more bytes are given back by another thread.
 const LARGE_BYTES: usize = 1 << 20;
 /// A list is cut down when a frame uses less than one part in so many of it.
-const UNUSED: usize = 32;
+pub(super) const UNUSED: usize = 32;
+/// The same after a frame that made most of the mesh, and with it lists that say nothing about the next ones.
+pub(super) const UNUSED_BY_NEW: usize = 8;
 
-/// Makes room for `more` elements in an array that lives as long as the mesh: by an eighth, where doubling would hold half of it empty.
+/// Makes room for `more` elements in an array that lives as long as the mesh: by a sixteenth, where doubling would hold half of it empty. Large arrays are mapped elsewhere, not copied.
 pub(super) fn grow<T>(array: &mut Vec<T>, more: usize) {
     if array.capacity() - array.len() < more {
-        array.reserve_exact(more.max(array.len() / 8));
+        array.reserve_exact(more.max(array.len() / 16));
     }
 }
 
@@ -21,10 +23,10 @@ pub(super) fn shorten<T>(array: &mut Vec<T>) {
     }
 }
 
-/// Gives back most of a list's memory if a frame that used `used` of it has no need of it: after the first frame, or a jump.
-pub(super) fn settle<T: Copy + Send + 'static>(list: &mut Vec<T>, used: usize) {
+/// Gives back most of a list's memory if a frame that used `used` of it has no need of it, but for one part in `unused`: after the first frame, or a jump.
+pub(super) fn settle<T: Copy + Send + 'static>(list: &mut Vec<T>, used: usize, unused: usize) {
     let bytes = list.capacity() * size_of::<T>();
-    if bytes > SMALL_BYTES && used < list.capacity() / UNUSED {
+    if bytes > SMALL_BYTES && used < list.capacity() / unused {
         let least = (4 * used).max(SMALL_BYTES / size_of::<T>());
         // What is in use now is given back by the next frame.
         if list.len() > list.capacity() / 2 {

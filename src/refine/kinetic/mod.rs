@@ -33,7 +33,7 @@ use super::{Culling, Engine, Phase, Probe, Work};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
-use capacity::settle;
+use capacity::{UNUSED, UNUSED_BY_NEW, settle};
 use frame::ahead::Ahead;
 use frame::budget::Allowance;
 use frame::edited::Edits;
@@ -101,6 +101,8 @@ pub struct Kinetic<S: RecordStore> {
     waiting: Vec<Entry>,
     patch: Patch,
     edits: Edits,
+    /// Whether the frame before has made most of the mesh.
+    is_new: bool,
     /// Whether arrays may hold more than the mesh needs, for it was larger before a jump.
     is_roomy: bool,
     work: Work,
@@ -140,6 +142,7 @@ impl<S: RecordStore> Kinetic<S> {
             waiting: Vec::new(),
             patch: Patch::default(),
             edits: Edits::default(),
+            is_new: false,
             is_roomy: false,
             work: Work::default(),
             records,
@@ -266,21 +269,22 @@ impl<S: RecordStore> Kinetic<S> {
         } else {
             (self.work.tests + self.work.slots_written) as usize
         };
+        let unused = if std::mem::replace(&mut self.is_new, made_anew) { UNUSED_BY_NEW } else { UNUSED };
         let lists = [&mut self.due, &mut self.late, &mut self.fresh, &mut self.list];
         lists
             .into_iter()
             .chain(&mut self.to_split)
             .chain(&mut self.to_merge)
-            .for_each(|list| settle(list, used));
-        settle(&mut self.over, used);
+            .for_each(|list| settle(list, used, unused));
+        settle(&mut self.over, used, unused);
         if made_anew {
             // Filled whenever a course ends, however little else there is to do.
-            settle(&mut self.waiting, 0);
+            settle(&mut self.waiting, 0, unused);
         }
-        settle(&mut self.verdicts, used);
-        self.nodes.clusters.settle(used);
-        settle(&mut self.patch.vertices, used);
-        settle(&mut self.patch.triangles, used);
+        settle(&mut self.verdicts, used, unused);
+        self.nodes.clusters.settle(used, unused);
+        settle(&mut self.patch.vertices, used, unused);
+        settle(&mut self.patch.triangles, used, unused);
         self.edits.settle(self.nodes.clusters.taken());
         self.give_back_room();
     }

@@ -288,8 +288,8 @@ impl Clusters {
     }
 
     /// Gives memory back that a frame which changed `used` slots has no need of.
-    pub(crate) fn settle(&mut self, used: usize) {
-        settle(&mut self.written, used);
+    pub(crate) fn settle(&mut self, used: usize, unused: usize) {
+        settle(&mut self.written, used, unused);
     }
 
     /// How places are dealt out.
