@@ -20,7 +20,7 @@ pub struct Studio<'a> {
 }
 
 impl<'a> Studio<'a> {
-    /// A studio for a terrain, on the best adapter there is. Pages of one that does not lend its records are read as views need them.
+    /// A studio for a terrain, on the best adapter there is. Pages of one that does not lend its records are read as views need them, into [128 MiB](terrasoar_layout::read::kinds::CACHE_BYTES).
     ///
     /// # Errors
     /// [`SceneError::Render`] with [`RenderError::NoAdapter`] where there is none, which says what to install; a size that the device cannot have;
@@ -31,8 +31,22 @@ impl<'a> Studio<'a> {
         culling: Culling,
         viewport: Viewport,
     ) -> Result<Self, SceneError> {
+        Self::reading(terrain, engine, culling, viewport, None)
+    }
+
+    /// As [`Studio::new`], with pages that are read into `cache_bytes` of memory as views need them, whatever the terrain; with `None` it is the same.
+    ///
+    /// # Errors
+    /// As [`Studio::new`].
+    pub fn reading(
+        terrain: &'a Terrain,
+        engine: PictureEngine,
+        culling: Culling,
+        viewport: Viewport,
+        cache_bytes: Option<u64>,
+    ) -> Result<Self, SceneError> {
         let gpu = Gpu::headless_blocking()?;
-        let ground = Ground::mapped(terrain, engine, culling)?;
+        let ground = Ground::reading(terrain, engine, culling, cache_bytes)?;
         let scene = Scene::new(&ground, &gpu, SceneOptions::default())?;
         let offscreen = offscreen(&gpu, viewport)?;
         Ok(Self { gpu, ground, scene, offscreen, viewport })

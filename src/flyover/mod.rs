@@ -31,7 +31,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::read::edited::EditedRecords;
-use terrasoar_layout::read::store::CompleteStore;
+use terrasoar_layout::read::store::{CompleteStore, PagesRead};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -309,6 +309,21 @@ pub fn frame_mesh(
     kind: EngineKind,
     batches: &[TimedBatch],
 ) -> Result<FrameMesh, ReplayError> {
+    frame_mesh_with_reads(terrain, frames, frame, quality, kind, batches).map(|(mesh, _)| mesh)
+}
+
+/// As [`frame_mesh`], and what was read for it and the frames before; `None` for a terrain whose records were taken where they lie.
+///
+/// # Errors
+/// As [`frame_mesh`].
+pub fn frame_mesh_with_reads(
+    terrain: &Arc<Terrain>,
+    frames: &[FlightFrame],
+    frame: usize,
+    quality: Quality,
+    kind: EngineKind,
+    batches: &[TimedBatch],
+) -> Result<(FrameMesh, Option<PagesRead>), ReplayError> {
     let quality = quality.check(terrain, kind)?;
     let Some(flown) = frames.get(..=frame) else {
         return Err(ReplayError::NoSuchFrame { asked: frame, last: frames.len().saturating_sub(1) });
@@ -331,7 +346,7 @@ fn frame_mesh_over<S: CompleteStore>(
     quality: Quality,
     kind: EngineKind,
     batches: &[TimedBatch],
-) -> Result<FrameMesh, ReplayError> {
+) -> Result<(FrameMesh, Option<PagesRead>), ReplayError> {
     let mut ground = Changing::new(terrain, batches)?;
     with_engine!(kind, EditedRecords::new(records), quality, engine => {
         let mut engine = engine;
@@ -340,6 +355,7 @@ fn frame_mesh_over<S: CompleteStore>(
             engine.update(&quality.view(frame), &mut Unobserved);
             engine.store_mut().take_error().map_or(Ok(()), Err)?;
         }
-        collect_mesh(engine)
+        let read = engine.store_mut().read_so_far();
+        Ok((collect_mesh(engine)?, read))
     })
 }

@@ -23,7 +23,7 @@ pub enum PictureEngine {
     Soar,
 }
 
-/// An engine over a terrain.
+/// An engine over a terrain, whose pages are read into so much memory where it is given.
 ///
 /// # Errors
 /// As [`Terrain::records`].
@@ -31,8 +31,9 @@ pub(super) fn mapped(
     terrain: &Terrain,
     engine: PictureEngine,
     culling: Culling,
+    cache_bytes: Option<u64>,
 ) -> Result<Box<dyn MeshEngine + '_>, LayoutError> {
-    Ok(match terrain.cache_bytes(None) {
+    Ok(match terrain.cache_bytes(cache_bytes) {
         None => with_records!(terrain.records()?, records => over(records, engine, culling)),
         Some(bytes) => with_records!(terrain.paged(bytes), records => over(records, engine, culling)),
     })

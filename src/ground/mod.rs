@@ -120,8 +120,22 @@ impl<'t> Ground<'t> {
         engine: PictureEngine,
         culling: Culling,
     ) -> Result<Self, LayoutError> {
+        Self::reading(terrain, engine, culling, None)
+    }
+
+    /// As [`Ground::mapped`], with records that are read into `cache_bytes` of memory when they are needed, whatever the source; with `None` it is the same.
+    ///
+    /// # Errors
+    /// As [`Ground::mapped`].
+    pub fn reading(
+        terrain: &'t Terrain,
+        engine: PictureEngine,
+        culling: Culling,
+        cache_bytes: Option<u64>,
+    ) -> Result<Self, LayoutError> {
         let options = StreamOptions::default();
-        Ok(Self::new(mapped::mapped(terrain, engine, culling)?, Opened::Mapped(terrain), options))
+        let engine = mapped::mapped(terrain, engine, culling, cache_bytes)?;
+        Ok(Self::new(engine, Opened::Mapped(terrain), options))
     }
 
     fn new(engine: Box<dyn MeshEngine + 't>, terrain: Opened<'t>, options: StreamOptions) -> Self {

@@ -1,7 +1,7 @@
 //! The definition, by brute force: test every vertex of the terrain against the view, then split every triangle whose vertex passed.
 //!
-//! It walks no tree to decide, and inherits or remembers no answer. Cost: one test for each vertex of the terrain in every frame. It is for tests and
-//! small terrains.
+//! It walks no tree to decide, and inherits or remembers no answer. It goes through the vertices in the order of their records, so that a store which reads pages reads each once a frame, however few it holds.
+//! Cost: one test for each vertex of the terrain in every frame. It is for tests and small terrains.
 
 use super::change::GroundChange;
 use super::{Culling, Engine, Probe};
@@ -9,7 +9,7 @@ use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
 use crate::view::View;
 use terrasoar_layout::grid::GridPoint;
-use terrasoar_layout::grid::order::{corners, slot_of};
+use terrasoar_layout::grid::order::{CENTRE_SLOT, corners, point_of, slot_count};
 use terrasoar_layout::read::store::{CompleteStore, RecordStore};
 
 /// Steps a side of the largest square that replays use it for: half a second a frame.
@@ -63,21 +63,17 @@ impl<S: CompleteStore> Engine for Naive<S> {
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
         let metric = Metric::new(view);
         let grid = *self.records.grid();
-        let n = grid.side_steps();
         let mut tests = 0;
-        for y in 0..=n {
-            for x in 0..=n {
-                let p = GridPoint::new(x, y);
-                if grid.is_corner(p) || (x, y) == (n / 2, n / 2) {
-                    continue;
-                }
-                tests += 1;
-                probe.read(slot_of(grid.k(), p));
-                let sighting = metric.sight(grid.position_m(p), &self.records.vertex_at(p));
-                let index = self.index(p);
-                let planes = if self.culling == Culling::Vertices { ALL_PLANES } else { 0 };
-                self.active[index] = sighting.is_selected() && metric.cull(&sighting, planes).is_some();
-            }
+        // Corners and centre come first, and are in every mesh.
+        for slot in CENTRE_SLOT + 1..slot_count(grid.k()) {
+            let Some(p) = point_of(grid.k(), slot) else { continue };
+            tests += 1;
+            probe.read(slot);
+            let vertex = self.records.vertex(slot, grid.level(p));
+            let sighting = metric.sight(grid.position_m(p), &vertex);
+            let index = self.index(p);
+            let planes = if self.culling == Culling::Vertices { ALL_PLANES } else { 0 };
+            self.active[index] = sighting.is_selected() && metric.cull(&sighting, planes).is_some();
         }
         self.triangles.clear();
         let [sw, se, ne, nw] = corners(grid.k());

@@ -32,7 +32,7 @@ use terrasoar_layout::file::header::ErrorKind;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::corners;
 use terrasoar_layout::grid::record::VertexClass;
-use terrasoar_layout::read::store::{CompleteStore, RecordStore};
+use terrasoar_layout::read::store::{CompleteStore, PagesRead, RecordStore};
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::read::window::SampleWindow;
 use terrasoar_layout::with_records;
@@ -85,6 +85,17 @@ impl SimplifyOptions {
 /// # Errors
 /// [`LayoutError::Usage`] for a bound that is no distance, for a terrain whose errors bound no distance, and where there would be too many triangles; damage and I/O.
 pub fn simplify(terrain: &Terrain, options: &SimplifyOptions) -> Result<IndexedMesh, LayoutError> {
+    simplify_with_reads(terrain, options).map(|(mesh, _)| mesh)
+}
+
+/// As [`simplify`], and what was read for it; `None` for a terrain whose records were taken where they lie.
+///
+/// # Errors
+/// As [`simplify`].
+pub fn simplify_with_reads(
+    terrain: &Terrain,
+    options: &SimplifyOptions,
+) -> Result<(IndexedMesh, Option<PagesRead>), LayoutError> {
     let shown = terrain.path().display();
     let max_error_m = options.max_error_m;
     if !(max_error_m.is_finite() && max_error_m >= 0.0) {
@@ -119,7 +130,7 @@ fn mesh_over(
     terrain: &Terrain,
     options: &SimplifyOptions,
     rectangle: Rectangle,
-) -> Result<IndexedMesh, LayoutError> {
+) -> Result<(IndexedMesh, Option<PagesRead>), LayoutError> {
     let walk = Walk { records, max_error_m: options.max_error_m, rectangle };
     let mut count = 0;
     let is_few = walk.leaves(&mut |_| {
@@ -141,7 +152,7 @@ fn mesh_over(
         making.add(triangle.map(|p| walk.corner(p)), &rectangle);
         true
     });
-    records.take_error().map_or(Ok(making.mesh), Err)
+    records.take_error().map_or(Ok((making.mesh, records.read_so_far())), Err)
 }
 
 /// A walk of the tree of the mesh.

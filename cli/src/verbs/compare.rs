@@ -12,7 +12,7 @@ use super::{WrongUsage, parse, sweep};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 use terrasoar::flight::Flight;
-use terrasoar::flyover::EngineKind;
+use terrasoar::flyover::{EngineKind, Quality};
 use terrasoar::stats::{Comparison, EngineComparison, FrameStats};
 use terrasoar_lab::report::{ComparisonReport, FlightPicture, remove_stale};
 use terrasoar_layout::read::terrain::Terrain;
@@ -112,7 +112,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         (sweep.by_tolerance()?, sweep.by_incoherence()?)
     };
     drop(progress);
-    let picture = middle_frame(args, &terrain, &flight);
+    let picture = middle_frame(&terrain, &flight, quality);
     let title = title(&args.terrain.file, &args.flight, quality);
     let report = ComparisonReport {
         title: &title,
@@ -149,15 +149,15 @@ pub(super) fn run(args: &Args) -> Result<()> {
 
 /// Draws the flight's middle frame; gives a PNG file and a caption, or says why there is none. A report without a picture is a report.
 #[cfg(feature = "pictures")]
-fn middle_frame(args: &Args, terrain: &Terrain, flight: &Flight) -> Result<(Vec<u8>, String), String> {
+fn middle_frame(terrain: &Terrain, flight: &Flight, quality: Quality) -> Result<(Vec<u8>, String), String> {
     let frame = flight.frames.len() / 2;
-    let drawn = super::picture::draw_frame(terrain, flight, frame, args.quality.quality());
+    let drawn = super::picture::draw_frame(terrain, flight, frame, quality);
     let (file, drawn_by) = drawn.map_err(|error| super::message(&error))?;
     Ok((file, format!("Frame {frame} of {}, drawn by {drawn_by}.", flight.frames.len())))
 }
 
 #[cfg(not(feature = "pictures"))]
-fn middle_frame(_: &Args, _: &Terrain, _: &Flight) -> Result<(Vec<u8>, String), String> {
+fn middle_frame(_: &Terrain, _: &Flight, _: Quality) -> Result<(Vec<u8>, String), String> {
     Err("this program was built without the feature pictures".into())
 }
 

@@ -2,6 +2,7 @@
 
 use super::output::{complain, decimal, grouped, print};
 use super::outputs::{Force, Kind};
+use super::pages::CacheArgs;
 use super::progress::Meter;
 use super::replay::QualityArgs;
 use super::terrain::TerrainArgs;
@@ -35,6 +36,8 @@ pub(super) struct Args {
     kind: FlightKind,
     #[command(flatten)]
     terrain: TerrainArgs,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Flight file to write
     #[arg(short, long, value_name = "F.flight")]
     output: PathBuf,
@@ -93,14 +96,14 @@ impl Args {
 pub(super) fn run(args: &Args) -> Result<()> {
     let plan = args.plan()?;
     args.force.stream(&args.output, Kind::Flight, &args.terrain.inputs(&[]))?;
-    let terrain = args.terrain.open()?;
+    let (terrain, cache_bytes) = args.cache.open(&args.terrain)?;
     let ground = TerrainGround::new(&terrain);
     let (mut flight, speed, told) = match args.pace.incoherence {
         None => (generate(&ground, &plan)?, plan.speed_m_per_frame, String::new()),
         Some(wanted) => {
             let progress = Meter::new("trials");
             progress.begin("finding the speed", MAX_TRIALS as u64);
-            let quality = args.quality.quality();
+            let quality = args.quality.quality().cache_bytes(cache_bytes);
             let solution = solve(&ground, &plan, wanted, |pairs| {
                 let percent = mean_incoherence_percent(&terrain, pairs, quality);
                 progress.add(1);

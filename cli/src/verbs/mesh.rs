@@ -1,23 +1,25 @@
 //! `terrasoar mesh`: triangles as a file that other programs read, of one frame of a flight, or of the ground without an eye.
 
 use super::area::AreaArgs;
-use super::output::{complain, grouped, print};
+use super::output::{complain, grouped, print, print_json};
 use super::outputs::{Force, Kind};
-use super::pages::CacheArgs;
+use super::pages::{CacheArgs, ReadForIt};
 use super::replay::{QualityArgs, batches_of};
 use super::siting;
 use super::terrain::TerrainArgs;
 use super::{WrongUsage, parse};
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
+use serde::Serialize;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use terrasoar::flight::Flight;
-use terrasoar::flyover::{EngineKind, frame_mesh};
+use terrasoar::flyover::{EngineKind, frame_mesh_with_reads};
 use terrasoar::mesh::IndexedMesh;
-use terrasoar::simplify::{SimplifyOptions, simplify};
+use terrasoar::simplify::{SimplifyOptions, simplify_with_reads};
 use terrasoar_lab::mesh_file::{Format, MeshFile, Placing, Texture};
 use terrasoar_layout::file::atomic::AtomicFile;
+use terrasoar_layout::read::store::PagesRead;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Write a terrain as triangles: PLY, OBJ, STL or GLB.
@@ -35,7 +37,10 @@ Examples:
   terrasoar mesh alps.iqt --max-error 0.5 --window 395000,5092000,396000,5093000 --crs dem --coordinates dem -o village.ply
   terrasoar mesh alps.iqt --overlay dam.iqo --max-error 1 --window 0,0,2000,2000 -o print.stl
   terrasoar mesh alps.iqt --flight low.flight --frame 0 -o frame.ply
-  terrasoar mesh alps.iqt --flight low.flight --frame 99 --engine soar --tolerance-px 4 -o frame.obj")]
+  terrasoar mesh alps.iqt --flight low.flight --frame 99 --engine soar --tolerance-px 4 -o frame.obj
+
+Fields of --json: output, format, triangles, vertices, texture_px (null without a picture), origin (what coordinates in single precision lack), cache_mib (memory for pages that were read as the mesh needed them; null if records were taken
+where they lie, and so are the rest), pages_read (each as often as it was), tiles_unpacked, tile_bytes_read (null too where the terrain is not packed), read_ms (waited for pages, over all threads), unpack_ms (the part of it for unpacking).")]
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
@@ -80,6 +85,23 @@ pub(super) struct Args {
     /// Largest side of GLB's picture in texels, 4096 without it; 0 for no picture
     #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(0..=16_384))]
     texture: Option<u32>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Answer {
+    output: String,
+    format: &'static str,
+    triangles: u64,
+    vertices: u64,
+    /// Null without a picture.
+    texture_px: Option<[u32; 2]>,
+    /// What coordinates in single precision lack.
+    origin: [f64; 2],
+    #[serde(flatten)]
+    read: ReadForIt,
 }
 
 /// What means something with `--flight` alone.
@@ -163,7 +185,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let (terrain, cache_bytes) = args.cache.open(&args.terrain)?;
     let terrain = std::sync::Arc::new(terrain);
     let placing = args.placing(&terrain, format)?;
-    let (mesh, part_m) = match (&args.flight, args.max_error) {
+    let (mesh, part_m, read) = match (&args.flight, args.max_error) {
         (None, Some(max_error_m)) => simplified(args, &terrain, max_error_m, cache_bytes)?,
         (Some(flight), _) => {
             let path = flight;
@@ -175,9 +197,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
             };
             let quality = args.quality.quality().cache_bytes(cache_bytes);
             let frame = args.frame.unwrap_or(0);
-            let mesh = frame_mesh(&terrain, &flight.frames, frame, quality, args.engine, &batches)?;
+            let (mesh, read) =
+                frame_mesh_with_reads(&terrain, &flight.frames, frame, quality, args.engine, &batches)?;
             let [east, north] = terrain.grid().extent_m();
-            (mesh, [0.0, 0.0, east, north])
+            (mesh, [0.0, 0.0, east, north], read)
         }
         (None, None) => return Err(WrongUsage("give --max-error, or --flight and --frame".into()).into()),
     };
@@ -198,28 +221,52 @@ pub(super) fn run(args: &Args) -> Result<()> {
             "note: coordinates are large for single precision; the file holds them less {x},{y}{again}"
         ));
     }
-    let picture =
-        texture.map(|t| format!(", a picture of {} x {} texels", t.size[0], t.size[1])).unwrap_or_default();
+    let texture_px = texture.map(|texture| texture.size);
+    let [triangles, vertices] = [mesh.triangles.len() as u64, mesh.positions.len() as u64];
+    let read = ReadForIt::of(read, cache_bytes);
+    if args.json {
+        return print_json(&Answer {
+            output: args.output.display().to_string(),
+            format: word_of(format),
+            triangles,
+            vertices,
+            texture_px,
+            origin: [x, y],
+            read,
+        });
+    }
+    let picture = texture_px.map(|[wide, high]| format!(", a picture of {wide} x {high} texels"));
+    let read = read.words().map(|words| format!("\n{words}"));
     print(&format!(
-        "{}: {} triangles, {} vertices{picture}",
+        "{}: {} triangles, {} vertices{}{}",
         args.output.display(),
-        grouped(mesh.triangles.len() as u64),
-        grouped(mesh.positions.len() as u64)
+        grouped(triangles),
+        grouped(vertices),
+        picture.unwrap_or_default(),
+        read.unwrap_or_default()
     ))
 }
 
-/// The mesh of a part within the error, and the part's sides in metres.
-fn simplified(
-    args: &Args,
-    terrain: &Terrain,
-    max_error_m: f64,
-    cache_bytes: Option<u64>,
-) -> Result<(IndexedMesh, [f64; 4])> {
+/// The word that names a kind of file.
+const fn word_of(format: Format) -> &'static str {
+    match format {
+        Format::PlyBinary | Format::PlyText => "ply",
+        Format::Obj => "obj",
+        Format::Stl => "stl",
+        Format::Glb => "glb",
+    }
+}
+
+/// A mesh, the sides of its part in metres, and what was read for it.
+type Made = (IndexedMesh, [f64; 4], Option<PagesRead>);
+
+/// The mesh of a part within the error.
+fn simplified(args: &Args, terrain: &Terrain, max_error_m: f64, cache_bytes: Option<u64>) -> Result<Made> {
     let window = args.area.window(terrain, &args.terrain.file, 1)?;
     let options =
         SimplifyOptions::default().max_error_m(max_error_m).window(window).max_triangles(args.max_triangles);
     let options = options.cache_bytes(cache_bytes);
-    let mesh = simplify(terrain, &options)?;
+    let (mesh, read) = simplify_with_reads(terrain, &options)?;
     if mesh.triangles.is_empty() {
         bail!(
             "{}: no three samples beside each other have heights there, so there are no triangles",
@@ -228,7 +275,8 @@ fn simplified(
     }
     let ([x0, y0], [x1, y1]) = (window.from, window.last());
     let [east, north] = terrain.grid().spacing_m();
-    Ok((mesh, [f64::from(x0) * east, f64::from(y0) * north, f64::from(x1) * east, f64::from(y1) * north]))
+    let sides_m = [f64::from(x0) * east, f64::from(y0) * north, f64::from(x1) * east, f64::from(y1) * north];
+    Ok((mesh, sides_m, read))
 }
 
 /// Writes the file, which appears when it is complete.

@@ -3,6 +3,7 @@
 use super::movie_file::{MovieFile, MovieFormat};
 use super::output::{complain, decimal, grouped, print, print_json};
 use super::outputs::{Force, Kind};
+use super::pages::CacheArgs;
 use super::picture::PictureArgs;
 use super::progress::Meter;
 use super::siting;
@@ -27,6 +28,8 @@ Examples:
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Flight file
     #[arg(long, value_name = "F")]
     flight: PathBuf,
@@ -84,12 +87,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if format != MovieFormat::Folder {
         args.force.file(&args.output, Kind::Film, &args.terrain.inputs(&[&args.flight]))?;
     }
-    let terrain = args.terrain.open()?;
+    let (terrain, cache_bytes) = args.cache.open(&args.terrain)?;
     let flight = Flight::read(&args.flight)?;
     let picture = &args.picture;
     within::flight(&terrain, &flight, &args.flight, picture.size)?;
     let moments = args.moments(&flight)?;
-    let mut studio = picture.studio(&terrain)?;
+    let mut studio = picture.studio(&terrain, cache_bytes)?;
     let has_image = studio.has_image();
     let look = picture.look(has_image, terrain.header().height_range_m);
     let mut movie = MovieFile::create(&args.output, format, picture.size, args.fps, args.force.is_given())?

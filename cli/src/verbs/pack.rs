@@ -14,7 +14,7 @@ use terrasoar_layout::packing::{pack, unpack};
 
 /// Pack a terrain file into a third to a tenth of its bytes, without any loss.
 ///
-/// Packed terrain is drawn and flown over as it is: tiles are unpacked as views need them, by every engine. Only iobench, which counts for other layouts too, unpacks the whole into memory first. It is
+/// Packed terrain is drawn and flown over as it is: tiles are unpacked as views need them, by every engine. It is
 /// edited, draped and undone as any other: what that appends is packed, too. Terrains with any kind of records can be packed. The history comes along, and undo goes on; what edits appended before keeps its size, and
 /// `terrasoar compact --packed` packs the terrain as it is instead, without history. What was written is unpacked again and compared with the terrain, byte for byte, before it gets its name.
 #[derive(Debug, clap::Args)]

@@ -3,14 +3,17 @@
 use super::output::grouped;
 use super::terrain::TerrainArgs;
 use anyhow::Result;
+use serde::Serialize;
+use std::time::Duration;
 use terrasoar::stats::FrameStats;
 use terrasoar_layout::file::bytes::PAGE_BYTES;
+use terrasoar_layout::read::store::PagesRead;
 use terrasoar_layout::read::terrain::Terrain;
 
 /// Memory for pages.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct CacheArgs {
-    /// Read pages as frames need them, into so much memory; without it packed terrain has 128 MiB, and other terrain is mapped
+    /// Read pages when they are needed, into so much memory; without it packed terrain has 128 MiB, and other terrain is mapped
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
     cache: Option<u64>,
 }
@@ -24,6 +27,47 @@ impl CacheArgs {
         }
         let cache_bytes = terrain.cache_bytes(self.cache.map(|mib| mib << 20));
         Ok((terrain, cache_bytes))
+    }
+}
+
+/// What was read for a mesh, in the words of `replay`; nothing where records were taken where they lie.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub(super) struct ReadForIt {
+    cache_mib: Option<u64>,
+    pages_read: Option<u64>,
+    tiles_unpacked: Option<u64>,
+    tile_bytes_read: Option<u64>,
+    read_ms: Option<f64>,
+    unpack_ms: Option<f64>,
+}
+
+impl ReadForIt {
+    pub(super) fn of(read: Option<PagesRead>, cache_bytes: Option<u64>) -> Self {
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        let unpacked = read.and_then(|read| read.unpacked);
+        Self {
+            cache_mib: cache_bytes.map(|bytes| bytes >> 20),
+            pages_read: read.map(|read| read.pages),
+            tiles_unpacked: unpacked.map(|unpacked| unpacked.tiles),
+            tile_bytes_read: unpacked.map(|unpacked| unpacked.bytes),
+            read_ms: read.map(|read| ms(read.time)),
+            unpack_ms: unpacked.map(|unpacked| ms(unpacked.time)),
+        }
+    }
+
+    /// In a line.
+    pub(super) fn words(&self) -> Option<String> {
+        let pages = format!("{} pages read as needed", grouped(self.pages_read?));
+        let tiles = self.tiles_unpacked.zip(self.tile_bytes_read).map(|(tiles, bytes)| {
+            format!(", from {} tiles of {} bytes in all", grouped(tiles), grouped(bytes))
+        });
+        let unpacking = self.unpack_ms.map(|ms| format!(", {ms:.1} ms of it for unpacking"));
+        Some(format!(
+            "{pages}{}; waited {:.1} ms for them{}",
+            tiles.unwrap_or_default(),
+            self.read_ms?,
+            unpacking.unwrap_or_default()
+        ))
     }
 }
 

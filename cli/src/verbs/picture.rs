@@ -128,9 +128,13 @@ impl PictureArgs {
         view.exaggeration(self.exaggeration)
     }
 
-    /// A studio for `terrain`.
-    pub(super) fn studio<'t>(&self, terrain: &'t Terrain) -> Result<Studio<'t>, SceneError> {
-        Studio::new(terrain, self.engine, self.culling, self.size)
+    /// A studio for `terrain`, whose pages are read into so much memory where it is given.
+    pub(super) fn studio<'t>(
+        &self,
+        terrain: &'t Terrain,
+        cache_bytes: Option<u64>,
+    ) -> Result<Studio<'t>, SceneError> {
+        Studio::reading(terrain, self.engine, self.culling, self.size, cache_bytes)
     }
 
     /// The engine's word.
@@ -244,7 +248,13 @@ pub(super) fn draw_frame(
     frame: usize,
     quality: Quality,
 ) -> Result<(Vec<u8>, String)> {
-    let mut studio = Studio::new(terrain, PictureEngine::default(), quality.culling, quality.viewport)?;
+    let mut studio = Studio::reading(
+        terrain,
+        PictureEngine::default(),
+        quality.culling,
+        quality.viewport,
+        quality.cache_bytes,
+    )?;
     let view = |frame: &FlightFrame| quality.view(frame);
     let Some(asked) = flight.frames.get(frame) else { bail!("the flight has no frame {frame}") };
     for flown in &flight.frames[..=frame] {

@@ -3,6 +3,7 @@
 use super::area::AreaArgs;
 use super::output::{complain, decimal, grouped, print, print_json};
 use super::outputs::{Force, Kind};
+use super::pages::CacheArgs;
 use super::picture::{INCH_M, PictureArgs, angles, png_with};
 use super::progress::Meter;
 use super::siting;
@@ -45,6 +46,8 @@ metres_per_px (null without --ortho), scale (n of 1:n; null without --ortho and 
 pub(super) struct Args {
     #[command(flatten)]
     terrain: TerrainArgs,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Flight file
     #[arg(long, value_name = "F", requires = "frame")]
     flight: Option<PathBuf>,
@@ -157,11 +160,11 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let flight: Vec<_> = args.flight.as_deref().into_iter().collect();
     args.force.file(&args.output, Kind::Picture, &args.terrain.inputs(&flight))?;
-    let terrain = args.terrain.open()?;
+    let (terrain, cache_bytes) = args.cache.open(&args.terrain)?;
     let (views, picture, raised_m, map) = args.views(&terrain)?;
     let others =
         if args.world_file { Some(beside(terrain.header(), &args.output, args.force)?) } else { None };
-    let mut studio = picture.studio(&terrain)?;
+    let mut studio = picture.studio(&terrain, cache_bytes)?;
     let progress = Meter::new("frames");
     progress.begin("flying", views.len() as u64);
     let mut triangles = 0;

@@ -24,11 +24,7 @@ pub(super) struct TerrainArgs {
 impl TerrainArgs {
     /// Opens it: mapped, or, where it is packed, to be unpacked page by page. Elevation data is built first.
     pub(super) fn open(&self) -> Result<Terrain> {
-        let terrain = self.open_mapped()?;
-        if terrain.source().unpacking().is_some() {
-            return Ok(terrain.open_again_unmapped()?);
-        }
-        Ok(terrain)
+        page_by_page(self.open_mapped()?)
     }
 
     fn open_mapped(&self) -> Result<Terrain> {
@@ -75,6 +71,19 @@ impl TerrainArgs {
         let own = std::iter::once(self.file.as_path()).chain(self.overlay.as_deref());
         own.chain(others.iter().copied()).collect()
     }
+}
+
+/// A terrain file that is opened: mapped, or, where it is packed, to be unpacked page by page.
+pub(super) fn open_for_pages(path: &Path) -> Result<Terrain> {
+    page_by_page(open(path)?)
+}
+
+/// A terrain that is packed, without a map, so that nothing takes it for one whose records lie in memory.
+fn page_by_page(terrain: Terrain) -> Result<Terrain> {
+    if terrain.source().unpacking().is_some() {
+        return Ok(terrain.open_again_unmapped()?);
+    }
+    Ok(terrain)
 }
 
 /// Opens a terrain file, naming what to do when it is elevation data instead.

@@ -1,5 +1,7 @@
 //! The counting run: a flight through one reader, what its reads touch under every layout, and what a page cache of a stated size misses.
 //!
+//! Records of a terrain that does not lend them are read page by page, into memory of a fixed size; what is counted is the same.
+//!
 //! One pass is enough for all layouts and all ways of preloading, because the engine's reads are the same. Within a frame a page is needed once, however often it is read.
 //! Preloads come from a disk of stated speed: so many pages between two frames, the coarsest first. **Nothing here reads a clock or the state of the machine**: equal
 //! input gives equal counts.
@@ -19,8 +21,7 @@ use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::file::source::{PackedNeed, Unpacking};
-use terrasoar_layout::grid::record::RecordCodec;
-use terrasoar_layout::read::records::Records;
+use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
 
@@ -43,6 +44,8 @@ pub struct CountOptions {
     pub block_m: f64,
     /// Whether to keep the pages of every frame in the order they are first read, for replaying them.
     pub trace: bool,
+    /// Memory for pages that are read while it is counted; without it as [`Terrain::cache_bytes`] has it. It changes no count.
+    pub cache_bytes: Option<u64>,
 }
 
 impl Default for CountOptions {
@@ -55,6 +58,7 @@ impl Default for CountOptions {
             disk_pages: 128,
             block_m: 1000.0,
             trace: false,
+            cache_bytes: None,
         }
     }
 }
@@ -89,12 +93,17 @@ impl CountOptions {
     pub fn trace(self, trace: bool) -> Self {
         Self { trace, ..self }
     }
+
+    /// These options with pages that are read into so many bytes of memory meanwhile.
+    pub fn cache_bytes(self, cache_bytes: impl Into<Option<u64>>) -> Self {
+        Self { cache_bytes: cache_bytes.into(), ..self }
+    }
 }
 
 /// Flies `views` with one reader and counts. `done` hears the number of frames finished.
 ///
 /// # Errors
-/// [`IoBenchError::NotInAddressSpace`]; [`IoBenchError::NoDeadlines`] if preloading by deadline is asked for; a damaged directory of a packed file.
+/// [`IoBenchError::NoDeadlines`] if preloading by deadline is asked for; damage and I/O.
 pub fn count(
     terrain: &Terrain,
     views: &[View],
@@ -106,22 +115,13 @@ pub fn count(
     if options.preloads.contains(&Prefetch::Deadline) {
         return Err(IoBenchError::NoDeadlines { reader });
     }
-    if !terrain.lends_records() {
-        return Err(IoBenchError::NotInAddressSpace(terrain.path().display().to_string()));
-    }
-    let records = terrain.records()?;
     let mut counts: Vec<LayoutCount<'_>> =
         options.layouts.iter().map(|kind| LayoutCount::new(terrain, *kind, options)).collect();
-    let flown = with_records!(records, records => {
-        let mut sink = Sink { records: &records, views, culling, options, counts: &mut counts, done };
-        match reader.engine() {
-            EngineKind::Naive => sink.fly(Naive::new(records.clone(), culling)),
-            EngineKind::Soar => sink.fly(Soar::new(records.clone(), culling)),
-            EngineKind::Smart => sink.fly(Smart::new(records.clone(), culling)),
-            EngineKind::Kinetic => sink.fly(Kinetic::new(records.clone(), culling)),
-        }
-    });
-    flown?;
+    let mut sink = Sink { views, culling, options, counts: &mut counts, done };
+    match terrain.cache_bytes(options.cache_bytes) {
+        None => with_records!(terrain.records()?, records => sink.fly(&records, reader))?,
+        Some(bytes) => with_records!(terrain.paged(bytes), records => sink.fly(&records, reader))?,
+    }
     Ok(counts.into_iter().flat_map(|count| count.into_runs(reader)).collect())
 }
 
@@ -136,8 +136,7 @@ impl Probe for Reads {
 }
 
 /// Where the reads of a flight go.
-struct Sink<'s, 't, C: RecordCodec> {
-    records: &'s Records<'t, C>,
+struct Sink<'s, 't> {
     views: &'s [View],
     culling: Culling,
     options: &'s CountOptions,
@@ -145,8 +144,17 @@ struct Sink<'s, 't, C: RecordCodec> {
     done: &'s mut dyn FnMut(u64),
 }
 
-impl<C: RecordCodec> Sink<'_, '_, C> {
-    fn fly(&mut self, mut engine: impl Engine) -> Result<(), LayoutError> {
+impl Sink<'_, '_> {
+    fn fly<S: CompleteStore + Clone>(&mut self, records: &S, reader: Reader) -> Result<(), LayoutError> {
+        match reader.engine() {
+            EngineKind::Naive => self.fly_with(records, Naive::new(records.clone(), self.culling)),
+            EngineKind::Soar => self.fly_with(records, Soar::new(records.clone(), self.culling)),
+            EngineKind::Smart => self.fly_with(records, Smart::new(records.clone(), self.culling)),
+            EngineKind::Kinetic => self.fly_with(records, Kinetic::new(records.clone(), self.culling)),
+        }
+    }
+
+    fn fly_with(&mut self, records: &impl CompleteStore, mut engine: impl Engine) -> Result<(), LayoutError> {
         let mut reads = Reads::default();
         let extends = self.options.preloads.contains(&Prefetch::Frustum);
         let mut before: Option<&View> = None;
@@ -157,15 +165,16 @@ impl<C: RecordCodec> Sink<'_, '_, C> {
                 count.frame(i as u64, &reads.0)?;
             }
             if extends {
-                let plain = ExtendedView::plain(view).slots(self.records, self.culling);
+                let plain = ExtendedView::plain(view).slots(records, self.culling);
                 let extended = ExtendedView::after(before.unwrap_or(view), view, self.options.block_m)
-                    .slots(self.records, self.culling);
+                    .slots(records, self.culling);
                 let extension: Vec<u64> =
                     extended.into_iter().filter(|slot| plain.binary_search(slot).is_err()).collect();
                 for count in self.counts.iter_mut() {
                     count.preload(&plain, &extension, self.options.disk_pages);
                 }
             }
+            records.take_error().map_or(Ok(()), Err)?;
             before = Some(view);
             (self.done)(i as u64 + 1);
         }

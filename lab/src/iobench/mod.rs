@@ -78,9 +78,6 @@ impl Reader {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum IoBenchError {
-    /// The terrain's source does not lend its bytes.
-    #[error("{0}: refinement needs a mapped or in-memory terrain")]
-    NotInAddressSpace(String),
     /// The reader does not know when it will need what.
     #[error("preloading by deadline needs the engine kinetic over a pool; preload {} by frustum or not at all", reader.name())]
     NoDeadlines {

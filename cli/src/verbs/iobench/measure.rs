@@ -18,7 +18,7 @@ use terrasoar_layout::read::terrain::Terrain;
 
 /// The counting run of all readers, and the block length it used.
 pub(super) fn counted(args: &Args, views: &[View], progress: &Meter) -> Result<(Vec<Run>, f64)> {
-    let terrain = terrain::open(&args.file)?;
+    let terrain = terrain::open_for_pages(&args.file)?;
     let block_m = args.block.unwrap_or_else(|| ExtendedView::block_m(terrain.grid()));
     let options = CountOptions::default()
         .layouts(args.layouts.clone())
@@ -27,7 +27,9 @@ pub(super) fn counted(args: &Args, views: &[View], progress: &Meter) -> Result<(
         .cache_pages(usize::try_from(args.cache * (1 << 20) / PAGE_BYTES as u64).unwrap_or(usize::MAX))
         .disk_pages(usize::try_from(args.disk_pages).unwrap_or(usize::MAX))
         .block_m(block_m)
-        .trace(args.scratch.is_some());
+        .trace(args.scratch.is_some())
+        // Of a packed file no more is unpacked than so much.
+        .cache_bytes((!terrain.lends_records()).then_some(args.cache << 20));
     let culling = args.quality.quality().culling;
     let mut runs = Vec::new();
     for reader in args.readers() {
@@ -58,7 +60,7 @@ pub(super) fn streamed(
         .map(|(run, _)| run)
         .find(|run| run.reader == Reader::Mesh && run.layout == LayoutKind::Ours);
     let mesh_pages: Vec<u64> = mesh.map_or(Vec::new(), |run| run.frames.iter().map(|f| f.pages).collect());
-    let terrain = terrain::open(&args.file)?;
+    let terrain = Terrain::open_unmapped(&args.file)?;
     let flight = |prefetch: &Prefetch| {
         let options = PoolOptions::default()
             .cache_bytes(args.cache << 20)
