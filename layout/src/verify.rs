@@ -58,7 +58,7 @@ pub struct VerifyReport {
     pub problems: Vec<Problem>,
     /// All problems.
     pub problem_count: u64,
-    /// The newest header, if it is damaged. It is no problem of the state that was checked, which is the one before it, and a power cut may leave it so.
+    /// The newest header, if it is damaged. It is no problem of the state that was checked, which is the one before it, and a power cut may leave it so, as [`LostHeader::was_saved`] tells.
     pub lost_header: Option<LostHeader>,
 }
 

@@ -54,7 +54,7 @@ pub(super) fn tell_of_lost(terrain: &Terrain) {
     if let Some(words) = newest_header_is_lost(terrain)
         && TOLD.lock().is_ok_and(|mut told| told.insert(terrain.path().to_owned()))
     {
-        complain(&format!("warning: {words}"));
+        complain(&words);
     }
 }
 
@@ -66,6 +66,7 @@ pub(super) fn tell_of_lost_in(file: &Path, overlay: Option<&Path>) -> bool {
     };
     opened.is_ok_and(|terrain| {
         tell_of_lost(&terrain);
-        !matches!(terrain.lost_header(), Ok(None))
+        // One that was cut off before it was saved leads to nothing.
+        !terrain.lost_header().is_ok_and(|lost| lost.is_none_or(|lost| lost.was_saved == Some(false)))
     })
 }

@@ -28,9 +28,18 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let report =
         verify(&terrain, &|pages| progress.add(pages)).inspect_err(|_| overlays::tell_of_lost(&terrain))?;
     drop(progress);
-    if let (true, Some(lost)) = (report.is_sound(), report.lost_header) {
+    // What was cut off before it was saved is said, and is no fault of the file.
+    let lost = report.lost_header.filter(|lost| lost.was_saved != Some(false));
+    if report.lost_header.is_some() && lost.is_none() {
+        overlays::tell_of_lost(&terrain);
+    }
+    if let (true, Some(lost)) = (report.is_sound(), lost) {
+        let or_else = match lost.was_saved {
+            Some(_) => "",
+            None => ", or let the next edit write it anew if a power cut stopped the last one",
+        };
         bail!(
-            "{}: the newest header, on page {}, is damaged; the state before it, which is read instead, is sound; restore a copy of the file, or let the next edit write it anew if a power cut stopped the last one",
+            "{}: the newest header, on page {}, is damaged; the state before it, which is read instead, is sound; restore a copy of the file{or_else}",
             terrain.path().display(),
             lost.page
         );
@@ -58,7 +67,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if more > 0 {
         lines.push(format!("  and {} more", grouped(more)));
     }
-    if let Some(lost) = report.lost_header {
+    if let Some(lost) = lost {
         lines.push(format!(
             "  the newest header, on page {}, is damaged, too; the state before it was read instead",
             lost.page

@@ -2,6 +2,7 @@
 
 use crate::edit::{read, with_script};
 use crate::support::text;
+use terrasoar_layout::file::bytes::checksum;
 
 /// A script of one batch, the file or overlay that it goes to, and the verbs' flags for it.
 const PLACES: [(&str, &[&str]); 2] = [("land.iqt", &[]), ("dam.iqo", &["--overlay", "dam.iqo"])];
@@ -30,6 +31,27 @@ fn verbs_tell_of_a_damaged_newest_header_once() {
         assert!(output.status.code() == Some(1) && output.stdout.is_empty(), "{said}");
         assert!(said.contains("is damaged; the state before it, which is read instead, is sound"), "{said}");
         assert!(said.starts_with("error: ") && said.matches("is damaged").count() == 1, "{said}");
+        // So does a page of zeros, which is all that a file without commits has there.
+        let mut zeroed = bytes.clone();
+        zeroed[4096..8192].fill(0);
+        std::fs::write(bench.path(file), &zeroed).unwrap();
+        let said = text(&bench.run(&at).stderr).to_owned();
+        assert!(said.contains(&told) && said.contains("which was saved"), "{said}");
+        assert_eq!(bench.run(&[&["verify", "land.iqt"], flags].concat()).status.code(), Some(1));
+        // A power cut in the middle of the edit: the file says itself that it was never saved.
+        let mut cut = bytes.clone();
+        let mark = cut.len() - 64;
+        cut[mark + 0x0c] = 1;
+        let sum = checksum(&cut[mark..mark + 0x3c]).to_le_bytes();
+        cut[mark + 0x3c..].copy_from_slice(&sum);
+        std::fs::write(bench.path(file), &cut).unwrap();
+        let note = format!("note: {file}: the last edit, undo or picture was cut off before it was saved");
+        let output = bench.run(&[&["verify", "land.iqt"], flags].concat());
+        assert!(output.status.success() && text(&output.stdout).contains("sound: "));
+        assert_eq!(text(&output.stderr).matches(&note).count(), 1, "{}", text(&output.stderr));
+        let output = bench.run(&at);
+        assert!(text(&output.stdout) == before && text(&output.stderr).starts_with(&note));
+        std::fs::write(bench.path(file), &bytes).unwrap();
         // Of a file that is not sound either, it is said once, too.
         let terrain = read(&bench, "land.iqt");
         let mut worse = terrain.clone();

@@ -5,6 +5,7 @@
 //! * `tail`: a file grows behind its end, and one write of a header makes that count. Edits, undo, pictures and overlays all go through it.
 //! * `directory_shape`: how many pages a directory has; `directory`: where pages lie, written behind them; `page_table`: where they lie, read on need.
 //! * `journal`: what commits led to and what was before them.
+//! * `mark`: how far the last commit came, in the file's last bytes.
 //! * `slots`: which of a file's two headers counts.
 //! * `seen`: edits committed to a terrain after it was decided to replace it are not lost.
 //! * `publish`: a terrain file that does not open is not published; `seen`: a terrain that was edited meanwhile is not replaced.
@@ -25,6 +26,7 @@ pub mod header;
 pub(crate) mod journal;
 #[cfg(feature = "files")]
 pub(crate) mod lock;
+pub(crate) mod mark;
 #[cfg(feature = "files")]
 pub mod opening;
 #[cfg(feature = "files")]

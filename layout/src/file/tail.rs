@@ -1,7 +1,7 @@
 //! The end of a file that grows while others read it: new bytes behind everything that a header leads to, and the header that makes them count (FORMAT.md, sections 7.1 and 8.5).
 //!
-//! The order is always the same: the new bytes, a sync, a check that the file still has its name, the header slot that is not current, a sync. Nothing that a header
-//! leads or led to is written over. Wherever this is cut off, the file holds what it held before, or all that is new.
+//! The order is always the same: the new bytes, a mark that the commit was begun, a sync, a check that the file still has its name, the header slot that is not current, a sync, a mark that it is saved. Nothing that a
+//! header leads or led to is written over. Wherever this is cut off, the file holds what it held before, or all that is new.
 //!
 //! **A header that was begun may be in force, whatever the error said.** [`Attempt`] remembers such a header, so that the next write goes behind what it counts and takes the next generation.
 
@@ -10,6 +10,7 @@ use super::directory::page_at;
 use super::disk::Disk;
 use super::header::Header;
 use super::lock::WriteLock;
+use super::mark::{MARK_BYTES, Mark};
 use super::packed_end::{PackedEnd, Run, packed_run};
 use super::slots::Slots;
 use super::source::Source;
@@ -264,6 +265,8 @@ impl Tail {
         if let Some(packed) = &self.packed {
             self.put_block(disk, packed, next)?;
         }
+        let mark_place = self.mark_place(disk, next)?;
+        self.put_mark(disk, mark_place, next, false)?;
         self.sync(disk)?;
         if let TailFile::Live(lock) = &self.file
             && !lock.is_of(&self.path)
@@ -276,7 +279,40 @@ impl Tail {
         next.attempt.header_begun.store(true, Ordering::Release);
         let page = self.packed_end().map(|end| end.to_file(&next.page));
         self.put(disk, &page.as_ref().unwrap_or(&next.page)[..], self.header_offset)?;
-        self.sync(disk)
+        self.sync(disk)?;
+        // Not brought to the disk in haste: a file without it reads as ever.
+        self.put_mark(disk, mark_place, next, true)
+    }
+
+    /// Where the mark goes: behind everything, or over another mark there.
+    fn mark_place(&self, disk: &dyn Disk, next: &NextHeader) -> Result<Option<u64>, LayoutError> {
+        // Nobody has a file yet that has no name, and none of it is lost one by one.
+        let TailFile::Live(lock) = &self.file else { return Ok(None) };
+        let io = |e| LayoutError::io(&self.path, "cannot read the end of the file", e);
+        let length = lock.file().metadata().map_err(io)?.len();
+        let end = match self.packed_end() {
+            Some(end) => end.end,
+            None => next.header.file_bytes - self.start,
+        };
+        if let Some(last) = length.checked_sub(MARK_BYTES as u64).filter(|last| *last >= end) {
+            let mut bytes = [0; MARK_BYTES];
+            disk.read_at(lock.file(), &mut bytes, last).map_err(io)?;
+            if Mark::parse(&bytes).is_some() {
+                return Ok(Some(last));
+            }
+        }
+        Ok(Some(length.max(end)))
+    }
+
+    fn put_mark(
+        &self,
+        disk: &dyn Disk,
+        place: Option<u64>,
+        next: &NextHeader,
+        is_saved: bool,
+    ) -> Result<(), LayoutError> {
+        let mark = Mark { generation: next.header.generation, is_saved };
+        place.map_or(Ok(()), |place| self.put(disk, &mark.to_bytes(), place))
     }
 
     /// Writes where the pages lie that a header counts besides those of the one before.

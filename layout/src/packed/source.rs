@@ -273,6 +273,10 @@ impl Source for PackedSource {
         self.header.file_bytes
     }
 
+    fn read_end(&self, buffer: &mut [u8]) -> Result<bool, LayoutError> {
+        self.inner.read_end(buffer)
+    }
+
     fn packed_end(&self) -> Option<&PackedEnd> {
         Some(&self.end)
     }

@@ -1,12 +1,13 @@
 //! A header that was newer than the one that counts, and can no longer be read.
 //!
-//! A commit writes the header slot that is not current. While that page is damaged the file reads as before the commit, whether a power cut stopped the writing or the page was damaged afterwards. Nobody can tell these two
-//! apart, so it is said.
+//! A commit writes the header slot that is not current. While that page is damaged the file reads as before the commit, whether a power cut stopped the writing or the page was damaged afterwards. The mark in the file's last
+//! bytes tells these two apart. Programs that know of no marks write none; then nobody can tell, and it is said.
 
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page, get_u32};
 use crate::file::header::{GENERATION, Header};
+use crate::file::mark::{MARK_BYTES, Mark};
 use crate::file::version::{MAGIC, OVERLAY_MAGIC};
 
 /// A header slot that was written after the current one, and holds no header.
@@ -16,6 +17,8 @@ pub struct LostHeader {
     pub page: u64,
     /// Generation of the header that counts instead.
     pub generation: u32,
+    /// Whether the commit that wrote it was saved, so that it is lost: a power cut stopped one that was not, of which nothing was said to be saved. `None` where the file does not say.
+    pub was_saved: Option<bool>,
 }
 
 impl Terrain {
@@ -33,21 +36,23 @@ impl Terrain {
 
     fn look_for_lost(&self) -> Result<Option<LostHeader>, LayoutError> {
         let (source, header) = (self.source(), self.header());
-        let magics = [MAGIC, OVERLAY_MAGIC];
-        let is_header =
-            |page: &Page| magics.iter().any(|magic| Header::parse_as(self.path(), page, *magic).is_ok());
-        let is_lost = |page: &Page| {
-            if page.iter().all(|byte| *byte == 0) {
-                // Before the first commit the second slot is empty, after it neither.
-                return header.history.is_some();
-            }
-            let says_it_is_older = magics.iter().any(|magic| page.starts_with(magic))
-                && get_u32(page, GENERATION) < header.generation;
-            !says_it_is_older && !is_header(page)
-        };
         let mut slots = [[0; PAGE_BYTES]; 2];
         source.read_at(source.own_start(), slots.as_flattened_mut())?;
-        let lost = slots.iter().position(is_lost);
-        Ok(lost.map(|page| LostHeader { page: page as u64, generation: header.generation }))
+        let magics = [MAGIC, OVERLAY_MAGIC];
+        let is_zero = |page: &Page| page.iter().all(|byte| *byte == 0);
+        let is_header =
+            |page: &Page| magics.iter().any(|magic| Header::parse_as(self.path(), page, *magic).is_ok());
+        let says_it_is_older = |page: &Page| {
+            magics.iter().any(|magic| page.starts_with(magic))
+                && get_u32(page, GENERATION) < header.generation
+        };
+        let is_damaged = |page: &Page| is_zero(page) || !says_it_is_older(page) && !is_header(page);
+        let Some(page) = slots.iter().position(is_damaged) else { return Ok(None) };
+        let mut end = [0; MARK_BYTES];
+        let mark = if source.read_end(&mut end)? { Mark::parse(&end) } else { None };
+        let was_saved = mark.filter(|mark| mark.generation > header.generation).map(|mark| mark.is_saved);
+        // Before the first commit the second slot is empty, after it neither.
+        let is_lost = !is_zero(&slots[page]) || header.history.is_some() || was_saved == Some(true);
+        Ok(is_lost.then_some(LostHeader { page: page as u64, generation: header.generation, was_saved }))
     }
 }

@@ -40,7 +40,7 @@ pub(super) fn terrain(path: &Path, start: &[u8]) -> Option<Option<String>> {
         });
     }
     // A commit that cannot be read any more may be there, and a person may have a way to it.
-    if !matches!(terrain.lost_header(), Ok(None)) {
+    if !terrain.lost_header().is_ok_and(|lost| lost.is_none_or(|lost| lost.was_saved == Some(false))) {
         held.push("a damaged header".into());
     }
     let held = held.join(" and ");

@@ -63,6 +63,10 @@ impl Source for LayeredSource<'_> {
         self.base.take_share(cache_bytes)
     }
 
+    fn read_end(&self, buffer: &mut [u8]) -> Result<bool, LayoutError> {
+        self.overlay.read_end(buffer)
+    }
+
     fn own_start(&self) -> u64 {
         self.split
     }

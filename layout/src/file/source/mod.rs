@@ -73,6 +73,10 @@ impl<S: Source + ?Sized> Source for &S {
         (**self).own_start()
     }
 
+    fn read_end(&self, buffer: &mut [u8]) -> Result<bool, LayoutError> {
+        (**self).read_end(buffer)
+    }
+
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> Result<(), LayoutError> {
         (**self).read_at(offset, buffer)
     }
@@ -146,6 +150,16 @@ pub trait Source: Send + Sync {
     /// Offset at which the header slots lie: 0, or where an overlay begins behind its base.
     fn own_start(&self) -> u64 {
         0
+    }
+
+    /// Fills `buffer` with the last bytes of the file itself, packed or not, as long as it was when it was opened; of two files, of the one with the header slots. Whether it has so many.
+    ///
+    /// # Errors
+    /// As [`Source::read_at`].
+    fn read_end(&self, buffer: &mut [u8]) -> Result<bool, LayoutError> {
+        let Some(at) = self.byte_count().checked_sub(buffer.len() as u64) else { return Ok(false) };
+        self.read_at(at, buffer)?;
+        Ok(true)
     }
 
     /// Fills `buffer` with the bytes at `offset`.
