@@ -217,6 +217,39 @@ fn threads_read_side_by_side() {
     }
 }
 
+/// Frames with so many tests that threads would share them: the pass that counts pages has one thread read them, so that counts are those of one thread, page by page.
+#[test]
+fn what_is_counted_does_not_depend_on_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = files(folder.path(), [1025, 1025], false, None);
+    let opened = Terrain::open(&files[0]).unwrap();
+    let flight: Vec<FlightFrame> = (0..5)
+        .map(|i| frame(&opened, [0.3 + 0.02 * f64::from(i), 0.2], 900.0, 30.0 + 9.0 * f64::from(i), -20.0))
+        .collect();
+    let replay_by = |threads: usize, path: &Path| {
+        let terrain = Terrain::open_unmapped(path).unwrap();
+        let quality = Quality::default().tolerance_px(0.5).cache_bytes(300 << 10);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let kind = EngineKind::Kinetic;
+        let frames = pool.install(|| replay(&terrain, &flight, quality, kind, &mut |_| {}).unwrap());
+        frames.iter().map(reads).collect::<Vec<FrameStats>>()
+    };
+    for path in &files {
+        let expected = replay_by(1, path);
+        let many = expected[1..].iter().filter(|f| f.vertex_tests > 40_000 && f.pages_read > Some(500));
+        assert!(
+            many.count() > 2,
+            "{:?}",
+            expected.iter().map(|f| (f.vertex_tests, f.pages_read)).collect::<Vec<_>>()
+        );
+        for threads in [2, 5] {
+            for _ in 0..3 {
+                assert_eq!(replay_by(threads, path), expected, "{threads} threads");
+            }
+        }
+    }
+}
+
 /// Whichever read fails, the replay says so; and none shows another ground than there is.
 #[test]
 fn a_read_that_fails_is_an_error_and_no_ground() {

@@ -5,7 +5,6 @@ mod common;
 use common::edits::{Bench, set};
 use std::path::Path;
 use terrasoar_layout::edit::EditSession;
-use terrasoar_layout::file::bytes::checksum;
 use terrasoar_layout::file::disk::SystemDisk;
 use terrasoar_layout::imagery::{DrapeOptions, MemoryImage, drape_on};
 use terrasoar_layout::packing::pack;
@@ -23,7 +22,7 @@ fn begun(mark: &[u8]) -> Vec<u8> {
     let mut mark = mark.to_vec();
     assert_eq!((&mark[..8], &mark[0x0c..0x10]), (&b"IQTSAVED"[..], &[2, 0, 0, 0][..]));
     mark[0x0c] = 1;
-    let sum = checksum(&mark[..0x3c]);
+    let sum = crc32fast::hash(&mark[..0x3c]);
     mark[0x3c..].copy_from_slice(&sum.to_le_bytes());
     mark
 }
@@ -96,7 +95,8 @@ fn a_damaged_newest_header_is_told_and_an_older_one_passed_over() {
                     assert_eq!(lost.map(|lost| lost.was_saved), is_told.then_some(None), "{fill}");
                     // One whose last commit was not finished.
                     let at = bytes.len() - MARK;
-                    bytes[at..].copy_from_slice(&begun(&bytes[at..]));
+                    let mark = begun(&bytes[at..]);
+                    bytes[at..].copy_from_slice(&mark);
                     std::fs::write(file, &bytes).unwrap();
                     let lost = open().lost_header().unwrap();
                     assert_eq!(lost.map(|lost| lost.was_saved), is_told.then_some(Some(false)), "{fill}");
@@ -141,7 +141,7 @@ fn pictures_leave_a_mark_too_and_marks_do_not_pile_up() {
             let options = DrapeOptions::default();
             drape_on(&SystemDisk, &path, &[Box::new(image)], &options, &Silent).unwrap();
             let whole = std::fs::read(&path).unwrap();
-            let newest = Terrain::open(&path).unwrap().header().generation as usize - 1 & 1;
+            let newest = (Terrain::open(&path).unwrap().header().generation as usize - 1) % 2;
             let mut bytes = whole.clone();
             bytes[newest * PAGE..(newest + 1) * PAGE].fill(0);
             std::fs::write(&path, &bytes).unwrap();

@@ -2,10 +2,19 @@
 
 use crate::edit::{read, with_script};
 use crate::support::text;
-use terrasoar_layout::file::bytes::checksum;
 
 /// A script of one batch, the file or overlay that it goes to, and the verbs' flags for it.
 const PLACES: [(&str, &[&str]); 2] = [("land.iqt", &[]), ("dam.iqo", &["--overlay", "dam.iqo"])];
+
+/// CRC-32, bit by bit.
+fn checksum(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0, |sum, byte| {
+        (0..8).fold(
+            sum ^ u32::from(*byte),
+            |sum, _| if sum & 1 == 1 { sum >> 1 ^ 0xedb8_8320 } else { sum >> 1 },
+        )
+    })
+}
 
 #[test]
 fn verbs_tell_of_a_damaged_newest_header_once() {

@@ -3,6 +3,7 @@
 use crate::error::LayoutError;
 use crate::file::bytes::PAGE_BYTES;
 use crate::file::entries::ENTRY_BYTES;
+use crate::file::mark::{MARK_BYTES, Mark};
 use crate::imagery::Imagery;
 use crate::read::terrain::Terrain;
 
@@ -23,5 +24,11 @@ pub fn unused_bytes(terrain: &Terrain) -> Result<u64, LayoutError> {
         Err(_) => header.imagery.map_or(0, |place| place.bytes),
     };
     let used = (3 + header.stored_pages + directory) * page + root_used + imagery;
-    Ok(terrain.source().byte_count().saturating_sub(used))
+    // A mark behind the end is in use.
+    let source = terrain.source();
+    let mut end = [0; MARK_BYTES];
+    let behind = source.byte_count().saturating_sub(header.file_bytes);
+    let has_mark = behind >= MARK_BYTES as u64 && source.read_end(&mut end)? && Mark::parse(&end).is_some();
+    let mark = if has_mark { MARK_BYTES as u64 } else { 0 };
+    Ok(source.byte_count().saturating_sub(used + mark))
 }
