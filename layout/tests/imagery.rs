@@ -219,10 +219,15 @@ fn imagery_decodes_by_hand() {
     let header = 4096;
     assert_eq!((u16_at(header + 0x008), u16_at(header + 0x00a), u32_at(header + 0x01c)), (1, 1, 2));
     assert_eq!(crc32fast::hash(&bytes[header..header + 0xffc]), u32_at(header + 0xffc));
-    assert_eq!(u64_at(header + 0x088), bytes.len());
+    // Behind everything the mark of what was saved.
+    let mark = bytes.len() - 64;
+    assert_eq!(u64_at(header + 0x088), mark);
+    assert_eq!((&bytes[mark..mark + 8], u32_at(mark + 0x08), u32_at(mark + 0x0c)), (&b"IQTSAVED"[..], 2, 2));
+    assert!(bytes[mark + 0x10..mark + 0x3c].iter().all(|byte| *byte == 0));
+    assert_eq!(crc32fast::hash(&bytes[mark..mark + 0x3c]), u32_at(mark + 0x3c));
     let section = u64_at(header + 0x090);
     assert_eq!(section, old.len().next_multiple_of(4096));
-    assert_eq!(section + u64_at(header + 0x098), bytes.len());
+    assert_eq!(section + u64_at(header + 0x098), mark);
 
     assert_eq!(&bytes[section..section + 8], b"IQTIMAGE");
     assert_eq!((u16_at(section + 8), bytes[section + 0x0a], bytes[section + 0x0b]), (1, 3, 1));
