@@ -3,11 +3,12 @@
 //! Tiles, directory and the section's first page go behind what the current header counts as the file; then a header makes them count ([`crate::file::tail`]). An append that fails
 //! before it has begun on the header gives the space back; one that is killed leaves bytes behind the file that no header counts, and the next append writes over them.
 
+use super::entries::Entries;
 use super::pyramid::MadeTile;
 use super::section::{Section, TileEntry};
 use super::shape::{ImageryShape, TileId};
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, checksum, to_usize};
+use crate::file::bytes::PAGE_BYTES;
 use crate::file::directory::page_at;
 use crate::file::disk::Disk;
 use crate::file::header::{Header, History, ImageryPlace};
@@ -15,6 +16,8 @@ use crate::file::journal::{Lineage, State};
 use crate::file::tail::Tail;
 
 const PAGE: u64 = PAGE_BYTES as u64;
+/// Bytes of the directory that are written at a time, from so many on.
+const WRITE_BYTES: usize = 1 << 20;
 
 /// An append under way.
 pub(crate) struct Append<'t> {
@@ -26,7 +29,7 @@ pub(crate) struct Append<'t> {
     shape: ImageryShape,
     /// First byte not yet taken, of a page.
     next: u64,
-    directory: Vec<u8>,
+    entries: Entries,
     stored_tiles: u64,
     tile_bytes: u64,
 }
@@ -48,7 +51,7 @@ impl<'t> Append<'t> {
             old,
             lineage,
             shape,
-            directory: vec![0; to_usize(directory_bytes)?],
+            entries: Entries::none_of(shape.tiles()),
             stored_tiles: 0,
             tile_bytes: 0,
         })
@@ -75,7 +78,7 @@ impl<'t> Append<'t> {
 
     fn enter(&mut self, id: TileId, entry: TileEntry) {
         if let Some(index) = self.shape.index(id) {
-            entry.write(&mut self.directory, index as usize);
+            self.entries.set(index, entry);
         }
     }
 
@@ -125,12 +128,20 @@ impl<'t> Append<'t> {
             stored_tiles: self.stored_tiles,
             tile_bytes: self.tile_bytes,
             directory_page: page_at(self.tail.path(), begin + PAGE)?,
-            directory_checksum: checksum(&self.directory),
+            directory_checksum: self.entries.checksum(),
             source: source.to_owned(),
         };
-        let mut start = section.to_page().to_vec();
-        start.extend_from_slice(&self.directory);
-        start.resize(start.len().next_multiple_of(PAGE_BYTES), 0);
-        self.write(&start, begin)
+        let (mut piece, mut at) = (section.to_page().to_vec(), begin);
+        self.entries.pieces(|bytes| {
+            piece.extend_from_slice(bytes);
+            if piece.len() >= WRITE_BYTES {
+                self.write(&piece, at)?;
+                at += piece.len() as u64;
+                piece.clear();
+            }
+            Ok(())
+        })?;
+        piece.resize(piece.len().next_multiple_of(PAGE_BYTES), 0);
+        self.write(&piece, at)
     }
 }

@@ -1,7 +1,7 @@
 //! Imagery draped over a terrain: a pyramid of colour tiles in a section of the terrain file (FORMAT.md, section 8).
 //!
-//! [`Imagery`] reads it: shape, directory and single tiles as a GPU takes them. Tile data stay in the file until they are asked for; 16 bytes a tile
-//! are held. Rows of texels run from south to north everywhere in this module, tiles from the south-west.
+//! [`Imagery`] reads it: shape, directory and single tiles as a GPU takes them. Tile data stay in the file until they are asked for; what the directory says of tiles that
+//! are stored is held, 16 bytes each. Rows of texels run from south to north everywhere in this module, tiles from the south-west.
 
 #[cfg(feature = "files")]
 mod append;
@@ -9,6 +9,7 @@ mod decode;
 #[cfg(feature = "files")]
 mod drape;
 mod encode;
+mod entries;
 mod linear;
 #[cfg(feature = "files")]
 mod mosaic;

@@ -1,12 +1,13 @@
 //! The imagery of an opened terrain: a checked directory in memory, tiles read from the file one by one.
 //!
-//! Cost: opening reads 16 bytes a tile; a tile is one read, a checksum, and for tiles at the rim a copy. Reading needs no exclusive
+//! Cost: opening reads 16 bytes a tile, stored or not, and keeps those that are; a tile is one read, a checksum, and for tiles at the rim a copy. Reading needs no exclusive
 //! access, so any number of threads may read through one [`Imagery`].
 
-use super::section::{Section, TILE_ENTRY_BYTES, TileEntry, damaged};
+use super::entries::Entries;
+use super::section::{Section, TileEntry, damaged};
 use super::shape::{ImageryShape, TILE_TEXELS, TileFormat, TileId};
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, checksum, to_usize};
+use crate::file::bytes::{PAGE_BYTES, checksum};
 use crate::file::entries::PageUses;
 use crate::file::header::ImageryPlace;
 use crate::file::source::Source;
@@ -16,7 +17,7 @@ use crate::read::terrain::Terrain;
 #[derive(Debug, Clone)]
 pub struct Imagery {
     section: Section,
-    entries: Vec<TileEntry>,
+    entries: Entries,
     /// The opened terrain whose imagery it is.
     of: u64,
 }
@@ -41,22 +42,22 @@ impl Imagery {
         let mut page = Box::new([0; PAGE_BYTES]);
         source.read_at(place.offset, &mut page[..])?;
         let section = Section::parse(path, place, &page)?;
-        let mut directory = vec![0; to_usize(section.directory_bytes())?];
-        source.read_at(u64::from(section.directory_page) * PAGE_BYTES as u64, &mut directory)?;
-        if checksum(&directory) != section.directory_checksum {
+        let directory = u64::from(section.directory_page) * PAGE_BYTES as u64;
+        let read = |offset, piece: &mut [u8]| source.read_at(directory + offset, piece);
+        let (entries, sum) = Entries::read(section.shape.tiles(), read)?;
+        if sum != section.directory_checksum {
             return Err(damaged(path, "imagery directory".into(), "the checksum does not match"));
         }
-        let entries: Vec<TileEntry> =
-            (0..directory.len() / TILE_ENTRY_BYTES).map(|i| TileEntry::read(&directory, i)).collect();
-        for (id, entry) in section.shape.ids().zip(&entries) {
-            if !section.is_entry(id, *entry, file_bytes) {
+        for (index, entry) in entries.all() {
+            let Some(id) = section.shape.id_at(index) else { continue };
+            if !section.is_entry(id, entry, file_bytes) {
                 let place = format!("imagery directory entry of {}", tile_name(id));
                 return Err(damaged(path, place, "the tile has another length or lies outside the file"));
             }
         }
         check_uses(source, place, &section, &entries, file_bytes)?;
-        let present = entries.iter().filter(|entry| entry.is_present());
-        let (tiles, bytes) = present.fold((0, 0), |(n, sum), entry| (n + 1, sum + u64::from(entry.bytes)));
+        let (tiles, bytes) =
+            entries.all().fold((0, 0), |(n, sum), (_, entry)| (n + 1, sum + u64::from(entry.bytes)));
         if (tiles, bytes) != (section.stored_tiles, section.tile_bytes) {
             let problem = "it holds another number of tiles or bytes than the imagery header says";
             return Err(damaged(path, "imagery directory".into(), problem));
@@ -150,12 +151,12 @@ impl Imagery {
     }
 
     /// The tiles' entries, in the order of the directory.
-    pub(super) fn entries(&self) -> &[TileEntry] {
+    pub(super) fn entries(&self) -> &Entries {
         &self.entries
     }
 
     /// Imagery of the same opened terrain, from what its first page says and its directory.
-    pub(super) fn with(&self, section: Section, entries: Vec<TileEntry>) -> Self {
+    pub(super) fn with(&self, section: Section, entries: Entries) -> Self {
         Self { section, entries, of: self.of }
     }
 
@@ -166,8 +167,8 @@ impl Imagery {
 
     /// Tiles that are not the same in two states of a file whose imagery has one shape.
     pub(super) fn differing(&self, other: &Self) -> Vec<TileId> {
-        let pairs = self.entries.iter().zip(&other.entries);
-        self.section.shape.ids().zip(pairs).filter(|(_, (a, b))| a != b).map(|(id, _)| id).collect()
+        let indices = self.entries.differing(&other.entries);
+        indices.into_iter().filter_map(|index| self.section.shape.id_at(index)).collect()
     }
 
     /// First page, length in bytes and checksum of a tile that is stored.
@@ -193,13 +194,13 @@ impl Imagery {
     /// Pages that first page, directory and tiles take, wherever they lie.
     pub(crate) fn used_pages(&self) -> u64 {
         let page = PAGE_BYTES as u64;
-        let tiles = self.entries.iter().map(|entry| u64::from(entry.bytes).div_ceil(page));
+        let tiles = self.entries.all().map(|(_, entry)| u64::from(entry.bytes).div_ceil(page));
         1 + self.section.directory_bytes().div_ceil(page) + tiles.sum::<u64>()
     }
 
     pub(super) fn entry(&self, id: TileId) -> Option<TileEntry> {
         let index = self.section.shape.index(id)?;
-        self.entries.get(index as usize).copied().filter(|entry| entry.is_present())
+        Some(self.entries.get(index)).filter(|entry| entry.is_present())
     }
 }
 
@@ -208,7 +209,7 @@ pub(super) fn check_uses(
     source: &dyn Source,
     place: ImageryPlace,
     section: &Section,
-    entries: &[TileEntry],
+    entries: &Entries,
     file_bytes: u64,
 ) -> Result<(), LayoutError> {
     let page = PAGE_BYTES as u64;
@@ -217,7 +218,8 @@ pub(super) fn check_uses(
     uses.take(place.offset / page, 1).map_err(damaged("imagery header".into()))?;
     uses.take(section.directory_page.into(), section.directory_bytes().div_ceil(page))
         .map_err(damaged("imagery directory".into()))?;
-    for (id, entry) in section.shape.ids().zip(entries).filter(|(_, entry)| entry.is_present()) {
+    for (index, entry) in entries.all() {
+        let Some(id) = section.shape.id_at(index) else { continue };
         let problem = uses.take(entry.page.into(), u64::from(entry.bytes).div_ceil(page)).err();
         if let Some(problem) = problem {
             return Err(damaged(format!("imagery directory entry of {}", tile_name(id)))(problem));

@@ -147,6 +147,20 @@ impl ImageryShape {
         Some(below + u64::from(id.y) * u64::from(across) + u64::from(id.x))
     }
 
+    /// The tile at a place in the directory; `None` past the last.
+    pub(super) fn id_at(&self, index: u64) -> Option<TileId> {
+        let mut rest = index;
+        for level in 0..self.levels {
+            let tiles = self.level_tiles(level);
+            if rest < tiles {
+                let across = u64::from(self.tile_count(level)[0]);
+                return Some(TileId { level, x: (rest % across) as u32, y: (rest / across) as u32 });
+            }
+            rest -= tiles;
+        }
+        None
+    }
+
     /// Every tile, in the order of the directory.
     pub fn ids(&self) -> impl Iterator<Item = TileId> + '_ {
         (0..self.levels).flat_map(move |level| {
@@ -173,12 +187,13 @@ mod tests {
             assert_eq!(shape.tile_count(shape.levels), [0, 0]);
             assert!(shape.levels == 1 || shape.tile_count(shape.levels - 2) != [1, 1]);
             for (i, id) in (0u64..).zip(shape.ids()) {
-                assert_eq!(shape.index(id), Some(i));
+                assert_eq!((shape.index(id), shape.id_at(i)), (Some(i), Some(id)));
                 let covered = shape.covered_texels(id);
                 assert!(covered.iter().all(|c| (1..=INNER_TEXELS).contains(c)));
                 assert!(shape.stored_texels(id).iter().all(|s| s % 4 == 0 && *s <= TILE_TEXELS));
             }
             assert_eq!(shape.ids().count() as u64, shape.tiles());
+            assert_eq!(shape.id_at(shape.tiles()), None);
             let [across, up] = shape.tile_count(0);
             let last = shape.covered_texels(TileId { level: 0, x: across - 1, y: up - 1 });
             let whole = [across - 1, up - 1].map(|tiles| tiles * INNER_TEXELS);

@@ -4,11 +4,11 @@
 
 use super::super::Imagery;
 use super::super::reader::check_uses;
-use super::super::section::{Section, TILE_ENTRY_BYTES, TileEntry};
+use super::super::section::{Section, TileEntry};
 use super::super::shape::TileId;
 use super::Painter;
 use crate::error::LayoutError;
-use crate::file::bytes::{PAGE_BYTES, checksum};
+use crate::file::bytes::{PAGE_BYTES, checksum, to_usize};
 use crate::file::header::ImageryPlace;
 #[cfg(feature = "files")]
 use rayon::prelude::*;
@@ -48,9 +48,10 @@ impl PaintedSection {
         let made: Vec<TileEntry> = ids.par_iter().map(entry).collect();
         #[cfg(not(feature = "files"))]
         let made: Vec<TileEntry> = ids.iter().map(entry).collect();
-        let mut entries = current.entries().to_vec();
-        let directory_bytes = (entries.len() * TILE_ENTRY_BYTES).next_multiple_of(PAGE_BYTES);
-        let mut bytes = vec![0; PAGE_BYTES + directory_bytes];
+        let mut entries = current.entries().clone();
+        let directory_bytes = to_usize(current.section().directory_bytes())?;
+        // What is zero takes no memory until it is written to.
+        let mut bytes = vec![0; PAGE_BYTES + directory_bytes.next_multiple_of(PAGE_BYTES)];
         for (id, mut entry) in ids.iter().zip(made) {
             let Some(index) = shape.index(*id) else { continue };
             if entry.page == 0 && entry.bytes > 0 {
@@ -66,23 +67,22 @@ impl PaintedSection {
                 }
                 bytes.resize(bytes.len().next_multiple_of(PAGE_BYTES), 0);
             }
-            entries[index as usize] = entry;
+            entries.set(index, entry);
         }
-        if entries == current.entries() {
+        if entries == *current.entries() {
             return Ok(None);
         }
-        let mut directory = vec![0; entries.len() * TILE_ENTRY_BYTES];
-        entries.iter().enumerate().for_each(|(i, entry)| entry.write(&mut directory, i));
-        let present = entries.iter().filter(|entry| entry.is_present());
+        for (index, entry) in entries.all() {
+            entry.write(&mut bytes[PAGE_BYTES..], index as usize);
+        }
         let section = Section {
-            stored_tiles: present.clone().count() as u64,
-            tile_bytes: present.map(|entry| u64::from(entry.bytes)).sum(),
+            stored_tiles: entries.all().count() as u64,
+            tile_bytes: entries.all().map(|(_, entry)| u64::from(entry.bytes)).sum(),
             directory_page: first_page + 1,
-            directory_checksum: checksum(&directory),
+            directory_checksum: entries.checksum(),
             ..current.section().clone()
         };
         bytes[..PAGE_BYTES].copy_from_slice(&section.to_page()[..]);
-        bytes[PAGE_BYTES..PAGE_BYTES + directory.len()].copy_from_slice(&directory);
         let place = ImageryPlace { offset: u64::from(first_page) * PAGE, bytes: bytes.len() as u64 };
         // Tiles of two states of a file of nonsense may lie over one another.
         check_uses(painter.files.terrain.source(), place, &section, &entries, place.end())?;
