@@ -4,6 +4,12 @@
 //! bytes, behind all that counts, and the next commit writes over it. Files without one read as ever.
 
 use super::bytes::{checksum, get_u32};
+#[cfg(feature = "files")]
+use super::header::Header;
+#[cfg(feature = "files")]
+use super::source::Source;
+#[cfg(feature = "files")]
+use crate::error::LayoutError;
 
 /// Bytes of a mark.
 pub(crate) const MARK_BYTES: usize = 64;
@@ -32,6 +38,21 @@ impl Mark {
         let sum = checksum(&bytes[..CHECKSUM]);
         put_u32(&mut bytes, CHECKSUM, sum);
         bytes
+    }
+
+    /// The mark that a file ends with, if it says of this header that it is saved: what a copy in another form is to end with, too.
+    ///
+    /// # Errors
+    /// I/O.
+    #[cfg(feature = "files")]
+    pub(crate) fn to_carry(
+        source: &dyn Source,
+        header: &Header,
+    ) -> Result<Option<[u8; MARK_BYTES]>, LayoutError> {
+        let mut end = [0; MARK_BYTES];
+        let saved = Self { generation: header.generation, is_saved: true };
+        let is_there = source.read_end(&mut end)? && Self::parse(&end) == Some(saved);
+        Ok(is_there.then_some(end))
     }
 
     /// `None` if these are no mark.

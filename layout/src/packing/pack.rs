@@ -14,6 +14,7 @@ use crate::file::directory::{page_at, put_directory};
 use crate::file::disk::Disk;
 use crate::file::header::{Header, INERT_PAGE};
 use crate::file::lock::WriteLock;
+use crate::file::mark::Mark;
 use crate::file::packed_end::{FRONT, Run};
 use crate::file::source::Source;
 use crate::grid::record::RecordCodec;
@@ -64,6 +65,11 @@ pub fn pack(disk: &dyn Disk, from: &Path, to: &Path, progress: &dyn Progress) ->
     let file = AtomicFile::create(to)?;
     let built = built.as_ref().unwrap_or(&terrain);
     let packed = pack_into(disk, &terrain, built, &file, Check::Pages, progress)?;
+    if let Some(mark) = Mark::to_carry(terrain.source(), terrain.header())? {
+        let when_full = "cannot write the packed file, for which there is no room; make some on its disk, or name an output on another";
+        disk.write_at(file.file(), &mark, packed.bytes)
+            .map_err(|e| LayoutError::write(to, "cannot write the packed file", when_full, e))?;
+    }
     progress.stage("syncing", 0);
     file.publish_on(disk)?;
     Ok(packed)

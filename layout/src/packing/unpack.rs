@@ -6,6 +6,7 @@ use crate::file::atomic::AtomicFile;
 use crate::file::bytes::to_usize;
 use crate::file::disk::Disk;
 use crate::file::header::Header;
+use crate::file::mark::Mark;
 use crate::progress::Progress;
 use crate::publish::publish_terrain;
 use crate::read::terrain::Terrain;
@@ -53,6 +54,9 @@ pub fn unpack(
         for (chunk, made) in (first..).zip(made) {
             disk.write_at(file.file(), &made, chunk * CHUNK_BYTES as u64).map_err(failed)?;
         }
+    }
+    if let Some(mark) = Mark::to_carry(terrain.source(), terrain.header())? {
+        disk.write_at(file.file(), &mark, bytes).map_err(failed)?;
     }
     progress.stage("checking", terrain.header().stored_pages * per_page);
     check(&terrain, &file, progress)?;
