@@ -64,11 +64,12 @@ pub fn pack(disk: &dyn Disk, from: &Path, to: &Path, progress: &dyn Progress) ->
     let built = terrain.header().history.map(|_| Terrain::open_original(from)).transpose()?;
     let file = AtomicFile::create(to)?;
     let built = built.as_ref().unwrap_or(&terrain);
-    let packed = pack_into(disk, &terrain, built, &file, Check::Pages, progress)?;
+    let mut packed = pack_into(disk, &terrain, built, &file, Check::Pages, progress)?;
     if let Some(mark) = Mark::to_carry(terrain.source(), terrain.header())? {
         let when_full = "cannot write the packed file, for which there is no room; make some on its disk, or name an output on another";
         disk.write_at(file.file(), &mark, packed.bytes)
             .map_err(|e| LayoutError::write(to, "cannot write the packed file", when_full, e))?;
+        packed.bytes += mark.len() as u64;
     }
     progress.stage("syncing", 0);
     file.publish_on(disk)?;
