@@ -12,9 +12,7 @@
 
 use super::certificate::{clock_of, expiry_of};
 use super::clocks::{CLOCKS, EXPIRY_BITS};
-use super::wheel::{
-    DIGIT, LEVELS, NONE, PLACES, SLOTS, Wheels, frames_a_slot, level_of, over, place_of, slot_at,
-};
+use super::wheel::{DIGIT, LEVELS, NONE, SLOTS, Wheels, frames_a_slot, level_of, over, slot_at};
 use crate::refine::kinetic::capacity::give_up;
 use crate::refine::kinetic::chunked::Chunked;
 use terrasoar_layout::read::prefetch::prefetch;
@@ -108,7 +106,8 @@ impl Queue {
 
     /// Where a word on clock `clock` is to be entered. Asks memory for what that will write to.
     #[inline(always)]
-    pub(crate) fn place(&self, clock: usize, word: u32) -> Place {
+    pub(crate) fn place(&mut self, clock: usize, word: u32) -> Place {
+        self.wheels.lend(clock);
         let place = self.place_on(clock, word);
         self.fetch_place(place);
         place
@@ -129,6 +128,7 @@ impl Queue {
     /// Enters a node under its word's expiry on clock `clock`.
     #[inline(always)]
     pub(crate) fn enter(&mut self, clock: usize, entry: Entry) {
+        self.wheels.lend(clock);
         self.enter_at(self.place_on(clock, entry.word), entry.node);
     }
 
@@ -167,7 +167,7 @@ impl Queue {
         let then =
             std::mem::replace(&mut self.wheels.now[clock % CLOCKS], now.min(u64::from(u32::MAX)) as u32);
         if self.wheels.is_empty(clock) {
-            return;
+            return self.wheels.take_back(clock);
         }
         if now >= 1 << EXPIRY_BITS {
             return self.drain(clock, due);
@@ -187,7 +187,7 @@ impl Queue {
         while open != 0 {
             let level = open.trailing_zeros() as usize % LEVELS;
             open &= open - 1;
-            let place = place_of(clock, level, slot_at(now, level));
+            let place = self.wheels.place_of(clock, level, slot_at(now, level));
             if !self.wheels.is_occupied(place) {
                 continue;
             }
@@ -209,8 +209,9 @@ impl Queue {
         for level in 0..LEVELS {
             let (end, same_turn) = over(then, now, level);
             // The slot that the tick is in, too: what it holds is looked at.
-            let end = place_of(clock, level, end.max(slot_at(now, level) + 1));
-            let mut at = place_of(clock, level, 0);
+            let first = self.wheels.place_of(clock, level, 0);
+            let end = first + end.max(slot_at(now, level) + 1);
+            let mut at = first;
             while let Some(place) = self.wheels.next_occupied(at, end) {
                 if heads {
                     prefetch(&self.wheels.heads, place);
@@ -255,7 +256,7 @@ impl Queue {
         for (level, count) in counts.into_iter().enumerate() {
             let (end, same_turn) = over(self.wheels.now[clock % CLOCKS], now as u32, level);
             if count > 0 {
-                let place = place_of(clock, level, 0);
+                let place = self.wheels.place_of(clock, level, 0);
                 sum += of(place, place + end, count);
             }
             if same_turn {
@@ -295,7 +296,7 @@ impl Queue {
         const SLOTS_A_FRAME: usize = 256;
         let mut kept = std::mem::take(&mut self.moving);
         for _ in 0..SLOTS_A_FRAME {
-            self.swept = (self.swept + 1) % PLACES;
+            self.swept = (self.swept + 1) % self.wheels.heads.len();
             if self.wheels.is_occupied(self.swept) {
                 self.take_slot(self.swept, &mut |node| kept.push((node, Place::default())));
                 kept.sort_unstable_by_key(|(node, _)| *node);
@@ -313,6 +314,7 @@ impl Queue {
     /// Sets the tick of an empty wheel.
     pub(crate) fn restart(&mut self, clock: usize, now: u32) {
         debug_assert!(self.wheels.is_empty(clock));
+        self.wheels.take_back(clock);
         (self.wheels.now[clock % CLOCKS], self.wheels.open[clock % CLOCKS]) = (now, 0);
     }
 
@@ -408,7 +410,8 @@ impl Queue {
     /// Takes the entries of the first `end` slots of a level out.
     #[inline(always)]
     fn take_slots(&mut self, clock: usize, level: usize, end: usize, each: &mut impl FnMut(u32)) {
-        let (mut at, end) = (place_of(clock, level, 0), place_of(clock, level, end));
+        let first = self.wheels.place_of(clock, level, 0);
+        let (mut at, end) = (first, first + end);
         while let Some(place) = self.wheels.next_occupied(at, end) {
             self.take_slot(place, each);
             at = place + 1;

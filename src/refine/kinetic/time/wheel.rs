@@ -3,8 +3,10 @@
 //! Hierarchical timing wheels, after G. Varghese, T. Lauck, "Hashed and Hierarchical Timing Wheels", SOSP 1987: an entry lies on the level of the highest digit in which its expiry
 //! differs from the clock. Digits have 8 bits: a frame takes some hundred ticks on a straight way, so that most entries are over on the level that they were entered on.
 //!
-//! Invariant: an entry's expiry is not below its wheel's tick, and differs from it in no digit above its level. Cost: 3 KiB a wheel. A place is one number, so that finding one takes few
-//! instructions.
+//! Few clocks have words at a time, so a wheel's slots are lent to it while it has entries: a *row* of all its levels.
+//!
+//! Invariant: an entry's expiry is not below its wheel's tick, and differs from it in no digit above its level. Row 0 is empty, and that of all wheels without entries. Cost: 3 KiB a row. A place is
+//! one number, so that finding one takes few instructions.
 
 use super::clocks::{CLOCKS, EXPIRY_BITS};
 
@@ -14,10 +16,10 @@ pub(super) const DIGIT: u32 = 8;
 pub(super) const SLOTS: usize = 1 << DIGIT;
 /// Levels that cover every expiry.
 pub(super) const LEVELS: usize = EXPIRY_BITS.div_ceil(DIGIT) as usize;
-/// Levels of all wheels.
-const ALL_LEVELS: usize = CLOCKS * LEVELS;
-/// Slots of all wheels.
-pub(super) const PLACES: usize = ALL_LEVELS * SLOTS;
+/// Slots of a row.
+const ROW: usize = LEVELS * SLOTS;
+/// Rows that memory is taken for at once.
+const ROWS_MORE: usize = 8;
 /// Slots whose bits are one word.
 const WORD: usize = 64;
 /// No chunk.
@@ -27,11 +29,15 @@ pub(super) const NONE: u32 = u32::MAX;
 #[derive(Debug)]
 pub(super) struct Wheels {
     /// First chunk of each slot.
-    pub heads: Box<[u32]>,
+    pub heads: Vec<u32>,
     /// Bit p % 64 of word p / 64: the slot at place p holds something.
-    occupied: Box<[u64]>,
-    /// Entries of a level.
-    pub counts: Box<[u32; ALL_LEVELS]>,
+    occupied: Vec<u64>,
+    /// Entries of each row's levels.
+    pub counts: Vec<u32>,
+    /// The row of a clock.
+    rows: [u8; CLOCKS],
+    /// Rows of no clock.
+    free: Vec<u8>,
     /// Tick of a wheel.
     pub now: [u32; CLOCKS],
     /// Bit l: the slot of level l that the tick is in has entries.
@@ -40,13 +46,19 @@ pub(super) struct Wheels {
 
 impl Wheels {
     pub(super) fn new() -> Self {
-        Self {
-            heads: vec![NONE; PLACES].into(),
-            occupied: vec![0; PLACES / WORD].into(),
-            counts: Box::new([0; ALL_LEVELS]),
+        let mut wheels = Self {
+            heads: Vec::new(),
+            occupied: Vec::new(),
+            counts: Vec::new(),
+            rows: [0; CLOCKS],
+            free: Vec::with_capacity(CLOCKS + 1),
             now: [0; CLOCKS],
             open: [0; CLOCKS],
-        }
+        };
+        wheels.more_rows();
+        // Row 0 is nobody's.
+        wheels.free.pop();
+        wheels
     }
 
     /// Empties all wheels, whose ticks stay.
@@ -55,28 +67,78 @@ impl Wheels {
         self.occupied.fill(0);
         self.counts.fill(0);
         self.open.fill(0);
+        self.rows.fill(0);
+        self.free.clear();
+        self.free.extend((1..self.counts.len() / LEVELS).rev().map(|row| row as u8));
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.heads) + size_of_val(&*self.occupied) + size_of_val(&*self.counts)
+        (self.heads.capacity() + self.counts.capacity()) * size_of::<u32>()
+            + self.occupied.capacity() * size_of::<u64>()
+            + self.free.capacity()
     }
 
-    /// The place of what is over at `expiry` on a clock.
+    /// Makes rows, the first to be lent last in the list.
+    fn more_rows(&mut self) {
+        let from = self.counts.len() / LEVELS;
+        let rows = (from + ROWS_MORE).min(CLOCKS + 1);
+        self.heads.reserve_exact((rows - from) * ROW);
+        self.heads.resize(rows * ROW, NONE);
+        self.occupied.reserve_exact((rows - from) * ROW / WORD);
+        self.occupied.resize(rows * ROW / WORD, 0);
+        self.counts.resize(rows * LEVELS, 0);
+        self.free.extend((from..rows).rev().map(|row| row as u8));
+    }
+
+    /// Lends a clock a row, unless it has one.
+    #[inline(always)]
+    pub(super) fn lend(&mut self, clock: usize) {
+        if self.rows[clock % CLOCKS] == 0 {
+            self.lend_row(clock % CLOCKS);
+        }
+    }
+
+    #[cold]
+    fn lend_row(&mut self, clock: usize) {
+        if self.free.is_empty() {
+            self.more_rows();
+        }
+        // There is one for each clock.
+        self.rows[clock] = self.free.pop().unwrap_or_default();
+    }
+
+    /// Takes back the row of a clock that has no entries.
+    #[inline(always)]
+    pub(super) fn take_back(&mut self, clock: usize) {
+        let row = std::mem::take(&mut self.rows[clock % CLOCKS]);
+        if row != 0 {
+            self.free.push(row);
+        }
+    }
+
+    /// A place of a clock's wheel.
+    #[inline(always)]
+    pub(super) fn place_of(&self, clock: usize, level: usize, slot: usize) -> usize {
+        (self.rows[clock % CLOCKS] as usize * LEVELS + level) * SLOTS + slot
+    }
+
+    /// The place of what is over at `expiry` on a clock. One in row 0 is to be looked at only.
     #[inline(always)]
     pub(super) fn place(&self, clock: usize, expiry: u32) -> usize {
-        const { assert!(LEVELS == 3) };
+        const { assert!(LEVELS == 3 && CLOCKS < 256) };
         let now = self.now[clock % CLOCKS];
         let expiry = expiry.max(now);
         let differing = expiry ^ now;
         let level = usize::from(differing >= 1 << DIGIT) + usize::from(differing >= 1 << (2 * DIGIT));
-        place_of(clock, level, slot_at(expiry, level))
+        self.place_of(clock, level, slot_at(expiry, level))
     }
 
     /// Entries of each level of a clock.
     #[inline(always)]
     pub(super) fn counts_of(&self, clock: usize) -> [u32; LEVELS] {
-        std::array::from_fn(|level| self.counts[clock % CLOCKS * LEVELS + level])
+        let row = self.rows[clock % CLOCKS] as usize;
+        std::array::from_fn(|level| self.counts[row * LEVELS + level])
     }
 
     #[inline(always)]
@@ -121,16 +183,10 @@ impl Wheels {
     }
 }
 
-/// The place of a slot.
-#[inline(always)]
-pub(super) fn place_of(clock: usize, level: usize, slot: usize) -> usize {
-    (clock % CLOCKS * LEVELS + level) * SLOTS + slot
-}
-
-/// The level of all wheels' levels that a place is on.
+/// The level of all rows' levels that a place is on.
 #[inline(always)]
 pub(super) fn level_of(place: usize) -> usize {
-    place / SLOTS % ALL_LEVELS
+    place / SLOTS
 }
 
 /// How many slots of a level, from the first one, are over as a whole when a wheel moves on from `then` to `now`: up to the one that the new tick is in, or all of a turn that is over. Whether the
