@@ -58,7 +58,9 @@ impl OpenedDem {
         let mut declared = reader.declared().clone();
         let mask = beside.complete(&mut declared, options)?;
         let mut warnings = declared.warnings.clone();
-        let system = crs::resolve(&declared.crs, options.crs.as_deref(), &mut warnings)?;
+        let mut system = crs::resolve(&declared.crs, options.crs.as_deref(), &mut warnings)?;
+        let map = declared.place.as_mut().map(|place| &mut place.value);
+        warnings.extend(crs::eastings_first(&mut system, map));
         let voids = Voids::new(path, &declared.value.nodata, &options.nodata, declared.sample_type)?
             .within(declared.value.valid.as_ref().map(|valid| valid.value), declared.sample_type);
         let heights = heights(&declared.value, &system, options, options.decode.is_some(), &mut warnings)?;
@@ -105,9 +107,9 @@ impl OpenedDem {
             }
             (samples, map, sample_type) = (warp.samples(), Some(warp.map()), warp.sample_type());
             placed.push(warp.words());
-            if warp.is_rough() {
+            if let Some(doubt) = warp.doubt() {
                 let target = warp.system().map_or("", |target| target.name.as_str());
-                warnings.push(Warning::new(crs::shift_lost(&system.name, target)));
+                warnings.push(Warning::new(crs::shift_in_doubt(doubt, &system.name, target)));
             }
             if let Some(target) = warp.system() {
                 system = System { vertical: system.vertical.clone(), ..target.clone() };

@@ -1,7 +1,7 @@
 //! Places on the ground: coordinates of a terrain's own reference system, or of another, to metres from its south-west sample and back.
 //!
 //! Coordinates are east before north in every system: longitude before latitude. A [`Frame`] is a terrain seen in one system. Longitudes may have any number of full turns added. Datums are
-//! shifted by parameters. Where the shift needs a grid, which is not here, or is not known, it is left out and [`Frame::is_rough`] says so. Cost: in the terrain's own system a few operations a place, in
+//! shifted by parameters. Where the shift needs a grid, which is not here, or is not known, it is left out and [`Frame::doubt`] says so. Cost: in the terrain's own system a few operations a place, in
 //! others a microsecond.
 //!
 //! ```
@@ -23,6 +23,7 @@
 //! # }
 //! ```
 
+pub use crate::crs::Doubt;
 use crate::crs::{Ground, HorizontalSize, Kind, System, Unit, by_text, is_earth};
 use terrasoar_layout::dem::HorizontalUnit;
 use terrasoar_layout::error::LayoutError;
@@ -284,11 +285,10 @@ impl Frame {
         self.other.as_ref().or(self.own.as_ref())
     }
 
-    /// Whether places may be off by some hundred metres, for the shift between the two datums is not known here.
-    pub fn is_rough(&self) -> bool {
+    /// How far places may be off, where the shift between the two datums is not known well.
+    pub fn doubt(&self) -> Option<Doubt> {
         let ground = |crs: &'_ Option<Crs>| crs.as_ref().and_then(|crs| crs.ground.clone());
-        matches!((ground(&self.own), ground(&self.other)), (Some(own), Some(other)) if own.is_rough_to(&other))
-            && !self.is_same
+        ground(&self.own)?.doubt(&ground(&self.other)?).filter(|_| !self.is_same)
     }
 
     /// Metres east and north of the south-west sample to coordinates; `None` where the projection has none. Longitudes of other systems than the own one lie within half a turn of 0.

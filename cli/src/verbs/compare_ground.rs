@@ -187,10 +187,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
 
 /// What may make differences that are none of the ground.
 fn warn(first: &Terrain, second: &Terrain, difference: &Difference<'_>) {
-    if difference.is_rough() {
-        complain(
-            "note: the shift between the two datums is not known here, or a grid that is not here; places may be off by up to some hundred metres",
-        );
+    if let Some(doubt) = difference.doubt() {
+        complain(&format!("note: the shift between the two datums {doubt}"));
     }
     let [a, b] = [first, second].map(|terrain| terrain.header().about.vertical_name.as_str());
     if a != b && !a.is_empty() && !b.is_empty() {

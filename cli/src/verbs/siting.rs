@@ -173,10 +173,8 @@ pub(super) fn frame(header: &Header, crs: Option<&str>) -> Result<Option<Frame>>
     } else {
         Frame::of(header, &Crs::named(text)?)?
     };
-    if frame.is_rough() {
-        complain(
-            "note: the shift between the two datums is not known here, or a grid that is not here; places may be off by up to some hundred metres",
-        );
+    if let Some(doubt) = frame.doubt() {
+        complain(&format!("note: the shift between the two datums {doubt}"));
     }
     Ok(Some(frame))
 }

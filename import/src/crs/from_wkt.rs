@@ -44,7 +44,8 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
             _ => None,
         })?;
         if let Some(shift) = bound::shift(node) {
-            inner.proj = inner.proj.map(|proj| shifted(&proj, &shift));
+            inner.proj = inner.proj.map(|proj| registry::shifted(&proj, &shift));
+            inner.off_m = None;
         }
         return Some(inner);
     }
@@ -68,12 +69,12 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
     system.datum = node.find(&DATUM).and_then(|datum| datum.text(0)).map(datum_key).unwrap_or_default();
     (system.signs, system.is_south_first) = axes(node);
     if kind != Kind::Local {
-        system.proj = projection(node, system.code);
+        (system.proj, system.off_m) = projection(node, system.code);
         // A grid is named where the registry does not tell the shift.
         if system.code.is_none()
             && let Some(grids) = bound::grids(node)
         {
-            system.proj = system.proj.map(|proj| shifted(&proj, &grids));
+            system.proj = system.proj.map(|proj| registry::shifted(&proj, &grids));
         }
     }
     if kind == Kind::Geographic {
@@ -186,21 +187,18 @@ fn signs(node: &Node) -> [f64; 2] {
     if both("SOUTH") || both("NORTH") { [1.0; 2] } else { signs }
 }
 
-/// How the system is projected: by its code, or by its own parameters.
-fn projection(node: &Node, code: Option<u32>) -> Option<String> {
-    match code.and_then(registry::horizontal) {
-        Some(registry::Horizontal::Text { proj, .. } | registry::Horizontal::Parts { proj, .. })
-            if !proj.is_empty() =>
-        {
-            return Some(proj.to_owned());
+/// How the system is projected, by its code or by its own parameters, and by how many metres places may be off.
+fn projection(node: &Node, code: Option<u32>) -> (Option<String>, Option<f64>) {
+    if let Some((code, known)) = code.and_then(|code| Some((code, registry::horizontal(code)?))) {
+        let (registry::Horizontal::Text { proj, .. } | registry::Horizontal::Parts { proj, .. }) = known;
+        if !proj.is_empty() {
+            let (proj, off_m) = registry::tied(code, proj);
+            return (Some(proj), off_m);
         }
-        _ => {}
     }
     // Another's parser on a stranger's text.
-    quiet(|| proj4wkt::wkt_to_projstring(&written(node)).ok())
-        .flatten()
-        .filter(|proj| proj.contains("+proj="))
-        .map(|proj| completed(proj, node))
+    let proj = quiet(|| proj4wkt::wkt_to_projstring(&written(node)).ok()).flatten();
+    (proj.filter(|proj| proj.contains("+proj=")).map(|proj| completed(proj, node)), None)
 }
 
 /// A string with what its parser leaves out.
@@ -230,13 +228,6 @@ fn completed(proj: String, node: &Node) -> String {
         Some(scale) if has(&["+proj=lcc"]) && !has(&["+k=", "+k_0="]) => format!("{proj} +k_0={scale}"),
         _ => proj,
     }
-}
-
-/// The string with another shift of datum.
-fn shifted(proj: &str, shift: &str) -> String {
-    let is_kept = |word: &&str| !["+towgs84=", "+nadgrids="].iter().any(|start| word.starts_with(start));
-    let kept: Vec<&str> = proj.split_whitespace().filter(is_kept).collect();
-    format!("{} {shift}", kept.join(" "))
 }
 
 /// The node as text again, for a parser that wants one system and nothing around it.

@@ -4,6 +4,7 @@
 //! most; the place remains known. Angles are radians. Cost: a microsecond a point.
 
 use super::from_proj;
+use super::south_first::crossed;
 use super::system::{Kind, System};
 use crate::guard::quiet;
 use crate::reader::HorizontalSize;
@@ -38,6 +39,7 @@ pub(crate) struct Ground {
     /// Metres or radians a unit.
     size: f64,
     signs: [f64; 2],
+    is_south_first: bool,
     /// Once around the globe in the system's unit, where that leads to the same place.
     turn: Option<f64>,
     /// Semi-axes of the ellipsoid in metres.
@@ -48,6 +50,26 @@ pub(crate) struct Ground {
     unshifted: Option<(Proj, String)>,
     /// The datum, where nothing says how it lies to that of WGS 84, and its ellipsoid is another.
     untied: Option<String>,
+    /// The metres by which a shift that differs from region to region may be off.
+    off_m: Option<f64>,
+}
+
+/// What is not known of the shift between two datums.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// Nothing is known, or a grid is not here, so that the shift was left out.
+    Unknown,
+    /// It differs from region to region, or is an old one, by so many metres.
+    OffM(f64),
+}
+
+impl std::fmt::Display for Doubt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Unknown => f.write_str("is not known here, or a grid that is not here, and was left out, so places may be off by up to some hundred metres"),
+            Self::OffM(off_m) => write!(f, "differs from region to region or is known roughly, so places may be off by up to {off_m:.0} m"),
+        }
+    }
 }
 
 impl std::fmt::Debug for Ground {
@@ -118,7 +140,13 @@ impl Ground {
             let unshifted =
                 Proj::from_proj_string(&plain(&no_grid)).ok().filter(|_| !system.datum.is_empty());
             let unshifted = unshifted.map(|proj| (proj, system.datum.clone()));
-            Some(Self { unshifted, untied: untied(&text, &system.datum), ..found })
+            Some(Self {
+                unshifted,
+                untied: untied(&text, &system.datum),
+                off_m: system.off_m,
+                is_south_first: system.is_south_first,
+                ..found
+            })
         })
         .flatten()
     }
@@ -137,8 +165,20 @@ impl Ground {
             true => Some(std::f64::consts::TAU / size),
             false => turn_on_map(&proj, &own).map(|metres| metres / size),
         };
-        let this =
-            Self { proj, own, world, size, signs, turn, axes_m, lost: None, unshifted: None, untied: None };
+        let this = Self {
+            proj,
+            own,
+            world,
+            size,
+            signs,
+            is_south_first: false,
+            turn,
+            axes_m,
+            lost: None,
+            unshifted: None,
+            untied: None,
+            off_m: None,
+        };
         // A datum by a grid that is not here shows at the first point.
         let (lon, lat) = (this.proj.longitude_of_origin(), this.proj.latitude_of_origin().clamp(-1.4, 1.4));
         let mut probe = (lon + 0.01, lat + 0.01);
@@ -157,8 +197,26 @@ impl Ground {
         self.out_of(point, &self.world)
     }
 
+    /// A point as the projection has it.
+    fn inward(&self, point: [f64; 2]) -> (f64, f64) {
+        if self.is_south_first {
+            let [x, y] = crossed(point);
+            return (x * self.size, y * self.size);
+        }
+        (point[0] * self.signs[0] * self.size, point[1] * self.signs[1] * self.size)
+    }
+
+    /// A point of the projection as the system has it.
+    fn outward(&self, (x, y): (f64, f64)) -> Option<[f64; 2]> {
+        let point = match self.is_south_first {
+            true => crossed([x / self.size, y / self.size]),
+            false => [x * self.signs[0] / self.size, y * self.signs[1] / self.size],
+        };
+        point.iter().all(|value| value.is_finite()).then_some(point)
+    }
+
     fn out_of(&self, [x, y]: [f64; 2], to: &Proj) -> Option<[f64; 2]> {
-        let mut point = (x * self.signs[0] * self.size, y * self.signs[1] * self.size);
+        let mut point = self.inward([x, y]);
         transform(&self.proj, to, &mut point).ok()?;
         (point.0.is_finite() && point.1.is_finite()).then_some([point.0, point.1])
     }
@@ -168,21 +226,19 @@ impl Ground {
     fn of_world(&self, [lon, lat]: [f64; 2]) -> Option<[f64; 2]> {
         let mut point = (lon, lat);
         transform(&self.world, &self.proj, &mut point).ok()?;
-        let point = [point.0 * self.signs[0] / self.size, point.1 * self.signs[1] / self.size];
-        point.iter().all(|value| value.is_finite()).then_some(point)
+        self.outward(point)
     }
 
     /// A point of this system in another one.
     pub(crate) fn across_to(&self, other: &Self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-        let mut point = (x * self.signs[0] * self.size, y * self.signs[1] * self.size);
+        let mut point = self.inward([x, y]);
         match (&self.unshifted, &other.unshifted) {
             // The registry has other parameters for one datum in different countries; between two systems of it there is nothing to shift.
             (Some((from, _)), Some((to, _))) if self.is_same_datum(other) => transform(from, to, &mut point),
             _ => transform(&self.proj, &other.proj, &mut point),
         }
         .ok()?;
-        let point = [point.0 * other.signs[0] / other.size, point.1 * other.signs[1] / other.size];
-        point.iter().all(|value| value.is_finite()).then_some(point)
+        other.outward(point)
     }
 
     /// Whether the datum is told by a grid that is not here, so that places are off by its shift where they are brought to another datum.
@@ -190,9 +246,16 @@ impl Ground {
         self.lost.is_some()
     }
 
-    /// Whether places brought to the other system are off by a shift that is not here or not known: one of both has lost it, or each another one.
-    pub(crate) fn is_rough_to(&self, other: &Self) -> bool {
-        (&self.lost, &self.untied) != (&other.lost, &other.untied) && !self.is_same_datum(other)
+    /// How far places brought to the other system may be off, for the shift between both datums is not known well; `None` where it is.
+    pub(crate) fn doubt(&self, other: &Self) -> Option<Doubt> {
+        if self.is_same_datum(other) {
+            return None;
+        }
+        if (&self.lost, &self.untied) != (&other.lost, &other.untied) {
+            return Some(Doubt::Unknown);
+        }
+        let off_m = self.off_m.unwrap_or(0.0) + other.off_m.unwrap_or(0.0);
+        (off_m > 0.0).then_some(Doubt::OffM(off_m))
     }
 
     /// Whether both are of one datum, so that nothing is shifted between them.
@@ -315,5 +378,7 @@ fn plain(text: &str) -> String {
     format!("{}{ellipsoid}", without(text, &["datum", "nadgrids", "towgs84"]))
 }
 
+#[cfg(test)]
+mod places_tests;
 #[cfg(test)]
 mod tests;

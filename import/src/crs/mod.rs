@@ -10,16 +10,19 @@ mod ground;
 mod keywords;
 mod registry;
 mod resolve;
+mod south_first;
 mod system;
 mod wkt;
 
 pub(crate) use compare::{figures_differ, places_differ};
 pub(crate) use from_proj::{unit_name as unit_in_words, word as proj_word};
+pub use ground::Doubt;
 pub(crate) use ground::{Ground, is_earth};
 pub(crate) use keywords::Keywords;
 pub(crate) use registry::{is_north_first, unit as unit_of_code, vertical_in_metres};
 pub(crate) use resolve::by_text;
 pub(crate) use resolve::resolve;
+pub(crate) use south_first::{east_north, turned as eastings_first};
 pub(crate) use system::{Kind, System, Unit, Vertical, exact_metres};
 
 pub(crate) use crate::reader::HorizontalSize;
@@ -31,14 +34,14 @@ pub(crate) const MAX_TEXT_BYTES: u64 = wkt::MAX_BYTES as u64;
 /// Longest name kept.
 const MAX_NAME_CHARS: usize = 200;
 
-/// Words for places that are off by a shift between the datums of two systems, which is not known.
-pub(crate) fn shift_lost(from: &str, to: &str) -> String {
+/// Words for places that are off by a shift between the datums of two systems, which is not known well.
+pub(crate) fn shift_in_doubt(doubt: Doubt, from: &str, to: &str) -> String {
     let [from, to] = [from, to].map(|name| match terrasoar_layout::words::harmless(name, 80) {
         name if name.is_empty() => "a system without a name".to_owned(),
         name => name,
     });
     format!(
-        "the shift between the datums of {from} and {to} is not known here, or a grid that is not here, and was left out, so places may be off by up to some hundred metres; for true places bring the data over before: gdalwarp -t_srs SYSTEM INPUT output.tif"
+        "the shift between the datums of {from} and {to} {doubt}; for true places bring the data over before: gdalwarp -t_srs SYSTEM INPUT output.tif"
     )
 }
 

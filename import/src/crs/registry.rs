@@ -8,12 +8,16 @@ const VERTICAL: &str = include_str!("registry/vertical.txt");
 const COMPOUND: &str = include_str!("registry/compound.txt");
 const MISSING: &str = include_str!("registry/missing.txt");
 const UNITS: &str = include_str!("registry/units.txt");
+const SHIFTS: &str = include_str!("registry/shifts.txt");
 
-/// PROJ strings that the list of definitions has wrong: a false easting of 40,000 chains taken for metres.
-const MENDED: [(u32, &str); 1] = [(
-    3167,
-    "+proj=omerc +lat_0=4 +lonc=102.25 +alpha=323.0257905 +k=0.99984 +x_0=804670.24 +y_0=0 +no_uoff +gamma=323.1301023611111 +a=6377295.664 +b=6356094.667915204 +to_meter=20.116756 +no_defs",
-)];
+/// PROJ strings that the list of definitions has wrong: a false easting of 40,000 chains taken for metres; a sphere for whose latitudes those of the ellipsoid are taken as they are.
+const MENDED: [(u32, &str); 2] = [
+    (
+        3167,
+        "+proj=omerc +lat_0=4 +lonc=102.25 +alpha=323.0257905 +k=0.99984 +x_0=804670.24 +y_0=0 +no_uoff +gamma=323.1301023611111 +a=6377295.664 +b=6356094.667915204 +to_meter=20.116756 +no_defs",
+    ),
+    (4055, "+proj=longlat +a=6378137 +b=6378137 +nadgrids=@null +no_defs"),
+];
 
 /// A horizontal system.
 pub(super) enum Horizontal {
@@ -58,6 +62,21 @@ pub(super) fn horizontal(code: u32) -> Option<Horizontal> {
     let size: f64 = size.parse().ok()?;
     let size = if kind == "p" { HorizontalSize::Metres(size) } else { HorizontalSize::Radians(size) };
     Some(Horizontal::Parts { name, unit_name, size, datum, proj })
+}
+
+/// The PROJ string of a code with the shift to WGS 84 as PROJ has it, and the metres by which places may still be off: where PROJ's shifts differ from region to region, and where it has none.
+pub(super) fn tied(code: u32, proj: &str) -> (String, Option<f64>) {
+    let Some([shift, off_m]) = line(SHIFTS, code) else { return (proj.to_owned(), None) };
+    let off_m = off_m.parse().ok().filter(|off_m: &f64| *off_m > 0.0);
+    let proj = if shift.is_empty() { proj.to_owned() } else { shifted(proj, &format!("+towgs84={shift}")) };
+    (proj, off_m)
+}
+
+/// The string with another shift of datum.
+pub(super) fn shifted(proj: &str, shift: &str) -> String {
+    let is_kept = |word: &&str| !["+towgs84=", "+nadgrids="].iter().any(|start| word.starts_with(start));
+    let kept: Vec<&str> = proj.split_whitespace().filter(is_kept).collect();
+    format!("{} {shift}", kept.join(" "))
 }
 
 /// Whether a system's own first axis goes north: so do those of longitudes and latitudes, and projected ones of which the list of definitions leaves the axes out, for such programs of

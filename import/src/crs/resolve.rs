@@ -28,7 +28,9 @@ fn by_code_alone(code: u32) -> Option<System> {
         Horizontal::Text { wkt, proj } => {
             let mut system = from_wkt::system(wkt)?;
             if !proj.is_empty() {
-                system.proj = Some(proj.to_owned());
+                let (proj, off_m) = registry::tied(code, proj);
+                (system.proj, system.off_m) = (Some(proj.clone()), off_m);
+                let proj = proj.as_str();
                 // A string that says nothing of axes does not deny what the text says of them, as for Krovak's to the south and west.
                 if from_proj::word(proj, "axis").is_some() {
                     system.signs = from_proj::signs(proj);
@@ -37,7 +39,9 @@ fn by_code_alone(code: u32) -> Option<System> {
             system
         }
         Horizontal::Parts { name, unit_name, size, datum, proj } => {
-            let mut system = from_proj::system(proj).unwrap_or_else(System::unknown);
+            let (proj, off_m) = registry::tied(code, proj);
+            let mut system = from_proj::system(&proj).unwrap_or_else(System::unknown);
+            system.off_m = off_m;
             system.name = name.to_owned();
             system.datum = from_wkt::datum_key(datum);
             system.kind = match size {
@@ -138,11 +142,9 @@ pub(crate) fn resolve(
             .mended_by(Remedy::ReferenceSystem)
         })?;
         system.by = "what was typed".into();
-        warnings.extend(south_first(&system));
         return Ok(system);
     }
     let mut system = found(said, warnings);
-    warnings.extend(south_first(&system));
     // What the file states by itself wins over the registry, as the standard of GeoTIFF has it.
     let yields = said.unit_yields && system.unit.is_some();
     if let Some(unit) = said.unit.as_ref().filter(|_| !yields) {
@@ -183,16 +185,6 @@ pub(crate) fn resolve(
         system.kind = Kind::Local;
     }
     Ok(system)
-}
-
-/// A warning of a system whose first number counts to the south, for grids in it may have either number first.
-fn south_first(system: &System) -> Option<Warning> {
-    system.is_south_first.then(|| {
-        Warning::new(format!(
-            "{} counts to the south first and to the west second; columns were taken to go west and rows south, so look whether the ground lies where it belongs",
-            harmless(&system.name, 80)
-        ))
-    })
 }
 
 /// By text, or by code, or by a name that is itself a text.

@@ -51,6 +51,8 @@ pub(crate) struct System {
     pub(crate) datum: String,
     /// How it is projected, as a PROJ string.
     pub(crate) proj: Option<String>,
+    /// Metres by which places of other datums may be off, for the shift differs from region to region.
+    pub(crate) off_m: Option<f64>,
     /// Whether x grows to the east and y to the north (1) or the other way (-1).
     pub(crate) signs: [f64; 2],
     /// Whether its first axis points south and its second west, so that its first number is no easting or westing.
@@ -73,6 +75,7 @@ impl System {
             radius_m: None,
             datum: String::new(),
             proj: None,
+            off_m: None,
             signs: [1.0; 2],
             is_south_first: false,
             text: String::new(),

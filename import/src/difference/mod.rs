@@ -9,7 +9,7 @@ mod survey;
 pub use survey::{Extreme, Reduced, Summary};
 
 use crate::export::{Meaning, Numbers, Written, write_raster};
-use crate::places::{Crs, Frame};
+use crate::places::{Crs, Doubt, Frame};
 use crate::raster::{Raster, TerrainSamples};
 use std::path::Path;
 use terrasoar_layout::dem::Window;
@@ -57,9 +57,9 @@ impl<'t> Difference<'t> {
         self.frames.is_some()
     }
 
-    /// Whether places may be off by some hundred metres, for a shift between datums is not known here.
-    pub fn is_rough(&self) -> bool {
-        self.frames.as_ref().is_some_and(|(_, second)| second.is_rough())
+    /// How far places may be off, where a shift between datums is not known well.
+    pub fn doubt(&self) -> Option<Doubt> {
+        self.frames.as_ref().and_then(|(_, second)| second.doubt())
     }
 
     /// Writes the differences in metres as a cloud-optimised GeoTIFF, in single precision.

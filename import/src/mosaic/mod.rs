@@ -19,7 +19,7 @@ mod told;
 mod values;
 
 use crate::cells::{CELL, Cells, each_block_met};
-use crate::crs::{System, shift_lost};
+use crate::crs::{System, shift_in_doubt};
 use crate::guard::is_ours;
 use crate::opened::{Known, OpenedDem};
 use crate::options::{OpenOptions, Priority, Resampling};
@@ -28,7 +28,6 @@ use crate::value::Voids;
 use crate::warp::{Store, blocks_bytes};
 use aim::{Aim, aimed};
 use blend::{Blend, Edges, over};
-use lattice::Tied;
 pub(crate) use names::Inputs;
 use plan::Placed;
 use sheet::{BLENDED, Laying, Sheet, cells_of, replace};
@@ -167,12 +166,10 @@ impl Mosaic {
         declared.place = Some(Said::new(target.map, "the places of the files"));
         declared.notes = vec![note(&placed, &sheets, resampled, resampling, options)];
         let (vertical, unlike) = levels::of(&placed.sources);
-        let is_rough = |tied: &&Tied| matches!((&tied.ground, &target.tied.ground), (Some(from), Some(to)) if from.is_rough_to(to));
-        let rough = placed
-            .systems
-            .iter()
-            .find(is_rough)
-            .map(|tied| Warning::new(shift_lost(&tied.system.name, &target.tied.system.name)));
+        let rough = placed.systems.iter().find_map(|tied| {
+            let doubt = tied.ground.as_ref()?.doubt(target.tied.ground.as_ref()?)?;
+            Some(Warning::new(shift_in_doubt(doubt, &tied.system.name, &target.tied.system.name)))
+        });
         let bytes = Store::all_bytes(sheets.iter().map(|sheet| &sheet.samples), sample_bytes);
         let bytes = if blend.is_some() { bytes.saturating_mul(2) } else { bytes };
         let allowed = options.memory_mib.unwrap_or(512) << 20;

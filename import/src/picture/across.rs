@@ -6,7 +6,7 @@
 
 use super::completed::Completed;
 use super::texels::Texels;
-use crate::crs::shift_lost;
+use crate::crs::shift_in_doubt;
 use crate::places::Crs;
 use crate::warp::{Mapping, Projections, apply};
 use rayon::prelude::*;
@@ -240,14 +240,14 @@ impl Brought {
             -step[1],
         ];
         let mut info = picture.info().clone();
-        let is_rough = way.projections.as_ref().is_some_and(|both| both.old.is_rough_to(&both.new));
+        let doubt = way.projections.as_ref().and_then(|both| both.old.doubt(&both.new));
         let mapping = Mapping::new(new_map, way.map, info.texels[0], way.projections);
         info.notes.push(format!(
             "brought onto the terrain: from {} x {} texels to {} x {}, bilinear",
             info.texels[0], info.texels[1], sides[0], sides[1]
         ));
-        if is_rough {
-            info.notes.push(shift_lost(&picture.system().name, "the terrain's system"));
+        if let Some(doubt) = doubt {
+            info.notes.push(shift_in_doubt(doubt, &picture.system().name, "the terrain's system"));
         }
         let windows = rayon::current_num_threads() as u64 * 8 * MOST_OLD as u64;
         info.memory_bytes =

@@ -43,9 +43,11 @@ impl Completed {
         declared.crs = crs;
         let beside = Beside::of_picture(&path, picture.mask().is_some());
         let masking = beside.complete(&mut declared, &options.open_options())?;
-        let system =
+        let mut system =
             crs::resolve(&declared.crs, None, &mut declared.warnings).unwrap_or_else(|_| System::unknown());
-        info.georeference = crs::georeference(&system, declared.place.map(|place| place.value));
+        let map = declared.place.as_mut().map(|place| &mut place.value);
+        declared.warnings.extend(crs::eastings_first(&mut system, map));
+        info.georeference = crs::georeference(&system, declared.place.as_ref().map(|place| place.value));
         info.notes.extend(declared.warnings.into_iter().map(|warning| warning.words));
         info.notes.extend(declared.notes);
         let (mut void, mut voids) = (None, Vec::new());

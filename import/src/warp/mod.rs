@@ -11,7 +11,7 @@ mod target;
 mod touch;
 
 use crate::cells::{CELL, Cells, each_block_met};
-use crate::crs::{Ground, HorizontalSize, Kind, System, is_earth};
+use crate::crs::{Doubt, Ground, HorizontalSize, Kind, System, is_earth};
 use crate::options::{OpenOptions, Resampling};
 use crate::parallel::each_task;
 use kernel::Kernel;
@@ -43,7 +43,7 @@ pub(crate) struct Warp {
     in_memory: bool,
     folder: PathBuf,
     words: String,
-    is_rough: bool,
+    doubt: Option<Doubt>,
 }
 
 impl Warp {
@@ -105,12 +105,9 @@ impl Warp {
             grid.samples[1],
             resampling.name()
         );
-        let is_rough = target.as_ref().is_some_and(|target| {
-            let grounds = [system, target].map(Ground::new);
-            matches!(grounds, [Some(old), Some(new)] if old.is_rough_to(&new))
-        });
+        let doubt = target.as_ref().and_then(|target| Ground::new(system)?.doubt(&Ground::new(target)?));
         Ok(Some(Self {
-            is_rough,
+            doubt,
             system: target,
             resampler: Resampler { mapping, kernel, sample_bytes },
             sample_type,
@@ -121,9 +118,9 @@ impl Warp {
         }))
     }
 
-    /// Whether places may be off by some hundred metres, for a shift between datums is not known here.
-    pub(crate) fn is_rough(&self) -> bool {
-        self.is_rough
+    /// How far places may be off, where a shift between datums is not known well.
+    pub(crate) fn doubt(&self) -> Option<Doubt> {
+        self.doubt
     }
 
     /// The new system, if it is another one.

@@ -4,7 +4,7 @@
 //! found by projecting the old rim and a mesh inside it. Cost: some hundred points.
 
 use super::mapping::apply;
-use crate::crs::{Ground, HorizontalSize, Kind, System, by_text, is_earth};
+use crate::crs::{Ground, HorizontalSize, Kind, System, by_text, east_north, is_earth};
 use crate::options::OpenOptions;
 use std::path::Path;
 use terrasoar_layout::error::LayoutError;
@@ -42,6 +42,8 @@ pub(crate) fn system(
     let lower = text.trim().to_ascii_lowercase();
     if !matches!(lower.as_str(), "utm" | "auto") {
         let system = by_text(text).filter(|system| system.kind != Kind::Local);
+        // A grid in a system that counts to the south first would cross it, so the same map with eastings is taken.
+        let system = system.map(|system| if system.is_south_first { east_north(&system) } else { system });
         return system.ok_or_else(|| {
             LayoutError::Usage(format!(
                 "\"{}\" is no reference system that is known here to bring data into; name one as EPSG:n, WKT or a PROJ string, or utm, or auto",
