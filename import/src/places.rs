@@ -179,6 +179,10 @@ impl Crs {
         let size = |system: &System| system.unit.as_ref().map(|unit| unit.size);
         let is_proj_same = match (&a.proj, &b.proj) {
             (Some(a), Some(b)) => a == b,
+            // A site's own system has no more than its name.
+            (None, None) if self.is_site() && other.is_site() && a.code.or(b.code).is_none() => {
+                !a.name.is_empty() && a.name == b.name && a.text == b.text
+            }
             _ => a.code.is_some() && a.code == b.code,
         };
         is_proj_same && size(a) == size(b) && a.signs == b.signs

@@ -51,7 +51,7 @@ fn what_an_edit_did_is_told_in_the_words_of_the_ground() {
     write(&bench, "a.edits", "set rect 400,400,480,440 to 100\n");
     let args = ["edit", "land.iqt", "--script", "a.edits", "--overlay", "o.iqo"];
     let said = bench.good(&args);
-    assert!(said.contains("changed: 6000 m2 of ground, by "), "{said}");
+    assert!(said.contains("changed: 6000 m2 of ground, "), "{said}");
     assert!(!said.contains("on top of") && !said.contains("records") && !said.contains("void"), "{said}");
     // The same once more: the ground is so already, and the first batch is told of.
     let said = bench.good(&args);
@@ -60,7 +60,7 @@ fn what_an_edit_did_is_told_in_the_words_of_the_ground() {
     write(&bench, "b.edits", "raise at 440,420 radius 15 by 3\n");
     let args = ["edit", "land.iqt", "--script", "b.edits", "--overlay", "o.iqo"];
     let said = bench.good(&args);
-    assert!(said.contains("changed: 400 m2 of ground, by up to 3 m"), "{said}");
+    assert!(said.contains("changed: 400 m2 of ground, raised by up to 3 m"), "{said}");
     assert!(
         said.contains(
             "on top of 1 batch in it before; `terrasoar undo land.iqt --overlay o.iqo` takes back the last"

@@ -38,6 +38,21 @@ fn own_coordinates_are_arithmetic() {
     assert_eq!(same.doubt(), None);
 }
 
+/// A part of a site is compared with the whole in the site's own numbers; another site's are others.
+#[test]
+fn sites_of_one_name_are_one() {
+    let at = |crs: &str, corner| header(crs, [11, 11], corner, [10.0; 2]);
+    let [whole, part] = [at("local", [100.0, 400.0]), at("local", [150.0, 350.0])];
+    let there = Frame::of(&whole, &Crs::of(&part).unwrap()).unwrap();
+    assert_eq!(there.coordinates([0.0, 0.0]), Some([100.0, 300.0]));
+    let named = |name: &str| format!("LOCAL_CS[\"{name}\",UNIT[\"metre\",1]]");
+    let pit = at(&named("pit"), [100.0, 400.0]);
+    assert!(Frame::of(&pit, &Crs::of(&at(&named("pit"), [150.0, 350.0])).unwrap()).is_ok());
+    for other in [at(&named("dam"), [150.0, 350.0]), at("EPSG:32632", [500_000.0, 5_001_000.0])] {
+        assert!(Frame::of(&pit, &Crs::of(&other).unwrap()).is_err());
+    }
+}
+
 /// Longitudes and latitudes by gdaltransform (PROJ 9.1).
 #[test]
 fn other_systems_come_to_the_same_places() {

@@ -77,11 +77,11 @@ impl Told {
             short(self.edits as f64 / self.seconds.max(1e-9)),
         );
         if let Some(change_m) = self.change_m.filter(|change_m| *change_m != [0.0; 2]) {
-            let [low, high] = change_m.map(|m| decimal(m, 3));
+            let [down, up] = change_m.map(|m| decimal(m.abs(), 3));
             let by = match change_m {
-                [0.0, _] => format!("by up to {high} m"),
-                [_, 0.0] => format!("by down to {low} m"),
-                _ => format!("by {low} to {high} m"),
+                [0.0, _] => format!("raised by up to {up} m"),
+                [_, 0.0] => format!("lowered by up to {down} m"),
+                _ => format!("lowered by up to {down} m and raised by up to {up} m"),
             };
             let area = decimal(self.changed_m2.unwrap_or_default(), 0);
             text += &format!("\nchanged: {area} m2 of ground, {by}");
