@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Makes import/src/crs/registry/shifts.txt: shifts to WGS 84 that crate crs-definitions has otherwise than PROJ, or lacks, and by how much places may be off where one shift does not do.
-And import/src/crs/ground/places.txt: places by PROJ in the midst of areas, for tests.
+And datums.txt beside it: names of datums that are shifted, letters and digits alone, with the code of their longitudes and latitudes, for texts that name no code; and
+import/src/crs/ground/places.txt: places by PROJ in the midst of areas, for tests.
 
 Needs PROJ's library (9.1 or later) with its proj.db, and numpy. Usage: make-shift-table.py PROJ_DB CRS_DEFINITIONS_DEFS_RS FOLDER
 
@@ -237,6 +238,22 @@ def main(proj_db, defs, folder):
         for code, x, y, lon, lat in tried:
             if bases[code][0] == "g" or code % 8 == 0 or code in shifted:
                 out.write(f"{code}|{x:.7f}|{y:.7f}|{lon:.9f}|{lat:.9f}\n")
+    write_datums(db, strings, {code: shift for code, shift, _ in lines}, folder)
+
+
+def write_datums(db, strings, shifts, folder):
+    owner, names = {}, {}
+    for code, datum in db.execute("select code, datum_code from geodetic_crs where auth_name = 'EPSG' and type = 'geographic 2D' and datum_auth_name = 'EPSG' order by deprecated, cast(code as int)"):
+        owner.setdefault(datum, int(code))
+    for datum, name in db.execute("select code, name from geodetic_datum where auth_name = 'EPSG' union select code, alt_name from alias_name where table_name = 'geodetic_datum' and auth_name = 'EPSG'"):
+        code = owner.get(datum)
+        stated = re.search(r"\+towgs84=(\S+)", strings.get(code, ""))
+        shift = shifts.get(code) or (stated[1] if stated else "")
+        if any(float(value) for value in shift.split(",") if value):
+            names.setdefault(re.sub("[^a-z0-9]", "", name.lower()), set()).add(code)
+    with open(f"{folder}/datums.txt", "w") as out:
+        out.write("# name|code\n")
+        out.writelines(f"{name}|{min(codes)}\n" for name, codes in sorted(names.items()) if len(codes) == 1)
 
 
 main(*sys.argv[1:])

@@ -112,6 +112,8 @@ const NAMED: &[Format] = &[
         is: |look| hgt::is_tile(look.path),
         open: |path, options| hgt_tiles(&[path.to_owned()], options),
     },
+    // Before labels: a table of text is no raw data, though the label of other data of that name stands beside it.
+    Format { name: "XYZ", is: xyz::is_xyz, open: |path, _| boxed(xyz::XyzDem::open(path)) },
     Format {
         name: "labelled (.hdr)",
         is: |look| labelled::is_labelled(look.path),
@@ -122,7 +124,6 @@ const NAMED: &[Format] = &[
         is: |look| ["r16", "r32", "raw"].iter().any(|e| look.is_called(e)),
         open: |path, _| boxed(raw::RawDem::square(path)),
     },
-    Format { name: "XYZ", is: xyz::is_xyz, open: |path, _| boxed(xyz::XyzDem::open(path)) },
 ];
 
 /// Whether the file at `path` is elevation data of a format that says where it lies. Masks, overviews and labels beside data are none.

@@ -70,6 +70,9 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
     (system.signs, system.is_south_first) = axes(node);
     if kind != Kind::Local {
         (system.proj, system.off_m) = projection(node, system.code);
+        if system.code.is_none() && node.find(&["TOWGS84"]).is_none() {
+            tie(&mut system);
+        }
         // A grid is named where the registry does not tell the shift.
         if system.code.is_none()
             && let Some(grids) = bound::grids(node)
@@ -81,6 +84,23 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
         system.vertical = ellipsoidal(node);
     }
     Some(system)
+}
+
+/// Gives a system of which neither a code nor the text tells the shift that of its datum, by the datum's name.
+fn tie(system: &mut System) {
+    let Some((shift, off_m, code)) = registry::shift_of_datum(&system.datum) else { return };
+    let radius_m = match registry::horizontal(code) {
+        Some(registry::Horizontal::Text { wkt, .. }) => {
+            wkt::parse(wkt).and_then(|nodes| nodes[0].find(&["SPHEROID"])?.number(1))
+        }
+        _ => None,
+    };
+    // Another body of that name has another shift.
+    if radius_m.zip(system.radius_m).is_some_and(|(a, b)| (a - b).abs() > 1.0) {
+        return;
+    }
+    system.proj = system.proj.as_ref().map(|proj| registry::shifted(proj, &shift));
+    system.off_m = off_m;
 }
 
 /// Names of ESRI's have underscores for spaces, and some begin with the kind.

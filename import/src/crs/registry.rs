@@ -9,6 +9,7 @@ const COMPOUND: &str = include_str!("registry/compound.txt");
 const MISSING: &str = include_str!("registry/missing.txt");
 const UNITS: &str = include_str!("registry/units.txt");
 const SHIFTS: &str = include_str!("registry/shifts.txt");
+const DATUMS: &str = include_str!("registry/datums.txt");
 
 /// PROJ strings that the list of definitions has wrong: a false easting of 40,000 chains taken for metres; a sphere for whose latitudes those of the ellipsoid are taken as they are.
 const MENDED: [(u32, &str); 2] = [
@@ -70,6 +71,15 @@ pub(super) fn tied(code: u32, proj: &str) -> (String, Option<f64>) {
     let off_m = off_m.parse().ok().filter(|off_m: &f64| *off_m > 0.0);
     let proj = if shift.is_empty() { proj.to_owned() } else { shifted(proj, &format!("+towgs84={shift}")) };
     (proj, off_m)
+}
+
+/// The shift to WGS 84 of the datum of a name, in small letters and digits alone, as a word of a PROJ string; the metres by which places may be off; and the code of its longitudes and latitudes.
+pub(super) fn shift_of_datum(name: &str) -> Option<(String, Option<f64>, u32)> {
+    let code = DATUMS.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('|')?.parse().ok())?;
+    let (Horizontal::Text { proj, .. } | Horizontal::Parts { proj, .. }) = horizontal(code)?;
+    let (proj, off_m) = tied(code, proj);
+    let word = proj.split_whitespace().find(|word| word.starts_with("+towgs84="))?.to_owned();
+    Some((word, off_m, code))
 }
 
 /// The string with another shift of datum.

@@ -105,6 +105,32 @@ fn texts_and_codes_have_the_same_shift() {
     assert!(matches!(ground_of("EPSG:4142").doubt(&world), Some(Doubt::OffM(off_m)) if off_m > 400.0));
 }
 
+/// Texts of ESRI's name no code: the datum's name tells the shift. Places by gdaltransform.
+#[test]
+fn datums_by_name_have_their_shift() {
+    let degrees = |datum: &str, body: &str| {
+        format!(
+            "GEOGCS[\"g\",DATUM[\"{datum}\",SPHEROID[\"s\",{body}]],PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]]"
+        )
+    };
+    let world = ground_of("EPSG:4326");
+    let israel = ground_of(&degrees("D_Israel", "6378137.0,298.257222101"));
+    let found = israel.world([35.0, 31.5]).unwrap().map(f64::to_degrees);
+    assert!(apart_m(found, [35.000_695_063_569_8, 31.500_372_037_396_8]) < 0.01, "{found:?}");
+    assert_eq!(israel.doubt(&world), None);
+    let europe = ground_of(&degrees("D_European_1950", "6378388.0,297.0"));
+    assert_eq!(europe.doubt(&world), Some(Doubt::OffM(10.0)));
+    // The name of one on another body, and a shift that the text states itself.
+    assert_eq!(
+        ground_of(&degrees("D_Israel", "6377397.155,299.1528128")).doubt(&world),
+        Some(Doubt::Unknown)
+    );
+    let stated =
+        degrees("D_Israel", "6378137.0,298.257222101").replace("]],PRIMEM", "],TOWGS84[-48,55,52]],PRIMEM");
+    let found = ground_of(&stated).world([35.0, 31.5]).unwrap().map(f64::to_degrees);
+    assert!(apart_m(found, [35.000_764_035_381_2, 31.500_436_496_968_7]) < 0.01, "{found:?}");
+}
+
 fn ground_of(text: &str) -> Ground {
     Ground::new(&by_text(text).unwrap()).unwrap()
 }
