@@ -131,6 +131,25 @@ fn esri_labels_of_every_layout_and_type() {
     }
 }
 
+/// A table of text beside raw data of its name is no raw data, whatever the label says.
+#[test]
+fn tables_of_text_are_not_read_by_the_label_of_other_data() {
+    let label = "nrows 5\nncols 7\nnbits 8\nulxmap 105\nulymap 245\nxdim 10\nydim 10\n";
+    for name in ["a.xyz", "a.txt", "a.csv"] {
+        let (folder, raw) = pair(["a.bil", "a.hdr"], &laid_out("u8", 1, "bil", [0; 3]), label);
+        let lines = (0..SIDES[1]).flat_map(|row| {
+            (0..SIDES[0])
+                .map(move |col| format!("{} {} {}\n", 105 + 10 * col, 245 - 10 * row, height(0, col, row)))
+        });
+        let table = folder.path().join(name);
+        std::fs::write(&table, lines.collect::<String>()).unwrap();
+        let grid = read(&[table]).unwrap();
+        is_band(&grid, 0, name);
+        assert!(grid.info.format.contains("XYZ"), "{name}: {}", grid.info.format);
+        assert!(read(&[raw]).is_ok());
+    }
+}
+
 #[test]
 fn float_grids_and_what_their_labels_leave_out() {
     let corner = "ncols 7\r\nnrows 5\r\nxllcorner 100\r\nyllcorner 200\r\ncellsize 10\r\nNODATA_value -9999\r\nbyteorder LSBFIRST\r\n";
