@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Makes import/src/crs/registry/shifts.txt: shifts to WGS 84 that crate crs-definitions has otherwise than PROJ, or lacks, and by how much places may be off where one shift does not do.
 And datums.txt beside it: names of datums that are shifted, letters and digits alone, with the code of their longitudes and latitudes, for texts that name no code; and
-import/src/crs/ground/places.txt: places by PROJ in the midst of areas, for tests.
+import/tests/crs_places.txt: places by PROJ in the midst of areas, for tests.
 
 Needs PROJ's library (9.1 or later) with its proj.db, and numpy. Usage: make-shift-table.py PROJ_DB CRS_DEFINITIONS_DEFS_RS FOLDER
 
@@ -233,7 +233,7 @@ def main(proj_db, defs, folder):
         out.write("# code|shift to WGS 84, empty where the list of definitions has it|metres by which places may be off\n")
         out.writelines(f"{code}|{shift}|{rest}\n" for code, shift, rest in lines)
     shifted = {code for code, _, _ in lines}
-    with open(f"{folder}/../ground/places.txt", "w") as out:
+    with open(f"{folder}/../../../tests/crs_places.txt", "w") as out:
         out.write("# code|x or longitude|y or latitude|longitude and latitude of WGS 84 by PROJ\n")
         for code, x, y, lon, lat in tried:
             if bases[code][0] == "g" or code % 8 == 0 or code in shifted:
