@@ -8,7 +8,7 @@ use terrasoar_layout::file::disk::{FailingDisk, Failure};
 
 #[test]
 fn a_commit_that_panics_is_told_and_what_it_was_to_write_is_in_the_next() {
-    for call in 1..=4 {
+    for call in 1..=6 {
         let land = Land::new();
         let mood = Arc::new(Mood::default());
         let mut workshop = land.workshop_on(Arc::new(TestDisk(Arc::clone(&mood))));
@@ -30,7 +30,15 @@ fn a_commit_that_panics_is_told_and_what_it_was_to_write_is_in_the_next() {
 
 #[test]
 fn a_disk_that_fails_once_or_is_full_is_told_and_nothing_is_lost_that_was_saved() {
-    for call in 0..4 {
+    let counting = Arc::new(FailingDisk::new(u64::MAX, Failure::Once));
+    let land = Land::new();
+    let mut workshop = land.workshop_on(counting.clone());
+    stroke(&mut workshop, 1);
+    workshop.close().1.unwrap();
+    // What is written, the mark and the header, each with its sync but for the last mark.
+    let calls = counting.calls();
+    assert_eq!(calls, 6);
+    for call in 0..calls {
         let land = Land::new();
         let mut workshop = land.workshop_on(Arc::new(FailingDisk::new(call, Failure::Once)));
         stroke(&mut workshop, 1);
@@ -43,7 +51,7 @@ fn a_disk_that_fails_once_or_is_full_is_told_and_nothing_is_lost_that_was_saved(
         assert!(land.pages() == land.pages_after(&[crater(1)]), "call {call}");
     }
     let land = Land::new();
-    let mut workshop = land.workshop_on(Arc::new(FailingDisk::new(4, Failure::Full { quarters: 2 })));
+    let mut workshop = land.workshop_on(Arc::new(FailingDisk::new(calls, Failure::Full { quarters: 2 })));
     stroke(&mut workshop, 1);
     workshop.commit("first");
     wait_for(&mut workshop, is_saved);
