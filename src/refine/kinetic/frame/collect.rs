@@ -1,7 +1,7 @@
 //! The start of a frame: clocks advance, words that are over leave the queue, and words change clocks where a course ends or a clock starts again.
 //!
-//! Invariant: afterwards every live word is in one of the queues exactly once, or due. Cost: in proportion to the words that are over, and to a course's words when the eye takes
-//! another course.
+//! Invariant: afterwards every node with a live word is in one of the queues where that word belongs, or due, and due once. Cost: in proportion to the words that are over, and to a
+//! course's words when the eye takes another course.
 
 use super::ahead::Ahead;
 use crate::refine::kinetic::Kinetic;
