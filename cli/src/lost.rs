@@ -2,6 +2,11 @@
 
 use terrasoar_layout::read::terrain::Terrain;
 
+/// Whether a commit that was saved may be lost with the newest header; so it is where that cannot be read.
+pub(crate) fn may_have_lost_a_commit(terrain: &Terrain) -> bool {
+    terrain.lost_header().map_or(true, |lost| lost.is_some_and(|lost| lost.may_have_been_saved()))
+}
+
 /// Words for a terrain that is seen as it was before the last commit, because that commit's header is damaged; `None` for all others. They begin with `note: ` where nothing that was saved is lost, else with `warning: `.
 pub(crate) fn newest_header_is_lost(terrain: &Terrain) -> Option<String> {
     // What cannot be read is told by whoever needs it.

@@ -5,7 +5,7 @@
 
 use super::output::complain;
 use crate::beside::named_beside;
-use crate::lost::newest_header_is_lost;
+use crate::lost::{may_have_lost_a_commit, newest_header_is_lost};
 use anyhow::{Result, bail};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -67,6 +67,6 @@ pub(super) fn tell_of_lost_in(file: &Path, overlay: Option<&Path>) -> bool {
     opened.is_ok_and(|terrain| {
         tell_of_lost(&terrain);
         // One that was cut off before it was saved leads to nothing.
-        !terrain.lost_header().is_ok_and(|lost| lost.is_none_or(|lost| lost.was_saved == Some(false)))
+        may_have_lost_a_commit(&terrain)
     })
 }

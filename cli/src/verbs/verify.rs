@@ -5,6 +5,7 @@ use super::progress::Meter;
 use super::terrain::TerrainArgs;
 use super::{Lines, overlays};
 use anyhow::{Result, bail};
+use terrasoar_layout::read::lost::LostHeader;
 use terrasoar_layout::verify::{verify, verify_pages};
 
 /// Check every page of a terrain file.
@@ -29,7 +30,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         verify(&terrain, &|pages| progress.add(pages)).inspect_err(|_| overlays::tell_of_lost(&terrain))?;
     drop(progress);
     // What was cut off before it was saved is said, and is no fault of the file.
-    let lost = report.lost_header.filter(|lost| lost.was_saved != Some(false));
+    let lost = report.lost_header.filter(LostHeader::may_have_been_saved);
     if report.lost_header.is_some() && lost.is_none() {
         overlays::tell_of_lost(&terrain);
     }

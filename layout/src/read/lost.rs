@@ -21,6 +21,13 @@ pub struct LostHeader {
     pub was_saved: Option<bool>,
 }
 
+impl LostHeader {
+    /// Whether something that was saved may be lost: not where the file says that the commit was cut off before.
+    pub fn may_have_been_saved(&self) -> bool {
+        self.was_saved != Some(false)
+    }
+}
+
 impl Terrain {
     /// The header slot that is damaged and newer than the current one: the terrain is as it was before the commit that wrote it. `None` in every sound file.
     ///

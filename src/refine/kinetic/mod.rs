@@ -95,7 +95,7 @@ pub struct Kinetic<S: RecordStore> {
     verdicts: Vec<(RawOf<S>, u32)>,
     /// Room for what is tested together.
     batch: Option<Box<Batch>>,
-    /// Entries that are over, of words that may have changed since.
+    /// Nodes that may be over, each with the latest word on its clock that is.
     over: Vec<Entry>,
     /// Entries on their way from one clock to another.
     waiting: Vec<Entry>,

@@ -1,5 +1,6 @@
 //! What kind of file is there already, in words.
 
+use crate::lost::may_have_lost_a_commit;
 use crate::verbs::output::grouped;
 use std::fs::File;
 use std::io::{self, Read};
@@ -40,7 +41,7 @@ pub(super) fn terrain(path: &Path, start: &[u8]) -> Option<Option<String>> {
         });
     }
     // A commit that cannot be read any more may be there, and a person may have a way to it.
-    if !terrain.lost_header().is_ok_and(|lost| lost.is_none_or(|lost| lost.was_saved == Some(false))) {
+    if may_have_lost_a_commit(&terrain) {
         held.push("a damaged header".into());
     }
     let held = held.join(" and ");
