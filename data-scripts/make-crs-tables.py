@@ -9,7 +9,9 @@ import subprocess
 import sys
 
 proj_db, defs, folder = sys.argv[1:]
-known = {int(code) for code in re.findall(r"^EPSG_(\d+)\|", open(defs).read(), re.M)}
+listed = {int(m[1]): m for m in re.finditer(r'^EPSG_(\d+)\|\d+\|"([^"]*)"\|r#"(.*)"#\|', open(defs).read(), re.M)}
+# Some have a PROJ string and no text.
+known = {code for code, m in listed.items() if m[3]}
 db = sqlite3.connect(proj_db)
 
 
@@ -65,11 +67,11 @@ for code, name, kind in sorted(systems, key=lambda row: int(row[0])):
     if int(code) in known:
         continue
     said = subprocess.run(["gdalsrsinfo", "-o", "proj4", f"EPSG:{code}"], capture_output=True, text=True)
-    proj = said.stdout.strip()
+    proj = listed[int(code)][2] if int(code) in listed else said.stdout.strip()
     # PROJ before 9.2 leaves out of its strings that this one is drawn on a sphere.
-    if methods.get(code) == "Lambert Azimuthal Equal Area (Spherical)" and "+R_A" not in proj:
+    if methods.get(str(code)) == "Lambert Azimuthal Equal Area (Spherical)" and "+R_A" not in proj:
         proj = proj.replace("+proj=laea", "+proj=laea +R_A")
-    datum = datums.get(bases.get(code, code), "")
+    datum = datums.get(bases.get(str(code), str(code)), "")
     wkt = subprocess.run(["gdalsrsinfo", "-o", "wkt2", "--single-line", f"EPSG:{code}"], capture_output=True, text=True).stdout
     word = "LENGTHUNIT" if kind == "p" else "ANGLEUNIT"
     units = re.findall(word + r'\["([^"]*)",([0-9.eE+-]+)', wkt)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Makes import/src/crs/registry/shifts.txt: shifts to WGS 84 that crate crs-definitions has otherwise than PROJ, or lacks, and by how much places may be off where one shift does not do.
-And datums.txt beside it: names of datums that are shifted, letters and digits alone, with the code of their longitudes and latitudes, for texts that name no code; and
-import/tests/crs_places.txt: places by PROJ in the midst of areas, for tests.
+And datums.txt beside it: names of datums, letters and digits alone, with the code of their longitudes and latitudes, for texts that name no code, EPSG's own name first; reach.txt: where on the
+globe PROJ has a shift for them; and import/tests/crs_places.txt: places by PROJ in the midst of areas, and at their rims where it shifts nothing, for tests.
 
 Needs PROJ's library (9.1 or later) with its proj.db, and numpy. Usage: make-shift-table.py PROJ_DB CRS_DEFINITIONS_DEFS_RS FOLDER
 
 Each system is tried at 25 places of its area. Where PROJ makes one shift of three or seven parameters there, that one is taken. Where it makes several steps, or those of Molodensky and
-Badekas, seven parameters are fitted to within a metre. Where its shifts differ from region to region, the one of most places is taken, and the largest distance is written beside it.
+Badekas, seven parameters are fitted to within a metre. Where its shifts differ from region to region, the one of most places is taken, and the largest distance is written beside it. Where PROJ has shifts for a part of the area alone, reach.txt tells.
 """
 import collections
 import ctypes
@@ -49,6 +49,18 @@ for name, result, takes in [
     ("proj_trans", Coordinate, [pointer, number, Coordinate]),
     ("proj_trans_get_last_used_operation", pointer, [pointer]),
     ("proj_as_proj_string", text, [pointer, pointer, number, pointer]),
+    ("proj_create", pointer, [pointer, text]),
+    ("proj_create_operation_factory_context", pointer, [pointer, text]),
+    ("proj_operation_factory_context_set_spatial_criterion", None, [pointer, pointer, number]),
+    ("proj_operation_factory_context_set_grid_availability_use", None, [pointer, pointer, number]),
+    ("proj_create_operations", pointer, [pointer, pointer, pointer, pointer]),
+    ("proj_list_get_count", number, [pointer]),
+    ("proj_list_get", pointer, [pointer, pointer, number]),
+    ("proj_coordoperation_has_ballpark_transformation", number, [pointer, pointer]),
+    ("proj_destroy", pointer, [pointer]),
+    ("proj_list_destroy", None, [pointer]),
+    ("proj_operation_factory_context_destroy", None, [pointer]),
+    ("proj_get_area_of_use", number, [pointer, pointer] + [ctypes.POINTER(ctypes.c_double)] * 4 + [pointer]),
 ]:
     function = getattr(proj, name)
     function.restype, function.argtypes = result, takes
@@ -75,6 +87,32 @@ class Way:
             return "", None
         written = written.decode()
         return written, [step for step in written.split("+step") if re.search(r"\+proj=(helmert|molobadekas)", step)]
+
+
+def reach(code):
+    """Rectangles of longitude and latitude in which PROJ has a shift to WGS 84: west, south, east, north. None where it shifts everywhere."""
+    factory = proj.proj_create_operation_factory_context(context, None)
+    partial_intersection, discard_if_missing = 1, 1
+    proj.proj_operation_factory_context_set_spatial_criterion(context, factory, partial_intersection)
+    proj.proj_operation_factory_context_set_grid_availability_use(context, factory, discard_if_missing)
+    ends = [proj.proj_create(context, f"EPSG:{end}".encode()) for end in (code, 4326)]
+    ways = proj.proj_create_operations(context, *ends, factory) if all(ends) else None
+    boxes, shifts_everywhere = set(), True
+    for i in range(proj.proj_list_get_count(ways) if ways else 0):
+        way = proj.proj_list_get(context, ways, i)
+        if proj.proj_coordoperation_has_ballpark_transformation(context, way):
+            shifts_everywhere = False
+            continue
+        sides = [ctypes.c_double() for _ in range(4)]
+        if proj.proj_get_area_of_use(context, way, *map(ctypes.byref, sides), None):
+            boxes.add(tuple(round(side.value, 4) for side in sides))
+        proj.proj_destroy(way)
+    proj.proj_list_destroy(ways)
+    proj.proj_operation_factory_context_destroy(factory)
+    for end in ends:
+        proj.proj_destroy(end)
+    holds = lambda a, b: a != b and a[0] <= b[0] and a[1] <= b[1] and a[2] >= b[2] and a[3] >= b[3] and a[0] < a[2] and b[0] < b[2]
+    return [] if shifts_everywhere else sorted(box for box in boxes if not any(holds(other, box) for other in boxes))
 
 
 def geocentric(at, body):
@@ -167,7 +205,7 @@ def main(proj_db, defs, folder):
         if area[0] is not None:
             areas.setdefault(int(code), area)
 
-    lines, tried = [], []
+    lines, tried, rims = [], [], []
     for code in sorted(set(strings) & set(bases) & set(areas)):
         kind, base = bases[code]
         world, own = Way(f"EPSG:{code}", "EPSG:4326"), Way(f"EPSG:{code}", f"EPSG:{base}")
@@ -181,7 +219,7 @@ def main(proj_db, defs, folder):
         shift_by = lambda shift, at: geodetic(turned(shift, geocentric(at, body)), WGS84) if shift else at
         west, south, east, north = areas[code]
         east += 360 * (east < west)
-        places, bare, used, is_grid, is_bare = [], [], collections.Counter(), False, False
+        places, bare, used, is_grid, rim = [], [], collections.Counter(), False, None
         for i in range(25):
             lon, lat = west + (east - west) * (0.08 + 0.21 * (i // 5)), south + (north - south) * (0.08 + 0.21 * (i % 5))
             at = world.go((lon - 360 * (lon > 180), lat), back=True)
@@ -197,7 +235,7 @@ def main(proj_db, defs, folder):
             here = (here[0] * degrees.get(base, 1) + meridian, here[1] * degrees.get(base, 1))
             if between is None or not (between or "gridshift" in written):
                 bare.append((here, there))
-                is_bare |= i == 12
+                rim = rim or (code, *at, *there)
                 continue
             places.append((here, there))
             is_grid |= "gridshift" in written
@@ -211,10 +249,10 @@ def main(proj_db, defs, folder):
             if known and off(known, bare) > NEAR_M:
                 lines.append((code, "", math.ceil(off(known, bare))))
             continue
+        if rim and known and off(known, bare) > NEAR_M:
+            rims.append(rim)
         before = off(known, places)
-        # Where PROJ shifts nothing in the midst of the area, the shift of its rims is doubtful there.
-        unshifted = off(known, bare) if known and is_bare else 0
-        if before <= NEAR_M and (before <= 2 or not used) and unshifted <= NEAR_M:
+        if before <= NEAR_M and (before <= 2 or not used):
             continue
         found = used.most_common(1)[0][0] if used else known
         if not is_grid and off(found, places) > NEAR_M:
@@ -224,9 +262,7 @@ def main(proj_db, defs, folder):
         is_better = found != known and (rest <= NEAR_M or (known and rest < before + 1))
         if is_better or known:
             shown = ",".join(f"{value:.10g}" for value in found) if is_better else ""
-            if is_bare and is_better:
-                unshifted = off(found, bare)
-            rest = max(rest if is_better else before, unshifted)
+            rest = rest if is_better else before
             if shown or rest > NEAR_M:
                 lines.append((code, shown, math.ceil(rest) if rest > NEAR_M else 0))
     with open(f"{folder}/shifts.txt", "w") as out:
@@ -235,25 +271,43 @@ def main(proj_db, defs, folder):
     shifted = {code for code, _, _ in lines}
     with open(f"{folder}/../../../tests/crs_places.txt", "w") as out:
         out.write("# code|x or longitude|y or latitude|longitude and latitude of WGS 84 by PROJ\n")
-        for code, x, y, lon, lat in tried:
-            if bases[code][0] == "g" or code % 8 == 0 or code in shifted:
-                out.write(f"{code}|{x:.7f}|{y:.7f}|{lon:.9f}|{lat:.9f}\n")
+        kept = [place for place in tried if bases[place[0]][0] == "g" or place[0] % 8 == 0 or place[0] in shifted]
+        for code, x, y, lon, lat in sorted(kept + rims):
+            out.write(f"{code}|{x:.7f}|{y:.7f}|{lon:.9f}|{lat:.9f}\n")
     write_datums(db, strings, {code: shift for code, shift, _ in lines}, folder)
 
 
 def write_datums(db, strings, shifts, folder):
-    owner, names = {}, {}
+    owner, own, names = {}, {}, {}
     for code, datum in db.execute("select code, datum_code from geodetic_crs where auth_name = 'EPSG' and type = 'geographic 2D' and datum_auth_name = 'EPSG' order by deprecated, cast(code as int)"):
         owner.setdefault(datum, int(code))
-    for datum, name in db.execute("select code, name from geodetic_datum where auth_name = 'EPSG' union select code, alt_name from alias_name where table_name = 'geodetic_datum' and auth_name = 'EPSG'"):
-        code = owner.get(datum)
-        stated = re.search(r"\+towgs84=(\S+)", strings.get(code, ""))
-        shift = shifts.get(code) or (stated[1] if stated else "")
-        if any(float(value) for value in shift.split(",") if value):
-            names.setdefault(re.sub("[^a-z0-9]", "", name.lower()), set()).add(code)
+    key = lambda name: re.sub("[^a-z0-9]", "", name.lower())
+    for datum, name in db.execute("select code, name from geodetic_datum where auth_name = 'EPSG'"):
+        if datum in owner:
+            own[owner[datum]] = key(name)
+    every = "select code, name from geodetic_datum where auth_name = 'EPSG' union select code, alt_name from alias_name where table_name = 'geodetic_datum' and auth_name = 'EPSG'"
+    for datum, name in db.execute(every):
+        if datum in owner:
+            names.setdefault(key(name), set()).add(owner[datum])
+    names = {name: min(codes) for name, codes in names.items() if len(codes) == 1}
+    # A name of its own alone tells nothing, unless there is a shift.
+    counts = collections.Counter(names.values())
+    stated = lambda code: shifts.get(code) or "".join(re.findall(r"\+towgs84=(\S+)", strings.get(code, ""))) or DATUMS.get("".join(re.findall(r"\+datum=(\S+)", strings.get(code, ""))), "")
+    is_shifted = lambda code: any(float(value) for value in stated(code).split(",") if value)
     with open(f"{folder}/datums.txt", "w") as out:
         out.write("# name|code\n")
-        out.writelines(f"{name}|{min(codes)}\n" for name, codes in sorted(names.items()) if len(codes) == 1)
+        for name, code in sorted(names.items(), key=lambda entry: (entry[1], entry[0] != own.get(entry[1]), entry[0])):
+            if counts[code] > 1 or is_shifted(code):
+                out.write(f"{name}|{code}\n")
+    bases = dict(db.execute("select cast(code as int), cast(geodetic_crs_code as int) from projected_crs where auth_name = 'EPSG' and geodetic_crs_auth_name = 'EPSG'"))
+    with open(f"{folder}/reach.txt", "w") as out:
+        out.write("# code|west,south,east,north;... of longitudes and latitudes, and of maps where it is another; empty where the shift is taken everywhere\n")
+        lines = {code: reach(code) for code in sorted(strings) if code not in bases and is_shifted(code)}
+        of_maps = {code: reach(code) for code, base in sorted(bases.items()) if code in strings and base in lines}
+        for code, boxes in sorted({**lines, **of_maps}.items()):
+            is_told = bool(boxes) if code in lines else bool(boxes) != bool(lines[bases[code]])
+            if is_told:
+                out.write(f"{code}|{';'.join(','.join(f'{side:g}' for side in box) for box in boxes)}\n")
 
 
 main(*sys.argv[1:])

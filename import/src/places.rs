@@ -24,7 +24,7 @@
 //! ```
 
 pub use crate::crs::Doubt;
-use crate::crs::{Ground, HorizontalSize, Kind, System, Unit, by_text, is_earth};
+use crate::crs::{Ground, HorizontalSize, Kind, System, Unit, all_over, by_text, is_earth};
 use terrasoar_layout::dem::HorizontalUnit;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::file::header::Header;
@@ -292,7 +292,8 @@ impl Frame {
     /// How far places may be off, where the shift between the two datums is not known well.
     pub fn doubt(&self) -> Option<Doubt> {
         let ground = |crs: &'_ Option<Crs>| crs.as_ref().and_then(|crs| crs.ground.clone());
-        ground(&self.own)?.doubt(&ground(&self.other)?).filter(|_| !self.is_same)
+        let places = all_over(&self.map, self.last.map(|last| last as u32 + 1));
+        ground(&self.own)?.doubt(&ground(&self.other)?, &places).filter(|_| !self.is_same)
     }
 
     /// Metres east and north of the south-west sample to coordinates; `None` where the projection has none. Longitudes of other systems than the own one lie within half a turn of 0.

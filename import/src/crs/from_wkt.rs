@@ -45,7 +45,7 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
         })?;
         if let Some(shift) = bound::shift(node) {
             inner.proj = inner.proj.map(|proj| registry::shifted(&proj, &shift));
-            inner.off_m = None;
+            (inner.off_m, inner.reach_deg) = (None, Vec::new());
         }
         return Some(inner);
     }
@@ -67,10 +67,18 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
     system.radius_m =
         spheroid.and_then(|found| Some(found.number(1)? * length(found))).filter(|radius| *radius > 0.0);
     system.datum = node.find(&DATUM).and_then(|datum| datum.text(0)).map(datum_key).unwrap_or_default();
+    let geographic =
+        if kind == Kind::Geographic { system.code } else { node.find(&GEOGRAPHIC).and_then(code) };
+    if let Some(name) = geographic.and_then(registry::name_of_datum) {
+        name.clone_into(&mut system.datum);
+    }
     (system.signs, system.is_south_first) = axes(node);
     if kind != Kind::Local {
         (system.proj, system.off_m) = projection(node, system.code);
-        if system.code.is_none() && node.find(&["TOWGS84"]).is_none() {
+        if system.code.is_some() {
+            system.reach_deg =
+                registry::reach(&[system.code, geographic, registry::code_of_datum(&system.datum)]);
+        } else if node.find(&["TOWGS84"]).is_none() {
             tie(&mut system);
         }
         // A grid is named where the registry does not tell the shift.
@@ -101,6 +109,7 @@ fn tie(system: &mut System) {
     }
     system.proj = system.proj.as_ref().map(|proj| registry::shifted(proj, &shift));
     system.off_m = off_m;
+    system.reach_deg = registry::reach(&[Some(code)]);
 }
 
 /// Names of ESRI's have underscores for spaces, and some begin with the kind.
@@ -109,11 +118,14 @@ fn plain_name(name: &str) -> String {
     if name.contains(' ') { name.to_owned() } else { name.replace('_', " ") }
 }
 
-/// The name of a datum as it is compared: letters and digits alone; empty for one that only says that it is not known.
+/// The name of a datum as it is compared: EPSG's, letters and digits alone; empty for one that only says that it is not known.
 pub(super) fn datum_key(name: &str) -> String {
     let key = squeezed(name);
     let is_unknown = ["unknown", "unnamed", "notspecified"].iter().any(|word| key.contains(word));
-    if is_unknown { String::new() } else { key }
+    if is_unknown {
+        return String::new();
+    }
+    registry::code_of_datum(&key).and_then(registry::name_of_datum).map_or(key, str::to_owned)
 }
 
 /// Small letters and digits alone.

@@ -3,11 +3,18 @@
 //! Units and the directions of axes are taken out of PROJ strings, because this program applies them itself. Where the grid of a datum's shift is missing, the shift is left out, which is some hundred metres at
 //! most; the place remains known. Angles are radians. Cost: a microsecond a point.
 
+mod doubt;
+mod methods;
+
+pub use doubt::Doubt;
+pub(crate) use doubt::all_over;
+
 use super::from_proj;
 use super::south_first::crossed;
 use super::system::{Kind, System};
 use crate::guard::quiet;
 use crate::reader::HorizontalSize;
+use methods::Method;
 use proj4rs::proj::Proj;
 use proj4rs::transform::transform;
 use terrasoar_layout::portable::{hypot, sin_cos};
@@ -32,6 +39,8 @@ const LEFT_OUT: [&str; 12] = [
 #[derive(Clone)]
 pub(crate) struct Ground {
     proj: Proj,
+    /// A method that the library does not have: then `proj` is that of longitudes and latitudes, which it leads to.
+    method: Option<Method>,
     /// Longitude and latitude on the same ellipsoid, without a shift of datum.
     own: Proj,
     /// Longitude and latitude of WGS 84, or of the same body.
@@ -52,24 +61,8 @@ pub(crate) struct Ground {
     untied: Option<String>,
     /// The metres by which a shift that differs from region to region may be off.
     off_m: Option<f64>,
-}
-
-/// What is not known of the shift between two datums.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Doubt {
-    /// Nothing is known, or a grid is not here, so that the shift was left out.
-    Unknown,
-    /// It differs from region to region, or is an old one, by so many metres.
-    OffM(f64),
-}
-
-impl std::fmt::Display for Doubt {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Unknown => f.write_str("is not known here, or a grid that is not here, and was left out, so places may be off by up to some hundred metres"),
-            Self::OffM(off_m) => write!(f, "differs from region to region or is known roughly, so places may be off by up to {off_m:.0} m"),
-        }
-    }
+    /// Rectangles of longitude and latitude outside of which the shift is one that nobody states; empty where nothing is known of that.
+    reach_deg: Vec<[f64; 4]>,
 }
 
 impl std::fmt::Debug for Ground {
@@ -137,13 +130,15 @@ impl Ground {
                 let datum = from_proj::word(&no_grid, "datum").map(str::to_owned);
                 Some(Self { lost: grid.or(datum).or_else(|| Some(String::new())), ..rough })
             })?;
-            let unshifted =
-                Proj::from_proj_string(&plain(&no_grid)).ok().filter(|_| !system.datum.is_empty());
+            let bare = plain(&no_grid);
+            let bare = if found.method.is_some() { methods::angles(&bare) } else { bare };
+            let unshifted = Proj::from_proj_string(&bare).ok().filter(|_| !system.datum.is_empty());
             let unshifted = unshifted.map(|proj| (proj, system.datum.clone()));
             Some(Self {
                 unshifted,
                 untied: untied(&text, &system.datum),
                 off_m: system.off_m,
+                reach_deg: system.reach_deg.clone(),
                 is_south_first: system.is_south_first,
                 ..found
             })
@@ -152,6 +147,9 @@ impl Ground {
     }
 
     fn of(text: &str, size: f64, signs: [f64; 2]) -> Option<Self> {
+        let method = Method::of(text, axes_of(text)?);
+        let angles = method.is_some().then(|| methods::angles(text));
+        let text = angles.as_deref().unwrap_or(text);
         let proj = Proj::from_proj_string(text).ok()?;
         // A projection may have taken its scale into its own axes, so the ellipsoid is asked apart.
         let [a, b] = axes_of(text)?;
@@ -162,11 +160,13 @@ impl Ground {
             false => own.clone(),
         };
         let turn = match proj.is_latlong() {
+            _ if method.is_some() => None,
             true => Some(std::f64::consts::TAU / size),
             false => turn_on_map(&proj, &own).map(|metres| metres / size),
         };
         let this = Self {
             proj,
+            method,
             own,
             world,
             size,
@@ -178,6 +178,7 @@ impl Ground {
             unshifted: None,
             untied: None,
             off_m: None,
+            reach_deg: Vec::new(),
         };
         // A datum by a grid that is not here shows at the first point.
         let (lon, lat) = (this.proj.longitude_of_origin(), this.proj.latitude_of_origin().clamp(-1.4, 1.4));
@@ -203,11 +204,14 @@ impl Ground {
             let [x, y] = crossed(point);
             return (x * self.size, y * self.size);
         }
-        (point[0] * self.signs[0] * self.size, point[1] * self.signs[1] * self.size)
+        let metres = [0, 1].map(|axis| point[axis] * self.signs[axis] * self.size);
+        let [x, y] = self.method.map_or(metres, |method| method.angles_of(metres));
+        (x, y)
     }
 
     /// A point of the projection as the system has it.
     fn outward(&self, (x, y): (f64, f64)) -> Option<[f64; 2]> {
+        let [x, y] = self.method.map_or([x, y], |method| method.map_of([x, y]));
         let point = match self.is_south_first {
             true => crossed([x / self.size, y / self.size]),
             false => [x * self.signs[0] / self.size, y * self.signs[1] / self.size],
@@ -244,24 +248,6 @@ impl Ground {
     /// Whether the datum is told by a grid that is not here, so that places are off by its shift where they are brought to another datum.
     pub(crate) fn is_shift_lost(&self) -> bool {
         self.lost.is_some()
-    }
-
-    /// How far places brought to the other system may be off, for the shift between both datums is not known well; `None` where it is.
-    pub(crate) fn doubt(&self, other: &Self) -> Option<Doubt> {
-        if self.is_same_datum(other) {
-            return None;
-        }
-        if (&self.lost, &self.untied) != (&other.lost, &other.untied) {
-            return Some(Doubt::Unknown);
-        }
-        let off_m = self.off_m.unwrap_or(0.0) + other.off_m.unwrap_or(0.0);
-        (off_m > 0.0).then_some(Doubt::OffM(off_m))
-    }
-
-    /// Whether both are of one datum, so that nothing is shifted between them.
-    fn is_same_datum(&self, other: &Self) -> bool {
-        let [a, b] = [self, other].map(|ground| ground.unshifted.as_ref().map(|(_, datum)| datum));
-        a.is_some() && a == b && !self.shape_differs(other)
     }
 
     /// Whether the ellipsoids differ by metres.

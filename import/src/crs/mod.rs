@@ -17,7 +17,7 @@ mod wkt;
 pub(crate) use compare::{figures_differ, places_differ};
 pub(crate) use from_proj::{unit_name as unit_in_words, word as proj_word};
 pub use ground::Doubt;
-pub(crate) use ground::{Ground, is_earth};
+pub(crate) use ground::{Ground, all_over, is_earth};
 pub(crate) use keywords::Keywords;
 pub(crate) use registry::{is_north_first, unit as unit_of_code, vertical_in_metres};
 pub(crate) use resolve::by_text;

@@ -10,6 +10,7 @@ const MISSING: &str = include_str!("registry/missing.txt");
 const UNITS: &str = include_str!("registry/units.txt");
 const SHIFTS: &str = include_str!("registry/shifts.txt");
 const DATUMS: &str = include_str!("registry/datums.txt");
+const REACH: &str = include_str!("registry/reach.txt");
 
 /// PROJ strings that the list of definitions has wrong: a false easting of 40,000 chains taken for metres; a sphere for whose latitudes those of the ellipsoid are taken as they are.
 const MENDED: [(u32, &str); 2] = [
@@ -75,11 +76,36 @@ pub(super) fn tied(code: u32, proj: &str) -> (String, Option<f64>) {
 
 /// The shift to WGS 84 of the datum of a name, in small letters and digits alone, as a word of a PROJ string; the metres by which places may be off; and the code of its longitudes and latitudes.
 pub(super) fn shift_of_datum(name: &str) -> Option<(String, Option<f64>, u32)> {
-    let code = DATUMS.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('|')?.parse().ok())?;
+    let code = code_of_datum(name)?;
     let (Horizontal::Text { proj, .. } | Horizontal::Parts { proj, .. }) = horizontal(code)?;
     let (proj, off_m) = tied(code, proj);
     let word = proj.split_whitespace().find(|word| word.starts_with("+towgs84="))?.to_owned();
     Some((word, off_m, code))
+}
+
+/// The code of the longitudes and latitudes of a datum.
+pub(super) fn code_of_datum(name: &str) -> Option<u32> {
+    DATUMS.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('|')?.parse().ok())
+}
+
+/// The EPSG registry's own name of the datum of longitudes and latitudes of a code; `None` for datums that have no other name.
+pub(super) fn name_of_datum(code: u32) -> Option<&'static str> {
+    DATUMS.lines().find_map(|line| {
+        let (name, of) = line.split_once('|')?;
+        (of.parse() == Ok(code)).then_some(name)
+    })
+}
+
+/// Rectangles of longitude and latitude of WGS 84, west, south, east and north in degrees, for which the shift of a system or of its datum is known, by the first of `codes` that the table has;
+/// empty where the shift is good everywhere, or nothing is known of that.
+pub(super) fn reach(codes: &[Option<u32>]) -> Vec<[f64; 4]> {
+    let Some([boxes]) = codes.iter().flatten().find_map(|code| line(REACH, *code)) else { return Vec::new() };
+    let numbers = |text: &str| {
+        let mut sides = text.split(',').map(|side| side.parse().ok());
+        let mut next = || sides.next().flatten();
+        Some([next()?, next()?, next()?, next()?])
+    };
+    boxes.split(';').filter_map(numbers).collect()
 }
 
 /// The string with another shift of datum.

@@ -53,6 +53,9 @@ fn by_code_alone(code: u32) -> Option<System> {
         }
     };
     system.code = Some(code);
+    if system.reach_deg.is_empty() {
+        system.reach_deg = registry::reach(&[Some(code), registry::code_of_datum(&system.datum)]);
+    }
     Some(system)
 }
 

@@ -53,6 +53,8 @@ pub(crate) struct System {
     pub(crate) proj: Option<String>,
     /// Metres by which places of other datums may be off, for the shift differs from region to region.
     pub(crate) off_m: Option<f64>,
+    /// Rectangles of longitude and latitude of WGS 84, west, south, east and north in degrees, outside of which the shift is none that anyone states; empty where nothing is known of that.
+    pub(crate) reach_deg: Vec<[f64; 4]>,
     /// Whether x grows to the east and y to the north (1) or the other way (-1).
     pub(crate) signs: [f64; 2],
     /// Whether its first axis points south and its second west, so that its first number is no easting or westing.
@@ -76,6 +78,7 @@ impl System {
             datum: String::new(),
             proj: None,
             off_m: None,
+            reach_deg: Vec::new(),
             signs: [1.0; 2],
             is_south_first: false,
             text: String::new(),

@@ -166,8 +166,9 @@ impl Mosaic {
         declared.place = Some(Said::new(target.map, "the places of the files"));
         declared.notes = vec![note(&placed, &sheets, resampled, resampling, options)];
         let (vertical, unlike) = levels::of(&placed.sources);
-        let rough = placed.systems.iter().find_map(|tied| {
-            let doubt = tied.ground.as_ref()?.doubt(target.tied.ground.as_ref()?)?;
+        let rough = placed.systems.iter().enumerate().find_map(|(number, tied)| {
+            let doubt =
+                tied.ground.as_ref()?.doubt(target.tied.ground.as_ref()?, &placed.places_in(number))?;
             Some(Warning::new(shift_in_doubt(doubt, &tied.system.name, &target.tied.system.name)))
         });
         let bytes = Store::all_bytes(sheets.iter().map(|sheet| &sheet.samples), sample_bytes);

@@ -6,7 +6,7 @@
 use super::lattice::{Lattice, Tied};
 use super::sheet::{Member, Sheet};
 use super::source::Source;
-use crate::crs::HorizontalSize;
+use crate::crs::{HorizontalSize, all_over};
 use crate::options::Priority;
 use std::path::PathBuf;
 use terrasoar_layout::error::LayoutError;
@@ -30,6 +30,13 @@ pub(super) struct Placed {
 }
 
 impl Placed {
+    /// Places all over the files of a system.
+    pub(super) fn places_in(&self, system: usize) -> Vec<[f64; 2]> {
+        let of = |(lattice, _): &(usize, _)| self.lattices[*lattice].system == system;
+        let files = self.sources.iter().zip(&self.at).filter(|(_, at)| of(at));
+        files.flat_map(|(source, _)| all_over(&source.map, source.samples)).collect()
+    }
+
     /// Finds systems and grids of files, which come in the order of their paths.
     pub(super) fn new(looked: Vec<(Source, crate::crs::System)>) -> Self {
         let (mut sources, mut systems, mut of) = (Vec::new(), Vec::<Tied>::new(), Vec::new());

@@ -6,7 +6,7 @@
 
 use super::completed::Completed;
 use super::texels::Texels;
-use crate::crs::shift_in_doubt;
+use crate::crs::{all_over, shift_in_doubt};
 use crate::places::Crs;
 use crate::warp::{Mapping, Projections, apply};
 use rayon::prelude::*;
@@ -240,7 +240,10 @@ impl Brought {
             -step[1],
         ];
         let mut info = picture.info().clone();
-        let doubt = way.projections.as_ref().and_then(|both| both.old.doubt(&both.new));
+        let doubt = way
+            .projections
+            .as_ref()
+            .and_then(|both| both.old.doubt(&both.new, &all_over(&way.map, info.texels)));
         let mapping = Mapping::new(new_map, way.map, info.texels[0], way.projections);
         info.notes.push(format!(
             "brought onto the terrain: from {} x {} texels to {} x {}, bilinear",

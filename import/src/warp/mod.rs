@@ -11,7 +11,7 @@ mod target;
 mod touch;
 
 use crate::cells::{CELL, Cells, each_block_met};
-use crate::crs::{Doubt, Ground, HorizontalSize, Kind, System, is_earth};
+use crate::crs::{Doubt, Ground, HorizontalSize, Kind, System, all_over, is_earth};
 use crate::options::{OpenOptions, Resampling};
 use crate::parallel::each_task;
 use kernel::Kernel;
@@ -105,7 +105,8 @@ impl Warp {
             grid.samples[1],
             resampling.name()
         );
-        let doubt = target.as_ref().and_then(|target| Ground::new(system)?.doubt(&Ground::new(target)?));
+        let doubt = |target| Ground::new(system)?.doubt(&Ground::new(target)?, &all_over(&map, samples));
+        let doubt = target.as_ref().and_then(doubt);
         Ok(Some(Self {
             doubt,
             system: target,

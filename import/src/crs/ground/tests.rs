@@ -75,14 +75,16 @@ fn shifts_of_bound_systems_are_made_or_told() {
     let grid =
         bound("METHOD[\"NTv2\"],PARAMETERFILE[\"Latitude and longitude difference file\",\"BETA2007.gsb\"]");
     assert!(
-        grid.is_shift_lost() && grid.doubt(&ground("EPSG:4326")).is_some() && grid.doubt(&grid).is_none()
+        grid.is_shift_lost()
+            && grid.doubt(&ground("EPSG:4326"), &[]).is_some()
+            && grid.doubt(&grid, &[]).is_none()
     );
     let in_one = ground(
         "GEOGCS[\"a\",DATUM[\"b\",SPHEROID[\"Bessel 1841\",6377397.155,299.1528128],EXTENSION[\"PROJ4_GRIDS\",\"BETA2007.gsb\"]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]",
     );
-    assert!(in_one.is_shift_lost() && in_one.doubt(&grid).is_none());
-    assert!(ground("EPSG:4267").doubt(&ground("EPSG:4326")).is_some());
-    assert!(ground("EPSG:26714").doubt(&ground("EPSG:4267")).is_none());
+    assert!(in_one.is_shift_lost() && in_one.doubt(&grid, &[]).is_none());
+    assert!(ground("EPSG:4267").doubt(&ground("EPSG:4326"), &[]).is_some());
+    assert!(ground("EPSG:26714").doubt(&ground("EPSG:4267"), &[]).is_none());
 }
 
 /// Miller's map is drawn on the sphere of the ellipsoid's area, and latitudes stay the ellipsoid's. Positions by gdaltransform.
@@ -172,7 +174,10 @@ fn systems_of_one_datum_are_not_shifted() {
 fn shifts_that_are_not_known_are_told() {
     let world = ground("EPSG:4326");
     for untied in ["EPSG:3396", "EPSG:3398", "EPSG:2000", "EPSG:4267", "+proj=utm +zone=32 +ellps=intl"] {
-        assert!(ground(untied).doubt(&world).is_some() && world.doubt(&ground(untied)).is_some(), "{untied}");
+        assert!(
+            ground(untied).doubt(&world, &[]).is_some() && world.doubt(&ground(untied), &[]).is_some(),
+            "{untied}"
+        );
     }
     for (a, b) in [
         ("EPSG:3396", "EPSG:4746"),
@@ -180,7 +185,7 @@ fn shifts_that_are_not_known_are_told() {
         ("EPSG:26714", "EPSG:4267"),
         ("+proj=utm +zone=32 +ellps=intl", "+proj=longlat +ellps=intl"),
     ] {
-        assert!(ground(a).doubt(&ground(b)).is_none(), "{a} {b}");
+        assert!(ground(a).doubt(&ground(b), &[]).is_none(), "{a} {b}");
     }
     for tied in [
         "EPSG:32632",
@@ -193,7 +198,7 @@ fn shifts_that_are_not_known_are_told() {
         "EPSG:2154",
         "+proj=longlat +R=6371229",
     ] {
-        assert!(ground(tied).doubt(&world).is_none(), "{tied}");
+        assert!(ground(tied).doubt(&world, &[]).is_none(), "{tied}");
     }
 }
 
