@@ -244,6 +244,7 @@ fn declared(path: &Path, heads: &[u8]) -> Result<Declared, LayoutError> {
     let format = level.map_or_else(|| "DTED".to_owned(), |level| format!("DTED level {level}"));
     let mut declared = Declared::new(samples, SampleType::I16, format);
     declared.place = Some(Said::new([west, across, 0.0, south, 0.0, up], "head UHL"));
+    declared.corrects.system = true;
     let code = if text(80 + 144, 5) == "WGS72" { 4322 } else { 4326 };
     declared.crs.code = Some(Said::new(code, "head DSI"));
     if text(80 + 141, 3) == "E96" {

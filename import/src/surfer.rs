@@ -13,7 +13,7 @@
 use crate::ascii_grid::single;
 use crate::input;
 use crate::plain::{Kind, Plain};
-use crate::reader::{Declared, Reader, Said};
+use crate::reader::{Corrects, Declared, Reader, Said};
 use crate::text::{Cut, Sequence, each_block, number, shown, words};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -85,6 +85,8 @@ impl Head {
         let mut declared = Declared::new(self.samples, kind, format);
         let map = [self.corner[0], self.steps[0], 0.0, self.corner[1], 0.0, self.steps[1]];
         declared.place = Some(Said::new(map, "the grid's head"));
+        declared.rows_from_south = true;
+        declared.corrects = Corrects { place: true, nodata: true, ..Corrects::default() };
         Ok(declared)
     }
 }

@@ -321,7 +321,7 @@ fn what_stands_beside_a_file_is_found_by_either_case_and_wins_where_it_should() 
         bare().with("a.tfw", world).with("a.prj", old).built().terrain.header().crs_name,
         "UTM zone 10N"
     );
-    // GDAL's file beside it wins over the file and over a world file.
+    // GDAL's file beside a TIFF wins over the file and over a world file.
     let pam = "<PAMDataset><SRS>EPSG:2263</SRS><GeoTransform>0, 5, 0, 0, 0, -5</GeoTransform><PAMRasterBand band=\"1\">\
                <UnitType>cm</UnitType></PAMRasterBand></PAMDataset>";
     let found = bare().with("a.tfw", world).with("a.tif.aux.xml", pam).built();

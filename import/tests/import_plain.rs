@@ -6,7 +6,7 @@ use import_support::{Grid, collect, data, read, refusal};
 use std::path::{Path, PathBuf};
 use tempfile::{TempDir, tempdir};
 use terrasoar_import::{OpenOptions, open_with};
-use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::dem::{HorizontalUnit, SampleType};
 use terrasoar_layout::remedy::Remedy;
 
 const SIDES: [usize; 2] = [7, 5];
@@ -238,6 +238,29 @@ fn envi_labels_of_every_layout_and_type() {
     let grid = read(&[path]).unwrap();
     assert_eq!(grid.info.georeference.pixel_to_crs, Some([10.25, 0.5, 0.0, 49.875, 0.0, -0.25]));
     assert_eq!((grid.info.height_scale, grid.info.height_offset_m), (0.5, -3.0));
+    // Longitudes and latitudes in parts of degrees; places by gdalinfo.
+    for (unit, place) in [
+        ("Minutes", [0.1875, 0.025, 0.0, 0.8375, 0.0, -0.0125]),
+        ("Seconds", [0.003_125, 1.5 / 3600.0, 0.0, 50.25 / 3600.0, 0.0, -0.75 / 3600.0]),
+    ] {
+        let label = format!(
+            "ENVI\nsamples = 7\nlines = 5\ndata type = 4\nmap info = {{Geographic Lat/Lon, 1, 1, 10.5, 50.625, 1.5, 0.75, WGS-84, units={unit}}}\n"
+        );
+        let (_folder, path) = pair(["a.img", "a.hdr"], &laid_out("f32le", 1, "bsq", [0; 3]), &label);
+        let found = read(&[path]).unwrap().info.georeference;
+        let map = found.pixel_to_crs.unwrap();
+        assert!(map.iter().zip(place).all(|(a, b)| (a - b).abs() < 1e-12), "{unit}: {map:?}");
+        assert_eq!(found.unit, HorizontalUnit::Degree, "{unit}");
+    }
+    // GDAL writes half a turn for rows from the south, and reads it so.
+    let label = "ENVI\nsamples = 7\nlines = 5\ndata type = 4\nmap info = {UTM, 1, 1, 100, 200, 10, 10, 33, North, WGS-84, rotation=180}\n";
+    let (_folder, path) = pair(["a.img", "a.hdr"], &laid_out("f32le", 1, "bsq", [0; 3]), label);
+    assert_eq!(
+        read(std::slice::from_ref(&path)).unwrap().info.georeference.pixel_to_crs,
+        Some([105.0, 10.0, 0.0, 205.0, 0.0, 10.0])
+    );
+    let told = open_with(&[path], &OpenOptions::default()).unwrap().warnings();
+    assert!(told.iter().any(|warning| warning.words.contains("rows from the south")), "{told:?}");
     for (line, wanted) in [
         ("data type = 6", "real or whole numbers"),
         ("data type = 4\nfile compression = 1", "compressed"),

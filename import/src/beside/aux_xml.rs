@@ -52,32 +52,48 @@ impl Aux {
         Self { corners, system: text(root, "SRS"), bands: bands.collect() }
     }
 
-    /// Adds it to what the file itself says, and wins.
-    pub(super) fn apply(self, name: &str, declared: &mut Declared) {
-        if let Some([x, a, b, y, d, e]) = self.corners {
-            declared.place = Some(Said::new([x + 0.5 * (a + b), a, b, y + 0.5 * (d + e), d, e], name));
-        }
-        if let Some(system) = self.system {
+    /// Adds it to what the file itself says, except for the place.
+    pub(super) fn apply(&mut self, name: &str, declared: &mut Declared) {
+        let corrects = declared.corrects;
+        let has_system = declared.crs.text.is_some() || declared.crs.code.is_some();
+        if let Some(system) = self.system.take().filter(|_| corrects.system || !has_system) {
             declared.crs.text = Some(Said::new(system, name));
             declared.crs.code = None;
             declared.crs.vertical_code = None;
             declared.crs.unit = None;
         }
         let wanted = declared.band_number;
-        let Some((_, band)) = self.bands.into_iter().find(|(number, _)| *number == wanted) else { return };
+        let Some((_, band)) =
+            std::mem::take(&mut self.bands).into_iter().find(|(number, _)| *number == wanted)
+        else {
+            return;
+        };
         let value = &mut declared.value;
-        if let Some(text) = band.nodata {
+        if let Some(text) = band.nodata.filter(|_| corrects.nodata || value.nodata.is_empty()) {
             value.nodata = vec![Said::new(text, name)];
         }
-        if let Some(scale) = band.scale {
-            value.scale = Some(Said::new(scale, name));
+        // A scale without an offset is whole.
+        let is_scaled = value.scale.is_some() || value.offset.is_some();
+        if corrects.scale || !is_scaled {
+            value.scale = band.scale.map(|scale| Said::new(scale, name)).or(value.scale.take());
+            value.offset = band.offset.map(|offset| Said::new(offset, name)).or(value.offset.take());
         }
-        if let Some(offset) = band.offset {
-            value.offset = Some(Said::new(offset, name));
-        }
-        if let Some(unit) = band.unit {
+        if let Some(unit) = band.unit.filter(|_| corrects.scale || value.unit.is_none()) {
             value.unit = Some(Said::new(VerticalUnit::Name(unit), name));
         }
+    }
+
+    /// Adds the place.
+    pub(super) fn place(&self, name: &str, declared: &mut Declared) {
+        let Some([x, a, b, y, d, e]) = self.corners else { return };
+        let mut centres = [x + 0.5 * (a + b), a, b, y + 0.5 * (d + e), d, e];
+        // GDAL turns some formats' rows from the south, and states places for the rows that it has then.
+        if declared.rows_from_south {
+            let last = f64::from(declared.samples[1] - 1);
+            let [x, a, b, y, d, e] = centres;
+            centres = [x + b * last, a, -b, y + e * last, d, -e];
+        }
+        declared.place = Some(Said::new(centres, name));
     }
 }
 

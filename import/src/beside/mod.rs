@@ -1,6 +1,6 @@
 //! Files beside a DEM that say more about it: GDAL's `.aux.xml` and `.msk`, world files, `.prj`.
 //!
-//! What GDAL keeps beside a file counts before the file itself, because that is how it is corrected. A world file or a `.prj` counts where the file says nothing. Each is looked for by its
+//! What GDAL keeps beside a file counts where the file says nothing, and before the file itself where GDAL has it so ([`Corrects`](crate::reader::Corrects)). A world file or a `.prj` counts where the file says nothing. Each is looked for by its
 //! name in small and in capital letters. Cost: a look at some names.
 
 mod aux_xml;
@@ -50,13 +50,27 @@ impl Beside {
         if !self.looks {
             return Ok(own);
         }
-        if let Some((name, text)) = text(&appended(&self.path, ".aux.xml"), aux_xml::MAX_BYTES)? {
-            Aux::parse(&text).apply(&name, declared);
+        let kept = match declared.corrects.nothing {
+            true => None,
+            false => text(&appended(&self.path, ".aux.xml"), aux_xml::MAX_BYTES)?,
+        };
+        let mut kept = kept.map(|(name, text)| (name, Aux::parse(&text)));
+        if let Some((name, aux)) = &mut kept {
+            aux.apply(name, declared);
         }
-        if declared.place.is_none()
-            && let Some(place) = world::place(&self.path)?
-        {
-            declared.place = Some(place);
+        let kept_place = |declared: &mut Declared| {
+            if let Some((name, aux)) = &kept {
+                aux.place(name, declared);
+            }
+        };
+        if declared.corrects.place {
+            kept_place(declared);
+        }
+        if declared.place.is_none() {
+            declared.place = world::place(&self.path)?;
+        }
+        if declared.place.is_none() {
+            kept_place(declared);
         }
         if declared.crs.text.is_none()
             && declared.crs.code.is_none()

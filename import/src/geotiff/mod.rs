@@ -64,7 +64,7 @@ use terrasoar_layout::error::LayoutError;
 use super::WINDOW_SAMPLES;
 use crate::mask;
 use crate::options::OpenOptions;
-use crate::reader::{CrsSaid, Declared, Reader, Said};
+use crate::reader::{Corrects, CrsSaid, Declared, Reader, Said};
 
 /// Longest text of the void value: a number.
 const MAX_NODATA_BYTES: u64 = 256;
@@ -163,6 +163,7 @@ impl TiffDem {
         );
         let mut declared = Declared::new(samples, sample_type, format);
         declared.band_number = bands.described as u32 + 1;
+        declared.corrects = Corrects { place: true, system: true, nodata: true, ..Corrects::default() };
         geokeys::read(&mut file, &directory)?.declare(&mut declared);
         metadata::heights(&xml, bands.described, &mut declared.value);
         let nodata = file.text(&directory, tags::GDAL_NODATA, MAX_NODATA_BYTES)?;

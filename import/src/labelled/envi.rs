@@ -4,12 +4,12 @@
 
 use super::{Interleave, Label, beside, side, whole};
 use crate::plain::Kind;
-use crate::reader::{CrsSaid, HorizontalSize, Said};
+use crate::reader::{Corrects, CrsSaid, HorizontalSize, Said};
 use crate::text::number;
 use crate::value::unit_m;
 use std::collections::BTreeMap;
 use std::path::Path;
-use terrasoar_layout::dem::SampleType;
+use terrasoar_layout::dem::{SampleType, Warning};
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::portable::sin_cos;
 
@@ -98,12 +98,14 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Label, LayoutError> {
             items(text).iter().filter_map(|item| number(item.as_bytes())).collect()
         })
     };
+    let mut warnings = Vec::new();
     let (place, crs) = match value("map info") {
-        Some(info) => map_info(path, info)?,
+        Some(info) => map_info(path, info, &mut warnings)?,
         None => (None, CrsSaid::default()),
     };
     let text = value("coordinate system string").map(|text| Said::new(text.to_owned(), beside::name(path)));
     Ok(Label {
+        corrects: Corrects { nodata: true, scale: true, ..Corrects::default() },
         format: "ENVI grid of plain numbers (.hdr)",
         samples,
         bands,
@@ -123,7 +125,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Label, LayoutError> {
         offsets: reals("data offset values"),
         unit: None,
         notes: Vec::new(),
-        warnings: Vec::new(),
+        warnings,
     })
 }
 
@@ -147,7 +149,11 @@ fn refuse_what_is_not_read(path: &Path, values: &Values) -> Result<(), LayoutErr
 }
 
 /// Place of sample centres and the system that the projection's name and datum make.
-fn map_info(path: &Path, info: &str) -> Result<(Option<[f64; 6]>, CrsSaid), LayoutError> {
+fn map_info(
+    path: &Path,
+    info: &str,
+    warnings: &mut Vec<Warning>,
+) -> Result<(Option<[f64; 6]>, CrsSaid), LayoutError> {
     let items = items(info);
     let mut numbers = [0.0; 6];
     for (to, item) in numbers.iter_mut().zip(items.iter().skip(1)) {
@@ -156,20 +162,35 @@ fn map_info(path: &Path, info: &str) -> Result<(Option<[f64; 6]>, CrsSaid), Layo
             LayoutError::damaged(path, "header", format!("{shown} in \"map info\" is no number; mend it"))
         })?;
     }
-    let [column, row, x, y, dx, dy] = numbers;
-    if items.len() < 7 || dx == 0.0 || dy == 0.0 {
-        return Ok((None, CrsSaid::default()));
-    }
     let named = |key: &str| {
         items.iter().find_map(|item| {
             let (name, value) = item.split_once('=')?;
             name.trim().eq_ignore_ascii_case(key).then(|| value.trim())
         })
     };
-    let turn = named("rotation").and_then(|text| number(text.as_bytes())).unwrap_or(0.0).to_radians();
-    let (sin, cos) = sin_cos(turn);
+    // Longitudes and latitudes may be counted in parts of degrees, which GDAL takes into degrees.
+    let is_geographic = items[0].to_ascii_lowercase().starts_with("geographic");
+    let parts = match named("units").map(str::to_ascii_lowercase).as_deref() {
+        Some("seconds") if is_geographic => 3600.0,
+        Some("minutes") if is_geographic => 60.0,
+        _ => 1.0,
+    };
+    let [column, row] = [numbers[0], numbers[1]];
+    let [x, y, dx, dy] = [2, 3, 4, 5].map(|at| numbers[at] / parts);
+    if items.len() < 7 || dx == 0.0 || dy == 0.0 {
+        return Ok((None, CrsSaid::default()));
+    }
+    let turn_deg = named("rotation").and_then(|text| number(text.as_bytes())).unwrap_or(0.0);
+    let (sin, cos) = sin_cos(turn_deg.to_radians());
     // Steps of a column and of a row, in x and y.
-    let [xc, xr, yc, yr] = [cos * dx, sin * dx, sin * dy, -cos * dy];
+    let [mut xc, mut xr, mut yc, mut yr] = [cos * dx, sin * dx, sin * dy, -cos * dy];
+    if turn_deg.abs() == 180.0 {
+        [xc, xr, yc, yr] = [dx, 0.0, 0.0, dy];
+        warnings.push(Warning::new(format!(
+            "the rotation of 180 degrees in {} was taken for rows from the south, for which GDAL writes it; if the grid was turned, so that columns run from the east, write it as another format",
+            beside::name(path)
+        )));
+    }
     let (across, down) = (1.5 - column, 1.5 - row);
     let place = [x + across * xc + down * xr, xc, xr, y + across * yc + down * yr, yc, yr];
     Ok((Some(place), system(path, &items, named("units"))))
@@ -197,6 +218,7 @@ fn system(path: &Path, items: &[&str], units: Option<&str>) -> CrsSaid {
         _ => None,
     };
     let unit = units.and_then(|units| match units.to_ascii_lowercase().as_str() {
+        "radians" => Some(HorizontalSize::Radians(1.0)),
         "degrees" => Some(HorizontalSize::Radians(1f64.to_radians())),
         units => unit_m(units).map(HorizontalSize::Metres),
     });

@@ -5,7 +5,7 @@
 
 use super::{Interleave, Label, beside, side, whole};
 use crate::plain::Kind;
-use crate::reader::{CrsSaid, Said};
+use crate::reader::{Corrects, CrsSaid, Said};
 use crate::text::number;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -76,6 +76,7 @@ pub(super) fn parse(path: &Path, text: &str, data: &Path, length: u64) -> Result
             }
         };
     Ok(Label {
+        corrects: Corrects::default(),
         format: "ESRI grid of plain numbers (.hdr)",
         samples,
         bands,

@@ -9,7 +9,7 @@ mod esri;
 
 use crate::OpenOptions;
 use crate::plain::{Kind, Plain};
-use crate::reader::{CrsSaid, Declared, Reader, Said, VerticalUnit};
+use crate::reader::{Corrects, CrsSaid, Declared, Reader, Said, VerticalUnit};
 use crate::value::band;
 use std::path::{Path, PathBuf};
 use terrasoar_layout::dem::{SampleSink, Warning};
@@ -65,6 +65,7 @@ struct Label {
     unit: Option<Said<VerticalUnit>>,
     notes: Vec<String>,
     warnings: Vec<Warning>,
+    corrects: Corrects,
 }
 
 /// Whether there is a label for the data file at `path`, or `path` is one.
@@ -140,6 +141,7 @@ impl LabelledDem {
             let value = values.get(number).copied().filter(|value| *value != idle);
             value.map(|value| Said::new(value, by))
         };
+        declared.corrects = label.corrects;
         declared.value.scale = of_band(&label.gains, 1.0, "data gain values");
         declared.value.offset = of_band(&label.offsets, 0.0, "data offset values");
         declared.value.unit = label.unit;

@@ -8,7 +8,7 @@ use super::stretched::{Limits, Shades, Stretched};
 use crate::beside::Beside;
 use crate::crs::{self, System};
 use crate::mask::{Bits, Masking};
-use crate::reader::{Declared, NumberRows, Numbers, Picture, Said};
+use crate::reader::{Corrects, Declared, NumberRows, Numbers, Picture, Said};
 use crate::shown::PictureOptions;
 use std::path::Path;
 use terrasoar_layout::dem::SampleType;
@@ -41,6 +41,9 @@ impl Completed {
         let (map, crs) = picture.said();
         declared.place = map.map(|map| Said::new(map, "the picture"));
         declared.crs = crs;
+        // A world file counts first beside a PNG alone.
+        let is_png = info.format.contains(" PNG");
+        declared.corrects = Corrects { place: !is_png, system: true, nodata: true, ..Corrects::default() };
         let beside = Beside::of_picture(&path, picture.mask().is_some());
         let masking = beside.complete(&mut declared, &options.open_options())?;
         let mut system =

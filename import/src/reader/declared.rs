@@ -44,6 +44,25 @@ pub(crate) struct Declared {
     pub(crate) aloud: Vec<String>,
     /// What may make the ground wrong, each with what would mend it.
     pub(crate) warnings: Vec<Warning>,
+    /// Whether the file's first row is the southernmost, and GDAL turns the rows round.
+    pub(crate) rows_from_south: bool,
+    /// What GDAL's `.aux.xml` beside the file corrects of all this.
+    pub(crate) corrects: Corrects,
+}
+
+/// What of GDAL's `.aux.xml` counts before what a file says itself, as GDAL has it in the file's format. The rest counts where the file says nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Corrects {
+    /// The place, also before a world file.
+    pub(crate) place: bool,
+    /// The reference system.
+    pub(crate) system: bool,
+    /// Voids.
+    pub(crate) nodata: bool,
+    /// Scale, offset and unit.
+    pub(crate) scale: bool,
+    /// Nothing counts at all: GDAL does not look for it.
+    pub(crate) nothing: bool,
 }
 
 impl Declared {
@@ -60,6 +79,8 @@ impl Declared {
             notes: Vec::new(),
             aloud: Vec::new(),
             warnings: Vec::new(),
+            rows_from_south: false,
+            corrects: Corrects::default(),
         }
     }
 }

@@ -7,7 +7,7 @@
 mod declared;
 mod picture;
 
-pub(crate) use declared::{CrsSaid, Declared, HorizontalSize, Said, ValueSaid, VerticalUnit};
+pub(crate) use declared::{Corrects, CrsSaid, Declared, HorizontalSize, Said, ValueSaid, VerticalUnit};
 pub(crate) use picture::{NumberRows, Numbers, Orientation, Picture, bits_of, upper_eight};
 
 use terrasoar_layout::dem::{SampleSink, Warning};

@@ -122,6 +122,7 @@ fn declared(vrt: &Vrt) -> Declared {
     };
     let mut declared = Declared::new(vrt.samples, band.sample_type, format.clone());
     declared.band_number = band.number;
+    declared.corrects.nothing = true;
     if let Some([x, a, b, y, d, e]) = vrt.corners {
         let centres = [x + 0.5 * (a + b), a, b, y + 0.5 * (d + e), d, e];
         declared.place = Some(Said::new(centres, "GeoTransform"));
