@@ -119,6 +119,7 @@ data: lat = {", ".join(str(40 + r + c / 10) for c, r in SOUTH_UP)}; lon = {", ".
         run("gdal_translate", "-q", "-of", "GTiff", "-a_srs", "EPSG:26710", grid, folder / "a.tif")
         run("gdal_translate", "-q", "-of", "USGSDEM", "-co", "ZRESOLUTION=0.1", folder / "a.tif", OUT / "utm-tenths.dem", stderr=subprocess.DEVNULL)
         run("gdal_translate", "-q", "-of", "USGSDEM", folder / "a.tif", OUT / "utm.dem", stderr=subprocess.DEVNULL)
+        run("gdal_translate", "-q", "-of", "BAG", folder / "a.tif", OUT / "utm.bag", stderr=subprocess.DEVNULL)
     for path in OUT.glob("*.aux.xml"):
         path.unlink()
     total = sum(path.stat().st_size for path in OUT.iterdir())

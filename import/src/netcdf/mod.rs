@@ -6,6 +6,7 @@
 
 mod attributes;
 mod axes;
+mod bare;
 mod choose;
 mod file;
 mod stream;
@@ -121,25 +122,10 @@ impl About<'_> {
                 let y = axes::read(self.path, self.file, &y_at, y)?;
                 self.place(&mut declared, &x, &y);
             }
-            (None, None) => self.places_apart()?,
+            (None, None) => self.without_axes(&mut declared)?,
             _ => {}
         }
         Ok((declared, shape))
-    }
-
-    /// Refuses a grid whose places are listed sample by sample.
-    fn places_apart(&self) -> Result<(), LayoutError> {
-        let Some(names) = text(self.grid.variable.attributes(), "coordinates") else { return Ok(()) };
-        let two = |name: &str| {
-            self.beside(name).is_some_and(|(_, v)| v.ndim() == 2 && axes::way("", Some(v)).is_some())
-        };
-        if names.split_whitespace().filter(|name| two(name)).count() < 2 {
-            return Ok(());
-        }
-        Err(LayoutError::unsupported(
-            self.path,
-            "the places of its samples are listed one by one, not as columns and rows; make a regular grid of it: gdalwarp -geoloc INPUT output.tif",
-        ))
     }
 
     /// The place that two axes make, and what their units say of the system.

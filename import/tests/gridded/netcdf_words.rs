@@ -1,6 +1,6 @@
 //! What netCDF's attributes say of coordinates and numbers, in files made here, against arithmetic.
 
-use super::cdf::{Axis, Values, words, write};
+use super::cdf::{Axis, Values, words, write, write_bare};
 use super::{Grid, at, refused, with};
 use std::path::{Path, PathBuf};
 use terrasoar_import::{OpenOptions, open_with};
@@ -159,4 +159,38 @@ fn only_what_is_valid_is_data() {
     let reals = ("valid_range", Values::Doubles(vec![10.0, 20.0]));
     let (found, said) = data(folder.path(), &[&packed()[..], &[reals]].concat(), shorts());
     assert!(found == whole(10, 20) && said.iter().any(|said| said.contains("taken as packed")), "{said:?}");
+}
+
+/// Grids without coordinates: the mapping may state their place, and else nothing says which side the rows begin on.
+#[test]
+fn grids_without_coordinates_have_the_place_of_their_mapping_or_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nc");
+    let z = Values::Floats((0..7).flat_map(|row| (0..9).map(move |col| height(col, row) as f32)).collect());
+    let write_with = |more: &[(&str, &[(&str, Values)])]| {
+        write_bare(&path, [9, 7], (&z, &[("grid_mapping", words("crs"))]), more);
+    };
+    write_with(&[("crs", &[("GeoTransform", words("500 10 0 900 0 -10 "))])]);
+    let grid = read(&path);
+    assert_eq!(grid.info.georeference.pixel_to_crs, Some([505.0, 10.0, 0.0, 895.0, 0.0, -10.0]));
+    assert_eq!(at(&grid, 505.0, 895.0), height(0, 0));
+    assert_eq!(at(&grid, 585.0, 835.0), height(8, 6));
+    assert!(told(&path).iter().all(|warning| !warning.words.contains("first row")));
+    write_with(&[("crs", &[("GeoTransform", words("500 10 0 900 0 0"))])]);
+    assert_eq!(read(&path).info.georeference.pixel_to_crs, None);
+    let told = told(&path);
+    assert!(
+        told.iter().any(|warning| warning.words.contains("on which side its first row lies")),
+        "{told:?}"
+    );
+}
+
+/// A bathymetry (BAG) is HDF5 with rows from the south and its place in a text: read as netCDF it lay upside down.
+#[test]
+fn bathymetric_attributed_grids_are_refused() {
+    let said = refused(
+        &super::fixture("utm.bag"),
+        &OpenOptions { band: Some("BAG_root/elevation".into()), ..OpenOptions::default() },
+    );
+    assert!(said.contains("Bathymetric Attributed Grid") && said.contains("gdal_translate"), "{said}");
 }

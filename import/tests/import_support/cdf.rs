@@ -67,7 +67,28 @@ pub(crate) struct Axis<'a> {
 /// Writes a grid, rows by columns; `more` are variables without dimensions, such as grid mappings.
 pub(crate) fn write(
     path: &Path,
+    axes: [&Axis<'_>; 2],
+    z: (&Values, &[(&str, Values)]),
+    more: &[(&str, &[(&str, Values)])],
+) {
+    write_variables(path, axes, true, z, more);
+}
+
+/// As [`write`], with dimensions "x" and "y" that have no coordinates.
+pub(crate) fn write_bare(
+    path: &Path,
+    samples: [usize; 2],
+    z: (&Values, &[(&str, Values)]),
+    more: &[(&str, &[(&str, Values)])],
+) {
+    let axis = |name, at: usize| Axis { name, numbers: vec![0.0; samples[at]], attributes: vec![] };
+    write_variables(path, [&axis("x", 0), &axis("y", 1)], false, z, more);
+}
+
+fn write_variables(
+    path: &Path,
     [columns, rows]: [&Axis<'_>; 2],
+    has_coordinates: bool,
     (z, about): (&Values, &[(&str, Values)]),
     more: &[(&str, &[(&str, Values)])],
 ) {
@@ -79,6 +100,9 @@ pub(crate) fn write(
         (columns.name, vec![1], axis(columns), columns.attributes.clone()),
         ("z", vec![0, 1], z.clone(), about.to_vec()),
     ];
+    if !has_coordinates {
+        variables.drain(..2);
+    }
     variables.extend(more.iter().map(|(name, about)| (*name, vec![], Values::Ints(vec![0]), about.to_vec())));
     let head = |places: &[u32]| {
         let mut head = b"CDF\x01\0\0\0\0".to_vec();
