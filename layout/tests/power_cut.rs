@@ -6,6 +6,7 @@ mod common;
 use common::MemoryDem;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::{BuildOptions, HeightRoom, build_on};
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::edit::{Area, Edit, EditSession, SampleRect, compact, widen};
@@ -51,16 +52,19 @@ fn set(i: u32) -> Edit {
     Edit::Set { area: Area::Rect(rect), height_m: f64::from(20 + i % 60) }
 }
 
+fn open(base: &Path, overlay: Option<&Path>) -> Result<Terrain, LayoutError> {
+    match overlay {
+        Some(overlay) => Terrain::open_with_overlay_unmapped(base, overlay),
+        None => Terrain::open_unmapped(base),
+    }
+}
+
 /// Everything that a reader sees: heights, errors and the picture; `None` if the file is not there.
 fn seen(base: &Path, overlay: Option<&Path>) -> Option<Vec<u8>> {
     if !overlay.unwrap_or(base).exists() {
         return None;
     }
-    let terrain = match overlay {
-        Some(overlay) => Terrain::open_with_overlay_unmapped(base, overlay),
-        None => Terrain::open_unmapped(base),
-    }
-    .unwrap();
+    let terrain = open(base, overlay).unwrap();
     let report = verify(&terrain, &|_| {}).unwrap();
     assert!(report.is_sound(), "{:?}", report.problems);
     // The file itself says that a header which was torn was never told as durable.
@@ -78,12 +82,36 @@ fn seen(base: &Path, overlay: Option<&Path>) -> Option<Vec<u8>> {
     Some(seen)
 }
 
+/// Damages each header of what a power cut left in turn. How often one was lost that had been told as durable, at `generation`; the file says so each time.
+fn lose_headers(base: &Path, overlay: Option<&Path>, generation: u32) -> usize {
+    let Ok(terrain) = open(base, overlay) else { return 0 };
+    let newest = terrain.header().generation;
+    let file = overlay.unwrap_or(base);
+    let whole = std::fs::read(file).unwrap();
+    let mut times = 0;
+    for slot in 0..2 {
+        let mut bytes = whole.clone();
+        bytes[slot * 4096 + 0x20] ^= 1;
+        std::fs::write(file, bytes).unwrap();
+        // Where no header is left, nothing is shown.
+        let Ok(terrain) = open(base, overlay) else { continue };
+        if newest == generation && terrain.header().generation < newest {
+            let lost = terrain.lost_header().unwrap();
+            assert!(lost.is_some_and(|lost| lost.may_have_been_saved()), "{lost:?} of {generation}");
+            times += 1;
+        }
+    }
+    times
+}
+
 /// What happens, and what is seen after each step of it.
 struct Story {
     folder: tempfile::TempDir,
     disk: Arc<ForgetfulDisk>,
     overlay: Option<&'static str>,
     states: Vec<Option<Vec<u8>>>,
+    /// Of the header that leads to a state.
+    generations: Vec<u32>,
 }
 
 impl Story {
@@ -91,8 +119,8 @@ impl Story {
         let folder = tempfile::tempdir().unwrap();
         prepare(&folder.path().join("t.iqt"));
         let disk = Arc::new(ForgetfulDisk::watching(folder.path()).unwrap());
-        let mut story = Self { folder, disk, overlay, states: Vec::new() };
-        story.states.push(story.seen_in(story.folder.path()));
+        let mut story = Self { folder, disk, overlay, states: Vec::new(), generations: Vec::new() };
+        story.note();
         story
     }
 
@@ -114,19 +142,31 @@ impl Story {
         .unwrap()
     }
 
+    fn files_in(&self, folder: &Path) -> (PathBuf, Option<PathBuf>) {
+        (folder.join("t.iqt"), self.overlay.map(|name| folder.join(name)))
+    }
+
     fn seen_in(&self, folder: &Path) -> Option<Vec<u8>> {
-        seen(&folder.join("t.iqt"), self.overlay.map(|name| folder.join(name)).as_deref())
+        let (base, overlay) = self.files_in(folder);
+        seen(&base, overlay.as_deref())
+    }
+
+    fn note(&mut self) {
+        let (base, overlay) = self.files_in(self.folder.path());
+        self.states.push(seen(&base, overlay.as_deref()));
+        self.generations
+            .push(open(&base, overlay.as_deref()).map_or(0, |terrain| terrain.header().generation));
     }
 
     /// A step has ended, and whoever asked for it was told that it is durable.
     fn told(&mut self) {
-        self.states.push(self.seen_in(self.folder.path()));
+        self.note();
         self.disk.promise(self.states.len() - 1);
     }
 
-    /// Cuts the power after every call.
-    fn check(&self) {
-        let mut images = 0;
+    /// Cuts the power after every call; of files that are `appended` to, damages headers then, too.
+    fn check(&self, is_appended: bool) {
+        let (mut images, mut lost) = (0, 0);
         for after in 0..=self.disk.calls() {
             for seed in 0..SEEDS {
                 let found = tempfile::tempdir().unwrap();
@@ -140,9 +180,13 @@ impl Story {
                     told + 1
                 );
                 images += 1;
+                if is_appended {
+                    let (base, overlay) = self.files_in(found.path());
+                    lost += lose_headers(&base, overlay.as_deref(), self.generations[told]);
+                }
             }
         }
-        assert!(images > 4 * SEEDS, "{images}");
+        assert!(images > 4 * SEEDS && (!is_appended || lost > SEEDS as usize), "{images}, {lost}");
     }
 }
 
@@ -165,7 +209,7 @@ fn edits_undone_and_redone() {
             story.told();
         }
         assert!(story.states.windows(2).all(|pair| pair[0] != pair[1]) || overlay.is_some());
-        story.check();
+        story.check(true);
     }
 }
 
@@ -196,7 +240,7 @@ fn pictures_and_paint() {
         drop(session);
         drape(&mut story, 2);
         assert!(story.states.windows(2).all(|pair| pair[0] != pair[1]));
-        story.check();
+        story.check(true);
     }
 }
 
@@ -208,7 +252,7 @@ fn builds_new_and_in_the_place_of_others() {
         story.told();
     }
     assert!(story.states[0].is_none() && story.states.windows(2).all(|pair| pair[0] != pair[1]));
-    story.check();
+    story.check(false);
 }
 
 /// A file that is written anew and commits before and after it.
@@ -240,6 +284,6 @@ fn files_written_anew() {
         // What is committed now goes into the new file; if that could vanish, this would with it.
         commit(&mut story, 3);
         commit(&mut story, 4);
-        story.check();
+        story.check(false);
     }
 }

@@ -20,8 +20,31 @@ pub(super) type Places = Vec<(u64, Entry)>;
 /// Batches of edits, in their order.
 pub(super) type Batches = VecDeque<Vec<Edit>>;
 
-/// What is left of a hand after an error, and the error.
-pub(super) type Failed = (Option<Box<Hand>>, LayoutError);
+/// Why a hand could not do its work, and what is left of it.
+pub(super) enum Failed {
+    /// It is as it was.
+    Back(Box<Hand>, LayoutError),
+    /// Nothing.
+    Gone(Gone),
+}
+
+/// An error after which nobody can edit, and how many edits are lost by it.
+pub(super) struct Gone {
+    pub(super) error: LayoutError,
+    pub(super) edits: usize,
+}
+
+impl Gone {
+    /// The error, with what is lost.
+    pub(super) fn told(self) -> LayoutError {
+        let Self { error, edits } = self;
+        match edits {
+            0 => error,
+            1 => LayoutError::Usage(format!("{error}; one edit that was not on the disk is lost")),
+            _ => LayoutError::Usage(format!("{error}; {edits} edits that were not on the disk are lost")),
+        }
+    }
+}
 
 /// A session and what is not on the disk.
 pub(super) struct Hand {
@@ -106,6 +129,11 @@ impl Hand {
         Ok(places)
     }
 
+    /// Edits that are in memory alone.
+    pub(super) fn unsaved_edits(&self) -> usize {
+        edits_of(&self.unsaved)
+    }
+
     /// Everything that is in memory alone.
     pub(super) fn uncommitted(&self) -> GroundPatch {
         let editor = self.session.editor();
@@ -153,16 +181,16 @@ impl Hand {
             Ok(header) => header,
             Err((Some(session), error)) => {
                 let before = Self { unsaved, refused, ..Self::of(*session, &path) };
-                return Err((Some(Box::new(before)), error));
+                return Err(Failed::Back(Box::new(before), error));
             }
-            Err((None, error)) => return Err((None, lost(error, &unsaved))),
+            Err((None, error)) => return Err(gone(error, &unsaved)),
         };
         match EditSession::open_on(disk, &path) {
             Ok(session) if session.header().state() == header.state() => {
                 Ok((Self { refused, ..Self::of(session, &path) }, unsaved))
             }
-            Ok(_) => Err((None, lost(edited_by_another(&path), &unsaved))),
-            Err(error) => Err((None, lost(error, &unsaved))),
+            Ok(_) => Err(gone(edited_by_another(&path), &unsaved)),
+            Err(error) => Err(gone(error, &unsaved)),
         }
     }
 }
@@ -186,11 +214,11 @@ fn edited_by_another(path: &Path) -> LayoutError {
     ))
 }
 
-/// An error after which edits are gone.
-fn lost(error: LayoutError, unsaved: &Batches) -> LayoutError {
-    match unsaved.iter().map(Vec::len).sum::<usize>() {
-        0 => error,
-        1 => LayoutError::Usage(format!("{error}; one edit that was not on the disk is lost")),
-        edits => LayoutError::Usage(format!("{error}; {edits} edits that were not on the disk are lost")),
-    }
+/// Edits in memory are gone with the hand.
+fn gone(error: LayoutError, unsaved: &Batches) -> Failed {
+    Failed::Gone(Gone { error, edits: edits_of(unsaved) })
+}
+
+fn edits_of(batches: &Batches) -> usize {
+    batches.iter().map(Vec::len).sum()
 }

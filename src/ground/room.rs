@@ -8,7 +8,7 @@
 //! that are lost by it. Cost: that of a build from records, and a second pool of pages at the end; frames have no part in it.
 
 use super::engine::MeshEngine;
-use super::hand::{Batches, Hand, Places};
+use super::hand::{Batches, Failed, Gone, Hand, Places};
 use super::options::StreamOptions;
 use super::streamed::streamed;
 use super::ticket::{CommitFailed, Promise};
@@ -36,6 +36,16 @@ pub(super) enum Order {
     Edit(Vec<Edit>),
     /// To write everything so far.
     Commit(String, Promise),
+}
+
+impl Order {
+    /// Edits that are lost with it.
+    fn edits(&self) -> usize {
+        match self {
+            Self::Edit(batch) => batch.len(),
+            Self::Commit(..) => 0,
+        }
+    }
 }
 
 /// What became of the ground, in its order.
@@ -176,7 +186,10 @@ impl Room {
         let ended = self.thread.take().map(JoinHandle::join);
         let made = match ended {
             Some(Ok(made)) => made,
-            _ => Err(unexpected(&self.path)),
+            _ => Err(LayoutError::Usage(format!(
+                "{}; edits that were not on the disk are lost",
+                unexpected(&self.path)
+            ))),
         };
         (made, std::mem::take(&mut self.desk.papers().errors))
     }
@@ -230,20 +243,23 @@ impl Maker {
     /// The thread's life.
     fn live(self, batch: Vec<Edit>, heights_m: [f64; 2]) -> Result<Made, LayoutError> {
         let desk = Closing(Arc::clone(&self.bench.desk));
-        let made = self.work(batch, heights_m);
-        if let Err(error) = &made {
+        self.work(batch, heights_m).map_err(|mut gone| {
             let mut papers = desk.0.papers();
             (papers.is_closed, papers.is_saved) = (true, false);
-            for order in papers.orders.drain(..) {
+            let orders = std::mem::take(&mut papers.orders);
+            drop(papers);
+            gone.edits += orders.iter().map(Order::edits).sum::<usize>();
+            let error = gone.told();
+            for order in orders {
                 if let Order::Commit(_, promise) = order {
                     promise.tell(Err(CommitFailed::of(LayoutError::Usage(error.to_string()))));
                 }
             }
-        }
-        made
+            error
+        })
     }
 
-    fn work(mut self, batch: Vec<Edit>, heights_m: [f64; 2]) -> Result<Made, LayoutError> {
+    fn work(mut self, batch: Vec<Edit>, heights_m: [f64; 2]) -> Result<Made, Gone> {
         match self.hand.end_writing() {
             Ok(places) => self.bench.steps.push(Step::Saved(places)),
             Err(error) => self.tell(error),
@@ -273,12 +289,13 @@ impl Maker {
     }
 
     /// Applies a batch; rewrites the file where that is what it takes, at once for heights that are known to have no room.
-    fn make(mut self, batch: Vec<Edit>, no_room_m: Option<[f64; 2]>) -> Result<Self, LayoutError> {
+    fn make(mut self, batch: Vec<Edit>, no_room_m: Option<[f64; 2]>) -> Result<Self, Gone> {
         let mut no_room_m = no_room_m;
         for widenings in 0.. {
             if let Some(heights_m) = no_room_m.take() {
-                let (maker, made) = self.widen(heights_m)?;
-                self = maker;
+                let made;
+                (self, made) =
+                    self.widen(heights_m).map_err(|gone| Gone { edits: gone.edits + batch.len(), ..gone })?;
                 if let Err(error) = made {
                     self.refuse(error);
                     break;
@@ -313,7 +330,7 @@ impl Maker {
     }
 
     /// Rewrites the file with room for these heights, and makes again what was not on the disk. What became of it comes with the maker: after an error all is as before.
-    fn widen(self, heights_m: [f64; 2]) -> Result<(Self, Result<(), LayoutError>), LayoutError> {
+    fn widen(self, heights_m: [f64; 2]) -> Result<(Self, Result<(), LayoutError>), Gone> {
         // A core is left to those who fly on.
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let pool = match rayon::ThreadPoolBuilder::new().num_threads((cores - 1).max(1)).build() {
@@ -333,8 +350,8 @@ impl Maker {
                 bench.steps.clear();
                 Ok((Self { hand, bench }.make_again(batches), Ok(())))
             }
-            Err((Some(hand), error)) => Ok((Self { hand: *hand, bench }, Err(error))),
-            Err((None, error)) => Err(error),
+            Err(Failed::Back(hand, error)) => Ok((Self { hand: *hand, bench }, Err(error))),
+            Err(Failed::Gone(gone)) => Err(gone),
         }
     }
 
@@ -371,20 +388,38 @@ impl Maker {
     ///
     /// # Errors
     /// Damage and I/O. All edits are on the disk then, if that can be.
-    fn show(&mut self) -> Result<(), LayoutError> {
+    fn show(&mut self) -> Result<(), Gone> {
         match self.new_ground() {
             Ok(shown) => {
                 self.bench.shown = Some(shown);
                 self.bench.steps.clear();
                 Ok(())
             }
-            Err(error) => Err(match self.hand.commit_now("edits") {
-                Ok(_) => LayoutError::Usage(format!("{error}; all edits are on the disk")),
-                Err(other) => {
-                    LayoutError::Usage(format!("{error}; edits that were not committed are lost: {other}"))
-                }
-            }),
+            Err(error) => Err(self.save_all(&error)),
         }
+    }
+
+    /// Takes no more orders, carries out those that came meanwhile, without rewriting the file again, and brings everything to the disk. What `error` is told with.
+    fn save_all(&mut self, error: &LayoutError) -> Gone {
+        let orders = {
+            let mut papers = self.bench.desk.papers();
+            papers.is_closed = true;
+            std::mem::take(&mut papers.orders)
+        };
+        for order in orders {
+            match order {
+                Order::Edit(batch) => match self.hand.apply(&batch) {
+                    Ok((_, patch)) => self.edited(patch),
+                    Err(error) => self.refuse(error),
+                },
+                Order::Commit(label, promise) => self.commit(&label, &promise),
+            }
+        }
+        let (words, edits) = match self.hand.commit_now("edits") {
+            Ok(_) => (format!("{error}; all edits that were made are on the disk"), 0),
+            Err(other) => (format!("{error}; {other}"), self.hand.unsaved_edits()),
+        };
+        Gone { error: LayoutError::Usage(words), edits }
     }
 
     fn new_ground(&self) -> Result<Shown, LayoutError> {

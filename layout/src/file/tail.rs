@@ -257,10 +257,10 @@ impl Tail {
         Ok(NextHeader { page, header, attempt: Arc::new(attempt) })
     }
 
-    /// Brings what was written to the disk, then the header that leads to it.
+    /// Brings what was written to the disk, then the header that leads to it, then the mark that says so.
     ///
     /// # Errors
-    /// [`LayoutError::Io`], or [`LayoutError::Usage`] if the file was replaced under its name. The file reads as before then, or as after if only the last sync failed.
+    /// [`LayoutError::Io`], or [`LayoutError::Usage`] if the file was replaced under its name. The file reads as before then, or as after if the header was written.
     pub(crate) fn flip(&self, disk: &dyn Disk, next: &NextHeader) -> Result<(), LayoutError> {
         if let Some(packed) = &self.packed {
             self.put_block(disk, packed, next)?;
@@ -280,8 +280,9 @@ impl Tail {
         let page = self.packed_end().map(|end| end.to_file(&next.page));
         self.put(disk, &page.as_ref().unwrap_or(&next.page)[..], self.header_offset)?;
         self.sync(disk)?;
-        // Not brought to the disk in haste: a file without it reads as ever.
-        self.put_mark(disk, mark_place, next, true)
+        // Only then is the commit told as saved: if its header is damaged some day, the file can tell that it is lost.
+        self.put_mark(disk, mark_place, next, true)?;
+        self.sync(disk)
     }
 
     /// Where the mark goes: behind everything, or over another mark there.

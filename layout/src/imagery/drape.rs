@@ -256,14 +256,14 @@ mod tests {
             assert_ne!(wanted_before, wanted_after);
             for at in 0..calls {
                 for quarters in 0..=4 {
-                    // Only the header's own write decides, and its sync and the mark may fail after it.
-                    let is_decided = at + 2 >= calls || at + 3 == calls && quarters == 4;
+                    // Only the header's own write decides; its sync, and the mark with its own, may fail after it.
+                    let is_decided = at + 3 >= calls || at + 4 == calls && quarters == 4;
                     let wanted = if is_decided { &wanted_after } else { &wanted_before };
                     for failure in [Failure::Killed { quarters }, Failure::Full { quarters }] {
                         let (stopped, done, _) = append(&before, &picture, (at, failure));
                         assert!(!done);
                         assert!(seen(stopped.clone()) == *wanted, "{failure:?} at {at} of {calls}");
-                        if matches!(failure, Failure::Full { .. }) && at + 3 < calls {
+                        if matches!(failure, Failure::Full { .. }) && at + 4 < calls {
                             // What counts; the mark of the append before may be written over.
                             let counted = before.len() - if seed == 1 { 0 } else { MARK_BYTES };
                             assert!(

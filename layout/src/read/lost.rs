@@ -57,9 +57,17 @@ impl Terrain {
         let Some(page) = slots.iter().position(is_damaged) else { return Ok(None) };
         let mut end = [0; MARK_BYTES];
         let mark = if source.read_end(&mut end)? { Mark::parse(&end) } else { None };
-        let was_saved = mark.filter(|mark| mark.generation > header.generation).map(|mark| mark.is_saved);
+        // How many headers the commit's is behind the current one.
+        let ahead = mark.map_or(0, |mark| mark.generation.saturating_sub(header.generation));
+        let was_saved = match mark {
+            Some(mark) if ahead > 0 && mark.is_saved => Some(true),
+            Some(_) if ahead == 1 => Some(false),
+            // A commit was cut off, and the damaged header is of the one before: that may well have been saved.
+            _ => None,
+        };
         // Before the first commit the second slot is empty, after it neither.
-        let is_lost = !is_zero(&slots[page]) || header.history.is_some() || was_saved == Some(true);
+        let is_lost =
+            !is_zero(&slots[page]) || header.history.is_some() || was_saved == Some(true) || ahead > 1;
         Ok(is_lost.then_some(LostHeader { page: page as u64, generation: header.generation, was_saved }))
     }
 }

@@ -1,8 +1,9 @@
 //! A disk that fails once, at every call of a rewriting: the ticket, the errors and the file say the same.
 
 use super::super::editing::{Edited, Editing};
+use super::super::ticket::CommitTicket;
 use super::super::{Ground, StreamOptions};
-use super::Hand;
+use super::{Desk, Hand, Maker, Order, Plan};
 use crate::view::View;
 use std::path::Path;
 use std::sync::Arc;
@@ -78,4 +79,60 @@ fn whatever_call_fails_nothing_is_told_as_saved_that_is_not() {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "call {call}");
     }
     assert!(refused > 3 && unsaved > 1 && fine > 2, "{refused} refused, {unsaved} not saved, {fine} fine");
+}
+
+/// A maker whose terrain is gone when its ground is to be shown, the orders that come meanwhile, and the terrain.
+fn maker_without_ground(folder: &Path, orders: Vec<Order>) -> (Maker, Arc<Desk>, std::path::PathBuf) {
+    let path = folder.join("land.iqt");
+    let dem = MemoryDem::from_fn([129; 2], SampleType::I16, |x, y| f64::from(500 + (x * 7 + y * 3) % 90));
+    build(&dem, &path, &BuildOptions::default().spacing_m([10.0; 2]), &Silent).unwrap();
+    let session = EditSession::open(&path).unwrap();
+    let desk = Arc::new(Desk::default());
+    let plan = Plan { options: StreamOptions::default(), view: None };
+    let mut maker = Maker::of(Hand::of(session, &folder.join("moved-away.iqt")), plan, Arc::clone(&desk));
+    maker.hand.apply(&[crater(400.0, 15.0)]).unwrap();
+    desk.papers().orders.extend(orders);
+    (maker, desk, path)
+}
+
+#[test]
+fn edits_that_come_while_ground_is_made_ready_are_saved_where_that_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let (ticket, promise) = CommitTicket::promised(Path::new("land.iqt"));
+    let orders = vec![
+        Order::Edit(vec![crater(800.0, 15.0)]),
+        Order::Commit("both".into(), promise),
+        Order::Edit(vec![crater(600.0, 15.0), crater(600.0, 60_000.0)]),
+        Order::Edit(vec![crater(1000.0, 15.0)]),
+    ];
+    let (mut maker, desk, path) = maker_without_ground(folder.path(), orders);
+    let old = [400.0, 600.0, 800.0, 1000.0].map(|x| height_m(&path, x));
+    let told = maker.show().err().unwrap().told().to_string();
+    assert!(
+        told.contains("moved-away.iqt") && told.ends_with("all edits that were made are on the disk"),
+        "{told}"
+    );
+    assert!(ticket.wait().is_ok());
+    let refused = desk.papers().errors.pop_front().unwrap().to_string();
+    assert!(refused.contains("hold"), "{refused}");
+    assert!(desk.papers().is_closed && desk.papers().orders.is_empty());
+    drop(maker);
+    let new = [400.0, 600.0, 800.0, 1000.0].map(|x| height_m(&path, x));
+    let is_made = [0, 1, 2, 3].map(|i: usize| new[i] < old[i] - 10.0);
+    assert_eq!(is_made, [true, false, true, true], "{old:?} {new:?}");
+}
+
+#[test]
+fn all_edits_that_are_lost_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let (ticket, promise) = CommitTicket::promised(Path::new("land.iqt"));
+    let orders = vec![Order::Commit("none".into(), promise), Order::Edit(vec![crater(800.0, 15.0); 3])];
+    let (maker, desk, path) = maker_without_ground(folder.path(), orders);
+    // The file is rewritten; the one that is opened then is not there.
+    let told = maker.live(vec![crater(600.0, 60_000.0); 2], [-59_500.0, 589.0]).err().unwrap().to_string();
+    // One in memory, two that there was no room for, three that came meanwhile.
+    assert!(told.ends_with("6 edits that were not on the disk are lost"), "{told}");
+    assert_eq!(ticket.wait().unwrap_err().to_string(), told);
+    assert!(desk.papers().is_closed && !desk.papers().is_saved);
+    assert!(verify(&Terrain::open_unmapped(&path).unwrap(), &|_| {}).unwrap().is_sound());
 }

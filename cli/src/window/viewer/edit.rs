@@ -221,12 +221,8 @@ impl Viewer {
             }
             News::NotTurned(error) => self.trouble(error.to_string()),
             News::NotOpened(error) => {
-                (self.stroke, self.rain) = (None, None);
-                let lost = match self.widening.take() {
-                    Some(_) => "; edits that were not saved before are not in the file",
-                    None => "",
-                };
-                self.trouble(format!("{error}{lost}"));
+                (self.stroke, self.rain, self.widening) = (None, None, None);
+                self.trouble(error.to_string());
             }
             News::Broken(words) => {
                 (self.stroke, self.rain, self.widening) = (None, None, None);

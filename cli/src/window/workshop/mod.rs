@@ -130,7 +130,7 @@ impl Workshop {
         match worker.reports.try_recv() {
             Ok(report) => Some(self.note(report)),
             Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => Some(News::Broken(self.break_down())),
+            Err(TryRecvError::Disconnected) => Some(News::Broken(self.come_to_an_end())),
         }
     }
 
@@ -145,7 +145,7 @@ impl Workshop {
         }
         while let State::Open(worker) = &self.state {
             let Ok(report) = worker.reports.recv() else {
-                return (news, Err(self.break_down()));
+                return (news, Err(self.come_to_an_end()));
             };
             let unsaved = worker.sent.edits - report.done.saved;
             match self.note(report) {
@@ -154,6 +154,7 @@ impl Workshop {
                     return (news, Err(format!("{error}; {}", lost(unsaved))));
                 }
                 News::NotOpened(error) => return (news, Err(error.to_string())),
+                News::Broken(words) => return (news, Err(words)),
                 other => news.push(other),
             }
         }
@@ -209,20 +210,32 @@ impl Workshop {
         if let State::Open(worker) = &mut self.state {
             worker.done = done;
         }
-        if matches!(news, News::Closed(_) | News::NotOpened(_)) {
-            // Waits for its last moments: the right to edit is given back then.
-            self.state = State::Closed;
+        match news {
+            // Edits that were made and seen are gone with the session.
+            News::NotOpened(error) if done.edits > done.saved => {
+                News::Broken(self.break_down(&error.to_string()))
+            }
+            News::Closed(_) | News::NotOpened(_) => {
+                // Waits for its last moments: the right to edit is given back then.
+                self.state = State::Closed;
+                news
+            }
+            news => news,
         }
-        news
     }
 
     /// The thread has ended unexpectedly; what that means, as a message.
-    fn break_down(&mut self) -> String {
+    fn come_to_an_end(&mut self) -> String {
+        self.break_down(&format!("{}: editing came to an unexpected end", self.path.display()))
+    }
+
+    /// Nobody can edit any more, for this reason; what that means, as a message.
+    fn break_down(&mut self, why: &str) -> String {
         let unsaved = match &self.state {
             State::Open(worker) => worker.unsaved(),
             State::Closed | State::Broken(_) => 0,
         };
-        let words = format!("{}: editing came to an unexpected end; {}", self.path.display(), lost(unsaved));
+        let words = format!("{why}; {}", lost(unsaved));
         self.state = State::Broken(words.clone());
         words
     }

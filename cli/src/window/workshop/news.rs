@@ -91,11 +91,11 @@ pub(crate) enum News {
     },
     /// A commit is not on the disk; it is part of the next.
     NotSaved(LayoutError),
-    /// The terrain could not be opened for editing, and the right was given back. What was ordered is not done.
+    /// The terrain could not be opened for editing, and the right was given back. What was ordered is not done; all edits that were made are on the disk.
     NotOpened(LayoutError),
     /// The right was given back, everything being on the disk but for what the error says.
     Closed(Option<LayoutError>),
-    /// The thread ended unexpectedly; what that means, as a message.
+    /// The thread ended, and edits with it that were made; what that means, as a message.
     Broken(String),
 }
 

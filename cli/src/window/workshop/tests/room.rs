@@ -188,3 +188,28 @@ fn what_fits_nowhere_is_refused_and_what_was_made_before_stays() {
     assert_eq!(letters(&news), "wWeweres");
     assert!(land.pages() == by_hand(&[&[&abyss[..], &[crater(3)]].concat()]).pages());
 }
+
+/// Another program takes the right to edit while the file is being rewritten: what was in memory is gone, and that is told, with the edits that wait.
+#[test]
+fn edits_that_are_lost_with_the_session_are_told() {
+    let land = tight();
+    let (path, opened) = (land.path.clone(), AtomicU64::new(0));
+    let open = move || match opened.fetch_add(1, Ordering::Relaxed) {
+        0 => EditSession::open(&path),
+        _ => Err(LayoutError::Usage(format!("{}: another program edits it", path.display()))),
+    };
+    let mut workshop = Workshop::with(&land.open(), Arc::new(open), Arc::new(|| {}), spawn);
+    stroke(&mut workshop, 1);
+    workshop.apply(2, vec![deep(900.0)], Vec::new()).unwrap();
+    stroke(&mut workshop, 3);
+    let heard = wait_for(&mut workshop, |news| matches!(news, News::Broken(_)));
+    let Some(News::Broken(words)) = heard.last() else { unreachable!() };
+    assert!(
+        words.ends_with("another program edits it; 3 edits were not told as saved and may be gone"),
+        "{words}"
+    );
+    assert!(workshop.apply(4, vec![crater(4)], Vec::new()).unwrap_err().contains("open the terrain again"));
+    assert!(!workshop.is_unsaved() && workshop.take().is_none());
+    // The file is the new one, without them.
+    assert!(land.pages() == land.pages_after(&[]));
+}
