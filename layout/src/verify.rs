@@ -2,13 +2,14 @@
 //! promises.
 //!
 //! Opening checks header, directory root and inert page. This checks the rest: the leaves of the directory first, then, in passes, all that they lead to. `structure` looks at what the directory says besides page numbers,
-//! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children, `imagery` reads the tiles. Of an edited file
+//! `checksums` below reads every record page once, `nesting` decodes every record of every sound page and looks at its children, `imagery` reads the tiles, `bounds` holds what packed terrain says of errors against its tiles. Of an edited file
 //! `journal` looks at all states that it can go back and forth to, by checksums and page numbers; how their records are nested is checked of the current one alone.
 //! Cost: each page is read some ten times; each thread holds a few hundred kilobytes at most, and there is the directory. Some bytes are not checked, because nothing depends
 //! on them: the header slot that is older than the current one, the bytes after the directory root's last entry, pages that no state reaches.
 //!
 //! Invariant: a report without problems means that every promise refinement relies on holds for the bytes as they were read.
 
+mod bounds;
 mod imagery;
 mod journal;
 mod nesting;
@@ -135,7 +136,8 @@ pub fn verify(terrain: &Terrain, progress: &(dyn Fn(u64) + Sync)) -> Result<Veri
     };
     let (tiles, pictures) = imagery::check(terrain, progress)?;
     let history = journal::check(terrain)?;
-    let findings = findings.merge(wrong_sums).merge(records).merge(pictures);
+    let bounds = bounds::check(terrain)?;
+    let findings = findings.merge(wrong_sums).merge(bounds).merge(records).merge(pictures);
     let Findings { listed, count } = findings.merge(history);
     Ok(VerifyReport {
         pages_checked: present.len() as u64,

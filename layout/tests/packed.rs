@@ -375,7 +375,7 @@ fn what_records_take_is_what_is_unpacked() {
     let terrain = open(bytes.clone()).unwrap();
     let per_page = terrain.header().records_per_page();
     let need = |slots: std::ops::Range<u64>| {
-        terrain.source().unpacking().unwrap().need_of(&slots.collect::<Vec<u64>>()).unwrap()
+        terrain.source().unpacking().unwrap().need_of(&slots.collect::<Vec<u64>>(), &[]).unwrap()
     };
     let (mut once, mut pages) = (0, 0);
     for page in 0..terrain.header().record_pages() {

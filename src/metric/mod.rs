@@ -19,6 +19,7 @@
 //! Every engine decides by this file, with the same operations in the same order. So all decide alike to
 //! the last bit. It is the only file that knows the projection. Cost: some ten floating-point operations a test, five more along the line of sight.
 
+mod foresight;
 pub(crate) mod pair;
 
 use crate::view::{ErrorMetric, View};

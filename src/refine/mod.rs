@@ -88,6 +88,12 @@ pub trait Probe {
         let _ = slot;
     }
 
+    /// The record at `slot` was left unread: it was certain that its vertex does not show. Counts as read for those who do not tell the two apart.
+    #[inline(always)]
+    fn foreseen(&mut self, slot: u64) {
+        self.read(slot);
+    }
+
     /// The update goes on to its next part.
     #[inline(always)]
     fn phase(&mut self, phase: Phase) {

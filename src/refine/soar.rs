@@ -3,6 +3,8 @@
 //! Based on: P. Lindstrom, V. Pascucci, "Visualization of Large Terrains Made Easy", IEEE Visualization 2001, and "Terrain
 //! Simplification Simplified", IEEE TVCG 8(3), 2002: nested spheres, inherited culling flags, strips by parity, slots by index arithmetic.
 //!
+//! Where a store has bounds of errors, a vertex that is certain not to show is left unread ([`Foresight`]): the mesh is the same.
+//!
 //! Cost: 2T - 1 nodes for T triangles, a record read and a test each. Allocates nothing once the strip has grown.
 
 use super::change::GroundChange;
@@ -14,7 +16,8 @@ use crate::metric::{ALL_PLANES, Metric};
 use crate::view::{ErrorMetric, View};
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::{CENTRE_SLOT, ROOTS, child_slots, corners};
-use terrasoar_layout::read::store::{CompleteStore, RecordStore};
+use terrasoar_layout::grid::record::{RecordCodec, Vertex};
+use terrasoar_layout::read::store::{CompleteStore, RawOf, RecordStore};
 
 /// A vertex of the strip: 12 bytes, ready to be uploaded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -58,7 +61,17 @@ impl<S: CompleteStore> Soar<S> {
     }
 
     /// Refines for a view whose errors are measured along the line of sight, or not.
+    #[inline(always)]
     fn refine<P: Probe, const SIGHT: bool>(&mut self, view: &View, probe: &mut P) -> u64 {
+        // Next to voids what is drawn depends on records of vertices that do not show.
+        if self.records.has_bounds() && !self.records.shape().has_voids {
+            self.refine_with::<P, Parent, SIGHT>(view, probe)
+        } else {
+            self.refine_with::<P, (), SIGHT>(view, probe)
+        }
+    }
+
+    fn refine_with<P: Probe, F: Foresight, const SIGHT: bool>(&mut self, view: &View, probe: &mut P) -> u64 {
         let grid = *self.records.grid();
         let c = corners(grid.k());
         let read = |slot: u64, level: u32, at: GridPoint| {
@@ -73,6 +86,7 @@ impl<S: CompleteStore> Soar<S> {
         let mut walk = Walk {
             records: &self.records,
             metric: PairMetric::<SIGHT>::new(&Metric::new(view), &grid),
+            plain: Metric::new(view),
             strip: self.strip.start(sw.at, first),
             tests: 0,
             probe,
@@ -84,8 +98,12 @@ impl<S: CompleteStore> Soar<S> {
             walk.tests += 1;
             let pair = walk.metric.sight([split.at; 2], &[vertex; 2]);
             match self.culling {
-                Culling::Vertices => walk.visit::<true>(height, centre, split, (0, &pair), base, ALL_PLANES),
-                Culling::Clusters => walk.visit::<false>(height, centre, split, (0, &pair), base, 0),
+                Culling::Vertices => {
+                    walk.visit::<F, true>(height, centre, split, (0, &pair, &[vertex; 2]), base, ALL_PLANES)
+                }
+                Culling::Clusters => {
+                    walk.visit::<F, false>(height, centre, split, (0, &pair, &[vertex; 2]), base, 0);
+                }
             }
             if let Some(next) = next {
                 walk.append(next, 0);
@@ -105,10 +123,72 @@ struct Apex {
     height_m: f32,
 }
 
+/// What is kept of a vertex that is split, to foresee its children.
+trait Foresight: Copy {
+    /// Whether anything is foreseen.
+    const FORESEES: bool;
+
+    fn of(at: GridPoint, vertex: &Vertex) -> Self;
+
+    /// Whether the record of the child at `p` is to be read. `planes` are those that the parent crosses.
+    fn is_read<S: RecordStore>(
+        self,
+        records: &S,
+        metric: &Metric,
+        slot: u64,
+        p: GridPoint,
+        planes: u8,
+    ) -> bool;
+}
+
+/// Nothing: all is read.
+impl Foresight for () {
+    const FORESEES: bool = false;
+
+    #[inline(always)]
+    fn of(_: GridPoint, _: &Vertex) -> Self {}
+
+    #[inline(always)]
+    fn is_read<S: RecordStore>(self, _: &S, _: &Metric, _: u64, _: GridPoint, _: u8) -> bool {
+        true
+    }
+}
+
+/// The vertex itself.
+#[derive(Clone, Copy)]
+struct Parent {
+    at: GridPoint,
+    vertex: Vertex,
+}
+
+impl Foresight for Parent {
+    const FORESEES: bool = true;
+
+    fn of(at: GridPoint, vertex: &Vertex) -> Self {
+        Self { at, vertex: *vertex }
+    }
+
+    fn is_read<S: RecordStore>(
+        self,
+        records: &S,
+        metric: &Metric,
+        slot: u64,
+        p: GridPoint,
+        planes: u8,
+    ) -> bool {
+        let bound_m = records.error_bound_m(slot, p);
+        let parent = Vertex { error_m: self.vertex.error_m.min(bound_m), ..self.vertex };
+        let [at_m, parent_m] = [p, self.at].map(|p| records.grid().position_m(p));
+        metric.may_show(at_m, parent_m, &parent, planes)
+    }
+}
+
 /// One frame's walk.
 struct Walk<'w, S: RecordStore, P, const SIGHT: bool> {
     records: &'w S,
     metric: PairMetric<SIGHT>,
+    /// The same, a vertex at a time.
+    plain: Metric,
     strip: StripBuilder<StripVertex>,
     tests: u64,
     probe: &'w mut P,
@@ -120,11 +200,11 @@ impl<S: RecordStore, P: Probe, const SIGHT: bool> Walk<'_, S, P, SIGHT> {
     /// The split vertices of both children are read and tested before either is visited: they lie side by side in the file, so two reads are under
     /// way at once, and the arithmetic of two tests fits the same instructions. `CULLS` says whether `planes`, those which all ancestors cross, are
     /// any: below a vertex that lies wholly inside the view nothing asks again.
-    fn split<const CULLS: bool>(
+    fn split<F: Foresight, const CULLS: bool>(
         &mut self,
         height: u32,
         apex: Apex,
-        here: Apex,
+        (here, foresight): (Apex, F),
         [b, d]: [GridPoint; 2],
         planes: u8,
     ) {
@@ -138,36 +218,52 @@ impl<S: RecordStore, P: Probe, const SIGHT: bool> Walk<'_, S, P, SIGHT> {
         let level = height - 2;
         let slots = child_slots(apex.slot, here.slot);
         let points = [b.midpoint(apex.at), d.midpoint(apex.at)];
-        let vertices = self.records.pair(slots).map(|raw| self.records.decode(raw, level));
+        let raws = if F::FORESEES {
+            [0, 1].map(|i| self.read_foreseen(slots[i], points[i], foresight, planes))
+        } else {
+            slots.into_iter().for_each(|slot| self.probe.read(slot));
+            self.records.pair(slots)
+        };
+        let vertices = raws.map(|raw| self.records.decode(raw, level));
         let pair = self.metric.sight(points, &vertices);
-        slots.into_iter().for_each(|slot| self.probe.read(slot));
         self.tests += 2;
         let child = |i: usize| Apex { slot: slots[i], at: points[i], height_m: vertices[i].height_m as f32 };
-        self.visit::<CULLS>(height - 1, here, child(0), (0, &pair), [b, apex.at], planes);
+        self.visit::<F, CULLS>(height - 1, here, child(0), (0, &pair, &vertices), [b, apex.at], planes);
         self.append(apex, height & 1);
-        self.visit::<CULLS>(height - 1, here, child(1), (1, &pair), [apex.at, d], planes);
+        self.visit::<F, CULLS>(height - 1, here, child(1), (1, &pair, &vertices), [apex.at, d], planes);
+    }
+
+    /// The record at a slot; an inert one, which no test selects, if it is certain that its vertex does not show.
+    fn read_foreseen<F: Foresight>(&mut self, slot: u64, at: GridPoint, parent: F, planes: u8) -> RawOf<S> {
+        if parent.is_read(self.records, &self.plain, slot, at, planes) {
+            self.probe.read(slot);
+            return self.records.get(slot).unwrap_or(S::Codec::INERT);
+        }
+        self.probe.foreseen(slot);
+        S::Codec::INERT
     }
 
     /// Visits the triangle (apex; base), whose split vertex is `split`, one of a pair.
     /// Inlined, so that only triangles that are split cost a call.
     #[inline(always)]
-    fn visit<const CULLS: bool>(
+    fn visit<F: Foresight, const CULLS: bool>(
         &mut self,
         height: u32,
         apex: Apex,
         split: Apex,
-        (i, pair): (usize, &SightedPair),
+        (i, pair, vertices): (usize, &SightedPair, &[Vertex; 2]),
         base: [GridPoint; 2],
         planes: u8,
     ) {
         if pair.is_selected(i) {
+            let here = (split, F::of(split.at, &vertices[i]));
             if !CULLS {
-                return self.split::<false>(height, apex, split, base, 0);
+                return self.split::<F, false>(height, apex, here, base, 0);
             }
             match self.metric.cull(pair, i, planes) {
                 None => {}
-                Some(0) => return self.split::<false>(height, apex, split, base, 0),
-                Some(planes) => return self.split::<true>(height, apex, split, base, planes),
+                Some(0) => return self.split::<F, false>(height, apex, here, base, 0),
+                Some(planes) => return self.split::<F, true>(height, apex, here, base, planes),
             }
         }
         self.append(apex, height & 1);

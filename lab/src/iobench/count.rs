@@ -21,6 +21,7 @@ use terrasoar::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::file::bytes::PAGE_BYTES;
 use terrasoar_layout::file::source::{PackedNeed, Unpacking};
+use terrasoar_layout::read::kinds::CACHE_BYTES;
 use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
@@ -118,7 +119,9 @@ pub fn count(
     let mut counts: Vec<LayoutCount<'_>> =
         options.layouts.iter().map(|kind| LayoutCount::new(terrain, *kind, options)).collect();
     let mut sink = Sink { views, culling, options, counts: &mut counts, done };
-    match terrain.cache_bytes(options.cache_bytes) {
+    // Packed terrain is read as its own readers read it: by pages, with what is known of records before they are read.
+    let asked = options.cache_bytes.or(terrain.source().unpacking().map(|_| CACHE_BYTES));
+    match terrain.cache_bytes(asked) {
         None => with_records!(terrain.records()?, records => sink.fly(&records, reader))?,
         Some(bytes) => with_records!(terrain.paged(bytes), records => sink.fly(&records, reader))?,
     }
@@ -127,11 +130,28 @@ pub fn count(
 
 /// Remembers the slots read.
 #[derive(Default)]
-struct Reads(Vec<u64>);
+struct Reads {
+    /// All that the mesh is made from, read or foreseen.
+    all: Vec<u64>,
+    read: Vec<u64>,
+    foreseen: Vec<u64>,
+}
+
+impl Reads {
+    fn clear(&mut self) {
+        [&mut self.all, &mut self.read, &mut self.foreseen].into_iter().for_each(Vec::clear);
+    }
+}
 
 impl Probe for Reads {
     fn read(&mut self, slot: u64) {
-        self.0.push(slot);
+        self.all.push(slot);
+        self.read.push(slot);
+    }
+
+    fn foreseen(&mut self, slot: u64) {
+        self.all.push(slot);
+        self.foreseen.push(slot);
     }
 }
 
@@ -159,10 +179,10 @@ impl Sink<'_, '_> {
         let extends = self.options.preloads.contains(&Prefetch::Frustum);
         let mut before: Option<&View> = None;
         for (i, view) in self.views.iter().enumerate() {
-            reads.0.clear();
+            reads.clear();
             engine.update(view, &mut reads);
             for count in self.counts.iter_mut() {
-                count.frame(i as u64, &reads.0)?;
+                count.frame(i as u64, &reads)?;
             }
             if extends {
                 let plain = ExtendedView::plain(view).slots(records, self.culling);
@@ -241,10 +261,11 @@ impl<'t> LayoutCount<'t> {
         self.pages.dedup();
     }
 
-    fn frame(&mut self, frame: u64, slots: &[u64]) -> Result<(), LayoutError> {
+    fn frame(&mut self, frame: u64, reads: &Reads) -> Result<(), LayoutError> {
+        let slots = &reads.all[..];
         self.gather(slots);
-        let PackedNeed { tiles, bytes: tile_bytes } = match self.unpacking {
-            Some(unpacking) => unpacking.need_of(slots)?,
+        let PackedNeed { tiles, bytes, bound_bytes, .. } = match self.unpacking {
+            Some(unpacking) => unpacking.need_of(&reads.read, &reads.foreseen)?,
             None => PackedNeed::default(),
         };
         let mut units: Vec<u64> = self.lines.iter().map(|line| line / LINES_PER_UNIT).collect();
@@ -264,7 +285,7 @@ impl<'t> LayoutCount<'t> {
                 realtime_pages: missing as u64,
                 preloaded_pages: std::mem::take(&mut mode.preloaded),
                 tiles,
-                tile_bytes,
+                tile_bytes: bytes + bound_bytes,
             });
         }
         Ok(())

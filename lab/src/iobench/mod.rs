@@ -154,7 +154,7 @@ pub struct FrameIo {
     pub preloaded_pages: u64,
     /// Distinct tiles of a packed file that they lie in; 0 for files that are not packed.
     pub tiles: u64,
-    /// Bytes of these tiles' segments in the file.
+    /// Bytes of these tiles' segments in the file, without what an engine leaves unread for what bounds of errors say, and of the bounds that are read with them.
     pub tile_bytes: u64,
 }
 

@@ -29,6 +29,8 @@ pub(crate) const INDEX: u32 = 3;
 pub(crate) const ROOT: u32 = 4;
 /// Which pages the leaves have, and their checksums: read leaf by leaf.
 pub(crate) const BLOCKS: u32 = 5;
+/// Says that leaves of the tile directory have bounds behind their entries.
+pub(crate) const BOUNDS: u32 = MAY_BE_SKIPPED | 6;
 
 /// A part of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,10 +123,10 @@ impl Container {
                 offset: get_u64(p, at + 8),
                 bytes: get_u64(p, at + 16),
             };
-            if section.kind & MAY_BE_SKIPPED != 0 {
+            if section.kind & MAY_BE_SKIPPED != 0 && section.kind != BOUNDS {
                 continue;
             }
-            if !(MODEL..=BLOCKS).contains(&section.kind) {
+            if !(MODEL..=BLOCKS).contains(&section.kind) && section.kind != BOUNDS {
                 return Err(unknown(format!("the packed terrain has a section of kind {}", section.kind)));
             }
             let end = section.offset.checked_add(section.bytes);
@@ -137,6 +139,11 @@ impl Container {
             sections.push(section);
         }
         Ok(Self { packed_bytes, pages: get_u64(p, 0x110), sections })
+    }
+
+    /// Whether leaves of the tile directory have bounds.
+    pub(crate) fn has_bounds(&self) -> bool {
+        self.sections.iter().any(|section| section.kind == BOUNDS)
     }
 
     /// The section of a kind; one without bytes if there is none.

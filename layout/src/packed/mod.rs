@@ -7,6 +7,7 @@
 //! * `leaves`: directory leaves of that file, each from its block.
 //! * `appended`: what was appended to it since.
 //! * `tile`, `blocks`: a tile's records, and where those of a page lie in tiles.
+//! * `bounds`: what no error of a segment exceeds.
 //! * `coder`, `encoder`, `model`, `token`, `bits`: values into bytes and back.
 //!
 //! Invariant: what is read is what was written, or an error; no bytes make reading panic, or take memory beyond a tile's.
@@ -14,6 +15,7 @@
 mod appended;
 mod bits;
 mod blocks;
+pub(crate) mod bounds;
 mod cache;
 pub(crate) mod coder;
 pub(crate) mod container;

@@ -1,5 +1,6 @@
 //! Where tiles lie in a packed file, and their checksums (FORMAT.md, section 9.2).
 
+use super::bounds::{Bounds, UNKNOWN};
 use super::leaves::present_numbers;
 #[cfg(feature = "files")]
 use super::leaves::runs_of;
@@ -53,6 +54,22 @@ impl TileRoot {
         self.numbers.len()
     }
 
+    /// The leaves that are listed and not absent, each with whether its bytes are its own: `bytes_of` says how many a leaf has.
+    #[cfg(feature = "files")]
+    pub(crate) fn leaves(&self, bytes_of: impl Fn(usize) -> usize) -> Vec<(usize, bool)> {
+        let listed = self.numbers.iter().zip(&self.places).filter(|(_, (offset, _))| *offset > 0);
+        let mut leaves: Vec<(u64, usize)> =
+            listed.map(|(number, (offset, _))| (*offset, *number as usize)).collect();
+        leaves.sort_unstable();
+        let mut end = 0;
+        let is_own = |(offset, leaf): (u64, usize)| {
+            let is_own = offset >= end;
+            end = end.max(offset.saturating_add(bytes_of(leaf) as u64));
+            (leaf, is_own)
+        };
+        leaves.into_iter().map(is_own).collect()
+    }
+
     /// Which of those that are listed a leaf is, its first byte and its checksum.
     pub(crate) fn find(&self, leaf: usize) -> Option<(usize, u64, u32)> {
         let at = self.numbers.binary_search(&u32::try_from(leaf).ok()?).ok()?;
@@ -62,17 +79,26 @@ impl TileRoot {
 }
 
 /// Where a tile lies; all zero if all that it gives is inert.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TilePlace {
     /// First byte, below 2^48.
     pub(crate) offset: u64,
     /// Bytes of each segment.
     pub(crate) lengths: [u16; SEGMENTS],
     pub(crate) checksums: [u32; SEGMENTS],
+    /// Those of its segments, if it has any.
+    pub(crate) bounds: Bounds,
+}
+
+impl Default for TilePlace {
+    fn default() -> Self {
+        let (lengths, checksums) = Default::default();
+        Self { offset: 0, lengths, checksums, bounds: [UNKNOWN; SEGMENTS] }
+    }
 }
 
 impl TilePlace {
-    /// The entry at index `i` of a leaf.
+    /// The entry at index `i` of a leaf, without bounds.
     pub(crate) fn read(bytes: &[u8], i: usize) -> Self {
         let at = i * PLACE_BYTES;
         let offset = u64::from(get_u32(bytes, at)) | u64::from(get_u16(bytes, at + 4)) << 32;
@@ -80,6 +106,7 @@ impl TilePlace {
             offset,
             lengths: std::array::from_fn(|s| get_u16(bytes, at + 6 + 2 * s)),
             checksums: std::array::from_fn(|s| get_u32(bytes, at + 12 + 4 * s)),
+            bounds: [UNKNOWN; SEGMENTS],
         }
     }
 
@@ -102,5 +129,20 @@ impl TilePlace {
     /// Bytes of the first `segments`.
     pub(crate) fn bytes(&self, segments: usize) -> usize {
         self.lengths[..segments].iter().map(|length| usize::from(*length)).sum()
+    }
+}
+
+#[cfg(all(test, feature = "files"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn leaves_that_lie_in_one_another_are_told() {
+        let root = TileRoot {
+            numbers: vec![0, 2, 5, 6, 9],
+            places: vec![(100, 1), (0, 0), (148, 2), (150, 3), (200, 4)],
+        };
+        let bytes_of = |leaf| if leaf == 5 { 40 } else { 48 };
+        assert_eq!(root.leaves(bytes_of), [(0, true), (5, true), (6, false), (9, true)]);
     }
 }

@@ -7,6 +7,7 @@
 //!
 //! Invariant: memory is what the front of the file takes, and tiles in a quarter of what the pool over it was given, [`MOST_CACHE_BYTES`] at most. Cost: a page takes its tiles, a handful, of which most are still there from the page before.
 
+mod bounds;
 mod growth;
 mod meter;
 mod records;
@@ -14,6 +15,7 @@ mod records;
 mod stages;
 
 use super::appended::Appended;
+use super::bounds::BoundTable;
 use super::cache::Cache;
 use super::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS, Section, current_of};
 use super::leaves::{PackedLeaves, PackedNodes};
@@ -70,6 +72,8 @@ pub(crate) struct PackedSource {
     tile_root: TileRoot,
     tiles: Vec<OnceLock<Box<[TilePlace]>>>,
     way: Way,
+    /// What bounds stand for.
+    bounds: BoundTable,
     tables: DecodeTables,
     cache: Cache,
     scratch: Mutex<Vec<Scratch>>,
@@ -135,6 +139,7 @@ impl PackedSource {
             tiles: (0..tile_root.count()).map(|_| OnceLock::new()).collect(),
             tile_root,
             way: Way::of(&header),
+            bounds: BoundTable::new(),
             inert: inert_page(header.record_kind),
             cache: Cache::new(MOST_CACHE_BYTES),
             scratch: Mutex::default(),

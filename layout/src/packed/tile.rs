@@ -127,6 +127,21 @@ impl TileRecords {
         4 * self.records.len() + size_of::<Self>()
     }
 
+    /// Hands `each` the words of the records of an octave that a tile gives, and whether they are of easts and norths.
+    pub(crate) fn for_each_given(&self, shape: &TileShape, octave: u32, mut each: impl FnMut(bool, &[u32])) {
+        let (words, m) = (self.words, 1usize << (shape.tile_log - octave - 1));
+        let (whites, blacks) = self.refining(m).split_at(words * m * m);
+        let (easts, norths) = blacks.split_at(words * m * (m + 1));
+        whites.chunks_exact(words).for_each(|record| each(false, record));
+        // Of those that run east the last row, of the others the last of each, may be another tile's.
+        let easts = &easts[..words * m * (m + usize::from(shape.is_last[1]))];
+        easts.chunks_exact(words).for_each(|record| each(true, record));
+        for row in norths.chunks_exact(words * (m + 1)) {
+            let row = &row[..words * (m + usize::from(shape.is_last[0]))];
+            row.chunks_exact(words).for_each(|record| each(true, record));
+        }
+    }
+
     /// Whether all records that a tile gives are those of another.
     pub(crate) fn gives_same(&self, other: &Self, shape: &TileShape) -> bool {
         let (words, last) = (self.words, 1 << shape.tile_log);

@@ -17,8 +17,9 @@ use crate::file::lock::WriteLock;
 use crate::file::mark::Mark;
 use crate::file::packed_end::{FRONT, Run};
 use crate::file::source::Source;
-use crate::grid::record::RecordCodec;
-use crate::packed::container::{BLOCKS, Container, INDEX, MODEL, ROOT, RUNS};
+use crate::grid::record::{AnyCodec, RecordCodec};
+use crate::packed::bounds::{BOUND_BYTES, BoundTable, SUM_BYTES, UNKNOWN};
+use crate::packed::container::{BLOCKS, BOUNDS, Container, INDEX, MODEL, ROOT, RUNS};
 use crate::packed::leaves::packed_leaves;
 use crate::packed::model::DecodeTables;
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES, TilePlace, TileRoot};
@@ -97,8 +98,10 @@ pub(crate) fn pack_into(
     let directory_end = check_packable(built)?;
     let records = built.records()?;
     let (groups, way) = (Groups::of(built.grid()), Way::of(built.header()));
+    let Header { record_kind, grid, scale, .. } = built.header();
+    let codec = AnyCodec::new(*record_kind, grid, scale);
     let bytes = with_records!(records, records => {
-        let packer = Packer { path: terrain.path(), records, groups, way, width: Width::best(), check, progress };
+        let packer = Packer { path: terrain.path(), records, groups, way, codec, bounds: BoundTable::new(), width: Width::best(), check, progress };
         packer.write(disk, terrain, built, directory_end, file)?
     });
     compare(terrain, built, file, check, progress)?;
@@ -205,7 +208,11 @@ impl<C: RecordCodec> Packer<'_, C> {
         root.resize(first_place + places * LEAF_BYTES, 0);
         let root = front.put(ROOT, &root) + first_place;
         let first_leaf = FRONT + front.bytes.len() as u64;
-        let mut at = first_leaf + (count * PLACE_BYTES) as u64;
+        front.put(BOUNDS, &[]);
+        let place_of = |tiles: usize, leaves: usize| {
+            first_leaf + (tiles * (PLACE_BYTES + BOUND_BYTES) + leaves * SUM_BYTES) as u64
+        };
+        let mut at = place_of(count, leaves.len());
 
         let failed = |e| {
             let when_full = "cannot write the packed file, for which there is no room; make some on its disk, or name an output on another";
@@ -223,22 +230,29 @@ impl<C: RecordCodec> Packer<'_, C> {
                     let mut bytes = Vec::new();
                     let mut made = std::mem::take(&mut made).into_iter();
                     for listed in batch {
-                        let mut entries = vec![0; (listed.end - listed.first) * PLACE_BYTES];
+                        let tiles = listed.end - listed.first;
+                        let mut entries = vec![0; tiles * PLACE_BYTES];
+                        let mut leaf_bounds = vec![UNKNOWN; tiles * BOUND_BYTES];
                         let mut is_present = false;
-                        for (within, made) in made.by_ref().take(listed.end - listed.first).enumerate() {
-                            let Some(Made { bytes: segments, lengths, checksums }) = made else { continue };
+                        for (within, made) in made.by_ref().take(tiles).enumerate() {
+                            let Some(Made { bytes: segments, lengths, checksums, bounds }) = made else {
+                                continue;
+                            };
                             let offset = at + bytes.len() as u64;
-                            TilePlace { offset, lengths, checksums }.write(&mut entries, within);
+                            TilePlace { offset, lengths, checksums, bounds }.write(&mut entries, within);
+                            leaf_bounds[within * BOUND_BYTES..][..BOUND_BYTES].copy_from_slice(&bounds);
                             bytes.extend(segments);
                             is_present = true;
                         }
-                        let offset = first_leaf + (listed.first * PLACE_BYTES) as u64;
+                        let offset = place_of(listed.first, listed.place);
                         if is_present {
                             let place = if is_sparse { listed.place } else { listed.leaf };
                             let to = root + place * LEAF_BYTES;
                             put_u64(&mut front.bytes, to, offset);
                             put_u32(&mut front.bytes, to + 8, checksum(&entries));
                         }
+                        entries.extend(leaf_bounds);
+                        entries.extend(checksum(&entries).to_le_bytes());
                         write(&entries, offset)?;
                     }
                     write(&bytes, at)?;

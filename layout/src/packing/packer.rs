@@ -10,11 +10,12 @@ use crate::error::LayoutError;
 use crate::file::bytes::checksum;
 use crate::grid::GridPoint;
 use crate::grid::order::slot_of;
-use crate::grid::record::RecordCodec;
+use crate::grid::record::{AnyCodec, RecordCodec};
+use crate::packed::bounds::{BoundTable, Bounds};
 use crate::packed::coder::Decoder;
 use crate::packed::encoder::{Encoder, PlainEncoder};
 use crate::packed::model::{CONTEXTS, Counts, DecodeTables, Model};
-use crate::packed::shape::{Groups, SEGMENTS, TileId};
+use crate::packed::shape::{Groups, SEGMENTS, TileId, TileShape};
 use crate::packed::symbols::EncodeTables;
 use crate::packed::tile::TileRecords;
 use crate::packed::token::TOKENS;
@@ -47,6 +48,7 @@ pub(super) struct Made {
     pub(super) bytes: Vec<u8>,
     pub(super) lengths: [u16; SEGMENTS],
     pub(super) checksums: [u32; SEGMENTS],
+    pub(super) bounds: Bounds,
 }
 
 /// What a thread keeps from tile to tile.
@@ -62,6 +64,9 @@ pub(super) struct Packer<'p, C: RecordCodec> {
     pub(super) records: Records<'p, C>,
     pub(super) groups: Groups,
     pub(super) way: Way,
+    /// For bounds of errors.
+    pub(super) codec: AnyCodec,
+    pub(super) bounds: BoundTable,
     pub(super) width: Width,
     pub(super) check: Check,
     pub(super) progress: &'p dyn Progress,
@@ -176,7 +181,7 @@ impl<C: RecordCodec> Packer<'_, C> {
         if !same {
             return Err(self.other_than_it_was(id));
         }
-        Ok(Some(made(&bench.bytes, ends)))
+        Ok(Some(made(&bench.bytes, ends, self.bounds_of(&shape, &records))))
     }
 
     /// Packs a tile of which a sample lacked a token: values are stored as they are.
@@ -199,7 +204,11 @@ impl<C: RecordCodec> Packer<'_, C> {
         if self.check == Check::Tiles && !self.reads_as(id, records, ends, tables, bench) {
             return Err(self.other_than_it_was(id));
         }
-        Ok(Some(made(&bench.bytes, ends)))
+        Ok(Some(made(&bench.bytes, ends, self.bounds_of(&shape, records))))
+    }
+
+    fn bounds_of(&self, shape: &TileShape, records: &TileRecords) -> Bounds {
+        self.bounds.of_tile(&self.codec, shape, records)
     }
 
     /// Whether a reader makes a tile's records of the segments in `bench`, which have these ends.
@@ -238,13 +247,14 @@ fn is_read_whole(id: TileId) -> bool {
 }
 
 /// A tile of segments with these ends.
-fn made(bytes: &[u8], ends: [usize; SEGMENTS]) -> Made {
+fn made(bytes: &[u8], ends: [usize; SEGMENTS], bounds: Bounds) -> Made {
     let mut start = 0;
     let segments = ends.map(|end| &bytes[std::mem::replace(&mut start, end)..end]);
     Made {
         bytes: bytes.to_vec(),
         lengths: segments.map(|segment| segment.len() as u16),
         checksums: segments.map(checksum),
+        bounds,
     }
 }
 

@@ -13,6 +13,7 @@ use super::store::{CompleteStore, PagesRead, RawOf, RecordShape, RecordStore, by
 use super::terrain::Terrain;
 use crate::error::LayoutError;
 use crate::file::bytes::{PAGE_BYTES, Page};
+use crate::grid::GridPoint;
 use crate::grid::record::RecordCodec;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering, fence};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -48,6 +49,8 @@ impl<C> Clone for PagedRecords<'_, C> {
 struct Inner<'t, C> {
     terrain: &'t Terrain,
     shape: RecordShape<C>,
+    /// Whether it is packed terrain with bounds of errors.
+    has_bounds: bool,
     sets: u64,
     /// Page and version of each place; 0 for an empty one.
     tags: Vec<AtomicU64>,
@@ -81,6 +84,7 @@ impl<'t, C: RecordCodec> PagedRecords<'t, C> {
         let inner = Inner {
             terrain,
             shape,
+            has_bounds: terrain.source().unpacking().is_some_and(|unpacking| unpacking.has_bounds()),
             sets,
             tags: (0..places).map(|_| AtomicU64::new(0)).collect(),
             // Zeroed lazily by the system: memory is taken as pages come.
@@ -221,6 +225,15 @@ impl<C: RecordCodec> RecordStore for PagedRecords<'_, C> {
     fn get(&self, slot: u64) -> Option<RawOf<Self>> {
         let (page, within) = (page_of::<C>(slot), byte_in_page::<C>(slot));
         Some(self.inner.find(page, within).unwrap_or_else(|| self.inner.read(page, within)))
+    }
+
+    #[inline(always)]
+    fn has_bounds(&self) -> bool {
+        self.inner.has_bounds
+    }
+
+    fn error_bound_m(&self, slot: u64, p: GridPoint) -> f64 {
+        self.inner.terrain.error_bound_m(page_of::<C>(slot), p)
     }
 
     #[inline(always)]

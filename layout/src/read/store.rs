@@ -61,6 +61,19 @@ pub trait RecordStore: Send + Sync {
     /// For a slot past the last page.
     fn get(&self, slot: u64) -> Option<RawOf<Self>>;
 
+    /// Whether [`RecordStore::error_bound_m`] says anything of this store's records.
+    #[inline(always)]
+    fn has_bounds(&self) -> bool {
+        false
+    }
+
+    /// What no error of the record at `slot`, that of the vertex at `p`, exceeds, in metres, told without reading the record; infinite where that is not known.
+    #[inline(always)]
+    fn error_bound_m(&self, slot: u64, p: GridPoint) -> f64 {
+        let _ = (slot, p);
+        f64::INFINITY
+    }
+
     /// Asks memory for the record at `slot`. A hint: reads nothing.
     fn prefetch(&self, slot: u64);
 

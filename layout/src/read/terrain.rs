@@ -261,6 +261,15 @@ impl Terrain {
         ))
     }
 
+    /// What no error of the record of the vertex at `p`, on this logical page, exceeds, in metres: of packed terrain, told without reading the record; infinite where that is not known, as it is where the ground was edited.
+    pub fn error_bound_m(&self, logical_page: u64, p: GridPoint) -> f64 {
+        let Some(unpacking) = self.source.unpacking() else { return f64::INFINITY };
+        // Tiles know nothing of pages that edits put in place of theirs.
+        let is_as_packed = unpacking.is_packed_root(self.header.root_page.into())
+            || self.entry(logical_page).is_ok_and(|entry| unpacking.is_packed_record_page(entry.page.into()));
+        if is_as_packed { unpacking.bound_m(p) } else { f64::INFINITY }
+    }
+
     /// One vertex, read from a checked page.
     ///
     /// # Errors

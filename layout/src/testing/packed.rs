@@ -7,7 +7,8 @@
 use crate::file::bytes::{PAGE_BYTES, checksum, get_u16, get_u32, get_u64};
 use crate::file::directory_shape::DirectoryShape;
 use crate::grid::Grid;
-use crate::packed::container::{BLOCKS, INDEX, ROOT, RUNS, Section};
+use crate::packed::bounds::BOUND_BYTES;
+use crate::packed::container::{BLOCKS, BOUNDS, INDEX, ROOT, RUNS, Section};
 use crate::packed::leaves::{INDEX_BYTES, PackedLeaves};
 use crate::packed::places::{LEAF_BYTES, PLACE_BYTES};
 use crate::packed::shape::{Groups, SEGMENTS};
@@ -54,11 +55,12 @@ pub fn reseal_packed(file: &mut [u8]) {
         }
         seal_directory(file, slot);
         let sizes = leaf_sizes(file, slot);
+        let has_bounds = sections(file, slot).any(|section| number(file, section, 4) == BOUNDS as usize);
         for section in sections(file, slot) {
             let range = range_of(file, section);
             if number(file, section, 4) == ROOT as usize && range.end <= file.len() {
                 for (leaf, tiles) in (range.start..range.end).step_by(LEAF_BYTES).zip(&sizes) {
-                    seal_leaf(file, leaf, *tiles);
+                    seal_leaf(file, leaf, *tiles, has_bounds);
                 }
             }
             seal(file, section + 4, range);
@@ -177,7 +179,7 @@ fn leaf_sizes(file: &[u8], slot: usize) -> Vec<usize> {
     )
 }
 
-fn seal_leaf(file: &mut [u8], named_at: usize, tiles: usize) {
+fn seal_leaf(file: &mut [u8], named_at: usize, tiles: usize, has_bounds: bool) {
     let at = number(file, named_at, 8);
     let range = at..at.saturating_add(tiles * PLACE_BYTES);
     if at == 0 || range.end > file.len() {
@@ -190,6 +192,10 @@ fn seal_leaf(file: &mut [u8], named_at: usize, tiles: usize) {
             seal(file, tile + 12 + 4 * s, from..end);
             from = end;
         }
+    }
+    // Of a leaf with bounds, what is behind them.
+    if has_bounds {
+        seal(file, range.end + tiles * BOUND_BYTES, range.start..range.end + tiles * BOUND_BYTES);
     }
     seal(file, named_at + 8, range);
 }

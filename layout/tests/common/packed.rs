@@ -6,6 +6,8 @@ use terrasoar_layout::LayoutError;
 use terrasoar_layout::build::BuildOptions;
 use terrasoar_layout::dem::SampleType;
 use terrasoar_layout::file::disk::SystemDisk;
+use terrasoar_layout::grid::GridPoint;
+use terrasoar_layout::grid::order::slot_of;
 use terrasoar_layout::grid::record::RecordKind;
 use terrasoar_layout::packing::pack;
 use terrasoar_layout::progress::Silent;
@@ -25,6 +27,24 @@ pub fn dem(size: [u32; 2], roughness: u32, voids: u32) -> MemoryDem {
 
 pub fn options() -> BuildOptions {
     BuildOptions::default().record(Some(RecordKind::Compact)).spacing_m([20.0, 25.0])
+}
+
+/// Whether no error exceeds what is told of it before its record is read; how many are told.
+pub fn assert_bounded(terrain: &Terrain) -> usize {
+    let grid = terrain.grid();
+    let per_page = terrain.header().records_per_page();
+    let n = grid.side_steps();
+    let points = (0..=n).flat_map(|y| (0..=n).map(move |x| GridPoint::new(x, y)));
+    let told = points.filter(|p| {
+        let bound_m = terrain.error_bound_m(slot_of(grid.k(), *p) / per_page, *p);
+        // One vertex in a few: each is read by itself.
+        if (p.x() + 7 * p.y()) % 23 == 0 && !grid.is_corner(*p) {
+            let vertex = terrain.checked_vertex(*p).unwrap();
+            assert!(vertex.error_m <= bound_m, "{p:?}: {vertex:?} {bound_m}");
+        }
+        bound_m < f64::INFINITY
+    });
+    told.count()
 }
 
 /// Whether every page of two terrains is the same.

@@ -6,6 +6,7 @@ use crate::file::bytes::{Page, checksum};
 use crate::file::source::Source;
 use crate::grid::order::{point_of, spread};
 use crate::packed::blocks::{MOST_TILES, Piece, pieces, tiles_of};
+use crate::packed::bounds::bounds_of;
 use crate::packed::coder::Decoder;
 use crate::packed::places::{PLACE_BYTES, TilePlace};
 use crate::packed::shape::{TILE_LOG, TileId, TileShape};
@@ -19,26 +20,38 @@ type Near = Vec<(TileId, Option<Arc<TileRecords>>)>;
 impl PackedSource {
     /// Where a leaf of the tile directory says that its tile `within` lies; absent if the leaf is.
     pub(super) fn tile_place(&self, leaf: usize, within: usize) -> Result<TilePlace, LayoutError> {
-        let Some((at, offset, sum)) = self.tile_root.find(leaf) else { return Ok(TilePlace::default()) };
+        let Some((at, ..)) = self.tile_root.find(leaf) else { return Ok(TilePlace::default()) };
         let known = &self.tiles[at];
         if known.get().is_none() {
-            let damaged = |problem: &str| {
-                LayoutError::damaged_terrain(self.path(), format!("tile directory leaf {leaf}"), problem)
-            };
-            let mut places = vec![TilePlace::default(); self.groups.leaf_size(leaf)];
-            let mut bytes = vec![0; places.len() * PLACE_BYTES];
-            let end = offset.checked_add(bytes.len() as u64);
-            if end.is_none_or(|end| end > self.container.packed_bytes) {
-                return Err(damaged("it lies outside the file"));
-            }
-            self.read_packed(offset, &mut bytes)?;
-            if checksum(&bytes) != sum {
-                return Err(damaged("the checksum does not match"));
-            }
-            places.iter_mut().enumerate().for_each(|(i, place)| *place = TilePlace::read(&bytes, i));
-            let _ = known.set(places.into());
+            let bytes = self.leaf_bytes(leaf)?;
+            let tiles = self.groups.leaf_size(leaf);
+            let mut places: Box<[TilePlace]> = (0..tiles).map(|i| TilePlace::read(&bytes, i)).collect();
+            // Without bounds, or with damaged ones, all is read that may be needed.
+            let bounds = self.container.has_bounds().then(|| bounds_of(&bytes, tiles)).flatten();
+            places.iter_mut().zip(bounds.unwrap_or_default()).for_each(|(place, b)| place.bounds = *b);
+            let _ = known.set(places);
         }
         Ok(known.get().and_then(|places| places.get(within)).copied().unwrap_or_default())
+    }
+
+    /// A leaf of the tile directory, with its bounds if it has any, which are not checked; nothing if it is absent.
+    pub(super) fn leaf_bytes(&self, leaf: usize) -> Result<Vec<u8>, LayoutError> {
+        let Some((_, offset, sum)) = self.tile_root.find(leaf) else { return Ok(Vec::new()) };
+        let damaged = |problem: &str| {
+            LayoutError::damaged_terrain(self.path(), format!("tile directory leaf {leaf}"), problem)
+        };
+        let tiles = self.groups.leaf_size(leaf);
+        let entries = tiles * PLACE_BYTES;
+        let mut bytes = vec![0; entries + self.bounds_bytes(tiles)];
+        let end = offset.checked_add(bytes.len() as u64);
+        if end.is_none_or(|end| end > self.container.packed_bytes) {
+            return Err(damaged("it lies outside the file"));
+        }
+        self.read_packed(offset, &mut bytes)?;
+        if checksum(&bytes[..entries]) != sum {
+            return Err(damaged("the checksum does not match"));
+        }
+        Ok(bytes)
     }
 
     /// The records of a tile down to octave `finest`, counted from its own finest; `None` if they are all inert.
