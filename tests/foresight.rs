@@ -25,6 +25,8 @@ struct Reads {
 }
 
 impl Probe for Reads {
+    const HEARS_FORESEEN: bool = true;
+
     fn read(&mut self, _: u64) {
         self.read += 1;
     }

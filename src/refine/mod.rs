@@ -82,6 +82,9 @@ pub trait Probe {
     /// Whether [`Probe::read`] does anything.
     const HEARS_READS: bool = true;
 
+    /// Whether [`Probe::foreseen`] is to hear of all that can be foreseen. Else what is in memory is taken from there, which is quicker.
+    const HEARS_FORESEEN: bool = false;
+
     /// The record at `slot` was read.
     #[inline(always)]
     fn read(&mut self, slot: u64) {

@@ -234,7 +234,18 @@ impl<S: RecordStore, P: Probe, const SIGHT: bool> Walk<'_, S, P, SIGHT> {
     }
 
     /// The record at a slot; an inert one, which no test selects, if it is certain that its vertex does not show.
+    #[inline(always)]
     fn read_foreseen<F: Foresight>(&mut self, slot: u64, at: GridPoint, parent: F, planes: u8) -> RawOf<S> {
+        let at_hand = if P::HEARS_FORESEEN { None } else { self.records.at_hand(slot) };
+        if let Some(raw) = at_hand {
+            self.probe.read(slot);
+            return raw;
+        }
+        self.foresee(slot, at, parent, planes)
+    }
+
+    #[inline(never)]
+    fn foresee<F: Foresight>(&mut self, slot: u64, at: GridPoint, parent: F, planes: u8) -> RawOf<S> {
         if parent.is_read(self.records, &self.plain, slot, at, planes) {
             self.probe.read(slot);
             return self.records.get(slot).unwrap_or(S::Codec::INERT);

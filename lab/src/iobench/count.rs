@@ -144,6 +144,8 @@ impl Reads {
 }
 
 impl Probe for Reads {
+    const HEARS_FORESEEN: bool = true;
+
     fn read(&mut self, slot: u64) {
         self.all.push(slot);
         self.read.push(slot);

@@ -228,6 +228,11 @@ impl<C: RecordCodec> RecordStore for PagedRecords<'_, C> {
     }
 
     #[inline(always)]
+    fn at_hand(&self, slot: u64) -> Option<RawOf<Self>> {
+        self.inner.find(page_of::<C>(slot), byte_in_page::<C>(slot))
+    }
+
+    #[inline(always)]
     fn has_bounds(&self) -> bool {
         self.inner.has_bounds
     }

@@ -61,6 +61,15 @@ pub trait RecordStore: Send + Sync {
     /// For a slot past the last page.
     fn get(&self, slot: u64) -> Option<RawOf<Self>>;
 
+    /// The record at `slot` if nothing has to be read for it.
+    ///
+    /// # Panics
+    /// For a slot past the last page.
+    #[inline(always)]
+    fn at_hand(&self, slot: u64) -> Option<RawOf<Self>> {
+        self.get(slot)
+    }
+
     /// Whether [`RecordStore::error_bound_m`] says anything of this store's records.
     #[inline(always)]
     fn has_bounds(&self) -> bool {
