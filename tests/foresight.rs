@@ -104,7 +104,7 @@ fn what_does_not_show_is_left_unread() {
             assert_eq!(all.foreseen, 0);
             assert_eq!(all.read, read.read + read.foreseen);
             // Next to voids it takes a record to know whether a triangle is drawn.
-            let least = if holes { 0 } else { all.read / 20 };
+            let least = if holes { 0 } else { all.read / 200 };
             assert!(
                 read.foreseen >= least && (holes == (read.foreseen == 0)),
                 "{record:?}: {} of {}",
