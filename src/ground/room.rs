@@ -7,6 +7,10 @@
 //! Invariants: orders are carried out in the order in which they come. **Nothing is told as saved that is not on the disk.** An error leaves the file as it was, or is told with the number of edits
 //! that are lost by it. Cost: that of a build from records, and a second pool of pages at the end; frames have no part in it.
 
+mod desk;
+
+pub(super) use desk::Order;
+
 use super::engine::MeshEngine;
 use super::hand::{Batches, Failed, Gone, Hand, Places};
 use super::options::StreamOptions;
@@ -15,10 +19,11 @@ use super::ticket::{CommitFailed, Promise};
 use crate::refine::Culling;
 use crate::stream::GroundPatch;
 use crate::view::View;
+use desk::Desk;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::channel;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use terrasoar_layout::LayoutError;
@@ -29,24 +34,6 @@ use terrasoar_layout::read::terrain::Terrain;
 const MOST_WIDENINGS: u32 = 3;
 /// How often the new ground is looked at while pages come.
 const PAGES_COME: Duration = Duration::from_millis(2);
-
-/// What is to be done, one after the other.
-pub(super) enum Order {
-    /// To edit, in memory.
-    Edit(Vec<Edit>),
-    /// To write everything so far.
-    Commit(String, Promise),
-}
-
-impl Order {
-    /// Edits that are lost with it.
-    fn edits(&self) -> usize {
-        match self {
-            Self::Edit(batch) => batch.len(),
-            Self::Commit(..) => 0,
-        }
-    }
-}
 
 /// What became of the ground, in its order.
 pub(super) enum Step {
@@ -87,27 +74,6 @@ pub(super) struct Room {
     desk: Arc<Desk>,
     /// What it leaves; without the right to edit if that is lost, which is told.
     thread: Option<JoinHandle<Result<Made, LayoutError>>>,
-}
-
-/// What both sides look at.
-#[derive(Default)]
-struct Desk(Mutex<Papers>);
-
-#[derive(Default)]
-struct Papers {
-    orders: VecDeque<Order>,
-    errors: VecDeque<LayoutError>,
-    /// Whether everything so far is on the disk.
-    is_saved: bool,
-    /// Whether no more orders are taken.
-    is_closed: bool,
-}
-
-impl Desk {
-    /// No code that holds the lock can panic.
-    fn papers(&self) -> MutexGuard<'_, Papers> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Room {
