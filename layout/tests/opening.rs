@@ -131,7 +131,7 @@ fn huge_packed(path: &Path) -> u64 {
     let root_page = 3 + pages + leaves;
     let root: Vec<u8> =
         (0..leaves).flat_map(|i| [(3 + pages + i) as u32, 0, 1, 0]).flat_map(u32::to_le_bytes).collect();
-    // Tables as they are; one run of present leaves; how many pages each has; no tile. Groups have 1,024, 128, 16, 2 and 1 tiles a side, 16 x 16 of them a leaf.
+    // No bounds; tables as they are; one run of present leaves; how many pages each has; no tile. Groups have 1,024, 128, 16, 2 and 1 tiles a side, 16 x 16 of them a leaf.
     let tables = seed[number(0x128)..number(0x128) + number(0x130)].to_vec();
     let run = vec![0, leaves as u8 | 128, (leaves >> 7) as u8 | 128, (leaves >> 14) as u8];
     let last = pages - 256 * (leaves - 1);
@@ -149,6 +149,8 @@ fn huge_packed(path: &Path) -> u64 {
     let blocks = 4 * pages + if last < 256 { 32 } else { 0 };
     sections.push((5, 0, at, blocks));
     let end = at + blocks;
+    put(0x107, &[sections.len() as u8]);
+    put(0x120, &[0; 24 * 8]);
     for (i, (kind, sum, offset, length)) in sections.into_iter().enumerate() {
         put(0x120 + 24 * i, &[kind.to_le_bytes(), sum.to_le_bytes()].concat());
         put(0x128 + 24 * i, &[offset.to_le_bytes(), length.to_le_bytes()].concat());
@@ -262,7 +264,7 @@ fn a_damaged_leaf_is_told_where_it_is_needed() {
     let root = number(&plain, 0x078, 4) * PAGE;
     let leaf = number(&plain, root + 16, 4) * PAGE;
     // The block of leaf 1 follows that of leaf 0.
-    let sections: Vec<usize> = (0..5).map(|i| 0x120 + 24 * i).collect();
+    let sections: Vec<usize> = (0..6).map(|i| 0x120 + 24 * i).collect();
     let section = |kind| *sections.iter().find(|at| number(&packed, **at, 4) == kind).unwrap();
     let [index, blocks] = [3, 5].map(|kind| number(&packed, section(kind) + 8, 8));
     let pages = usize::from(packed[index]) + 1;
