@@ -3,7 +3,7 @@
 //! Based on: P. Lindstrom, V. Pascucci, "Visualization of Large Terrains Made Easy", IEEE Visualization 2001, and "Terrain
 //! Simplification Simplified", IEEE TVCG 8(3), 2002: nested spheres, inherited culling flags, strips by parity, slots by index arithmetic.
 //!
-//! Where a store has bounds of errors, a vertex that is certain not to show is left unread ([`Foresight`]): the mesh is the same.
+//! Where a store has bounds of errors, a vertex that is certain not to show is left unread (`Foresight`): the mesh is the same.
 //!
 //! Cost: 2T - 1 nodes for T triangles, a record read and a test each. Allocates nothing once the strip has grown.
 
