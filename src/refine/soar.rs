@@ -83,10 +83,11 @@ impl<S: CompleteStore> Soar<S> {
         let (centre, _) = read(CENTRE_SLOT, height, c[0].midpoint(c[2]));
         (0..=CENTRE_SLOT).for_each(|slot| probe.read(slot));
         let first = StripVertex { x: sw.at.x(), y: sw.at.y(), height_m: sw.height_m };
+        let plain = Metric::new(view);
         let mut walk = Walk {
             records: &self.records,
-            metric: PairMetric::<SIGHT>::new(&Metric::new(view), &grid),
-            plain: Metric::new(view),
+            metric: PairMetric::<SIGHT>::new(&plain, &grid),
+            plain,
             strip: self.strip.start(sw.at, first),
             tests: 0,
             probe,

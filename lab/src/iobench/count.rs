@@ -266,7 +266,7 @@ impl<'t> LayoutCount<'t> {
     fn frame(&mut self, frame: u64, reads: &Reads) -> Result<(), LayoutError> {
         let slots = &reads.all[..];
         self.gather(slots);
-        let PackedNeed { tiles, bytes, bound_bytes, .. } = match self.unpacking {
+        let PackedNeed { tiles, bytes, bound_bytes } = match self.unpacking {
             Some(unpacking) => unpacking.need_of(&reads.read, &reads.foreseen)?,
             None => PackedNeed::default(),
         };
