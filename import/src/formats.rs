@@ -134,6 +134,9 @@ pub(crate) fn is_placed(path: &Path) -> bool {
     if BESIDE.iter().any(|name| identify::is_called(path, name)) {
         return false;
     }
+    if strangers::headed(path).is_some() {
+        return false;
+    }
     let Ok(look) = Look::at(path) else { return false };
     let format = SIGNED.iter().chain(NAMED).find(|format| (format.is)(&look));
     format.is_some_and(|format| !UNPLACED.contains(&format.name))
@@ -172,6 +175,12 @@ fn open_file(path: &Path, options: &OpenOptions) -> Result<Box<dyn Reader>, Layo
         return boxed(crate::gdal::GdalDem::open(path, options));
     }
     let look = Look::at(path)?;
+    // Stated shapes are for what a person knows better.
+    if options.raw.is_none()
+        && let Some(refusal) = strangers::headed(path)
+    {
+        return stranger(path, options, refusal);
+    }
     if let Some(format) = SIGNED.iter().find(|format| (format.is)(&look)) {
         if options.raw.is_some() && !hgt::is_tile(path) {
             return Err(LayoutError::Usage(format!(
@@ -241,9 +250,12 @@ fn stranger(path: &Path, _: &OpenOptions, refusal: String) -> Result<Box<dyn Rea
     Err(LayoutError::not_this_format(path, format!("{refusal} ({READ_HERE})")))
 }
 
-/// Hands what no line knows to GDAL; what that does not open either is refused with the words of its kind.
+/// Hands what no line knows to GDAL; what that does not open either is refused with the words of its kind. One tile of a file of many would pass for the whole.
 #[cfg(feature = "gdal")]
 fn stranger(path: &Path, options: &OpenOptions, refusal: String) -> Result<Box<dyn Reader>, LayoutError> {
+    if strangers::is_part(path) {
+        return Err(LayoutError::not_this_format(path, refusal));
+    }
     match crate::gdal::GdalDem::open(path, options) {
         Err(LayoutError::NotThisFormat { .. }) => Err(LayoutError::not_this_format(
             path,

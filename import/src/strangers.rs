@@ -3,7 +3,9 @@
 //! A line each. Signatures of four bytes or more are looked at before any name; shorter ones and names last, for samples of a file without a header may look like them.
 //! A command in an advice has INPUT where the file's name belongs.
 
-use crate::identify::Look;
+use crate::identify::{Look, is_called};
+use std::path::Path;
+use terrasoar_layout::words::harmless;
 
 /// A format that is not read.
 struct Stranger {
@@ -138,6 +140,33 @@ const NAMES: &[(&str, &str, &str)] = &[
         "open it to fly, or name the data to build from",
     ),
 ];
+
+/// Data of other programs by the end of its name, the end of the name of the header that must stand beside, and what it is. Without this their data would be read by any other
+/// header of that name, or by the signature of its first piece.
+const HEADED: &[(&[&str], &str, &str)] = &[
+    (&["sdat"], "sgrd", "the data of a SAGA grid"),
+    (&["rst"], "rdc", "an Idrisi raster"),
+    (&["gri"], "grd", "the data of a raster of R"),
+    (&["ppg", "pjg", "ptf", "pzp", "til", "lrc", "psz"], "mrf", "the tiles of a Meta Raster Format file"),
+];
+
+/// What to say of data that another program's header beside it describes.
+pub(crate) fn headed(path: &Path) -> Option<String> {
+    let (_, header, what) = HEADED.iter().find(|(data, ..)| data.iter().any(|name| is_called(path, name)))?;
+    let names = [path.with_extension(header), path.with_extension(header.to_ascii_uppercase())];
+    let header = names.into_iter().find(|name| name.is_file())?;
+    let name = harmless(&header.file_name()?.to_string_lossy(), 80);
+    let input = if is_called(&header, "mrf") || is_called(&header, "grd") { name.as_str() } else { "INPUT" };
+    let advice = CONVERT.replace("INPUT", input);
+    Some(format!("this is {what} that {name} beside it describes, which is not read; {advice}"))
+}
+
+/// Whether a file is but tiles of a file of many, which have signatures of their own.
+#[cfg(feature = "gdal")]
+pub(crate) fn is_part(path: &Path) -> bool {
+    HEADED.last().is_some_and(|(data, ..)| data.iter().any(|name| is_called(path, name)))
+        && headed(path).is_some()
+}
 
 fn told(what: &str, advice: &str) -> String {
     format!("this is {what}, which is not read; {advice}")

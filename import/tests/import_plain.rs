@@ -371,3 +371,33 @@ fn netpbm_as_text_bytes_and_reals() {
         assert!(said.contains(wanted), "{head}: {said}");
     }
 }
+
+/// Data that another program's header describes is not read by a label that has its name by chance: SAGA's rows begin in the south.
+#[test]
+fn data_of_another_header_is_refused() {
+    let envi = "ENVI\nsamples = 7\nlines = 5\nbands = 1\ndata type = 4\ninterleave = bsq\nbyte order = 0\n";
+    let grid = laid_out("f32le", 1, "bsq", [0; 3]);
+    for (data, header) in [("a.sdat", "a.sgrd"), ("a.rst", "a.RDC"), ("a.gri", "a.grd"), ("a.ptf", "a.mrf")] {
+        let (folder, path) = pair([data, "a.hdr"], &grid, envi);
+        assert_eq!(read(std::slice::from_ref(&path)).unwrap().samples.len(), 35, "{data}");
+        std::fs::write(folder.path().join(header), "x").unwrap();
+        let said = refusal(std::slice::from_ref(&path));
+        assert!(said.contains("beside it describes") && said.contains("gdal_translate"), "{said}");
+        // A person knows better.
+        let options = OpenOptions { raw: Some("7x5:f32le".into()), ..OpenOptions::default() };
+        assert_eq!(open_with(&[path], &options).unwrap().info().samples_wide, 7, "{data}");
+    }
+}
+
+#[test]
+fn a_label_that_says_less_than_the_file_has_is_told() {
+    let warnings = |bytes: &[u8], label: &str| {
+        let (_folder, path) = pair(["a.bsq", "a.hdr"], bytes, label);
+        format!("{:?}", open_with(&[path], &OpenOptions::default()).unwrap().warnings())
+    };
+    let label = "nrows 5\nncols 7\nnbands 2\nlayout bsq\nnbits 16\npixeltype signedint\nskipbytes 4\nbandrowbytes 16\nbandgapbytes 6\n";
+    let mut bytes = laid_out("i16le", 2, "bsq", [4, 2, 6]);
+    assert!(!warnings(&bytes, label).contains("bytes more"));
+    bytes.extend([0; 20]);
+    assert!(warnings(&bytes, label).contains("20 bytes more than a.hdr says"));
+}

@@ -76,6 +76,13 @@ fn shapes_and_packings_of_one_tile() {
             );
         }
     }
+    // Both borders of a degree make an odd number of heights a side.
+    let warnings = |side: u32| {
+        let path = put(folder.path().join("N61E010.hgt"), &tile([side; 2], ground));
+        open_with(&[path], &OpenOptions::default()).unwrap().warnings()
+    };
+    let is_told = |side| warnings(side).iter().any(|warning| warning.words.contains("both borders"));
+    assert!(is_told(40) && !is_told(41));
     // A shape that no tile has must be stated.
     let path = put(folder.path().join("N60E010.hgt"), &tile([50, 40], ground));
     assert!(refusal(std::slice::from_ref(&path)).contains("state its shape"));

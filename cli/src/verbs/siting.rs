@@ -34,10 +34,13 @@ impl Siting {
         let done = header.about.origins.iter().filter(|(what, _)| what == "placement");
         let mut words = vec![lie(header).to_owned()];
         words.extend(done.map(|(_, words)| words.clone()));
+        let world = Frame::wgs84(header);
+        let doubt = world.as_ref().and_then(Frame::doubt);
+        words.extend(doubt.map(|doubt| format!("the shift between its datum and that of WGS 84 {doubt}")));
         Self {
             placement: Placement { words, sample_to_crs: header.sample_to_crs },
             bounds: Frame::own(header).and_then(|frame| frame.bounds()),
-            bounds_wgs84: Frame::wgs84(header).and_then(|frame| frame.bounds_deg()),
+            bounds_wgs84: world.and_then(|frame| frame.bounds_deg()),
         }
     }
 

@@ -21,6 +21,10 @@ const RADII_M: [(&str, f64); 12] = [
     ("aust_SA", 6_378_160.0),
 ];
 
+/// Directions of the first two axes that are read: eastings or westings first; northings first, which data has the other way round all the same; and southings before westings, which are
+/// turned. Others cross columns and rows.
+const AXES: [&str; 6] = ["en", "es", "wn", "ws", "ne", "sw"];
+
 /// The value of a word, "" for one without.
 pub(crate) fn word<'t>(text: &'t str, name: &str) -> Option<&'t str> {
     text.split_whitespace().find_map(|word| {
@@ -48,6 +52,9 @@ pub(super) fn init_code(text: &str) -> Option<u32> {
 pub(super) fn system(text: &str) -> Option<System> {
     let text = text.trim();
     let projection = word(text, "proj")?;
+    if word(text, "axis").is_some_and(|axis| !AXES.iter().any(|known| axis.starts_with(known))) {
+        return None;
+    }
     let mut system = System::unknown();
     system.text = text.to_owned();
     system.proj = Some(text.to_owned());
@@ -67,9 +74,10 @@ pub(super) fn system(text: &str) -> Option<System> {
             }
             _ => format!("PROJ {projection}"),
         };
-        let metres = match (word(text, "to_meter"), word(text, "units")) {
-            (Some(size), _) => number(size),
-            (None, Some(name)) => unit_m(name),
+        // A named unit counts before its size, as in PROJ.
+        let metres = match (word(text, "units"), word(text, "to_meter")) {
+            (Some(name), _) => unit_m(name),
+            (None, Some(size)) => number(size),
             (None, None) => Some(1.0),
         };
         let name = word(text, "units").unwrap_or("metre").to_owned();
@@ -78,7 +86,7 @@ pub(super) fn system(text: &str) -> Option<System> {
     system.signs = signs(text);
     system.is_south_first = word(text, "axis").is_some_and(|axis| axis.starts_with("sw"));
     let vertical_m =
-        word(text, "vto_meter").and_then(number).or_else(|| word(text, "vunits").and_then(unit_m));
+        word(text, "vunits").and_then(unit_m).or_else(|| word(text, "vto_meter").and_then(number));
     system.vertical = vertical_m.map(|metres| Vertical {
         name: word(text, "geoidgrids").map(|grid| format!("heights by {grid}")).unwrap_or_default(),
         code: None,

@@ -78,7 +78,7 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
         if system.code.is_some() {
             system.reach_deg =
                 registry::reach(&[system.code, geographic, registry::code_of_datum(&system.datum)]);
-        } else if node.find(&["TOWGS84"]).is_none() {
+        } else if node.find(&["TOWGS84"]).is_none() && extension(node).is_none() {
             tie(&mut system);
         }
         // A grid is named where the registry does not tell the shift.
@@ -94,9 +94,16 @@ fn horizontal(node: &Node, depth: u32) -> Option<System> {
     Some(system)
 }
 
+/// Ends of the names of ESRI's datums that lie apart from WGS 84 though their ellipsoid is that one, and by how many metres.
+const APART: [(&str, f64); 2] = [("xrail84", 80.0), ("georgiageodeticdatum", 8.0)];
+
 /// Gives a system of which neither a code nor the text tells the shift that of its datum, by the datum's name.
 fn tie(system: &mut System) {
-    let Some((shift, off_m, code)) = registry::shift_of_datum(&system.datum) else { return };
+    let Some((shift, off_m, code)) = registry::shift_of_datum(&system.datum) else {
+        let apart = APART.iter().find(|(name, _)| system.datum.ends_with(name));
+        system.off_m = apart.map(|(_, off_m)| *off_m);
+        return;
+    };
     let radius_m = match registry::horizontal(code) {
         Some(registry::Horizontal::Text { wkt, .. }) => {
             wkt::parse(wkt).and_then(|nodes| nodes[0].find(&["SPHEROID"])?.number(1))
@@ -172,9 +179,10 @@ fn unsaid_axes(node: &Node) -> ([f64; 2], bool) {
     let method = node.find(&["PROJECTION", "METHOD"]).and_then(|method| method.text(0)).map(squeezed);
     match method.as_deref() {
         Some("transversemercatorsouthorientated") => ([-1.0; 2], false),
+        // GDAL writes neither axes nor these parameters for Krovak's old maps.
         Some("krovak")
-            if parameter(node, "XY_Plane_Rotation") == Some(0.0)
-                && parameter(node, "X_Scale") == Some(1.0) =>
+            if parameter(node, "XY_Plane_Rotation").unwrap_or(0.0) == 0.0
+                && parameter(node, "X_Scale").unwrap_or(1.0) == 1.0 =>
         {
             ([-1.0; 2], true)
         }
@@ -228,9 +236,63 @@ fn projection(node: &Node, code: Option<u32>) -> (Option<String>, Option<f64>) {
             return (Some(proj), off_m);
         }
     }
+    if let Some(proj) = extension(node) {
+        return (Some(proj.to_owned()), None);
+    }
     // Another's parser on a stranger's text.
     let proj = quiet(|| proj4wkt::wkt_to_projstring(&written(node)).ok()).flatten();
-    (proj.filter(|proj| proj.contains("+proj=")).map(|proj| completed(proj, node)), None)
+    (
+        proj.filter(|proj| proj.contains("+proj="))
+            .and_then(|proj| Some(completed(middled(proj, node)?, node))),
+        None,
+    )
+}
+
+/// The PROJ string that GDAL puts into a text that cannot say the map, as that of the web's Mercator; it counts before the text.
+fn extension(node: &Node) -> Option<&str> {
+    let mut all = node.children(&["EXTENSION"]);
+    all.find(|extension| extension.text(0) == Some("PROJ4"))?.text(1).filter(|proj| proj.contains("+proj="))
+}
+
+/// Names of the parameters for the middle of a map in small letters, and their words in a PROJ string. The first is the one that no map can do without.
+const MIDDLES: [(&str, &[&str]); 4] = [
+    (
+        "lon_0",
+        &[
+            "longitudeofnaturalorigin",
+            "longitudeoffalseorigin",
+            "longitudeoforigin",
+            "longitudeofcenter",
+            "centralmeridian",
+        ],
+    ),
+    ("lat_0", &["latitudeofnaturalorigin", "latitudeoffalseorigin", "latitudeoforigin", "latitudeofcenter"]),
+    ("x_0", &["falseeasting", "eastingatfalseorigin"]),
+    ("y_0", &["falsenorthing", "northingatfalseorigin"]),
+];
+
+/// A string with the middle of the map where its parser leaves that out, as of equidistant conic maps in WKT 2; `None` for a map of another kind without one, which would lie anywhere.
+fn middled(proj: String, node: &Node) -> Option<String> {
+    let around = node.child(&["CONVERSION"]).unwrap_or(node);
+    let value = |names: &[&str]| {
+        let mut all = around.children(&["PARAMETER"]);
+        let found =
+            all.find(|one| one.text(0).is_some_and(|name| names.contains(&squeezed(name).as_str())))?;
+        let size = |keys: &[&str], whole: f64| {
+            found.child(keys).and_then(|unit| unit.number(1)).map_or(1.0, |size| size / whole)
+        };
+        Some(found.number(1)? * size(&["ANGLEUNIT"], 1f64.to_radians()) * size(&["LENGTHUNIT"], 1.0))
+    };
+    let is_centred =
+        ["lon_0", "lonc", "lon_1", "lon_2", "zone"].iter().any(|word| from_proj::word(&proj, word).is_some());
+    if is_centred || value(MIDDLES[0].1).is_none_or(|lon| lon == 0.0) {
+        return Some(proj);
+    }
+    if from_proj::word(&proj, "proj") != Some("eqdc") {
+        return None;
+    }
+    let words = MIDDLES.iter().filter_map(|(word, names)| Some(format!(" +{word}={}", value(names)?)));
+    Some(words.fold(proj, |proj, word| proj + &word))
 }
 
 /// A string with what its parser leaves out.

@@ -35,6 +35,9 @@ const LEFT_OUT: [&str; 12] = [
     "init",
 ];
 
+/// Words for spheres that the library passes over.
+const SPHERES_AT_A_LATITUDE: [&str; 2] = ["R_lat_a", "R_lat_g"];
+
 /// A system that coordinates can be brought out of and into.
 #[derive(Clone)]
 pub(crate) struct Ground {
@@ -112,6 +115,9 @@ impl Ground {
             },
             (None, _) => return None,
         };
+        if SPHERES_AT_A_LATITUDE.iter().any(|word| from_proj::word(&text, word).is_some()) {
+            return None;
+        }
         let bare = quiet(|| on_sphere(without(&text, &LEFT_OUT)))?;
         let (no_grid, grid) = match from_proj::word(&bare, "nadgrids") {
             Some("@null") | None => (bare, None),
@@ -309,7 +315,9 @@ fn turn_on_map(proj: &Proj, own: &Proj) -> Option<f64> {
 /// The string with the sphere of the ellipsoid's area for `+R_A`, and that of its equator for `+f=0` beside an ellipsoid: its formulas are those of the sphere, and latitudes stay those of the
 /// ellipsoid, so that no shift of datum may be made between both.
 fn on_sphere(text: String) -> String {
-    let is_of_area = from_proj::word(&text, "R_A").is_some();
+    // Miller's is drawn so by PROJ, whether a string says it or not.
+    let is_of_area =
+        from_proj::word(&text, "R_A").is_some() || from_proj::word(&text, "proj") == Some("mill");
     let has_no_flattening = from_proj::word(&text, "f").is_some_and(|f| f.parse() == Ok(0.0));
     if !is_of_area && !has_no_flattening {
         return text;
@@ -368,3 +376,5 @@ fn plain(text: &str) -> String {
 mod places_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod texts_tests;

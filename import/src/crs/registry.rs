@@ -21,6 +21,15 @@ const MENDED: [(u32, &str); 2] = [
     (4055, "+proj=longlat +a=6378137 +b=6378137 +nadgrids=@null +no_defs"),
 ];
 
+/// Datums by their words in PROJ strings, with PROJ's shifts to WGS 84. NAD27's is a grid; those of Germany and Austria (potsdam, hermannskogel) differ from region to region.
+const SHIFTS_OF_WORDS: [(&str, &str); 5] = [
+    ("GGRS87", "-199.87,74.79,246.62"),
+    ("carthage", "-263,6,431"),
+    ("ire65", "482.53,-130.596,564.557,-1.042,-0.214,-0.631,8.15"),
+    ("nzgd49", "59.47,-5.04,187.44,0.47,-0.1,1.024,-4.5993"),
+    ("OSGB36", "446.448,-125.157,542.06,0.1502,0.247,0.8421,-20.4894"),
+];
+
 /// A horizontal system.
 pub(super) enum Horizontal {
     /// Its WKT and its PROJ string.
@@ -79,8 +88,16 @@ pub(super) fn shift_of_datum(name: &str) -> Option<(String, Option<f64>, u32)> {
     let code = code_of_datum(name)?;
     let (Horizontal::Text { proj, .. } | Horizontal::Parts { proj, .. }) = horizontal(code)?;
     let (proj, off_m) = tied(code, proj);
-    let word = proj.split_whitespace().find(|word| word.starts_with("+towgs84="))?.to_owned();
+    let word = proj.split_whitespace().find_map(|word| match word.strip_prefix("+datum=") {
+        Some(datum) => shift_of_word(datum).map(|shift| format!("+towgs84={shift}")),
+        None => word.starts_with("+towgs84=").then(|| word.to_owned()),
+    })?;
     Some((word, off_m, code))
+}
+
+/// The shift that PROJ has for a datum of its strings.
+fn shift_of_word(datum: &str) -> Option<&'static str> {
+    SHIFTS_OF_WORDS.iter().find(|(word, _)| *word == datum).map(|(_, shift)| *shift)
 }
 
 /// The code of the longitudes and latitudes of a datum.

@@ -56,6 +56,11 @@ impl HgtDem {
         };
         match mosaic.north_west {
             Some((north, west)) => {
+                if wide % 2 == 0 || high % 2 == 0 {
+                    declared.warnings.push(Warning::new(format!(
+                        "a tile of {wide} x {high} heights is none that is known, for those with both borders of their degree have odd numbers; both borders were taken to be in it, so places may be off by up to a step"
+                    )));
+                }
                 let [across, down] = [wide, high].map(|side| 1.0 / f64::from(side - 1));
                 declared.place = Some(Said::new([west, across, 0.0, north, 0.0, -down], "the file's name"));
             }

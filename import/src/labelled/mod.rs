@@ -114,13 +114,14 @@ impl LabelledDem {
             true => envi::parse(&label_path, &text)?,
             false => esri::parse(&label_path, &text, &data, length)?,
         };
-        Self::with_label(&data, &label_path, label, options)
+        Self::with_label(&data, &label_path, label, length, options)
     }
 
     fn with_label(
         data: &Path,
         label_path: &Path,
         label: Label,
+        length: u64,
         options: &OpenOptions,
     ) -> Result<Self, LayoutError> {
         let names: Vec<&str> = label.names.iter().map(String::as_str).collect();
@@ -130,6 +131,7 @@ impl LabelledDem {
         };
         let (at, steps) = label.layout(label_path, number as u64)?;
         let plain = Plain::checked(data, label.samples, label.kind, at, steps)?;
+        let more = length.saturating_sub(label.length(steps));
         let mut declared = Declared::new(label.samples, label.kind.sample_type, label.format);
         if label.bands > 1 && options.band.is_none() {
             let words = format!("band 1 of {} was read", label.bands);
@@ -141,6 +143,12 @@ impl LabelledDem {
             let value = values.get(number).copied().filter(|value| *value != idle);
             value.map(|value| Said::new(value, by))
         };
+        if more > 0 {
+            declared.warnings.push(Warning::new(format!(
+                "the file has {more} bytes more than {} says, so that this label may be another file's; compare the heights with what they should be",
+                beside::name(label_path)
+            )));
+        }
         declared.corrects = label.corrects;
         declared.value.scale = of_band(&label.gains, 1.0, "data gain values");
         declared.value.offset = of_band(&label.offsets, 0.0, "data offset values");
@@ -197,6 +205,18 @@ impl Label {
         }
         let at = self.skip.checked_add(from_start).ok_or_else(too_large)?;
         Ok((at, [along, down]))
+    }
+
+    /// Bytes of the whole file, for rows that are so far apart.
+    fn length(&self, [_, down]: [u64; 2]) -> u64 {
+        let rows = down.saturating_mul(u64::from(self.samples[1]));
+        let bands = match self.interleave {
+            Interleave::Sequential => {
+                rows.saturating_add(self.band_gap).saturating_mul(u64::from(self.bands))
+            }
+            Interleave::Line | Interleave::Pixel => rows,
+        };
+        self.skip.saturating_add(bands)
     }
 
     fn short_rows(&self, path: &Path, said: u64, needed: u64) -> LayoutError {

@@ -12,6 +12,7 @@ use terrasoar_layout::dem::Warning;
 use terrasoar_layout::error::LayoutError;
 use terrasoar_layout::portable::hypot;
 use terrasoar_layout::remedy::Remedy;
+use terrasoar_layout::words::harmless;
 
 /// How far a map may be from the ground before it is measured, and how far the step may change within a grid before this is said.
 const TRUE_TO: f64 = 0.01;
@@ -85,6 +86,9 @@ pub(crate) fn spacing(
         Some(HorizontalSize::Metres(size)) => {
             let on_map = lengths.map(|length| length * size);
             let Some((metres, latitude)) = measured(centre) else {
+                if !stated && system.kind == Kind::Projected {
+                    warnings.push(unmeasured(system, ground.is_some()));
+                }
                 return Ok(Spacing { metres: Some(on_map), latitude_deg: None, words: String::new() });
             };
             if !ground.as_ref().is_some_and(Ground::is_cylindrical) {
@@ -124,6 +128,21 @@ fn tell_off(on_map_m: [f64; 2], metres: [f64; 2], latitude: f64, warnings: &mut 
     }
 }
 
+/// Says that nothing is known of the ground below a map.
+fn unmeasured(system: &System, is_known: bool) -> Warning {
+    let name = match harmless(&system.name, 80) {
+        name if name.is_empty() => "the reference system".to_owned(),
+        name => name,
+    };
+    let why = match is_known {
+        true => format!("the centre of the elevation model lies outside of what {name} covers"),
+        false => format!("how {name} is projected is not known here"),
+    };
+    Warning::new(format!(
+        "{why}, so longitudes and latitudes are not known, and distances on the map were taken for those on the ground; for true ones bring the elevation model over before: gdalwarp -t_srs SYSTEM INPUT output.tif"
+    ))
+}
+
 fn beyond(path: &Path) -> LayoutError {
     LayoutError::Usage(format!(
         "{}: the centre of the elevation model lies outside of what its reference system covers; check its place, or state the spacing in metres",
@@ -158,5 +177,33 @@ fn tell_change(
             ))
             .mended_by(Remedy::Reproject, "utm"),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::crs::by_text;
+
+    fn words(text: &str, origin: [f64; 2]) -> Vec<String> {
+        let mut system = by_text(text).unwrap();
+        let map = Some([origin[0], 10.0, 0.0, origin[1], 0.0, -10.0]);
+        let mut warnings = Vec::new();
+        spacing(Path::new("a"), &mut system, map, [3, 3], false, &mut warnings).unwrap();
+        warnings.into_iter().map(|warning| warning.words).collect()
+    }
+
+    #[test]
+    fn maps_that_lead_to_no_ground_are_told() {
+        for (text, wanted) in [
+            ("EPSG:8441", "how Tananarive / Laborde Grid is projected is not known here"),
+            ("+proj=bonne +lat_1=45 +lon_0=2 +ellps=clrk66", "how PROJ bonne is projected"),
+            ("+proj=wintri +datum=WGS84", "distances on the map were taken"),
+        ] {
+            let words = words(text, [500_000.0, 800_000.0]);
+            assert!(words.len() == 1 && words[0].contains(wanted), "{words:?}");
+        }
+        assert!(words("EPSG:32632", [500_000.0, 5_000_000.0]).is_empty());
+        assert!(words("local", [0.0, 0.0]).is_empty());
     }
 }

@@ -67,6 +67,11 @@ pub(super) trait Archive: Send + Sync {
 
     fn about(&self) -> &About;
 
+    /// What to say where it is in doubt from where rows are counted.
+    fn rows_in_doubt(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Memory that looking tiles up takes.
     fn memory_bytes(&self) -> u64;
 

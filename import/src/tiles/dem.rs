@@ -61,6 +61,7 @@ impl TileDem {
         declared.crs = pyramid.crs();
         declared.value.unit = Some(Said::new(VerticalUnit::Metres(1.0), "the packing"));
         declared.aloud.extend(halves.all.iter().map(|(half, _)| half.plan.words.clone()));
+        declared.aloud.extend(pyramid.archive.rows_in_doubt().map(str::to_owned));
         declared.notes.push(format!("heights are packed into colours: {}", found.by));
         declared.warnings.extend(found.warning.clone());
         for missing in halves.all.iter().filter_map(|(half, _)| half.plan.missing.as_ref()) {

@@ -194,6 +194,13 @@ impl Archive for Folder {
         &self.about
     }
 
+    fn rows_in_doubt(&self) -> Option<&'static str> {
+        let is_said = self.from_south || self.about.from_south.is_some() || self.about.bounds.is_some();
+        (!is_said).then_some(
+            "nothing says from where rows of tiles are counted; from the north was taken (XYZ); if the ground lies on the other side of the equator, they are counted from the south (TMS)",
+        )
+    }
+
     fn memory_bytes(&self) -> u64 {
         1 << 20
     }

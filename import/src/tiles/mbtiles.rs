@@ -318,6 +318,12 @@ impl Archive for Mbtiles {
         &self.about
     }
 
+    fn rows_in_doubt(&self) -> Option<&'static str> {
+        (self.about.from_south == Some(false)).then_some(
+            "rows of tiles are counted from the south, as in all MBTiles, though the metadata says xyz; if the ground lies on the other side of the equator, its writer counted from the north",
+        )
+    }
+
     fn memory_bytes(&self) -> u64 {
         // Pages, and a tile.
         8 << 20

@@ -104,6 +104,12 @@ fn every_archive_has_the_same_heights() {
     // Rows that nothing says run north, said by a person.
     let silent = folder(&folder_of.path().join("silent"), &made, ".png", true);
     let from_south = TileOptions { from_south: true, ..TileOptions::default() };
+    let origins =
+        |path: &Path, tiles| format!("{:?}", read(path, Some("mapbox"), tiles).unwrap().info.about.origins);
+    assert!(origins(&silent, TileOptions::default()).contains("nothing says from where rows"));
+    for (path, tiles) in [(&silent, from_south.clone()), (&archives[2].1, TileOptions::default())] {
+        assert!(!origins(path, tiles).contains("nothing says from where rows"));
+    }
     is_alps(&read(&silent, Some("mapbox"), from_south.clone()).unwrap(), 64, "by flag");
     let words = refusal(&archives[3].1, Some("mapbox"), from_south);
     assert!(words.contains("only rows of a folder"), "{words}");
