@@ -7,6 +7,7 @@
 pub mod change;
 mod clock;
 pub mod kinetic;
+mod listener;
 pub mod naive;
 pub mod smart;
 pub mod soar;

@@ -29,6 +29,7 @@ pub use mesh::bounds::Bounds;
 pub use mesh::patch::{MeshVertex, Patch};
 
 use super::change::GroundChange;
+use super::listener::Listener;
 use super::{Culling, Engine, Phase, Probe, Work};
 use crate::mesh::Triangle;
 use crate::metric::{ALL_PLANES, Metric};
@@ -294,46 +295,8 @@ impl<S: RecordStore> Kinetic<S> {
         self.records.get(slot).unwrap_or(S::Codec::INERT)
     }
 
-    /// Makes the mesh of four triangles that every other grows from.
-    fn plant<P: Probe>(&mut self, probe: &mut P) {
-        let grid = *self.records.grid();
-        let square = corners(grid.k());
-        // The first page is always at hand.
-        for (slot, at) in square.into_iter().enumerate() {
-            probe.read(slot as u64);
-            let vertex = self.records.decode(self.first_record(slot as u64), 0);
-            self.corners[slot] = vertex;
-            self.place_vertex(at, &vertex, Ring::new([Corner::NONE; 2], [slot as u32; 2]));
-            self.patch.vertices.push((slot as u32, self.patch_vertex(at, &vertex, [slot as u32; 2])));
-        }
-        let centre_at = square[0].midpoint(square[2]);
-        probe.read(CENTRE_SLOT);
-        let raw = self.first_record(CENTRE_SLOT);
-        let centre = self.nodes.create(CENTRE, raw);
-        let level = level_of(centre_at);
-        let vertex = self.records.decode(raw, level);
-        // Its corners are told by the roots.
-        let slot = self.place_vertex(centre_at, &vertex, Ring::new([Corner::NONE; 2], [0; 2]));
-        let record = self.nodes.get_mut(centre);
-        record.word = STATUS;
-        record.become_split(slot, level);
-        self.patch.vertices.push((slot, self.patch_vertex(centre_at, &vertex, [slot; 2])));
-        for (side, [b, d]) in ROOTS {
-            self.plant_root(root_label(side), [b as u32, d as u32]);
-        }
-        self.triangles = ROOTS.len();
-    }
-}
-
-/// The centre's label for the root whose side has this slot in the file: W, S, E, N are 5 to 8.
-fn root_label(side_slot: u64) -> usize {
-    [2, 3, 0, 1][side_slot as usize - 5]
-}
-
-impl<S: RecordStore> Engine for Kinetic<S> {
-    type Store = S;
-
-    fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
+    /// Brings the mesh to a view; returns the vertex tests that took.
+    fn refine(&mut self, view: &View, probe: &mut Listener<'_>) -> u64 {
         let metric = Metric::new(view);
         let pose = Pose::of(view, &metric);
         self.work = Work::default();
@@ -379,6 +342,49 @@ impl<S: RecordStore> Engine for Kinetic<S> {
         self.settle();
         probe.phase(Phase::Done);
         self.work.tests
+    }
+
+    /// Makes the mesh of four triangles that every other grows from.
+    fn plant(&mut self, probe: &mut Listener<'_>) {
+        let grid = *self.records.grid();
+        let square = corners(grid.k());
+        // The first page is always at hand.
+        for (slot, at) in square.into_iter().enumerate() {
+            probe.read(slot as u64);
+            let vertex = self.records.decode(self.first_record(slot as u64), 0);
+            self.corners[slot] = vertex;
+            self.place_vertex(at, &vertex, Ring::new([Corner::NONE; 2], [slot as u32; 2]));
+            self.patch.vertices.push((slot as u32, self.patch_vertex(at, &vertex, [slot as u32; 2])));
+        }
+        let centre_at = square[0].midpoint(square[2]);
+        probe.read(CENTRE_SLOT);
+        let raw = self.first_record(CENTRE_SLOT);
+        let centre = self.nodes.create(CENTRE, raw);
+        let level = level_of(centre_at);
+        let vertex = self.records.decode(raw, level);
+        // Its corners are told by the roots.
+        let slot = self.place_vertex(centre_at, &vertex, Ring::new([Corner::NONE; 2], [0; 2]));
+        let record = self.nodes.get_mut(centre);
+        record.word = STATUS;
+        record.become_split(slot, level);
+        self.patch.vertices.push((slot, self.patch_vertex(centre_at, &vertex, [slot; 2])));
+        for (side, [b, d]) in ROOTS {
+            self.plant_root(root_label(side), [b as u32, d as u32]);
+        }
+        self.triangles = ROOTS.len();
+    }
+}
+
+/// The centre's label for the root whose side has this slot in the file: W, S, E, N are 5 to 8.
+fn root_label(side_slot: u64) -> usize {
+    [2, 3, 0, 1][side_slot as usize - 5]
+}
+
+impl<S: RecordStore> Engine for Kinetic<S> {
+    type Store = S;
+
+    fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
+        self.refine(view, &mut Listener::new(probe))
     }
 
     fn for_each_triangle(&self, visit: &mut dyn FnMut(Triangle)) {

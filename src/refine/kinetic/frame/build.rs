@@ -13,6 +13,7 @@
 //! Cost: some fifty nanoseconds a node on one thread, a third of it for memory that is touched for the first time.
 
 use super::piece::{Line, Parent, Piece, Places, order_of};
+use crate::refine::Phase;
 use crate::refine::kinetic::capacity::grow;
 use crate::refine::kinetic::frame::collect::enter;
 use crate::refine::kinetic::frame::shown::Shown;
@@ -25,7 +26,7 @@ use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of};
 use crate::refine::kinetic::time::queue::Entry;
 use crate::refine::kinetic::{Kinetic, MeshVertex, Patch};
-use crate::refine::{Phase, Probe};
+use crate::refine::listener::Listener;
 use std::ops::Range;
 use terrasoar_layout::grid::GridPoint;
 use terrasoar_layout::grid::order::slot_of;
@@ -45,7 +46,7 @@ const NEAR_FILL: u32 = CLUSTER as u32 * 7 / 8;
 
 impl<S: RecordStore> Kinetic<S> {
     /// Makes the mesh for a view of one that has been planted in this frame.
-    pub(crate) fn build<P: Probe>(&mut self, judge: &Judge, probe: &mut P) {
+    pub(crate) fn build(&mut self, judge: &Judge, probe: &mut Listener<'_>) {
         probe.phase(Phase::Test);
         let fill = if self.nodes.clusters.dealing() == Dealing::Near { NEAR_FILL } else { CLUSTER as u32 };
         let places = Places { fill };
@@ -98,9 +99,11 @@ impl<S: RecordStore> Kinetic<S> {
         }
         self.finish(nodes, fill, stale);
         probe.phase(Phase::Apply);
+        if !probe.hears_reads() {
+            return;
+        }
         let k = self.records.grid().k();
-        let nodes = self.nodes.all[1..].iter().filter(|_| P::HEARS_READS);
-        for node in nodes.filter(|node| node.is_live() && node.word != UNREAD) {
+        for node in self.nodes.all[1..].iter().filter(|node| node.is_live() && node.word != UNREAD) {
             probe.read(slot_of(k, node.place(&self.vertices).0));
         }
     }

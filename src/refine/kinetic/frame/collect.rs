@@ -4,19 +4,20 @@
 //! course's words when the eye takes another course.
 
 use super::ahead::Ahead;
+use crate::refine::Phase;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS};
 use crate::refine::kinetic::time::certificate::{expiry_of, with_certificate};
 use crate::refine::kinetic::time::clocks::{BANDS, EXPIRY_BITS, HORIZON, Kind, clock_id};
 use crate::refine::kinetic::time::course::Pose;
 use crate::refine::kinetic::time::queue::{Entry, Queue};
-use crate::refine::{Phase, Probe};
+use crate::refine::listener::Listener;
 use terrasoar_layout::read::prefetch::prefetch;
 use terrasoar_layout::read::store::RecordStore;
 
 impl<S: RecordStore> Kinetic<S> {
     /// Takes from the queue what is over, and brings clocks and courses in order.
-    pub(crate) fn collect<P: Probe>(&mut self, pose: Pose, probe: &mut P) {
+    pub(crate) fn collect(&mut self, pose: Pose, probe: &mut Listener<'_>) {
         let moved = self.clocks.move_to(pose);
         if let Some(ahead) = &mut self.ahead {
             ahead.keep_pace(&self.clocks);

@@ -5,6 +5,7 @@
 //! children of vertices that are split.
 
 use super::budget::Allowance;
+use crate::refine::Phase;
 use crate::refine::kinetic::Kinetic;
 use crate::refine::kinetic::hands::is_shared;
 use crate::refine::kinetic::mesh::nodes::{SPLIT, STATUS, UNREAD};
@@ -12,7 +13,7 @@ use crate::refine::kinetic::mesh::tree::Fetch;
 use crate::refine::kinetic::time::certificate::batch::{BATCH, Batch, Words};
 use crate::refine::kinetic::time::certificate::{ACTIVE, Judge, clock_of, expiry_of};
 use crate::refine::kinetic::time::queue::{Entry, Place};
-use crate::refine::{Phase, Probe};
+use crate::refine::listener::Listener;
 #[cfg(feature = "files")]
 use rayon::prelude::*;
 use terrasoar_layout::grid::GridPoint;
@@ -27,7 +28,7 @@ const FETCH_AHEAD: [(Fetch, usize); 3] = [(Fetch::Node, 6), (Fetch::Near, 4), (F
 
 impl<S: RecordStore> Kinetic<S> {
     /// Tests what is due, as far as the budget allows.
-    pub(crate) fn test_due<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+    pub(crate) fn test_due(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut Listener<'_>) {
         let mut batch = std::mem::take(&mut self.list);
         while !self.due.is_empty() {
             let splits_wait = self.to_split.iter().any(|nodes| !nodes.is_empty());
@@ -46,7 +47,7 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Tests nodes and sorts out those that are to be split or merged. Fresh ones have their records read first; where a record is away
     /// the node waits for it.
-    fn test<P: Probe>(&mut self, nodes: &[u32], fresh: bool, judge: &Judge, probe: &mut P) {
+    fn test(&mut self, nodes: &[u32], fresh: bool, judge: &Judge, probe: &mut Listener<'_>) {
         let mut verdicts = std::mem::take(&mut self.verdicts);
         let mut batch = self.batch.take().unwrap_or_default();
         self.work.tests += nodes.len() as u64;
@@ -128,14 +129,14 @@ impl<S: RecordStore> Kinetic<S> {
 
     /// Enters a node's new word, and lists the node if it is to be split or merged.
     #[inline(always)]
-    fn take_verdict<P: Probe>(
+    fn take_verdict(
         &mut self,
         node: u32,
         fresh: bool,
         raw: RawOf<S>,
         word: u32,
         place: Place,
-        probe: &mut P,
+        probe: &mut Listener<'_>,
     ) {
         let record = self.nodes.get_mut(node);
         let old = record.word;
@@ -146,7 +147,7 @@ impl<S: RecordStore> Kinetic<S> {
         }
         if fresh {
             record.raw = raw;
-            if P::HEARS_READS {
+            if probe.hears_reads() {
                 probe.read(slot_of(self.records.grid().k(), self.point_of(node)));
             }
         } else if expiry_of(old) != 0 {
@@ -173,7 +174,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Tests the children that splits have made.
-    pub(crate) fn test_fresh<P: Probe>(&mut self, judge: &Judge, probe: &mut P) {
+    pub(crate) fn test_fresh(&mut self, judge: &Judge, probe: &mut Listener<'_>) {
         let mut fresh = std::mem::take(&mut self.fresh);
         self.test(&fresh, true, judge, probe);
         fresh.clear();
@@ -181,7 +182,7 @@ impl<S: RecordStore> Kinetic<S> {
     }
 
     /// Splits and merges what is to be, until no child made on the way is left untested.
-    pub(crate) fn apply<P: Probe>(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut P) {
+    pub(crate) fn apply(&mut self, judge: &Judge, allowance: &mut Allowance, probe: &mut Listener<'_>) {
         let mut list = std::mem::take(&mut self.list);
         // From fine to coarse, so that children have merged before their parents.
         list.extend(self.to_merge.iter_mut().flat_map(|nodes| nodes.drain(..)));
