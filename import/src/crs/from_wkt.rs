@@ -324,9 +324,25 @@ fn completed(proj: String, node: &Node) -> String {
     }
 }
 
+/// Prime meridians in degrees: Ferro, Lisbon, Paris (RGS), Rome, Bern, Athens, Stockholm, Oslo, Brussels, Madrid, Bogota, Jakarta. GDAL and ESRI write them so whatever the unit beside; Paris itself is known to the parser.
+const IN_DEGREES: [f64; 12] = [
+    -17.666_666_666_7,
+    -9.131_906_111_1,
+    2.337_208_333_3,
+    12.452_333_333_3,
+    7.439_583_333_3,
+    23.716_337_5,
+    18.058_277_777_8,
+    10.722_916_666_7,
+    4.367_975,
+    -3.687_938_888_9,
+    -74.080_916_666_7,
+    106.807_719_444_4,
+];
+
 /// The node as text again, for a parser that wants one system and nothing around it.
 fn written(node: &Node) -> String {
-    let values: Vec<String> = node
+    let mut values: Vec<String> = node
         .values
         .iter()
         .map(|value| match value {
@@ -336,6 +352,13 @@ fn written(node: &Node) -> String {
             wkt::Value::Node(node) => written(node),
         })
         .collect();
+    let is_in_degrees = |degrees: f64| IN_DEGREES.iter().any(|known| (known - degrees).abs() < 1e-8);
+    if node.key.starts_with("PRIMEM")
+        && node.number(1).is_some_and(is_in_degrees)
+        && node.child(&UNITS).is_none()
+    {
+        values.push("ANGLEUNIT[\"degree\",0.0174532925199433]".to_owned());
+    }
     format!("{}[{}]", node.key, values.join(","))
 }
 

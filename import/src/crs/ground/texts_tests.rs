@@ -105,3 +105,23 @@ fn the_middle_of_a_map_is_never_passed_over() {
     };
     lies(&text("Equidistant Conic"), [501_000.0, 200_000.0], [-90.053_291_680_310_4, 40.654_434_816_445_1]);
 }
+
+/// GDAL and ESRI write known meridians in degrees, though all else may be in grads.
+#[test]
+fn known_meridians_are_in_degrees() {
+    let meridian = |pm: &str| {
+        let text = format!(
+            "GEOGCS[\"a\",DATUM[\"b\",SPHEROID[\"s\",6376523,308.64]],PRIMEM[{pm}],UNIT[\"grad\",0.0157079632679489]]"
+        );
+        let system = by_text(&text).unwrap();
+        system.proj.as_deref().and_then(|proj| from_proj::word(proj, "pm")?.parse::<f64>().ok()).unwrap()
+    };
+    for (pm, degrees) in [
+        ("\"Paris RGS\",2.33720833333333", 2.337_208_333),
+        ("\"Paris_RGS\",2.596898", 2.337_208_2),
+        ("\"Ferro\",-17.6666666666667", -17.666_666_667),
+        ("\"Foo\",2.5", 2.25),
+    ] {
+        assert!((meridian(pm) - degrees).abs() < 1e-8, "{pm}: {}", meridian(pm));
+    }
+}
