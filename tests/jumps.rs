@@ -226,14 +226,10 @@ fn jumps_over_a_pool_that_lacks_pages() {
             let mut streamed = Streamed::new(pool, disk, culling, Prefetch::Deadline);
             let mut mirror = Mirror::default();
             for view in &views {
-                for i in 0..12 {
+                for _ in 0..12 {
                     streamed.update(view, &mut Unobserved);
                     let engine = streamed.engine();
                     mirror.apply(engine.patch());
-                    // What a patch has left out shows in the frames after it as well.
-                    if i % 3 != 0 {
-                        continue;
-                    }
                     let mut whole = Mirror::default();
                     whole.apply(&engine.whole_patch());
                     assert!(mirror.triangles() == whole.triangles());
