@@ -285,11 +285,12 @@ fn middled(proj: String, node: &Node) -> Option<String> {
     };
     let is_centred =
         ["lon_0", "lonc", "lon_1", "lon_2", "zone"].iter().any(|word| from_proj::word(&proj, word).is_some());
-    if is_centred || value(MIDDLES[0].1).is_none_or(|lon| lon == 0.0) {
+    if is_centred {
         return Some(proj);
     }
+    // Without a word the middle is Greenwich.
     if from_proj::word(&proj, "proj") != Some("eqdc") {
-        return None;
+        return value(MIDDLES[0].1).is_none_or(|lon| lon == 0.0).then_some(proj);
     }
     let words = MIDDLES.iter().filter_map(|(word, names)| Some(format!(" +{word}={}", value(names)?)));
     Some(words.fold(proj, |proj, word| proj + &word))
@@ -335,7 +336,7 @@ const IN_DEGREES: [f64; 12] = [
     18.058_277_777_8,
     10.722_916_666_7,
     4.367_975,
-    -3.687_938_888_9,
+    -3.687_375,
     -74.080_916_666_7,
     106.807_719_444_4,
 ];

@@ -104,6 +104,8 @@ fn the_middle_of_a_map_is_never_passed_over() {
         )
     };
     lies(&text("Equidistant Conic"), [501_000.0, 200_000.0], [-90.053_291_680_310_4, 40.654_434_816_445_1]);
+    let at_greenwich = text("Equidistant Conic").replace("-96", "0");
+    lies(&at_greenwich, [501_000.0, 200_000.0], [5.946_708_319_689_6, 40.654_434_816_445_1]);
 }
 
 /// GDAL and ESRI write known meridians in degrees, though all else may be in grads.
@@ -120,6 +122,7 @@ fn known_meridians_are_in_degrees() {
         ("\"Paris RGS\",2.33720833333333", 2.337_208_333),
         ("\"Paris_RGS\",2.596898", 2.337_208_2),
         ("\"Ferro\",-17.6666666666667", -17.666_666_667),
+        ("\"Madrid\",-3.687375", -3.687_375),
         ("\"Foo\",2.5", 2.25),
     ] {
         assert!((meridian(pm) - degrees).abs() < 1e-8, "{pm}: {}", meridian(pm));
