@@ -9,6 +9,7 @@ use crate::stream::{HeightAt, height_at};
 use crate::view::View;
 use terrasoar_layout::LayoutError;
 use terrasoar_layout::grid::record::RecordCodec;
+use terrasoar_layout::read::edited::EditedRecords;
 use terrasoar_layout::read::store::CompleteStore;
 use terrasoar_layout::read::terrain::Terrain;
 use terrasoar_layout::with_records;
@@ -33,25 +34,28 @@ pub(super) fn mapped(
     culling: Culling,
     cache_bytes: Option<u64>,
 ) -> Result<Box<dyn MeshEngine + '_>, LayoutError> {
-    Ok(match terrain.cache_bytes(cache_bytes) {
-        None => with_records!(terrain.records()?, records => over(records, engine, culling)),
-        Some(bytes) => with_records!(terrain.paged(bytes), records => over(records, engine, culling)),
+    Ok(match (engine, terrain.cache_bytes(cache_bytes)) {
+        (PictureEngine::Kinetic, None) => {
+            with_records!(terrain.records()?, records => flown(records, culling))
+        }
+        // None of them will be edited. But replays fly over records that may be, and so that engine is there already.
+        (PictureEngine::Kinetic, Some(bytes)) => {
+            with_records!(terrain.paged(bytes), records => flown(EditedRecords::new(records), culling))
+        }
+        (PictureEngine::Soar, None) => with_records!(terrain.records()?, records => whole(records, culling)),
+        (PictureEngine::Soar, Some(bytes)) => {
+            with_records!(terrain.paged(bytes), records => whole(records, culling))
+        }
     })
 }
 
-fn over<'t, S: CompleteStore + Clone + 't>(
-    records: S,
-    engine: PictureEngine,
-    culling: Culling,
-) -> Box<dyn MeshEngine + 't> {
-    match engine {
-        PictureEngine::Kinetic => Box::new(Mapped {
-            engine: Kinetic::new(records.clone(), culling),
-            reads: Reads::over(&records),
-            records,
-        }),
-        PictureEngine::Soar => Box::new(FullMesh::new(records, culling)),
-    }
+fn flown<'t, S: CompleteStore + Clone + 't>(records: S, culling: Culling) -> Box<dyn MeshEngine + 't> {
+    let (engine, reads) = (Kinetic::new(records.clone(), culling), Reads::over(&records));
+    Box::new(Mapped { engine, records, reads })
+}
+
+fn whole<'t, S: CompleteStore + Clone + 't>(records: S, culling: Culling) -> Box<dyn MeshEngine + 't> {
+    Box::new(FullMesh::new(records, culling))
 }
 
 struct Mapped<S: CompleteStore> {

@@ -8,6 +8,7 @@
 //! Cost: 2T - 1 nodes for T triangles, a record read and a test each. Allocates nothing once the strip has grown.
 
 use super::change::GroundChange;
+use super::listener::Listener;
 use super::strip::{Strip, StripBuilder};
 use super::{Culling, Engine, Probe};
 use crate::mesh::{Triangle, for_each_in_strip};
@@ -62,16 +63,20 @@ impl<S: CompleteStore> Soar<S> {
 
     /// Refines for a view whose errors are measured along the line of sight, or not.
     #[inline(always)]
-    fn refine<P: Probe, const SIGHT: bool>(&mut self, view: &View, probe: &mut P) -> u64 {
+    fn refine<const HEARD: bool, const SIGHT: bool>(&mut self, view: &View, probe: Listener<'_>) -> u64 {
         // Next to voids what is drawn depends on records of vertices that do not show.
         if self.records.has_bounds() && !self.records.shape().has_voids {
-            self.refine_with::<P, Parent, SIGHT>(view, probe)
+            self.refine_with::<HEARD, Parent, SIGHT>(view, probe)
         } else {
-            self.refine_with::<P, (), SIGHT>(view, probe)
+            self.refine_with::<HEARD, (), SIGHT>(view, probe)
         }
     }
 
-    fn refine_with<P: Probe, F: Foresight, const SIGHT: bool>(&mut self, view: &View, probe: &mut P) -> u64 {
+    fn refine_with<const HEARD: bool, F: Foresight, const SIGHT: bool>(
+        &mut self,
+        view: &View,
+        mut probe: Listener<'_>,
+    ) -> u64 {
         let grid = *self.records.grid();
         let c = corners(grid.k());
         let read = |slot: u64, level: u32, at: GridPoint| {
@@ -84,7 +89,7 @@ impl<S: CompleteStore> Soar<S> {
         (0..=CENTRE_SLOT).for_each(|slot| probe.read(slot));
         let first = StripVertex { x: sw.at.x(), y: sw.at.y(), height_m: sw.height_m };
         let plain = Metric::new(view);
-        let mut walk = Walk {
+        let mut walk = Walk::<'_, '_, S, HEARD, SIGHT> {
             records: &self.records,
             metric: PairMetric::<SIGHT>::new(&plain, &grid),
             plain,
@@ -95,7 +100,7 @@ impl<S: CompleteStore> Soar<S> {
         for ((slot, [b, d]), next) in ROOTS.into_iter().zip([Some(se), Some(ne), Some(nw), None]) {
             let base = [c[b], c[d]];
             let (split, vertex) = read(slot, height - 1, base[0].midpoint(base[1]));
-            walk.probe.read(slot);
+            walk.hear(slot);
             walk.tests += 1;
             let pair = walk.metric.sight([split.at; 2], &[vertex; 2]);
             match self.culling {
@@ -185,17 +190,26 @@ impl Foresight for Parent {
 }
 
 /// One frame's walk.
-struct Walk<'w, S: RecordStore, P, const SIGHT: bool> {
+struct Walk<'w, 'p, S: RecordStore, const HEARD: bool, const SIGHT: bool> {
     records: &'w S,
     metric: PairMetric<SIGHT>,
     /// The same, a vertex at a time.
     plain: Metric,
     strip: StripBuilder<StripVertex>,
     tests: u64,
-    probe: &'w mut P,
+    /// Told of reads if it is `HEARD`.
+    probe: Listener<'p>,
 }
 
-impl<S: RecordStore, P: Probe, const SIGHT: bool> Walk<'_, S, P, SIGHT> {
+impl<S: RecordStore, const HEARD: bool, const SIGHT: bool> Walk<'_, '_, S, HEARD, SIGHT> {
+    /// The record at a slot was read.
+    #[inline(always)]
+    fn hear(&mut self, slot: u64) {
+        if HEARD {
+            self.probe.read(slot);
+        }
+    }
+
     /// Visits the two children of the triangle (apex; b, d), which is split at `here`; `height` is the level of `here` and one.
     ///
     /// The split vertices of both children are read and tested before either is visited: they lie side by side in the file, so two reads are under
@@ -222,7 +236,7 @@ impl<S: RecordStore, P: Probe, const SIGHT: bool> Walk<'_, S, P, SIGHT> {
         let raws = if F::FORESEES {
             [0, 1].map(|i| self.read_foreseen(slots[i], points[i], foresight, planes))
         } else {
-            slots.into_iter().for_each(|slot| self.probe.read(slot));
+            slots.into_iter().for_each(|slot| self.hear(slot));
             self.records.pair(slots)
         };
         let vertices = raws.map(|raw| self.records.decode(raw, level));
@@ -237,9 +251,9 @@ impl<S: RecordStore, P: Probe, const SIGHT: bool> Walk<'_, S, P, SIGHT> {
     /// The record at a slot; an inert one, which no test selects, if it is certain that its vertex does not show.
     #[inline(always)]
     fn read_foreseen<F: Foresight>(&mut self, slot: u64, at: GridPoint, parent: F, planes: u8) -> RawOf<S> {
-        let at_hand = if P::HEARS_FORESEEN { None } else { self.records.at_hand(slot) };
+        let at_hand = if HEARD && self.probe.hears_foreseen() { None } else { self.records.at_hand(slot) };
         if let Some(raw) = at_hand {
-            self.probe.read(slot);
+            self.hear(slot);
             return raw;
         }
         self.foresee(slot, at, parent, planes)
@@ -248,10 +262,12 @@ impl<S: RecordStore, P: Probe, const SIGHT: bool> Walk<'_, S, P, SIGHT> {
     #[inline(never)]
     fn foresee<F: Foresight>(&mut self, slot: u64, at: GridPoint, parent: F, planes: u8) -> RawOf<S> {
         if parent.is_read(self.records, &self.plain, slot, at, planes) {
-            self.probe.read(slot);
+            self.hear(slot);
             return self.records.get(slot).unwrap_or(S::Codec::INERT);
         }
-        self.probe.foreseen(slot);
+        if HEARD {
+            self.probe.foreseen(slot);
+        }
         S::Codec::INERT
     }
 
@@ -300,9 +316,13 @@ impl<S: CompleteStore> Engine for Soar<S> {
     fn ground_changed(&mut self, _: &GroundChange<'_>) {}
 
     fn update<P: Probe>(&mut self, view: &View, probe: &mut P) -> u64 {
-        match view.metric {
-            ErrorMetric::Ball => self.refine::<P, false>(view, probe),
-            ErrorMetric::Sight => self.refine::<P, true>(view, probe),
+        let is_heard = P::HEARS_READS || P::HEARS_FORESEEN;
+        let probe = Listener::new(probe);
+        match (is_heard, view.metric) {
+            (false, ErrorMetric::Ball) => self.refine::<false, false>(view, probe),
+            (false, ErrorMetric::Sight) => self.refine::<false, true>(view, probe),
+            (true, ErrorMetric::Ball) => self.refine::<true, false>(view, probe),
+            (true, ErrorMetric::Sight) => self.refine::<true, true>(view, probe),
         }
     }
 

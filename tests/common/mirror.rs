@@ -35,9 +35,9 @@ impl Mirror {
             .map(|t| t.map(|v| self.vertices[v as usize].expect("a vertex that was sent")))
     }
 
-    /// The drawn triangles' folded corners, rotated to begin with the least, in order.
-    pub fn triangles(&self) -> Vec<[u64; 3]> {
-        sorted(self.drawn().map(|t| t.map(|v| GridPoint::new(v.x, v.y).packed())))
+    /// The drawn triangles' folded corners, rotated to begin with the least, as one number each, in order.
+    pub fn triangles(&self) -> Vec<u128> {
+        sorted(self.drawn().map(|t| t.map(|v| GridPoint::new(v.x, v.y))))
     }
 
     /// What is drawn has the same vertices, all their numbers included.
@@ -71,38 +71,56 @@ impl Mirror {
     }
 }
 
-fn sorted(triangles: impl Iterator<Item = [u64; 3]>) -> Vec<[u64; 3]> {
-    let mut all: Vec<[u64; 3]> = triangles
-        .map(|mut t| {
-            let least = (0..3).min_by_key(|i| t[*i]).unwrap_or(0);
-            t.rotate_left(least);
-            t
+fn sorted(triangles: impl Iterator<Item = [GridPoint; 3]>) -> Vec<u128> {
+    // Numbers are sorted in half the time of rows.
+    let number = |p: GridPoint| {
+        assert!(p.x() < 1 << 21 && p.y() < 1 << 21, "{p:?} does not fit a third of a number");
+        u128::from(p.y()) << 21 | u128::from(p.x())
+    };
+    let mut all: Vec<u128> = triangles
+        .map(|t| {
+            let [a, b, c] = t.map(number);
+            let [a, b, c] = if a <= b && a <= c {
+                [a, b, c]
+            } else if b <= c {
+                [b, c, a]
+            } else {
+                [c, a, b]
+            };
+            a << 84 | b << 42 | c
         })
         .collect();
     all.sort_unstable();
     all
 }
 
+/// The corners of a triangle of [`Mirror::triangles`].
+pub fn corners(triangle: u128) -> [GridPoint; 3] {
+    let coordinate = |low: u32| (triangle >> low) as u32 & 0x1f_ffff;
+    [84, 42, 0].map(|low| GridPoint::new(coordinate(low), coordinate(low + 21)))
+}
+
 /// What of a full mesh is drawn, in the form of [`Mirror::triangles`].
-pub fn drawn(records: &impl RecordStore, triangles: &[Triangle]) -> Vec<[u64; 3]> {
+pub fn drawn(records: &impl RecordStore, triangles: &[Triangle]) -> Vec<u128> {
     let grid = records.grid();
-    sorted(triangles.iter().filter(|t| is_drawn(records, **t)).map(|t| t.map(|p| grid.fold(p).packed())))
+    sorted(triangles.iter().filter(|t| is_drawn(records, **t)).map(|t| t.map(|p| grid.fold(p))))
 }
 
 /// Clusters lie around their triangles, and each triangle of the mesh is in one of them.
 pub fn check_clusters<S: RecordStore>(engine: &Kinetic<S>, whole: &Patch, expected: &[TriangleKey]) {
     let mut found = 0;
+    assert!(whole.triangles.is_sorted_by_key(|(slot, _)| *slot));
+    let first_from = |from: u32| whole.triangles.partition_point(|(slot, _)| *slot < from);
     for (bounds, range) in engine.clusters() {
-        for (slot, corners) in &whole.triangles {
-            if range.contains(slot) {
-                found += 1;
-                for corner in corners.iter().filter(|_| corners[0] != corners[1]) {
-                    let at =
-                        whole.vertices.binary_search_by_key(corner, |(slot, _)| *slot).expect("in the patch");
-                    let v = whole.vertices[at].1;
-                    for (i, x) in [v.x as f32, v.y as f32, v.height_m].into_iter().enumerate() {
-                        assert!((bounds.least[i]..=bounds.largest[i]).contains(&x), "{v:?} {bounds:?}");
-                    }
+        let triangles = &whole.triangles[first_from(range.start)..first_from(range.end)];
+        found += triangles.len();
+        for (_, corners) in triangles.iter().filter(|(_, corners)| corners[0] != corners[1]) {
+            for corner in corners {
+                let at =
+                    whole.vertices.binary_search_by_key(corner, |(slot, _)| *slot).expect("in the patch");
+                let v = whole.vertices[at].1;
+                for (i, x) in [v.x as f32, v.y as f32, v.height_m].into_iter().enumerate() {
+                    assert!((bounds.least[i]..=bounds.largest[i]).contains(&x), "{v:?} {bounds:?}");
                 }
             }
         }

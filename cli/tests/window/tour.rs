@@ -129,11 +129,12 @@ pub fn window_within_the_screen(display: &Display) -> Outcome {
 /// Elevation data is built and shown, a flight is taken, and what is neither is told.
 pub fn dropped_files(display: &Display) -> Outcome {
     let folder = display.folder.path();
-    let input = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/puget_sound_1025.png");
-    std::fs::copy(input, folder.join("dropped.png")).map_err(|e| e.to_string())?;
+    // It says how far apart its samples are: on ground taken to be steeper than it is a processor draws for half a minute.
+    let input = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/crater_lake_1025.bt");
+    std::fs::copy(input, folder.join("dropped.bt")).map_err(|e| e.to_string())?;
     std::fs::write(folder.join("bad.flight"), "no flight").map_err(|e| e.to_string())?;
     std::fs::write(folder.join("bad.iqt"), "no terrain").map_err(|e| e.to_string())?;
-    let dropped = ["--drop", "bad.flight", "--drop", "bad.iqt", "--drop", "dropped.png"];
+    let dropped = ["--drop", "bad.flight", "--drop", "bad.iqt", "--drop", "dropped.bt"];
     let mut window = display.open(&dropped)?;
     for file in ["bad.flight", "bad.iqt"] {
         let words = window.hear("trouble ")?;

@@ -6,6 +6,7 @@
 use super::bits::BitReader;
 use super::model::{DecodeTable, DecodeTables, ERRORS};
 use super::token::{BASES, TOKENS};
+use super::wide::{Width, Work};
 
 /// What a state is before the first and after the last symbol.
 pub(super) const START: u32 = 1 << 16;
@@ -16,7 +17,7 @@ pub(super) const SPAN: usize = 64;
 /// Values that are decoded at a time; all numbers of lanes divide it.
 pub(super) const ROW: usize = 1024;
 
-/// Either way through the values of a tile: walking over it is the same for both.
+/// Either way through the values of a tile: walking over it is the same for both, and compiled once for them.
 pub(crate) trait Coder {
     /// One value after the other, each in its context, counted from `first`. The place of a value decides whose turn it is.
     fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]);
@@ -28,6 +29,24 @@ pub(crate) trait Coder {
     fn raw(&mut self, bits: u32, value: &mut u16);
 }
 
+/// The coders of a tile's segments, in order.
+pub(crate) trait Segments {
+    fn count(&self) -> usize;
+
+    /// `None` if there are not so many.
+    fn segment(&mut self, number: usize) -> Option<&mut dyn Coder>;
+}
+
+impl<C: Coder> Segments for &mut [C] {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn segment(&mut self, number: usize) -> Option<&mut dyn Coder> {
+        self.get_mut(number).map(|coder| -> &mut dyn Coder { coder })
+    }
+}
+
 /// Bits of a value that is stored as it is.
 pub(super) fn plain_bits(context: u16) -> u32 {
     if context < ERRORS { 16 } else { 8 }
@@ -36,6 +55,7 @@ pub(super) fn plain_bits(context: u16) -> u32 {
 /// A segment's values.
 #[derive(Debug)]
 pub(crate) struct Decoder<'b> {
+    width: Width,
     tables: &'b DecodeTables,
     states: [u32; MOST_LANES],
     /// 0 where values are stored as they are.
@@ -48,7 +68,7 @@ pub(crate) struct Decoder<'b> {
 
 impl<'b> Decoder<'b> {
     /// `None` if the bytes do not begin as a segment does.
-    pub(crate) fn new(tables: &'b DecodeTables, bytes: &'b [u8]) -> Option<Self> {
+    pub(crate) fn new(width: Width, tables: &'b DecodeTables, bytes: &'b [u8]) -> Option<Self> {
         let (lanes, rest) = bytes.split_first()?;
         let lanes = usize::from(*lanes);
         let mut states = [START; MOST_LANES];
@@ -66,7 +86,7 @@ impl<'b> Decoder<'b> {
             (words, bits) = (of_words.as_chunks().0, rest);
         }
         let bits = BitReader::new(bits);
-        Some(Self { tables, states, lanes, words, at: 0, bits })
+        Some(Self { width, tables, states, lanes, words, at: 0, bits })
     }
 
     /// Whether all of the segment was used, and led back to where encoding began.
@@ -140,29 +160,15 @@ impl<'b> Decoder<'b> {
 }
 
 impl Coder for Decoder<'_> {
-    #[inline(always)]
     fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
         if self.lanes == 0 {
             let bits = plain_bits(first);
             values.iter_mut().for_each(|value| *value = self.bits.take(bits) as u16);
             return;
         }
-        for (contexts, values) in contexts.chunks(ROW).zip(values.chunks_mut(ROW)) {
-            let mut tokens = [0; ROW];
-            let tokens = &mut tokens[..contexts.len()];
-            match self.lanes {
-                1 => self.tokens::<1>(first, contexts, tokens),
-                2 => self.tokens::<2>(first, contexts, tokens),
-                4 => self.tokens::<4>(first, contexts, tokens),
-                8 => self.tokens::<8>(first, contexts, tokens),
-                16 => self.tokens::<16>(first, contexts, tokens),
-                _ => self.tokens::<MOST_LANES>(first, contexts, tokens),
-            }
-            self.expand(tokens, values);
-        }
+        self.width.run(Rows { decoder: self, first, contexts, values });
     }
 
-    #[inline(always)]
     fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
         if self.lanes == 0 {
             *value = self.bits.take(plain_bits(context)) as u16;
@@ -181,8 +187,37 @@ impl Coder for Decoder<'_> {
         *value = base.wrapping_add(self.bits.take(bits.into()) as u16);
     }
 
-    #[inline(always)]
     fn raw(&mut self, bits: u32, value: &mut u16) {
         *value = self.bits.take(bits) as u16;
+    }
+}
+
+/// Decodes values of a segment that has tables.
+struct Rows<'d, 'b> {
+    decoder: &'d mut Decoder<'b>,
+    first: u16,
+    contexts: &'d [u8],
+    values: &'d mut [u16],
+}
+
+impl Work for Rows<'_, '_> {
+    type Made = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Rows { decoder, first, contexts, values } = self;
+        for (contexts, values) in contexts.chunks(ROW).zip(values.chunks_mut(ROW)) {
+            let mut tokens = [0; ROW];
+            let tokens = &mut tokens[..contexts.len()];
+            match decoder.lanes {
+                1 => decoder.tokens::<1>(first, contexts, tokens),
+                2 => decoder.tokens::<2>(first, contexts, tokens),
+                4 => decoder.tokens::<4>(first, contexts, tokens),
+                8 => decoder.tokens::<8>(first, contexts, tokens),
+                16 => decoder.tokens::<16>(first, contexts, tokens),
+                _ => decoder.tokens::<MOST_LANES>(first, contexts, tokens),
+            }
+            decoder.expand(tokens, values);
+        }
     }
 }

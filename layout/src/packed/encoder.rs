@@ -16,8 +16,9 @@ const BARE: u16 = 16;
 const TOGETHER: usize = 16;
 
 /// What a walk asked of a segment.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Encoder {
+    width: Width,
     asked: Vec<Asked>,
     /// Of rows, one after the other.
     contexts: Vec<u8>,
@@ -35,35 +36,8 @@ enum Asked {
 }
 
 impl Coder for Encoder {
-    #[inline(always)]
     fn values(&mut self, first: u16, contexts: &[u8], values: &mut [u16]) {
-        self.asked.push(Asked::Row { first, count: values.len() as u32 });
-        self.contexts.extend_from_slice(&contexts[..values.len()]);
-        self.values.extend_from_slice(values);
-        self.tokens.extend(values.iter().map(|value| *value as u8));
-        let from = self.tokens.len() - values.len();
-        // Most rows of flat ground have nothing but bare tokens.
-        let (tokens, last_tokens) = self.tokens[from..].as_chunks_mut::<TOGETHER>();
-        let (values, last_values) = values.as_chunks::<TOGETHER>();
-        let beside = |token: u8, value: u16| {
-            let (base, bits) = BASES[usize::from(token) % TOKENS];
-            (value.wrapping_sub(base), bits)
-        };
-        for (tokens, values) in tokens.iter_mut().zip(values) {
-            if values.iter().fold(0, |all, value| all | value) < BARE {
-                continue;
-            }
-            *tokens = values.map(token_of);
-            let mut some = [(0, 0); TOGETHER];
-            for i in 0..TOGETHER {
-                some[i] = beside(tokens[i], values[i]);
-            }
-            self.bits.put_some(some);
-        }
-        for (token, value) in last_tokens.iter_mut().zip(last_values) {
-            *token = token_of(*value);
-            self.bits.put_some([beside(*token, *value)]);
-        }
+        self.width.run(Note { encoder: self, first, contexts, values });
     }
 
     fn value(&mut self, context: u16, turn: usize, value: &mut u16) {
@@ -80,7 +54,56 @@ impl Coder for Encoder {
     }
 }
 
+/// Keeps a row.
+struct Note<'e> {
+    encoder: &'e mut Encoder,
+    first: u16,
+    contexts: &'e [u8],
+    values: &'e [u16],
+}
+
+impl Work for Note<'_> {
+    type Made = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Note { encoder, first, contexts, values } = self;
+        encoder.asked.push(Asked::Row { first, count: values.len() as u32 });
+        encoder.contexts.extend_from_slice(&contexts[..values.len()]);
+        encoder.values.extend_from_slice(values);
+        encoder.tokens.extend(values.iter().map(|value| *value as u8));
+        let from = encoder.tokens.len() - values.len();
+        // Most rows of flat ground have nothing but bare tokens.
+        let (tokens, last_tokens) = encoder.tokens[from..].as_chunks_mut::<TOGETHER>();
+        let (values, last_values) = values.as_chunks::<TOGETHER>();
+        let beside = |token: u8, value: u16| {
+            let (base, bits) = BASES[usize::from(token) % TOKENS];
+            (value.wrapping_sub(base), bits)
+        };
+        for (tokens, values) in tokens.iter_mut().zip(values) {
+            if values.iter().fold(0, |all, value| all | value) < BARE {
+                continue;
+            }
+            *tokens = values.map(token_of);
+            let mut some = [(0, 0); TOGETHER];
+            for i in 0..TOGETHER {
+                some[i] = beside(tokens[i], values[i]);
+            }
+            encoder.bits.put_some(some);
+        }
+        for (token, value) in last_tokens.iter_mut().zip(last_values) {
+            *token = token_of(*value);
+            encoder.bits.put_some([beside(*token, *value)]);
+        }
+    }
+}
+
 impl Encoder {
+    pub(crate) fn new(width: Width) -> Self {
+        let (asked, bits) = (Vec::new(), BitWriter::default());
+        Self { width, asked, contexts: Vec::new(), values: Vec::new(), tokens: Vec::new(), singles: 0, bits }
+    }
+
     /// Forgets what was asked, and keeps the room for more.
     pub(crate) fn clear(&mut self) {
         self.asked.clear();
@@ -113,7 +136,6 @@ impl Encoder {
     /// Appends the segment to `bytes`, by way of `words`, which keeps its room. `None` if the tables lack one of its tokens: then nothing is appended.
     pub(crate) fn finish(
         &self,
-        width: Width,
         tables: &EncodeTables,
         words: &mut Vec<[u8; 2]>,
         bytes: &mut Vec<u8>,
@@ -124,7 +146,7 @@ impl Encoder {
             3_000..11_000 => 16,
             _ => MOST_LANES,
         };
-        let (states, words) = width.run(Finish { encoder: self, tables, lanes, words })?;
+        let (states, words) = self.width.run(Finish { encoder: self, tables, lanes, words })?;
         let count = u16::try_from(words.len()).ok()?;
         let words = words.as_flattened();
         bytes.push(lanes as u8);
@@ -136,9 +158,38 @@ impl Encoder {
     }
 
     /// Whether a segment gives all that was asked, and nothing else.
-    pub(crate) fn is_given_by(&self, width: Width, tables: &DecodeTables, segment: &[u8]) -> bool {
-        let decoder = Decoder::new(tables, segment);
-        decoder.is_some_and(|decoder| width.run(Ask { encoder: self, decoder }))
+    pub(crate) fn is_given_by(&self, tables: &DecodeTables, segment: &[u8]) -> bool {
+        Decoder::new(self.width, tables, segment).is_some_and(|decoder| self.is_what_gives(decoder))
+    }
+
+    fn is_what_gives(&self, mut decoder: Decoder<'_>) -> bool {
+        let (mut is_same, mut from) = (true, 0);
+        let mut found = [0; ROW];
+        for asked in &self.asked {
+            match *asked {
+                Asked::Row { first, count } => {
+                    let row = from..from + count as usize;
+                    from = row.end;
+                    let rows = self.contexts[row.clone()].chunks(ROW).zip(self.values[row].chunks(ROW));
+                    for (contexts, values) in rows {
+                        let found = &mut found[..values.len()];
+                        decoder.values(first, contexts, found);
+                        is_same &= found == values;
+                    }
+                }
+                Asked::Single { context, turn, value } => {
+                    let mut found = 0;
+                    decoder.value(context, turn.into(), &mut found);
+                    is_same &= found == value;
+                }
+                Asked::Raw { bits, value } => {
+                    let mut found = 0;
+                    decoder.raw(bits.into(), &mut found);
+                    is_same &= found == value;
+                }
+            }
+        }
+        is_same && decoder.finish()
     }
 }
 
@@ -234,48 +285,6 @@ impl States<'_> {
                 self.take(lane, step(contexts[lane], tokens[lane]));
             }
         }
-    }
-}
-
-/// Asks a decoder what was asked.
-struct Ask<'e, 'b> {
-    encoder: &'e Encoder,
-    decoder: Decoder<'b>,
-}
-
-impl Work for Ask<'_, '_> {
-    type Made = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        let Ask { encoder, mut decoder } = self;
-        let (mut is_same, mut from) = (true, 0);
-        let mut found = [0; ROW];
-        for asked in &encoder.asked {
-            match *asked {
-                Asked::Row { first, count } => {
-                    let row = from..from + count as usize;
-                    from = row.end;
-                    let rows = encoder.contexts[row.clone()].chunks(ROW).zip(encoder.values[row].chunks(ROW));
-                    for (contexts, values) in rows {
-                        let found = &mut found[..values.len()];
-                        decoder.values(first, contexts, found);
-                        is_same &= found == values;
-                    }
-                }
-                Asked::Single { context, turn, value } => {
-                    let mut found = 0;
-                    decoder.value(context, turn.into(), &mut found);
-                    is_same &= found == value;
-                }
-                Asked::Raw { bits, value } => {
-                    let mut found = 0;
-                    decoder.raw(bits.into(), &mut found);
-                    is_same &= found == value;
-                }
-            }
-        }
-        is_same && decoder.finish()
     }
 }
 

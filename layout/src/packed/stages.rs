@@ -23,7 +23,7 @@ impl Way {
 
     /// Whether every processor has it.
     pub fn is_portable(self) -> bool {
-        self.0 == Width::Portable
+        self.0 == Width::PORTABLE
     }
 
     /// A name for it.
@@ -118,7 +118,7 @@ impl Stages {
                 "its records are exact; the stages are those of compact ones".into(),
             ));
         };
-        let mut scratch = Scratch::default();
+        let (width, mut scratch) = (source.width(), Scratch::default());
         let mut tiles = Vec::new();
         for (id, shape, place) in source.all_tiles()? {
             let mut bytes = vec![0; place.bytes(SEGMENTS)];
@@ -127,11 +127,11 @@ impl Stages {
             let mut segments = Vec::new();
             for length in place.lengths {
                 let (segment, after) = rest.split_at(length.into());
-                let Some(decoder) = Decoder::new(source.tables(), segment) else { break };
+                let Some(decoder) = Decoder::new(width, source.tables(), segment) else { break };
                 segments.push(Noting { decoder, noted: Recorded::default() });
                 rest = after;
             }
-            walk(&shape, rules, &mut scratch, &mut segments, None);
+            walk(width, &shape, rules, &mut scratch, &mut &mut segments[..], None);
             let mut noted: Vec<Recorded> = segments.into_iter().map(|segment| segment.noted).collect();
             noted.resize(SEGMENTS, Recorded::default());
             let segments: [Recorded; SEGMENTS] = noted.try_into().unwrap_or_default();
@@ -153,12 +153,12 @@ impl Stages {
 
     /// All values, without what is made of them.
     pub fn values(&mut self) {
-        let mut found = vec![0; 1 << 13];
+        let (width, mut found) = (self.source.width(), vec![0; 1 << 13]);
         for tile in &self.tiles {
             let mut rest = &tile.bytes[..];
             for (length, noted) in tile.place.lengths.iter().zip(&tile.segments) {
                 let (segment, after) = rest.split_at(usize::from(*length));
-                let Some(mut decoder) = Decoder::new(self.source.tables(), segment) else { break };
+                let Some(mut decoder) = Decoder::new(width, self.source.tables(), segment) else { break };
                 for (first, contexts, values) in &noted.rows {
                     decoder.values(*first, contexts, &mut found[..values.len()]);
                 }
@@ -170,10 +170,10 @@ impl Stages {
 
     /// All that is made of values: predictions, contexts, codes, records in the order of tiles.
     pub fn making(&mut self) {
-        let Some(rules) = self.source.rules() else { return };
+        let (Some(rules), width) = (self.source.rules(), self.source.width()) else { return };
         for tile in &self.tiles {
             let mut segments = tile.segments.each_ref().map(|noted| Giving { noted, row: 0, single: 0 });
-            black_box(walk(&tile.shape, rules, &mut self.scratch, &mut segments, None));
+            black_box(walk(width, &tile.shape, rules, &mut self.scratch, &mut &mut segments[..], None));
         }
     }
 

@@ -52,21 +52,17 @@ fn records(shape: &TileShape, seed: u64, wildness: u64) -> TileRecords {
 }
 
 fn encoded(width: Width, shape: &TileShape, rules: &Rules, truth: &TileRecords) -> [Encoder; SEGMENTS] {
-    let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-    let made = width.walk(shape, rules, &mut Scratch::default(), &mut encoders, Some(truth));
+    let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::new(width));
+    let made = walk(width, shape, rules, &mut Scratch::default(), &mut &mut encoders[..], Some(truth));
     assert!(made.gives_same(truth, shape), "what is written is not what was made of it");
     encoders
 }
 
 /// The bytes of each segment.
-pub(super) fn finished(
-    width: Width,
-    tables: &EncodeTables,
-    encoders: &[Encoder; SEGMENTS],
-) -> [Vec<u8>; SEGMENTS] {
+pub(super) fn finished(tables: &EncodeTables, encoders: &[Encoder; SEGMENTS]) -> [Vec<u8>; SEGMENTS] {
     encoders.each_ref().map(|encoder| {
         let mut bytes = Vec::new();
-        encoder.finish(width, tables, &mut Vec::new(), &mut bytes).unwrap();
+        encoder.finish(tables, &mut Vec::new(), &mut bytes).unwrap();
         bytes
     })
 }
@@ -97,8 +93,9 @@ fn read(
     tables: &DecodeTables,
     segments: &[Vec<u8>],
 ) -> (TileRecords, bool) {
-    let mut decoders: Vec<_> = segments.iter().map(|bytes| Decoder::new(tables, bytes).unwrap()).collect();
-    let found = width.walk(shape, rules, &mut Scratch::default(), &mut decoders, None);
+    let mut decoders: Vec<_> =
+        segments.iter().map(|bytes| Decoder::new(width, tables, bytes).unwrap()).collect();
+    let found = walk(width, shape, rules, &mut Scratch::default(), &mut &mut decoders[..], None);
     (found, decoders.iter().all(Decoder::finish))
 }
 
@@ -133,25 +130,25 @@ proptest! {
     #[test]
     fn tiles_come_back(shape in shapes(), seed: u64, wildness in prop_oneof![Just(0u64), Just(9), Just(60_000)]) {
         let (rules, truth) = (rules(), records(&shape, seed, wildness));
-        let encoders = encoded(Width::Portable, &shape, &rules, &truth);
+        let encoders = encoded(Width::PORTABLE, &shape, &rules, &truth);
         let mut counts = vec![[0; TOKENS]; CONTEXTS];
         encoders.iter().for_each(|encoder| encoder.count(&mut counts));
         let model = Model::from_counts(&counts);
         let model = Model::parse(&model.to_bytes()).unwrap();
         let encode = EncodeTables::of(&model);
-        let segments = finished(Width::Portable, &encode, &encoders);
+        let segments = finished(&encode, &encoders);
         let tables = DecodeTables::of(&model);
         for width in Width::all() {
             let same = encoded(width, &shape, &rules, &truth);
-            prop_assert!(finished(width, &encode, &same) == segments, "{width:?}");
+            prop_assert!(finished(&encode, &same) == segments, "{width:?}");
             let mut pairs = same.iter().zip(&segments);
-            prop_assert!(pairs.all(|(encoder, segment)| encoder.is_given_by(width, &tables, segment)));
+            prop_assert!(pairs.all(|(encoder, segment)| encoder.is_given_by(&tables, segment)));
         }
         let mut scratch = Scratch::default();
         for count in (1..=SEGMENTS).rev() {
             let mut decoders: Vec<Decoder<'_>> =
-                segments[..count].iter().map(|bytes| Decoder::new(&tables, bytes).unwrap()).collect();
-            let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
+                segments[..count].iter().map(|bytes| Decoder::new(Width::PORTABLE, &tables, bytes).unwrap()).collect();
+            let found = walk(Width::PORTABLE, &shape, &rules, &mut scratch, &mut &mut decoders[..], None);
             prop_assert!(decoders.iter().all(|decoder| decoder.finish()));
             for width in Width::all() {
                 let (other, is_whole) = read(width, &shape, &rules, &tables, &segments[..count]);
@@ -164,14 +161,14 @@ proptest! {
         }
         // Without tables.
         let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
-        walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
+        walk(Width::PORTABLE, &shape, &rules, &mut scratch, &mut &mut encoders[..], Some(&truth));
         let segments = encoders.map(|encoder| {
             let mut bytes = Vec::new();
             encoder.finish(&mut bytes);
             bytes
         });
-        let mut decoders = segments.each_ref().map(|bytes| Decoder::new(&tables, bytes).unwrap());
-        let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
+        let mut decoders = segments.each_ref().map(|bytes| Decoder::new(Width::PORTABLE, &tables, bytes).unwrap());
+        let found = walk(Width::PORTABLE, &shape, &rules, &mut scratch, &mut &mut decoders[..], None);
         prop_assert!(decoders.iter().all(|decoder| decoder.finish()));
         prop_assert_eq!(given(&shape, &found, 0), given(&shape, &truth, 0));
     }
@@ -185,15 +182,16 @@ proptest! {
         encoders.iter().for_each(|encoder| encoder.count(&mut counts));
         let model = Model::from_counts(&counts);
         let tables = DecodeTables::of(&model);
-        let whole = finished(Width::best(), &EncodeTables::of(&model), &encoders);
+        let whole = finished(&EncodeTables::of(&model), &encoders);
         let mut segments = whole.clone();
         spoil(&mut segments, seed, &bytes);
         for width in Width::all() {
+            let encoders = encoded(width, &shape, &rules, &records(&shape, seed, 9));
             for ((encoder, segment), whole) in encoders.iter().zip(&segments).zip(&whole) {
-                prop_assert!(segment == whole || !encoder.is_given_by(width, &tables, segment));
+                prop_assert!(segment == whole || !encoder.is_given_by(&tables, segment));
             }
         }
-        let segments: Vec<_> = segments.into_iter().take_while(|bytes| Decoder::new(&tables, bytes).is_some()).collect();
+        let segments: Vec<_> = segments.into_iter().take_while(|bytes| Decoder::new(Width::PORTABLE, &tables, bytes).is_some()).collect();
         if !segments.is_empty() {
             let found = Width::all().into_iter().map(|width| read(width, &shape, &rules, &tables, &segments));
             let found: Vec<_> = found.collect();

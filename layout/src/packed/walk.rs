@@ -7,13 +7,14 @@
 mod codes;
 pub(super) mod special;
 
-use super::coder::Coder;
+use super::coder::{Coder, Segments};
 use super::model::{HEIGHT_CLASSES, HEIGHTS};
 use super::plane::{Lattices, Whole};
 use super::rules::{Rules, TOP_ERROR};
 use super::shape::{TILE_LOG, TileShape};
 use super::tile::{INERT, TileRecords};
 use super::token::{folded, unfolded};
+use super::wide::{Width, Work};
 use std::ops::Range;
 
 /// What a vertex is.
@@ -129,22 +130,51 @@ impl Octave {
 }
 
 /// Takes a tile's values through `segments`, as many as there are. Reading makes `truth` out of nothing; writing gives the records, which come out as they went in.
-#[inline(always)]
-pub(crate) fn walk<C: Coder>(
+pub(crate) fn walk(
+    width: Width,
     shape: &TileShape,
     rules: &Rules,
     scratch: &mut Scratch,
-    segments: &mut [C],
+    segments: &mut dyn Segments,
     truth: Option<&TileRecords>,
 ) -> TileRecords {
-    let finest = (0..shape.tile_log).find(|o| TileShape::segment_of(*o) < segments.len());
+    width.run(Walk { shape, rules, scratch, segments, truth })
+}
+
+struct Walk<'w> {
+    shape: &'w TileShape,
+    rules: &'w Rules,
+    scratch: &'w mut Scratch,
+    segments: &'w mut dyn Segments,
+    truth: Option<&'w TileRecords>,
+}
+
+impl Work for Walk<'_> {
+    type Made = TileRecords;
+
+    #[inline(always)]
+    fn run(self) -> TileRecords {
+        let Walk { shape, rules, scratch, segments, truth } = self;
+        octaves(shape, rules, scratch, segments, truth)
+    }
+}
+
+#[inline(always)]
+fn octaves(
+    shape: &TileShape,
+    rules: &Rules,
+    scratch: &mut Scratch,
+    segments: &mut dyn Segments,
+    truth: Option<&TileRecords>,
+) -> TileRecords {
+    let finest = (0..shape.tile_log).find(|o| TileShape::segment_of(*o) < segments.count());
     let finest = finest.unwrap_or(shape.tile_log);
     let mut records = TileRecords::inert(shape, finest);
-    let Some((coder, _)) = segments.split_first_mut() else { return records };
+    let Some(coder) = segments.segment(0) else { return records };
     corners(shape, scratch, coder, truth, &mut records);
     for octave in (finest..shape.tile_log).rev() {
         let m = 1usize << (shape.tile_log - octave - 1);
-        let Some(coder) = segments.get_mut(TileShape::segment_of(octave)) else { break };
+        let Some(coder) = segments.segment(TileShape::segment_of(octave)) else { break };
         let is_finest = octave == finest;
         let octave = Octave { octave, m, is_last: shape.is_last };
         scratch.heights.ring_coarse(m);
@@ -166,10 +196,10 @@ pub(crate) fn walk<C: Coder>(
 }
 
 /// The heights of the corners; in the coarsest tile their whole records.
-fn corners<C: Coder>(
+fn corners(
     shape: &TileShape,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&TileRecords>,
     records: &mut TileRecords,
 ) {
@@ -202,11 +232,11 @@ fn some_height(shape: &TileShape, truth: &TileRecords) -> u16 {
 /// An octave of which the tile gives the records.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "the walk's own, taken apart")]
-fn deliver<C: Coder>(
+fn deliver(
     shape: &TileShape,
     rules: &Rules,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&TileRecords>,
     octave: &Octave,
     is_finest: bool,
@@ -237,9 +267,9 @@ fn deliver<C: Coder>(
 
 /// All heights of an octave: whites, then blacks.
 #[inline(always)]
-fn heights<C: Coder>(
+fn heights(
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[u32]>,
     octave: &Octave,
     coded: usize,
@@ -259,9 +289,9 @@ fn heights<C: Coder>(
 
 /// Makes heights of what was predicted for some vertices. Those that are inert have none.
 #[inline(always)]
-fn residuals<C: Coder>(
+fn residuals(
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[u32]>,
     range: Range<usize>,
     first: u16,

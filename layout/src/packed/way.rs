@@ -60,15 +60,15 @@ impl Way {
         width: Width,
         shape: &TileShape,
         scratch: &mut Scratch,
-        segments: &mut [C],
+        mut segments: &mut [C],
         truth: Option<&TileRecords>,
     ) -> TileRecords {
         match (self, scratch) {
             (Self::Compact(rules), Scratch::Compact(scratch)) => {
-                width.walk(shape, rules, scratch, segments, truth)
+                walk::walk(width, shape, rules, scratch, &mut segments, truth)
             }
             (Self::Exact(rules), Scratch::Exact(scratch)) => {
-                exact::walk(shape, rules, scratch, segments, truth)
+                exact::walk(shape, rules, scratch, &mut segments, truth)
             }
             // One of another file.
             (_, scratch) => {

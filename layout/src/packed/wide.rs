@@ -1,17 +1,13 @@
-//! Reading and writing tiles with what the processor has: the same walk, compiled three times, for the instructions of any processor, for AVX2 and for AVX-512.
+//! Reading and writing tiles with what the processor has: the same walk over coders, and the same coders, compiled three times, for the instructions of any processor, for AVX2 and for AVX-512.
 //!
-//! Nothing in it differs but what the compiler makes of loops over rows. Invariant: all of them read the same from any bytes and write the same, which the tests hold against each other. Cost: asking what the processor has is a
-//! load.
+//! Nothing in it differs but what the compiler makes of loops over rows. Invariant: all of them read the same from any bytes and write the same, which the tests hold against each other. Cost: a branch.
 
-use super::coder::Coder;
-use super::rules::Rules;
-use super::shape::TileShape;
-use super::tile::TileRecords;
-use super::walk::{Scratch, walk};
+/// Instructions that tiles are read and written with. Only those that this processor has can be had.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Width(Instructions);
 
-/// Instructions that tiles are read and written with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Width {
+enum Instructions {
     /// Those that every processor of the target has.
     Portable,
     #[cfg(target_arch = "x86_64")]
@@ -20,22 +16,9 @@ pub(crate) enum Width {
     Avx512,
 }
 
-impl Width {
-    /// All that this processor has, the best one last.
-    pub(crate) fn all() -> Vec<Self> {
-        let mut all = vec![Self::Portable];
-        #[cfg(target_arch = "x86_64")]
-        all.extend([Self::Avx2, Self::Avx512].into_iter().filter(|width| width.is_here()));
-        all
-    }
-
-    /// The best one that this processor has.
-    pub(crate) fn best() -> Self {
-        Self::all().pop().unwrap_or(Self::Portable)
-    }
-
+impl Instructions {
     #[cfg(target_arch = "x86_64")]
-    fn is_here(self) -> bool {
+    fn are_here(self) -> bool {
         let has_avx2 = is_x86_feature_detected!("avx2")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")
@@ -51,36 +34,50 @@ impl Width {
             Self::Avx512 => has_avx2 && has_avx512,
         }
     }
+}
+
+impl std::fmt::Debug for Width {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl Width {
+    /// What every processor has.
+    pub(crate) const PORTABLE: Self = Self(Instructions::Portable);
+
+    /// All that this processor has, the best one last.
+    pub(crate) fn all() -> Vec<Self> {
+        let mut all = vec![Self::PORTABLE];
+        #[cfg(target_arch = "x86_64")]
+        all.extend(
+            [Instructions::Avx2, Instructions::Avx512].into_iter().filter(|set| set.are_here()).map(Self),
+        );
+        all
+    }
+
+    /// The best one that this processor has.
+    pub(crate) fn best() -> Self {
+        Self::all().pop().unwrap_or(Self::PORTABLE)
+    }
 
     /// Does some work with these instructions.
     pub(crate) fn run<W: Work>(self, work: W) -> W::Made {
-        match self {
+        match self.0 {
             #[cfg(target_arch = "x86_64")]
             #[expect(unsafe_code, reason = "instructions that not every processor has")]
-            Self::Avx2 if self.is_here() => {
-                // SAFETY: the processor has all that the function is compiled for.
+            Instructions::Avx2 => {
+                // SAFETY: `all` alone makes this width, where the processor has what the function is compiled for.
                 unsafe { run_avx2(work) }
             }
             #[cfg(target_arch = "x86_64")]
             #[expect(unsafe_code, reason = "instructions that not every processor has")]
-            Self::Avx512 if self.is_here() => {
-                // SAFETY: the processor has all that the function is compiled for.
+            Instructions::Avx512 => {
+                // SAFETY: `all` alone makes this width, where the processor has what the function is compiled for.
                 unsafe { run_avx512(work) }
             }
-            _ => run_portable(work),
+            Instructions::Portable => run_portable(work),
         }
-    }
-
-    /// Takes a tile's values through its segments, as [`walk`] does.
-    pub(crate) fn walk<C: Coder>(
-        self,
-        shape: &TileShape,
-        rules: &Rules,
-        scratch: &mut Scratch,
-        segments: &mut [C],
-        truth: Option<&TileRecords>,
-    ) -> TileRecords {
-        self.run(Walk { shape, rules, scratch, segments, truth })
     }
 }
 
@@ -89,23 +86,6 @@ pub(crate) trait Work {
     type Made;
 
     fn run(self) -> Self::Made;
-}
-
-struct Walk<'w, C> {
-    shape: &'w TileShape,
-    rules: &'w Rules,
-    scratch: &'w mut Scratch,
-    segments: &'w mut [C],
-    truth: Option<&'w TileRecords>,
-}
-
-impl<C: Coder> Work for Walk<'_, C> {
-    type Made = TileRecords;
-
-    #[inline(always)]
-    fn run(self) -> TileRecords {
-        walk(self.shape, self.rules, self.scratch, self.segments, self.truth)
-    }
 }
 
 #[inline(never)]

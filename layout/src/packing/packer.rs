@@ -145,7 +145,7 @@ impl<C: RecordCodec> Packer<'_, C> {
     fn bench(&self) -> Bench {
         Bench {
             scratch: self.way.scratch(),
-            encoders: std::array::from_fn(|_| Encoder::default()),
+            encoders: std::array::from_fn(|_| Encoder::new(self.width)),
             words: Vec::new(),
             bytes: Vec::new(),
         }
@@ -161,7 +161,7 @@ impl<C: RecordCodec> Packer<'_, C> {
         let mut ends = [0; SEGMENTS];
         let mut is_whole = true;
         for (encoder, end) in bench.encoders.iter().zip(&mut ends) {
-            let done = encoder.finish(self.width, &tables.encode, &mut bench.words, &mut bench.bytes);
+            let done = encoder.finish(&tables.encode, &mut bench.words, &mut bench.bytes);
             is_whole &= done.is_some();
             *end = bench.bytes.len();
         }
@@ -174,7 +174,7 @@ impl<C: RecordCodec> Packer<'_, C> {
             // A reader's walk is this one, and asks by what it was given: what it is given is what it makes.
             let segments = starts.iter().zip(ends).map(|(start, end)| &bench.bytes[*start..end]);
             let mut pairs = bench.encoders.iter().zip(segments);
-            same = pairs.all(|(encoder, segment)| encoder.is_given_by(self.width, &tables.decode, segment))
+            same = pairs.all(|(encoder, segment)| encoder.is_given_by(&tables.decode, segment))
                 && found.gives_same(&records, &shape)
                 && (!is_read_whole(id) || self.reads_as(id, &records, ends, tables, bench));
         }
@@ -222,7 +222,8 @@ impl<C: RecordCodec> Packer<'_, C> {
     ) -> bool {
         let shape = self.groups.shape(id);
         let segments = [0, ends[0], ends[1]].into_iter().zip(ends);
-        let decoders = segments.map(|(start, end)| Decoder::new(&tables.decode, &bench.bytes[start..end]));
+        let decoders =
+            segments.map(|(start, end)| Decoder::new(self.width, &tables.decode, &bench.bytes[start..end]));
         decoders.collect::<Option<Vec<_>>>().is_some_and(|mut decoders| {
             let found = self.way.walk(self.width, &shape, &mut bench.scratch, &mut decoders, None);
             decoders.iter().all(Decoder::finish) && found.gives_same(records, &shape)

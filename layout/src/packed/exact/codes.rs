@@ -116,10 +116,10 @@ pub(super) fn derived(rules: &Rules, scratch: &mut Scratch, octave: &Octave) {
 }
 
 /// Codes of coarser levels: whites from the blacks of the octave before, blacks from the whites.
-pub(super) fn coded<C: Coder>(
+pub(super) fn coded(
     rules: &Rules,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[Parts]>,
     octave: &Octave,
     octave_of_square: u32,
@@ -141,10 +141,10 @@ pub(super) fn coded<C: Coder>(
 
 /// Errors, then radii, of the ordinary whites or blacks whose records the tile gives.
 #[expect(clippy::too_many_arguments, reason = "the walk's own, taken apart")]
-fn take<C: Coder>(
+fn take(
     rules: &Rules,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[Parts]>,
     octave: &Octave,
     is_white: bool,

@@ -28,7 +28,7 @@ pub(super) fn shift_of(row: &Row, numbers: &[u64]) -> u32 {
 }
 
 /// The low bits that stand as they are, coded.
-pub(super) fn shift<C: Coder>(coder: &mut C, row: &Row, numbers: Option<&[u64]>) -> u32 {
+pub(super) fn shift(coder: &mut dyn Coder, row: &Row, numbers: Option<&[u64]>) -> u32 {
     let mut shift = numbers.map_or(0, |numbers| shift_of(row, numbers)) as u16;
     coder.raw(SHIFT_BITS, &mut shift);
     u32::from(shift).min(row.bits - 1)
@@ -36,8 +36,8 @@ pub(super) fn shift<C: Coder>(coder: &mut C, row: &Row, numbers: Option<&[u64]>)
 
 /// A row of numbers, each in its context, counted from the row's first; `shift` low bits of each as they are.
 #[inline(always)]
-pub(super) fn row<C: Coder>(
-    coder: &mut C,
+pub(super) fn row(
+    coder: &mut dyn Coder,
     row: &Row,
     shift: u32,
     contexts: &[u8],
@@ -60,7 +60,7 @@ pub(super) fn row<C: Coder>(
 }
 
 /// A single number in a context, as one of a row without low bits.
-pub(super) fn single<C: Coder>(coder: &mut C, bits: u32, context: u16, turn: usize, number: &mut u64) {
+pub(super) fn single(coder: &mut dyn Coder, bits: u32, context: u16, turn: usize, number: &mut u64) {
     let most = u64::from(u8::MAX);
     let mut head = (*number).min(most) as u16;
     coder.value(context, turn, &mut head);
@@ -73,7 +73,7 @@ pub(super) fn single<C: Coder>(coder: &mut C, bits: u32, context: u16, turn: usi
 
 /// The low bits of a number as they are; the others become 0.
 #[inline(always)]
-pub(super) fn raw<C: Coder>(coder: &mut C, bits: u32, number: &mut u64) {
+pub(super) fn raw(coder: &mut dyn Coder, bits: u32, number: &mut u64) {
     let (mut at, whole) = (0, *number);
     *number = 0;
     while at < bits {

@@ -9,10 +9,10 @@ use crate::packed::walk::special::{OTHERS, coded_kinds};
 use crate::packed::walk::{IS_FRINGE, IS_INERT, ORDINARY, Octave};
 
 /// Kinds of all vertices of an octave, where any is not ordinary; whether that is so. Of vertices whose records other tiles give, what is fringe counts as ordinary.
-pub(super) fn kinds<C: Coder>(
+pub(super) fn kinds(
     form: Form,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[Parts]>,
     octave: &Octave,
 ) -> bool {
@@ -33,10 +33,10 @@ pub(super) fn kinds<C: Coder>(
 }
 
 /// Errors and radii of the fringe vertices, each after the one before it.
-pub(super) fn fringe<C: Coder>(
+pub(super) fn fringe(
     form: Form,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[Parts]>,
     octave: &Octave,
 ) {
@@ -53,7 +53,7 @@ pub(super) fn fringe<C: Coder>(
 }
 
 /// A code that is near an expected one.
-fn coded<C: Coder>(form: Form, coder: &mut C, context: u16, turn: usize, expected: u32, code: u32) -> u32 {
+fn coded(form: Form, coder: &mut dyn Coder, context: u16, turn: usize, expected: u32, code: u32) -> u32 {
     let bits = form.code_bits();
     let mut number = folded(u64::from(code.wrapping_sub(expected)), bits);
     single(coder, bits, context, turn, &mut number);
@@ -61,10 +61,10 @@ fn coded<C: Coder>(form: Form, coder: &mut C, context: u16, turn: usize, expecte
 }
 
 /// Codes that are others than follow from heights, where there are any.
-pub(super) fn others<C: Coder>(
+pub(super) fn others(
     form: Form,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[Parts]>,
     octave: &Octave,
 ) {

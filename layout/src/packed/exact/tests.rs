@@ -116,16 +116,16 @@ proptest! {
     #[test]
     fn tiles_come_back(shape in shapes(), seed: u64, form in forms(), wildness in prop_oneof![Just(0u64), Just(9), Just(60_000)]) {
         let (rules, truth, mut scratch) = (rules(form), records(form, &shape, seed, wildness), Scratch::default());
-        let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        let made = walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
+        let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::new(Width::best()));
+        let made = walk(&shape, &rules, &mut scratch, &mut &mut encoders[..], Some(&truth));
         prop_assert!(made.gives_same(&truth, &shape));
         let model = model_of(&encoders);
-        let segments = finished(Width::best(), &EncodeTables::of(&model), &encoders);
+        let segments = finished(&EncodeTables::of(&model), &encoders);
         for (encoder, segment) in encoders.iter().zip(&segments) {
-            prop_assert!(encoder.is_given_by(Width::best(), &DecodeTables::of(&model), segment));
+            prop_assert!(encoder.is_given_by(&DecodeTables::of(&model), segment));
         }
         let mut encoders: [PlainEncoder; SEGMENTS] = std::array::from_fn(|_| PlainEncoder::default());
-        walk(&shape, &rules, &mut scratch, &mut encoders, Some(&truth));
+        walk(&shape, &rules, &mut scratch, &mut &mut encoders[..], Some(&truth));
         let plain = encoders.map(|encoder| {
             let mut bytes = Vec::new();
             encoder.finish(&mut bytes);
@@ -135,8 +135,8 @@ proptest! {
         for (segments, count) in [(&segments, 3), (&segments, 2), (&segments, 1), (&plain, 3)] {
             prop_assert!(segments.iter().all(|segment| segment.len() < 1 << 16));
             let mut decoders: Vec<Decoder<'_>> =
-                segments[..count].iter().map(|bytes| Decoder::new(&tables, bytes).unwrap()).collect();
-            let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
+                segments[..count].iter().map(|bytes| Decoder::new(Width::best(), &tables, bytes).unwrap()).collect();
+            let found = walk(&shape, &rules, &mut scratch, &mut &mut decoders[..], None);
             prop_assert!(decoders.iter().all(|decoder| decoder.finish()));
             let finest = ((SEGMENTS - count) as u32).min(shape.tile_log);
             prop_assert_eq!(found.finest, finest);
@@ -148,14 +148,14 @@ proptest! {
     #[test]
     fn any_bytes_are_a_tile_or_none(shape in shapes(), seed: u64, form in forms(), bytes in prop::collection::vec(any::<u8>(), 0..900)) {
         let (rules, mut scratch) = (rules(form), Scratch::default());
-        let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::default());
-        walk(&shape, &rules, &mut scratch, &mut encoders, Some(&records(form, &shape, seed, 9)));
+        let mut encoders: [Encoder; SEGMENTS] = std::array::from_fn(|_| Encoder::new(Width::best()));
+        walk(&shape, &rules, &mut scratch, &mut &mut encoders[..], Some(&records(form, &shape, seed, 9)));
         let model = model_of(&encoders);
         let tables = DecodeTables::of(&model);
-        let mut segments = finished(Width::best(), &EncodeTables::of(&model), &encoders);
+        let mut segments = finished(&EncodeTables::of(&model), &encoders);
         spoil(&mut segments, seed, &bytes);
-        let mut decoders: Vec<_> = segments.iter().map_while(|bytes| Decoder::new(&tables, bytes)).collect();
-        let found = walk(&shape, &rules, &mut scratch, &mut decoders, None);
+        let mut decoders: Vec<_> = segments.iter().map_while(|bytes| Decoder::new(Width::best(), &tables, bytes)).collect();
+        let found = walk(&shape, &rules, &mut scratch, &mut &mut decoders[..], None);
         prop_assert!(found.finest <= shape.tile_log);
     }
 }

@@ -8,7 +8,7 @@ use super::numbers::{Row, raw, row, shift};
 use super::rules::Rules;
 use super::scratch::{Scratch, UNKNOWN};
 use super::{codes, special};
-use crate::packed::coder::Coder;
+use crate::packed::coder::{Coder, Segments};
 use crate::packed::model::{HEIGHT_CLASSES, HEIGHTS};
 use crate::packed::shape::TileShape;
 use crate::packed::tile::TileRecords;
@@ -16,22 +16,22 @@ use crate::packed::walk::{IS_INERT, ORDINARY, Octave};
 use std::ops::Range;
 
 /// Takes a tile's values through `segments`, as many as there are. Reading makes the records out of nothing; writing gives them as `truth`.
-pub(crate) fn walk<C: Coder>(
+pub(crate) fn walk(
     shape: &TileShape,
     rules: &Rules,
     scratch: &mut Scratch,
-    segments: &mut [C],
+    segments: &mut dyn Segments,
     truth: Option<&TileRecords>,
 ) -> TileRecords {
     let form = rules.form();
-    let finest = (0..shape.tile_log).find(|o| TileShape::segment_of(*o) < segments.len());
+    let finest = (0..shape.tile_log).find(|o| TileShape::segment_of(*o) < segments.count());
     let finest = finest.unwrap_or(shape.tile_log);
     let mut records = TileRecords::filled(shape, finest, form.inert_words());
-    let Some((coder, _)) = segments.split_first_mut() else { return records };
+    let Some(coder) = segments.segment(0) else { return records };
     corners(form, shape, scratch, coder, truth, &mut records);
     for octave in (finest..shape.tile_log).rev() {
         let m = 1usize << (shape.tile_log - octave - 1);
-        let Some(coder) = segments.get_mut(TileShape::segment_of(octave)) else { break };
+        let Some(coder) = segments.segment(TileShape::segment_of(octave)) else { break };
         let truth: Option<Vec<Parts>> = truth.map(|truth| {
             truth.refining(m).chunks_exact(form.words()).map(|words| form.parts(words)).collect()
         });
@@ -56,11 +56,11 @@ pub(crate) fn walk<C: Coder>(
 }
 
 /// The heights of the corners; in the coarsest tile their whole records.
-fn corners<C: Coder>(
+fn corners(
     form: Form,
     shape: &TileShape,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&TileRecords>,
     records: &mut TileRecords,
 ) {
@@ -90,11 +90,11 @@ fn corners<C: Coder>(
 }
 
 /// An octave of which the tile gives the records.
-fn deliver<C: Coder>(
+fn deliver(
     shape: &TileShape,
     rules: &Rules,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[Parts]>,
     octave: &Octave,
     records: &mut [u32],
@@ -123,10 +123,10 @@ fn deliver<C: Coder>(
 }
 
 /// All heights of an octave: whites, then blacks.
-fn heights<C: Coder>(
+fn heights(
     form: Form,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[Parts]>,
     octave: &Octave,
     coded: u32,
@@ -144,10 +144,10 @@ fn heights<C: Coder>(
 }
 
 /// Makes heights of what was predicted for some vertices. Those that are inert have none.
-fn residuals<C: Coder>(
+fn residuals(
     form: Form,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[Parts]>,
     range: Range<usize>,
     first: u16,

@@ -98,7 +98,7 @@ impl PackedSource {
                 return Err(damaged("the checksum does not match"));
             }
             let wrong = || damaged("it holds something else than a tile");
-            decoders.push(Decoder::new(&self.tables, segment).ok_or_else(wrong)?);
+            decoders.push(Decoder::new(self.width, &self.tables, segment).ok_or_else(wrong)?);
             rest = after;
         }
         let scratch = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();

@@ -15,6 +15,10 @@ impl PackedSource {
         self.width = width;
     }
 
+    pub(in crate::packed) fn width(&self) -> Width {
+        self.width
+    }
+
     pub(in crate::packed) fn packed(&self) -> &dyn Source {
         &*self.inner
     }

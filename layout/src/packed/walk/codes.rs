@@ -134,10 +134,10 @@ fn row_farther(of: &[i32], a: &[i32], b: &[i32], apart: &mut [u32]) {
 
 /// Codes of coarser levels: whites from the blacks of the octave before, blacks from the whites.
 #[inline(always)]
-pub(super) fn coded<C: Coder>(
+pub(super) fn coded(
     rules: &Rules,
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[u32]>,
     octave: &Octave,
     octave_of_square: u32,
@@ -324,9 +324,9 @@ fn contexts(rules: &Rules, slopes: &[u8; 256], rows: &mut Rows, count: usize, fi
 
 /// Error codes, then radius codes, of the ordinary ones of a row of vertices, whose kinds begin at `kinds`. They replace what followed from the parents.
 #[inline(always)]
-fn take<C: Coder>(
+fn take(
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[u32]>,
     count: usize,
     kinds: usize,

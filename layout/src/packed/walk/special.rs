@@ -13,9 +13,9 @@ pub(in crate::packed) const OTHERS: u16 = KINDS + KIND_COUNT * KIND_COUNT;
 
 /// Kinds of all vertices of an octave, where any is not ordinary; whether that is so. Of vertices whose records other tiles give, what is fringe counts as ordinary.
 #[inline(always)]
-pub(super) fn kinds<C: Coder>(
+pub(super) fn kinds(
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[u32]>,
     octave: &Octave,
 ) -> bool {
@@ -42,9 +42,9 @@ pub(super) fn kinds<C: Coder>(
 
 /// Brings the kinds of an octave's vertices through a coder, which begin as the writer has them; whether any is not ordinary. Otherwise what they are is not said.
 #[inline(always)]
-pub(in crate::packed) fn coded_kinds<C: Coder>(
+pub(in crate::packed) fn coded_kinds(
     kinds: &mut [u8],
-    coder: &mut C,
+    coder: &mut dyn Coder,
     octave: &Octave,
     is_writing: bool,
 ) -> bool {
@@ -69,7 +69,7 @@ pub(in crate::packed) fn coded_kinds<C: Coder>(
 }
 
 /// Codes of the fringe vertices, each after the one before it.
-pub(super) fn fringe<C: Coder>(scratch: &mut Scratch, coder: &mut C, truth: Option<&[u32]>, octave: &Octave) {
+pub(super) fn fringe(scratch: &mut Scratch, coder: &mut dyn Coder, truth: Option<&[u32]>, octave: &Octave) {
     let of: Vec<usize> = (0..octave.count()).filter(|i| scratch.kinds[*i] == IS_FRINGE).collect();
     let codes = |i: usize| truth.map_or([0; 2], |truth| codes_of(truth[i]));
     let mut last = 0;
@@ -87,9 +87,9 @@ pub(super) fn fringe<C: Coder>(scratch: &mut Scratch, coder: &mut C, truth: Opti
 
 /// Codes that are others than follow from heights, where there are any.
 #[inline(always)]
-pub(super) fn others<C: Coder>(
+pub(super) fn others(
     scratch: &mut Scratch,
-    coder: &mut C,
+    coder: &mut dyn Coder,
     truth: Option<&[u32]>,
     octave: &Octave,
     is_special: bool,
