@@ -78,7 +78,7 @@ pub(crate) fn page() -> String {
         "# Formats of elevation data\n\n\
          What `terrasoar build` reads, and what it makes of it. The tables are made from the list of {} files that a test writes with GDAL, builds, and compares sample by sample with \
          what GDAL reads in them and with the arithmetic by which they were made: heights, voids, places and spacing.\n\n\
-         The test is `import_gdal_matrix` of the package terrasoar-import; it needs gdal-bin. It also makes this page, where TERRASOAR_BLESS is 1.\n\n\
+         The test is `import_gdal_matrix` of the package terrasoar-import; it needs gdal-bin. `./test` compares one file in three, `./test --full` all. It also makes this page, where TERRASOAR_BLESS is 1.\n\n\
          ## What is read\n\n\
          | format | files compared | samples | voids |\n|---|---|---|---|\n",
         all.len()

@@ -8,6 +8,7 @@
 //! | [`mutate_packed`], [`reseal_packed`] | the same for packed files |
 //! | [`seeds`], [`packed_seeds`] | small sound files to begin with |
 //! | `Stages`, `Way` | what unpacking is made of, to be measured |
+//! | [`is_thorough`], [`one_in`] | whether tests try all they could, or a part |
 //! | [`exercise`] | everything that this crate does with a file |
 //!
 //! Invariant: mutating and sealing never panic or take long, whatever the bytes; equal recipes give equal files. Cost: a few checksums of the file.
@@ -20,6 +21,7 @@ mod parts;
 mod seal;
 mod sealed;
 mod seeds;
+mod share;
 
 #[cfg(feature = "testing")]
 pub use crate::packed::stages::{Stages, Way};
@@ -29,3 +31,4 @@ pub use packed::{mutate_packed, reseal_packed};
 pub use seal::{Counts, reseal, reseal_overlay};
 pub use sealed::Sealed;
 pub use seeds::{Seed, packed_seeds, seeds};
+pub use share::{is_thorough, one_in};
