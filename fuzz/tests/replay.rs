@@ -4,9 +4,10 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use terrasoar_fuzz::mutation::mutate;
 use terrasoar_fuzz::{TARGETS, Target};
+use terrasoar_layout::testing::is_thorough;
 
-/// Mutations of a target where nothing else is said.
-const MUTATIONS: u64 = 200;
+/// Mutations of a target where nothing else is said, and where there is time.
+const MUTATIONS: [u64; 2] = [60, 200];
 /// A run that takes longer hangs, for one takes milliseconds.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -21,8 +22,8 @@ fn replay(name: &str) {
     let target = TARGETS.iter().find(|target| target.name == name).expect("a target");
     let seeds = (target.seeds)();
     assert!(seeds.len() > 3, "only {} seeds", seeds.len());
-    let mutations =
-        std::env::var("TERRASOAR_MUTATIONS").map_or(MUTATIONS, |number| number.parse().expect("a number"));
+    let mutations = std::env::var("TERRASOAR_MUTATIONS")
+        .map_or(MUTATIONS[usize::from(is_thorough())], |number| number.parse().expect("a number"));
     let mutated = (0..mutations).map(|number| {
         let (input, bytes) = &seeds[number as usize % seeds.len()];
         (format!("{input}, mutation {number}"), mutate(bytes, number, target.is_text))

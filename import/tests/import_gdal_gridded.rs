@@ -10,6 +10,7 @@ use gdal::{agrees, agrees_north_up, run};
 use import_support::data;
 use std::path::Path;
 use tempfile::tempdir;
+use terrasoar_layout::testing::is_thorough;
 
 /// A grid in GDAL's simplest format: heights from 16-bit numbers with voids, in degrees.
 fn source(folder: &Path, [wide, high]: [u32; 2], west: f64, north: f64, steps: [f64; 2]) {
@@ -230,6 +231,10 @@ fn tiff_of_odd_widths_planes_and_lerc() {
                         if !goes {
                             continue;
                         }
+                        made += 1;
+                        if !is_thorough() && made % 3 != 0 {
+                            continue;
+                        }
                         let name = format!("a{made}.tif");
                         let co = [
                             endianness.to_owned(),
@@ -248,12 +253,15 @@ fn tiff_of_odd_widths_planes_and_lerc() {
                         arguments.extend(["positive.tif", &name]);
                         run(folder.path(), "gdal_translate", &arguments);
                         agrees(&folder.path().join(&name));
-                        made += 1;
                     }
                 }
             }
             for lerc in ["LERC", "LERC_DEFLATE", "LERC_ZSTD"] {
                 for dtype in ["Byte", "Int16", "UInt16", "Int32", "UInt32", "Float32", "Float64"] {
+                    made += 1;
+                    if !is_thorough() && made % 3 != 0 {
+                        continue;
+                    }
                     let name = format!("a{made}.tif");
                     let compress = format!("COMPRESS={lerc}");
                     run(
@@ -274,7 +282,6 @@ fn tiff_of_odd_widths_planes_and_lerc() {
                         ],
                     );
                     agrees(&folder.path().join(&name));
-                    made += 1;
                 }
             }
         }

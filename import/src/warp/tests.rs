@@ -127,7 +127,8 @@ fn windows_around_the_globe_hold_what_reaches_them() {
             .map(|[col, row]| Window { col, row, width: SIDE, height: SIDE })
             .map(|window| (window, resampler.places(window)))
             .collect();
-        for [x, y] in [[0, 900], [3599, 300], [3590, 1500], [10, 1200], [1800, 20], [700, 905], [5, 1790]] {
+        let spots = [[0, 900], [3599, 300], [3590, 1500], [10, 1200], [1800, 20], [700, 905], [5, 1790]];
+        for [x, y] in terrasoar_layout::testing::one_in(2, spots) {
             let mut cells = Cells::of(4);
             cells.add([x, y], [x + 1, y + 1]);
             let is_reached = |place: &[f64; 2]| {
