@@ -7,7 +7,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use terrasoar_layout::testing::{is_thorough, one_in};
+use terrasoar_layout::testing::one_in;
 
 /// Signals that end a program, and their numbers.
 pub const SIGNALS: [(&str, i32); 4] = [("INT", 2), ("TERM", 15), ("HUP", 1), ("KILL", 9)];
@@ -98,7 +98,8 @@ fn check_file(bench: &Bench, args: &[&str], out: &str) {
 #[test]
 fn a_killed_synth_leaves_nothing() {
     let bench = Bench::with_terrain();
-    let [tiff, png] = if is_thorough() { ["2049", "1025"] } else { ["1025", "513"] };
+    let [tiff, png] =
+        if terrasoar_layout::testing::is_thorough() { ["2049", "1025"] } else { ["1025", "513"] };
     check_file(&bench, &["synth", "--size", tiff, "--seed", "1"], "a.tif");
     check_file(&bench, &["synth", "--size", png, "--seed", "1"], "a.png");
     check_file(&bench, &["synth", "--colour", "land.iqt", "--texels", "16"], "b.tif");
