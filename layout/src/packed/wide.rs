@@ -17,21 +17,35 @@ enum Instructions {
 }
 
 impl Instructions {
-    #[cfg(target_arch = "x86_64")]
+    /// All there are, the best ones last.
+    const ALL: &[Self] = &[
+        Self::Portable,
+        #[cfg(target_arch = "x86_64")]
+        Self::Avx2,
+        #[cfg(target_arch = "x86_64")]
+        Self::Avx512,
+    ];
+
+    /// Whether this processor has them.
     fn are_here(self) -> bool {
-        let has_avx2 = is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-            && is_x86_feature_detected!("popcnt");
-        let has_avx512 = is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512bw")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl");
         match self {
             Self::Portable => true,
-            Self::Avx2 => has_avx2,
-            Self::Avx512 => has_avx2 && has_avx512,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => {
+                is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("bmi1")
+                    && is_x86_feature_detected!("bmi2")
+                    && is_x86_feature_detected!("lzcnt")
+                    && is_x86_feature_detected!("popcnt")
+            }
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                Self::Avx2.are_here()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+            }
         }
     }
 }
@@ -48,12 +62,7 @@ impl Width {
 
     /// All that this processor has, the best one last.
     pub(crate) fn all() -> Vec<Self> {
-        let mut all = vec![Self::PORTABLE];
-        #[cfg(target_arch = "x86_64")]
-        all.extend(
-            [Instructions::Avx2, Instructions::Avx512].into_iter().filter(|set| set.are_here()).map(Self),
-        );
-        all
+        Instructions::ALL.iter().copied().filter(|set| set.are_here()).map(Self).collect()
     }
 
     /// The best one that this processor has.
