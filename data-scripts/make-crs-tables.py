@@ -71,7 +71,7 @@ for code, name, kind in sorted(systems, key=lambda row: int(row[0])):
     # PROJ before 9.2 leaves out of its strings that this one is drawn on a sphere.
     if methods.get(str(code)) == "Lambert Azimuthal Equal Area (Spherical)" and "+R_A" not in proj:
         proj = proj.replace("+proj=laea", "+proj=laea +R_A")
-    # It says nothing to those who take no defaults.
+    # It keeps PROJ from its file of defaults, of which there is none here.
     proj = proj.replace(" +no_defs", "")
     datum = datums.get(bases.get(str(code), str(code)), "")
     wkt = subprocess.run(["gdalsrsinfo", "-o", "wkt2", "--single-line", f"EPSG:{code}"], capture_output=True, text=True).stdout

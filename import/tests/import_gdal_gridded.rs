@@ -199,7 +199,8 @@ fn tiff_of_odd_widths_planes_and_lerc() {
             "positive.tif",
         ],
     );
-    let mut made = 0;
+    let few = if is_thorough() { 1 } else { 3 };
+    let (mut made, mut compared) = (0_usize, 0);
     for endianness in ["ENDIANNESS=LITTLE", "ENDIANNESS=BIG"] {
         for tiled in ["TILED=NO", "TILED=YES"] {
             for (compress, predictors) in [
@@ -232,7 +233,7 @@ fn tiff_of_odd_widths_planes_and_lerc() {
                             continue;
                         }
                         made += 1;
-                        if !is_thorough() && made % 3 != 0 {
+                        if !made.is_multiple_of(few) {
                             continue;
                         }
                         let name = format!("a{made}.tif");
@@ -253,13 +254,14 @@ fn tiff_of_odd_widths_planes_and_lerc() {
                         arguments.extend(["positive.tif", &name]);
                         run(folder.path(), "gdal_translate", &arguments);
                         agrees(&folder.path().join(&name));
+                        compared += 1;
                     }
                 }
             }
             for lerc in ["LERC", "LERC_DEFLATE", "LERC_ZSTD"] {
                 for dtype in ["Byte", "Int16", "UInt16", "Int32", "UInt32", "Float32", "Float64"] {
                     made += 1;
-                    if !is_thorough() && made % 3 != 0 {
+                    if !made.is_multiple_of(few) {
                         continue;
                     }
                     let name = format!("a{made}.tif");
@@ -282,9 +284,10 @@ fn tiff_of_odd_widths_planes_and_lerc() {
                         ],
                     );
                     agrees(&folder.path().join(&name));
+                    compared += 1;
                 }
             }
         }
     }
-    assert!(made > 200, "{made}");
+    assert!(compared * few > 200, "{compared}");
 }

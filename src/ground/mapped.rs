@@ -38,7 +38,7 @@ pub(super) fn mapped(
         (PictureEngine::Kinetic, None) => {
             with_records!(terrain.records()?, records => flown(records, culling))
         }
-        // None of them will be edited. But replays fly over records that may be, and so that engine is there already.
+        // Nothing edits these records. Replays over edited pages have this engine too, so it is compiled once for both.
         (PictureEngine::Kinetic, Some(bytes)) => {
             with_records!(terrain.paged(bytes), records => flown(EditedRecords::new(records), culling))
         }
@@ -49,9 +49,9 @@ pub(super) fn mapped(
     })
 }
 
-fn flown<'t, S: CompleteStore + Clone + 't>(records: S, culling: Culling) -> Box<dyn MeshEngine + 't> {
-    let (engine, reads) = (Kinetic::new(records.clone(), culling), Reads::over(&records));
-    Box::new(Mapped { engine, records, reads })
+fn flown<'t, S: CompleteStore + 't>(records: S, culling: Culling) -> Box<dyn MeshEngine + 't> {
+    let reads = Reads::over(&records);
+    Box::new(Mapped { engine: Kinetic::new(records, culling), reads })
 }
 
 fn whole<'t, S: CompleteStore + Clone + 't>(records: S, culling: Culling) -> Box<dyn MeshEngine + 't> {
@@ -60,11 +60,10 @@ fn whole<'t, S: CompleteStore + Clone + 't>(records: S, culling: Culling) -> Box
 
 struct Mapped<S: CompleteStore> {
     engine: Kinetic<S>,
-    records: S,
     reads: Reads,
 }
 
-impl<S: CompleteStore + Clone> MeshEngine for Mapped<S> {
+impl<S: CompleteStore> MeshEngine for Mapped<S> {
     fn update(&mut self, view: &View) -> Refined {
         self.engine.update(view, &mut self.reads);
         let [reads, pages_read] = self.reads.take();
@@ -91,19 +90,19 @@ impl<S: CompleteStore + Clone> MeshEngine for Mapped<S> {
     }
 
     fn heights_m(&mut self, tile: HeightTile, heights_m: &mut Vec<f32>) -> bool {
-        tile_of(&self.records, tile, heights_m);
+        tile_of(self.engine.store(), tile, heights_m);
         true
     }
 
     fn height_range_m(&self) -> [f64; 2] {
-        self.records.shape().height_range_m
+        self.engine.store().shape().height_range_m
     }
 
     fn height_at(&self, east_m: f64, north_m: f64) -> HeightAt {
-        height_at(&self.records, east_m, north_m)
+        height_at(self.engine.store(), east_m, north_m)
     }
 
     fn take_error(&mut self) -> Option<LayoutError> {
-        self.records.take_error()
+        self.engine.store().take_error()
     }
 }

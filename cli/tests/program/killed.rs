@@ -41,7 +41,7 @@ fn seen(tree: &BTreeMap<String, Option<Vec<u8>>>, repeats: bool) -> BTreeMap<Str
     tree.iter().map(|(name, file)| (name.clone(), bytes(file))).collect()
 }
 
-/// Runs `args` in `bench` and ends it by every signal at moments that together are all, or each at every moment where there is time; `restore` brings back what was there before.
+/// Runs `args` in `bench` and ends it by every signal, each at one or two moments, or with `./test --full` at all; `restore` brings back what was there before.
 pub fn check(bench: &Bench, args: &[&str], repeats: bool, restore: &dyn Fn(&Bench)) {
     restore(bench);
     let before = seen(&tree(bench.folder()), repeats);

@@ -129,7 +129,7 @@ pub fn window_within_the_screen(display: &Display) -> Outcome {
 /// Elevation data is built and shown, a flight is taken, and what is neither is told.
 pub fn dropped_files(display: &Display) -> Outcome {
     let folder = display.folder.path();
-    // It says how far apart its samples are: on ground taken to be steeper than it is a processor draws for half a minute.
+    // This file says how far apart its samples are. Where one does not, a metre is taken, and ground so steep takes a processor half a minute to draw.
     let input = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/crater_lake_1025.bt");
     std::fs::copy(input, folder.join("dropped.bt")).map_err(|e| e.to_string())?;
     std::fs::write(folder.join("bad.flight"), "no flight").map_err(|e| e.to_string())?;

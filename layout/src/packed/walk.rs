@@ -155,44 +155,33 @@ impl Work for Walk<'_> {
     #[inline(always)]
     fn run(self) -> TileRecords {
         let Walk { shape, rules, scratch, segments, truth } = self;
-        octaves(shape, rules, scratch, segments, truth)
-    }
-}
-
-#[inline(always)]
-fn octaves(
-    shape: &TileShape,
-    rules: &Rules,
-    scratch: &mut Scratch,
-    segments: &mut dyn Segments,
-    truth: Option<&TileRecords>,
-) -> TileRecords {
-    let finest = (0..shape.tile_log).find(|o| TileShape::segment_of(*o) < segments.count());
-    let finest = finest.unwrap_or(shape.tile_log);
-    let mut records = TileRecords::inert(shape, finest);
-    let Some(coder) = segments.segment(0) else { return records };
-    corners(shape, scratch, coder, truth, &mut records);
-    for octave in (finest..shape.tile_log).rev() {
-        let m = 1usize << (shape.tile_log - octave - 1);
-        let Some(coder) = segments.segment(TileShape::segment_of(octave)) else { break };
-        let is_finest = octave == finest;
-        let octave = Octave { octave, m, is_last: shape.is_last };
-        scratch.heights.ring_coarse(m);
-        if octave.octave < shape.delivered() {
-            if octave.octave + 1 == shape.delivered() {
-                scratch.errors.coarse.fill(m + 1, m + 1, TOP_ERROR);
-                scratch.radii.coarse.fill(m + 1, m + 1, 0);
+        let finest = (0..shape.tile_log).find(|o| TileShape::segment_of(*o) < segments.count());
+        let finest = finest.unwrap_or(shape.tile_log);
+        let mut records = TileRecords::inert(shape, finest);
+        let Some(coder) = segments.segment(0) else { return records };
+        corners(shape, scratch, coder, truth, &mut records);
+        for octave in (finest..shape.tile_log).rev() {
+            let m = 1usize << (shape.tile_log - octave - 1);
+            let Some(coder) = segments.segment(TileShape::segment_of(octave)) else { break };
+            let is_finest = octave == finest;
+            let octave = Octave { octave, m, is_last: shape.is_last };
+            scratch.heights.ring_coarse(m);
+            if octave.octave < shape.delivered() {
+                if octave.octave + 1 == shape.delivered() {
+                    scratch.errors.coarse.fill(m + 1, m + 1, TOP_ERROR);
+                    scratch.radii.coarse.fill(m + 1, m + 1, 0);
+                }
+                deliver(shape, rules, scratch, coder, truth, &octave, is_finest, &mut records);
+            } else {
+                heights(scratch, coder, truth.map(|truth| truth.refining(m)), &octave, 3, false);
             }
-            deliver(shape, rules, scratch, coder, truth, &octave, is_finest, &mut records);
-        } else {
-            heights(scratch, coder, truth.map(|truth| truth.refining(m)), &octave, 3, false);
+            if !is_finest {
+                let (east, north) = scratch.flat_heights[octave.blacks()].split_at(octave.easts());
+                scratch.heights.merge(m, east, north);
+            }
         }
-        if !is_finest {
-            let (east, north) = scratch.flat_heights[octave.blacks()].split_at(octave.easts());
-            scratch.heights.merge(m, east, north);
-        }
+        records
     }
-    records
 }
 
 /// The heights of the corners; in the coarsest tile their whole records.
